@@ -1,0 +1,89 @@
+"""The solver's input: triangles with diffuse reflectance and emission, and lamps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..errors import SceneError
+from .lights import Light
+
+MAX_REFLECTANCE = 0.99
+"""Reflectances are clamped here: at 1 a closed room has no solution."""
+
+
+class Scene:
+    """Triangles that reflect, emit and block light, and the lamps that light them.
+
+    Parameters
+    ----------
+    triangles : (t, 3, 3) float
+        World-space corners [m]; counter-clockwise order is seen from the front.
+    reflectance : (t, 3) float
+        Diffuse reflectance in [0, 1], linear RGB; clamped to `MAX_REFLECTANCE`.
+    emission : (t, 3) float
+        Self-emitted exitance of each emitting side [W/m²], linear RGB.
+    two_sided : bool or (t,) bool
+        True: the back receives, reflects and emits too, apart from the front.
+        False: the back is black and blocks.
+    lights : sequence of Light
+    normals : (t, 3, 3) float or None
+        Unit shading normals at the corners; None for flat shading.
+
+    Raises
+    ------
+    SceneError
+        If shapes do not match, or a value is NaN, infinite or negative.
+    """
+
+    def __init__(
+        self,
+        triangles: np.ndarray,
+        reflectance: np.ndarray,
+        emission: np.ndarray,
+        two_sided: bool | np.ndarray = False,
+        lights: Sequence[Light] = (),
+        normals: np.ndarray | None = None,
+    ) -> None:
+        self.triangles = np.ascontiguousarray(triangles, dtype=np.float64)
+        if self.triangles.ndim != 3 or self.triangles.shape[1:] != (3, 3):
+            raise SceneError(f"triangles have shape {self.triangles.shape}; (t, 3, 3) is needed")
+        count = len(self.triangles)
+        self.reflectance = np.minimum(_rgb_rows("reflectance", reflectance, count), MAX_REFLECTANCE)
+        self.emission = _rgb_rows("emission", emission, count)
+        self.two_sided = np.broadcast_to(np.asarray(two_sided, dtype=bool), (count,)).copy()
+        self.lights = tuple(lights)
+        if not np.isfinite(self.triangles).all():
+            row = int(np.flatnonzero(~np.isfinite(self.triangles).all(axis=(1, 2)))[0])
+            raise SceneError(f"triangle {row} has a corner that is NaN or infinite")
+
+        edge_1 = self.triangles[:, 1] - self.triangles[:, 0]
+        edge_2 = self.triangles[:, 2] - self.triangles[:, 0]
+        cross = np.cross(edge_1, edge_2)
+        double_area = np.linalg.norm(cross, axis=1)
+        self.areas = 0.5 * double_area
+        """(t,) float64 [m²]"""
+        self.face_normals = cross / np.maximum(double_area, np.finfo(float).tiny)[:, None]
+        """(t, 3) float64, unit; zero for a triangle without area"""
+        if normals is None:
+            self.normals = np.repeat(self.face_normals[:, None, :], 3, axis=1)
+        else:
+            self.normals = np.ascontiguousarray(normals, dtype=np.float64)
+            if self.normals.shape != self.triangles.shape:
+                raise SceneError(f"normals have shape {self.normals.shape}; {self.triangles.shape} is needed")
+        """(t, 3, 3) float64: shading normals at the corners"""
+
+    def __len__(self) -> int:
+        return len(self.triangles)
+
+
+def _rgb_rows(name: str, values: np.ndarray, count: int) -> np.ndarray:
+    """Return `values` as (count, 3) float64, refusing what is not finite and non-negative."""
+    rows = np.asarray(values, dtype=np.float64)
+    if rows.shape != (count, 3):
+        raise SceneError(f"{name} has shape {rows.shape}; ({count}, 3) is needed")
+    bad = ~(np.isfinite(rows).all(axis=1) & (rows >= 0).all(axis=1))
+    if bad.any():
+        raise SceneError(f"{name} of triangle {int(np.flatnonzero(bad)[0])} is negative, NaN or infinite")
+    return rows
