@@ -1,0 +1,43 @@
+"""What all tests share: the scenes beside the checkout, and an end that Blender survives."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+SHARED_SCENES = Path(__file__).resolve().parents[2] / "shared" / "scenes"
+
+
+@pytest.fixture(scope="session")
+def shared_scenes() -> Path:
+    """Folder of the scenes made by other people; skips where it is absent."""
+    if not SHARED_SCENES.is_dir():
+        pytest.skip(f"the shared scenes are not here ({SHARED_SCENES})")
+    return SHARED_SCENES
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_sessionstart(session: pytest.Session) -> None:
+    session.config.stash[_SESSION] = session
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Leave without Python's own clean-up when Blender was imported.
+
+    Interpreter exit with Blender callbacks registered segfaults in 4.2 and hangs in 4.5.
+    This hook runs last: the summary, the junit file and the caches are written by then.
+    """
+    session = config.stash.get(_SESSION, None)
+    if session is None or "bpy" not in sys.modules:
+        return
+    for stream in (sys.stdout, sys.stderr, sys.__stdout__, sys.__stderr__):
+        if stream is not None:
+            stream.flush()
+    os._exit(int(session.exitstatus))
+
+
+_SESSION = pytest.StashKey[pytest.Session]()
