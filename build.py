@@ -1,0 +1,113 @@
+#!/usr/bin/env python3
+"""One front door for everything a developer does: `python3 build.py VERB ...`, standard library only.
+
+It sets itself up: the first verb that needs packages makes `.venv` beside this file with the
+pinned versions of `requirements/`, later ones only check that the pins have not changed.
+"""
+
+import os
+import sys
+
+SUPPORTED_PYTHONS = ((3, 11), (3, 13))
+
+if sys.version_info[:2] not in SUPPORTED_PYTHONS:
+    # Not an f-string, so that the oldest Pythons get the message too.
+    sys.exit(
+        "build.py: error: Blender's Python module exists for Python 3.11 and 3.13 only, this is %d.%d; "  # noqa: UP031
+        "run `python3.11 build.py ...` or `python3.13 build.py ...` (Debian 12: apt-get install -y "
+        "python3.11 python3.11-venv, Debian 13: apt-get install -y python3.13 python3.13-venv)"
+        % sys.version_info[:2]
+    )
+
+from pathlib import Path  # noqa: E402  (after the check, so that an old Python gets the message)
+
+from build_tools import environments  # noqa: E402
+from build_tools.errors import BuildError  # noqa: E402
+
+ROOT = Path(__file__).resolve().parent
+
+USAGE = """\
+usage: python3 build.py VERB [arguments]
+
+  bake [SCENE] [options]     bake a scene, or the bundled Cornell box (bake --help lists the options)
+  restore SCENE [options]    take a bake out of a .blend again
+  test [--bpy VERSION] ...   run the tests; what follows goes to pytest
+                             --bpy 4.2 or 5.2: with that bpy, in an environment of its own
+  check                      lint, layer rule and types
+  package                    make the extension's zips in dist/, one a platform
+"""
+
+
+def main(arguments: list[str]) -> int:
+    """Run the verb that `arguments` starts with; returns the exit code."""
+    if not arguments or arguments[0] in ("-h", "--help", "help"):
+        print(USAGE, end="")
+        return 0 if arguments else 2
+    verb, rest = arguments[0], arguments[1:]
+    verbs = {"bake": bake, "restore": restore, "test": test, "check": check, "package": package}
+    if verb not in verbs:
+        print(f"build.py: error: no verb {verb!r}; there are {', '.join(verbs)}", file=sys.stderr)
+        return 2
+    try:
+        return verbs[verb](rest)
+    except BuildError as error:
+        print(f"build.py: error: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
+
+
+def bake(arguments: list[str]) -> int:
+    """Bake with the command line of the add-on, which says where everything is."""
+    return environments.main_environment(ROOT).hand_over("-m", "radiosity_addon", "bake", *arguments)
+
+
+def restore(arguments: list[str]) -> int:
+    """Restore with the command line of the add-on."""
+    return environments.main_environment(ROOT).hand_over("-m", "radiosity_addon", "restore", *arguments)
+
+
+def test(arguments: list[str]) -> int:
+    """Run pytest, in the main environment or in one with another bpy."""
+    if arguments[:1] != ["--bpy"]:
+        environment = environments.main_environment(ROOT)
+    elif len(arguments) > 1:
+        environment, arguments = environments.bpy_environment(ROOT, arguments[1]), arguments[2:]
+    else:
+        print("build.py: error: --bpy needs a version, such as 4.2", file=sys.stderr)
+        return 2
+    os.chdir(ROOT)
+    return environment.hand_over("-m", "pytest", *arguments)
+
+
+def check(arguments: list[str]) -> int:
+    """Lint, layers and types; all are run even if one fails."""
+    environment = environments.main_environment(ROOT)
+    os.chdir(ROOT)
+    failures = [
+        name
+        for name, command in (
+            ("ruff", ("-m", "ruff", "check", *arguments, ".")),
+            ("layers", ("-m", "pytest", "-q", "tests/unit/test_layers.py")),
+            ("mypy", ("-m", "mypy")),
+        )
+        if environment.run(*command) != 0
+    ]
+    print(f"check: {', '.join(failures)} failed" if failures else "check: ruff, layers and mypy are content")
+    return 1 if failures else 0
+
+
+def package(arguments: list[str]) -> int:
+    """Make the extension's zips and say where they are."""
+    from build_tools import extension
+
+    if arguments:
+        print(f"build.py: error: package takes no arguments, got {arguments[0]!r}", file=sys.stderr)
+        return 2
+    for path in extension.build(ROOT, environments.main_environment(ROOT)):
+        print(f"{path.relative_to(ROOT)}  {path.stat().st_size / 1e6:.1f} MB")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

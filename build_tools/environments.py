@@ -1,0 +1,123 @@
+"""Virtual environments with pinned packages: made once, brought up to date when the pins change."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from . import system
+from .errors import BuildError
+
+# Each bpy release is built for one Python.
+PYTHON_OF_BPY = {"4.2": (3, 11), "5.0": (3, 11), "5.2": (3, 13)}
+BPY_OF_PYTHON = {(3, 11): "5.0", (3, 13): "5.2"}
+
+
+@dataclass(frozen=True)
+class Environment:
+    """A virtual environment that is known to hold the pinned packages.
+
+    Parameters
+    ----------
+    root : the checkout, which commands import the project from
+    folder : the virtual environment
+    """
+
+    root: Path
+    folder: Path
+
+    @property
+    def python(self) -> Path:
+        """The environment's interpreter."""
+        return _interpreter(self.folder)
+
+    def run(self, *arguments: str) -> int:
+        """Run the interpreter and return its exit code."""
+        return subprocess.run([str(self.python), *arguments], env=self._variables(), check=False).returncode
+
+    def hand_over(self, *arguments: str) -> int:
+        """Become the interpreter, so that signals and exit codes are its own; returns only on Windows."""
+        sys.stdout.flush()
+        if os.name != "nt":
+            os.execve(str(self.python), [str(self.python), *arguments], self._variables())
+        return self.run(*arguments)
+
+    def _variables(self) -> dict[str, str]:
+        paths = [str(self.root), *filter(None, [os.environ.get("PYTHONPATH")])]
+        return {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+
+
+def main_environment(root: Path) -> Environment:
+    """`.venv` with the bpy for its Python: the one it was made with, else the caller's."""
+    folder = root / ".venv"
+    python = _python_version(folder) or sys.version_info[:2]
+    if python not in BPY_OF_PYTHON:
+        made_with = f"{python[0]}.{python[1]}"
+        raise BuildError(f"{folder} was made with Python {made_with}; delete it and run this again")
+    return _ready(root, folder, BPY_OF_PYTHON[python])
+
+
+def bpy_environment(root: Path, bpy: str) -> Environment:
+    """`.envs/bpy-VERSION`, whose Python may be another than the caller's."""
+    if bpy not in PYTHON_OF_BPY:
+        raise BuildError(f"no pins for bpy {bpy}; there are {', '.join(PYTHON_OF_BPY)}")
+    return _ready(root, root / ".envs" / f"bpy-{bpy}", bpy)
+
+
+def _ready(root: Path, folder: Path, bpy: str) -> Environment:
+    """Make or update the environment unless its stamp says that it holds these very pins."""
+    system.require_libraries()
+    pins = [root / "requirements" / f"bpy-{bpy}.txt", root / "requirements" / "tools.txt"]
+    stamp = folder / "pins.sha256"
+    wanted = hashlib.sha256(b"".join(path.read_bytes() for path in pins)).hexdigest()
+    if stamp.is_file() and stamp.read_text() == wanted and _works(folder):
+        return Environment(root, folder)
+    if not _works(folder):
+        _create(folder, PYTHON_OF_BPY[bpy])
+    _install(folder, pins)
+    # Last, so that an interrupted installation is taken up again by the next call.
+    stamp.write_text(wanted)
+    return Environment(root, folder)
+
+
+def _create(folder: Path, version: tuple[int, int]) -> None:
+    python = system.find_python(version)
+    system.require_venv(python, version)
+    print(f"making {folder} with {python}", file=sys.stderr, flush=True)
+    if subprocess.run([python, "-m", "venv", "--clear", str(folder)], check=False).returncode != 0:
+        raise BuildError(f"{python} could not make {folder} (its message is above); mend that, run again")
+
+
+def _install(folder: Path, pins: list[Path]) -> None:
+    names = " and ".join(path.name for path in pins)
+    print(f"installing the pinned packages of {names}, about 1 GB", file=sys.stderr, flush=True)
+    command = [str(_interpreter(folder)), "-m", "pip", "install", "--disable-pip-version-check"]
+    command += ["--no-input"]
+    command += [] if sys.stderr.isatty() else ["-qq"]
+    command += [word for path in pins for word in ("-r", str(path))]
+    # What pip says belongs to the set-up, not to the verb's own output.
+    if subprocess.run(command, stdout=sys.stderr, check=False).returncode != 0:
+        raise BuildError(f"pip could not install {names} (its message is above); mend that, run again")
+
+
+def _works(folder: Path) -> bool:
+    """Whether the environment's own Python starts and has pip: a half-made one does not."""
+    python = _interpreter(folder)
+    if not python.is_file():
+        return False
+    return subprocess.run([str(python), "-c", "import pip"], capture_output=True, check=False).returncode == 0
+
+
+def _python_version(folder: Path) -> tuple[int, int] | None:
+    """The Python a virtual environment was made with, None if there is no whole one."""
+    if not _works(folder):
+        return None
+    return system.version_of(str(_interpreter(folder)))
+
+
+def _interpreter(folder: Path) -> Path:
+    return folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
