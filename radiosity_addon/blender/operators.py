@@ -1,0 +1,277 @@
+"""The operators behind the panel's buttons: each calls one function and reports its errors."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ..errors import RadiosityError
+from . import runtime
+from .properties import settings_of
+
+TICK = 0.03
+"""Seconds of baking between two redraws."""
+
+# What still works while a bake runs: looking around.
+_NAVIGATION = {
+    "MOUSEMOVE",
+    "INBETWEEN_MOUSEMOVE",
+    "MIDDLEMOUSE",
+    "WHEELUPMOUSE",
+    "WHEELDOWNMOUSE",
+    "TRACKPADPAN",
+    "TRACKPADZOOM",
+    "MOUSEROTATE",
+    "NDOF_MOTION",
+    "WINDOW_DEACTIVATE",
+}
+
+
+class RADIOSITY_OT_bake(bpy.types.Operator):
+    """Bake the light of the scene into lightmaps and show them on the objects"""
+
+    bl_idname = "radiosity.bake"
+    bl_label = "Bake Radiosity"
+    bl_options = {"REGISTER", "UNDO"}
+
+    _job: Generator[Any, None, Any] | None = None
+    _timer: bpy.types.Timer | None = None
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Offer the bake wherever there is a scene and no bake is running."""
+        if runtime.running.active:
+            cls.poll_message_set("A bake is running; press Esc to cancel it")
+            return False
+        if context.scene is None:
+            cls.poll_message_set("There is no scene")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Run the bake through."""
+        try:
+            self._begin(context)
+            while not self._advance(context, float("inf")):
+                pass
+        except RadiosityError as error:
+            return self._fail(context, error)
+        except BaseException:
+            self._end(context)
+            raise
+        return self._finish(context)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Start the bake; a timer carries it on."""
+        if bpy.app.background or context.window is None:
+            return self.execute(context)
+        try:
+            self._begin(context)
+        except RadiosityError as error:
+            return self._fail(context, error)
+        manager = context.window_manager
+        self._timer = manager.event_timer_add(TICK / 3, window=context.window)
+        manager.progress_begin(0, 100)
+        context.workspace.status_text_set("Baking radiosity…  Esc: cancel")
+        manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Carry on for a tick, or cancel."""
+        if event.type == "ESC" and event.value == "PRESS":
+            self._end(context)
+            self.report({"INFO"}, "Bake cancelled; everything is as it was")
+            return {"CANCELLED"}
+        if event.type != "TIMER":
+            return {"PASS_THROUGH"} if event.type in _NAVIGATION else {"RUNNING_MODAL"}
+        try:
+            if not self._advance(context, TICK):
+                self._show_progress(context)
+                return {"RUNNING_MODAL"}
+        except RadiosityError as error:
+            return self._fail(context, error)
+        except BaseException:
+            self._end(context)
+            raise
+        return self._finish(context)
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Blender ends the operator from outside: a window closes, or Blender quits."""
+        self._end(context)
+
+    def _begin(self, context: bpy.types.Context) -> None:
+        from .job import run_bake
+        from .output import OutputFolder
+
+        flush_edit_mode(context)
+        settings = settings_of(context)
+        folder = output_folder(context)
+        self._report = None
+        self._folder = folder
+        self._job = run_bake(context, settings, None if folder is None else OutputFolder(folder))
+        runtime.running.active = True
+        runtime.running.stage, runtime.running.fraction = "Starting", 0.0
+
+    def _advance(self, context: bpy.types.Context, seconds: float) -> bool:
+        """Bake for about so long; True once it is done."""
+        until = time.perf_counter() + seconds
+        while time.perf_counter() < until:
+            try:
+                progress = next(self._job)
+            except StopIteration as done:
+                self._report = done.value
+                return True
+            runtime.running.stage, runtime.running.fraction = progress.stage, progress.fraction
+        return False
+
+    def _show_progress(self, context: bpy.types.Context) -> None:
+        running = runtime.running
+        context.window_manager.progress_update(int(100 * running.fraction))
+        context.workspace.status_text_set(
+            f"Baking radiosity: {running.stage}, {running.fraction:.0%}    Esc: cancel"
+        )
+        redraw_sidebars(context)
+
+    def _finish(self, context: bpy.types.Context) -> set[str]:
+        self._end(context)
+        report = self._report.as_dict()
+        runtime.remember(context.scene, report, "" if self._folder is None else str(self._folder))
+        taken = sum(report["seconds"].values())
+        self.report({"INFO"}, f"Baked {len(report['objects'])} objects in {taken:.1f} s")
+        warnings = report["warnings"]
+        for warning in warnings[:3]:
+            self.report({"WARNING"}, f"{warning['name']}: {warning['message']}")
+        if len(warnings) > 3:
+            self.report({"WARNING"}, f"and {len(warnings) - 3} more warnings, listed in the panel")
+        return {"FINISHED"}
+
+    def _fail(self, context: bpy.types.Context, error: RadiosityError) -> set[str]:
+        self._end(context)
+        self.report({"ERROR"}, " ".join(str(error).split()))
+        return {"CANCELLED"}
+
+    def _end(self, context: bpy.types.Context) -> None:
+        """Close the bake, whatever state it is in, and everything shown about it."""
+        job, self._job = self._job, None
+        try:
+            if job is not None:
+                job.close()
+        finally:
+            runtime.running.active = False
+            if self._timer is not None:
+                context.window_manager.event_timer_remove(self._timer)
+                context.window_manager.progress_end()
+                context.workspace.status_text_set(None)
+                self._timer = None
+            redraw_sidebars(context)
+
+
+class RADIOSITY_OT_restore(bpy.types.Operator):
+    """Take the lightmaps off again: objects, materials and UV layers are as before the bake"""
+
+    bl_idname = "radiosity.restore"
+    bl_label = "Restore"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Offer it unless a bake is running."""
+        if runtime.running.active:
+            cls.poll_message_set("A bake is running; press Esc to cancel it")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Bring every baked object of the file back."""
+        from .restore import restore
+
+        count = restore(context)
+        for scene in bpy.data.scenes:
+            runtime.forget(scene)
+        redraw_sidebars(context)
+        if not count:
+            self.report({"INFO"}, "Nothing to restore: no object shows a lightmap")
+            return {"CANCELLED"}
+        self.report({"INFO"}, f"Restored {count} objects")
+        return {"FINISHED"}
+
+
+class RADIOSITY_OT_add_cornell_box(bpy.types.Operator):
+    """Add a new scene with the Cornell box, ready to bake"""
+
+    bl_idname = "radiosity.add_cornell_box"
+    bl_label = "Add Cornell Box"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Offer it unless a bake is running."""
+        return not runtime.running.active
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Build the scene and show it."""
+        from .cornell import build_cornell_box
+
+        scene = build_cornell_box()
+        if context.window is not None:
+            context.window.scene = scene
+        return {"FINISHED"}
+
+
+class RADIOSITY_OT_open_folder(bpy.types.Operator):
+    """Show the lightmaps of the last bake in the file browser"""
+
+    bl_idname = "radiosity.open_folder"
+    bl_label = "Open Folder"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Offer it where the last bake wrote files."""
+        last = runtime.last_bake(context.scene)
+        if last is None or not last.folder:
+            cls.poll_message_set("The last bake wrote no files")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Open the folder."""
+        folder = runtime.last_bake(context.scene).folder
+        if not Path(folder).is_dir():
+            self.report({"ERROR"}, f"The folder '{folder}' is not there any more")
+            return {"CANCELLED"}
+        bpy.ops.wm.path_open(filepath=folder)
+        return {"FINISHED"}
+
+
+def output_folder(context: bpy.types.Context) -> Path | None:
+    """Return where the panel's bake writes; None packs, for an unsaved file has no place."""
+    from .properties import DEFAULT_FOLDER
+
+    folder = context.scene.radiosity.output_folder.strip() or DEFAULT_FOLDER
+    if folder.startswith("//") and not bpy.data.filepath:
+        return None
+    return Path(bpy.path.abspath(folder)).resolve()
+
+
+def flush_edit_mode(context: bpy.types.Context) -> None:
+    """Write meshes that are being edited back into their data, which is what a bake reads."""
+    for obj in context.view_layer.objects:
+        if obj.mode == "EDIT" and obj.type == "MESH":
+            obj.update_from_editmode()
+
+
+def redraw_sidebars(context: bpy.types.Context) -> None:
+    """Have the panel drawn again in every 3D viewport."""
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                for region in area.regions:
+                    if region.type == "UI":
+                        region.tag_redraw()
+
+
+CLASSES = (RADIOSITY_OT_bake, RADIOSITY_OT_restore, RADIOSITY_OT_add_cornell_box, RADIOSITY_OT_open_folder)

@@ -1,0 +1,189 @@
+"""The panel's settings, kept with the scene."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..settings import ATLASES, FORMATS, LIGHTS, MAX_RESOLUTION, QUALITIES, QUANTITIES, BakeSettings
+
+DEFAULTS = BakeSettings()
+
+DEFAULT_FOLDER = "//lightmaps/"
+
+_LABELS = {
+    "shared": ("Shared", "One image for all objects"),
+    "per-object": ("Per Object", "An image for each object"),
+    "draft": ("Draft", "Fast: coarse elements and few rays, to judge the light"),
+    "medium": ("Medium", "Clean light at a moderate time"),
+    "high": ("High", "Fine elements and many rays, for the final bake"),
+    "irradiance_over_pi": (
+        "Irradiance / π",
+        "What Cycles' diffuse bake without color writes: the radiance of a white surface [W/m²/sr]",
+    ),
+    "irradiance": ("Irradiance", "The light that arrives [W/m²], as three.js adds it"),
+    "radiosity": ("Radiosity", "The light that leaves: own emission and what is reflected [W/m²]"),
+    "all": ("All", "Direct and indirect light"),
+    "direct": ("Direct", "Only the light that comes straight from lamps, emitters and world"),
+    "indirect": ("Indirect", "Only the light that was reflected, for lamps that stay dynamic"),
+    "exr": ("OpenEXR", "Linear floating point, exact"),
+    "png16": ("PNG 16 bit", "Scaled to the brightest texel; the scale is in the report"),
+}
+
+
+def _items(values: tuple[str, ...]) -> list[tuple[str, str, str]]:
+    return [(value, *_LABELS[value]) for value in values]
+
+
+# Blender 4.5 and later want paths that start with // declared; 4.2 refuses the word.
+_RELATIVE_PATH = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set()
+
+
+class RadiositySettings(bpy.types.PropertyGroup):
+    """`scene.radiosity`: what the next bake from the panel does."""
+
+    scope: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Objects",
+        description="Which objects get a lightmap; all others still light and block",
+        items=[
+            ("all", "All", "Every mesh that shows in renders"),
+            ("selected", "Selected", "The selected meshes that show in renders"),
+        ],
+        default="all",
+    )
+    size_mode: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Size",
+        description="How the size of the lightmaps is chosen",
+        items=[
+            ("resolution", "Resolution", "Square images of this many pixels"),
+            ("density", "Density", "Pixels per metre of surface; the image size follows"),
+        ],
+        default="resolution",
+    )
+    resolution: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Resolution",
+        description="Width and height of a lightmap in pixels",
+        default=DEFAULTS.resolution,
+        min=1,
+        max=MAX_RESOLUTION,
+        soft_min=64,
+        soft_max=4096,
+        subtype="PIXEL",
+    )
+    texel_density: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="Pixels per Metre",
+        description="Lightmap pixels along one metre of surface",
+        default=64.0,
+        min=0.01,
+        soft_min=1.0,
+        soft_max=1024.0,
+    )
+    atlas: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Atlas",
+        description="How objects share images",
+        items=_items(ATLASES),
+        default=DEFAULTS.atlas,
+    )
+    quality: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Quality",
+        description="How fine the light is computed",
+        items=_items(QUALITIES),
+        default=DEFAULTS.quality,
+    )
+    quantity: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Quantity",
+        description="What a pixel of the lightmap holds",
+        items=_items(QUANTITIES),
+        default=DEFAULTS.quantity,
+    )
+    light: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Light",
+        description="Which light goes into the lightmap",
+        items=_items(LIGHTS),
+        default=DEFAULTS.light,
+    )
+    format: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Format",
+        description="Kind of image file",
+        items=_items(FORMATS),
+        default=DEFAULTS.format,
+    )
+    sky: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Sky if Dark",
+        description="Add a plain white sky of strength 1 where the scene has no light at all",
+        default=DEFAULTS.sky,
+    )
+    keep_uvs: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Keep Lightmap UVs",
+        description="Use an existing UV layer 'Lightmap' as it is instead of unwrapping anew",
+        default=DEFAULTS.keep_uvs,
+    )
+    seed: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Seed",
+        description="Same scene, same seed: the same lightmap to the last bit",
+        default=DEFAULTS.seed,
+        min=0,
+    )
+    threads: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Threads",
+        description="Processor threads to use; 0 uses all. The result does not depend on it",
+        default=DEFAULTS.threads,
+        min=0,
+        soft_max=64,
+    )
+    output_folder: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Folder",
+        description="Where the lightmaps are written. A folder beside an unsaved file is not known yet: "
+        "the lightmaps are then packed into the file",
+        default=DEFAULT_FOLDER,
+        subtype="DIR_PATH",
+        options=_RELATIVE_PATH,
+    )
+    last_bake: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Last Bake",
+        description="Figures and warnings of the last bake",
+        options={"HIDDEN"},
+    )
+
+
+def settings_of(context: bpy.types.Context) -> BakeSettings:
+    """Return the scene's settings as a bake takes them.
+
+    Raises
+    ------
+    UsageError
+        If a value is out of range.
+    """
+    group = context.scene.radiosity
+    by_density = group.size_mode == "density"
+    return BakeSettings(
+        resolution=group.resolution,
+        texel_density=group.texel_density if by_density else None,
+        objects=selected_meshes(context) if group.scope == "selected" else None,
+        **{
+            name: getattr(group, name)
+            for name in ("atlas", "quality", "quantity", "light", "format")
+            + ("sky", "keep_uvs", "seed", "threads")
+        },
+    )
+
+
+def selected_meshes(context: bpy.types.Context) -> tuple[str, ...]:
+    """Return the names of the selected objects that show a surface when rendered."""
+    surfaces = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
+    return tuple(
+        obj.name
+        for obj in context.view_layer.objects.selected
+        if obj.type in surfaces and not obj.hide_render
+    )
+
+
+def register() -> None:
+    """Register the settings and hang them on every scene."""
+    bpy.utils.register_class(RadiositySettings)
+    bpy.types.Scene.radiosity = bpy.props.PointerProperty(type=RadiositySettings)
+
+
+def unregister() -> None:
+    """Take the settings away; what a file holds stays in the file."""
+    del bpy.types.Scene.radiosity
+    bpy.utils.unregister_class(RadiositySettings)

@@ -1,0 +1,142 @@
+"""An earlier bake set aside while a new one is made, and put back if that comes to nothing.
+
+A bake must see the originals, yet until the new lightmaps are there the old ones are all
+the user has. So the earlier bake is neither restored nor removed: its meshes are taken off
+the objects, its record into memory, and only success removes it for good.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import bpy
+
+from .bake_record import made_datablocks, mark_made, recorded_objects, unmark_made
+from .restore import leave_edit_modes, show_original
+
+_RECORD_FIELDS = (
+    "is_baked",
+    "original_mesh",
+    "object_slots",
+    "active_material_index",
+    "is_hidden",
+    "hide_viewport",
+    "hide_render",
+)
+
+
+@dataclass(frozen=True)
+class _Baked:
+    """One object as the earlier bake left it, and what its record said."""
+
+    obj: bpy.types.Object
+    record: dict[str, object]
+    modifiers: tuple[tuple[str, bool, bool], ...]
+    mesh: bpy.types.ID | None
+    slot_links: tuple[str, ...]
+    active_material_index: int
+    modifier_flags: tuple[tuple[str, bool, bool], ...]
+    hide_viewport: bool
+    hide_render: bool
+
+
+class EarlierBake:
+    """A bake that is set aside; it must be put back or discarded before control returns to the user.
+
+    While aside its datablocks are not marked as made by a bake and have names that leave
+    theirs free, so that a new bake can be applied as if this one had never been.
+    """
+
+    def __init__(self, context: bpy.types.Context) -> None:
+        objects = recorded_objects()
+        leave_edit_modes(context, objects)
+        self._context = context
+        self._objects = [_remember(obj) for obj in objects]
+        self._made = [(block, block.name) for block in made_datablocks()]
+        self._stand_ins = [
+            (block, block.hide_viewport, block.hide_render)
+            for block, _ in self._made
+            if isinstance(block, bpy.types.Object)
+        ]
+        for obj in objects:
+            show_original(obj)
+        for block, _, _ in self._stand_ins:
+            block.hide_viewport = block.hide_render = True
+        for block, name in self._made:
+            unmark_made(block)
+            block.name = f".earlier {name}"
+        context.view_layer.update()
+
+    def put_back(self) -> None:
+        """Show the earlier bake again, exactly as it was."""
+        for block, hide_viewport, hide_render in self._stand_ins:
+            block.hide_viewport, block.hide_render = hide_viewport, hide_render
+        for block, name in self._made:
+            mark_made(block)
+            block.name = name
+        for baked in self._objects:
+            _show_baked(baked)
+        self._context.view_layer.update()
+
+    def discard(self) -> None:
+        """Remove the earlier bake for good."""
+        bpy.data.batch_remove([block for block, _ in self._made])
+        self._context.view_layer.update()
+
+
+@contextmanager
+def originals_shown(context: bpy.types.Context) -> Iterator[None]:
+    """Show the originals for a moment, as if nothing had been baked."""
+    earlier = EarlierBake(context)
+    try:
+        yield
+    finally:
+        earlier.put_back()
+
+
+@contextmanager
+def replacing_earlier(context: bpy.types.Context) -> Iterator[None]:
+    """Set the earlier bake aside; remove it on success, put it back on any failure."""
+    earlier = EarlierBake(context)
+    try:
+        yield
+    except BaseException:
+        earlier.put_back()
+        raise
+    earlier.discard()
+
+
+def _remember(obj: bpy.types.Object) -> _Baked:
+    record = obj.radiosity_bake
+    return _Baked(
+        obj=obj,
+        record={name: getattr(record, name) for name in _RECORD_FIELDS if record.is_property_set(name)},
+        modifiers=tuple((entry.name, entry.show_viewport, entry.show_render) for entry in record.modifiers),
+        mesh=obj.data,
+        slot_links=tuple(slot.link for slot in obj.material_slots),
+        active_material_index=obj.active_material_index,
+        modifier_flags=tuple((m.name, m.show_viewport, m.show_render) for m in obj.modifiers),
+        hide_viewport=obj.hide_viewport,
+        hide_render=obj.hide_render,
+    )
+
+
+def _show_baked(baked: _Baked) -> None:
+    obj = baked.obj
+    for name, value in baked.record.items():
+        setattr(obj.radiosity_bake, name, value)
+    for name, show_viewport, show_render in baked.modifiers:
+        entry = obj.radiosity_bake.modifiers.add()
+        entry.name, entry.show_viewport, entry.show_render = name, show_viewport, show_render
+    if obj.data != baked.mesh:
+        obj.data = baked.mesh
+    for slot, link in zip(obj.material_slots, baked.slot_links, strict=False):
+        slot.link = link
+    obj.active_material_index = baked.active_material_index
+    for name, show_viewport, show_render in baked.modifier_flags:
+        modifier = obj.modifiers.get(name)
+        if modifier is not None:
+            modifier.show_viewport, modifier.show_render = show_viewport, show_render
+    obj.hide_viewport, obj.hide_render = baked.hide_viewport, baked.hide_render

@@ -1,0 +1,42 @@
+"""All that the extension adds to Blender, in one order, and takes out again in the reverse."""
+
+from __future__ import annotations
+
+import atexit
+from collections.abc import Callable
+
+import bpy
+
+from . import bake_record, cli_host, operators, panels, properties
+
+CLASSES = (*operators.CLASSES, *panels.CLASSES)
+
+_undo: list[Callable[[], None]] = []
+
+
+def register() -> None:
+    """Register everything once; a failure part of the way takes back what was done."""
+    if _undo:
+        return
+    try:
+        for module in (bake_record, properties):
+            module.register()
+            _undo.append(module.unregister)
+        for cls in CLASSES:
+            bpy.utils.register_class(cls)
+            _undo.append(lambda cls=cls: bpy.utils.unregister_class(cls))
+        cli_host.register()
+        _undo.append(cli_host.unregister)
+    except BaseException:
+        unregister()
+        raise
+    # Blender as a Python module crashes or hangs at exit (4.2, 4.5) while Python classes
+    # of ours are still registered.
+    atexit.register(unregister)
+
+
+def unregister() -> None:
+    """Take everything out again; harmless where nothing is registered."""
+    atexit.unregister(unregister)
+    while _undo:
+        _undo.pop()()

@@ -1,0 +1,111 @@
+"""What panels draw from: the running bake's progress, and the last bake's figures.
+
+`draw()` runs at every redraw, so nothing here computes: the last bake is parsed once
+for each new text the scene holds.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+
+import bpy
+
+MAX_WARNINGS = 100
+"""A scene keeps this many of the last bake's warnings; the report has them all."""
+
+
+@dataclass
+class Running:
+    """The bake that is going on in this Blender, if any."""
+
+    active: bool = False
+    cancel: bool = False
+    stage: str = ""
+    fraction: float = 0.0
+
+
+@dataclass(frozen=True)
+class LastBake:
+    """Figures and warnings of the last bake of a scene."""
+
+    figures: tuple[tuple[str, str], ...] = ()
+    warnings: tuple[tuple[str, str], ...] = ()
+    warning_count: int = 0
+    folder: str = ""
+
+
+@dataclass
+class _Cache:
+    text: str = ""
+    parsed: LastBake | None = None
+
+
+running = Running()
+_cache = _Cache()
+
+
+def remember(scene: bpy.types.Scene, report: dict, folder: str) -> None:
+    """Keep what the panel shows of a finished bake with the scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    report : dict
+        As it is written to report.json.
+    folder : str
+        Where the files are; empty if they are packed.
+    """
+    scene.radiosity.last_bake = json.dumps(
+        {
+            "objects": len(report["objects"]),
+            "images": len({entry["image"] for entry in report["objects"]}),
+            "solver": report["solver"],
+            "seconds": sum(report["seconds"].values()),
+            "warnings": [[w["name"], w["message"]] for w in report["warnings"][:MAX_WARNINGS]],
+            "warning_count": len(report["warnings"]),
+            "folder": folder,
+        }
+    )
+
+
+def forget(scene: bpy.types.Scene) -> None:
+    """Drop the scene's memory of its last bake."""
+    scene.radiosity.property_unset("last_bake")
+
+
+def last_bake(scene: bpy.types.Scene) -> LastBake | None:
+    """Return the last bake of the scene; None if there was none."""
+    text = scene.radiosity.last_bake
+    if not text:
+        return None
+    if text != _cache.text:
+        _cache.text, _cache.parsed = text, _parse(text)
+    return _cache.parsed
+
+
+def _parse(text: str) -> LastBake | None:
+    """Return what `remember` wrote; None for what somebody else put there."""
+    try:
+        record = json.loads(text)
+        solver = record["solver"]
+        figures = [
+            ("Time", f"{record['seconds']:.1f} s"),
+            ("Objects", f"{record['objects']:,}"),
+            ("Images", f"{record['images']:,}"),
+            ("Elements", f"{solver['elements']:,}"),
+            ("Links", f"{solver['links']:,}"),
+            ("Rays", f"{solver['rays']:,}"),
+        ]
+        if solver.get("residual") is not None:
+            figures.append(("Residual", f"{solver['residual']:.1e}"))
+        if solver.get("closure_area_mean") is not None:
+            figures.append(("Closure", f"{solver['closure_area_mean']:.4f}"))
+        return LastBake(
+            figures=tuple(figures),
+            warnings=tuple((str(name), str(message)) for name, message in record["warnings"]),
+            warning_count=int(record["warning_count"]),
+            folder=str(record["folder"]),
+        )
+    except (ValueError, KeyError, TypeError):
+        return None

@@ -1,0 +1,208 @@
+"""The command line: one parser for `python -m`, Blender's `--command` and build.py.
+
+Parsing needs neither Blender nor NumPy; what a verb does is imported when it runs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import traceback
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from .console import Console
+from .errors import RadiosityError, UsageError
+from .interrupts import Interrupts
+from .settings import ATLASES, FORMATS, LIGHTS, QUALITIES, QUANTITIES, BakeSettings
+
+EXIT_DONE = 0
+EXIT_FAILED = 1
+EXIT_USAGE = 2
+EXIT_INTERRUPTED = 130
+
+BUNDLED_OUTPUT = Path("out/cornell")
+"""Where the bundled scene goes when no --output is given."""
+
+
+def main(
+    argv: Sequence[str] | None = None, prog: str = "python -m radiosity_addon", loaded: Path | None = None
+) -> int:
+    """Run one command and return its exit code; nothing is raised, nothing exits.
+
+    Parameters
+    ----------
+    argv : sequence of str or None
+        The words after the program's name; None takes them from the process.
+    prog : str
+        How the user started us, for the help texts.
+    loaded : Path or None
+        The scene file the host has open already (`blender -b FILE --command …`):
+        it is what a command without SCENE works on.
+
+    Returns
+    -------
+    code : int
+        0 done, 1 scene or bake error, 2 usage, 130 interrupted.
+    """
+    try:
+        request = build_parser(prog).parse_args(sys.argv[1:] if argv is None else list(argv))
+        settings = settings_of(request) if request.verb == "bake" else None
+        if settings is not None:
+            request.output = bake_output(request, loaded)
+    except RadiosityError as error:
+        return _fail(str(error), error.exit_code)
+    except SystemExit as help_was_asked:
+        return int(help_was_asked.code or 0)
+    with Interrupts() as interrupts:
+        return _run(request, settings, loaded, interrupts)
+
+
+def build_parser(prog: str) -> argparse.ArgumentParser:
+    """Return the parser of both verbs; it raises `UsageError` where argparse would exit."""
+    parser = _Parser(prog=prog, description="Bake radiosity lightmaps.", allow_abbrev=False)
+    verbs = parser.add_subparsers(dest="verb", required=True, metavar="{bake,restore}")
+    _add_bake(verbs.add_parser("bake", help="bake lightmaps", allow_abbrev=False))
+    _add_restore(verbs.add_parser("restore", help="take the lightmaps out again", allow_abbrev=False))
+    return parser
+
+
+def settings_of(request: argparse.Namespace) -> BakeSettings:
+    """Return the validated settings of a parsed `bake`."""
+    given = {
+        name: getattr(request, name)
+        for name in ("texel_density", "atlas", "quality", "quantity", "light", "format")
+        + ("sky", "keep_uvs", "seed", "threads")
+    }
+    if request.resolution is not None:
+        given["resolution"] = request.resolution
+    if request.objects is not None:
+        given["objects"] = tuple(request.objects)
+    return BakeSettings(**given)
+
+
+def bake_output(request: argparse.Namespace, loaded: Path | None) -> Path:
+    """Return where the bake goes: a scene needs --output, the bundled one has a default."""
+    if request.output is not None:
+        return request.output
+    if request.scene is not None or loaded is not None:
+        raise UsageError("bake needs --output DIR, the folder everything is written to")
+    return BUNDLED_OUTPUT
+
+
+class _Parser(argparse.ArgumentParser):
+    """An ArgumentParser whose errors are ours: one line, no exit."""
+
+    def error(self, message: str) -> NoReturn:
+        raise UsageError(f"{message} (see {self.prog} --help)")
+
+
+def _add_bake(parser: argparse.ArgumentParser) -> None:
+    default = BakeSettings()
+    add = parser.add_argument
+    add(
+        "scene",
+        nargs="?",
+        type=Path,
+        metavar="SCENE",
+        help=".blend, .glb, .gltf or .obj; without it the file Blender has open, or the bundled Cornell box",
+    )
+    add(
+        "--output",
+        type=Path,
+        metavar="DIR",
+        help=f"where everything goes (default for the bundled scene: {BUNDLED_OUTPUT})",
+    )
+    size = parser.add_mutually_exclusive_group()
+    size.add_argument(
+        "--resolution",
+        type=int,
+        metavar="N",
+        help=f"width and height of an atlas page in pixels (default {default.resolution})",
+    )
+    size.add_argument(
+        "--texel-density",
+        type=float,
+        metavar="PX_PER_M",
+        help="pixels per metre; the page size follows from the surface",
+    )
+    for name, choices, text in (
+        ("atlas", ATLASES, "one image for all objects, or one for each"),
+        ("quality", QUALITIES, "how fine the solution is"),
+        ("quantity", QUANTITIES, "what a texel holds"),
+        ("light", LIGHTS, "which light is baked"),
+        ("format", FORMATS, "kind of image file"),
+    ):
+        chosen = getattr(default, name)
+        add(f"--{name}", choices=choices, default=chosen, help=f"{text} (default {chosen})")
+    add(
+        "--objects",
+        nargs="+",
+        metavar="NAME",
+        help="what gets a lightmap; the rest still lights and blocks (default: every rendered mesh)",
+    )
+    add(
+        "--sky", action="store_true", help="add a white sky of strength 1 where the scene has no light at all"
+    )
+    add("--keep-uvs", action="store_true", help="use an existing UV layer Lightmap as it is")
+    add("--seed", type=int, default=default.seed, metavar="N", help="random seed (default 0)")
+    add("--threads", type=int, default=default.threads, metavar="N", help="threads (default: all cores)")
+    _add_common(parser)
+    add("--report", type=Path, metavar="FILE", help="second copy of report.json")
+
+
+def _add_restore(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "scene",
+        nargs="?",
+        type=Path,
+        metavar="SCENE",
+        help="a baked .blend; without it the file Blender has open",
+    )
+    parser.add_argument(
+        "--output", type=Path, required=True, metavar="FILE", help="the restored .blend to write"
+    )
+    _add_common(parser)
+
+
+def _add_common(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--quiet", action="store_true", help="print errors only")
+
+
+def _run(
+    request: argparse.Namespace, settings: BakeSettings | None, loaded: Path | None, interrupts: Interrupts
+) -> int:
+    """Run the verb and turn however it ends into an exit code."""
+    try:
+        from .blender import commands
+    except ModuleNotFoundError as error:
+        return _fail(
+            f"{error.name} is not installed; run this through build.py or inside Blender", EXIT_FAILED
+        )
+    try:
+        with Console(quiet=request.quiet) as console:
+            if settings is not None:
+                commands.bake(
+                    request.scene, loaded, request.output, settings, request.report, console, interrupts
+                )
+            else:
+                commands.restore(request.scene, loaded, request.output, console)
+            interrupts.check()
+    except KeyboardInterrupt:
+        return _fail("interrupted; nothing was written", EXIT_INTERRUPTED)
+    except RadiosityError as error:
+        # An importer that Ctrl-C stopped may come back as its own failure.
+        return _fail(str(error), EXIT_INTERRUPTED if interrupts.requested else error.exit_code)
+    except MemoryError:
+        return _fail("out of memory; lower the resolution, the texel density or the quality", EXIT_FAILED)
+    except Exception as error:
+        traceback.print_exc()
+        return _fail(f"internal error, please report it: {type(error).__name__}: {error}", EXIT_FAILED)
+    return EXIT_DONE
+
+
+def _fail(message: str, code: int) -> int:
+    line = " ".join(message.split())
+    print(f"error: {line}", file=sys.stderr, flush=True)
+    return code

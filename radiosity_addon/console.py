@@ -1,0 +1,120 @@
+"""What the command line prints: progress, where things are, warnings."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterable
+from typing import TextIO
+
+STEP = 10
+"""Without a terminal a stage prints a line again after this many per cent."""
+
+
+class Console:
+    """Our own lines on standard output, with Blender's chatter kept off it.
+
+    While entered, file descriptor 1 leads to the null device: Blender's C code writes
+    a line there for every sample it renders. Our lines go to a copy of the original.
+
+    Parameters
+    ----------
+    quiet : bool
+        Print nothing at all.
+    """
+
+    def __init__(self, quiet: bool = False) -> None:
+        self.quiet = quiet
+        self._stream: TextIO = sys.stdout
+        self._saved: int | None = None
+        self._stage = ""
+        self._percent = -STEP
+        self._open_line = False
+
+    def __enter__(self) -> Console:
+        self._stream = sys.stdout
+        try:
+            redirected = sys.stdout.fileno() == 1
+        except (AttributeError, OSError, ValueError):
+            redirected = False
+        if redirected:
+            sys.stdout.flush()
+            self._saved = os.dup(1)
+            self._stream = os.fdopen(
+                os.dup(1), "w", encoding=sys.stdout.encoding or "utf-8", errors="replace"
+            )
+            null = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(null, 1)
+            os.close(null)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._end_line()
+        self._stream.flush()
+        if self._saved is not None:
+            sys.stdout.flush()
+            os.dup2(self._saved, 1)
+            os.close(self._saved)
+            self._saved = None
+            self._stream.close()
+            self._stream = sys.stdout
+
+    def progress(self, stage: str, fraction: float) -> None:
+        """Show the stage and how much of the whole is done, `fraction` in 0 to 1."""
+        if self.quiet:
+            return
+        percent = int(100 * min(max(fraction, 0.0), 1.0))
+        if self._stream.isatty():
+            if (stage, percent) != (self._stage, self._percent):
+                self._stream.write(f"\r\x1b[K[{percent:3d} %] {stage}")
+                self._stream.flush()
+                self._open_line = True
+                self._stage, self._percent = stage, percent
+        elif stage != self._stage or percent >= self._percent + STEP:
+            self._stream.write(f"[{percent:3d} %] {stage}\n")
+            self._stream.flush()
+            self._stage, self._percent = stage, percent
+
+    def lines(self, lines: Iterable[str]) -> None:
+        """Print finished lines."""
+        if self.quiet:
+            return
+        self._end_line()
+        for line in lines:
+            self._stream.write(line + "\n")
+        self._stream.flush()
+
+    def _end_line(self) -> None:
+        if self._open_line:
+            self._stream.write("\r\x1b[K")
+            self._open_line = False
+
+
+def summary(where: str, files: Iterable[tuple[str, str]], report: dict) -> list[str]:
+    """Return the closing lines of a bake: where things are, how long, what to look at.
+
+    Parameters
+    ----------
+    where : str
+        The output folder as the user named it.
+    files : pairs of (name, what it is)
+    report : dict
+        The report as it is written to report.json.
+    """
+    solver = report["solver"]
+    lines = [f"{len(report['objects'])} objects baked into {where}"]
+    lines += [f"  {name:<24} {what}" for name, what in files]
+    lines.append(
+        f"{solver['elements']:,} elements, {solver['links']:,} links, {solver['rays']:,} rays, "
+        f"closure {solver['closure_area_mean']:.4f}"
+        if solver.get("closure_area_mean") is not None
+        else f"{solver['elements']:,} elements, {solver['links']:,} links, {solver['rays']:,} rays"
+    )
+    seconds = report["seconds"]
+    lines += [f"  {stage:<24} {taken:7.2f} s" for stage, taken in seconds.items()]
+    lines.append(f"  {'total':<24} {sum(seconds.values()):7.2f} s")
+    warnings = report["warnings"]
+    if warnings:
+        lines.append(f"{len(warnings)} warning{'s' if len(warnings) > 1 else ''}:")
+        lines += [f"  {warning['name']}: {warning['message']}" for warning in warnings]
+    return lines
