@@ -66,7 +66,7 @@ class BakeSettings:
         if not 1 <= self.resolution <= MAX_RESOLUTION:
             raise UsageError(f"resolution {self.resolution} is not between 1 and {MAX_RESOLUTION} pixels")
         if self.texel_density is not None and not 0 < self.texel_density < float("inf"):
-            raise UsageError(f"texel density {self.texel_density} is not a positive number of pixels per metre")
+            raise UsageError(f"texel density {self.texel_density} is not a positive number of pixels a metre")
         if self.threads < 0:
             raise UsageError(f"threads {self.threads} is negative; 0 means all cores")
         if self.seed < 0:
