@@ -10,7 +10,7 @@ import sys
 import traceback
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from .console import Console
 from .errors import RadiosityError, UsageError
@@ -21,6 +21,12 @@ EXIT_DONE = 0
 EXIT_FAILED = 1
 EXIT_USAGE = 2
 EXIT_INTERRUPTED = 130
+
+SHARED_FIELDS = (
+    *("texel_density", "atlas", "quality", "quantity", "light", "format"),
+    *("sky", "keep_uvs", "seed", "threads"),
+)
+"""Settings whose option says exactly what the field says."""
 
 BUNDLED_OUTPUT = Path("out/cornell")
 """Where the bundled scene goes when no --output is given."""
@@ -70,11 +76,7 @@ def build_parser(prog: str) -> argparse.ArgumentParser:
 
 def settings_of(request: argparse.Namespace) -> BakeSettings:
     """Return the validated settings of a parsed `bake`."""
-    given = {
-        name: getattr(request, name)
-        for name in ("texel_density", "atlas", "quality", "quantity", "light", "format")
-        + ("sky", "keep_uvs", "seed", "threads")
-    }
+    given: dict[str, Any] = {name: getattr(request, name) for name in SHARED_FIELDS}
     if request.resolution is not None:
         given["resolution"] = request.resolution
     if request.objects is not None:
@@ -188,7 +190,6 @@ def _run(
                 )
             else:
                 commands.restore(request.scene, loaded, request.output, console)
-            interrupts.check()
     except KeyboardInterrupt:
         return _fail("interrupted; nothing was written", EXIT_INTERRUPTED)
     except RadiosityError as error:
@@ -196,7 +197,7 @@ def _run(
         return _fail(str(error), EXIT_INTERRUPTED if interrupts.requested else error.exit_code)
     except MemoryError:
         return _fail("out of memory; lower the resolution, the texel density or the quality", EXIT_FAILED)
-    except Exception as error:
+    except Exception as error:  # noqa: BLE001 (the last resort: a code and a line, not a bare crash)
         traceback.print_exc()
         return _fail(f"internal error, please report it: {type(error).__name__}: {error}", EXIT_FAILED)
     return EXIT_DONE
@@ -204,5 +205,5 @@ def _run(
 
 def _fail(message: str, code: int) -> int:
     line = " ".join(message.split())
-    print(f"error: {line}", file=sys.stderr, flush=True)
+    print(f"error: {line}", file=sys.stderr, flush=True)  # noqa: T201
     return code

@@ -102,7 +102,8 @@ def summary(where: str, files: Iterable[tuple[str, str]], report: dict) -> list[
         The report as it is written to report.json.
     """
     solver = report["solver"]
-    lines = [f"{len(report['objects'])} objects baked into {where}"]
+    count = len(report["objects"])
+    lines = [f"{count} object{'' if count == 1 else 's'} baked into {where}"]
     lines += [f"  {name:<24} {what}" for name, what in files]
     lines.append(
         f"{solver['elements']:,} elements, {solver['links']:,} links, {solver['rays']:,} rays, "

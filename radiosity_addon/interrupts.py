@@ -38,7 +38,7 @@ class Interrupts:
             previous = signal.default_int_handler if self._previous is None else self._previous
             signal.signal(signal.SIGINT, previous)  # type: ignore[arg-type]
 
-    def _handle(self, signum: int, frame: FrameType | None) -> None:
+    def _handle(self, _signum: int, _frame: FrameType | None) -> None:
         again = self.requested
         self.requested = True
         if again or not self.deferred:

@@ -56,7 +56,7 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
         """Run the bake through."""
         try:
             self._begin(context)
-            while not self._advance(context, float("inf")):
+            while not self._advance(float("inf")):
                 pass
         except RadiosityError as error:
             return self._fail(context, error)
@@ -65,7 +65,7 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
             raise
         return self._finish(context)
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         """Start the bake; a timer carries it on."""
         if bpy.app.background or context.window is None:
             return self.execute(context)
@@ -89,7 +89,7 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
         if event.type != "TIMER":
             return {"PASS_THROUGH"} if event.type in _NAVIGATION else {"RUNNING_MODAL"}
         try:
-            if not self._advance(context, TICK):
+            if not self._advance(TICK):
                 self._show_progress(context)
                 return {"RUNNING_MODAL"}
         except RadiosityError as error:
@@ -116,7 +116,7 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
         runtime.running.active = True
         runtime.running.stage, runtime.running.fraction = "Starting", 0.0
 
-    def _advance(self, context: bpy.types.Context, seconds: float) -> bool:
+    def _advance(self, seconds: float) -> bool:
         """Bake for about so long; True once it is done."""
         until = time.perf_counter() + seconds
         while time.perf_counter() < until:
@@ -178,7 +178,7 @@ class RADIOSITY_OT_restore(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, _context: bpy.types.Context) -> bool:
         """Offer it unless a bake is running."""
         if runtime.running.active:
             cls.poll_message_set("A bake is running; press Esc to cancel it")
@@ -208,7 +208,7 @@ class RADIOSITY_OT_add_cornell_box(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def poll(cls, _context: bpy.types.Context) -> bool:
         """Offer it unless a bake is running."""
         return not runtime.running.active
 

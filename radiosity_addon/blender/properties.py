@@ -8,6 +8,12 @@ from ..settings import ATLASES, FORMATS, LIGHTS, MAX_RESOLUTION, QUALITIES, QUAN
 
 DEFAULTS = BakeSettings()
 
+SHARED_FIELDS = (
+    *("atlas", "quality", "quantity", "light", "format"),
+    *("sky", "keep_uvs", "seed", "threads"),
+)
+"""Settings of the panel that a bake takes as they are."""
+
 DEFAULT_FOLDER = "//lightmaps/"
 
 _LABELS = {
@@ -159,11 +165,7 @@ def settings_of(context: bpy.types.Context) -> BakeSettings:
         resolution=group.resolution,
         texel_density=group.texel_density if by_density else None,
         objects=selected_meshes(context) if group.scope == "selected" else None,
-        **{
-            name: getattr(group, name)
-            for name in ("atlas", "quality", "quantity", "light", "format")
-            + ("sky", "keep_uvs", "seed", "threads")
-        },
+        **{name: getattr(group, name) for name in SHARED_FIELDS},
     )
 
 

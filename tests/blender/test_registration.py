@@ -1,0 +1,103 @@
+"""Switching the extension on and off."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+import pytest
+
+import radiosity_addon
+from radiosity_addon.blender import registration
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture
+def registered() -> Iterator[None]:
+    radiosity_addon.register()
+    yield
+    radiosity_addon.unregister()
+
+
+def traces() -> set[str]:
+    """What of ours Blender knows at the moment."""
+    known = {name for name in dir(bpy.types) if "radiosity" in name.lower()}
+    known |= {f"ops.{name}" for name in dir(bpy.ops.radiosity)}
+    known |= {
+        f"{kind.__name__}.{name}"
+        for kind in (bpy.types.Scene, bpy.types.Object)
+        for name in vars(kind)
+        if "radiosity" in name
+    }
+    return known
+
+
+def test_register_adds_and_unregister_leaves_nothing() -> None:
+    assert traces() == set()
+    for _ in range(2):
+        radiosity_addon.register()
+        assert {"RADIOSITY_PT_main", "ops.bake", "ops.restore", "ops.add_cornell_box"} <= traces()
+        assert bpy.context.scene.radiosity.output_folder == "//lightmaps/"
+        radiosity_addon.unregister()
+        assert traces() == set()
+
+
+def test_registering_twice_is_once(registered: None) -> None:
+    radiosity_addon.register()
+    radiosity_addon.unregister()
+    assert traces() == set()
+
+
+def test_a_failure_half_way_takes_back_the_first_half(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail() -> None:
+        raise RuntimeError("no command today")
+
+    monkeypatch.setattr(registration.cli_host, "register", fail)
+    with pytest.raises(RuntimeError, match="no command today"):
+        radiosity_addon.register()
+    assert traces() == set()
+
+
+def test_registering_imports_no_solver(tmp_path: Path) -> None:
+    """In a process of its own, for here the tests have imported everything."""
+    code = (
+        "import sys, bpy, radiosity_addon\n"
+        "before = set(sys.modules)\n"
+        "radiosity_addon.register()\n"
+        "new = set(sys.modules) - before\n"
+        "heavy = {'embreex', 'xatlas', 'numpy', 'multiprocessing', 'concurrent'}\n"
+        "print('heavy:', sorted(m for m in new if m.split('.')[0] in heavy))\n"
+        "ours = {m.split('.')[1] for m in new if m.startswith('radiosity_addon.')}\n"
+        "print('ours:', sorted(ours))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=120, check=False
+    )
+    # The exit code tells that Blender survived leaving with the extension registered.
+    assert done.returncode == 0, done.stderr
+    lines = dict(line.split(": ", 1) for line in done.stdout.splitlines() if ": [" in line)
+    assert lines == {"heavy": "[]", "ours": "['blender', 'errors', 'settings']"}
+
+
+@pytest.mark.parametrize(
+    "field",
+    ["resolution", "atlas", "quality", "quantity", "light", "format", "sky", "keep_uvs", "seed", "threads"],
+)
+def test_panel_and_command_line_have_the_same_defaults(field: str, registered: None) -> None:
+    from radiosity_addon.blender.properties import settings_of
+    from radiosity_addon.settings import BakeSettings
+
+    assert getattr(settings_of(bpy.context), field) == getattr(BakeSettings(), field)
+
+
+def test_every_setting_has_a_tooltip(registered: None) -> None:
+    properties = bpy.types.Scene.bl_rna.properties["radiosity"].fixed_type.properties
+    for prop in properties:
+        if prop.identifier not in {"rna_type", "name"}:
+            assert prop.description, prop.identifier
+        for item in getattr(prop, "enum_items", ()):
+            assert item.description, (prop.identifier, item.identifier)

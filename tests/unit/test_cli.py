@@ -1,0 +1,283 @@
+"""The command line's parser and exit codes, without Blender."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from radiosity_addon import cli
+from radiosity_addon.errors import BakeError, SceneError, UsageError
+from radiosity_addon.settings import BakeSettings
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture
+def verbs(monkeypatch: pytest.MonkeyPatch) -> list[tuple]:
+    """Calls that reach the Blender layer, recorded instead of carried out."""
+    calls: list[tuple] = []
+    stand_in = ModuleType("radiosity_addon.blender.commands")
+    stand_in.bake = lambda *args: calls.append(("bake", *args))
+    stand_in.restore = lambda *args: calls.append(("restore", *args))
+    package = ModuleType("radiosity_addon.blender")
+    package.commands = stand_in
+    monkeypatch.setitem(sys.modules, "radiosity_addon.blender", package)
+    monkeypatch.setitem(sys.modules, "radiosity_addon.blender.commands", stand_in)
+    return calls
+
+
+def failing(verbs: list[tuple], error: BaseException) -> None:
+    """Make `bake` end with this error."""
+
+    def bake(*_: object) -> None:
+        raise error
+
+    sys.modules["radiosity_addon.blender.commands"].bake = bake
+
+
+def test_defaults_are_those_of_the_settings(verbs: list[tuple]) -> None:
+    assert cli.main(["bake", "room.blend", "--output", "out"]) == 0
+    (verb, scene, loaded, output, settings, report, *_) = verbs[0]
+    assert (verb, scene, loaded, output, report) == ("bake", Path("room.blend"), None, Path("out"), None)
+    assert settings == BakeSettings(
+        resolution=512,
+        texel_density=None,
+        atlas="shared",
+        quality="medium",
+        quantity="irradiance_over_pi",
+        light="all",
+        format="exr",
+        objects=None,
+        sky=False,
+        keep_uvs=False,
+        seed=0,
+        threads=0,
+    )
+
+
+def test_every_option_arrives(verbs: list[tuple]) -> None:
+    line = (
+        "bake s.glb --output o --texel-density 12.5 --atlas per-object --quality high --quantity radiosity "
+        "--light indirect --format png16 --objects Floor Wall --sky --keep-uvs --seed 7 --threads 2 "
+        "--quiet --report r.json"
+    )
+    assert cli.main(line.split()) == 0
+    (_, scene, _, output, settings, report, console, _) = verbs[0]
+    assert (scene, output, report, console.quiet) == (Path("s.glb"), Path("o"), Path("r.json"), True)
+    assert settings == BakeSettings(
+        texel_density=12.5,
+        atlas="per-object",
+        quality="high",
+        quantity="radiosity",
+        light="indirect",
+        format="png16",
+        objects=("Floor", "Wall"),
+        sky=True,
+        keep_uvs=True,
+        seed=7,
+        threads=2,
+    )
+
+
+def test_the_bundled_scene_has_a_default_output(verbs: list[tuple]) -> None:
+    assert cli.main(["bake"]) == 0
+    assert verbs[0][1] is None
+    assert verbs[0][3] == Path("out/cornell")
+
+
+def test_a_loaded_file_is_the_scene(verbs: list[tuple]) -> None:
+    assert cli.main(["bake", "--output", "o"], loaded=Path("open.blend")) == 0
+    assert verbs[0][1:4] == (None, Path("open.blend"), Path("o"))
+
+
+def test_restore(verbs: list[tuple]) -> None:
+    assert cli.main(["restore", "baked.blend", "--output", "back.blend"]) == 0
+    assert verbs[0][:4] == ("restore", Path("baked.blend"), None, Path("back.blend"))
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("", "required"),
+        ("paint", "paint"),
+        ("bake a.blend", "--output"),
+        ("bake --output o a.blend extra", "extra"),
+        ("bake --resolution 512 --texel-density 3 --output o", "not allowed with"),
+        ("bake --resolution 0", "resolution 0"),
+        ("bake --resolution 16385", "16384"),
+        ("bake --resolution 2k", "2k"),
+        ("bake --texel-density 0", "texel density"),
+        ("bake --texel-density nan", "texel density"),
+        ("bake --atlas both", "both"),
+        ("bake --quality best", "best"),
+        ("bake --quantity lux", "lux"),
+        ("bake --light some", "some"),
+        ("bake --format jpg", "jpg"),
+        ("bake --threads -1", "threads -1"),
+        ("bake --seed -1", "seed -1"),
+        ("bake --objects", "--objects"),
+        ("bake --res 5", "--res"),
+        ("restore a.blend", "--output"),
+    ],
+)
+def test_usage_errors_are_one_line_and_2(
+    line: str, says: str, verbs: list[tuple], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(line.split()) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert verbs == []
+    assert captured.err.startswith("error: ")
+    assert captured.err.count("\n") == 1
+    assert says in captured.err
+
+
+@pytest.mark.parametrize("line", ["-h", "bake --help", "restore -h"])
+def test_help_is_0(line: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(line.split()) == 0
+    assert "usage:" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [
+        (SceneError("object 'A'\nis bad"), 1),
+        (BakeError("folder 'x' cannot be written"), 1),
+        (UsageError("no object 'B'"), 2),
+        (MemoryError(), 1),
+        (KeyboardInterrupt(), 130),
+    ],
+)
+def test_each_way_to_end_has_its_code(
+    error: BaseException, code: int, verbs: list[tuple], capsys: pytest.CaptureFixture[str]
+) -> None:
+    failing(verbs, error)
+    assert cli.main(["bake"]) == code
+    err = capsys.readouterr().err
+    assert err.startswith("error: ")
+    assert err.count("\n") == 1
+
+
+def test_a_defect_of_ours_shows_its_traceback(verbs: list[tuple], capsys: pytest.CaptureFixture[str]) -> None:
+    failing(verbs, ZeroDivisionError("oops"))
+    assert cli.main(["bake"]) == 1
+    err = capsys.readouterr().err
+    assert "Traceback" in err
+    assert "ZeroDivisionError: oops" in err.splitlines()[-1]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals are sent the POSIX way")
+@pytest.mark.parametrize("swallow", [RuntimeError, SceneError])
+def test_an_interrupt_that_a_callback_swallows_still_ends_in_130(
+    swallow: type[Exception], verbs: list[tuple]
+) -> None:
+    def bake(*args: object) -> None:
+        try:
+            os.kill(os.getpid(), signal.SIGINT)
+        except KeyboardInterrupt as stop:
+            if swallow is SceneError:
+                raise SceneError("the importer failed") from stop
+        args[-1].check()
+
+    sys.modules["radiosity_addon.blender.commands"].bake = bake
+    before = signal.getsignal(signal.SIGINT)
+    assert cli.main(["bake"]) == 130
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals are sent the POSIX way")
+def test_a_deferred_stage_is_finished_before_the_interrupt(verbs: list[tuple]) -> None:
+    finished = []
+
+    def bake(*args: object) -> None:
+        interrupts = args[-1]
+        interrupts.deferred = True
+        os.kill(os.getpid(), signal.SIGINT)
+        finished.append(True)
+        interrupts.check()
+        finished.append(False)
+
+    sys.modules["radiosity_addon.blender.commands"].bake = bake
+    assert cli.main(["bake"]) == 130
+    assert finished == [True]
+
+
+def run_python(code: str) -> subprocess.CompletedProcess[str]:
+    """Run code in a fresh interpreter beside the package."""
+    return subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=120, check=False
+    )
+
+
+def test_parsing_imports_neither_blender_nor_arrays() -> None:
+    done = run_python(
+        "import sys; from radiosity_addon import cli; code = cli.main(['bake', '--resolution', '0']); "
+        "print(code, sorted({m.split('.')[0] for m in sys.modules} & {'bpy', 'numpy', 'embreex', 'xatlas'}))"
+    )
+    assert done.stdout.strip() == "2 []"
+
+
+def console_run(body: str) -> str:
+    """What a fresh process writes to standard output while a console is open."""
+    done = run_python(f"import os\nfrom radiosity_addon.console import Console\n{body}")
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_console_keeps_other_writers_off_standard_output() -> None:
+    out = console_run(
+        "print('before')\n"
+        "with Console() as c:\n"
+        "    os.write(1, b'Fra:1 Mem:22M\\n'); print('chatter')\n"
+        "    c.lines(['ours'])\n"
+        "print('after')"
+    )
+    assert out.splitlines() == ["before", "ours", "after"]
+
+
+@pytest.mark.parametrize(
+    ("quiet", "expected"),
+    [
+        (False, ["[  0 %] export", "[  5 %] links", "[ 15 %] links", "[100 %] links", "done"]),
+        (True, []),
+    ],
+)
+def test_progress_off_a_terminal_is_a_line_a_stage_and_a_step(quiet: bool, expected: list[str]) -> None:
+    out = console_run(
+        f"with Console(quiet={quiet}) as c:\n"
+        "    c.progress('export', 0.0)\n"
+        "    for f in (0.05, 0.051, 0.1, 0.149, 0.1500001, 1.2): c.progress('links', f)\n"
+        "    c.lines(['done'])"
+    )
+    assert out.splitlines() == expected
+
+
+def test_summary_says_where_how_long_and_what_to_look_at() -> None:
+    from radiosity_addon.console import summary
+
+    report = {
+        "objects": [{"object": "Floor"}],
+        "solver": {"elements": 1200, "links": 34000, "rays": 5, "closure_area_mean": 0.99871},
+        "seconds": {"export": 0.25, "solve": 1.5},
+        "warnings": [{"name": "Glass", "message": "not understood; grey used instead"}],
+    }
+    text = "\n".join(summary("out/x", [("baked.blend", "the scene")], report))
+    for part in ("1 object baked into out/x", "baked.blend", "1,200 elements", "34,000 links", "0.9987"):
+        assert part in text
+    for part in (
+        "export",
+        "0.25 s",
+        "solve",
+        "1.50 s",
+        "total",
+        "1.75 s",
+        "1 warning:",
+        "Glass: not understood",
+    ):
+        assert part in text
