@@ -13,8 +13,8 @@ class Interrupts:
     Blender prints and drops an exception raised in its own Python callbacks (a Cycles
     render, an importer), and a Blender in the background installs a handler of its own
     that never reaches Python. So the request is also kept in `requested`: loops call
-    `check`, and stages that must not be torn apart set `deferred`. A second Ctrl-C
-    is raised at once, whatever is going on.
+    `check`, and while `deferred` is set nothing is raised, so that what must not be torn
+    apart is finished first.
     """
 
     def __init__(self) -> None:
@@ -39,7 +39,6 @@ class Interrupts:
             signal.signal(signal.SIGINT, previous)  # type: ignore[arg-type]
 
     def _handle(self, _signum: int, _frame: FrameType | None) -> None:
-        again = self.requested
         self.requested = True
-        if again or not self.deferred:
+        if not self.deferred:
             raise KeyboardInterrupt

@@ -1,0 +1,135 @@
+"""What the command line's verbs do inside Blender."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import bpy
+
+from .. import register, unregister
+from ..console import Console, summary
+from ..errors import BakeError, SceneError, UsageError
+from ..interrupts import Interrupts
+from ..settings import BakeSettings
+from . import runtime
+
+
+def bake(
+    scene: Path | None,
+    loaded: Path | None,
+    output: Path,
+    settings: BakeSettings,
+    report_copy: Path | None,
+    console: Console,
+    interrupts: Interrupts,
+) -> None:
+    """Bake a scene file, the file that is open, or the bundled Cornell box.
+
+    Parameters
+    ----------
+    scene : Path or None
+        The file to open; None for `loaded`, or else the Cornell box.
+    loaded : Path or None
+        The file the host has open.
+    output : Path
+        Folder for everything.
+    settings : BakeSettings
+    report_copy : Path or None
+        Second copy of the report.
+    console : Console
+    interrupts : Interrupts
+    """
+    with _registered():
+        from .job import WRITING_STAGES, run_bake
+        from .output import BLEND_NAME, FILES, OutputFolder
+
+        source = scene or loaded
+        if source is not None and _same_file(source, output / BLEND_NAME):
+            raise UsageError(f"--output {output} would overwrite the scene '{source}'; choose another folder")
+        if report_copy is not None:
+            _make_folder_of(report_copy)
+        console.progress("open", 0.0)
+        _open(scene, loaded)
+        job = run_bake(bpy.context, settings, OutputFolder(output), with_copy=True)
+        try:
+            while True:
+                try:
+                    progress = next(job)
+                except StopIteration as done:
+                    report = done.value
+                    break
+                interrupts.check()
+                interrupts.deferred = progress.stage in WRITING_STAGES
+                console.progress(progress.stage, progress.fraction)
+        finally:
+            interrupts.deferred = True
+            job.close()
+        if report_copy is not None:
+            report.write(report_copy)
+        console.lines(summary(str(output), FILES, report.as_dict()))
+
+
+def restore(scene: Path | None, loaded: Path | None, output: Path, console: Console) -> None:
+    """Take the bake out of a file and write the result to another.
+
+    Raises
+    ------
+    SceneError
+        If the file shows no bake.
+    """
+    with _registered():
+        from .files import open_scene
+        from .output import save_copy
+        from .restore import restore as restore_file
+
+        if scene is not None:
+            open_scene(scene)
+        elif loaded is None:
+            raise UsageError("restore needs SCENE, a baked .blend")
+        count = restore_file(bpy.context)
+        if not count:
+            raise SceneError(f"'{scene or loaded}' shows no bake; there is nothing to restore")
+        for each in bpy.data.scenes:
+            runtime.forget(each)
+        save_copy(output)
+        console.lines([f"{count} object{'' if count == 1 else 's'} restored, written to {output}"])
+
+
+def _open(scene: Path | None, loaded: Path | None) -> None:
+    """Have the scene to bake as the open file's scene."""
+    from .cornell import build_cornell_box
+    from .files import open_scene
+
+    if scene is not None:
+        open_scene(scene)
+    elif loaded is None:
+        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+        bpy.context.window_manager.windows[0].scene = build_cornell_box()
+
+
+def _make_folder_of(report: Path) -> None:
+    """Make the folder of the report's copy, so that a bake does not end in finding it missing."""
+    try:
+        report.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BakeError(f"--report {report}: the folder cannot be made ({error.strerror})") from error
+
+
+def _same_file(one: Path, other: Path) -> bool:
+    """Whether both name one existing file."""
+    return one.exists() and other.exists() and one.samefile(other)
+
+
+@contextmanager
+def _registered() -> Iterator[None]:
+    """Register the extension for a command, unless the host has done so already."""
+    if hasattr(bpy.types.Scene, "radiosity"):
+        yield
+        return
+    register()
+    try:
+        yield
+    finally:
+        unregister()

@@ -1,0 +1,155 @@
+"""One bake from the open scene to lit materials: what the panel and the command line both run."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator, Iterator
+from contextlib import ExitStack, contextmanager
+
+import bpy
+
+from .. import pipeline
+from ..bake_scene import BakeResult, Progress
+from ..settings import BakeSettings
+from .apply import apply_lightmaps, check_targets
+from .export import export_scene
+from .export_sources import Export
+from .images import set_folder, write_pages
+from .output import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, OutputFolder, save_copy
+from .preview import render_preview
+from .rebake import originals_shown, replacing_earlier
+from .report import BakeReport
+from .restore import restore
+
+BakeJob = Generator[Progress, None, BakeReport]
+
+# How far the whole is when each part begins; rough, from bakes at medium quality.
+SOLVE, APPLY, SAVE, PREVIEW = 0.03, 0.85, 0.89, 0.92
+
+WRITING_STAGES = frozenset({"apply", "save", "preview", "write"})
+"""Stages in which an exception from outside, such as Ctrl-C, would be lost or do harm."""
+
+
+def run_bake(
+    context: bpy.types.Context, settings: BakeSettings, output: OutputFolder | None, with_copy: bool = False
+) -> BakeJob:
+    """Bake the context's scene and show the lightmaps on its objects.
+
+    A generator: each `next` does a piece of the work, so that a window stays alive.
+    Closing it, or an error, leaves the scene and the output folder as they were; an earlier
+    bake stays in place until the new one has succeeded. (Only a failure while the copy or
+    the preview is written comes too late for that: it leaves the originals.)
+
+    Parameters
+    ----------
+    context : Context
+    settings : BakeSettings
+    output : OutputFolder or None
+        None packs the lightmaps into the file and writes nothing.
+    with_copy : bool
+        Write `baked.blend` and `preview.png` into the output folder as well.
+
+    Yields
+    ------
+    progress : Progress
+        The stage that begins or goes on.
+
+    Returns
+    -------
+    report : BakeReport
+
+    Raises
+    ------
+    RadiosityError
+        Whatever cannot be baked or written, in one line.
+    """
+    seconds: dict[str, float] = {}
+    with ExitStack() as stack:
+        if output is not None:
+            # Opened first: a folder that cannot be written is no news for after the work.
+            stack.enter_context(output)
+        yield Progress("export", 0.0)
+        with _timed(seconds, "export"), originals_shown(context):
+            export = export_scene(context, settings)
+            check_targets(context, export)
+        result = yield from _solve(export, settings)
+        seconds.update(result.seconds)
+        yield Progress("apply", APPLY)
+        if with_copy and output is not None:
+            return (yield from _deliver(context, settings, export, result, output, seconds))
+        with replacing_earlier(context), _timed(seconds, "apply"):
+            images = _show(context, settings, export, result, output)
+            report = BakeReport.of(export, result, images, settings, seconds)
+            if output is not None:
+                report.write(output.staging / REPORT_NAME)
+                output.publish()
+    return report
+
+
+def _solve(export: Export, settings: BakeSettings) -> Generator[Progress, None, BakeResult]:
+    """Run the pipeline, its progress scaled to its share of the whole."""
+    baking = pipeline.bake(export.bake_scene, settings)
+    try:
+        while True:
+            try:
+                progress = next(baking)
+            except StopIteration as done:
+                return done.value
+            yield Progress(progress.stage, SOLVE + (APPLY - SOLVE) * progress.fraction)
+    finally:
+        baking.close()
+
+
+def _deliver(
+    context: bpy.types.Context,
+    settings: BakeSettings,
+    export: Export,
+    result: BakeResult,
+    output: OutputFolder,
+    seconds: dict[str, float],
+) -> BakeJob:
+    """Show the lightmaps, save the scene beside them, render it, and publish all at once."""
+    with replacing_earlier(context), _timed(seconds, "apply"):
+        images = _show(context, settings, export, result, output)
+    try:
+        yield Progress("save", SAVE)
+        with _timed(seconds, "save"):
+            save_copy(output.staging / BLEND_NAME)
+        yield Progress("preview", PREVIEW)
+        with _timed(seconds, "preview"):
+            render_preview(context, output.staging / PREVIEW_NAME, settings)
+        report = BakeReport.of(export, result, images, settings, seconds)
+        report.write(output.staging / REPORT_NAME)
+        yield Progress("write", 1.0)
+        output.publish()
+    except BaseException:
+        restore(context)
+        raise
+    return report
+
+
+def _show(
+    context: bpy.types.Context,
+    settings: BakeSettings,
+    export: Export,
+    result: BakeResult,
+    output: OutputFolder | None,
+) -> list[bpy.types.Image]:
+    """Make the images and put them on the objects."""
+    images = write_pages(result, settings, None if output is None else output.staging)
+    try:
+        if output is not None:
+            set_folder(images, output.path)
+        apply_lightmaps(context, export, result, images, settings)
+    except BaseException:
+        bpy.data.batch_remove(images)
+        raise
+    return images
+
+
+@contextmanager
+def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
+    """Add what the block takes to a stage's time."""
+    start = time.perf_counter()
+    yield
+    seconds[stage] = seconds.get(stage, 0.0) + time.perf_counter() - start
