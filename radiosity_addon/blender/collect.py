@@ -1,0 +1,196 @@
+"""Collect what an evaluated scene holds into plain records, while the evaluation lives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ..bake_scene import LIGHTMAP_UV_LAYER, BakeWarning
+from ..errors import SceneError
+from ..solver.lights import Light
+from .export_sources import ExportSource
+from .lamps import read_lamp
+from .materials import DEFAULT_GREY, Surface, read_material
+from .mesh_arrays import MeshArrays, read_mesh
+from .scene_objects import is_generated, materials_of, matrix_of, original_object, source_of, visible_objects
+from .world import read_world
+
+
+@dataclass(frozen=True)
+class Piece:
+    """One mesh at one place.
+
+    Parameters
+    ----------
+    source : ExportSource
+    mesh : MeshArrays
+    matrix : (4, 4) float64
+    surface : (t,) int32
+        Rows of `Collected.surfaces`.
+    bakeable : bool
+        A lightmap can be assigned to it: it is a mesh and can be edited.
+    linked : bool
+        It would be bakeable, were it not linked from a library.
+    uv_layers : int
+        The UV layers of the mesh that would get another.
+    has_lightmap_layer : bool
+    """
+
+    source: ExportSource
+    mesh: MeshArrays
+    matrix: np.ndarray
+    surface: np.ndarray
+    bakeable: bool
+    linked: bool
+    uv_layers: int
+    has_lightmap_layer: bool
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names by which a user may ask for it."""
+        return tuple(filter(None, (self.source.name, self.source.object_name, self.source.instancer)))
+
+
+@dataclass(frozen=True)
+class Collected:
+    """All that was found. `surfaces` is indexed by `Piece.surface`."""
+
+    pieces: list[Piece]
+    surfaces: list[Surface]
+    lights: list[Light]
+    warnings: list[BakeWarning]
+
+
+def collect(depsgraph: bpy.types.Depsgraph) -> Collected:
+    """Read meshes, materials, lamps and world of an evaluated scene.
+
+    Raises
+    ------
+    SceneError
+        If a coordinate is NaN or infinite.
+    """
+    collector = _Collector(depsgraph)
+    for instance in visible_objects(depsgraph):
+        if instance.object.type == "LIGHT":
+            collector.lamp(instance)
+        else:
+            collector.mesh(instance)
+    collector.world(depsgraph.scene_eval.world)
+    return collector.collected
+
+
+class _Collector:
+    def __init__(self, depsgraph: bpy.types.Depsgraph) -> None:
+        self.collected = Collected([], [], [], [])
+        self._override = depsgraph.view_layer_eval.material_override
+        self._meshes: dict[int, MeshArrays | None] = {}
+        self._surface_of: dict[str | None, int] = {}
+        self._taken = {obj.name for obj in bpy.data.objects if obj.library is None}
+        self._instancers = {
+            instance.parent.original.name
+            for instance in visible_objects(depsgraph)
+            if instance.is_instance and instance.object.type == "MESH"
+        }
+
+    def lamp(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
+        light, warnings = read_lamp(instance.object, matrix_of(instance))
+        self._warn(warnings)
+        if light is not None:
+            self.collected.lights.append(light)
+
+    def world(self, world: bpy.types.World | None) -> None:
+        light, warnings = read_world(world)
+        self._warn(warnings)
+        if light is not None:
+            self.collected.lights.append(light)
+
+    def mesh(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
+        shown = original_object(instance)
+        matrix = matrix_of(instance)
+        mesh = self._read(instance)
+        if mesh is None or not np.isfinite(matrix).all():
+            raise SceneError(f"object '{shown.name}' has NaN or infinite coordinates; mend its mesh or transform")
+        if len(mesh) == 0:
+            return
+        name = self._unique_name(instance)
+        source = source_of(instance, name, not instance.is_instance and shown.name in self._instancers)
+        owner = instance.parent.original if instance.is_instance else shown
+        is_mesh = shown.type == "MESH"
+        layers = {layer.name for layer in shown.data.uv_layers} if is_mesh and not instance.is_instance else set()
+        self._warn_about(shown, owner, is_mesh)
+        self.collected.pieces.append(
+            Piece(
+                source=source,
+                mesh=mesh,
+                matrix=matrix,
+                surface=self._surfaces(instance, name, mesh),
+                bakeable=is_mesh and owner.library is None,
+                linked=is_mesh and owner.library is not None,
+                uv_layers=max(mesh.uv_layers, len(layers)),
+                has_lightmap_layer=mesh.lightmap_uv is not None or LIGHTMAP_UV_LAYER in layers,
+            )
+        )
+
+    def _read(self, instance: bpy.types.DepsgraphObjectInstance) -> MeshArrays | None:
+        obj = instance.object
+        key = obj.data.as_pointer()
+        if key not in self._meshes:
+            if is_generated(instance):
+                self._meshes[key] = read_mesh(obj.data)
+            else:
+                # Not `obj.data`: a window's subdivision may still be pending on the GPU.
+                self._meshes[key] = read_mesh(obj.to_mesh())
+                obj.to_mesh_clear()
+        return self._meshes[key]
+
+    def _unique_name(self, instance: bpy.types.DepsgraphObjectInstance) -> str:
+        shown = original_object(instance)
+        if not instance.is_instance and shown.library is None:
+            return shown.name
+        base = f"{instance.parent.original.name}/{shown.name}" if instance.is_instance else shown.name
+        name, count = base, 0
+        while name in self._taken:
+            count += 1
+            name = f"{base}.{count:03d}"
+        self._taken.add(name)
+        return name
+
+    def _surfaces(self, instance: bpy.types.DepsgraphObjectInstance, name: str, mesh: MeshArrays) -> np.ndarray:
+        """Return the row of `collected.surfaces` for each triangle, (t,) int32."""
+        if self._override is not None:
+            return np.full(len(mesh), self._surface(self._override), dtype=np.int32)
+        materials = materials_of(instance)
+        if any(material is None for material in materials):
+            self._warn([BakeWarning(name, f"object '{name}': an empty material slot; grey {DEFAULT_GREY} is used")])
+        rows = np.array([self._surface(material) for material in materials or [None]], dtype=np.int32)
+        # A face whose slot does not exist shows the last one, as in Blender.
+        return rows[np.clip(mesh.material, 0, len(rows) - 1)]
+
+    def _surface(self, material: bpy.types.Material | None) -> int:
+        key = None if material is None else material.original.name_full
+        if key not in self._surface_of:
+            surface = read_material(material)
+            self._warn(surface.warnings)
+            self._surface_of[key] = len(self.collected.surfaces)
+            self.collected.surfaces.append(surface)
+        return self._surface_of[key]
+
+    def _warn_about(self, shown: bpy.types.Object, owner: bpy.types.Object, is_mesh: bool) -> None:
+        if not is_mesh:
+            self._warn([_unlit(shown.name, "is not a mesh", "convert it to one")])
+        elif owner.library is not None:
+            self._warn([_unlit(owner.name, "is linked from a library", "make it local or a library override")])
+        for kind in ("shadow", "diffuse"):
+            if not getattr(shown, f"visible_{kind}"):
+                message = f"object '{shown.name}': 'Ray Visibility: {kind.title()}' off is ignored: it lights and blocks"
+                self._warn([BakeWarning(shown.name, message)])
+
+    def _warn(self, warnings: Sequence[BakeWarning]) -> None:
+        self.collected.warnings.extend(warnings)
+
+
+def _unlit(name: str, why: str, mend: str) -> BakeWarning:
+    return BakeWarning(name, f"object '{name}' {why}: it lights and blocks but gets no lightmap; {mend} to bake it")

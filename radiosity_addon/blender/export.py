@@ -1,0 +1,177 @@
+"""The scene as arrays: what a bake needs of the open file, and where it came from."""
+
+from __future__ import annotations
+
+import difflib
+
+import bpy
+import numpy as np
+
+from ..bake_scene import BakeObject, BakeScene, BakeWarning
+from ..errors import SceneError, UsageError
+from ..settings import BakeSettings
+from ..solver.lights import EnvironmentLight
+from ..solver.scene import Scene
+from .collect import Collected, Piece, collect
+from .export_sources import Export
+from .mesh_arrays import degenerate, world_from_object
+from .render_state import leave_edit_mode, render_depsgraph
+
+MAX_UV_LAYERS = 8
+
+
+def export_scene(context: bpy.types.Context, settings: BakeSettings) -> Export:
+    """Read the context's view layer as a render would see it.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+        Of a scene without lightmaps: restore an earlier bake first.
+    settings : BakeSettings
+        `objects`, `sky` and `keep_uvs` matter here.
+
+    Returns
+    -------
+    Export
+
+    Raises
+    ------
+    UsageError
+        If `settings.objects` names what is not there or cannot have a lightmap.
+    SceneError
+        If there is nothing to bake, a coordinate is NaN or infinite, or an object to be
+        baked has no room for another UV layer.
+    """
+    leave_edit_mode(context)
+    with render_depsgraph(context) as depsgraph:
+        collected = collect(depsgraph)
+    chosen = _chosen(context, collected.pieces, settings.objects)
+    for piece in chosen:
+        _check_uv_layers(piece)
+    return _assemble(context, collected, {piece.source.name for piece in chosen}, settings)
+
+
+def _assemble(context: bpy.types.Context, collected: Collected, chosen: set[str], settings: BakeSettings) -> Export:
+    warnings = list(collected.warnings)
+    reflectance = np.array([surface.reflectance for surface in collected.surfaces]).reshape(-1, 3)
+    emission = np.array([surface.emission for surface in collected.surfaces]).reshape(-1, 3)
+    objects, corners, normals, surfaces = [], [], [], []
+    first, area_to_bake = 0, False
+    for piece in collected.pieces:
+        mesh = piece.mesh
+        world, world_normals, mirrored = world_from_object(mesh, piece.matrix)
+        if not np.isfinite(world).all():
+            raise SceneError(_not_finite(piece.source.object_name))
+        flat = degenerate(world)
+        if flat.any():
+            warnings.append(_degenerate_warning(piece.source.name, int(flat.sum())))
+        bake = piece.source.name in chosen
+        area_to_bake |= bake and not flat.all()
+        order = slice(None, None, -1 if mirrored else 1)
+        keep = settings.keep_uvs and mesh.lightmap_uv is not None
+        objects.append(
+            BakeObject(
+                name=piece.source.name,
+                first=first,
+                count=len(mesh),
+                bake=bake,
+                polygon=mesh.polygon,
+                loops=np.ascontiguousarray(mesh.loops[:, order]),
+                uv=np.ascontiguousarray(mesh.lightmap_uv[:, order]) if keep else None,
+            )
+        )
+        corners.append(world)
+        normals.append(world_normals)
+        surfaces.append(piece.surface)
+        first += len(mesh)
+    if not area_to_bake:
+        raise SceneError(_nothing_to_bake(context))
+
+    surface = np.concatenate(surfaces)
+    lights = list(collected.lights)
+    if not lights and not emission[surface].any():
+        if settings.sky:
+            lights.append(EnvironmentLight(1.0))
+        else:
+            warnings.append(_no_light(context))
+    scene = Scene(
+        triangles=np.concatenate(corners),
+        reflectance=reflectance[surface],
+        emission=emission[surface],
+        two_sided=True,  # Blender's surfaces reflect and emit on both sides
+        lights=lights,
+        normals=np.concatenate(normals),
+    )
+    return Export(
+        BakeScene(scene, tuple(objects), tuple(dict.fromkeys(warnings))),
+        tuple(piece.source for piece in collected.pieces),
+    )
+
+
+def _chosen(context: bpy.types.Context, pieces: list[Piece], names: tuple[str, ...] | None) -> list[Piece]:
+    """Return the pieces that get a lightmap."""
+    if names is None:
+        bakeable = [piece for piece in pieces if piece.bakeable]
+        if not bakeable:
+            linked = [piece for piece in pieces if piece.linked]
+            raise SceneError(_linked(linked[0]) if linked else _nothing_to_bake(context))
+        return bakeable
+    chosen: list[Piece] = []
+    for name in names:
+        named = [piece for piece in pieces if name in piece.names]
+        bakeable = [piece for piece in named if piece.bakeable]
+        if not bakeable:
+            linked = [piece for piece in named if piece.linked]
+            if linked:
+                raise SceneError(_linked(linked[0]))
+            raise UsageError(_unknown(context, pieces, name))
+        chosen += bakeable
+    return chosen
+
+
+def _unknown(context: bpy.types.Context, pieces: list[Piece], name: str) -> str:
+    """Say why `name` cannot be baked."""
+    obj = context.scene.objects.get(name)
+    if obj is None:
+        known = sorted({known for piece in pieces if piece.bakeable for known in piece.names})
+        close = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
+        hint = " or ".join(f"'{match}'" for match in close)
+        return f"no object '{name}' to bake" + (f"; did you mean {hint}?" if close else " in this scene")
+    if obj.type != "MESH":
+        return f"object '{name}' is not a mesh but {obj.type.lower()}; only meshes get lightmaps"
+    if not any(name in piece.names for piece in pieces) and len(obj.data.polygons) > 0:
+        return f"object '{name}' is hidden from render; show it there to bake it"
+    return f"object '{name}' has no faces to bake"
+
+
+def _check_uv_layers(piece: Piece) -> None:
+    if not piece.has_lightmap_layer and piece.uv_layers >= MAX_UV_LAYERS:
+        raise SceneError(
+            f"object '{piece.source.object_name}' already has {piece.uv_layers} UV layers; "
+            "remove one to make room for the lightmap's"
+        )
+
+
+def _degenerate_warning(name: str, count: int) -> BakeWarning:
+    which = "a triangle" if count == 1 else f"{count} triangles"
+    return BakeWarning(name, f"object '{name}': {which} without area; no light falls there")
+
+
+def _no_light(context: bpy.types.Context) -> BakeWarning:
+    name = context.scene.name
+    return BakeWarning(name, f"scene '{name}' has no light at all: the lightmaps are black; add a lamp or the sky")
+
+
+def _nothing_to_bake(context: bpy.types.Context) -> str:
+    return f"scene '{context.scene.name}' has nothing to bake: no mesh with faces is visible in renders"
+
+
+def _not_finite(name: str) -> str:
+    return f"object '{name}' has NaN or infinite coordinates; mend its mesh or transform"
+
+
+def _linked(piece: Piece) -> str:
+    return (
+        f"object '{piece.source.object_name}' is linked from {piece.source.library or 'a library'}; "
+        "make it local or a library override to bake it"
+    )

@@ -1,0 +1,61 @@
+"""Mean colours of images, in linear scene colours."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+_ENCODED = ("sRGB", "AgX Base sRGB", "Filmic sRGB")
+_BAND_ROWS = 256  # rows decoded at a time: bounds the temporaries of a large image
+
+
+def image_mean(image: bpy.types.Image, equirectangular: bool = False) -> np.ndarray | None:
+    """Return the mean of an image's pixels, colours made linear first.
+
+    Parameters
+    ----------
+    image : bpy.types.Image
+    equirectangular : bool
+        Weight each row by the solid angle it covers on the sphere.
+
+    Returns
+    -------
+    (4,) float64, linear RGB and alpha, not weighted by alpha; None for an image without pixels.
+    """
+    width, height = image.size
+    if width == 0 or height == 0 or image.channels == 0:
+        return None
+    flat = np.empty(width * height * image.channels, dtype=np.float32)
+    try:
+        image.pixels.foreach_get(flat)
+    except (RuntimeError, TypeError):  # a file that Blender names but cannot decode
+        return None
+    rows = flat.reshape(height, width, image.channels)
+    # Only byte images hold encoded values; float buffers are linear in memory.
+    encoded = not image.is_float and image.colorspace_settings.name in _ENCODED
+    weights = _row_weights(height, equirectangular)
+    mean = np.zeros(image.channels)
+    for start in range(0, height, _BAND_ROWS):
+        band = rows[start : start + _BAND_ROWS].astype(np.float64)
+        if encoded:
+            band[..., :3] = linear_from_srgb(band[..., :3])
+        mean += weights[start : start + _BAND_ROWS] @ band.mean(axis=1)
+    return _as_rgba(np.nan_to_num(mean, posinf=0.0, neginf=0.0))
+
+
+def linear_from_srgb(values: np.ndarray) -> np.ndarray:
+    """Decode sRGB values of any shape (IEC 61966-2-1)."""
+    return np.where(values <= 0.04045, values / 12.92, ((np.maximum(values, 0.0) + 0.055) / 1.055) ** 2.4)
+
+
+def _row_weights(height: int, equirectangular: bool) -> np.ndarray:
+    if not equirectangular:
+        return np.full(height, 1.0 / height)
+    sine = np.sin((np.arange(height) + 0.5) / height * np.pi)
+    return sine / sine.sum()
+
+
+def _as_rgba(mean: np.ndarray) -> np.ndarray:
+    if len(mean) < 3:
+        return np.array([mean[0], mean[0], mean[0], mean[1] if len(mean) == 2 else 1.0])
+    return mean if len(mean) == 4 else np.append(mean, 1.0)

@@ -1,0 +1,153 @@
+"""Blender lamps as the solver's lights, in the units Cycles renders them with."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+import numpy as np
+
+from ..bake_scene import BakeWarning
+from ..errors import SceneError
+from ..solver.lights import AreaLight, Light, PointLight, SpotLight, SunLight
+from .materials import read_radiance, uses_nodes
+
+_SAME_SCALE = 1e-4  # relative difference of axes below which a scale counts as uniform
+
+
+def read_lamp(lamp: bpy.types.Object, matrix_world: np.ndarray) -> tuple[Light | None, tuple[BakeWarning, ...]]:
+    """Return the light that a lamp object, or an instance of one, is.
+
+    Parameters
+    ----------
+    lamp : bpy.types.Object of type LIGHT, evaluated
+    matrix_world : (4, 4) float64
+
+    Returns
+    -------
+    light : Light or None
+        None where it gives no light.
+    warnings : tuple of BakeWarning
+
+    Raises
+    ------
+    SceneError
+        If its position or power is NaN or infinite.
+    """
+    data = lamp.data
+    name = lamp.name
+    if _is_portal(data):
+        return None, ()
+    warnings = _not_understood(lamp)
+    strength, notes = _strength(name, data)
+    warnings += notes
+    if not (np.isfinite(matrix_world).all() and np.isfinite(strength).all()):
+        raise SceneError(f"lamp '{name}' has a NaN or infinite position or power; mend its transform and strength")
+    if (strength < 0).any():
+        warnings.append(BakeWarning(name, f"lamp '{name}': negative power is not possible; 0 is used"))
+        strength = np.maximum(strength, 0.0)
+    light, notes = _MAKE[data.type](name, data, matrix_world, strength)
+    return (light if strength.any() else None), tuple(warnings + notes)
+
+
+def _strength(name: str, data: bpy.types.Light) -> tuple[np.ndarray, list[BakeWarning]]:
+    """Return energy × colour of all that scales it, (3,) RGB [W, or W/m² of a sun]."""
+    strength = data.energy * np.array(data.color[:3], dtype=np.float64)
+    if getattr(data, "use_temperature", False):
+        strength = strength * np.array(data.temperature_color[:3], dtype=np.float64)
+    strength = strength * 2.0 ** getattr(data, "exposure", 0.0)
+    if not uses_nodes(data):
+        return strength, []
+    factor, warnings = read_radiance(data, "lamp")
+    return strength * factor, [BakeWarning(name, warning.message) for warning in warnings]
+
+
+def _point(name: str, data: bpy.types.Light, matrix: np.ndarray, strength: np.ndarray) -> tuple[Light, list[BakeWarning]]:
+    # The object's scale does not act on the radius (measured in Cycles 4.2 and 5.0).
+    radius = data.shadow_soft_size
+    return PointLight(
+        matrix[:3, 3], strength * _sphere_area(data), radius=radius, soft_falloff=data.use_soft_falloff
+    ), []
+
+
+def _spot(name: str, data: bpy.types.Light, matrix: np.ndarray, strength: np.ndarray) -> tuple[Light, list[BakeWarning]]:
+    scale = np.linalg.norm(matrix[:3, :3], axis=0)
+    angle, warnings = data.spot_size, []
+    if scale.min() > 0 and np.ptp(scale) > _SAME_SCALE * scale.max() and angle < math.pi:
+        # Cycles tests the cone in the lamp's own space, so a scale across it widens it.
+        stretch = math.sqrt(scale[0] * scale[1]) / scale[2]
+        angle = 2.0 * math.atan(math.tan(angle / 2.0) * stretch)
+        warnings.append(
+            BakeWarning(name, f"lamp '{name}': scaled unevenly; a round cone of {math.degrees(angle):.3g}° is used")
+        )
+    return SpotLight(
+        matrix[:3, 3],
+        _backward(matrix),
+        strength * _sphere_area(data),
+        angle,
+        blend=data.spot_blend,
+        radius=data.shadow_soft_size,
+        soft_falloff=data.use_soft_falloff,
+    ), warnings
+
+
+def _sun(name: str, data: bpy.types.Light, matrix: np.ndarray, strength: np.ndarray) -> tuple[Light, list[BakeWarning]]:
+    if not getattr(data, "normalize", True):
+        strength = strength * math.pi * math.sin(data.angle / 2.0) ** 2  # its projected solid angle
+    return SunLight(_backward(matrix), strength, angle=data.angle), []
+
+
+def _area(name: str, data: bpy.types.Light, matrix: np.ndarray, strength: np.ndarray) -> tuple[Light, list[BakeWarning]]:
+    # Power stays the same when the object is scaled, the emitting surface does not.
+    size_y = data.size_y if data.shape in ("RECTANGLE", "ELLIPSE") else data.size
+    edge_u = matrix[:3, 0] * data.size
+    edge_v = matrix[:3, 1] * size_y
+    if np.cross(edge_u, edge_v) @ _backward(matrix) < 0:
+        edge_v = -edge_v  # emits along the object's -Z, mirrored or not
+    shape = "ellipse" if data.shape in ("DISK", "ELLIPSE") else "rectangle"
+    area = float(np.linalg.norm(np.cross(edge_u, edge_v))) * (math.pi / 4 if shape == "ellipse" else 1.0)
+    if area == 0.0:
+        if not strength.any():
+            return AreaLight(matrix[:3, 3], edge_u, edge_v, strength, shape=shape), []
+        raise SceneError(f"lamp '{name}' has no area; give it a size and a scale above 0")
+    if not getattr(data, "normalize", True):
+        strength = strength * area
+    return AreaLight(matrix[:3, 3], edge_u, edge_v, strength, shape=shape), []
+
+
+def _backward(matrix: np.ndarray) -> np.ndarray:
+    """Return the unit direction a lamp points in: its object's -Z axis."""
+    axis = -matrix[:3, 2]
+    length = float(np.linalg.norm(axis))
+    return axis / length if length > 0 else np.array([0.0, 0.0, -1.0])
+
+
+def _sphere_area(data: bpy.types.Light) -> float:
+    """Return what an unnormalised point or spot lamp's power is multiplied by (measured)."""
+    if getattr(data, "normalize", True):
+        return 1.0
+    return 4.0 * math.pi * data.shadow_soft_size**2
+
+
+def _is_portal(data: bpy.types.Light) -> bool:
+    return data.type == "AREA" and bool(getattr(getattr(data, "cycles", None), "is_portal", False))
+
+
+def _not_understood(lamp: bpy.types.Object) -> list[BakeWarning]:
+    data = lamp.data
+    messages = []
+    if not data.use_shadow:
+        messages.append("'Cast Shadow' off is ignored: it casts shadows")
+    if data.type == "AREA" and data.spread < math.pi - 1e-4:
+        messages.append(f"a spread of {math.degrees(data.spread):.3g}° is ignored; 180° is used")
+    if data.type == "SPOT" and data.use_square:
+        messages.append("the square cone is ignored; a round one is used")
+    linking = getattr(lamp, "light_linking", None)
+    if linking and (linking.receiver_collection or linking.blocker_collection):
+        messages.append("light linking is ignored: it lights everything")
+    if not lamp.visible_diffuse:
+        messages.append("'Ray Visibility: Diffuse' off is ignored: it lights everything")
+    return [BakeWarning(lamp.name, f"lamp '{lamp.name}': {message}") for message in messages]
+
+
+_MAKE = {"POINT": _point, "SPOT": _spot, "SUN": _sun, "AREA": _area}

@@ -1,0 +1,139 @@
+"""Blender meshes as arrays: triangles, their corners and what they belong to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ..bake_scene import LIGHTMAP_UV_LAYER
+
+
+@dataclass(frozen=True)
+class MeshArrays:
+    """A mesh, triangulated, in its own space.
+
+    Parameters
+    ----------
+    corners : (t, 3, 3) float64
+        Positions of the triangles' corners.
+    normals : (t, 3, 3) float64
+        Shading normals there.
+    loops : (t, 3) int32
+        The mesh corners (loops) they are.
+    polygon : (t,) int32
+        The polygon each triangle is part of.
+    material : (t,) int32
+        The slot of each triangle's polygon.
+    lightmap_uv : (t, 3, 2) float32 or None
+        The UVs of the layer `Lightmap`, where there is one.
+    uv_layers : int
+    """
+
+    corners: np.ndarray
+    normals: np.ndarray
+    loops: np.ndarray
+    polygon: np.ndarray
+    material: np.ndarray
+    lightmap_uv: np.ndarray | None
+    uv_layers: int
+
+    def __len__(self) -> int:
+        return len(self.corners)
+
+
+def read_mesh(mesh: bpy.types.Mesh) -> MeshArrays | None:
+    """Return a mesh's triangles; None if a vertex is NaN or infinite.
+
+    Loose vertices and edges are left out: they neither reflect nor block.
+    """
+    positions = _read(mesh.vertices, "co", (len(mesh.vertices), 3), np.float32)
+    if not np.isfinite(positions).all():
+        return None
+    mesh.calc_loop_triangles()
+    count = len(mesh.loop_triangles)
+    loops = _read(mesh.loop_triangles, "loops", (count, 3), np.int32)
+    polygon = _read(mesh.loop_triangles, "polygon_index", (count,), np.int32)
+    vertex = _read(mesh.loops, "vertex_index", (len(mesh.loops),), np.int32)
+    material = _read(mesh.polygons, "material_index", (len(mesh.polygons),), np.int32)
+    normals = _read(mesh.corner_normals, "vector", (len(mesh.loops), 3), np.float32)
+    layer = mesh.uv_layers.get(LIGHTMAP_UV_LAYER)
+    uv = None
+    if layer is not None:
+        uv = _read(layer.uv, "vector", (len(mesh.loops), 2), np.float32)[loops]
+    return MeshArrays(
+        positions[vertex[loops]].astype(np.float64),
+        normals[loops].astype(np.float64),
+        loops,
+        polygon,
+        material[polygon],
+        uv,
+        len(mesh.uv_layers),
+    )
+
+
+def same_polygons(first: bpy.types.Mesh, second: bpy.types.Mesh) -> bool:
+    """Tell whether two meshes have the same polygons over the same vertices, corner by corner."""
+    sizes = [(len(mesh.vertices), len(mesh.polygons), len(mesh.loops)) for mesh in (first, second)]
+    if sizes[0] != sizes[1]:
+        return False
+    for collection, attribute in (("polygons", "loop_start"), ("loops", "vertex_index")):
+        a, b = (getattr(mesh, collection) for mesh in (first, second))
+        if not np.array_equal(*(_read(values, attribute, (len(values),), np.int32) for values in (a, b))):
+            return False
+    return True
+
+
+def world_from_object(mesh: MeshArrays, matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Carry a mesh's triangles into world space.
+
+    A mirroring matrix turns counter-clockwise triangles clockwise; Blender swaps them
+    back, so that the side its normals show stays the front.
+
+    Parameters
+    ----------
+    mesh : MeshArrays
+    matrix : (4, 4) float64
+
+    Returns
+    -------
+    corners : (t, 3, 3) float64
+    normals : (t, 3, 3) float64, unit
+        In the corners' order. A normal that vanishes becomes the face's, or 0.
+    mirrored : bool
+        Whether the order of the corners was reversed: index what belongs to them
+        with [:, ::-1].
+    """
+    linear = matrix[:3, :3]
+    corners = mesh.corners @ linear.T + matrix[:3, 3]
+    mirrored = bool(np.linalg.det(linear) < 0)
+    # The cofactor matrix is det · inverse-transpose, and exists for flattening ones too.
+    cofactors = np.array([np.cross(linear[1], linear[2]), np.cross(linear[2], linear[0]), np.cross(linear[0], linear[1])])
+    normals = mesh.normals @ (-cofactors if mirrored else cofactors).T
+    if mirrored:
+        corners, normals = corners[:, ::-1], normals[:, ::-1]
+    return corners, _unit_normals(normals, corners), mirrored
+
+
+def degenerate(corners: np.ndarray) -> np.ndarray:
+    """Tell which triangles (t, 3, 3) have no area, within the rounding of single precision: (t,) bool."""
+    edges = corners - np.roll(corners, 1, axis=1)
+    longest = np.einsum("tci,tci->tc", edges, edges).max(axis=1, initial=0.0)
+    double_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+    return double_area <= 1e-7 * longest
+
+
+def _unit_normals(normals: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, None, :]
+    length = np.linalg.norm(normals, axis=2, keepdims=True)
+    vanished = ~(length > 0)
+    normals = np.where(vanished, faces, normals)
+    length = np.linalg.norm(normals, axis=2, keepdims=True)
+    return normals / np.where(length > 0, length, 1.0)
+
+
+def _read(collection: bpy.types.bpy_prop_collection, attribute: str, shape: tuple[int, ...], kind: type) -> np.ndarray:
+    values = np.empty(int(np.prod(shape)), dtype=kind)
+    collection.foreach_get(attribute, values)
+    return values.reshape(shape)

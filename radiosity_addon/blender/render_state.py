@@ -1,0 +1,120 @@
+"""See the scene as a render would, through the viewport's dependency graph.
+
+Python can only reach the graph that the viewport evaluates: objects hidden there are not
+in it, and modifiers run at viewport levels. A graph in render mode exists only inside a
+render engine. So whatever has a viewport and a render setting is switched to the render's
+for a moment, and put back after.
+
+What this does not see: the *Is Viewport* node of geometry nodes, and settings that an
+action or a driver animates, which win over what is switched here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import bpy
+
+_MODIFIER_PAIRS = {  # modifier type → (viewport attribute, render attribute)
+    "SUBSURF": ("levels", "render_levels"),
+    "MULTIRES": ("levels", "render_levels"),
+    "SCREW": ("steps", "render_steps"),
+    "OCEAN": ("viewport_resolution", "resolution"),
+}
+_SIMPLIFY_PAIRS = (
+    ("simplify_subdivision", "simplify_subdivision_render"),
+    ("simplify_child_particles", "simplify_child_particles_render"),
+)
+
+
+def leave_edit_mode(context: bpy.types.Context) -> None:
+    """Flush every mesh in edit mode: its edits are not in the mesh before it is left."""
+    editing = [obj for obj in context.view_layer.objects if obj.mode == "EDIT"]
+    if editing and bpy.ops.object.mode_set.poll():
+        bpy.ops.object.mode_set(mode="OBJECT")
+    for obj in editing:
+        if obj.mode == "EDIT":
+            obj.update_from_editmode()
+
+
+@contextmanager
+def render_depsgraph(context: bpy.types.Context) -> Iterator[bpy.types.Depsgraph]:
+    """Evaluate the context's view layer as a render would; the scene is put back after.
+
+    Yields the evaluated dependency graph, valid inside the `with` block only.
+    """
+    layer = context.view_layer
+    selected = [obj for obj in layer.objects if obj.select_get()]
+    active = layer.objects.active
+    changes = _Changes()
+    hidden = [obj for obj in layer.objects if obj.hide_get()]
+    try:
+        for obj in hidden:
+            obj.hide_set(False)
+        _switch_visibility(layer, changes)
+        _switch_levels(context.scene, changes)
+        layer.update()
+        yield context.evaluated_depsgraph_get()
+    finally:
+        changes.undo()
+        layer.update()
+        for obj in hidden:
+            obj.hide_set(True)
+        # Hiding an object deselects it, so this comes last.
+        layer.objects.active = active
+        for obj in selected:
+            obj.select_set(True)
+
+
+class _Changes:
+    """Attributes that were switched, and what they were."""
+
+    def __init__(self) -> None:
+        self._before: list[tuple[Any, str, Any]] = []
+
+    def set(self, owner: Any, attribute: str, value: Any) -> None:
+        before = getattr(owner, attribute)
+        if before != value:
+            self._before.append((owner, attribute, before))
+            setattr(owner, attribute, value)
+
+    def undo(self) -> None:
+        for owner, attribute, before in reversed(self._before):
+            setattr(owner, attribute, before)
+
+
+def _switch_visibility(layer: bpy.types.ViewLayer, changes: _Changes) -> None:
+    for obj in bpy.data.objects:
+        changes.set(obj, "hide_viewport", obj.hide_render)
+        changes.set(obj, "show_instancer_for_viewport", obj.show_instancer_for_render)
+    for collection in bpy.data.collections:
+        changes.set(collection, "hide_viewport", collection.hide_render)
+    for child in _layer_collections(layer.layer_collection):
+        changes.set(child, "hide_viewport", False)
+
+
+def _layer_collections(root: bpy.types.LayerCollection) -> Iterator[bpy.types.LayerCollection]:
+    for child in root.children:
+        yield child
+        yield from _layer_collections(child)
+
+
+def _switch_levels(scene: bpy.types.Scene, changes: _Changes) -> None:
+    for obj in bpy.data.objects:
+        for modifier in obj.modifiers:
+            changes.set(modifier, "show_viewport", modifier.show_render)
+            if modifier.type in _MODIFIER_PAIRS:
+                viewport, render = _MODIFIER_PAIRS[modifier.type]
+                changes.set(modifier, viewport, getattr(modifier, render))
+    for curve in bpy.data.curves:
+        for axis in "uv":
+            if getattr(curve, f"render_resolution_{axis}") > 0:  # 0: the viewport's
+                changes.set(curve, f"resolution_{axis}", getattr(curve, f"render_resolution_{axis}"))
+    for metaball in bpy.data.metaballs:
+        changes.set(metaball, "resolution", metaball.render_resolution)
+    for particles in bpy.data.particles:
+        changes.set(particles, "display_percentage", 100)
+    for viewport, render in _SIMPLIFY_PAIRS if scene.render.use_simplify else ():
+        changes.set(scene.render, viewport, getattr(scene.render, render))

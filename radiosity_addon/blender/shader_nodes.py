@@ -1,0 +1,205 @@
+"""Walk shader node trees: from a socket to the node or the constant that feeds it.
+
+Reroutes, muted nodes and links, and node groups at any depth are seen through. Values
+are constants only: what varies over the surface is replaced by its mean (images) or
+refused (`NotConstant`), and the caller falls back on the socket's own default.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+
+from .image_values import image_mean
+
+Stack = tuple[bpy.types.Node, ...]
+"""The group nodes a walk has entered, outermost first."""
+
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+_MAX_STEPS = 1000  # a tree with an invalid cycle must not hang us
+
+
+class NotConstant(Exception):
+    """What feeds a socket varies over the surface; the message names it."""
+
+
+@dataclass(frozen=True)
+class Feed:
+    """What feeds a socket: a node's output, or (node None) the default of `socket`."""
+
+    node: bpy.types.Node | None
+    socket: bpy.types.NodeSocket
+    stack: Stack
+
+
+@dataclass(frozen=True)
+class Value:
+    """A constant a socket comes to.
+
+    Parameters
+    ----------
+    rgb : (3,) float64
+    notes : tuple of str
+        The textures whose means went into it, as the user knows them.
+    """
+
+    rgb: np.ndarray
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def scalar(self) -> float:
+        """The value as Cycles turns a colour into a float: its luminance."""
+        return float(self.rgb @ _LUMINANCE)
+
+
+def feed_of(socket: bpy.types.NodeSocket, stack: Stack = ()) -> Feed:
+    """Follow an input socket to the node that computes it, or to the constant it ends at."""
+    for _ in range(_MAX_STEPS):
+        links = [link for link in socket.links if link.is_valid and not link.is_muted]
+        if not links:
+            return Feed(None, socket, stack)
+        node, output = links[0].from_node, links[0].from_socket
+        if node.mute:
+            inner = [link.from_socket for link in node.internal_links if link.to_socket == output]
+            if not inner:
+                return Feed(None, socket, stack)
+            socket = inner[0]
+        elif node.type == "REROUTE":
+            socket = node.inputs[0]
+        elif node.type == "GROUP" and node.node_tree is not None:
+            inside = _group_output(node.node_tree, output.identifier)
+            if inside is None:
+                return Feed(None, socket, stack)
+            socket, stack = inside, (*stack, node)
+        elif node.type == "GROUP_INPUT" and stack:
+            outside = _by_identifier(stack[-1].inputs, output.identifier)
+            if outside is None:
+                return Feed(None, socket, stack)
+            socket, stack = outside, stack[:-1]
+        else:
+            return Feed(node, output, stack)
+    return Feed(None, socket, stack)
+
+
+def evaluate(socket: bpy.types.NodeSocket, stack: Stack = ()) -> Value:
+    """Compute the constant an input socket comes to.
+
+    Raises
+    ------
+    NotConstant
+        If a node on the way is not understood.
+    """
+    feed = feed_of(socket, stack)
+    if feed.node is None:
+        return Value(default_rgb(feed.socket))
+    compute = _COMPUTE.get(feed.node.type)
+    if compute is None:
+        raise NotConstant(f"node '{feed.node.bl_label}'")
+    return compute(feed)
+
+
+def default_rgb(socket: bpy.types.NodeSocket) -> np.ndarray:
+    """Return a socket's own value as (3,) float64; zero for one without a value."""
+    value = getattr(socket, "default_value", 0.0)
+    if isinstance(value, (int, float)):
+        return np.full(3, float(value))
+    return np.array([float(component) for component in value[:3]])
+
+
+def output_node(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
+    """Return the output that Cycles would render: its own, or the one for all engines."""
+    return tree.get_output_node("CYCLES") or tree.get_output_node("ALL")
+
+
+def _group_output(tree: bpy.types.NodeTree, identifier: str) -> bpy.types.NodeSocket | None:
+    outputs = [node for node in tree.nodes if node.type == "GROUP_OUTPUT"]
+    active = [node for node in outputs if node.is_active_output] or outputs
+    return _by_identifier(active[0].inputs, identifier) if active else None
+
+
+def _by_identifier(sockets: bpy.types.bpy_prop_collection, identifier: str) -> bpy.types.NodeSocket | None:
+    return next((socket for socket in sockets if socket.identifier == identifier), None)
+
+
+def _constant(feed: Feed) -> Value:
+    return Value(default_rgb(feed.socket))
+
+
+def _image(feed: Feed) -> Value:
+    image = feed.node.image
+    if image is None:
+        raise NotConstant("an image texture without an image")
+    mean = image_mean(image, equirectangular=feed.node.type == "TEX_ENVIRONMENT")
+    if mean is None:
+        raise NotConstant(f"image '{image.name}', which has no pixels (is its file missing?)")
+    rgb = np.full(3, mean[3]) if feed.socket.name == "Alpha" else mean[:3]
+    return Value(rgb, (f"image '{image.name}'",))
+
+
+def _light_path(feed: Feed) -> Value:
+    # A lightmap sees diffuse bounces only.
+    known = {"Is Camera Ray": 0.0, "Is Diffuse Ray": 1.0, "Is Glossy Ray": 0.0, "Is Transmission Ray": 0.0}
+    if feed.socket.name not in known:
+        raise NotConstant(f"Light Path '{feed.socket.name}'")
+    return Value(np.full(3, known[feed.socket.name]))
+
+
+def _mix(feed: Feed) -> Value:
+    node = feed.node
+    if node.type == "MIX":
+        kind = {"RGBA": "Color", "FLOAT": "Float", "VECTOR": "Vector"}.get(node.data_type)
+        if kind is None or (kind == "Vector" and node.factor_mode != "UNIFORM"):
+            raise NotConstant(f"node '{node.bl_label}'")
+        names = ("Factor_Float", f"A_{kind}", f"B_{kind}")
+        sockets = [_by_identifier(node.inputs, name) for name in names]
+        blend = node.blend_type if kind == "Color" else "MIX"
+        clamp = kind == "Color" and node.clamp_result
+    else:
+        sockets, blend, clamp = list(node.inputs[:3]), node.blend_type, node.use_clamp
+    factor, a, b = (evaluate(socket, feed.stack) for socket in sockets)
+    if blend not in _BLEND:
+        raise NotConstant(f"node '{node.bl_label}' ({blend.lower()})")
+    share = min(max(factor.scalar, 0.0), 1.0)
+    rgb = (1 - share) * a.rgb + share * _BLEND[blend](a.rgb, b.rgb)
+    return Value(np.clip(rgb, 0, 1) if clamp else rgb, _merge(factor.notes, a.notes, b.notes))
+
+
+def _math(feed: Feed) -> Value:
+    operation = _MATH.get(feed.node.operation)
+    if operation is None:
+        raise NotConstant(f"node '{feed.node.bl_label}' ({feed.node.operation.lower()})")
+    a, b = (evaluate(socket, feed.stack) for socket in feed.node.inputs[:2])
+    result = operation(a.scalar, b.scalar)
+    if feed.node.use_clamp:
+        result = min(max(result, 0.0), 1.0)
+    return Value(np.full(3, result), _merge(a.notes, b.notes))
+
+
+def _merge(*notes: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(note for group in notes for note in group))
+
+
+_BLEND = {
+    "MIX": lambda a, b: b,
+    "MULTIPLY": lambda a, b: a * b,
+    "ADD": lambda a, b: a + b,
+    "SUBTRACT": lambda a, b: a - b,
+}
+_MATH = {
+    "ADD": lambda a, b: a + b,
+    "SUBTRACT": lambda a, b: a - b,
+    "MULTIPLY": lambda a, b: a * b,
+    "DIVIDE": lambda a, b: a / b if b else 0.0,
+}
+_COMPUTE = {
+    "RGB": _constant,
+    "VALUE": _constant,
+    "TEX_IMAGE": _image,
+    "TEX_ENVIRONMENT": _image,
+    "LIGHT_PATH": _light_path,
+    "MIX": _mix,
+    "MIX_RGB": _mix,
+    "MATH": _math,
+}
