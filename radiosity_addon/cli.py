@@ -28,6 +28,8 @@ SHARED_FIELDS = (
 )
 """Settings whose option says exactly what the field says."""
 
+INTERRUPTED = "interrupted; nothing was written"
+
 BUNDLED_OUTPUT = Path("out/cornell")
 """Where the bundled scene goes when no --output is given."""
 
@@ -191,10 +193,12 @@ def _run(
             else:
                 commands.restore(request.scene, loaded, request.output, console)
     except KeyboardInterrupt:
-        return _fail("interrupted; nothing was written", EXIT_INTERRUPTED)
+        return _fail(INTERRUPTED, EXIT_INTERRUPTED)
     except RadiosityError as error:
-        # An importer that Ctrl-C stopped may come back as its own failure.
-        return _fail(str(error), EXIT_INTERRUPTED if interrupts.requested else error.exit_code)
+        # An importer that Ctrl-C stopped comes back with a failure of its own.
+        if interrupts.requested:
+            return _fail(INTERRUPTED, EXIT_INTERRUPTED)
+        return _fail(str(error), error.exit_code)
     except MemoryError:
         return _fail("out of memory; lower the resolution, the texel density or the quality", EXIT_FAILED)
     except Exception as error:  # noqa: BLE001 (the last resort: a code and a line, not a bare crash)

@@ -100,13 +100,13 @@ def restore(scene: Path | None, loaded: Path | None, output: Path, console: Cons
 def _open(scene: Path | None, loaded: Path | None) -> None:
     """Have the scene to bake as the open file's scene."""
     from .cornell import build_cornell_box
-    from .files import open_scene
+    from .files import empty_scene, open_scene
 
     if scene is not None:
         open_scene(scene)
     elif loaded is None:
-        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-        bpy.context.window_manager.windows[0].scene = build_cornell_box()
+        empty_scene()
+        build_cornell_box()
 
 
 def _make_folder_of(report: Path) -> None:

@@ -201,7 +201,7 @@ class RADIOSITY_OT_restore(bpy.types.Operator):
 
 
 class RADIOSITY_OT_add_cornell_box(bpy.types.Operator):
-    """Add a new scene with the Cornell box, ready to bake"""
+    """Add the Cornell box, ready to bake, to this scene if it is empty, else in a scene of its own"""
 
     bl_idname = "radiosity.add_cornell_box"
     bl_label = "Add Cornell Box"
@@ -212,13 +212,11 @@ class RADIOSITY_OT_add_cornell_box(bpy.types.Operator):
         """Offer it unless a bake is running."""
         return not runtime.running.active
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        """Build the scene and show it."""
+    def execute(self, _context: bpy.types.Context) -> set[str]:
+        """Build the box, in this scene if it is empty, and show it."""
         from .cornell import build_cornell_box
 
-        scene = build_cornell_box()
-        if context.window is not None:
-            context.window.scene = scene
+        build_cornell_box()
         return {"FINISHED"}
 
 

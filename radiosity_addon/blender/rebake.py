@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from .bake_record import made_datablocks, mark_made, recorded_objects, unmark_made
+from .bake_record import made_datablocks, mark_made, recorded_objects, remove_datablocks, unmark_made
 from .restore import leave_edit_modes, show_original
 
 _RECORD_FIELDS = (
@@ -82,7 +82,7 @@ class EarlierBake:
 
     def discard(self) -> None:
         """Remove the earlier bake for good."""
-        bpy.data.batch_remove([block for block, _ in self._made])
+        remove_datablocks([block for block, _ in self._made])
         self._context.view_layer.update()
 
 
