@@ -1,0 +1,140 @@
+"""Clusters: one binary tree above the faces, so that n faces need not link n times n.
+
+The tree is split level by level at the median of the widest axis of (position, ½ · box
+diagonal · normal): neighbours that face the same way stay together, so that low clusters
+are pieces of one wall and only high ones mix directions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from .hierarchy import Faces
+
+
+class Clusters:
+    """c clusters as arrays; node numbers of single faces start at c.
+
+    Attributes
+    ----------
+    order : (f,) int32
+        Faces such that every cluster is a run of them.
+    start, end : (c,) int64
+        The cluster's run in `order`.
+    children : (c, 2) int64
+        Nodes: clusters, or n_clusters + face.
+    lower, upper : (c, 3) float64
+        Bounding box [m].
+    area : (c,) float64 [m²]
+    area_before : (f + 1,) float64
+        Running sum of the faces' areas along `order`.
+    """
+
+    def __init__(self, order: np.ndarray, start: np.ndarray, end: np.ndarray, children: np.ndarray) -> None:
+        self.order, self.start, self.end, self.children = order, start, end, children
+        self.lower = self.upper = np.zeros((0, 3))
+        self.area = np.zeros(0)
+        self.area_before = np.zeros(1)
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+    def measure(self, faces: Faces) -> None:
+        """Fill in areas and boxes."""
+        self.area_before = np.concatenate([[0.0], np.cumsum(faces.area[self.order])])
+        self.area = self.area_before[self.end] - self.area_before[self.start]
+        if len(self) == 0:
+            return
+        lower = faces.corners.min(axis=1)[self.order]
+        upper = faces.corners.max(axis=1)[self.order]
+        # reduceat over start, end pairs: every other result is the run itself.
+        bounds = np.stack([self.start, self.end], axis=1).ravel()
+        padded = np.minimum(bounds, len(self.order) - 1)
+        last = self.end == len(self.order)
+        self.lower = np.minimum.reduceat(lower, padded, axis=0)[::2]
+        self.upper = np.maximum.reduceat(upper, padded, axis=0)[::2]
+        self.lower[last] = np.minimum(self.lower[last], lower[-1])
+        self.upper[last] = np.maximum(self.upper[last], upper[-1])
+
+    def average(self, values: np.ndarray, areas: np.ndarray) -> np.ndarray:
+        """Return the (c, 3) area-weighted means of (f, 3) face `values`."""
+        weighted = (values * areas[:, None])[self.order]
+        before = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(weighted, axis=0)])
+        return np.asarray((before[self.end] - before[self.start]) / self.area[:, None])
+
+
+def build_clusters(faces: Faces, groups: Sequence[np.ndarray]) -> tuple[Clusters, np.ndarray]:
+    """Build a tree over each group of faces.
+
+    Parameters
+    ----------
+    faces : Faces
+    groups : sequence of (g,) int
+        Disjoint; empty ones are skipped.
+
+    Returns
+    -------
+    clusters : Clusters
+    roots : (r,) int64
+        One node per non-empty group.
+    """
+    lower, upper = faces.corners.min(axis=1), faces.corners.max(axis=1)
+    diagonal = np.linalg.norm(upper.max(axis=0) - lower.min(axis=0)) if len(faces) else 0.0
+    position = np.concatenate([faces.corners.mean(axis=1), 0.5 * diagonal * faces.normal], axis=1)
+
+    order = np.concatenate([np.asarray(group, dtype=np.int64) for group in groups])
+    sizes = np.array([len(group) for group in groups], dtype=np.int64)
+    ends = np.cumsum(sizes)
+    start, end = (ends - sizes)[sizes > 0], ends[sizes > 0]
+    tops = len(start)
+
+    starts, ends_of, children = [], [], []
+    numbered = 0
+    while len(start):
+        # Runs of two and more become clusters of this level; single faces are done.
+        large = end - start > 1
+        start, end = start[large], end[large]
+        if len(start) == 0:
+            break
+        _sort_runs(order, position, start, end)
+        middle = (start + end) // 2
+        starts.append(start)
+        ends_of.append(end)
+        numbered += len(start)
+        halves_start = np.stack([start, middle], axis=1)
+        halves_end = np.stack([middle, end], axis=1)
+        wide = halves_end - halves_start > 1
+        child = np.where(wide, 0, -1 - halves_start)
+        child[wide] = numbered + np.arange(int(wide.sum()))
+        children.append(child)
+        start, end = halves_start.ravel(), halves_end.ravel()
+
+    if starts:
+        clusters = Clusters(order, np.concatenate(starts), np.concatenate(ends_of), np.concatenate(children))
+    else:
+        none = np.zeros(0, dtype=np.int64)
+        clusters = Clusters(order, none, none, np.zeros((0, 2), dtype=np.int64))
+    single = clusters.children < 0
+    clusters.children[single] = len(clusters) + order[-1 - clusters.children[single]]
+    clusters.measure(faces)
+
+    first = np.concatenate([[0], np.cumsum(sizes[sizes > 0])])[:tops]
+    is_cluster = sizes[sizes > 0] > 1
+    roots = np.where(is_cluster, np.cumsum(is_cluster) - 1, len(clusters) + order[first] if tops else 0)
+    return clusters, roots.astype(np.int64)
+
+
+def _sort_runs(order: np.ndarray, position: np.ndarray, start: np.ndarray, end: np.ndarray) -> None:
+    """Sort each run of `order` along the widest of the six axes of its positions, in place."""
+    length = end - start
+    run = np.repeat(np.arange(len(start)), length)
+    first = np.cumsum(length) - length
+    slots = np.arange(len(run)) - first[run] + start[run]
+    local = position[order[slots]]
+    width = np.maximum.reduceat(local, first, axis=0) - np.minimum.reduceat(local, first, axis=0)
+    key = local[np.arange(len(run)), width.argmax(axis=1)[run]]
+    order[slots] = order[slots][np.lexsort((key, run))]

@@ -1,0 +1,94 @@
+"""Ray casting with Embree: the only module that imports embreex.
+
+It owns what Embree needs: float32, origins moved to the scene's centre (so that a scene
+far from the origin keeps its precision), batches on threads, the first query single.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .parallel import for_chunks
+from .visibility import NO_HIT, Hits, surface_offset
+
+CHUNK = 1 << 16
+"""Rays a call: large enough to hide the call's 2 µs, small enough for cache and threads."""
+
+TARGET_SLACK = 1e-5
+"""A segment is tested up to this fraction short of its end, in float32's reach."""
+
+
+class EmbreeCaster:
+    """Visibility by Embree 4 in its robust mode, which leaks no ray through shared edges.
+
+    Parameters
+    ----------
+    triangles : (t, 3, 3) float64
+        World-space corners [m].
+    threads : int
+        0 means all cores. Results do not depend on it.
+    """
+
+    def __init__(self, triangles: np.ndarray, threads: int = 0) -> None:
+        from embreex.mesh_construction import TriangleMesh
+        from embreex.rtcore_scene import EmbreeScene
+
+        self.rays = 0
+        self.surface_offset = surface_offset(triangles)
+        self._threads = threads
+        self._empty = len(triangles) == 0
+        if self._empty:
+            return
+        corners = triangles.reshape(-1, 3)
+        self._centre = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+        local = np.ascontiguousarray(triangles - self._centre, dtype=np.float32)
+        self._scene = EmbreeScene()
+        self._mesh = TriangleMesh(self._scene, local)
+        edges = local[:, 1:] - local[:, :1]
+        self._normals = np.cross(edges[:, 0], edges[:, 1])
+        # The first query builds the hierarchy; it must not race with another thread's.
+        self._scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32), query="OCCLUDED")
+
+    def visible(self, origins: np.ndarray, directions: np.ndarray, distances: np.ndarray) -> np.ndarray:
+        """Return (n,) bool: nothing lies within `distances` along the unit `directions`."""
+        count = len(origins)
+        free = np.ones(count, dtype=bool)
+        if self._empty or count == 0:
+            return free
+        self.rays += count
+
+        def trace(rows: slice) -> None:
+            start = (origins[rows] - self._centre).astype(np.float32)
+            along = np.ascontiguousarray(directions[rows], dtype=np.float32)
+            # A copy on purpose: Embree overwrites the distances it is given.
+            reach = np.minimum(distances[rows] * (1.0 - TARGET_SLACK), 1e30).astype(np.float32)
+            free[rows] = self._scene.run(start, along, dists=reach, query="OCCLUDED") != 0
+
+        for_chunks(trace, count, CHUNK, self._threads)
+        return free
+
+    def first_hits(self, origins: np.ndarray, directions: np.ndarray) -> Hits:
+        """Return what each ray meets first."""
+        count = len(origins)
+        triangle = np.full(count, NO_HIT, dtype=np.int32)
+        barycentric = np.zeros((count, 2), dtype=np.float32)
+        front = np.zeros(count, dtype=bool)
+        distance = np.full(count, np.inf, dtype=np.float32)
+        if self._empty or count == 0:
+            return Hits(triangle, barycentric, front, distance)
+        self.rays += count
+
+        def trace(rows: slice) -> None:
+            start = (origins[rows] - self._centre).astype(np.float32)
+            along = np.ascontiguousarray(directions[rows], dtype=np.float32)
+            found = self._scene.run(start, along, output=True)
+            row = found["primID"]
+            hit = row >= 0
+            triangle[rows] = row
+            barycentric[rows, 0] = np.where(hit, found["u"], 0)
+            barycentric[rows, 1] = np.where(hit, found["v"], 0)
+            distance[rows] = np.where(hit, found["tfar"], np.inf)
+            front[rows] = np.einsum("nk,nk->n", along, self._normals[row]) < 0
+
+        for_chunks(trace, count, CHUNK, self._threads)
+        return Hits(triangle, barycentric, front, distance)

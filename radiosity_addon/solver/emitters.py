@@ -1,0 +1,99 @@
+"""Emissive faces as lamps: exact unoccluded factor, samples in proportion to it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .form_factor import point_to_polygon
+from .hierarchy import Faces
+from .sampling import points_on_triangles
+from .visibility import RayCaster
+
+CHUNK_PAIRS = 1 << 20
+"""Point and face pairs evaluated at once; bounds the temporaries to about 200 MB."""
+
+
+class EmitterGroup:
+    """Faces of one emission, lit points see them as one lamp.
+
+    Parameters
+    ----------
+    corners : (m, 3, 3) float64
+    normals : (m, 3) float64
+    strength : (3,) float64
+        Exitance [W/m²].
+    offset : float
+        Shadow rays end this far off the surface, so that they do not meet it.
+    """
+
+    def __init__(self, corners: np.ndarray, normals: np.ndarray, strength: np.ndarray, offset: float) -> None:
+        self._corners, self._normals, self._offset = corners, normals, offset
+        self.strength = strength
+
+    @staticmethod
+    def of_faces(faces: Faces, caster: RayCaster) -> list[EmitterGroup]:
+        """Group the emissive faces by colour, which visibility then cannot mix up."""
+        rows = np.flatnonzero(faces.emission.max(axis=1, initial=0.0) > 0)
+        if len(rows) == 0:
+            return []
+        colours, group = np.unique(faces.emission[rows], axis=0, return_inverse=True)
+        group = group.reshape(-1)
+        return [
+            EmitterGroup(
+                faces.corners[rows[group == g]], faces.normal[rows[group == g]], colour, caster.surface_offset
+            )
+            for g, colour in enumerate(colours)
+        ]
+
+    def unit_irradiance(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """Return (n,) the unoccluded irradiance per unit of exitance: Σ_m F(point → face m)."""
+        gain = np.empty(len(points))
+        step = max(CHUNK_PAIRS // len(self._corners), 1)
+        for first in range(0, len(points), step):
+            rows = slice(first, first + step)
+            gain[rows] = self._factors(points[rows], normals[rows]).sum(axis=1)
+        return gain
+
+    def shadow_rays(
+        self, points: np.ndarray, normals: np.ndarray, u: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Aim (n, k) rays at the faces in proportion to their factors; equal weights.
+
+        Returns
+        -------
+        directions : (n, k, 3), distances : (n, k), weights : (n, k)
+        """
+        factors = self._factors(points, normals)
+        running = np.cumsum(factors, axis=1)
+        total = running[:, -1:]
+        rows = np.arange(len(points))[:, None]
+        pick = u[..., 0] * total
+        face = np.minimum((running[:, None, :] <= pick[..., None]).sum(axis=2), len(self._corners) - 1)
+        # What is left of the first coordinate within the chosen face places the point on it.
+        below = np.where(face > 0, running[rows, face - 1], 0.0)
+        width = np.maximum(factors[rows, face], 1e-300)
+        inside = np.stack([np.clip((pick - below) / width, 0.0, 1.0), u[..., 1]], axis=-1)
+        corners = self._corners[face]
+        targets = points_on_triangles(corners.reshape(-1, 3, 3), inside.reshape(-1, 1, 2)).reshape(*face.shape, 3)
+        along = targets + self._offset * self._normals[face] - points[:, None]
+        distances = np.linalg.norm(along, axis=2)
+        directions = along / np.maximum(distances, 1e-300)[..., None]
+        # A uniform point of a face stands for the kernel there over the face's mean.
+        cos_r = np.einsum("nkc,nc->nk", directions, normals)
+        cos_s = -np.einsum("nkc,nkc->nk", directions, self._normals[face])
+        kernel = np.maximum(cos_r, 0) * np.maximum(cos_s, 0) / (np.pi * np.maximum(distances, 1e-300) ** 2)
+        areas = 0.5 * np.linalg.norm(
+            np.cross(corners[..., 1, :] - corners[..., 0, :], corners[..., 2, :] - corners[..., 0, :]), axis=-1
+        )
+        weights = np.where(total > 0, kernel * areas / width, 0.0)
+        return directions, distances, weights
+
+    def _factors(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """Return (n, m) form factors from points to faces."""
+        count, faces = len(points), len(self._corners)
+        shape = (count, faces, 3)
+        return point_to_polygon(
+            np.broadcast_to(points[:, None], shape).reshape(-1, 3),
+            np.broadcast_to(normals[:, None], shape).reshape(-1, 3),
+            np.broadcast_to(self._corners[None], (count, faces, 3, 3)).reshape(-1, 3, 3),
+        ).reshape(count, faces)

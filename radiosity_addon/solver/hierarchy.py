@@ -1,0 +1,162 @@
+"""The hierarchy's nodes: clusters above the faces, elements below (structure of arrays).
+
+A *face* is one side of one triangle: the two sides receive, reflect and emit apart. Every
+face is the root of a quadtree of *elements*, made by joining the midpoints of the edges;
+its first element has the face's own index. *Clusters* group faces and are only sources.
+
+Nodes are numbered clusters first: node n < n_clusters is a cluster, node n ≥ n_clusters is
+element n − n_clusters. So a link's source may be either and its receiver is an element.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .clusters import Clusters, build_clusters
+from .scene import Scene
+
+LEAF = -1
+
+
+class Faces:
+    """The f sides of the scene's triangles that take part: fronts first, then backs.
+
+    Triangles without area have no faces. Backs exist where `two_sided`.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        solid = np.flatnonzero(scene.areas > 0)
+        backs = solid[scene.two_sided[solid]]
+        self.triangle = np.concatenate([solid, backs]).astype(np.int32)
+        """(f,) int32"""
+        self.front = np.arange(len(self.triangle)) < len(solid)
+        """(f,) bool"""
+        corners = scene.triangles[self.triangle]
+        corners[~self.front] = corners[~self.front][:, [0, 2, 1]]
+        self.corners = corners
+        """(f, 3, 3) float64, counter-clockwise as seen from the side's own half-space"""
+        sign = np.where(self.front, 1.0, -1.0)[:, None]
+        self.normal = scene.face_normals[self.triangle] * sign
+        """(f, 3) float64"""
+        self.area = scene.areas[self.triangle]
+        """(f,) float64 [m²]"""
+        self.reflectance = scene.reflectance[self.triangle]
+        """(f, 3) float64"""
+        self.emission = scene.emission[self.triangle]
+        """(f, 3) float64 [W/m²]"""
+        self.of_triangle = np.full((2, len(scene)), LEAF, dtype=np.int32)
+        """(2, t) int32: the face of each triangle's front (row 0) and back (row 1), or −1"""
+        self.of_triangle[0, solid] = np.arange(len(solid))
+        self.of_triangle[1, backs] = np.arange(len(solid), len(self.triangle))
+
+    def __len__(self) -> int:
+        return len(self.triangle)
+
+
+class Hierarchy:
+    """Faces, the clusters above them and the elements below; grows as links ask for it.
+
+    Attributes
+    ----------
+    corners : (e, 3, 3) float64
+    face : (e,) int32
+    parent, first_child : (e,) int32
+        −1 for none. Four children are contiguous: three at the corners, one in the middle.
+    level : (e,) int32
+    area : (e,) float64 [m²]
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.faces = Faces(scene)
+        count = len(self.faces)
+        self.corners = self.faces.corners.copy()
+        self.face = np.arange(count, dtype=np.int32)
+        self.parent = np.full(count, LEAF, dtype=np.int32)
+        self.first_child = np.full(count, LEAF, dtype=np.int32)
+        self.level = np.zeros(count, dtype=np.int32)
+        self.area = self.faces.area.copy()
+        emits = self.faces.emission.max(axis=1, initial=0.0) > 0
+        # Emitters are grouped apart: averaged into a cluster of dark faces a small lamp is
+        # missed by a few samples.
+        self.clusters: Clusters
+        self.roots: np.ndarray
+        self.clusters, self.roots = build_clusters(
+            self.faces, [np.flatnonzero(~emits), np.flatnonzero(emits)]
+        )
+        """roots: the nodes that together hold every face once; first links start from them"""
+
+    @property
+    def n_clusters(self) -> int:
+        """Number of clusters, and the node of element 0."""
+        return len(self.clusters)
+
+    @property
+    def n_elements(self) -> int:
+        """Number of elements, inner ones included."""
+        return len(self.face)
+
+    @property
+    def leaves(self) -> np.ndarray:
+        """(l,) int: the elements without children; they tile all faces."""
+        return np.flatnonzero(self.first_child == LEAF)
+
+    @property
+    def normal(self) -> np.ndarray:
+        """(e, 3) float64: the unit normal of every element."""
+        return self.faces.normal[self.face]
+
+    def subdivide(self, elements: np.ndarray) -> None:
+        """Give four children to each of the distinct leaf `elements` (handout §4.2, Subdiv)."""
+        if len(elements) == 0:
+            return
+        first = self.n_elements + 4 * np.arange(len(elements), dtype=np.int32)
+        self.first_child[elements] = first
+        self.corners = np.concatenate([self.corners, split_in_four(self.corners[elements]).reshape(-1, 3, 3)])
+        self.face = np.concatenate([self.face, np.repeat(self.face[elements], 4)])
+        self.parent = np.concatenate([self.parent, np.repeat(elements, 4).astype(np.int32)])
+        self.first_child = np.concatenate([self.first_child, np.full(4 * len(elements), LEAF, np.int32)])
+        self.level = np.concatenate([self.level, np.repeat(self.level[elements] + 1, 4).astype(np.int32)])
+        self.area = np.concatenate([self.area, np.repeat(self.area[elements] / 4, 4)])
+
+    def leaf_at(self, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+        """Find the leaf element under points of faces.
+
+        Parameters
+        ----------
+        face : (n,) int
+        barycentric : (n, 2) float
+            Weights of the *triangle's* second and third corner, as ray casting gives them.
+
+        Returns
+        -------
+        element : (n,) int32
+        """
+        v = np.asarray(barycentric, dtype=np.float64)
+        back = ~self.faces.front[face]
+        second, third = np.where(back, v[:, 1], v[:, 0]), np.where(back, v[:, 0], v[:, 1])
+        weights = np.stack([1.0 - second - third, second, third], axis=1)
+        element = face.astype(np.int32)
+        inner = np.flatnonzero(self.first_child[element] != LEAF)
+        while len(inner):
+            local = weights[inner]
+            child = np.where(local.max(axis=1) >= 0.5, local.argmax(axis=1), 3)
+            at_corner = 2.0 * local
+            at_corner[np.arange(len(inner)), np.minimum(child, 2)] -= 1.0
+            weights[inner] = np.where((child == 3)[:, None], 1.0 - 2.0 * local, at_corner)
+            element[inner] = self.first_child[element[inner]] + child
+            inner = inner[self.first_child[element[inner]] != LEAF]
+        return element
+
+
+def split_in_four(corners: np.ndarray) -> np.ndarray:
+    """Join the midpoints of the edges of (n, 3, 3) triangles.
+
+    Returns
+    -------
+    children : (n, 4, 3, 3)
+        At corner 0, 1, 2, and the middle one; all oriented like their parent, of equal area.
+    """
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
+    children = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (bc, ca, ab)]
+    return np.stack([np.stack(child, axis=1) for child in children], axis=1)

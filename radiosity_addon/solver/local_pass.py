@@ -1,0 +1,236 @@
+"""Irradiance at any point: what texels and probes ask of a solution.
+
+The elements' constants are too coarse to show, so each point looks for itself. Direct
+light is the exact unoccluded factor times a visibility from shadow rays (no noise where a
+lamp is fully seen or fully hidden). Indirect light is gathered by cosine-distributed rays,
+whose hits are looked up in the solution.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .emitters import EmitterGroup
+from .lights import EnvironmentLight, Light
+from .sampling import cosine_hemisphere, stratified_square, to_world
+from .visibility import Hits
+
+if TYPE_CHECKING:
+    from .methods.hierarchical import HierarchicalState
+
+CHUNK_RAYS = 1 << 20
+"""Rays traced at once; bounds the temporaries to about 150 MB."""
+
+MORE_SHADOW_RAYS = 8
+"""Times as many shadow rays where the first disagree."""
+
+Sampler = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""(rows, u (r, k, 2)) → (r, k, 3): points of the rows' footprints."""
+
+Resolver = Callable[[Hits], np.ndarray]
+"""Hits → (n,) int32: the number under which a hit's radiosity will be looked up; SKY for none."""
+
+SKY = -1
+NOTHING = -2
+"""A gather ray that left through the surface it started on: it carries no light."""
+
+
+class LocalPass:
+    """Asks for the light at points of a solved scene."""
+
+    def __init__(self, state: HierarchicalState) -> None:
+        self._state = state
+        self._caster = state.caster
+        self._seed = state.settings.seed
+        self.emitters = EmitterGroup.of_faces(state.hierarchy.faces, state.caster)
+
+    def direct(
+        self,
+        points: np.ndarray,
+        normals: np.ndarray,
+        keys: np.ndarray,
+        sampler: Sampler | None = None,
+        near: Callable[[np.ndarray], np.ndarray] | None = None,
+        rays: int | None = None,
+    ) -> np.ndarray:
+        """Return the irradiance straight from lamps and emissive surfaces, the sky's apart.
+
+        Parameters
+        ----------
+        points, normals : (n, 3) float64
+            Centres of the footprints, unit normals.
+        keys : (n,) int
+            With the seed, what places each point's samples.
+        sampler : callable or None
+            Spreads the samples over each point's footprint; None keeps them at the point.
+        near : callable or None
+            Grows a (n,) mask of doubtful points to their neighbours, which then also get the
+            larger number of rays.
+        rays : int or None
+            Shadow rays a point and lamp; None takes the settings'.
+
+        Returns
+        -------
+        irradiance : (n, 3) float64 [W/m²]
+        """
+        total = np.zeros((len(points), 3))
+        shadow_rays = rays or self._state.settings.shadow_rays
+        for number, light in enumerate(self._state.scene.lights):
+            if isinstance(light, EnvironmentLight) or not light.strength.any():
+                continue
+            seed = self._seed + 31 + 7 * number
+            gain = self._mean_gain(light, points, normals, keys, sampler, seed)
+            share = self._share(light, points, normals, gain > 0, keys, sampler, near, shadow_rays, seed)
+            total += (gain * share)[:, None] * light.strength
+        for number, group in enumerate(self.emitters):
+            seed = self._seed + 17 + 7 * number
+            gain = group.unit_irradiance(points, normals)
+            share = self._share(group, points, normals, gain > 0, keys, sampler, near, shadow_rays, seed)
+            total += (gain * share)[:, None] * group.strength
+        return total
+
+    def _mean_gain(
+        self, light: Light, points: np.ndarray, normals: np.ndarray, keys: np.ndarray, sampler: Sampler | None, seed: int
+    ) -> np.ndarray:
+        """Return (n,) the unoccluded irradiance per unit of strength, a mean over the footprint."""
+        if sampler is None:
+            return light.unit_irradiance(points, normals)
+        rows = np.arange(len(points))
+        spread = sampler(rows, stratified_square(keys, 4, seed)).reshape(-1, 3)
+        return np.asarray(
+            light.unit_irradiance(spread, np.repeat(normals, 4, axis=0)).reshape(-1, 4).mean(axis=1)
+        )
+
+    def _share(
+        self,
+        light: Light | EmitterGroup,
+        points: np.ndarray,
+        normals: np.ndarray,
+        facing: np.ndarray,
+        keys: np.ndarray,
+        sampler: Sampler | None,
+        near: Callable[[np.ndarray], np.ndarray] | None,
+        rays: int,
+        seed: int,
+    ) -> np.ndarray:
+        """Return (n,) the unblocked share: few rays everywhere, many in penumbrae."""
+        lit, total = np.zeros(len(points)), np.zeros(len(points))
+        rows = np.flatnonzero(facing)
+        self._shadow(light, points, normals, rows, keys, sampler, 0, rays, seed, lit, total)
+        doubtful = (lit > 0) & (lit < total * (1 - 1e-9))
+        if near is not None:
+            lightness = np.where(total > 0, lit / np.maximum(total, 1e-300), 0.0)
+            doubtful = near(doubtful) | (near(lightness > 0.5) & near(facing & (lightness <= 0.5)))
+        rows = np.flatnonzero(doubtful & facing)
+        more = rays * MORE_SHADOW_RAYS
+        lit[rows] = total[rows] = 0.0
+        self._shadow(light, points, normals, rows, keys, sampler, 0, more, seed, lit, total)
+        return np.asarray(np.where(total > 0, lit / np.maximum(total, 1e-300), 0.0))
+
+    def _shadow(
+        self,
+        light: Light | EmitterGroup,
+        points: np.ndarray,
+        normals: np.ndarray,
+        rows: np.ndarray,
+        keys: np.ndarray,
+        sampler: Sampler | None,
+        first: int,
+        count: int,
+        seed: int,
+        lit: np.ndarray,
+        total: np.ndarray,
+    ) -> None:
+        """Add `count` shadow rays a row to the sums of unblocked and of all weights."""
+        step = max(CHUNK_RAYS // count, 1)
+        for begin in range(0, len(rows), step):
+            chunk = rows[begin : begin + step]
+            at, normal = points[chunk], normals[chunk]
+            unit = stratified_square(keys[chunk], count, seed + 1, first)
+            directions, distances, weights = light.shadow_rays(at, normal, unit)
+            start = np.repeat(at[:, None], count, axis=1)
+            if sampler is not None:
+                # The same lamp points, seen from points spread over the footprint.
+                start = sampler(chunk, stratified_square(keys[chunk], count, seed + 2, first))
+                finite = np.isfinite(distances)[..., None]
+                reach = np.where(finite, distances[..., None], 1.0)
+                along = np.where(finite, at[:, None] + directions * reach - start, directions)
+                length = np.linalg.norm(along, axis=2)
+                directions = along / np.maximum(length, 1e-300)[..., None]
+                distances = np.where(finite[..., 0], length, np.inf)
+            start = start + self._caster.surface_offset * normal[:, None]
+            point, sample = np.nonzero(weights > 0)
+            free = self._caster.visible(start[point, sample], directions[point, sample], distances[point, sample])
+            lit[chunk] += np.bincount(point, free * weights[point, sample], minlength=len(chunk))
+            total[chunk] += weights.sum(axis=1)
+
+    def gather(
+        self,
+        points: np.ndarray,
+        normals: np.ndarray,
+        surface_normals: np.ndarray,
+        keys: np.ndarray,
+        rays: int,
+        resolve: Resolver,
+        sampler: Sampler | None = None,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Trace cosine-distributed rays and keep what they hit: links at the finest level.
+
+        Parameters
+        ----------
+        points, normals, surface_normals : (n, 3) float64
+            `normals` shade; a ray that dips below `surface_normals` carries nothing.
+        rays : int
+            A point; each stands for a form factor of 1 / rays.
+        resolve : callable
+            Numbers the hits.
+
+        Returns
+        -------
+        sources : (n, rays) int32
+            What `resolve` said; SKY where nothing was hit, NOTHING below the surface.
+        closeness : (n,) float64
+            Mean of 1/distance over the rays [1/m]: how quickly irradiance may change.
+        """
+        sources = np.empty((len(points), rays), dtype=np.int32)
+        closeness = np.empty(len(points))
+        step = max(CHUNK_RAYS // rays, 1)
+        for begin in range(0, len(points), step):
+            rows = np.arange(begin, min(begin + step, len(points)))
+            unit = stratified_square(keys[rows], rays, self._seed + 3)
+            directions = to_world(cosine_hemisphere(unit), normals[rows])
+            start = np.repeat(points[rows][:, None], rays, axis=1)
+            if sampler is not None:
+                start = sampler(rows, stratified_square(keys[rows], rays, self._seed + 4))
+            start = start + self._caster.surface_offset * surface_normals[rows][:, None]
+            hits = self._caster.first_hits(start.reshape(-1, 3), directions.reshape(-1, 3))
+            found = np.where(hits.triangle < 0, SKY, resolve(hits))
+            below = np.einsum("nrk,nk->nr", directions, surface_normals[rows]) <= 0
+            sources[rows] = np.where(below, NOTHING, found.reshape(len(rows), rays))
+            inverse = 1.0 / np.maximum(hits.distance.reshape(len(rows), rays), self._caster.surface_offset)
+            closeness[rows] = inverse.mean(axis=1)
+        return sources, closeness
+
+    def leaves_of(self, hits: Hits) -> np.ndarray:
+        """Return (n,) int32: the leaf element under each hit; SKY for none or a black back."""
+        hierarchy = self._state.hierarchy
+        face = hierarchy.faces.of_triangle[(~hits.front).astype(np.int8), hits.triangle]
+        on_face = (hits.triangle >= 0) & (face >= 0)
+        leaf = np.full(len(face), NOTHING, dtype=np.int32)
+        leaf[on_face] = hierarchy.leaf_at(face[on_face], hits.barycentric[on_face])
+        return leaf
+
+    def reflected(self) -> np.ndarray:
+        """Return (e, 3): the part of every element's radiosity it does not emit itself [W/m²]."""
+        hierarchy = self._state.hierarchy
+        return np.asarray(hierarchy.faces.reflectance[hierarchy.face] * self._state.irradiance)
+
+    def sky(self) -> np.ndarray:
+        """Return (3,) the radiosity equivalent πL of the sky [W/m²]."""
+        lights = self._state.scene.lights
+        return sum(
+            (np.pi * light.strength for light in lights if isinstance(light, EnvironmentLight)), np.zeros(3)
+        )

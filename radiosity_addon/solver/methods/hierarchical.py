@@ -1,0 +1,189 @@
+"""Refined hierarchical radiosity: refine and iterate in turn (handout §4.2.1).
+
+HierarchicalRad: link the lights, link every face coarsely to the roots of the cluster
+tree, then alternate Gather and PushPull with RefineLink while BF_ε falls, until no link is
+refined and the residual is small.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..embree import EmbreeCaster
+from ..hierarchy import Hierarchy
+from ..light_links import LightLinks, light_strengths, link_lights
+from ..links import Links, join, measure_links, no_links
+from ..oracle import children_of_links, misplaced_power
+from ..power import light_power
+from ..scene import Scene
+from ..settings import SolverSettings
+from ..transport import gather, node_radiosity, push_pull
+from ..visibility import RayCaster
+
+FIRST_SIZE = 0.4
+"""First links go to clusters whose radius is at most this part of their distance."""
+
+COARSENING = (64.0, 16.0, 4.0, 1.0)
+"""BF_ε of the rounds, in units of the final one: start coarse, tighten (our addition)."""
+
+MAX_ITERATIONS = 1000
+
+
+@dataclass
+class HierarchicalState:
+    """What the solver works on; complete when `solve_steps` is exhausted."""
+
+    scene: Scene
+    settings: SolverSettings
+    hierarchy: Hierarchy
+    caster: RayCaster
+    light_links: LightLinks
+    links: Links
+    power: float
+    """The light's power Φ [W], the largest channel: the unit of BF_ε."""
+    irradiance: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    """(e, 3) float64: area means over every element [W/m²]."""
+    radiosity: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    """(e, 3) float64 [W/m²]"""
+    iterations: int = 0
+    residual: float = 0.0
+    """Σ A |E + ρ K B − B| over the leaves, relative to the light's power."""
+    over_budget: float = 0.0
+    """Largest misplaced power left unrefined for want of links, relative to Φ; 0 if none."""
+
+
+def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float, HierarchicalState]]:
+    """Solve step by step: yields (fraction done, state) so that a caller may show or cancel.
+
+    The last state yielded is the solution.
+    """
+    caster = EmbreeCaster(scene.triangles, settings.threads)
+    hierarchy = Hierarchy(scene)
+    state = HierarchicalState(
+        scene, settings, hierarchy, caster, LightLinks(*np.zeros((3, 0), np.int32)), no_links(), 0.0
+    )
+    state.power = light_power(scene, hierarchy.faces)
+    min_area = settings.min_area * float(hierarchy.faces.area.sum())
+    yield 0.02, state
+    if state.power == 0.0 or len(hierarchy.faces) == 0:
+        _reset(state)
+        yield 1.0, state
+        return
+    state.light_links = link_lights(
+        hierarchy, scene.lights, caster, 4 * settings.error * state.power, min_area, settings.seed
+    )
+    yield 0.1, state
+    state.links = first_links(hierarchy, caster, settings.seed)
+    _reset(state)
+    yield 0.3, state
+
+    for done, coarsening in enumerate(COARSENING):
+        threshold = coarsening * settings.error * state.power
+        while True:
+            iterate(state, settings.tolerance if coarsening == 1.0 else 0.03)
+            refined = refine(state, threshold, min_area)
+            yield 0.3 + 0.65 * (done + 0.5) / len(COARSENING), state
+            if not refined:
+                break
+    iterate(state, settings.tolerance)
+    yield 1.0, state
+
+
+def first_links(hierarchy: Hierarchy, caster: RayCaster, seed: int) -> Links:
+    """Link every face to clusters that look small from it, and to single faces nearby.
+
+    Starts from one pair per face and root; a cluster that looks too large is opened.
+    """
+    clusters, faces = hierarchy.clusters, hierarchy.faces
+    radius = 0.5 * np.linalg.norm(clusters.upper - clusters.lower, axis=1)
+    middle = 0.5 * (clusters.upper + clusters.lower)
+    half = 0.5 * (clusters.upper - clusters.lower)
+    centre = faces.corners.mean(axis=1)
+    own_radius = np.linalg.norm(faces.corners - centre[:, None], axis=2).max(axis=1)
+
+    receiver = np.repeat(np.arange(len(faces)), len(hierarchy.roots))
+    source = np.tile(hierarchy.roots, len(faces))
+    parts: list[Links] = []
+    while len(receiver):
+        is_cluster = source < len(clusters)
+        ready_receiver, ready_source = [receiver[~is_cluster]], [source[~is_cluster]]
+        receiver, source = receiver[is_cluster], source[is_cluster]
+        # A cluster wholly behind the receiver's plane sends it nothing: exactly so.
+        along = middle[source] - centre[receiver]
+        normal = faces.normal[receiver]
+        rise = np.einsum("nk,nk->n", along, normal) + np.einsum("nk,nk->n", half[source], np.abs(normal))
+        above = rise > 0
+        receiver, source, along = receiver[above], source[above], along[above]
+        distance = np.linalg.norm(along, axis=1)
+        small = radius[source] + own_radius[receiver] <= FIRST_SIZE * distance
+        ready_receiver.append(receiver[small])
+        ready_source.append(source[small])
+        parts.append(
+            measure_links(hierarchy, caster, np.concatenate(ready_receiver), np.concatenate(ready_source), seed)
+        )
+        receiver = np.repeat(receiver[~small], 2)
+        source = clusters.children[source[~small]].ravel()
+    return join(parts).sorted_by_receiver()
+
+
+def refine(state: HierarchicalState, threshold: float, min_area: float) -> int:
+    """Replace every link that may misplace more than `threshold` watts; return how many."""
+    hierarchy, links = state.hierarchy, state.links
+    spread, bias = misplaced_power(hierarchy, links, state.radiosity)
+    errors = np.maximum(spread, bias)
+    chosen = np.flatnonzero(errors > threshold)
+    room = max((state.settings.max_links - len(links)) // 3, 0)
+    if len(chosen) > room:
+        order = np.argsort(errors[chosen], kind="stable")[::-1]
+        state.over_budget = float(errors[chosen[order[room:]]].max(initial=0.0)) / state.power
+        chosen = np.sort(chosen[order[:room]])
+    if len(chosen) == 0:
+        return 0
+    before = hierarchy.n_elements
+    candidates = links.take(chosen)
+    receiver, source, replaced = children_of_links(
+        hierarchy, candidates, bias[chosen] > spread[chosen], min_area
+    )
+    if not replaced.any():
+        return 0
+    kept = np.ones(len(links), dtype=bool)
+    kept[chosen[replaced]] = False
+    new = measure_links(hierarchy, state.caster, receiver, source, state.settings.seed)
+    state.links = join([links.take(kept), new]).sorted_by_receiver()
+    # Children start with their parent's radiosity; a batch only ever adds one level.
+    parents = hierarchy.parent[before:]
+    state.radiosity = np.concatenate([state.radiosity, state.radiosity[parents]])
+    state.irradiance = np.concatenate([state.irradiance, state.irradiance[parents]])
+    return int(replaced.sum())
+
+
+def iterate(state: HierarchicalState, tolerance: float) -> None:
+    """Gather and push-pull in Jacobi order until the residual is below `tolerance`."""
+    hierarchy = state.hierarchy
+    leaves = hierarchy.leaves
+    area = hierarchy.area[leaves][:, None]
+    reflectance = hierarchy.faces.reflectance[hierarchy.face]
+    emission = hierarchy.faces.emission[hierarchy.face]
+    direct = state.light_links.irradiance(light_strengths(state.scene.lights), hierarchy.n_elements)
+    for _ in range(MAX_ITERATIONS):
+        own = direct + gather(
+            state.links, node_radiosity(hierarchy, state.radiosity), hierarchy.n_elements
+        )
+        irradiance, radiosity = push_pull(hierarchy, own, emission, reflectance)
+        # One Jacobi step is the residual at the leaves: E + ρ K B − B.
+        change = np.abs(radiosity[leaves] - state.radiosity[leaves])
+        state.residual = float((area * change).sum(axis=0).max()) / state.power
+        state.irradiance, state.radiosity = irradiance, radiosity
+        state.iterations += 1
+        if state.residual < tolerance:
+            break
+
+
+def _reset(state: HierarchicalState) -> None:
+    """Start from what the surfaces emit themselves."""
+    hierarchy = state.hierarchy
+    state.irradiance = np.zeros((hierarchy.n_elements, 3))
+    state.radiosity = hierarchy.faces.emission[hierarchy.face].copy()

@@ -1,0 +1,43 @@
+"""Run one function over fixed chunks of rows on a few threads.
+
+The chunks do not depend on the number of threads and each writes its own rows, so the
+result is the same bytes whatever the machine. NumPy and embreex release the GIL, so
+threads are enough.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+
+def thread_count(threads: int) -> int:
+    """Return `threads`, or the number of usable cores if it is 0."""
+    if threads > 0:
+        return threads
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def for_chunks(work: Callable[[slice], None], rows: int, chunk: int, threads: int) -> None:
+    """Call `work` on slices of at most `chunk` rows that cover 0 … rows.
+
+    Parameters
+    ----------
+    work : callable
+        Takes a slice of rows; must touch nothing another slice writes.
+    rows, chunk : int
+    threads : int
+        0 means all cores.
+    """
+    slices = [slice(start, min(start + chunk, rows)) for start in range(0, rows, chunk)]
+    workers = min(thread_count(threads), len(slices))
+    if workers <= 1:
+        for piece in slices:
+            work(piece)
+        return
+    with ThreadPoolExecutor(workers) as pool:
+        for _ in pool.map(work, slices):
+            pass

@@ -1,0 +1,129 @@
+"""Where the light's power goes: emitted, absorbed, and escaped from the scene.
+
+The escaped part is followed by rays that leave the surfaces and lamps, never taken as the
+remainder, so that emitted = absorbed + escaped is a check and not a definition. Powers are
+means over the three channels, in watts.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .hierarchy import Faces, Hierarchy
+from .lights import AreaLight, EnvironmentLight, PointLight, SpotLight, SunLight
+from .sampling import cosine_hemisphere, points_on_triangles, stratified_square, to_world
+from .scene import Scene
+
+if TYPE_CHECKING:
+    from .methods.hierarchical import HierarchicalState
+
+ESCAPE_RAYS = 1 << 17
+"""Rays that follow the light surfaces send out."""
+
+
+def light_power(scene: Scene, faces: Faces) -> float:
+    """Return the power Φ [W] that enters the scene, in its largest channel: the unit of BF_ε.
+
+    Emission of all sides, lamps, and what a sun or sky would send onto the scene's box.
+    """
+    total = faces.area @ faces.emission
+    if len(scene) == 0:
+        return 0.0
+    corners = scene.triangles.reshape(-1, 3)
+    width = corners.max(axis=0) - corners.min(axis=0)
+    sides = np.array([width[1] * width[2], width[2] * width[0], width[0] * width[1]])
+    for light in scene.lights:
+        if isinstance(light, SunLight):
+            total = total + light.strength * float(np.abs(light.unit_direction) @ sides)
+        elif isinstance(light, EnvironmentLight):
+            total = total + np.pi * light.strength * float(sides.sum())
+        else:
+            total = total + light.flux
+    return float(np.max(total))
+
+
+def power_balance(state: HierarchicalState) -> dict[str, float]:
+    """Return the emitted, absorbed and escaped power [W].
+
+    Lamps and emission count over all their sides, sun and sky what arrives at the faces.
+    """
+    hierarchy, scene = state.hierarchy, state.scene
+    faces = hierarchy.faces
+    leaves = hierarchy.leaves
+    emitted = float((faces.area @ faces.emission).mean()) if len(faces) else 0.0
+    gain = hierarchy.area[state.light_links.receiver] * state.light_links.gain
+    for number, light in enumerate(scene.lights):
+        if isinstance(light, SunLight | EnvironmentLight):
+            arriving = float(gain[state.light_links.light == number].sum())
+            emitted += arriving * float(light.strength.mean())
+        else:
+            emitted += float(light.flux.mean())
+
+    kept = (1.0 - faces.reflectance[hierarchy.face[leaves]]) * state.irradiance[leaves]
+    absorbed = float((hierarchy.area[leaves] @ kept).mean()) if len(leaves) else 0.0
+    from_surfaces = _follow_surfaces(state)
+    from_lamps = _follow_lamps(state)
+    return {
+        "emitted": emitted,
+        "absorbed": absorbed + from_surfaces[0] + from_lamps[0],
+        "escaped": from_surfaces[1] + from_lamps[1],
+    }
+
+
+def _follow_surfaces(state: HierarchicalState) -> tuple[float, float]:
+    """Return the power [W] that leaves the surfaces onto black backs, and out of the scene."""
+    hierarchy = state.hierarchy
+    leaves = hierarchy.leaves
+    power = hierarchy.area[leaves] * state.radiosity[leaves].mean(axis=1)
+    total = float(power.sum())
+    if total == 0.0:
+        return 0.0, 0.0
+    # Stratified by power: the rays are shared out along the running sum.
+    number = np.arange(ESCAPE_RAYS)
+    along = (number + 0.5) / ESCAPE_RAYS
+    leaf = leaves[np.minimum(np.searchsorted(np.cumsum(power) / total, along), len(leaves) - 1)]
+    seed = state.settings.seed
+    points = points_on_triangles(hierarchy.corners[leaf], stratified_square(number, 1, seed + 11))[:, 0]
+    normals = hierarchy.normal[leaf]
+    unit = stratified_square(number, 1, seed + 12)
+    directions = to_world(cosine_hemisphere(unit), normals)[:, 0]
+    black, escaped = _fate(state, points + state.caster.surface_offset * normals, directions)
+    return total * float(black.mean()), total * float(escaped.mean())
+
+
+def _follow_lamps(state: HierarchicalState) -> tuple[float, float]:
+    """Return the power [W] that leaves the lamps onto black backs, and out of the scene."""
+    black_total = escaped_total = 0.0
+    count = ESCAPE_RAYS // 8
+    for number, light in enumerate(state.scene.lights):
+        if not isinstance(light, PointLight | SpotLight | AreaLight) or not light.strength.any():
+            continue
+        unit = stratified_square(np.arange(count), 2, state.settings.seed + 21 + number)
+        origins, directions, share = light.emit(unit[:, 0], unit[:, 1])
+        black, escaped = _fate(state, origins, directions)
+        flux = float(light.flux.mean())
+        black_total += flux * float((black * share).sum() / share.sum())
+        escaped_total += flux * float((escaped * share).sum() / share.sum())
+    return black_total, escaped_total
+
+
+def _fate(state: HierarchicalState, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return (n,) whether rays end on a black back, and whether they leave the scene."""
+    hits = state.caster.first_hits(origins, directions)
+    escaped = hits.triangle < 0
+    face = state.hierarchy.faces.of_triangle[(~hits.front).astype(int), hits.triangle]
+    return ~escaped & (face < 0), escaped
+
+
+def closure(hierarchy: Hierarchy, state: HierarchicalState) -> np.ndarray:
+    """Return (f,) the area mean over each face's leaves of ΣFV over own and inherited links.
+
+    1 in a closed scene: all that leaves a face arrives somewhere.
+    """
+    links = state.links
+    own = np.bincount(links.receiver, links.factor * links.visibility, minlength=hierarchy.n_elements)
+    # An element's own links count for its whole area: exactly the mean over its leaves.
+    per_face = np.bincount(hierarchy.face, own * hierarchy.area, minlength=len(hierarchy.faces))
+    return np.asarray(per_face / hierarchy.faces.area)

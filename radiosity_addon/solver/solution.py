@@ -1,0 +1,91 @@
+"""What solving yields: the light on every triangle's two sides, and anywhere between."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from .local_pass import NOTHING, SKY, LocalPass
+from .methods.hierarchical import HierarchicalState
+from .power import closure, power_balance
+
+POINT_RAYS = 1024
+"""Hemisphere rays of a single point in `Solution.irradiance`."""
+
+
+class Solution:
+    """A solved scene.
+
+    Attributes
+    ----------
+    triangle_radiosity, triangle_irradiance : (t, 3) float64
+        Area means over the front of each triangle [W/m²].
+    back_radiosity, back_irradiance : (t, 3) float64
+        The same for the backs; 0 where a triangle is one-sided.
+    triangle_closure, back_closure : (t,) float64
+        Area mean of ΣFV: the share of what leaves a side that arrives at another.
+    report : dict
+        "elements", "links", "rays", "iterations", "residual", "power_W" (emitted, absorbed,
+        escaped), "closure_area_mean" (over the sides that receive light).
+    """
+
+    def __init__(self, state: HierarchicalState) -> None:
+        self._state = state
+        hierarchy = state.hierarchy
+        face_count = len(hierarchy.faces)
+        shares = closure(hierarchy, state)
+        self.triangle_radiosity, self.back_radiosity = self._by_side(state.radiosity[:face_count])
+        self.triangle_irradiance, self.back_irradiance = self._by_side(state.irradiance[:face_count])
+        fronts, backs = self._by_side(shares[:, None])
+        self.triangle_closure, self.back_closure = fronts[:, 0], backs[:, 0]
+        lit = state.irradiance[:face_count].max(axis=1, initial=0.0) > 0
+        lit_area = hierarchy.faces.area * lit
+        mean = float(lit_area @ shares / lit_area.sum()) if lit.any() else 0.0
+        self.report: dict[str, Any] = {
+            "elements": hierarchy.n_elements,
+            "links": len(state.links) + len(state.light_links),
+            "rays": state.caster.rays,
+            "iterations": state.iterations,
+            "residual": state.residual,
+            "power_W": power_balance(state),
+            "closure_area_mean": mean,
+        }
+
+    @cached_property
+    def local_pass(self) -> LocalPass:
+        """The local pass over this solution: direct light and gather rays at points."""
+        return LocalPass(self._state)
+
+    def irradiance(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """Return the irradiance at points, direct and indirect.
+
+        Parameters
+        ----------
+        points : (n, 3) float
+            May lie on surfaces.
+        normals : (n, 3) float
+            The directions they face; need not be unit.
+
+        Returns
+        -------
+        irradiance : (n, 3) float64 [W/m²]
+        """
+        points = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+        normals = np.asarray(normals, dtype=np.float64).reshape(-1, 3)
+        normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        local = self.local_pass
+        keys = np.arange(len(points))
+        direct = local.direct(points, normals, keys, rays=64)
+        sources, _ = local.gather(points, normals, normals, keys, POINT_RAYS, local.leaves_of)
+        radiosity = np.concatenate([local.reflected(), np.zeros((1, 3)), local.sky()[None]])
+        assert (NOTHING, SKY) == (-2, -1)  # they index the two rows appended
+        return np.asarray(direct + radiosity[sources].mean(axis=1))
+
+    def _by_side(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Spread (f, k) face values over the triangles' fronts and backs: two (t, k)."""
+        faces = self._state.hierarchy.faces
+        sides = np.zeros((2, faces.of_triangle.shape[1], values.shape[1]))
+        sides[np.where(faces.front, 0, 1), faces.triangle] = values
+        return sides[0], sides[1]
