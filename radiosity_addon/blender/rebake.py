@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import bpy
 
 from .bake_record import made_datablocks, mark_made, recorded_objects, remove_datablocks, unmark_made
-from .restore import leave_edit_modes, show_original
+from .restore import leave_edit_modes, restore, show_original
 
 _RECORD_FIELDS = (
     "is_baked",
@@ -103,6 +103,7 @@ def replacing_earlier(context: bpy.types.Context) -> Iterator[None]:
     try:
         yield
     except BaseException:
+        restore(context)  # what the new bake has shown so far
         earlier.put_back()
         raise
     earlier.discard()
