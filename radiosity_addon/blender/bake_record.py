@@ -1,0 +1,151 @@
+"""What a bake changed on each object, remembered in the file so that Restore can undo it.
+
+Two kinds of memory, both saved with the .blend:
+
+* `Object.radiosity_bake`, a `BakeRecord` on every object the bake touched. Its mesh pointer
+  counts as a user, so the original mesh outlives saving while a copy stands in for it.
+* a marker on every datablock the bake made (images, materials, meshes, node trees,
+  stand-in objects, their collection), so that Restore removes these and nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import bpy
+
+MADE_MARKER = "radiosity_lightmaps"
+"""Custom property of the datablocks that a bake made."""
+
+_TYPES = {
+    "objects": bpy.types.Object,
+    "collections": bpy.types.Collection,
+    "meshes": bpy.types.Mesh,
+    "materials": bpy.types.Material,
+    "node_groups": bpy.types.NodeTree,
+    "images": bpy.types.Image,
+}
+"""The collections of `bpy.data` that a bake adds to, users before what they use."""
+
+
+class ModifierRecord(bpy.types.PropertyGroup):
+    """A modifier that was switched off because its result is in the baked mesh copy."""
+
+    # `name` comes with PropertyGroup and is the modifier's.
+    show_viewport: bpy.props.BoolProperty()  # type: ignore[valid-type]
+    show_render: bpy.props.BoolProperty()  # type: ignore[valid-type]
+
+
+class BakeRecord(bpy.types.PropertyGroup):
+    """How one object was before the bake."""
+
+    is_baked: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Baked", description="The object shows a lightmap; Restore brings the original back"
+    )
+    original_mesh: bpy.props.PointerProperty(type=bpy.types.Mesh)  # type: ignore[valid-type]
+    object_slots: bpy.props.StringProperty(  # type: ignore[valid-type]
+        description="Indices of the material slots that were linked to the object, not its data"
+    )
+    active_material_index: bpy.props.IntProperty()  # type: ignore[valid-type]
+    modifiers: bpy.props.CollectionProperty(type=ModifierRecord)  # type: ignore[valid-type]
+    is_hidden: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        description="Stand-ins replace the object, which was hidden"
+    )
+    hide_viewport: bpy.props.BoolProperty()  # type: ignore[valid-type]
+    hide_render: bpy.props.BoolProperty()  # type: ignore[valid-type]
+
+
+def register() -> None:
+    """Register the record and hang it on every object."""
+    bpy.utils.register_class(ModifierRecord)
+    bpy.utils.register_class(BakeRecord)
+    bpy.types.Object.radiosity_bake = bpy.props.PointerProperty(type=BakeRecord)
+
+
+def unregister() -> None:
+    """Take the record's type away; what a file remembers stays in the file."""
+    del bpy.types.Object.radiosity_bake
+    bpy.utils.unregister_class(BakeRecord)
+    bpy.utils.unregister_class(ModifierRecord)
+
+
+def recorded_objects() -> list[bpy.types.Object]:
+    """Every object of the file that a bake touched and Restore can bring back."""
+    # Asking first: before Blender 5.0 merely reading the record would leave one in the file.
+    touched = [obj for obj in bpy.data.objects if obj.is_property_set("radiosity_bake")]
+    return [obj for obj in touched if obj.radiosity_bake.is_baked or obj.radiosity_bake.is_hidden]
+
+
+def is_baked() -> bool:
+    """Whether the file shows a bake, so that Restore has something to do."""
+    return bool(recorded_objects()) or next(made_datablocks(), None) is not None
+
+
+def mark_made(datablock: bpy.types.ID) -> None:
+    """Mark a datablock as made by the bake, for Restore to remove."""
+    datablock[MADE_MARKER] = True
+
+
+def unmark_made(datablock: bpy.types.ID) -> None:
+    """Take the mark off again: Restore will leave the datablock alone."""
+    datablock.pop(MADE_MARKER, None)
+
+
+def is_made(datablock: bpy.types.ID) -> bool:
+    """Whether a bake made this datablock."""
+    return MADE_MARKER in datablock.keys()
+
+
+def made_datablocks() -> Iterator[bpy.types.ID]:
+    """Yield every datablock that a bake made, users before what they use."""
+    for collection in _TYPES:
+        yield from [datablock for datablock in getattr(bpy.data, collection) if is_made(datablock)]
+
+
+def remove_made() -> None:
+    """Remove every datablock that a bake made."""
+    remove_datablocks(list(made_datablocks()))
+
+
+def remove_datablocks(datablocks: Iterable[bpy.types.ID]) -> None:
+    """Remove datablocks of the kinds that a bake makes, users before what they use.
+
+    One by one: before Blender 5.0 `batch_remove` forgets to release what the node tree of
+    a removed material used.
+    """
+    for datablock in datablocks:
+        kind = next(name for name, kind in _TYPES.items() if isinstance(datablock, kind))
+        getattr(bpy.data, kind).remove(datablock)
+
+
+def record_mesh_swap(obj: bpy.types.Object) -> None:
+    """Remember the object's mesh and how its material slots are linked."""
+    record = obj.radiosity_bake
+    record.is_baked = True
+    record.original_mesh = obj.data
+    record.active_material_index = obj.active_material_index
+    linked_to_object = [i for i, slot in enumerate(obj.material_slots) if slot.link == "OBJECT"]
+    record.object_slots = " ".join(map(str, linked_to_object))
+
+
+def record_modifiers(obj: bpy.types.Object) -> None:
+    """Remember which of the object's modifiers show."""
+    record = obj.radiosity_bake
+    for modifier in obj.modifiers:
+        entry = record.modifiers.add()
+        entry.name = modifier.name
+        entry.show_viewport = modifier.show_viewport
+        entry.show_render = modifier.show_render
+
+
+def record_hiding(obj: bpy.types.Object) -> None:
+    """Remember whether the object shows in the viewport and in renders."""
+    record = obj.radiosity_bake
+    record.is_hidden = True
+    record.hide_viewport = obj.hide_viewport
+    record.hide_render = obj.hide_render
+
+
+def forget(obj: bpy.types.Object) -> None:
+    """Drop the object's record, leaving no trace of it in the file."""
+    obj.property_unset("radiosity_bake")

@@ -1,0 +1,141 @@
+"""Lightmap pages as Blender images and as files.
+
+EXR holds the values themselves in 32-bit float, PNG holds value / scale in 16 bits, linear.
+Everything is Non-Color: any other setting would have Blender convert the values when it
+saves or reads them.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ..bake_scene import BakeResult, LightmapPage
+from ..errors import BakeError
+from ..settings import BakeSettings
+from .bake_record import mark_made, remove_datablocks
+
+SCALE_PROPERTY = "radiosity_lightmap_scale"
+"""Custom property of an image: multiply a texel by it to get the quantity."""
+
+_FILE_FORMATS = {"exr": ("OPEN_EXR", ".exr"), "png16": ("PNG", ".png")}
+_RESERVED_NAMES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
+
+
+def page_file_names(result: BakeResult, settings: BakeSettings) -> list[str]:
+    """Name the file of every page: `lightmap.exr`, or one after each object.
+
+    The names differ from each other even where upper and lower case do not count.
+    """
+    extension = _FILE_FORMATS[settings.format][1]
+    stems = ["lightmap"] * len(result.pages)
+    if settings.atlas == "per-object":
+        for baked in result.objects:
+            stems[baked.page] = sanitised_stem(baked.object.name)
+    names: list[str] = []
+    taken: set[str] = set()
+    for stem in stems:
+        unique, number = stem, 1
+        while unique.lower() in taken:
+            number += 1
+            unique = f"{stem}_{number}"
+        taken.add(unique.lower())
+        names.append(unique + extension)
+    return names
+
+
+def sanitised_stem(name: str) -> str:
+    """Turn an object's name into a file name's stem that every file system takes."""
+    stem = re.sub(r'[\x00-\x1f<>:"/\\|?*]', "_", name).strip(" .")[:100].strip(" .")
+    return f"_{stem}" if not stem or _RESERVED_NAMES.fullmatch(stem) else stem
+
+
+def write_pages(
+    result: BakeResult, settings: BakeSettings, folder: Path | None
+) -> list[bpy.types.Image]:
+    """Make an image of each page, saved into `folder` or packed into the .blend.
+
+    Parameters
+    ----------
+    result : BakeResult
+    settings : BakeSettings
+        Its format and atlas name the files.
+    folder : Path or None
+        None packs the images.
+
+    Returns
+    -------
+    images : list of Image
+        Parallel to `result.pages`.
+
+    Raises
+    ------
+    BakeError
+        If a file cannot be written.
+    """
+    images: list[bpy.types.Image] = []
+    try:
+        for page, file_name in zip(result.pages, page_file_names(result, settings), strict=True):
+            images.append(_new_image(page, settings.format, file_name))
+            _store(images[-1], folder, file_name)
+    except BaseException:
+        remove_datablocks(images)
+        raise
+    return images
+
+
+def set_folder(images: Sequence[bpy.types.Image], folder: Path) -> None:
+    """Point saved images at the same files in another folder, relative to a saved .blend."""
+    for image in images:
+        if image.packed_file is None:
+            image.filepath_raw = relative_path(folder / Path(bpy.path.abspath(image.filepath_raw)).name)
+
+
+def relative_path(path: Path) -> str:
+    """Return Blender's `//` path from the open file; absolute if unsaved or on another drive."""
+    if not bpy.data.filepath:
+        return str(path)
+    try:
+        return bpy.path.relpath(str(path))
+    except ValueError:
+        return str(path)
+
+
+def image_scale(image: bpy.types.Image) -> float:
+    """What a texel of the image must be multiplied by to get the quantity."""
+    return float(image.get(SCALE_PROPERTY, 1.0))
+
+
+def _new_image(page: LightmapPage, file_format: str, file_name: str) -> bpy.types.Image:
+    """Make an unsaved float image of a page."""
+    height, width = page.pixels.shape[:2]
+    image = bpy.data.images.new(file_name, width, height, alpha=False, float_buffer=True, is_data=True)
+    mark_made(image)
+    image.file_format = _FILE_FORMATS[file_format][0]
+    scale = 1.0
+    if file_format == "png16":
+        # A black page has nothing to scale.
+        scale = float(page.pixels.max(initial=0.0)) or 1.0
+        image[SCALE_PROPERTY] = scale
+    pixels = np.ones((height, width, 4), dtype=np.float32)
+    pixels[..., :3] = page.pixels if scale == 1.0 else np.clip(page.pixels / scale, 0.0, 1.0)
+    image.pixels.foreach_set(pixels.ravel())
+    image.update()
+    return image
+
+
+def _store(image: bpy.types.Image, folder: Path | None, file_name: str) -> None:
+    """Save the image into the folder, or pack it."""
+    if folder is None:
+        image.pack()
+        return
+    path = folder / file_name
+    image.filepath_raw = str(path)
+    try:
+        image.save()
+    except RuntimeError as error:
+        raise BakeError(f"cannot write '{path}': {' '.join(str(error).split())}") from error

@@ -1,0 +1,152 @@
+"""Copies of materials that show a lightmap: base color × lightmap, plus their own light.
+
+One copy for each (material, image, whether UVs are pinned), shared between the objects for
+which these are the same. The originals are never edited.
+"""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+
+from ..bake_scene import LIGHTMAP_UV_LAYER
+from .bake_record import is_made, mark_made
+from .images import image_scale
+from .materials import read_material, uses_nodes
+from .node_group import BASE_COLOR, EMISSION, LIGHTMAP, LIGHTMAP_ONLY, SCALE, SHADER, lightmap_group
+from .surface_nodes import BLACK, Surface, feed_color, feed_float, read_surface
+from .uv_pin import pin_uvs
+
+RADIANCE_PER_TEXEL = {"irradiance_over_pi": 1.0, "irradiance": 1.0 / math.pi, "radiosity": 1.0 / math.pi}
+"""What a texel of 1 makes a surface send out [W/m²/sr]: of a white one for the irradiances
+(L = H/π), of the surface itself for radiosity (L = B/π, reflection and emission included)."""
+
+
+class LightmapMaterials:
+    """Makes the lightmap copies of materials for one bake, each once."""
+
+    def __init__(self, quantity: str) -> None:
+        self._quantity = quantity
+        self._made: dict[tuple[bpy.types.Material | None, bpy.types.Image, bool], bpy.types.Material] = {}
+
+    def copy_of(
+        self, material: bpy.types.Material | None, image: bpy.types.Image, pinned: bool
+    ) -> bpy.types.Material:
+        """Return the copy of `material` that shows `image`.
+
+        Parameters
+        ----------
+        material : Material or None
+            None gives a plain grey.
+        image : Image
+            The lightmap page.
+        pinned : bool
+            The object had no UV layer of its own.
+        """
+        key = (material, image, pinned)
+        if key not in self._made:
+            self._made[key] = self._make(material, image, pinned)
+        return self._made[key]
+
+    def _make(
+        self, material: bpy.types.Material | None, image: bpy.types.Image, pinned: bool
+    ) -> bpy.types.Material:
+        """Build one copy."""
+        if material is None:
+            copy = bpy.data.materials.new("No Material (Lightmap)")
+        else:
+            copy = material.copy()
+            copy.name = f"{material.name} (Lightmap)"
+        mark_made(copy)
+        constant = read_material(material)
+        plain = Surface(tuple(constant.reflectance.tolist()), tuple((constant.emission / math.pi).tolist()))
+
+        if material is None or not uses_nodes(material):
+            _enable_nodes(copy)
+            copy.node_tree.nodes.clear()
+            outputs = [copy.node_tree.nodes.new("ShaderNodeOutputMaterial")]
+        else:
+            outputs = [node for node in copy.node_tree.nodes if node.type == "OUTPUT_MATERIAL"]
+            outputs = outputs or [copy.node_tree.nodes.new("ShaderNodeOutputMaterial")]
+            if pinned:
+                pin_uvs(copy.node_tree)
+
+        for index, output in enumerate(outputs):
+            surface = plain
+            if material is not None and uses_nodes(material):
+                surface = read_surface(copy.node_tree, output.inputs["Surface"], plain)
+            self._wire(copy.node_tree, output, surface, image)
+            if index == 0:
+                _skip_light_sampling(copy, surface)
+        return copy
+
+    def _wire(
+        self,
+        tree: bpy.types.NodeTree,
+        output: bpy.types.Node,
+        surface: Surface,
+        image: bpy.types.Image,
+    ) -> None:
+        """Wire UV Map → Image → group → output; the transparent part stays so."""
+        x, y = output.location
+        uv_map = tree.nodes.new("ShaderNodeUVMap")
+        uv_map.uv_map = LIGHTMAP_UV_LAYER
+        uv_map.location = (x - 200, y + 450)
+        texture = tree.nodes.new("ShaderNodeTexImage")
+        texture.image = image
+        texture.extension = "EXTEND"
+        texture.interpolation = "Linear"
+        texture.location = (x, y + 450)
+        group = tree.nodes.new("ShaderNodeGroup")
+        group.node_tree = lightmap_group()
+        group.name = group.label = group.node_tree.name
+        group.location = (x + 300, y + 300)
+        tree.links.new(uv_map.outputs["UV"], texture.inputs["Vector"])
+        tree.links.new(texture.outputs["Color"], group.inputs[LIGHTMAP])
+        group.inputs[SCALE].default_value = RADIANCE_PER_TEXEL[self._quantity] * image_scale(image)
+
+        # Radiosity already holds what the surface reflects and emits.
+        if self._quantity != "radiosity":
+            feed_color(tree, group.inputs[BASE_COLOR], surface.base)
+            feed_color(tree, group.inputs[EMISSION], surface.emission)
+
+        shader = group.outputs[SHADER]
+        if surface.alpha != 1.0:
+            transparent = tree.nodes.new("ShaderNodeBsdfTransparent")
+            transparent.location = (x + 300, y + 450)
+            mix = tree.nodes.new("ShaderNodeMixShader")
+            mix.location = (x + 500, y + 300)
+            feed_float(tree, mix.inputs[0], surface.alpha)
+            tree.links.new(transparent.outputs[0], mix.inputs[1])
+            tree.links.new(shader, mix.inputs[2])
+            shader = mix.outputs[0]
+        tree.links.new(shader, output.inputs["Surface"])
+
+
+def set_lightmap_only(lightmap_only: bool) -> int:
+    """Show the lightmap alone, or base color × lightmap, in all lightmap materials.
+
+    Returns how many materials there are.
+    """
+    count = 0
+    for material in bpy.data.materials:
+        if is_made(material) and material.node_tree is not None:
+            for node in material.node_tree.nodes:
+                if node.type == "GROUP" and node.node_tree is not None and is_made(node.node_tree):
+                    if LIGHTMAP_ONLY in node.inputs:
+                        node.inputs[LIGHTMAP_ONLY].default_value = float(lightmap_only)
+            count += 1
+    return count
+
+
+def _enable_nodes(material: bpy.types.Material) -> None:
+    """Give the material a node tree; Blender 5.0 and later need no asking and warn of it."""
+    if bpy.app.version < (5, 0):
+        material.use_nodes = True
+
+
+def _skip_light_sampling(material: bpy.types.Material, surface: Surface) -> None:
+    """Keep Cycles from sampling baked walls as lamps: they are bright, but light nothing."""
+    if surface.emission == BLACK and hasattr(material, "cycles"):
+        material.cycles.emission_sampling = "NONE"

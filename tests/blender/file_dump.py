@@ -1,0 +1,94 @@
+"""Everything that RNA tells of the open file, as plain data to compare before and after."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+_FILE_COLLECTIONS = (
+    "scenes", "objects", "collections", "meshes", "curves", "shape_keys", "materials", "node_groups",
+    "images", "textures", "worlds", "lights", "cameras", "armatures", "actions", "particles",
+    "libraries", "texts", "metaballs", "lattices",
+)  # fmt: skip
+
+# What belongs to the session or is a cache, not to the file (reading uv_sculpt crashes 4.2).
+_VOLATILE = {
+    "rna_type", "session_uid", "depsgraph", "loop_triangles", "loop_triangle_polygons", "bindcode",
+    "is_evaluated", "preview", "asset_data", "original", "window_managers", "evaluated_depsgraph",
+    "execution_time", "bl_system_properties_get", "warnings", "uv_sculpt", "storage_type",
+}  # fmt: skip
+
+
+def dump_file() -> dict[str, Any]:
+    """Dump all datablocks of the open file by collection and name."""
+    return {
+        f"{collection}/{datablock.name_full}": _dump_struct(datablock, ())
+        for collection in _FILE_COLLECTIONS
+        for datablock in getattr(bpy.data, collection)
+    }
+
+
+def differences(before: Any, after: Any, path: str = "") -> list[str]:
+    """Where two dumps differ, one line each."""
+    if isinstance(before, dict) and isinstance(after, dict):
+        lines = [f"{path}/{key}: gone" for key in before.keys() - after.keys()]
+        lines += [f"{path}/{key}: new" for key in after.keys() - before.keys()]
+        for key in before.keys() & after.keys():
+            lines += differences(before[key], after[key], f"{path}/{key}")
+        return lines
+    if isinstance(before, list) and isinstance(after, list) and len(before) == len(after):
+        return [
+            line
+            for i, (a, b) in enumerate(zip(before, after, strict=True))
+            for line in differences(a, b, f"{path}[{i}]")
+        ]
+    return [] if repr(before) == repr(after) else [f"{path}: {before!r:.120} -> {after!r:.120}"]
+
+
+def _dump_struct(struct: Any, above: tuple[int, ...]) -> Any:
+    """Dump one struct's properties; `above` holds the structs it is nested in."""
+    if struct.as_pointer() in above:
+        return "<itself>"
+    above = (*above, struct.as_pointer())
+    dump = {
+        prop.identifier: _dump_property(struct, prop, above)
+        for prop in struct.bl_rna.properties
+        if prop.identifier not in _VOLATILE
+    }
+    if isinstance(struct, bpy.types.ID):
+        dump["<custom>"] = sorted((key, repr(struct[key])) for key in struct.keys() if key != "cycles")
+    return dump
+
+
+def _dump_property(struct: Any, prop: Any, above: tuple[int, ...]) -> Any:
+    """Dump one property; references to what is dumped elsewhere become names."""
+    if prop.identifier.startswith("radiosity"):
+        return struct.is_property_set(prop.identifier)  # reading it would create it in 4.2
+    value = getattr(struct, prop.identifier)
+    if prop.type == "POINTER":
+        return _dump_reference(value, above)
+    if prop.type == "COLLECTION":
+        return [_dump_reference(item, above) for item in value]
+    if getattr(prop, "is_array", False):
+        return [list(row) if hasattr(row, "__len__") else row for row in value]
+    return sorted(value) if isinstance(value, set) else value
+
+
+def _dump_reference(value: Any, above: tuple[int, ...]) -> Any:
+    """Dump what a pointer or a collection's item refers to."""
+    if value is None:
+        return None
+    if isinstance(value, bpy.types.ID) and not value.is_embedded_data:
+        return f"{value.rna_type.identifier} {value.name_full}"
+    if isinstance(value, bpy.types.NodeLink):
+        return [_socket_name(value.from_socket), _socket_name(value.to_socket), value.is_muted]
+    if isinstance(value, bpy.types.NodeSocket) and len(above) > 3:
+        return _socket_name(value)
+    if isinstance(value, bpy.types.Node) and len(above) > 2:
+        return value.name
+    return _dump_struct(value, above)
+
+
+def _socket_name(socket: Any) -> str:
+    return f"{socket.node.name}:{socket.identifier}"
