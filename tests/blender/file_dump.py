@@ -57,7 +57,7 @@ def _dump_struct(struct: Any, above: tuple[int, ...]) -> Any:
         if prop.identifier not in _VOLATILE
     }
     if isinstance(struct, bpy.types.ID):
-        dump["<custom>"] = sorted((key, repr(struct[key])) for key in struct.keys() if key != "cycles")
+        dump["<custom>"] = {key: _plain(struct[key]) for key in struct.keys()}
     return dump
 
 
@@ -88,6 +88,11 @@ def _dump_reference(value: Any, above: tuple[int, ...]) -> Any:
     if isinstance(value, bpy.types.Node) and len(above) > 2:
         return value.name
     return _dump_struct(value, above)
+
+
+def _plain(value: Any) -> Any:
+    """Turn a custom property into plain data."""
+    return value.to_dict() if hasattr(value, "to_dict") else repr(value)
 
 
 def _socket_name(socket: Any) -> str:
