@@ -112,14 +112,18 @@ class _Collector:
         matrix = matrix_of(instance)
         mesh = self._read(instance)
         if mesh is None or not np.isfinite(matrix).all():
-            raise SceneError(f"object '{shown.name}' has NaN or infinite coordinates; mend its mesh or transform")
+            raise SceneError(
+                f"object '{shown.name}' has NaN or infinite coordinates; mend its mesh or transform"
+            )
         if len(mesh) == 0:
             return
         name = self._unique_name(instance)
         source = source_of(instance, name, not instance.is_instance and shown.name in self._instancers)
         owner = instance.parent.original if instance.is_instance else shown
         is_mesh = shown.type == "MESH"
-        layers = {layer.name for layer in shown.data.uv_layers} if is_mesh and not instance.is_instance else set()
+        layers = (
+            {layer.name for layer in shown.data.uv_layers} if is_mesh and not instance.is_instance else set()
+        )
         self._warn_about(shown, owner, is_mesh)
         self.collected.pieces.append(
             Piece(
@@ -158,13 +162,16 @@ class _Collector:
         self._taken.add(name)
         return name
 
-    def _surfaces(self, instance: bpy.types.DepsgraphObjectInstance, name: str, mesh: MeshArrays) -> np.ndarray:
+    def _surfaces(
+        self, instance: bpy.types.DepsgraphObjectInstance, name: str, mesh: MeshArrays
+    ) -> np.ndarray:
         """Return the row of `collected.surfaces` for each triangle, (t,) int32."""
         if self._override is not None:
             return np.full(len(mesh), self._surface(self._override), dtype=np.int32)
         materials = materials_of(instance)
         if any(material is None for material in materials):
-            self._warn([BakeWarning(name, f"object '{name}': an empty material slot; grey {DEFAULT_GREY} is used")])
+            message = f"object '{name}' has an empty material slot; grey {DEFAULT_GREY} is used"
+            self._warn([BakeWarning(name, message)])
         rows = np.array([self._surface(material) for material in materials or [None]], dtype=np.int32)
         # A face whose slot does not exist shows the last one, as in Blender.
         return rows[np.clip(mesh.material, 0, len(rows) - 1)]
@@ -182,15 +189,18 @@ class _Collector:
         if not is_mesh:
             self._warn([_unlit(shown.name, "is not a mesh", "convert it to one")])
         elif owner.library is not None:
-            self._warn([_unlit(owner.name, "is linked from a library", "make it local or a library override")])
+            self._warn(
+                [_unlit(owner.name, "is linked from a library", "make it local or a library override")]
+            )
         for kind in ("shadow", "diffuse"):
             if not getattr(shown, f"visible_{kind}"):
-                message = f"object '{shown.name}': 'Ray Visibility: {kind.title()}' off is ignored: it lights and blocks"
-                self._warn([BakeWarning(shown.name, message)])
+                message = f"'Ray Visibility: {kind.title()}' off is ignored: it lights and blocks"
+                self._warn([BakeWarning(shown.name, f"object '{shown.name}': {message}")])
 
     def _warn(self, warnings: Sequence[BakeWarning]) -> None:
         self.collected.warnings.extend(warnings)
 
 
 def _unlit(name: str, why: str, mend: str) -> BakeWarning:
-    return BakeWarning(name, f"object '{name}' {why}: it lights and blocks but gets no lightmap; {mend} to bake it")
+    what = f"object '{name}' {why}: it lights and blocks but gets no lightmap"
+    return BakeWarning(name, f"{what}; {mend} to bake it")

@@ -31,7 +31,10 @@ _LAMP_X, _LAMP_Z = (213.0, 343.0), (227.0, 332.0)
 # Corners as Cornell lists them: x to the left, y up, z into the room.
 _WALLS = {
     "Floor": ("White", ((552.8, 0, 0), (0, 0, 0), (0, 0, 559.2), (549.6, 0, 559.2))),
-    "Ceiling": ("White", ((556, _CEILING, 0), (556, _CEILING, 559.2), (0, _CEILING, 559.2), (0, _CEILING, 0))),
+    "Ceiling": (
+        "White",
+        ((556, _CEILING, 0), (556, _CEILING, 559.2), (0, _CEILING, 559.2), (0, _CEILING, 0)),
+    ),
     "Back Wall": ("White", ((549.6, 0, 559.2), (0, 0, 559.2), (0, _CEILING, 559.2), (556, _CEILING, 559.2))),
     "Right Wall": ("Green", ((0, 0, 559.2), (0, 0, 0), (0, _CEILING, 0), (0, _CEILING, 559.2))),
     "Left Wall": ("Red", ((552.8, 0, 0), (549.6, 0, 559.2), (556, _CEILING, 559.2), (556, _CEILING, 0))),
@@ -67,7 +70,7 @@ def build_cornell_box(scene: bpy.types.Scene | None = None) -> bpy.types.Scene:
     scene.world = _black_world()
     scene.view_settings.view_transform = "Standard"
     scene.view_settings.look = "None"
-    scene.view_settings.exposure = 1.0
+    scene.view_settings.exposure = 1.5
     scene.render.resolution_x = scene.render.resolution_y = 512
     scene.render.resolution_percentage = 100
     return scene

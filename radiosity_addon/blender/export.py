@@ -51,7 +51,9 @@ def export_scene(context: bpy.types.Context, settings: BakeSettings) -> Export:
     return _assemble(context, collected, {piece.source.name for piece in chosen}, settings)
 
 
-def _assemble(context: bpy.types.Context, collected: Collected, chosen: set[str], settings: BakeSettings) -> Export:
+def _assemble(
+    context: bpy.types.Context, collected: Collected, chosen: set[str], settings: BakeSettings
+) -> Export:
     warnings = list(collected.warnings)
     reflectance = np.array([surface.reflectance for surface in collected.surfaces]).reshape(-1, 3)
     emission = np.array([surface.emission for surface in collected.surfaces]).reshape(-1, 3)
@@ -68,7 +70,7 @@ def _assemble(context: bpy.types.Context, collected: Collected, chosen: set[str]
         bake = piece.source.name in chosen
         area_to_bake |= bake and not flat.all()
         order = slice(None, None, -1 if mirrored else 1)
-        keep = settings.keep_uvs and mesh.lightmap_uv is not None
+        uv = mesh.lightmap_uv if settings.keep_uvs else None
         objects.append(
             BakeObject(
                 name=piece.source.name,
@@ -77,7 +79,7 @@ def _assemble(context: bpy.types.Context, collected: Collected, chosen: set[str]
                 bake=bake,
                 polygon=mesh.polygon,
                 loops=np.ascontiguousarray(mesh.loops[:, order]),
-                uv=np.ascontiguousarray(mesh.lightmap_uv[:, order]) if keep else None,
+                uv=None if uv is None else np.ascontiguousarray(uv[:, order]),
             )
         )
         corners.append(world)
@@ -159,7 +161,9 @@ def _degenerate_warning(name: str, count: int) -> BakeWarning:
 
 def _no_light(context: bpy.types.Context) -> BakeWarning:
     name = context.scene.name
-    return BakeWarning(name, f"scene '{name}' has no light at all: the lightmaps are black; add a lamp or the sky")
+    return BakeWarning(
+        name, f"scene '{name}' has no light at all: the lightmaps are black; add a lamp or the sky"
+    )
 
 
 def _nothing_to_bake(context: bpy.types.Context) -> str:

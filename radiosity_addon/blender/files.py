@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-import addon_utils
+import addon_utils  # type: ignore[import-not-found]
 import bpy
 
 from ..errors import SceneError
@@ -51,7 +51,14 @@ def empty_scene() -> None:
 
 def _open_blend(path: Path) -> None:
     # load_ui: a saved window layout is of no use, and its areas cost time.
-    _run(path, lambda: bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False))
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False)
+    except RuntimeError:
+        # What Blender says is no help: a newer file is "not a blend file" to it.
+        raise SceneError(
+            f"{path} cannot be read by Blender {bpy.app.version_string}: "
+            "it is damaged, no .blend, or saved by a newer version"
+        ) from None
 
 
 def _import_gltf(path: Path) -> None:
@@ -59,33 +66,31 @@ def _import_gltf(path: Path) -> None:
     if addon_utils.check("io_scene_gltf2")[1] is False:
         addon_utils.enable("io_scene_gltf2", default_set=False)
     empty_scene()
-    _run(path, lambda: bpy.ops.import_scene.gltf(filepath=str(path), export_import_convert_lighting_mode="SPEC"))
+    _import(
+        path,
+        lambda: bpy.ops.import_scene.gltf(filepath=str(path), export_import_convert_lighting_mode="SPEC"),
+    )
 
 
 def _import_obj(path: Path) -> None:
     empty_scene()
-    _run(path, lambda: bpy.ops.wm.obj_import(filepath=str(path)))
+    _import(path, lambda: bpy.ops.wm.obj_import(filepath=str(path)))
 
 
-def _run(path: Path, operation: Callable[[], set[str]]) -> None:
-    """Run an operator, its failure told in one line that names the file."""
+def _import(path: Path, operation: Callable[[], set[str]]) -> None:
+    """Run an importer, its failure told in one line that names the file."""
     try:
-        status = operation()
-    except RuntimeError as error:
-        raise SceneError(f"{path} cannot be read: {_one_line(str(error), path)}") from None
-    except Exception as error:  # the importers let any exception of a broken file through
-        raise SceneError(f"{path} cannot be read: {type(error).__name__}: {_one_line(str(error), path)}") from None
-    if "FINISHED" not in status:
-        raise SceneError(f"{path} cannot be read: Blender gave up on it; is the file complete?")
+        operation()
+    except Exception as error:  # noqa: BLE001 - importers let any exception of a broken file through
+        raise SceneError(f"{path} cannot be read: {_last_line(str(error))}; is the file complete?") from None
+    if len(bpy.data.objects) == 0:
+        raise SceneError(f"{path} cannot be read: no object was found in it; is the file complete?")
 
 
-def _one_line(message: str, path: Path) -> str:
-    """Keep the last line of an operator's message, without Blender's prefix and our path."""
+def _last_line(message: str) -> str:
+    """Keep the last line of an operator's message, without Blender's prefix."""
     lines = [line.strip() for line in message.splitlines() if line.strip()]
-    line = lines[-1] if lines else "unknown error"
-    for noise in ("Error: ", f'Cannot read file "{path}": ', f"Cannot read file '{path}': "):
-        line = line.removeprefix(noise)
-    return line
+    return lines[-1].removeprefix("Error: ") if lines else "unknown error"
 
 
 _OPENERS: dict[str, Callable[[Path], None]] = {

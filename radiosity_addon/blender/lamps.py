@@ -15,7 +15,9 @@ from .materials import read_radiance, uses_nodes
 _SAME_SCALE = 1e-4  # relative difference of axes below which a scale counts as uniform
 
 
-def read_lamp(lamp: bpy.types.Object, matrix_world: np.ndarray) -> tuple[Light | None, tuple[BakeWarning, ...]]:
+def read_lamp(
+    lamp: bpy.types.Object, matrix_world: np.ndarray
+) -> tuple[Light | None, tuple[BakeWarning, ...]]:
     """Return the light that a lamp object, or an instance of one, is.
 
     Parameters
@@ -42,12 +44,16 @@ def read_lamp(lamp: bpy.types.Object, matrix_world: np.ndarray) -> tuple[Light |
     strength, notes = _strength(name, data)
     warnings += notes
     if not (np.isfinite(matrix_world).all() and np.isfinite(strength).all()):
-        raise SceneError(f"lamp '{name}' has a NaN or infinite position or power; mend its transform and strength")
+        raise SceneError(
+            f"lamp '{name}' has a NaN or infinite position or power; mend its transform and strength"
+        )
     if (strength < 0).any():
         warnings.append(BakeWarning(name, f"lamp '{name}': negative power is not possible; 0 is used"))
         strength = np.maximum(strength, 0.0)
+    if not strength.any():
+        return None, tuple(warnings)
     light, notes = _MAKE[data.type](name, data, matrix_world, strength)
-    return (light if strength.any() else None), tuple(warnings + notes)
+    return light, tuple(warnings + notes)
 
 
 def _strength(name: str, data: bpy.types.Light) -> tuple[np.ndarray, list[BakeWarning]]:
@@ -62,15 +68,23 @@ def _strength(name: str, data: bpy.types.Light) -> tuple[np.ndarray, list[BakeWa
     return strength * factor, [BakeWarning(name, warning.message) for warning in warnings]
 
 
-def _point(name: str, data: bpy.types.Light, matrix: np.ndarray, strength: np.ndarray) -> tuple[Light, list[BakeWarning]]:
+def _point(
+    name: str, data: bpy.types.Light, matrix: np.ndarray, strength: np.ndarray
+) -> tuple[Light, list[BakeWarning]]:
     # The object's scale does not act on the radius (measured in Cycles 4.2 and 5.0).
     radius = data.shadow_soft_size
     return PointLight(
-        matrix[:3, 3], strength * _sphere_area(data), radius=radius, soft_falloff=data.use_soft_falloff
+        matrix[:3, 3],
+        strength * _sphere_area(data),
+        radius=radius,
+        soft_falloff=data.use_soft_falloff,
+        name=name,
     ), []
 
 
-def _spot(name: str, data: bpy.types.Light, matrix: np.ndarray, strength: np.ndarray) -> tuple[Light, list[BakeWarning]]:
+def _spot(
+    name: str, data: bpy.types.Light, matrix: np.ndarray, strength: np.ndarray
+) -> tuple[Light, list[BakeWarning]]:
     scale = np.linalg.norm(matrix[:3, :3], axis=0)
     angle, warnings = data.spot_size, []
     if scale.min() > 0 and np.ptp(scale) > _SAME_SCALE * scale.max() and angle < math.pi:
@@ -78,7 +92,9 @@ def _spot(name: str, data: bpy.types.Light, matrix: np.ndarray, strength: np.nda
         stretch = math.sqrt(scale[0] * scale[1]) / scale[2]
         angle = 2.0 * math.atan(math.tan(angle / 2.0) * stretch)
         warnings.append(
-            BakeWarning(name, f"lamp '{name}': scaled unevenly; a round cone of {math.degrees(angle):.3g}° is used")
+            BakeWarning(
+                name, f"lamp '{name}': scaled unevenly; a round cone of {math.degrees(angle):.3g}° is used"
+            )
         )
     return SpotLight(
         matrix[:3, 3],
@@ -88,16 +104,21 @@ def _spot(name: str, data: bpy.types.Light, matrix: np.ndarray, strength: np.nda
         blend=data.spot_blend,
         radius=data.shadow_soft_size,
         soft_falloff=data.use_soft_falloff,
+        name=name,
     ), warnings
 
 
-def _sun(name: str, data: bpy.types.Light, matrix: np.ndarray, strength: np.ndarray) -> tuple[Light, list[BakeWarning]]:
+def _sun(
+    name: str, data: bpy.types.Light, matrix: np.ndarray, strength: np.ndarray
+) -> tuple[Light, list[BakeWarning]]:
     if not getattr(data, "normalize", True):
         strength = strength * math.pi * math.sin(data.angle / 2.0) ** 2  # its projected solid angle
-    return SunLight(_backward(matrix), strength, angle=data.angle), []
+    return SunLight(_backward(matrix), strength, angle=data.angle, name=name), []
 
 
-def _area(name: str, data: bpy.types.Light, matrix: np.ndarray, strength: np.ndarray) -> tuple[Light, list[BakeWarning]]:
+def _area(
+    name: str, data: bpy.types.Light, matrix: np.ndarray, strength: np.ndarray
+) -> tuple[Light, list[BakeWarning]]:
     # Power stays the same when the object is scaled, the emitting surface does not.
     size_y = data.size_y if data.shape in ("RECTANGLE", "ELLIPSE") else data.size
     edge_u = matrix[:3, 0] * data.size
@@ -107,12 +128,10 @@ def _area(name: str, data: bpy.types.Light, matrix: np.ndarray, strength: np.nda
     shape = "ellipse" if data.shape in ("DISK", "ELLIPSE") else "rectangle"
     area = float(np.linalg.norm(np.cross(edge_u, edge_v))) * (math.pi / 4 if shape == "ellipse" else 1.0)
     if area == 0.0:
-        if not strength.any():
-            return AreaLight(matrix[:3, 3], edge_u, edge_v, strength, shape=shape), []
         raise SceneError(f"lamp '{name}' has no area; give it a size and a scale above 0")
     if not getattr(data, "normalize", True):
         strength = strength * area
-    return AreaLight(matrix[:3, 3], edge_u, edge_v, strength, shape=shape), []
+    return AreaLight(matrix[:3, 3], edge_u, edge_v, strength, shape=shape, name=name), []
 
 
 def _backward(matrix: np.ndarray) -> np.ndarray:

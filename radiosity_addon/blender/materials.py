@@ -13,7 +13,7 @@ import numpy as np
 
 from ..bake_scene import BakeWarning
 from ..solver.scene import MAX_REFLECTANCE
-from .shader_nodes import NotConstant, Stack, Value, default_rgb, evaluate, feed_of, output_node
+from .shader_nodes import NotConstantError, Stack, Value, default_rgb, evaluate, feed_of, output_node
 
 DEFAULT_GREY = 0.8
 """Reflectance of a face without material, as in Cycles."""
@@ -86,7 +86,9 @@ def read_material(material: bpy.types.Material | None) -> Surface:
     )
 
 
-def read_radiance(owner: bpy.types.Light | bpy.types.World, kind: str) -> tuple[np.ndarray, tuple[BakeWarning, ...]]:
+def read_radiance(
+    owner: bpy.types.Light | bpy.types.World, kind: str
+) -> tuple[np.ndarray, tuple[BakeWarning, ...]]:
     """Return the constant radiance that a lamp's or world's own node tree gives.
 
     Parameters
@@ -160,7 +162,7 @@ class _Reader:
         if node.type == "MIX_SHADER":
             return self._mix(node, feed.stack)
         if node.type == "ADD_SHADER":
-            first, second = (self.shader(input, feed.stack) for input in node.inputs[:2])
+            first, second = (self.shader(socket, feed.stack) for socket in node.inputs[:2])
             return _Shader(first.reflectance + second.reflectance, first.radiance + second.radiance)
         return self._not_understood(node, feed.stack)
 
@@ -168,12 +170,14 @@ class _Reader:
         """Return a socket's constant (3,), with a warning where it stands for something else."""
         try:
             value = evaluate(socket, stack)
-        except NotConstant as reason:
+        except NotConstantError as reason:
             default = default_rgb(socket)
             self.warn(f"{socket.name} comes from {reason}; {_text(default)} is used")
             return default
         if value.notes:
-            self.warn(f"{socket.name} comes from {', '.join(value.notes)}; the mean {_text(value.rgb)} is used")
+            self.warn(
+                f"{socket.name} comes from {', '.join(value.notes)}; the mean {_text(value.rgb)} is used"
+            )
         return value.rgb
 
     def scalar(self, socket: bpy.types.NodeSocket, stack: Stack) -> float:
@@ -213,7 +217,7 @@ class _Reader:
         return _Shader(self.value(node.inputs["Base Color"], stack), radiance)
 
     def _mix(self, node: bpy.types.Node, stack: Stack) -> _Shader:
-        first, second = (self.shader(input, stack) for input in node.inputs[1:3])
+        first, second = (self.shader(socket, stack) for socket in node.inputs[1:3])
         if first.transparent != second.transparent:
             self.warn("transparency is ignored: the surface is baked opaque with its other shader")
             return second if first.transparent else first

@@ -79,8 +79,9 @@ def same_polygons(first: bpy.types.Mesh, second: bpy.types.Mesh) -> bool:
     if sizes[0] != sizes[1]:
         return False
     for collection, attribute in (("polygons", "loop_start"), ("loops", "vertex_index")):
-        a, b = (getattr(mesh, collection) for mesh in (first, second))
-        if not np.array_equal(*(_read(values, attribute, (len(values),), np.int32) for values in (a, b))):
+        rows = [getattr(mesh, collection) for mesh in (first, second)]
+        values = [_read(row, attribute, (len(row),), np.int32) for row in rows]
+        if not np.array_equal(values[0], values[1]):
             return False
     return True
 
@@ -109,7 +110,7 @@ def world_from_object(mesh: MeshArrays, matrix: np.ndarray) -> tuple[np.ndarray,
     corners = mesh.corners @ linear.T + matrix[:3, 3]
     mirrored = bool(np.linalg.det(linear) < 0)
     # The cofactor matrix is det · inverse-transpose, and exists for flattening ones too.
-    cofactors = np.array([np.cross(linear[1], linear[2]), np.cross(linear[2], linear[0]), np.cross(linear[0], linear[1])])
+    cofactors = np.cross(np.roll(linear, -1, axis=0), np.roll(linear, -2, axis=0))
     normals = mesh.normals @ (-cofactors if mirrored else cofactors).T
     if mirrored:
         corners, normals = corners[:, ::-1], normals[:, ::-1]
@@ -133,7 +134,9 @@ def _unit_normals(normals: np.ndarray, corners: np.ndarray) -> np.ndarray:
     return normals / np.where(length > 0, length, 1.0)
 
 
-def _read(collection: bpy.types.bpy_prop_collection, attribute: str, shape: tuple[int, ...], kind: type) -> np.ndarray:
-    values = np.empty(int(np.prod(shape)), dtype=kind)
+def _read(
+    collection: bpy.types.bpy_prop_collection, attribute: str, shape: tuple[int, ...], kind: type
+) -> np.ndarray:
+    values: np.ndarray = np.empty(int(np.prod(shape)), dtype=kind)
     collection.foreach_get(attribute, values)
     return values.reshape(shape)

@@ -14,10 +14,38 @@ from .render_state import render_depsgraph
 _NO_ID = 2**31 - 1  # fills the unused end of a persistent id
 
 _KEEPS_POLYGONS = frozenset(
-    "ARMATURE CAST CLOTH COLLISION CORRECTIVE_SMOOTH CURVE DATA_TRANSFER DISPLACE HOOK LAPLACIANDEFORM "
-    "LAPLACIANSMOOTH LATTICE MESH_CACHE MESH_DEFORM NORMAL_EDIT PARTICLE_SYSTEM SHRINKWRAP SIMPLE_DEFORM SMOOTH "
-    "SOFT_BODY SURFACE SURFACE_DEFORM UV_PROJECT UV_WARP VERTEX_WEIGHT_EDIT VERTEX_WEIGHT_MIX "
-    "VERTEX_WEIGHT_PROXIMITY WARP WAVE WEIGHTED_NORMAL".split()
+    {
+        "ARMATURE",
+        "CAST",
+        "CLOTH",
+        "COLLISION",
+        "CORRECTIVE_SMOOTH",
+        "CURVE",
+        "DATA_TRANSFER",
+        "DISPLACE",
+        "HOOK",
+        "LAPLACIANDEFORM",
+        "LAPLACIANSMOOTH",
+        "LATTICE",
+        "MESH_CACHE",
+        "MESH_DEFORM",
+        "NORMAL_EDIT",
+        "PARTICLE_SYSTEM",
+        "SHRINKWRAP",
+        "SIMPLE_DEFORM",
+        "SMOOTH",
+        "SOFT_BODY",
+        "SURFACE",
+        "SURFACE_DEFORM",
+        "UV_PROJECT",
+        "UV_WARP",
+        "VERTEX_WEIGHT_EDIT",
+        "VERTEX_WEIGHT_MIX",
+        "VERTEX_WEIGHT_PROXIMITY",
+        "WARP",
+        "WAVE",
+        "WEIGHTED_NORMAL",
+    }
 )
 """Modifiers that move or mark what is there. Geometry nodes are not among them: they may
 set materials and drop UV layers even where the polygons stay."""
@@ -69,18 +97,19 @@ def materials_of(instance: bpy.types.DepsgraphObjectInstance) -> list[bpy.types.
 
 
 def source_of(instance: bpy.types.DepsgraphObjectInstance, name: str, makes_instances: bool) -> ExportSource:
-    """Return the record by which `copy_evaluated_meshes` and others find it again."""
-    shown = original_object(instance)
-    matrix = tuple(tuple(float(value) for value in row) for row in instance.matrix_world)
+    """Return the record by which what was exported is found again."""
+    object_name, library, instancer, persistent_id = _identity(instance)
     return ExportSource(
         name=name,
-        object_name=shown.name,
-        library=shown.library.filepath if shown.library else None,
+        object_name=object_name,
+        library=library,
         is_instance=instance.is_instance,
-        instancer=instance.parent.original.name if instance.is_instance else "",
-        persistent_id=_persistent_id(instance),
-        matrix_world=matrix,
-        needs_evaluated_mesh=instance.is_instance or makes_instances or _modifiers_change_polygons(instance.object),
+        instancer=instancer,
+        persistent_id=persistent_id,
+        matrix_world=tuple(tuple(float(value) for value in row) for row in instance.matrix_world),
+        needs_evaluated_mesh=instance.is_instance
+        or makes_instances
+        or _modifiers_change_polygons(instance.object),
         makes_instances=makes_instances,
     )
 
@@ -102,27 +131,36 @@ def copy_evaluated_meshes(
         By `ExportSource.name`: polygons and loops in the exported order, all layers, and
         the materials it is drawn with. Nothing uses them yet.
     """
-    wanted = {_key(source): source.name for source in sources}
+    wanted = {
+        (source.object_name, source.library, source.instancer, source.persistent_id): source.name
+        for source in sources
+    }
     meshes: dict[str, bpy.types.Mesh] = {}
     with render_depsgraph(context) as depsgraph:
         for instance in visible_objects(depsgraph):
             if instance.object.type != "MESH" or not wanted:
                 continue
-            name = wanted.pop(_key(source_of(instance, "", False)), None)
+            name = wanted.pop(_identity(instance), None)
             if name is not None:
                 meshes[name] = _copy_mesh(instance, depsgraph)
     return meshes
 
 
-def _key(source: ExportSource) -> tuple:
-    return source.object_name, source.library, source.instancer, source.persistent_id
+def _identity(instance: bpy.types.DepsgraphObjectInstance) -> tuple[str, str | None, str, tuple[int, ...]]:
+    """Return what tells an instance from all others: object, library, instancer, persistent id."""
+    shown = original_object(instance)
+    library = shown.library.filepath if shown.library else None
+    instancer = instance.parent.original.name if instance.is_instance else ""
+    return shown.name, library, instancer, _persistent_id(instance)
 
 
 def _copy_mesh(instance: bpy.types.DepsgraphObjectInstance, depsgraph: bpy.types.Depsgraph) -> bpy.types.Mesh:
     if is_generated(instance):
         mesh = instance.object.data.copy()
     else:
-        mesh = bpy.data.meshes.new_from_object(instance.object, preserve_all_data_layers=True, depsgraph=depsgraph)
+        mesh = bpy.data.meshes.new_from_object(
+            instance.object, preserve_all_data_layers=True, depsgraph=depsgraph
+        )
     materials = [material and material.original for material in materials_of(instance)]
     # In place: clearing the slots would move every polygon to the first.
     for index, material in enumerate(materials):

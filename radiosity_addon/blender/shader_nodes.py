@@ -2,7 +2,7 @@
 
 Reroutes, muted nodes and links, and node groups at any depth are seen through. Values
 are constants only: what varies over the surface is replaced by its mean (images) or
-refused (`NotConstant`), and the caller falls back on the socket's own default.
+refused (`NotConstantError`), and the caller falls back on the socket's own default.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 _MAX_STEPS = 1000  # a tree with an invalid cycle must not hang us
 
 
-class NotConstant(Exception):
+class NotConstantError(Exception):
     """What feeds a socket varies over the surface; the message names it."""
 
 
@@ -88,7 +88,7 @@ def evaluate(socket: bpy.types.NodeSocket, stack: Stack = ()) -> Value:
 
     Raises
     ------
-    NotConstant
+    NotConstantError
         If a node on the way is not understood.
     """
     feed = feed_of(socket, stack)
@@ -96,8 +96,8 @@ def evaluate(socket: bpy.types.NodeSocket, stack: Stack = ()) -> Value:
         return Value(default_rgb(feed.socket))
     compute = _COMPUTE.get(feed.node.type)
     if compute is None:
-        raise NotConstant(f"node '{feed.node.bl_label}'")
-    return compute(feed)
+        raise NotConstantError(f"node '{feed.node.bl_label}'")
+    return compute(feed.node, feed.socket, feed.stack)
 
 
 def default_rgb(socket: bpy.types.NodeSocket) -> np.ndarray:
@@ -123,56 +123,55 @@ def _by_identifier(sockets: bpy.types.bpy_prop_collection, identifier: str) -> b
     return next((socket for socket in sockets if socket.identifier == identifier), None)
 
 
-def _constant(feed: Feed) -> Value:
-    return Value(default_rgb(feed.socket))
+def _constant(_: bpy.types.Node, output: bpy.types.NodeSocket, _stack: Stack) -> Value:
+    return Value(default_rgb(output))
 
 
-def _image(feed: Feed) -> Value:
-    image = feed.node.image
+def _image(node: bpy.types.Node, output: bpy.types.NodeSocket, _stack: Stack) -> Value:
+    image = node.image
     if image is None:
-        raise NotConstant("an image texture without an image")
-    mean = image_mean(image, equirectangular=feed.node.type == "TEX_ENVIRONMENT")
+        raise NotConstantError("an image texture without an image")
+    mean = image_mean(image, equirectangular=node.type == "TEX_ENVIRONMENT")
     if mean is None:
-        raise NotConstant(f"image '{image.name}', which has no pixels (is its file missing?)")
-    rgb = np.full(3, mean[3]) if feed.socket.name == "Alpha" else mean[:3]
+        raise NotConstantError(f"image '{image.name}', which has no pixels (is its file missing?)")
+    rgb = np.full(3, mean[3]) if output.name == "Alpha" else mean[:3]
     return Value(rgb, (f"image '{image.name}'",))
 
 
-def _light_path(feed: Feed) -> Value:
+def _light_path(_: bpy.types.Node, output: bpy.types.NodeSocket, _stack: Stack) -> Value:
     # A lightmap sees diffuse bounces only.
     known = {"Is Camera Ray": 0.0, "Is Diffuse Ray": 1.0, "Is Glossy Ray": 0.0, "Is Transmission Ray": 0.0}
-    if feed.socket.name not in known:
-        raise NotConstant(f"Light Path '{feed.socket.name}'")
-    return Value(np.full(3, known[feed.socket.name]))
+    if output.name not in known:
+        raise NotConstantError(f"Light Path '{output.name}'")
+    return Value(np.full(3, known[output.name]))
 
 
-def _mix(feed: Feed) -> Value:
-    node = feed.node
+def _mix(node: bpy.types.Node, _: bpy.types.NodeSocket, stack: Stack) -> Value:
     if node.type == "MIX":
         kind = {"RGBA": "Color", "FLOAT": "Float", "VECTOR": "Vector"}.get(node.data_type)
         if kind is None or (kind == "Vector" and node.factor_mode != "UNIFORM"):
-            raise NotConstant(f"node '{node.bl_label}'")
+            raise NotConstantError(f"node '{node.bl_label}'")
         names = ("Factor_Float", f"A_{kind}", f"B_{kind}")
         sockets = [_by_identifier(node.inputs, name) for name in names]
         blend = node.blend_type if kind == "Color" else "MIX"
         clamp = kind == "Color" and node.clamp_result
     else:
         sockets, blend, clamp = list(node.inputs[:3]), node.blend_type, node.use_clamp
-    factor, a, b = (evaluate(socket, feed.stack) for socket in sockets)
+    factor, a, b = (evaluate(socket, stack) for socket in sockets)
     if blend not in _BLEND:
-        raise NotConstant(f"node '{node.bl_label}' ({blend.lower()})")
+        raise NotConstantError(f"node '{node.bl_label}' ({blend.lower()})")
     share = min(max(factor.scalar, 0.0), 1.0)
     rgb = (1 - share) * a.rgb + share * _BLEND[blend](a.rgb, b.rgb)
     return Value(np.clip(rgb, 0, 1) if clamp else rgb, _merge(factor.notes, a.notes, b.notes))
 
 
-def _math(feed: Feed) -> Value:
-    operation = _MATH.get(feed.node.operation)
+def _math(node: bpy.types.Node, _: bpy.types.NodeSocket, stack: Stack) -> Value:
+    operation = _MATH.get(node.operation)
     if operation is None:
-        raise NotConstant(f"node '{feed.node.bl_label}' ({feed.node.operation.lower()})")
-    a, b = (evaluate(socket, feed.stack) for socket in feed.node.inputs[:2])
+        raise NotConstantError(f"node '{node.bl_label}' ({node.operation.lower()})")
+    a, b = (evaluate(socket, stack) for socket in node.inputs[:2])
     result = operation(a.scalar, b.scalar)
-    if feed.node.use_clamp:
+    if node.use_clamp:
         result = min(max(result, 0.0), 1.0)
     return Value(np.full(3, result), _merge(a.notes, b.notes))
 
@@ -182,7 +181,7 @@ def _merge(*notes: tuple[str, ...]) -> tuple[str, ...]:
 
 
 _BLEND = {
-    "MIX": lambda a, b: b,
+    "MIX": lambda _, b: b,
     "MULTIPLY": lambda a, b: a * b,
     "ADD": lambda a, b: a + b,
     "SUBTRACT": lambda a, b: a - b,

@@ -21,4 +21,4 @@ def read_world(world: bpy.types.World | None) -> tuple[EnvironmentLight | None, 
         radiance, warnings = read_radiance(world, "world")
     else:
         radiance, warnings = np.array(world.color[:3], dtype=np.float64), ()
-    return (EnvironmentLight(radiance) if radiance.any() else None), warnings
+    return (EnvironmentLight(radiance, name=world.name) if radiance.any() else None), warnings
