@@ -1,0 +1,224 @@
+"""Lamps that shine from about a point: Cycles' point and spot lights."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from .curved_factor import cap_cosine
+from .light_base import Emitter, Float64Array, Rays, Samples, directions_to, row_cosines
+from .sampling import concentric_disk, cosine_hemisphere, to_world, uniform_cone
+
+_EDGE_SAMPLES = 16
+"""Samples across a spot's disk, each way, that average the cone's edge over it."""
+
+_EDGE_CHUNK = 1 << 10
+"""Points whose edge samples are taken at a time; temporaries stay below 64 MB."""
+
+
+class _Bulb(Emitter):
+    """What point and spot lamps share: intensity power/4π, a radius and an attenuation by direction.
+
+    With soft falloff the lamp is a disk of that radius facing the receiver, of radiance
+    I/(π r²): H = I cosθ / (d² + r²) while all of it is up. Without, a sphere of the same
+    radiance: H = I cosθ / d², and I/r² for points inside it.
+    """
+
+    position: npt.ArrayLike
+    power: npt.ArrayLike
+    radius: float
+    soft_falloff: bool
+
+    @property
+    def strength(self) -> Float64Array:
+        return np.asarray(self.power, dtype=np.float64)
+
+    def _validate(self) -> None:
+        self._set_vector("position")
+        self._set_rgb("power")
+        self._set_number("radius", 0.0, np.finfo(float).max)
+
+    def _attenuation(self, directions: Float64Array) -> Float64Array:
+        """Return (...,) shares of the intensity sent along unit directions (..., 3) from the lamp."""
+        return np.ones(directions.shape[:-1])
+
+    def unit_irradiance(self, points: Float64Array, normals: Float64Array) -> Float64Array:
+        toward, distance = directions_to(np.asarray(self.position) - points)
+        cosine = np.einsum("ij,ij->i", toward, normals)
+        reach = np.hypot(distance, self.radius) if self.soft_falloff else np.maximum(distance, self.radius)
+        reach = np.where(reach > 0.0, reach, np.inf)
+        effective = cap_cosine(cosine, self.radius / reach)
+        if not self.soft_falloff:
+            effective = np.where(distance < self.radius, 1.0, effective)
+        return effective / (4.0 * np.pi * reach * reach)
+
+    def shadow_rays(self, points: Float64Array, normals: Float64Array, u: Samples) -> Rays:
+        directions, distances, weights = self._plain_rays(points, normals, u)
+        return directions, distances, weights * self._attenuation(-directions) / (4.0 * np.pi * u.shape[1])
+
+    def _plain_rays(self, points: Float64Array, normals: Float64Array, u: Samples) -> Rays:
+        """Return rays whose weights leave the attenuation out and average to irradiance per intensity."""
+        toward, distance = directions_to(np.asarray(self.position) - points)
+        if self.soft_falloff or self.radius == 0.0:
+            return self._disk_rays(toward, distance, normals, u)
+        return self._sphere_rays(toward, distance, normals, u)
+
+    def _disk_rays(
+        self, toward: Float64Array, distance: Float64Array, normals: Float64Array, u: Samples
+    ) -> Rays:
+        """Sample the disk across `toward` by area."""
+        on_disk = self.radius * concentric_disk(u.astype(np.float64))
+        depth = np.broadcast_to(distance[:, None, None], on_disk.shape[:-1] + (1,))
+        directions, distances = directions_to(to_world(np.concatenate([on_disk, depth], axis=-1), toward))
+        cosine = row_cosines(directions, normals)
+        facing = np.einsum("ikj,ij->ik", directions, toward)
+        square = distances * distances
+        return directions, distances, cosine * facing / np.where(square > 0.0, square, np.inf)
+
+    def _sphere_rays(
+        self, toward: Float64Array, distance: Float64Array, normals: Float64Array, u: Samples
+    ) -> Rays:
+        """Sample the cone the sphere fills, or the hemisphere from inside."""
+        square = np.where(distance > self.radius, distance, np.inf) ** 2
+        sine_square = self.radius**2 / square
+        drop = sine_square / (1.0 + np.sqrt(1.0 - sine_square))
+        inside = distance <= self.radius
+        samples = u.astype(np.float64)
+        cone = to_world(uniform_cone(samples, drop[:, None]), toward)
+        directions = np.where(inside[:, None, None], to_world(cosine_hemisphere(samples), normals), cone)
+        ahead = distance[:, None] * np.einsum("ikj,ij->ik", directions, toward)
+        half_chord = np.sqrt(np.maximum(self.radius**2 - distance[:, None] ** 2 + ahead * ahead, 0.0))
+        distances = np.where(inside[:, None], ahead + half_chord, ahead - half_chord)
+        cosine = row_cosines(directions, normals)
+        # Ω / (π r²) per unit of intensity, with Ω = 2π (1 − cosα).
+        weights = np.where(inside[:, None], 1.0, 2.0 * drop[:, None] * cosine) / self.radius**2
+        return directions, distances, weights
+
+
+@dataclass(frozen=True, eq=False)
+class PointLight(_Bulb):
+    """A lamp that shines alike in all directions.
+
+    Parameters
+    ----------
+    position : (3,) float [m]
+    power : float or (3,) float [W]
+        Emitted power; the intensity is power / 4π.
+    radius : float [m]
+    soft_falloff : bool
+        A disk facing the receiver (Blender's default) instead of a sphere. It sends slightly
+        less than its power: power · R²/(R² + r²) through a sphere of radius R around it.
+
+    Raises
+    ------
+    SceneError
+        If a value is negative, NaN or infinite.
+    """
+
+    position: npt.ArrayLike
+    power: npt.ArrayLike
+    radius: float = 0.0
+    soft_falloff: bool = True
+
+    def __post_init__(self) -> None:
+        self._validate()
+
+    @property
+    def flux(self) -> Float64Array:
+        return self.strength.copy()
+
+    def emit(self, place: Samples, way: Samples) -> Rays:
+        """Return rays from the lamp's centre, uniform over the sphere (see `Emitter.emit`)."""
+        directions = uniform_cone(np.asarray(way, dtype=np.float64), 2.0)
+        return np.broadcast_to(np.asarray(self.position), directions.shape), directions, np.ones(len(directions))
+
+
+@dataclass(frozen=True, eq=False)
+class SpotLight(_Bulb):
+    """A point lamp that shines into a cone only, with the point lamp's intensity.
+
+    Parameters
+    ----------
+    position : (3,) float [m]
+    direction : (3,) float
+        The cone's axis, away from the lamp.
+    power : float or (3,) float [W]
+        The power an unshaded lamp of that intensity would emit: intensity = power / 4π.
+    angle : float [rad]
+        The full cone, above 0 to π.
+    blend : float
+        Share of 1 − cos(angle/2) over which the edge fades by a smoothstep in the cosine.
+    radius, soft_falloff : as for a `PointLight`
+
+    Raises
+    ------
+    SceneError
+        If a value is out of range.
+    """
+
+    position: npt.ArrayLike
+    direction: npt.ArrayLike
+    power: npt.ArrayLike
+    angle: float
+    blend: float = 0.15
+    radius: float = 0.0
+    soft_falloff: bool = True
+
+    def __post_init__(self) -> None:
+        self._validate()
+        self._set_vector("direction", unit=True)
+        self._set_number("angle", 0.0, float(np.pi) + 1e-6, above=True)
+        self._set_number("blend", 0.0, 1.0)
+
+    @property
+    def flux(self) -> Float64Array:
+        """(3,) RGB power inside the cone [W]: the smoothstep's mean is a half."""
+        return 0.5 * self.strength * self._opening * (1.0 - 0.5 * self.blend)
+
+    @property
+    def _opening(self) -> float:
+        """1 − cos(angle/2), exact for narrow cones too."""
+        return float(2.0 * np.sin(0.25 * self.angle) ** 2)
+
+    def emit(self, place: Samples, way: Samples) -> Rays:
+        """Return rays from the lamp's centre, uniform over the cone (see `Emitter.emit`)."""
+        axis = np.asarray(self.direction)[None]
+        directions = to_world(uniform_cone(np.asarray(way, dtype=np.float64), self._opening)[None], axis)[0]
+        origins = np.broadcast_to(np.asarray(self.position), directions.shape)
+        return origins, directions, self._attenuation(directions)
+
+    def _attenuation(self, directions: Float64Array) -> Float64Array:
+        edge = np.cos(0.5 * self.angle)
+        above = directions @ np.asarray(self.direction) - edge
+        if self.blend == 0.0:
+            return np.where(above > 0.0, 1.0, 0.0)
+        step = np.clip(above / (self.blend * self._opening), 0.0, 1.0)
+        return step * step * (3.0 - 2.0 * step)
+
+    def unit_irradiance(self, points: Float64Array, normals: Float64Array) -> Float64Array:
+        """Return the irradiance per power; where the cone's edge crosses the lamp, averaged over it."""
+        toward, distance = directions_to(np.asarray(self.position) - points)
+        share = self._attenuation(-toward)
+        rows = np.flatnonzero(self._edge_crosses(toward, distance))
+        step = (np.arange(_EDGE_SAMPLES) + 0.5) / _EDGE_SAMPLES
+        grid = np.stack(np.meshgrid(step, step), axis=-1).reshape(1, -1, 2)
+        for start in range(0, len(rows), _EDGE_CHUNK):
+            part = rows[start : start + _EDGE_CHUNK]
+            u = np.broadcast_to(grid, (len(part), grid.shape[1], 2))
+            directions, _, plain = self._plain_rays(points[part], normals[part], u)
+            lit = (plain * self._attenuation(-directions)).sum(axis=1)
+            total = plain.sum(axis=1)
+            share[part] = lit / np.where(total > 0.0, total, 1.0)
+        return super().unit_irradiance(points, normals) * share
+
+    def _edge_crosses(self, toward: Float64Array, distance: Float64Array) -> npt.NDArray[np.bool_]:
+        """Return (n,) whether the attenuation differs over the lamp's disk or sphere as seen."""
+        half = 0.5 * self.angle
+        plateau = np.arccos(np.clip(np.cos(half) + self.blend * self._opening, -1.0, 1.0))
+        off_axis = np.arccos(np.clip(-(toward @ np.asarray(self.direction)), -1.0, 1.0))
+        spread = np.arctan2(self.radius, distance)
+        if not self.soft_falloff:
+            spread = np.arcsin(np.minimum(self.radius / np.maximum(distance, np.finfo(float).tiny), 1.0))
+        return (spread > 0.0) & (off_axis + spread > plateau) & (off_axis - spread < half)

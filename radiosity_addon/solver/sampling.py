@@ -1,0 +1,211 @@
+"""Where samples lie: low-discrepancy points and the maps that carry them onto shapes.
+
+Counter-based: a point depends on its row's key, its own index and the seed alone, never on
+what was drawn before, so neither chunks nor threads change a result.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.floating[Any]]
+
+_SOBOL_BITS = 32
+
+
+def hash_keys(keys: npt.ArrayLike, seed: int = 0) -> npt.NDArray[np.uint32]:
+    """Mix integers into 32 well-scattered bits each.
+
+    An avalanche of xor-shifts and odd multiplications, applied to the low word, then to the
+    high word and the seed, so that keys above 2³² and neighbouring seeds stay apart.
+
+    Parameters
+    ----------
+    keys : (...,) non-negative integers
+    seed : int
+
+    Returns
+    -------
+    bits : (...,) uint32
+    """
+    wide = np.asarray(keys).astype(np.uint64)
+    low = (wide & np.uint64(0xFFFFFFFF)).astype(np.uint32)
+    high = (wide >> np.uint64(32)).astype(np.uint32)
+    salt = np.array([seed & 0xFFFFFFFF, (seed >> 32) & 0xFFFFFFFF], dtype=np.uint32)
+    mixed = _avalanche(high + np.uint32(0x9E3779B9) ^ _avalanche(salt[:1] ^ _avalanche(salt[1:] + np.uint32(1))))
+    return _avalanche(low ^ mixed)
+
+
+def _avalanche(bits: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:
+    """Return a bijection of uint32 in which every input bit flips about half the output bits."""
+    bits = bits ^ (bits >> np.uint32(16))
+    bits = bits * np.uint32(0x7FEB352D)
+    bits = bits ^ (bits >> np.uint32(15))
+    bits = bits * np.uint32(0x846CA68B)
+    return bits ^ (bits >> np.uint32(16))
+
+
+def stratified_square(keys: npt.ArrayLike, k: int, seed: int = 0, first: int = 0) -> npt.NDArray[np.float32]:
+    """Return k low-discrepancy points in the unit square for every key.
+
+    The first two Sobol' dimensions, a (0,2)-sequence in base 2, shifted digitally by the
+    row's own random bits: every aligned run of 2^m points (from `first` = 0, or a multiple of
+    2^m) has one point in each elementary box of area 2^-m, and each point alone is uniform.
+    Asking on with `first` = k continues the same row's sequence.
+
+    Parameters
+    ----------
+    keys : (n,) non-negative integers
+        What each row is for, a texel's number, say. Equal keys get equal points.
+    k : int
+        Points a row; powers of two stratify best.
+    seed : int
+    first : int
+        Index of the first point.
+
+    Returns
+    -------
+    u : (n, k, 2) float32 in [0, 1)
+    """
+    rows = np.asarray(keys)
+    pattern = _sobol_bits(np.arange(first, first + k, dtype=np.uint32))
+    shift = np.stack([hash_keys(rows, 2 * seed), hash_keys(rows, 2 * seed + 1)], axis=-1)
+    bits = shift[:, None, :] ^ pattern[None, :, :]
+    # 24 bits are what a float32 below 1 holds exactly; rounding 32 could give 1.
+    return (bits >> np.uint32(8)).astype(np.float32) * np.float32(2.0**-24)
+
+
+def _sobol_bits(index: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:
+    """Return the first two Sobol' dimensions of points `index` (k,) as (k, 2) binary fractions."""
+    bits = np.zeros((len(index), 2), dtype=np.uint32)
+    radical, pascal = 1 << (_SOBOL_BITS - 1), 1 << (_SOBOL_BITS - 1)
+    for digit in range(_SOBOL_BITS):
+        on = ((index >> np.uint32(digit)) & np.uint32(1)).astype(bool)
+        bits[on, 0] ^= np.uint32(radical)
+        bits[on, 1] ^= np.uint32(pascal)
+        radical >>= 1
+        pascal ^= pascal >> 1
+    return bits
+
+
+def points_on_triangles(triangles: FloatArray, u: FloatArray) -> FloatArray:
+    """Carry points of the unit square onto triangles, keeping them uniform.
+
+    The square is folded onto the triangle along its diagonal (Heitz 2019, "A low-distortion
+    map between triangle and square"), which keeps strata compact.
+
+    Parameters
+    ----------
+    triangles : (n, 3, 3) float
+    u : (n, k, 2) or (k, 2) float in [0, 1]
+
+    Returns
+    -------
+    points : (n, k, 3) float
+    """
+    smaller = 0.5 * np.minimum(u[..., 0], u[..., 1])
+    first = u[..., 0] - smaller
+    second = u[..., 1] - smaller
+    weights = np.stack([1.0 - first - second, first, second], axis=-1)
+    return weights @ triangles
+
+
+def concentric_disk(u: FloatArray) -> FloatArray:
+    """Carry points of the unit square onto the unit disk, keeping them uniform.
+
+    Concentric squares become concentric circles (Shirley and Chiu 1997), so neighbours stay
+    neighbours.
+
+    Parameters
+    ----------
+    u : (..., 2) float in [0, 1]
+
+    Returns
+    -------
+    points : (..., 2) float
+    """
+    x, y = 2.0 * u[..., 0] - 1.0, 2.0 * u[..., 1] - 1.0
+    wide = np.abs(x) > np.abs(y)
+    radius = np.where(wide, x, y)
+    ratio = np.where(wide, y, x) / np.where(radius == 0.0, 1.0, radius)
+    angle = np.where(wide, (np.pi / 4) * ratio, np.pi / 2 - (np.pi / 4) * ratio)
+    points: FloatArray = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+    return points.astype(u.dtype, copy=False)
+
+
+def cosine_hemisphere(u: FloatArray) -> FloatArray:
+    """Carry points of the unit square to directions with density cosθ/π about +z.
+
+    Parameters
+    ----------
+    u : (..., 2) float in [0, 1]
+
+    Returns
+    -------
+    directions : (..., 3) float, unit, z ≥ 0
+    """
+    disk = concentric_disk(u)
+    height = np.sqrt(np.maximum(1.0 - disk[..., 0] ** 2 - disk[..., 1] ** 2, 0.0))
+    return np.concatenate([disk, height[..., None]], axis=-1)
+
+
+def uniform_cone(u: FloatArray, one_minus_cosine: FloatArray | float) -> FloatArray:
+    """Carry points of the unit square to directions uniform in solid angle in a cone about +z.
+
+    Parameters
+    ----------
+    u : (..., 2) float in [0, 1]
+    one_minus_cosine : float or (...,) float
+        1 − cos of the cone's half angle; given so because it stays exact in narrow cones.
+
+    Returns
+    -------
+    directions : (..., 3) float, unit
+    """
+    disk = concentric_disk(u)
+    share = disk[..., 0] ** 2 + disk[..., 1] ** 2
+    drop = share * one_minus_cosine
+    # On the cap sin²θ = drop (2 − drop); the disk's direction only gives the azimuth.
+    stretch = np.sqrt(one_minus_cosine * (2.0 - drop))
+    return np.stack([disk[..., 0] * stretch, disk[..., 1] * stretch, 1.0 - drop], axis=-1)
+
+
+def orthonormal_basis(normals: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return two tangents that make a right-handed frame with each unit normal.
+
+    Without a branch or a singular direction (Duff et al. 2017).
+
+    Parameters
+    ----------
+    normals : (..., 3) float, unit
+
+    Returns
+    -------
+    tangent, bitangent : (..., 3) float, unit; tangent × bitangent = normal
+    """
+    x, y, z = normals[..., 0], normals[..., 1], normals[..., 2]
+    sign = np.copysign(1.0, z).astype(normals.dtype, copy=False)
+    a = -1.0 / (sign + z)
+    b = x * y * a
+    tangent = np.stack([1.0 + sign * x * x * a, sign * b, -sign * x], axis=-1)
+    bitangent = np.stack([b, sign + y * y * a, -y], axis=-1)
+    return tangent, bitangent
+
+
+def to_world(local: FloatArray, normals: FloatArray) -> FloatArray:
+    """Turn directions given about +z into world space about each row's normal.
+
+    Parameters
+    ----------
+    local : (n, k, 3) float
+    normals : (n, 3) float, unit
+
+    Returns
+    -------
+    directions : (n, k, 3) float
+    """
+    tangent, bitangent = orthonormal_basis(normals)
+    return local @ np.stack([tangent, bitangent, normals], axis=-2)
