@@ -1,0 +1,1 @@
+"""From triangles to lightmap pages and back: charts, packing, texels, dilation, encoding."""

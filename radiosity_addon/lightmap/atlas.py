@@ -1,0 +1,321 @@
+"""Lightmap UVs for all objects of a bake: charts, pages, and what becomes of UVs to keep.
+
+The only module that imports xatlas, which grows the charts; everything else is ours.
+
+Kept UVs (an existing layer) stay as they are, bit for bit, wherever that is possible: on an
+object's own page always, on a shared page when all objects bring UVs and none lies over another's.
+Otherwise each object's kept layout is packed, as one chart of unchanged shape, beside the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..bake_scene import BakeWarning
+from ..errors import BakeError
+from ..settings import MAX_RESOLUTION
+from .charts import Charts, unwrap
+from .flatten import rescale_to_area, signed_double_area
+from .packing import Packing, pack
+from .rasterise import coverage_sum
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+Int = NDArray[np.int64]
+
+_PROBE = 1024
+"""Kept UVs are searched for overlaps at no more than this resolution."""
+
+_OVERLAP = 1.01
+"""A texel filled to more than this holds triangles that lie over each other."""
+
+
+@dataclass(frozen=True)
+class AtlasInput:
+    """One object to lay out.
+
+    Parameters
+    ----------
+    name : str
+    triangles : (n, 3, 3) float
+        Corners in world space [m].
+    polygon : (n,) int
+        The polygon of each triangle: it stays in one chart.
+    uv : (n, 3, 2) float32 or None
+        UVs to keep; None to unwrap.
+    """
+
+    name: str
+    triangles: Float
+    polygon: NDArray[np.int32]
+    uv: Float32 | None = None
+
+
+@dataclass(frozen=True)
+class AtlasObject:
+    """Where one object lies: its UVs (n, 3, 2) float32 in [0, 1], v up, and its page."""
+
+    uv: Float32
+    page: int
+
+
+@dataclass(frozen=True)
+class AtlasPage:
+    """One page.
+
+    Parameters
+    ----------
+    resolution : int
+        Width and height in texels.
+    density : float
+        Texels per metre, the mean over all its surface; 0 if there is none.
+    utilisation : float
+        The share of the page that charts cover, 0 to 1.
+    """
+
+    resolution: int
+    density: float
+    utilisation: float
+
+
+@dataclass(frozen=True)
+class Atlas:
+    """All objects, in the order they were given, and the pages they lie on."""
+
+    objects: tuple[AtlasObject, ...]
+    pages: tuple[AtlasPage, ...]
+    warnings: tuple[BakeWarning, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """One object's charts, and whether they are UVs to keep."""
+
+    source: AtlasInput
+    charts: Charts
+    kept: bool
+
+
+def build_atlas(
+    objects: Sequence[AtlasInput],
+    resolution: int = 512,
+    texel_density: float | None = None,
+    shared: bool = True,
+) -> Iterator[float | Atlas]:
+    """Lay out all objects; yields the fraction done now and then, and at the end the `Atlas`.
+
+    Parameters
+    ----------
+    objects : sequence of AtlasInput
+    resolution : int
+        Width and height of a page, if no density is given.
+    texel_density : float or None
+        Texels per metre; pages become as large as that needs, multiples of 4.
+    shared : bool
+        All objects on one page, or each on its own.
+
+    Raises
+    ------
+    BakeError
+        If there is nothing to lay out, or the density needs a page that is too large.
+    """
+    if not objects:
+        raise BakeError("there is no mesh to lay out: give an object with faces to bake")
+    warnings: list[BakeWarning] = []
+    layouts: list[_Layout] = []
+    total = sum(len(source.triangles) for source in objects)
+    done = 0
+    for source in objects:
+        layout = None
+        for layout in _lay_flat(source, warnings):
+            share = float((layout.charts.chart >= 0).mean()) if len(source.triangles) else 0.0
+            yield 0.7 * (done + share * len(source.triangles)) / max(total, 1)
+        assert layout is not None
+        layouts.append(layout)
+        done += len(source.triangles)
+
+    pages: list[AtlasPage] = []
+    placed: list[AtlasObject] = []
+    for group in [layouts] if shared else [[layout] for layout in layouts]:
+        packing = _kept_as_they_are(group, resolution, texel_density)
+        if packing is None:
+            for trial in _pack_page(group, resolution, texel_density):
+                packing = trial
+                yield 0.7 + 0.3 * len(placed) / len(layouts)
+        assert packing is not None
+        if packing.crowded:
+            warnings.append(_crowded(group, packing.resolution))
+        ends = np.cumsum([len(layout.source.triangles) for layout in group])
+        placed += [AtlasObject(uv, len(pages)) for uv in np.split(packing.uv, ends[:-1])]
+        pages.append(_page(packing))
+    yield Atlas(tuple(placed), tuple(pages), tuple(warnings))
+
+
+def run_atlas(
+    objects: Sequence[AtlasInput],
+    resolution: int = 512,
+    texel_density: float | None = None,
+    shared: bool = True,
+) -> Atlas:
+    """Run `build_atlas` through and return the `Atlas`."""
+    *_, result = build_atlas(objects, resolution, texel_density, shared)
+    assert isinstance(result, Atlas)
+    return result
+
+
+def grow_charts(vertices: Float, faces: Int) -> tuple[Float, Int]:
+    """Cut a mesh into charts with xatlas.
+
+    Parameters
+    ----------
+    vertices : (v, 3) float64
+        At a scale where triangles are about 1 in area, welded.
+    faces : (n, 3) int64
+
+    Returns
+    -------
+    uv : (n, 3, 2) float64
+        Stretched along u and v, each chart otherwise; charts may lie over each other.
+    chart : (n,) int64
+        −1 for faces that xatlas left out.
+    """
+    import xatlas
+
+    atlas = xatlas.Atlas()
+    atlas.add_mesh(vertices.astype(np.float32), faces.astype(np.uint32))
+    # Its packing is not used: make it quick, and do not let it turn charts twice.
+    packing = xatlas.PackOptions()
+    packing.rotate_charts = False
+    packing.bilinear = False
+    atlas.generate(xatlas.ChartOptions(), packing)
+    _, indices, uv = atlas[0]
+    _, chart_of_vertex = atlas.get_mesh_vertex_assignment(0)
+    chart = chart_of_vertex[indices[:, 0]].astype(np.int64)
+    chart[chart == np.iinfo(np.uint32).max] = -1
+    scale = np.array((max(atlas.width, 1), max(atlas.height, 1)), dtype=np.float64)
+    return uv[indices].astype(np.float64) * scale, chart
+
+
+def _lay_flat(source: AtlasInput, warnings: list[BakeWarning]) -> Iterator[_Layout]:
+    """Cut one object into charts, or take the UVs it has."""
+    triangles = np.asarray(source.triangles, dtype=np.float64).reshape(-1, 3, 3)
+    if source.uv is not None:
+        kept = _kept_charts(source, triangles, warnings)
+        if kept is not None:
+            yield _Layout(source, kept, kept=True)
+            return
+    if not len(triangles):
+        yield _Layout(source, Charts(np.zeros((0, 3, 2)), np.zeros(0, dtype=np.int64), 0), kept=False)
+        return
+    for charts in unwrap(triangles, np.asarray(source.polygon, dtype=np.int64), grow_charts):
+        yield _Layout(source, charts, kept=False)
+
+
+def _kept_charts(source: AtlasInput, triangles: Float, warnings: list[BakeWarning]) -> Charts | None:
+    """Take an object's UVs as one chart at world scale; None, with a warning, if they are useless."""
+    assert source.uv is not None
+    uv = source.uv.astype(np.float64)
+    if not np.isfinite(uv).all() or not (signed_double_area(uv) != 0).any():
+        warnings.append(
+            BakeWarning(source.name, "its Lightmap UVs have no area or are not numbers; unwrapped anew")
+        )
+        return None
+    if uv.min() < -1e-6 or uv.max() > 1 + 1e-6:
+        warnings.append(
+            BakeWarning(source.name, "its Lightmap UVs leave the unit square; what is outside gets no light")
+        )
+    elif (coverage_sum(source.uv, _PROBE) > _OVERLAP).any():
+        warnings.append(
+            BakeWarning(source.name, "its Lightmap UVs overlap; faces that share texels show the same light")
+        )
+    chart = np.zeros(len(uv), dtype=np.int64)
+    return Charts(rescale_to_area(uv, triangles, chart, 1), chart, 1)
+
+
+def _kept_as_they_are(group: list[_Layout], resolution: int, density: float | None) -> Packing | None:
+    """Return the page of kept UVs left bit for bit, None if they must be packed."""
+    if not all(layout.kept for layout in group):
+        return None
+    kept = [layout.source.uv for layout in group if layout.source.uv is not None]
+    uv = np.concatenate(kept).astype(np.float32, copy=False)
+    if len(group) > 1 and not _apart(kept, min(resolution, _PROBE)):
+        return None
+    surface = _surface(group)
+    flat = float(0.5 * np.abs(signed_double_area(uv.astype(np.float64))).sum())
+    if density is not None:
+        size = density * np.sqrt(surface / flat)
+        if not size <= MAX_RESOLUTION:
+            raise BakeError(
+                f"a texel density of {density:g} px/m needs a page above {MAX_RESOLUTION} px for the kept UVs of "
+                f"{group[0].source.name}: lower the density"
+            )
+        resolution = max(4, 4 * int(np.ceil(size / 4)))
+    return Packing(uv, resolution, resolution * float(np.sqrt(flat / surface)) if surface > 0 else 0.0)
+
+
+def _apart(layouts: list[Float32], resolution: int) -> bool:
+    """Return whether no object's UVs lie over another's (nor wholly outside the page)."""
+    taken = np.zeros((resolution, resolution))
+    for uv in layouts:
+        if uv.min() < -1e-6 or uv.max() > 1 + 1e-6:
+            return False
+        # An object that overlaps itself is its own affair.
+        taken += np.minimum(coverage_sum(uv, resolution), 1.0)
+    return not (taken > _OVERLAP).any()
+
+
+def _pack_page(group: list[_Layout], resolution: int, density: float | None) -> Iterator[Packing]:
+    """Pack the charts of several objects together; triangles without area get a harmless place."""
+    uv = np.concatenate([layout.charts.uv for layout in group])
+    first = np.cumsum([0] + [layout.charts.count for layout in group])
+    chart = np.concatenate(
+        [
+            np.where(layout.charts.chart >= 0, layout.charts.chart + start, -1)
+            for layout, start in zip(group, first[:-1], strict=True)
+        ]
+    )
+    used = np.flatnonzero(chart >= 0)
+    if not len(used):
+        yield Packing(np.full(uv.shape, 0.5, dtype=np.float32), resolution if density is None else 4, 0.0)
+        return
+    for packing in pack(uv[used], chart[used], resolution, density):
+        pages = np.empty(uv.shape, dtype=np.float32)
+        pages[used] = packing.uv
+        _park(pages, chart, [len(layout.source.triangles) for layout in group])
+        yield Packing(pages, packing.resolution, packing.density, packing.crowded)
+
+
+def _park(uv: Float32, chart: Int, lengths: list[int]) -> None:
+    """Put triangles without area on a corner of their own object, else of the page's first."""
+    start = 0
+    fallback = uv[np.flatnonzero(chart >= 0)[0], 0].copy()
+    for length in lengths:
+        rows = np.arange(start, start + length)
+        placed = rows[chart[rows] >= 0]
+        uv[rows[chart[rows] < 0]] = uv[placed[0], 0] if len(placed) else fallback
+        start += length
+
+
+def _page(packing: Packing) -> AtlasPage:
+    area = 0.5 * np.abs(signed_double_area(packing.uv.astype(np.float64))).sum()
+    return AtlasPage(packing.resolution, packing.density, min(float(area), 1.0))
+
+
+def _surface(group: list[_Layout]) -> float:
+    """Return the area of all triangles [m²]."""
+    corners = np.concatenate([np.asarray(layout.source.triangles, dtype=np.float64) for layout in group])
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return float(0.5 * np.linalg.norm(cross, axis=1).sum())
+
+
+def _crowded(group: list[_Layout], resolution: int) -> BakeWarning:
+    count = sum(layout.charts.count for layout in group)
+    return BakeWarning(
+        group[0].source.name if len(group) == 1 else "atlas",
+        f"{resolution} px is too small to keep {count} charts apart, so light bleeds between them; "
+        "raise the resolution",
+    )

@@ -1,0 +1,185 @@
+"""Cutting one object into charts that lie flat, to scale and front side up.
+
+A polygon must stay whole in one chart, because UVs are written per polygon corner; the chart
+grower works on triangles and now and then cuts one. Such polygons get a chart of their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .flatten import project, project_polygons, rescale_to_area, signed_double_area, undo_stretch
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+GrowCharts = Callable[[Float, Int], tuple[Float, Int]]
+"""(vertices (v, 3), faces (n, 3)) → (uv (n, 3, 2), chart (n,), −1 where a face was left out)."""
+
+PIECE = 20_000
+"""Triangles handed to the chart grower at once: it can neither report progress nor stop."""
+
+_FLAT = 1e-7
+"""A triangle whose height is less than this share of its longest side has no area."""
+
+_COPLANAR = 1e-5
+"""A chart whose normals all lie this close (chord length) to their mean is projected exactly."""
+
+
+@dataclass(frozen=True)
+class Charts:
+    """One object's charts.
+
+    Parameters
+    ----------
+    uv : (n, 3, 2) float64
+        1 unit is 1 m; every chart has its own origin.
+    chart : (n,) int64
+        0 … count − 1, or −1 for triangles of polygons without area.
+    count : int
+    """
+
+    uv: Float
+    chart: Int
+    count: int
+
+
+def unwrap(triangles: Float, polygon: Int, grow: GrowCharts | None) -> Iterator[Charts]:
+    """Cut an object into charts, piece by piece.
+
+    Parameters
+    ----------
+    triangles : (n, 3, 3) float64
+        Corners in world space [m].
+    polygon : (n,) int
+        The polygon of each triangle.
+    grow : callable or None
+        The chart grower; None gives every polygon a chart of its own.
+
+    Yields
+    ------
+    Charts
+        Of all the triangles, with those pieces done so far; the last one is the result.
+    """
+    polygon = np.unique(polygon, return_inverse=True)[1].reshape(-1)
+    uv = np.zeros((len(triangles), 3, 2))
+    chart = np.full(len(triangles), -1, dtype=np.int64)
+    count = 0
+    for rows in _pieces(triangles, polygon):
+        piece_uv, piece_chart = _unwrap_piece(triangles[rows], polygon[rows], grow)
+        uv[rows] = piece_uv
+        chart[rows] = np.where(piece_chart >= 0, piece_chart + count, -1)
+        count = max(count, int(chart.max()) + 1)
+        yield Charts(uv, chart, count)
+
+
+def _pieces(triangles: Float, polygon: Int) -> Iterator[NDArray[np.intp]]:
+    """Halve the polygons across the longest axis until a piece has at most `PIECE` triangles."""
+    count = int(polygon.max()) + 1 if len(polygon) else 0
+    size = np.maximum(np.bincount(polygon, minlength=count), 1)
+    middle = triangles.mean(axis=1)
+    centre = np.stack([np.bincount(polygon, middle[:, k], count) for k in range(3)], axis=-1) / size[:, None]
+    waiting = [np.arange(count)]
+    while waiting:
+        part = waiting.pop()
+        if size[part].sum() <= PIECE or len(part) < 2:
+            yield np.flatnonzero(np.isin(polygon, part))
+            continue
+        axis = int(np.ptp(centre[part], axis=0).argmax())
+        part = part[np.argsort(centre[part, axis], kind="stable")]
+        waiting += [part[len(part) // 2 :], part[: len(part) // 2]]
+
+
+def _unwrap_piece(triangles: Float, polygon: Int, grow: GrowCharts | None) -> tuple[Float, Int]:
+    """Return uv (n, 3, 2) [m] and chart (n,) of one piece; charts are numbered without gaps."""
+    count = len(triangles)
+    polygon = np.unique(polygon, return_inverse=True)[1].reshape(-1)
+    corners, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    faces = index.reshape(count, 3)
+    solid = _has_area(triangles)
+    uv = np.zeros((count, 3, 2))
+    chart = np.full(count, -1, dtype=np.int64)
+    if grow is not None and solid.any():
+        uv[solid], chart[solid] = grow(_normalised(corners, triangles[solid]), faces[solid])
+    torn = _torn_polygons(uv, chart, faces, polygon, solid)
+    own = torn[polygon]
+    if own.any():
+        number = np.unique(polygon[own], return_inverse=True)[1].reshape(-1)
+        uv[own] = project_polygons(triangles[own], number)
+        chart[own] = chart.max() + 1 + number
+    used = np.flatnonzero(chart >= 0)
+    if not len(used):
+        return uv, chart
+    chart[used] = np.unique(chart[used], return_inverse=True)[1].reshape(-1)
+    uv[used] = _to_scale(uv[used], triangles[used], chart[used], own[used])
+    return uv, chart
+
+
+def _has_area(triangles: Float) -> NDArray[np.bool_]:
+    """Return which triangles are more than a line or a point."""
+    sides = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
+    longest = sides.max(axis=1)
+    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    return np.asarray((longest > 0) & (np.linalg.norm(cross, axis=1) > _FLAT * longest**2))
+
+
+def _normalised(corners: Float, triangles: Float) -> Float:
+    """Move to the origin and scale to a mean triangle of area 1: the grower's epsilons are absolute."""
+    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    size = np.sqrt(0.5 * np.linalg.norm(cross, axis=1).mean())
+    return np.asarray((corners - 0.5 * (corners.min(axis=0) + corners.max(axis=0))) / size)
+
+
+def _torn_polygons(
+    uv: Float, chart: Int, faces: Int, polygon: Int, solid: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Return which polygons need a chart of their own.
+
+    Those cut by the grower, left out by it, turned over against the rest of their chart, or
+    with a triangle without area beside one that has some (the grower never saw it).
+    """
+    count = int(polygon.max()) + 1
+    torn = np.zeros(count, dtype=np.bool_)
+    alive = np.zeros(count, dtype=np.bool_)
+    alive[polygon[solid]] = True
+    torn[polygon[(chart < 0)]] = True
+
+    placed = np.flatnonzero(chart >= 0)
+    if len(placed):
+        area = signed_double_area(uv[placed])
+        total = np.bincount(chart[placed], area)
+        torn[polygon[placed[area * total[chart[placed]] <= 0]]] = True
+        first = np.full(count, -1, dtype=np.int64)
+        first[polygon[placed]] = chart[placed]
+        torn[polygon[placed[chart[placed] != first[polygon[placed]]]]] = True
+        # Corners of one polygon at one position must share their UV.
+        owner = np.repeat(polygon[placed], 3)
+        key = owner * (int(faces.max()) + 1) + faces[placed].reshape(-1)
+        _, start, same = np.unique(key, return_index=True, return_inverse=True)
+        flat = uv[placed].reshape(-1, 2)
+        torn[owner[(flat != flat[start[same.reshape(-1)]]).any(axis=1)]] = True
+    return torn & alive
+
+
+def _to_scale(uv: Float, triangles: Float, chart: Int, projected: NDArray[np.bool_]) -> Float:
+    """Bring charts to world scale and front side up; planar ones exactly, by projection."""
+    count = int(chart.max()) + 1
+    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    mean = np.stack([np.bincount(chart, cross[:, k], count) for k in range(3)], axis=-1)
+    grown = np.flatnonzero(~projected)
+    if len(grown):
+        turned = np.bincount(chart[grown], signed_double_area(uv[grown]), count) < 0
+        uv = uv.copy()
+        uv[grown, :, 0] *= np.where(turned, -1.0, 1.0)[chart[grown], None]
+        uv[grown] = undo_stretch(uv[grown], triangles[grown], chart[grown], count)
+        unit = cross / np.linalg.norm(cross, axis=1, keepdims=True).clip(np.finfo(float).tiny)
+        axis = mean / np.linalg.norm(mean, axis=1, keepdims=True).clip(np.finfo(float).tiny)
+        bent = np.zeros(count, dtype=np.bool_)
+        bent[chart[np.linalg.norm(unit - axis[chart], axis=1) > _COPLANAR]] = True
+        planar = grown[~bent[chart[grown]]]
+        uv[planar] = project(triangles[planar], mean[chart[planar]])
+    return rescale_to_area(uv, triangles, chart, count)

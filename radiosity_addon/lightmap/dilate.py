@@ -1,0 +1,93 @@
+"""Filling the texels that no triangle covers, so that filtering never meets an empty one.
+
+Near the charts each uncovered texel takes the weighted mean of its covered neighbours, ring by
+ring; being a mean over all eight directions it prefers none. What is farther than the rings is
+filled from ever coarser means of the covered texels (a pyramid), so that mip levels stay
+bright too. Covered texels are never changed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float32 = NDArray[np.float32]
+Bool = NDArray[np.bool_]
+
+_NEIGHBOURS = tuple(
+    (row, column, 1.0 if row == 0 or column == 0 else 0.5)
+    for row in (-1, 0, 1)
+    for column in (-1, 0, 1)
+    if (row, column) != (0, 0)
+)
+
+
+def dilate(pixels: Float32, coverage: Bool, rings: int = 8) -> Float32:
+    """Fill every uncovered texel of a page.
+
+    Parameters
+    ----------
+    pixels : (height, width, channels) float32
+        Only covered texels are read.
+    coverage : (height, width) bool
+    rings : int
+        How many texels past the charts are filled by neighbours' means; the rest coarsely.
+
+    Returns
+    -------
+    (height, width, channels) float32
+        A new array; all zero if nothing is covered.
+    """
+    result = np.where(coverage[..., None], pixels, np.float32(0)).astype(np.float32)
+    if not coverage.any():
+        return result
+    filled = coverage.copy()
+    for _ in range(rings):
+        if not _grow(result, filled):
+            return result
+    if not filled.all():
+        coarse = _pyramid(result, filled)
+        result[~filled] = coarse[~filled]
+    return result
+
+
+def _grow(pixels: Float32, filled: Bool) -> bool:
+    """Fill one ring around what is filled, in place; False if there was nothing to fill."""
+    height, width = filled.shape
+    padded = np.pad(filled, 1)
+    near = np.zeros_like(filled)
+    for row, column, _ in _NEIGHBOURS:
+        near |= padded[1 + row : 1 + row + height, 1 + column : 1 + column + width]
+    rows, columns = np.nonzero(near & ~filled)
+    if not len(rows):
+        return False
+    total = np.zeros((len(rows), pixels.shape[2]))
+    weights = np.zeros(len(rows))
+    for row, column, weight in _NEIGHBOURS:
+        y, x = rows + row, columns + column
+        known = padded[y + 1, x + 1]
+        total[known] += weight * pixels[y[known], x[known]]
+        weights += weight * known
+    pixels[rows, columns] = total / weights[:, None]
+    filled[rows, columns] = True
+    return True
+
+
+def _pyramid(pixels: Float32, filled: Bool) -> Float32:
+    """Return the page with every texel filled.
+
+    Each takes the mean of the filled texels in the smallest of the blocks of 2, 4, 8 … texels
+    around it that holds any.
+    """
+    height, width = filled.shape
+    if filled.all() or (height == 1 and width == 1):
+        return pixels
+    pad = ((0, height % 2), (0, width % 2))
+    weight = np.pad(filled, pad).astype(np.float32)
+    values = np.pad(pixels, (*pad, (0, 0))) * weight[..., None]
+    half_height, half_width = weight.shape[0] // 2, weight.shape[1] // 2
+    count = weight.reshape(half_height, 2, half_width, 2).sum(axis=(1, 3))
+    total = values.reshape(half_height, 2, half_width, 2, -1).sum(axis=(1, 3))
+    coarse = _pyramid(total / np.maximum(count, 1)[..., None], count > 0)
+    wide = coarse.repeat(2, axis=0).repeat(2, axis=1)[:height, :width]
+    return np.asarray(np.where(filled[..., None], pixels, wide), dtype=np.float32)

@@ -1,0 +1,243 @@
+"""Packing charts into one square page, as large as they fit or at a given density.
+
+Charts keep their shape and their common scale; each box starts on a texel's border. Between
+the texels that any two charts cover at least `GAP` texels stay free, and one at the page's
+border, so neither bilinear filtering nor dilation mixes charts. The packer of xatlas was
+measured and left aside: it stretches every chart to whole texels, spills into more pages without
+a limit on time, and cannot be run twice on one atlas (docs/decisions).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import BakeError
+from ..settings import MAX_RESOLUTION
+from .flatten import signed_double_area
+from .shapes import Shapes, align, measure
+from .skyline import Placement, place
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+Int = NDArray[np.int64]
+
+GAP = 2
+"""Free texels between charts."""
+
+BORDER = 1
+"""Free texels along the page's border."""
+
+SMALLEST = 0.25
+"""Texels; a chart that would be narrower is widened to this, so that nothing gets lost."""
+
+FINEST = 2048
+"""Cells along a page's side; larger pages are packed in cells of several texels."""
+
+FEW = 200
+"""Up to this many charts several orders and rules are tried at each scale."""
+
+
+@dataclass(frozen=True)
+class Packing:
+    """A packed page.
+
+    Parameters
+    ----------
+    uv : (n, 3, 2) float32
+        In [0, 1].
+    resolution : int
+    density : float
+        Texels per metre.
+    crowded : bool
+        Whether the page is too small to keep the charts two texels apart.
+    """
+
+    uv: Float32
+    resolution: int
+    density: float
+    crowded: bool = False
+
+
+@dataclass(frozen=True)
+class _Job:
+    """Aligned charts and the orders worth trying."""
+
+    uv: Float
+    chart: Int
+    extent: Float
+    orders: tuple[Int, ...]
+    area: float
+
+
+def pack(uv: Float, chart: Int, resolution: int, density: float | None) -> Iterator[Packing]:
+    """Pack charts into a square page.
+
+    Parameters
+    ----------
+    uv : (n, 3, 2) float64
+        Charts, 1 unit = 1 m.
+    chart : (n,) int64
+        0 … count − 1, none missing.
+    resolution : int
+        The page's size, if no density is given.
+    density : float or None
+        Texels per metre; the page becomes the smallest square multiple of 4 that holds it.
+
+    Yields
+    ------
+    Packing
+        The best so far, each at least as good as the one before (so a caller can breathe);
+        the last one is the result.
+
+    Raises
+    ------
+    BakeError
+        If the density asks for more than `MAX_RESOLUTION` texels.
+    """
+    job = _job(uv, chart)
+    if density is not None:
+        yield _pack_at(job, density)
+        return
+    found = False
+    for packing in _pack_into(job, resolution, resolution):
+        found = True
+        yield packing
+    finer = resolution
+    while not found:
+        # Too small to keep the charts apart: pack a finer page and shrink it.
+        finer *= 2
+        for packing in _pack_into(job, finer, resolution):
+            found = True
+            yield packing
+
+
+def _job(uv: Float, chart: Int) -> _Job:
+    count = int(chart.max()) + 1
+    aligned = align(uv, chart, count)
+    extent = np.zeros((count, 2))
+    np.maximum.at(extent, chart, aligned.max(axis=1))
+    long, short = extent.max(axis=1), extent.min(axis=1)
+    orders = [np.lexsort((np.arange(count), -short, -long))]
+    if count <= FEW:
+        orders.append(np.lexsort((np.arange(count), -long, -extent.prod(axis=1))))
+        orders.append(np.lexsort((np.arange(count), -long, -short)))
+    area = float(0.5 * np.abs(signed_double_area(aligned)).sum())
+    return _Job(aligned, chart, extent, tuple(orders), area)
+
+
+def _shapes(job: _Job, scale: float, cell: int) -> tuple[Float, Shapes]:
+    """Return the charts in cells at `scale` texels per metre, and their shapes."""
+    extent = job.extent * scale
+    widen = np.where(extent < SMALLEST, SMALLEST / np.maximum(extent, 1e-30), 1.0)
+    local = job.uv * (scale / cell * widen[job.chart][:, None])
+    return local, measure(local, job.chart, len(job.extent))
+
+
+def _pack_into(job: _Job, resolution: int, page: int) -> Iterator[Packing]:
+    """Look for the largest scale that fits a page of `resolution`; nothing if none does.
+
+    `page` is the page's real size when `resolution` is a finer stand-in for it.
+    """
+    cell = -(-resolution // FINEST)
+    side = resolution // cell - 2 * BORDER
+    count = len(job.extent)
+    if side < 1:
+        return
+    low, high = 0.0, resolution / np.sqrt(job.area)
+    scale = 0.85 * high
+    for _ in range(int(np.clip(6000 // count, 6, 40))):
+        local, shapes = _shapes(job, scale, cell)
+        placement, height = _place(job, shapes, side, cell)
+        if placement is not None:
+            low = scale
+            moved = _moved(local, job.chart, shapes, placement)
+            yield _packing(moved * cell, resolution, page, scale)
+            scale = float(np.sqrt(low * high))
+        else:
+            high = scale
+            guess = scale * np.sqrt(side / height) if height else 0.5 * scale
+            scale = float(np.sqrt(low * high)) if low else float(min(max(guess, 0.25 * scale), 0.97 * scale))
+        if low and high < low * 1.002:
+            return
+        if not low and high * job.extent.max() < SMALLEST:
+            return
+
+
+def _pack_at(job: _Job, density: float) -> Packing:
+    """Find the smallest page that holds the charts at `density` texels per metre."""
+    reach = float(job.extent.max()) * density + 2 * BORDER
+    guess = max(float(np.sqrt(job.area)) * density, reach if len(job.extent) == 1 else 0.7 * reach)
+    if not guess <= MAX_RESOLUTION:
+        raise _too_dense(density)
+    step = 1.0
+    resolution, too_small, best = _multiple(guess), 0, None
+    while best is None or best.resolution - too_small > max(4, best.resolution // 256):
+        if resolution > MAX_RESOLUTION:
+            raise _too_dense(density)
+        cell = -(-resolution // FINEST)
+        side = resolution // cell - 2 * BORDER
+        local, shapes = _shapes(job, density, cell)
+        placement, _ = _place(job, shapes, side, cell) if side > 0 else (None, 0)
+        if placement is not None:
+            moved = _moved(local, job.chart, shapes, placement)
+            best = _packing(moved * cell, resolution, resolution, density)
+            resolution = _multiple((too_small + best.resolution) / 2)
+        else:
+            too_small = resolution
+            step *= 1.5
+            grown = resolution * (1 + 0.02 * step) if best is None else (resolution + best.resolution) / 2
+            # The largest page is tried before giving up.
+            ceiling = MAX_RESOLUTION if too_small < MAX_RESOLUTION else 2 * MAX_RESOLUTION
+            resolution = min(_multiple(max(grown, resolution + 1)), ceiling)
+        if best is not None and resolution >= best.resolution:
+            return best
+    return best
+
+
+def _multiple(size: float) -> int:
+    """Round up to a multiple of 4."""
+    return max(4, 4 * int(np.ceil(size / 4)))
+
+
+def _too_dense(density: float) -> BakeError:
+    return BakeError(
+        f"a texel density of {density:g} px/m needs an atlas page above {MAX_RESOLUTION} px: "
+        "lower the density, bake fewer objects, or give each object its own page"
+    )
+
+
+def _place(job: _Job, shapes: Shapes, side: int, cell: int) -> tuple[Placement | None, int]:
+    """Return the first placement within a square of `side` cells, else None and the height reached."""
+    gap = -(-GAP // cell)
+    if (np.maximum(shapes.width, shapes.height) > side).any():
+        return None, 0
+    if ((shapes.width + gap) * (shapes.height + gap) * shapes.boxy).sum() > (side + gap) ** 2:
+        return None, 0
+    few = len(job.extent) <= FEW
+    for order in job.orders:
+        for thrifty in (False, True) if few else (True,):
+            placement = place(shapes, order, side, gap, side if few else None, thrifty)
+            if placement is not None and placement.height <= side:
+                return placement, placement.height
+    return None, placement.height if placement is not None else 0
+
+
+def _moved(local: Float, chart: Int, shapes: Shapes, placement: Placement) -> Float:
+    """Turn and move (n, 3, 2) chart corners to their place [cells]."""
+    x, y = local[..., 0], local[..., 1]
+    width, height = (size[chart][:, None] for size in (shapes.width, shapes.height))
+    quarter = placement.quarter[chart][:, None]
+    u = np.choose(quarter, (x, height - y, width - x, y))
+    v = np.choose(quarter, (y, x, height - y, width - x))
+    corner = np.stack((placement.x, placement.y), axis=-1)[chart][:, None] + BORDER
+    return np.asarray(np.stack((u, v), axis=-1) + corner)
+
+
+def _packing(texels: Float, resolution: int, page: int, density: float) -> Packing:
+    """Scale from texels of a page of `resolution` to [0, 1]."""
+    uv = np.clip(texels / resolution, 0, 1).astype(np.float32)
+    return Packing(uv, page, density * page / resolution, crowded=resolution != page)
