@@ -33,18 +33,20 @@ class _Bulb(Emitter):
 
     @property
     def strength(self) -> Float64Array:
+        """(3,) RGB power [W]."""
         return np.asarray(self.power, dtype=np.float64)
 
     def _validate(self) -> None:
         self._set_vector("position")
         self._set_rgb("power")
-        self._set_number("radius", 0.0, np.finfo(float).max)
+        self._set_number("radius", 0.0, float(np.finfo(float).max))
 
     def _attenuation(self, directions: Float64Array) -> Float64Array:
         """Return (...,) shares of the intensity sent along unit directions (..., 3) from the lamp."""
         return np.ones(directions.shape[:-1])
 
     def unit_irradiance(self, points: Float64Array, normals: Float64Array) -> Float64Array:
+        """Return the irradiance per power (see `Lamp.unit_irradiance`)."""
         toward, distance = directions_to(np.asarray(self.position) - points)
         cosine = np.einsum("ij,ij->i", toward, normals)
         reach = np.hypot(distance, self.radius) if self.soft_falloff else np.maximum(distance, self.radius)
@@ -52,9 +54,11 @@ class _Bulb(Emitter):
         effective = cap_cosine(cosine, self.radius / reach)
         if not self.soft_falloff:
             effective = np.where(distance < self.radius, 1.0, effective)
-        return effective / (4.0 * np.pi * reach * reach)
+        irradiance: Float64Array = effective / (4.0 * np.pi * reach * reach)
+        return irradiance
 
     def shadow_rays(self, points: Float64Array, normals: Float64Array, u: Samples) -> Rays:
+        """Return rays to samples of the disk or sphere (see `Lamp.shadow_rays`)."""
         directions, distances, weights = self._plain_rays(points, normals, u)
         return directions, distances, weights * self._attenuation(-directions) / (4.0 * np.pi * u.shape[1])
 
@@ -70,7 +74,7 @@ class _Bulb(Emitter):
     ) -> Rays:
         """Sample the disk across `toward` by area."""
         on_disk = self.radius * concentric_disk(u.astype(np.float64))
-        depth = np.broadcast_to(distance[:, None, None], on_disk.shape[:-1] + (1,))
+        depth = np.broadcast_to(distance[:, None, None], (*on_disk.shape[:-1], 1))
         directions, distances = directions_to(to_world(np.concatenate([on_disk, depth], axis=-1), toward))
         cosine = row_cosines(directions, normals)
         facing = np.einsum("ikj,ij->ik", directions, toward)
@@ -127,12 +131,14 @@ class PointLight(_Bulb):
 
     @property
     def flux(self) -> Float64Array:
+        """(3,) RGB power it sends out [W]."""
         return self.strength.copy()
 
-    def emit(self, place: Samples, way: Samples) -> Rays:
+    def emit(self, place: Samples, way: Samples) -> Rays:  # noqa: ARG002 - all start at one place
         """Return rays from the lamp's centre, uniform over the sphere (see `Emitter.emit`)."""
         directions = uniform_cone(np.asarray(way, dtype=np.float64), 2.0)
-        return np.broadcast_to(np.asarray(self.position), directions.shape), directions, np.ones(len(directions))
+        origins = np.broadcast_to(np.asarray(self.position), directions.shape)
+        return origins, directions, np.ones(len(directions))
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +188,7 @@ class SpotLight(_Bulb):
         """1 − cos(angle/2), exact for narrow cones too."""
         return float(2.0 * np.sin(0.25 * self.angle) ** 2)
 
-    def emit(self, place: Samples, way: Samples) -> Rays:
+    def emit(self, place: Samples, way: Samples) -> Rays:  # noqa: ARG002 - all start at one place
         """Return rays from the lamp's centre, uniform over the cone (see `Emitter.emit`)."""
         axis = np.asarray(self.direction)[None]
         directions = to_world(uniform_cone(np.asarray(way, dtype=np.float64), self._opening)[None], axis)[0]
@@ -195,7 +201,8 @@ class SpotLight(_Bulb):
         if self.blend == 0.0:
             return np.where(above > 0.0, 1.0, 0.0)
         step = np.clip(above / (self.blend * self._opening), 0.0, 1.0)
-        return step * step * (3.0 - 2.0 * step)
+        smooth: Float64Array = step * step * (3.0 - 2.0 * step)
+        return smooth
 
     def unit_irradiance(self, points: Float64Array, normals: Float64Array) -> Float64Array:
         """Return the irradiance per power; where the cone's edge crosses the lamp, averaged over it."""
@@ -221,4 +228,5 @@ class SpotLight(_Bulb):
         spread = np.arctan2(self.radius, distance)
         if not self.soft_falloff:
             spread = np.arcsin(np.minimum(self.radius / np.maximum(distance, np.finfo(float).tiny), 1.0))
-        return (spread > 0.0) & (off_axis + spread > plateau) & (off_axis - spread < half)
+        crosses: npt.NDArray[np.bool_] = (off_axis + spread > plateau) & (off_axis - spread < half)
+        return crosses & (spread > 0.0)

@@ -47,7 +47,7 @@ def cap_cosine(cosine: npt.ArrayLike, sine_half: npt.ArrayLike) -> Float64Array:
     -------
     effective : (...) float64 in [0, 1]
     """
-    cosine, sine_half = np.broadcast_arrays(np.float64(cosine), np.float64(sine_half))
+    cosine, sine_half = np.broadcast_arrays(np.asarray(cosine, np.float64), np.asarray(sine_half, np.float64))
     effective = np.array(np.maximum(cosine, 0.0))
     rows = np.abs(cosine) < sine_half
     if not rows.any():
@@ -64,7 +64,11 @@ def cap_cosine(cosine: npt.ArrayLike, sine_half: npt.ArrayLike) -> Float64Array:
 
 
 def point_to_ellipse(
-    points: npt.ArrayLike, normals: npt.ArrayLike, centre: npt.ArrayLike, axis_u: npt.ArrayLike, axis_v: npt.ArrayLike
+    points: npt.ArrayLike,
+    normals: npt.ArrayLike,
+    centre: npt.ArrayLike,
+    axis_u: npt.ArrayLike,
+    axis_v: npt.ArrayLike,
 ) -> Float64Array:
     """Return the form factor from oriented points to one ellipse, seen from its front.
 
@@ -137,19 +141,21 @@ def _arc_factor(
         ends = summit + np.array([[-1.0], [1.0]]) * half
         rim = offset + np.cos(ends)[..., None] * u + np.sin(ends)[..., None] * v
         total += _horizon_turn(rim[1], rim[0], normals)
-    return -total / (2.0 * np.pi)
+    factor: Float64Array = -total / (2.0 * np.pi)
+    return factor
 
 
 def _horizon_turn(start: Float64Array, end: Float64Array, normals: Float64Array) -> Float64Array:
     """Return the angle about the normal from one direction in the horizon to another, within ±π."""
     sine = np.einsum("ij,ij->i", np.cross(start, end), normals)
-    return np.arctan2(sine, np.einsum("ij,ij->i", start, end))
+    angle: Float64Array = np.arctan2(sine, np.einsum("ij,ij->i", start, end))
+    return angle
 
 
 @lru_cache(maxsize=16)
 def _gauss_panels(nodes: int) -> tuple[Float64Array, Float64Array]:
     """Return nodes in (-1, 1) and weights of equal panels of `PANEL` Gauss-Legendre nodes each."""
     panels = nodes // PANEL
-    where, weight = np.polynomial.legendre.leggauss(PANEL)
+    where, weight = np.polynomial.legendre.leggauss(PANEL)  # type: ignore[no-untyped-call, unused-ignore]
     centres = (2.0 * np.arange(panels) + 1.0) / panels - 1.0
     return (centres[:, None] + where / panels).ravel(), np.tile(weight / panels, panels)

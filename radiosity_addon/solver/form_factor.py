@@ -28,7 +28,11 @@ FloatArray = npt.NDArray[np.floating[Any]]
 
 
 def disk_factor(
-    points: FloatArray, normals: FloatArray, centres: FloatArray, source_normals: FloatArray, areas: FloatArray
+    points: FloatArray,
+    normals: FloatArray,
+    centres: FloatArray,
+    source_normals: FloatArray,
+    areas: FloatArray,
 ) -> FloatArray:
     """Approximate the factor from points to far sources as if each were a disk facing halfway.
 

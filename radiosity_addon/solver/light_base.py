@@ -46,7 +46,7 @@ class Light:
         """Replace the field by a read-only (3,) float64, normalised if `unit`."""
         value = np.asarray(getattr(self, field), dtype=np.float64)
         if value.shape != (3,) or not np.isfinite(value).all():
-            raise self._fail(f"{field} {value.tolist()} is not three finite numbers", "set its transform anew")
+            raise self._fail(f"{field} {value.tolist()} is not finite and (3,)", "set its transform anew")
         if unit:
             length = np.linalg.norm(value)
             if length == 0.0:
@@ -140,4 +140,5 @@ def directions_to(offsets: Float64Array) -> tuple[Float64Array, Float64Array]:
 
 def row_cosines(directions: Float64Array, normals: Float64Array) -> Float64Array:
     """Return (n, k) cosines above the horizon of (n, k, 3) directions about (n, 3) normals, else 0."""
-    return np.maximum(np.einsum("ikj,ij->ik", directions, normals), 0.0)
+    cosines: Float64Array = np.maximum(np.einsum("ikj,ij->ik", directions, normals), 0.0)
+    return cosines

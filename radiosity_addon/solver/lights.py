@@ -18,7 +18,16 @@ from .light_base import Emitter, Float64Array, Lamp, Light, Rays, Samples, direc
 from .point_factor import point_to_polygon
 from .sampling import concentric_disk, cosine_hemisphere, to_world, uniform_cone
 
-__all__ = ["AREA_SHAPES", "AreaLight", "EnvironmentLight", "Lamp", "Light", "PointLight", "SpotLight", "SunLight"]
+__all__ = [
+    "AREA_SHAPES",
+    "AreaLight",
+    "EnvironmentLight",
+    "Lamp",
+    "Light",
+    "PointLight",
+    "SpotLight",
+    "SunLight",
+]
 
 AREA_SHAPES = ("rectangle", "ellipse")
 
@@ -58,12 +67,15 @@ class SunLight(Lamp):
 
     @property
     def strength(self) -> Float64Array:
+        """(3,) RGB irradiance of what faces it [W/m²]."""
         return np.asarray(self.irradiance, dtype=np.float64)
 
-    def unit_irradiance(self, points: Float64Array, normals: Float64Array) -> Float64Array:
+    def unit_irradiance(self, points: Float64Array, normals: Float64Array) -> Float64Array:  # noqa: ARG002
+        """Return cosθ, or what the cap keeps of it at the horizon (see `Lamp.unit_irradiance`)."""
         return cap_cosine(-(normals @ np.asarray(self.direction)), np.sin(0.5 * self.angle))
 
     def shadow_rays(self, points: Float64Array, normals: Float64Array, u: Samples) -> Rays:
+        """Return rays to samples of the sun's cap, uniform over it (see `Lamp.shadow_rays`)."""
         toward = np.broadcast_to(-np.asarray(self.direction), (len(points), 3))
         drop = 2.0 * np.sin(0.25 * self.angle) ** 2
         directions = to_world(uniform_cone(np.asarray(u, dtype=np.float64), drop), toward)
@@ -109,6 +121,7 @@ class AreaLight(Emitter):
 
     @property
     def strength(self) -> Float64Array:
+        """(3,) RGB power [W]."""
         return np.asarray(self.power, dtype=np.float64)
 
     @property
@@ -124,6 +137,7 @@ class AreaLight(Emitter):
 
     @property
     def flux(self) -> Float64Array:
+        """(3,) RGB power it sends out [W]."""
         return self.strength.copy()
 
     def emit(self, place: Samples, way: Samples) -> Rays:
@@ -133,6 +147,7 @@ class AreaLight(Emitter):
         return self._points(np.asarray(place, dtype=np.float64)), directions, np.ones(len(directions))
 
     def unit_irradiance(self, points: Float64Array, normals: Float64Array) -> Float64Array:
+        """Return the irradiance per power, F / area (see `Lamp.unit_irradiance`)."""
         centre, half_u, half_v = self._half_axes()
         if self.shape == "ellipse":
             return point_to_ellipse(points, normals, centre, half_u, half_v) / self.area
@@ -140,12 +155,20 @@ class AreaLight(Emitter):
         return point_to_polygon(points, normals, np.broadcast_to(corners, (len(points), 4, 3))) / self.area
 
     def shadow_rays(self, points: Float64Array, normals: Float64Array, u: Samples) -> Rays:
+        """Return rays to samples uniform over the lamp (see `Lamp.shadow_rays`)."""
         samples = self._points(np.asarray(u, dtype=np.float64))
         directions, distances = directions_to(samples - points[:, None])
         facing = np.maximum(-(directions @ (self._facing / np.linalg.norm(self._facing))), 0.0)
         spread = np.pi * distances * distances * directions.shape[1]
         weights = row_cosines(directions, normals) * facing / np.where(spread > 0.0, spread, np.inf)
         return directions, distances, weights
+
+    def _points(self, square: Float64Array) -> Float64Array:
+        """Map (…, 2) points of the unit square to uniform points of the lamp, (…, 3)."""
+        centre, half_u, half_v = self._half_axes()
+        across = concentric_disk(square) if self.shape == "ellipse" else 2.0 * square - 1.0
+        points: Float64Array = centre + across @ np.stack([half_u, half_v])
+        return points
 
     def _half_axes(self) -> tuple[Float64Array, Float64Array, Float64Array]:
         return np.asarray(self.position), 0.5 * np.asarray(self.edge_u), 0.5 * np.asarray(self.edge_v)
@@ -172,4 +195,5 @@ class EnvironmentLight(Light):
 
     @property
     def strength(self) -> Float64Array:
+        """(3,) RGB radiance [W/m²/sr]."""
         return np.asarray(self.radiance, dtype=np.float64)

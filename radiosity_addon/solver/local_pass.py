@@ -15,7 +15,7 @@ import numpy as np
 
 from .emitters import EmitterGroup
 from .lights import EnvironmentLight, Light
-from .sampling import cosine_hemisphere, stratified_square, to_world
+from .sampling import cosine_hemisphere, points_on_triangles, stratified_square, to_world
 from .visibility import Hits
 
 if TYPE_CHECKING:
@@ -227,6 +227,45 @@ class LocalPass:
         """Return (e, 3): the part of every element's radiosity it does not emit itself [W/m²]."""
         hierarchy = self._state.hierarchy
         return np.asarray(hierarchy.faces.reflectance[hierarchy.face] * self._state.irradiance)
+
+    def reflected_at(self, triangle: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+        """Return (n, 3): the same at points of triangles' fronts, (n, 2) weights of corners 2 and 3."""
+        hierarchy = self._state.hierarchy
+        face = hierarchy.faces.of_triangle[0, triangle]
+        leaf = hierarchy.leaf_at(np.maximum(face, 0), barycentric)
+        return np.where((face >= 0)[:, None], self.reflected()[leaf], 0.0)
+
+    def gather_at_leaves(
+        self, leaves: np.ndarray, rays: int, resolve: Resolver
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Gather over whole leaf elements instead of points: (l, rays) sources and (l,) closeness."""
+        corners = self._state.hierarchy.corners[leaves]
+        normals = self._state.hierarchy.normal[leaves]
+        return self.gather(
+            corners.mean(axis=1),
+            normals,
+            normals,
+            leaves,
+            rays,
+            resolve,
+            lambda rows, u: points_on_triangles(corners[rows], u),
+        )
+
+    def leaf_reflectance(self, leaves: np.ndarray) -> np.ndarray:
+        """Return (l, 3) the reflectance of leaf elements."""
+        hierarchy = self._state.hierarchy
+        return np.asarray(hierarchy.faces.reflectance[hierarchy.face[leaves]])
+
+    def leaf_direct(self, leaves: np.ndarray) -> np.ndarray:
+        """Return (l, 3) the irradiance of leaf elements straight from lamps and emissive faces, the sky's apart."""
+        corners = self._state.hierarchy.corners[leaves]
+        return self.direct(
+            corners.mean(axis=1),
+            self._state.hierarchy.normal[leaves],
+            leaves,
+            lambda rows, u: points_on_triangles(corners[rows], u),
+            rays=16,
+        )
 
     def sky(self) -> np.ndarray:
         """Return (3,) the radiosity equivalent πL of the sky [W/m²]."""

@@ -53,7 +53,8 @@ def point_to_polygon(
     ValueError
         If shapes do not match.
     """
-    points, normals, polygons = (np.asarray(rows, dtype=np.float64) for rows in (points, normals, polygons))
+    points, normals = np.asarray(points, dtype=np.float64), np.asarray(normals, dtype=np.float64)
+    polygons = np.asarray(polygons, dtype=np.float64)
     count = len(points)
     if points.shape != (count, 3) or normals.shape != (count, 3):
         raise ValueError(f"points {points.shape} and normals {normals.shape} must both be (n, 3)")
@@ -94,9 +95,8 @@ def _chunk_factors(corners: Float64Array, normal: Float64Array, both_sides: bool
         turn[rows] = _closed_turn(corners.take(rows, axis=2), normal.take(rows, axis=1))
     rows = np.flatnonzero(cut)
     if len(rows):
-        turn[rows] = _cut_turn(
-            corners.take(rows, axis=2), heights.take(rows, axis=1), normal.take(rows, axis=1), area_vector[:, rows]
-        )
+        picked = (array.take(rows, axis=-1) for array in (corners, heights, normal, area_vector))
+        turn[rows] = _cut_turn(*picked)
     rows = np.flatnonzero(~off_plane & (area > 0.0))
     if len(rows):
         facing = area_vector[:, rows] / area[rows]
@@ -107,7 +107,7 @@ def _chunk_factors(corners: Float64Array, normal: Float64Array, both_sides: bool
 def _closed_turn(corners: Float64Array, normal: Float64Array) -> Float64Array:
     """Return n · Σ γ Γ̂ over the edges: γ the angle an edge spans, Γ̂ the normal of its plane."""
     turn = np.zeros(corners.shape[2])
-    for start, end in zip(np.roll(corners, 1, axis=0), corners):
+    for start, end in zip(np.roll(corners, 1, axis=0), corners, strict=True):
         turn += edge_turn(start, end, normal)
     return turn
 
@@ -125,7 +125,8 @@ def edge_turn(start: Float64Array, end: Float64Array, normal: Float64Array) -> F
     length = np.sqrt(cross_x * cross_x + cross_y * cross_y + cross_z * cross_z)
     angle = np.arctan2(length, _dot(start, end))
     along = cross_x * normal[0] + cross_y * normal[1] + cross_z * normal[2]
-    return along * (angle / np.where(length > 0.0, length, 1.0))
+    turn: Float64Array = along * (angle / np.where(length > 0.0, length, 1.0))
+    return turn
 
 
 def _cut_turn(
@@ -145,7 +146,8 @@ def _cut_turn(
         normal[0] * toward[1] - normal[1] * toward[0],
     ])
     turn = np.zeros(corners.shape[2])
-    for start, end, low, high in zip(np.roll(corners, 1, axis=0), corners, np.roll(heights, 1, axis=0), heights):
+    before, below = np.roll(corners, 1, axis=0), np.roll(heights, 1, axis=0)
+    for start, end, low, high in zip(before, corners, below, heights, strict=True):
         rise = high - low
         crosses = (low < 0.0) != (high < 0.0)
         where = np.where(crosses, -low / np.where(crosses, rise, 1.0), 0.0)
@@ -170,10 +172,10 @@ def _contact_turn(
 
 def _area_vector(corners: Float64Array) -> Float64Array:
     """Return (3, m) twice the polygon's area times its unit normal, of (k, 3, m) corners."""
-    total = np.zeros(corners.shape[1:])
-    edge = corners[1] - corners[0]
+    total: Float64Array = np.zeros(corners.shape[1:])
+    edge: Float64Array = corners[1] - corners[0]
     for corner in corners[2:]:
-        following = corner - corners[0]
+        following = np.subtract(corner, corners[0], dtype=np.float64)
         total[0] += edge[1] * following[2] - edge[2] * following[1]
         total[1] += edge[2] * following[0] - edge[0] * following[2]
         total[2] += edge[0] * following[1] - edge[1] * following[0]

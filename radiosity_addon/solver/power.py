@@ -36,7 +36,7 @@ def light_power(scene: Scene, faces: Faces) -> float:
     sides = np.array([width[1] * width[2], width[2] * width[0], width[0] * width[1]])
     for light in scene.lights:
         if isinstance(light, SunLight):
-            total = total + light.strength * float(np.abs(light.unit_direction) @ sides)
+            total = total + light.strength * float(np.abs(np.asarray(light.direction)) @ sides)
         elif isinstance(light, EnvironmentLight):
             total = total + np.pi * light.strength * float(sides.sum())
         else:
@@ -98,10 +98,12 @@ def _follow_lamps(state: HierarchicalState) -> tuple[float, float]:
     black_total = escaped_total = 0.0
     count = ESCAPE_RAYS // 8
     for number, light in enumerate(state.scene.lights):
-        if not isinstance(light, PointLight | SpotLight | AreaLight) or not light.strength.any():
+        if not isinstance(light, PointLight | SpotLight | AreaLight) or not light.flux.any():
             continue
-        unit = stratified_square(np.arange(count), 2, state.settings.seed + 21 + number)
-        origins, directions, share = light.emit(unit[:, 0], unit[:, 1])
+        seed = state.settings.seed + 21 + 2 * number
+        place = stratified_square(np.zeros(1, np.int64), count, seed)[0]
+        way = stratified_square(np.zeros(1, np.int64), count, seed + 1)[0]
+        origins, directions, share = light.emit(place, way)
         black, escaped = _fate(state, origins, directions)
         flux = float(light.flux.mean())
         black_total += flux * float((black * share).sum() / share.sum())

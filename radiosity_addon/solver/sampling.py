@@ -35,8 +35,8 @@ def hash_keys(keys: npt.ArrayLike, seed: int = 0) -> npt.NDArray[np.uint32]:
     low = (wide & np.uint64(0xFFFFFFFF)).astype(np.uint32)
     high = (wide >> np.uint64(32)).astype(np.uint32)
     salt = np.array([seed & 0xFFFFFFFF, (seed >> 32) & 0xFFFFFFFF], dtype=np.uint32)
-    mixed = _avalanche(high + np.uint32(0x9E3779B9) ^ _avalanche(salt[:1] ^ _avalanche(salt[1:] + np.uint32(1))))
-    return _avalanche(low ^ mixed)
+    salt = _avalanche(salt[:1] ^ _avalanche(salt[1:] + np.uint32(1)))
+    return _avalanche(low ^ _avalanche((high + np.uint32(0x9E3779B9)) ^ salt))
 
 
 def _avalanche(bits: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:
@@ -110,7 +110,8 @@ def points_on_triangles(triangles: FloatArray, u: FloatArray) -> FloatArray:
     first = u[..., 0] - smaller
     second = u[..., 1] - smaller
     weights = np.stack([1.0 - first - second, first, second], axis=-1)
-    return weights @ triangles
+    points: FloatArray = weights @ triangles
+    return points
 
 
 def concentric_disk(u: FloatArray) -> FloatArray:
@@ -208,4 +209,5 @@ def to_world(local: FloatArray, normals: FloatArray) -> FloatArray:
     directions : (n, k, 3) float
     """
     tangent, bitangent = orthonormal_basis(normals)
-    return local @ np.stack([tangent, bitangent, normals], axis=-2)
+    directions: FloatArray = local @ np.stack([tangent, bitangent, normals], axis=-2)
+    return directions

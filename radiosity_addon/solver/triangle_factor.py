@@ -126,8 +126,8 @@ def _chunk_factors(receivers: Float64Array, sources: Float64Array) -> Float64Arr
     opposite = np.einsum("ij,ij->i", outer_normal, inner_normal) < CONTACT - 1.0
     touching = solid & opposite & ~outer_height.any(axis=1) & ~inner_height.any(axis=1)
 
+    # A F as a share of the smaller area: the factor from the smaller triangle.
     mutual = np.zeros(len(outer))
-    """A F as a share of the smaller area: the factor from the smaller triangle."""
     rows = np.flatnonzero(far)
     if len(rows):
         mutual[rows] = _cubature(outer[rows], outer_normal[rows], inner[rows])
@@ -143,7 +143,8 @@ def _chunk_factors(receivers: Float64Array, sources: Float64Array) -> Float64Arr
     if len(rows):
         mutual[rows] = _overlap_area(outer[rows], inner[rows], inner_normal[rows]) / outer_area[rows]
     share = np.divide(outer_area, area_r, out=np.zeros_like(area_r), where=area_r > 0.0)
-    return np.clip(mutual, 0.0, 1.0) * share
+    factors: Float64Array = np.clip(mutual, 0.0, 1.0) * share
+    return factors
 
 
 def _normals(triangles: Float64Array) -> tuple[Float64Array, Float64Array]:
@@ -160,7 +161,9 @@ def _radius(triangles: Float64Array, centres: Float64Array) -> Float64Array:
     return radius
 
 
-def _heights(corners: Float64Array, base: Float64Array, normals: Float64Array, noise: Float64Array) -> Float64Array:
+def _heights(
+    corners: Float64Array, base: Float64Array, normals: Float64Array, noise: Float64Array
+) -> Float64Array:
     """Return (m, k) signed distances of corners (m, k, 3) to planes, with `noise` taken as 0."""
     heights = np.einsum("ijk,ik->ij", corners - base[:, None], normals)
     return np.where(np.abs(heights) <= noise, 0.0, heights)
@@ -173,7 +176,8 @@ def _cubature(outer: Float64Array, outer_normal: Float64Array, inner: Float64Arr
     spread = (count, len(_CUBATURE_WEIGHTS), 3)
     normals = np.broadcast_to(outer_normal[:, None], spread).reshape(-1, 3)
     factors = point_to_polygon(points, normals, np.repeat(inner, spread[1], axis=0))
-    return factors.reshape(count, -1) @ _CUBATURE_WEIGHTS
+    mean: Float64Array = factors.reshape(count, -1) @ _CUBATURE_WEIGHTS
+    return mean
 
 
 def _clip(polygons: Float64Array, heights: Float64Array) -> Float64Array:
@@ -192,7 +196,8 @@ def _clip(polygons: Float64Array, heights: Float64Array) -> Float64Array:
     order = np.argsort(~kept, axis=1, kind="stable")[:, : corners + 1]
     last = np.maximum(np.minimum(np.arange(corners + 1), kept.sum(axis=1)[:, None] - 1), 0)
     order = np.take_along_axis(order, last, axis=1)
-    return np.take_along_axis(candidates, order[..., None], axis=1)
+    clipped: Float64Array = np.take_along_axis(candidates, order[..., None], axis=1)
+    return clipped
 
 
 def _overlap_area(polygons: Float64Array, triangles: Float64Array, normals: Float64Array) -> Float64Array:
@@ -203,7 +208,8 @@ def _overlap_area(polygons: Float64Array, triangles: Float64Array, normals: Floa
         polygons = _clip(polygons, np.einsum("ijk,ik->ij", polygons - start[:, None], inward))
     arms = polygons[:, 1:] - polygons[:, :1]
     total = np.cross(arms[:, :-1], arms[:, 1:]).sum(axis=1)
-    return 0.5 * np.sqrt(np.einsum("ij,ij->i", total, total))
+    area: Float64Array = 0.5 * np.sqrt(np.einsum("ij,ij->i", total, total))
+    return area
 
 
 def _outline_factor(outer: Float64Array, inner: Float64Array, area: Float64Array) -> Float64Array:
@@ -245,24 +251,31 @@ def _edge_integrals(points: Float64Array, direction: Float64Array, polygons: Flo
     total = np.zeros(points.shape[:2])
     px, py, pz = (np.ascontiguousarray(points[..., axis]) for axis in range(3))
     ends = [[polygons[:, corner, axis, None] for axis in range(3)] for corner in range(polygons.shape[1])]
-    ax, ay, az = ends[-1][0] - px, ends[-1][1] - py, ends[-1][2] - pz
+    ax, ay, az = _offsets(ends[-1], px, py, pz)
     log_a = _half_log(ax * ax + ay * ay + az * az)
-    for corner, (qx, qy, qz) in enumerate(ends):
+    for corner, end in enumerate(ends):
         side = polygons[:, corner] - polygons[:, corner - 1]
         length = np.sqrt(np.einsum("ij,ij->i", side, side))
         unit = side / np.where(length > 0.0, length, 1.0)[:, None]
         ex, ey, ez = (unit[:, axis, None] for axis in range(3))
-        bx, by, bz = qx - px, qy - py, qz - pz
+        bx, by, bz = _offsets(end, px, py, pz)
         log_b = _half_log(bx * bx + by * by + bz * bz)
         cx, cy, cz = ay * ez - az * ey, az * ex - ax * ez, ax * ey - ay * ex
         away = np.sqrt(cx * cx + cy * cy + cz * cz)
         angle = np.arctan2(away * length[:, None], ax * bx + ay * by + az * bz)
-        integral = (bx * ex + by * ey + bz * ez) * log_b - (ax * ex + ay * ey + az * ez) * log_a + away * angle
+        along_a, along_b = ax * ex + ay * ey + az * ez, bx * ex + by * ey + bz * ez
+        integral = along_b * log_b - along_a * log_a + away * angle
         total += np.einsum("ij,ij->i", direction, unit)[:, None] * integral
         ax, ay, az, log_a = bx, by, bz, log_b
     return total
 
 
+def _offsets(end: list[Float64Array], *points: Float64Array) -> list[Float64Array]:
+    """Return the coordinates of `end` as seen from points, each an array of its own."""
+    return [np.subtract(coordinate, point) for coordinate, point in zip(end, points, strict=True)]
+
+
 def _half_log(square: Float64Array) -> Float64Array:
-    """Return ln r of r², with a finite stand-in at r = 0, where its factor is 0."""
-    return 0.5 * np.log(np.maximum(square, np.finfo(float).tiny))
+    """Return ln r of r², with a finite stand-in at r = 0, where ln r is multiplied by 0."""
+    half_log: Float64Array = 0.5 * np.log(np.maximum(square, np.finfo(float).tiny))
+    return half_log

@@ -1,0 +1,114 @@
+"""Where every lightmap texel lies in the world, over all pages at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..solver.scene import Scene
+from ..solver.visibility import Hits
+from .rasterise import Texels, sample_footprints
+
+NO_TEXEL = -1
+
+
+class TexelGeometry:
+    """The n covered texels of all pages, numbered page by page.
+
+    Parameters
+    ----------
+    scene : Scene
+    uv : (t, 3, 2) float32
+        Lightmap coordinates of every scene triangle; rows without a lightmap are ignored.
+    page_of_triangle : (t,) int32
+        −1 where a triangle has no lightmap.
+    texels : sequence of Texels
+        One per page.
+    rows : sequence of (p,) int
+        Per page, the scene triangle of each of the page's triangles.
+
+    Attributes
+    ----------
+    page, row, column, triangle : (n,) int32
+    barycentric : (n, 2) float32
+        Weights of the triangle's second and third corner at the centre of the footprint.
+    position, normal, surface_normal : (n, 3) float64
+        Centre of the footprint; interpolated shading normal; the triangle's own normal.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        uv: np.ndarray,
+        page_of_triangle: np.ndarray,
+        texels: Sequence[Texels],
+        rows: Sequence[np.ndarray],
+    ) -> None:
+        self._scene, self._uv, self._page_of_triangle = scene, uv, page_of_triangle
+        self._texels = list(texels)
+        self._first = np.cumsum([0] + [len(page) for page in texels])
+        self.page = np.repeat(np.arange(len(texels), dtype=np.int32), np.diff(self._first))
+        self.row = np.concatenate([page.row for page in texels])
+        self.column = np.concatenate([page.column for page in texels])
+        self.triangle = np.concatenate([of[page.triangle] for of, page in zip(rows, texels, strict=True)]).astype(np.int32)
+        weights = np.concatenate([page.centroid for page in texels]).astype(np.float64)
+        self.barycentric = weights[:, 1:].astype(np.float32)
+        self.position = np.einsum("nc,nck->nk", weights, scene.triangles[self.triangle])
+        self.surface_normal = scene.face_normals[self.triangle]
+        shading = np.einsum("nc,nck->nk", weights, scene.normals[self.triangle])
+        length = np.linalg.norm(shading, axis=1, keepdims=True)
+        # A shading normal that vanished or turned behind the surface says nothing.
+        sane = (length[:, 0] > 1e-6) & (np.einsum("nk,nk->n", shading, self.surface_normal) > 0)
+        self.normal = np.where(sane[:, None], shading / np.maximum(length, 1e-6), self.surface_normal)
+        self.index = []
+        """per page (height, width) int32: the texel's number, or NO_TEXEL"""
+        for number, page in enumerate(texels):
+            numbers = np.full((page.resolution,) * 2, NO_TEXEL, dtype=np.int32)
+            numbers[page.row, page.column] = self._first[number] + np.arange(len(page))
+            self.index.append(numbers)
+
+    def __len__(self) -> int:
+        return len(self.page)
+
+    def sample(self, rows: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Return (r, k, 3) points spread over the footprints of r texels by u (r, k, 2)."""
+        points = np.empty((len(rows), u.shape[1], 3))
+        for number, page in enumerate(self._texels):
+            mine = np.flatnonzero(self.page[rows] == number)
+            if len(mine) == 0:
+                continue
+            local = rows[mine] - self._first[number]
+            weights = sample_footprints(page.take(local), u[mine])
+            points[mine] = weights @ self._scene.triangles[self.triangle[rows[mine]]]
+        return points
+
+    def neighbourhood(self, chosen: np.ndarray) -> np.ndarray:
+        """Grow a (n,) mask of texels by one texel in all eight directions of their page."""
+        grown = np.zeros(len(self), dtype=bool)
+        for numbers in self.index:
+            inside = numbers != NO_TEXEL
+            image = np.zeros(np.array(numbers.shape) + 2, dtype=bool)
+            image[1:-1, 1:-1][inside] = chosen[numbers[inside]]
+            image[1:-1] = image[1:-1] | image[:-2] | image[2:]
+            image[:, 1:-1] = image[:, 1:-1] | image[:, :-2] | image[:, 2:]
+            grown[numbers[inside]] = image[1:-1, 1:-1][inside]
+        return grown
+
+    def texel_at(self, hits: Hits) -> np.ndarray:
+        """Return (h,) int32: the texel under each ray's hit; NO_TEXEL on backs and unbaked surfaces."""
+        found = np.full(len(hits.triangle), NO_TEXEL, dtype=np.int32)
+        baked = (hits.triangle >= 0) & hits.front
+        baked &= self._page_of_triangle[hits.triangle] >= 0
+        rows = np.flatnonzero(baked)
+        triangle = hits.triangle[rows]
+        second, third = hits.barycentric[rows, 0:1], hits.barycentric[rows, 1:2]
+        corners = self._uv[triangle]
+        uv = (1 - second - third) * corners[:, 0] + second * corners[:, 1] + third * corners[:, 2]
+        page = self._page_of_triangle[triangle]
+        for number, numbers in enumerate(self.index):
+            mine = page == number
+            size = len(numbers)
+            at = np.clip((uv[mine] * size).astype(np.int64), 0, size - 1)
+            found[rows[mine]] = numbers[at[:, 1], at[:, 0]]
+        return found
