@@ -35,6 +35,7 @@ usage: python3 build.py VERB [arguments]
                              --bpy 4.2 or 5.2: with that bpy, in an environment of its own
   check                      lint, layer rule and types
   package                    make the extension's zips in dist/, one a platform
+  real-blender               install the Blender that the tests with a window use (root on Debian)
 """
 
 
@@ -44,11 +45,20 @@ def main(arguments: list[str]) -> int:
         print(USAGE, end="")
         return 0 if arguments else 2
     verb, rest = arguments[0], arguments[1:]
-    verbs = {"bake": bake, "restore": restore, "test": test, "check": check, "package": package}
+    verbs = {
+        "bake": bake,
+        "restore": restore,
+        "test": test,
+        "check": check,
+        "package": package,
+        "real-blender": prepare_real_blender,
+    }
     if verb not in verbs:
         print(f"build.py: error: no verb {verb!r}; there are {', '.join(verbs)}", file=sys.stderr)
         return 2
     try:
+        if rest and verb in ("package", "real-blender"):
+            raise BuildError(f"{verb} takes no arguments, got {rest[0]!r}")
         return verbs[verb](rest)
     except BuildError as error:
         print(f"build.py: error: {error}", file=sys.stderr)
@@ -97,15 +107,20 @@ def check(arguments: list[str]) -> int:
     return 1 if failures else 0
 
 
-def package(arguments: list[str]) -> int:
+def package(_: list[str]) -> int:
     """Make the extension's zips and say where they are."""
     from build_tools import extension
 
-    if arguments:
-        print(f"build.py: error: package takes no arguments, got {arguments[0]!r}", file=sys.stderr)
-        return 2
-    for path in extension.build(ROOT, environments.main_environment(ROOT)):
+    for path in extension.build(ROOT, environments.main_environment(ROOT), ROOT / "dist"):
         print(f"{path.relative_to(ROOT)}  {path.stat().st_size / 1e6:.1f} MB")
+    return 0
+
+
+def prepare_real_blender(_: list[str]) -> int:
+    """Install the Blender that the tests need beside the module, if it is not there yet."""
+    from build_tools import real_blender
+
+    print(f"Blender is in {real_blender.prepare().root}")
     return 0
 
 

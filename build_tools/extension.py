@@ -6,6 +6,7 @@ Blender itself judges the zips in `tests/app/real_blender`.
 
 from __future__ import annotations
 
+import hashlib
 import re
 import shutil
 import subprocess
@@ -27,18 +28,17 @@ PIP_PLATFORMS = {
 }
 
 
-def build(root: Path, environment: Environment) -> list[Path]:
-    """Make `dist/ID-VERSION-PLATFORM.zip` for every platform of the manifest and return their paths."""
+def build(root: Path, environment: Environment, folder: Path) -> list[Path]:
+    """Make `ID-VERSION-PLATFORM.zip` in `folder` for every platform of the manifest, in its order."""
     manifest_text = (root / "blender_manifest.toml").read_text(encoding="utf-8")
     manifest = tomllib.loads(manifest_text)
-    dist = root / "dist"
-    dist.mkdir(exist_ok=True)
+    folder.mkdir(exist_ok=True)
     zips = []
     for platform in manifest["platforms"]:
         wheels = _download(root, environment, platform)
         name = f"{manifest['id']}-{manifest['version']}-{platform.replace('-', '_')}.zip"
         contents = _contents(root, platform_manifest(manifest_text, platform, wheels), wheels)
-        zips.append(_write_zip(dist / name, contents))
+        zips.append(_write_zip(folder / name, contents))
     return zips
 
 
@@ -61,10 +61,14 @@ def platform_manifest(text: str, platform: str, wheels: list[Path]) -> str:
 
 
 def _download(root: Path, environment: Environment, platform: str) -> list[Path]:
-    """Fetch the platform's wheels by their pinned hashes; sorted by name."""
+    """Return the platform's wheels by name, fetched unless they lie there with pinned hashes."""
     folder = root / "build" / "wheels" / platform
     pins = root / "requirements" / "extension-wheels.txt"
-    packages = re.findall(r"^\w+==", pins.read_text(), flags=re.MULTILINE)
+    wanted = len(PYTHON_VERSIONS) * len(re.findall(r"^\w+==", pins.read_text(), flags=re.MULTILINE))
+    hashes = set(re.findall(r"--hash=sha256:(\w+)", pins.read_text()))
+    wheels = sorted(folder.glob("*.whl"))
+    if len(wheels) == wanted and all(_sha256(wheel) in hashes for wheel in wheels):
+        return wheels
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     for version in PYTHON_VERSIONS:
@@ -76,9 +80,13 @@ def _download(root: Path, environment: Environment, platform: str) -> list[Path]
         if subprocess.run(command, check=False).returncode != 0:
             raise BuildError(f"pip could not fetch the wheels for {platform}, Python {version} (see above)")
     wheels = sorted(folder.glob("*.whl"))
-    if len(wheels) != len(PYTHON_VERSIONS) * len(packages):
+    if len(wheels) != wanted:
         raise BuildError(f"pip fetched {len(wheels)} wheels for {platform}, not one a Python and package")
     return wheels
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def _contents(root: Path, manifest: str, wheels: list[Path]) -> dict[str, bytes]:

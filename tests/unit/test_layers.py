@@ -15,7 +15,7 @@ FRONT_DOORS = ("", "__main__", "cli", "console", "interrupts")
 
 # What stands beside the layers, for all to import: errors and settings know none of them, the
 # record of a scene names the solver's lamps.
-BESIDE = {"errors": (), "settings": (), "bake_scene": ("solver",)}
+BESIDE = {"errors": (), "settings": (), "report": (), "bake_scene": ("solver",)}
 
 # What only Blender has belongs to one layer, what is compiled to one file.
 HOMES = {

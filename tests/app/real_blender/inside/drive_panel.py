@@ -1,0 +1,107 @@
+"""Work the panel as a user does: Bake, undo, bake and Esc, bake and Restore. Writes what was seen.
+
+Usage: blender cornell.blend --enable-event-simulate --python drive_panel.py -- ANSWER.json
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).parent))
+import events
+from file_dump import differences, dump_file
+
+ANSWER = Path(sys.argv[sys.argv.index("--") + 1])
+MODULE = "bl_ext.user_default.radiosity_addon"
+HEADER = 34  # pixels at the sidebar's top: the panel's title, which a click would fold
+
+seen = {}
+
+
+def baking():
+    """A bake runs as a modal operator."""
+    return any(operator.bl_idname == "RADIOSITY_OT_bake" for operator in events.window().modal_operators)
+
+
+def not_baking():
+    """The modal operator has ended."""
+    return not baking()
+
+
+def lit_objects():
+    """Names of the objects with a UV layer Lightmap."""
+    return sorted(
+        obj.name for obj in bpy.data.objects if obj.type == "MESH" and "Lightmap" in obj.data.uv_layers
+    )
+
+
+def script():
+    view = events.centre("WINDOW")
+    yield from events.open_sidebar("Radiosity")
+    events.screenshot(ANSWER.with_name("panel-before.png"))
+    before = dump_file()
+    seen["objects"] = sorted(obj.name for obj in bpy.data.objects if obj.type == "MESH")
+
+    bake_button = yield from events.click_down(HEADER, baking)
+    seen["modal"] = True
+    events.screenshot(ANSWER.with_name("panel-baking.png"))
+    seen["asked_while_baking"] = yield from events.until(not_baking, 120)
+    seen["lit"] = lit_objects()
+    seen["images"] = [image.name for image in bpy.data.images if image.has_data or image.packed_file]
+    yield from shaded("MATERIAL")
+    events.screenshot(ANSWER.with_name("panel.png"))
+    yield from shaded("SOLID")
+
+    yield from events.key("Z", *view, ctrl=True)
+    yield 0.5
+    seen["after_undo"] = differences(before, dump_file())
+    yield from events.key("Z", *view, ctrl=True, shift=True)
+    yield 0.5
+    seen["lit_after_redo"] = lit_objects()
+    yield from events.key("Z", *view, ctrl=True)
+    yield 0.5
+
+    sidebar = events.region("UI")
+    x, y = sidebar.x + sidebar.width // 2, sidebar.y + sidebar.height - bake_button
+    yield from events.click(x, y)
+    seen["baking_before_escape"] = baking()
+    yield from events.key("ESC", *view)
+    yield from events.until(not_baking, 30)
+    seen["after_escape"] = differences(before, dump_file())
+
+    yield from events.click(x, y)
+    yield from events.until(not_baking, 120)
+    seen["lit_before_restore"] = lit_objects()
+    # Just below the Bake button, whose lower edge is not known: a bake that starts is cancelled.
+    distance = bake_button
+    while lit_objects() and distance < bake_button + 90:
+        distance += 6
+        yield from events.click(x, y + bake_button - distance)
+        if baking():
+            yield from events.key("ESC", *view)
+            yield from events.until(not_baking, 30)
+    yield 0.5
+    seen["after_restore"] = differences(before, dump_file())
+    events.screenshot(ANSWER.with_name("panel-restored.png"))
+
+
+def shaded(kind):
+    """Shade the viewport so and let it finish: the first time its shaders have to be compiled."""
+    events.area_3d().spaces.active.shading.type = kind
+    events.area_3d().tag_redraw()
+    yield 1.0
+    yield 1.0
+    yield 1.0
+
+
+def finished(failure):
+    seen["failure"] = failure
+    if failure:
+        events.screenshot(ANSWER.with_name("panel-failure.png"))
+    ANSWER.write_text(json.dumps(seen, indent=1))
+
+
+bpy.context.preferences.view.show_splash = False
+events.drive(script(), finished)

@@ -1,0 +1,103 @@
+"""Mouse and key events for a script that drives Blender's window, and where to aim them.
+
+The scripts are generators: each `yield SECONDS` gives the window time to handle what was sent.
+References to Blender's data do not outlive an undo, so everything here looks it up anew.
+"""
+
+import subprocess
+import traceback
+
+import bpy
+
+PAUSE = 0.08
+
+
+def window():
+    return bpy.context.window_manager.windows[0]
+
+
+def area_3d():
+    return next(area for area in window().screen.areas if area.type == "VIEW_3D")
+
+
+def region(kind):
+    return next(region for region in area_3d().regions if region.type == kind)
+
+
+def centre(kind):
+    place = region(kind)
+    return place.x + place.width // 2, place.y + place.height // 2
+
+
+def hover(x, y):
+    window().event_simulate(type="MOUSEMOVE", value="NOTHING", x=x, y=y)
+    yield PAUSE
+
+
+def click(x, y):
+    yield from hover(x, y)
+    for value in ("PRESS", "RELEASE"):
+        window().event_simulate(type="LEFTMOUSE", value=value, x=x, y=y)
+        yield PAUSE
+
+
+def key(kind, x, y, **modifiers):
+    yield from hover(x, y)
+    for value in ("PRESS", "RELEASE"):
+        window().event_simulate(type=kind, value=value, x=x, y=y, **modifiers)
+        yield PAUSE
+
+
+def open_sidebar(category):
+    """Show the sidebar of the 3D viewport on one of its tabs."""
+    area_3d().spaces.active.show_region_ui = True
+    yield 0.5
+    region("UI").active_panel_category = category
+    area_3d().tag_redraw()
+    yield 0.5
+
+
+def click_down(below, happened):
+    """Click at the sidebar in steps downwards until `happened()`; returns how far below its top.
+
+    A button is not to be found by name, only by what it does.
+    """
+    sidebar = region("UI")
+    x, top, height = sidebar.x + sidebar.width // 2, sidebar.y + sidebar.height, sidebar.height
+    for distance in range(below, height, 6):
+        yield from click(x, top - distance)
+        if happened():
+            return distance
+    raise AssertionError(f"no click in the sidebar, {below} to {height} px below its top, did it")
+
+
+def until(happened, seconds):
+    """Wait for `happened()`; returns how many times it was asked."""
+    for asked in range(int(seconds / 0.05)):
+        if happened():
+            return asked
+        yield 0.05
+    raise AssertionError(f"not within {seconds} s: {happened.__doc__}")
+
+
+def screenshot(path):
+    """Picture of the whole screen; Blender's own operator knows only what was drawn already."""
+    subprocess.run(["import", "-window", "root", str(path)], check=True)
+
+
+def drive(script, finished):
+    """Run the generator `script` on a timer, then call `finished(traceback or None)` and quit."""
+
+    def tick():
+        try:
+            return next(script)
+        except StopIteration:
+            failure = None
+        except Exception:  # noqa: BLE001  (whatever it is, the test has to hear of it)
+            failure = traceback.format_exc()
+        finished(failure)
+        bpy.ops.wm.quit_blender()
+        return None
+
+    # Persistent, for undo and opening files take other timers away.
+    bpy.app.timers.register(tick, first_interval=1.0, persistent=True)

@@ -1,0 +1,28 @@
+"""Switch the extension off and on with nothing of it loaded: how long it takes, what it imports."""
+
+import json
+import sys
+import time
+from pathlib import Path
+
+import addon_utils
+
+MODULE = "bl_ext.user_default.radiosity_addon"
+
+answer = {"enabled": addon_utils.check(MODULE), "seconds": []}
+for _ in range(5):
+    addon_utils.disable(MODULE)
+    for name in [name for name in sys.modules if name.startswith(MODULE)]:
+        del sys.modules[name]
+    start = time.perf_counter()
+    addon_utils.enable(MODULE)
+    answer["seconds"].append(time.perf_counter() - start)
+answer["modules"] = sorted(name.removeprefix(f"{MODULE}.") for name in sys.modules)
+
+# The wheels are there all the same.
+import embreex  # noqa: E402
+import xatlas  # noqa: E402
+
+answer["wheels"] = [embreex.__file__, xatlas.__file__]
+
+Path(sys.argv[sys.argv.index("--") + 1]).write_text(json.dumps(answer))

@@ -1,0 +1,67 @@
+"""The zip a user installs: Blender accepts it, starts it quickly and bakes with it from the command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.app.real_blender.installed import Installed
+
+pytestmark = pytest.mark.real_blender
+
+
+@pytest.mark.parametrize("platform", ["linux-x64", "windows-x64", "macos-arm64", "macos-x64"])
+def test_blender_validates_every_zip(blender, zips, platform) -> None:
+    done = blender.run(
+        "--command", "extension", "validate", blender.inside(zips[platform]), resources=zips[platform].parent
+    )
+    assert done.returncode == 0, done.stdout
+    assert "Success" in done.stdout
+
+
+def test_registering_is_quick_and_imports_nothing_heavy(installed: Installed) -> None:
+    answer = installed.answer("registration_cost.py")
+    assert answer["enabled"] == [True, True]
+    assert min(answer["seconds"]) < 0.05
+    assert not {"embreex", "xatlas", "solver", "pipeline", "lightmap"} & set(answer["modules"])
+    assert all(path.startswith(installed.blender.inside(installed.resources)) for path in answer["wheels"])
+
+
+def test_bakes_from_blenders_command_line(installed: Installed, cornell_blend: Path) -> None:
+    output = installed.folder / "baked"
+    before = cornell_blend.read_bytes()
+    command = ["-b", cornell_blend, "--command", "radiosity", "bake", "--output", output]
+    done = installed.run(*command, "--resolution", "64", "--quality", "draft")
+    assert done.returncode == 0, done.stdout
+    assert cornell_blend.read_bytes() == before
+    report = json.loads((output / "report.json").read_text())
+    assert report["version"] == 1
+    assert report["objects"]
+    for entry in report["objects"]:
+        assert entry["resolution"] == [64, 64]
+        assert (output / entry["image"]).stat().st_size > 0
+    emitted, absorbed, escaped = (report["solver"]["power_W"][k] for k in ("emitted", "absorbed", "escaped"))
+    assert absorbed + escaped == pytest.approx(emitted, rel=0.02)
+    assert (output / "baked.blend").exists()
+    assert (output / "preview.png").exists()
+
+
+def test_restores_from_blenders_command_line(installed: Installed, cornell_blend: Path) -> None:
+    baked, restored = installed.folder / "to-restore", installed.folder / "restored.blend"
+    bake = ["-b", cornell_blend, "--command", "radiosity", "bake", "--output", baked]
+    assert installed.run(*bake, "--resolution", "32", "--quality", "draft").returncode == 0
+    restore = ["-b", baked / "baked.blend", "--command", "radiosity", "restore", "--output", restored]
+    done = installed.run(*restore)
+    assert done.returncode == 0, done.stdout
+    assert installed.answer("compare_files.py", cornell_blend, restored) == []
+
+
+def test_exit_codes_come_through_blender(installed: Installed, cornell_blend: Path) -> None:
+    command = ["-b", cornell_blend, "--command", "radiosity", "bake"]
+    assert installed.run(*command).returncode == 2
+    assert installed.run(*command, "--output", installed.folder / "x", "--resolution", "0").returncode == 2
+    unwritable = installed.run(*command, "--output", "/proc/radiosity")
+    assert unwritable.returncode == 1
+    assert "/proc/radiosity" in unwritable.stdout
