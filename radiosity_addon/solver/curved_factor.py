@@ -102,10 +102,12 @@ def point_to_ellipse(
         nodes, factor = PANEL, np.full(len(rows), np.inf)
         while len(rows) and nodes <= MAX_NODES:
             step = max(_CHUNK_NODES // nodes, 1)
-            finer = np.concatenate([
-                _arc_factor(offset[part], normals[part], u, v, nodes, cut)
-                for part in (rows[start : start + step] for start in range(0, len(rows), step))
-            ])
+            finer = np.concatenate(
+                [
+                    _arc_factor(offset[part], normals[part], u, v, nodes, cut)
+                    for part in (rows[start : start + step] for start in range(0, len(rows), step))
+                ]
+            )
             factors[rows] = finer
             moved = np.abs(finer - factor) > ELLIPSE_TOLERANCE
             rows, factor, nodes = rows[moved], finer[moved], 2 * nodes

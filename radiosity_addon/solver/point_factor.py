@@ -140,11 +140,13 @@ def _cut_turn(
     """
     toward = area_vector - _dot(area_vector, normal) * normal
     toward *= -np.copysign(1.0, -_dot(corners[0], area_vector))
-    across = np.stack([
-        normal[1] * toward[2] - normal[2] * toward[1],
-        normal[2] * toward[0] - normal[0] * toward[2],
-        normal[0] * toward[1] - normal[1] * toward[0],
-    ])
+    across = np.stack(
+        [
+            normal[1] * toward[2] - normal[2] * toward[1],
+            normal[2] * toward[0] - normal[0] * toward[2],
+            normal[0] * toward[1] - normal[1] * toward[0],
+        ]
+    )
     turn = np.zeros(corners.shape[2])
     before, below = np.roll(corners, 1, axis=0), np.roll(heights, 1, axis=0)
     for start, end, low, high in zip(before, corners, below, heights, strict=True):
@@ -173,13 +175,13 @@ def _contact_turn(
 def _area_vector(corners: Float64Array) -> Float64Array:
     """Return (3, m) twice the polygon's area times its unit normal, of (k, 3, m) corners."""
     total: Float64Array = np.zeros(corners.shape[1:])
-    edge: Float64Array = corners[1] - corners[0]
+    edge = np.subtract(corners[1], corners[0], dtype=np.float64)
     for corner in corners[2:]:
         following = np.subtract(corner, corners[0], dtype=np.float64)
         total[0] += edge[1] * following[2] - edge[2] * following[1]
         total[1] += edge[2] * following[0] - edge[0] * following[2]
         total[2] += edge[0] * following[1] - edge[1] * following[0]
-        edge = following
+        edge[...] = following
     return total
 
 

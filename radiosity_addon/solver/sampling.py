@@ -6,6 +6,7 @@ what was drawn before, so neither chunks nor threads change a result.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,8 @@ import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.floating[Any]]
 
-_SOBOL_BITS = 32
+_TABLE_BITS = 16
+"""Points of a row's sequence that are shuffled among themselves, as a power of two."""
 
 
 def hash_keys(keys: npt.ArrayLike, seed: int = 0) -> npt.NDArray[np.uint32]:
@@ -51,10 +53,12 @@ def _avalanche(bits: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:
 def stratified_square(keys: npt.ArrayLike, k: int, seed: int = 0, first: int = 0) -> npt.NDArray[np.float32]:
     """Return k low-discrepancy points in the unit square for every key.
 
-    The first two Sobol' dimensions, a (0,2)-sequence in base 2, shifted digitally by the
-    row's own random bits: every aligned run of 2^m points (from `first` = 0, or a multiple of
+    The first two Sobol' dimensions, a (0,2)-sequence in base 2, shuffled and shifted by the
+    row's own random bits. Every aligned run of 2^m points (from `first` = 0, or a multiple of
     2^m) has one point in each elementary box of area 2^-m, and each point alone is uniform.
-    Asking on with `first` = k continues the same row's sequence.
+    The shuffle moves aligned runs as wholes (Burley 2020, "Practical hash-based Owen
+    scrambling"), so squares of different seeds may be joined to more dimensions. Asking on
+    with `first` = k continues the same row's sequence.
 
     Parameters
     ----------
@@ -71,18 +75,47 @@ def stratified_square(keys: npt.ArrayLike, k: int, seed: int = 0, first: int = 0
     u : (n, k, 2) float32 in [0, 1)
     """
     rows = np.asarray(keys)
-    pattern = _sobol_bits(np.arange(first, first + k, dtype=np.uint32))
-    shift = np.stack([hash_keys(rows, 2 * seed), hash_keys(rows, 2 * seed + 1)], axis=-1)
-    bits = shift[:, None, :] ^ pattern[None, :, :]
+    index = np.arange(first, first + k, dtype=np.uint32)
+    low = index & np.uint32((1 << _TABLE_BITS) - 1)
+    high = index - low
+    order = _shuffle(_reversed_bits(low), hash_keys(rows, 3 * seed)[:, None])
+    bits = _reversed_table()[order] ^ _sobol_bits(high)
+    bits ^= np.stack([hash_keys(rows, 3 * seed + 1), hash_keys(rows, 3 * seed + 2)], axis=-1)[:, None]
     # 24 bits are what a float32 below 1 holds exactly; rounding 32 could give 1.
     return (bits >> np.uint32(8)).astype(np.float32) * np.float32(2.0**-24)
+
+
+def _shuffle(reversed_index: npt.NDArray[np.uint32], salt: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:
+    """Permute bit-reversed indices so that each bit flips by a hash of the bits below it only.
+
+    Multiplying by an even number carries upwards alone (Laine and Karras 2011): in plain
+    order, halves swap within halves, as in Owen's scrambling.
+    """
+    bits = reversed_index + salt
+    for factor in (0x6C50B47C, 0xB82F1E52, 0xC7AFE638, 0x8D22F6E6):
+        bits = bits ^ (bits * np.uint32(factor))
+    return bits & np.uint32((1 << _TABLE_BITS) - 1)
+
+
+def _reversed_bits(index: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:
+    """Return the low `_TABLE_BITS` bits of each index in opposite order."""
+    reverse = np.zeros_like(index)
+    for digit in range(_TABLE_BITS):
+        reverse |= ((index >> np.uint32(digit)) & np.uint32(1)) << np.uint32(_TABLE_BITS - 1 - digit)
+    return reverse
+
+
+@cache
+def _reversed_table() -> npt.NDArray[np.uint32]:
+    """Return the Sobol' points by bit-reversed index, (2^`_TABLE_BITS`, 2)."""
+    return _sobol_bits(_reversed_bits(np.arange(1 << _TABLE_BITS, dtype=np.uint32)))
 
 
 def _sobol_bits(index: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:
     """Return the first two Sobol' dimensions of points `index` (k,) as (k, 2) binary fractions."""
     bits = np.zeros((len(index), 2), dtype=np.uint32)
-    radical, pascal = 1 << (_SOBOL_BITS - 1), 1 << (_SOBOL_BITS - 1)
-    for digit in range(_SOBOL_BITS):
+    radical, pascal = 1 << 31, 1 << 31
+    for digit in range(32):
         on = ((index >> np.uint32(digit)) & np.uint32(1)).astype(bool)
         bits[on, 0] ^= np.uint32(radical)
         bits[on, 1] ^= np.uint32(pascal)
