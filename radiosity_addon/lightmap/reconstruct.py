@@ -20,6 +20,7 @@ from .interpolate import GatherPoints, fit
 from .sweeps import StoredLinks, TexelLight, sweep
 from .texel_geometry import NO_TEXEL, TexelGeometry
 
+
 @dataclass(frozen=True)
 class GatherSettings:
     """How densely indirect light is gathered.
@@ -29,6 +30,8 @@ class GatherSettings:
     strides : tuple of int
         Lattices of gather points, coarse to fine, in texels; finer ones are used only where
         coarser points do not reach.
+    support : float
+        A texel whose coarser points weigh less than this together becomes a point itself.
     rays : int
         A gather point.
     sweeps : int
@@ -36,6 +39,7 @@ class GatherSettings:
     """
 
     strides: tuple[int, ...] = (4, 2, 1)
+    support: float = 1.0
     rays: int = 256
     sweeps: int = 4
 
@@ -53,7 +57,7 @@ def reconstruct(
     points = GatherPoints(geometry)
     sources: list[np.ndarray] = []
     for number, stride in enumerate(settings.strides):
-        chosen = _choose(points, geometry, stride)
+        chosen = _choose(points, geometry, stride, settings.support)
         found, closeness = local.gather(
             geometry.position[chosen],
             geometry.normal[chosen],
@@ -74,13 +78,13 @@ def reconstruct(
     return light
 
 
-def _choose(points: GatherPoints, geometry: TexelGeometry, stride: int) -> np.ndarray:
+def _choose(points: GatherPoints, geometry: TexelGeometry, stride: int, support: float) -> np.ndarray:
     """Return the texels on a lattice that no point so far reaches."""
     on_lattice = (geometry.row % stride == 0) & (geometry.column % stride == 0)
     candidates = np.flatnonzero(on_lattice)
     if len(points):
         candidates = np.setdiff1d(candidates, points.texel, assume_unique=True)
-        candidates = candidates[points.support(candidates) < 1.0]
+        candidates = candidates[points.support(candidates) < support]
     return candidates.astype(np.int32)
 
 

@@ -71,6 +71,10 @@ class TexelGeometry:
     def __len__(self) -> int:
         return len(self.page)
 
+    def first(self, page: int) -> int:
+        """Return the number of a page's first texel."""
+        return int(self._first[page])
+
     def sample(self, rows: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Return (r, k, 3) points spread over the footprints of r texels by u (r, k, 2)."""
         points = np.empty((len(rows), u.shape[1], 3))

@@ -53,6 +53,10 @@ class Solution:
             "closure_area_mean": mean,
         }
 
+    def final_report(self) -> dict[str, Any]:
+        """Return the report with the rays counted that were traced since solving."""
+        return {**self.report, "rays": self._state.caster.rays}
+
     @cached_property
     def local_pass(self) -> LocalPass:
         """The local pass over this solution: direct light and gather rays at points."""
