@@ -15,6 +15,9 @@ from ..interrupts import Interrupts
 from ..settings import BakeSettings
 from . import runtime
 
+MAX_IMAGES = 8
+"""The closing lines name so many lightmaps one by one."""
+
 
 def bake(
     scene: Path | None,
@@ -43,12 +46,13 @@ def bake(
     """
     with _registered():
         from .job import WRITING_STAGES, run_bake
-        from .output import BLEND_NAME, FILES, OutputFolder
+        from .output import BLEND_NAME, OutputFolder
 
         source = scene or loaded
         if source is not None and _same_file(source, output / BLEND_NAME):
             raise UsageError(f"--output {output} would overwrite the scene '{source}'; choose another folder")
         if report_copy is not None:
+            # Now, not after all the work.
             _make_folder_of(report_copy)
         console.progress("open", 0.0)
         _open(scene, loaded)
@@ -68,7 +72,7 @@ def bake(
             job.close()
         if report_copy is not None:
             report.write(report_copy)
-        console.lines(summary(str(output), FILES, report.as_dict()))
+        console.lines(summary(str(output), _files(report.as_dict()), report.as_dict()))
 
 
 def restore(scene: Path | None, loaded: Path | None, output: Path, console: Console) -> None:
@@ -93,6 +97,7 @@ def restore(scene: Path | None, loaded: Path | None, output: Path, console: Cons
             raise SceneError(f"'{scene or loaded}' shows no bake; there is nothing to restore")
         for each in bpy.data.scenes:
             runtime.forget(each)
+        _make_folder_of(output)
         save_copy(output)
         console.lines([f"{count} object{'' if count == 1 else 's'} restored, written to {output}"])
 
@@ -109,12 +114,29 @@ def _open(scene: Path | None, loaded: Path | None) -> None:
         build_cornell_box()
 
 
-def _make_folder_of(report: Path) -> None:
-    """Make the folder of the report's copy, so that a bake does not end in finding it missing."""
+def _files(report: dict) -> list[tuple[str, str]]:
+    """What a bake has left in its folder, for people to read."""
+    from .output import BLEND_NAME, PREVIEW_NAME, REPORT_NAME
+
+    images = list(dict.fromkeys(entry["image"] for entry in report["objects"]))
+    shown = images if len(images) <= MAX_IMAGES else [f"{images[0]} … {images[-1]}"]
+    return [
+        (BLEND_NAME, "the scene with its lightmaps"),
+        *(
+            (image, "lightmap" if len(shown) == len(images) else f"{len(images)} lightmaps")
+            for image in shown
+        ),
+        (PREVIEW_NAME, "what it looks like"),
+        (REPORT_NAME, "objects, figures and warnings"),
+    ]
+
+
+def _make_folder_of(path: Path) -> None:
+    """Make the folder of a file to be written."""
     try:
-        report.parent.mkdir(parents=True, exist_ok=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise BakeError(f"--report {report}: the folder cannot be made ({error.strerror})") from error
+        raise BakeError(f"cannot write '{path}': its folder cannot be made ({error.strerror})") from error
 
 
 def _same_file(one: Path, other: Path) -> bool:

@@ -38,6 +38,7 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
     bl_label = "Bake Radiosity"
     bl_options = {"REGISTER", "UNDO"}
 
+    _was_editing = False
     _job: Generator[Any, None, Any] | None = None
     _timer: bpy.types.Timer | None = None
 
@@ -84,6 +85,7 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
         """Carry on for a tick, or cancel."""
         if event.type == "ESC" and event.value == "PRESS":
             self._end(context)
+            self._return_to_edit_mode(context)
             self.report({"INFO"}, "Bake cancelled; everything is as it was")
             return {"CANCELLED"}
         if event.type != "TIMER":
@@ -97,6 +99,7 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
         except BaseException:
             self._end(context)
             raise
+        show_result(context)
         return self._finish(context)
 
     def cancel(self, context: bpy.types.Context) -> None:
@@ -107,11 +110,10 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
         from .job import run_bake
         from .output import OutputFolder
 
-        flush_edit_mode(context)
+        self._was_editing = context.mode == "EDIT_MESH"
         settings = settings_of(context)
         folder = output_folder(context)
         self._report = None
-        self._folder = folder
         self._job = run_bake(context, settings, None if folder is None else OutputFolder(folder))
         runtime.running.active = True
         runtime.running.stage, runtime.running.fraction = "Starting", 0.0
@@ -137,9 +139,12 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
         redraw_sidebars(context)
 
     def _finish(self, context: bpy.types.Context) -> set[str]:
+        from .lightmap_materials import set_lightmap_only
+
         self._end(context)
         report = self._report.as_dict()
-        runtime.remember(context.scene, report, "" if self._folder is None else str(self._folder))
+        if context.scene.radiosity.lightmap_only:
+            set_lightmap_only(True)
         taken = sum(report["seconds"].values())
         self.report({"INFO"}, f"Baked {len(report['objects'])} objects in {taken:.1f} s")
         warnings = report["warnings"]
@@ -151,8 +156,14 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
 
     def _fail(self, context: bpy.types.Context, error: RadiosityError) -> set[str]:
         self._end(context)
+        self._return_to_edit_mode(context)
         self.report({"ERROR"}, " ".join(str(error).split()))
         return {"CANCELLED"}
+
+    def _return_to_edit_mode(self, context: bpy.types.Context) -> None:
+        """Go on with the editing that the export had to leave."""
+        if self._was_editing and context.mode == "OBJECT" and bpy.ops.object.mode_set.poll():
+            bpy.ops.object.mode_set(mode="EDIT")
 
     def _end(self, context: bpy.types.Context) -> None:
         """Close the bake, whatever state it is in, and everything shown about it."""
@@ -237,7 +248,7 @@ class RADIOSITY_OT_open_folder(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Open the folder."""
-        folder = runtime.last_bake(context.scene).folder
+        folder = bpy.path.abspath(runtime.last_bake(context.scene).folder)
         if not Path(folder).is_dir():
             self.report({"ERROR"}, f"The folder '{folder}' is not there any more")
             return {"CANCELLED"}
@@ -255,11 +266,12 @@ def output_folder(context: bpy.types.Context) -> Path | None:
     return Path(bpy.path.abspath(folder)).resolve()
 
 
-def flush_edit_mode(context: bpy.types.Context) -> None:
-    """Write meshes that are being edited back into their data, which is what a bake reads."""
-    for obj in context.view_layer.objects:
-        if obj.mode == "EDIT" and obj.type == "MESH":
-            obj.update_from_editmode()
+def show_result(context: bpy.types.Context) -> None:
+    """Switch a viewport that shows no materials to the preview that does, if that is wanted."""
+    space = context.space_data
+    wanted = context.scene.radiosity.show_result
+    if wanted and isinstance(space, bpy.types.SpaceView3D) and space.shading.type in {"WIREFRAME", "SOLID"}:
+        space.shading.type = "MATERIAL"
 
 
 def redraw_sidebars(context: bpy.types.Context) -> None:

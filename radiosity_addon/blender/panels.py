@@ -81,6 +81,7 @@ class RADIOSITY_PT_advanced(_Panel, bpy.types.Panel):
         column = layout.column(align=True)
         column.prop(settings, "seed")
         column.prop(settings, "threads")
+        layout.column(heading="Viewport").prop(settings, "show_result")
 
 
 class RADIOSITY_PT_last_bake(_Panel, bpy.types.Panel):
@@ -103,6 +104,7 @@ class RADIOSITY_PT_last_bake(_Panel, bpy.types.Panel):
             split = column.split(factor=0.45)
             split.label(text=name)
             split.label(text=value)
+        self.layout.prop(context.scene.radiosity, "lightmap_only")
         if last.folder:
             self.layout.operator("radiosity.open_folder", icon="FILE_FOLDER")
 

@@ -44,6 +44,12 @@ def _items(values: tuple[str, ...]) -> list[tuple[str, str, str]]:
 _RELATIVE_PATH = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set()
 
 
+def _show_lightmap_only(settings: RadiositySettings, _context: bpy.types.Context) -> None:
+    from .lightmap_materials import set_lightmap_only
+
+    set_lightmap_only(settings.lightmap_only)
+
+
 class RadiositySettings(bpy.types.PropertyGroup):
     """`scene.radiosity`: what the next bake from the panel does."""
 
@@ -143,6 +149,17 @@ class RadiositySettings(bpy.types.PropertyGroup):
         default=DEFAULT_FOLDER,
         subtype="DIR_PATH",
         options=_RELATIVE_PATH,
+    )
+    show_result: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Show Result",
+        description="Switch the viewport from solid to material preview when the bake is done",
+        default=True,
+    )
+    lightmap_only: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Lightmap Only",
+        description="Show the lightmaps alone instead of base color × lightmap",
+        default=False,
+        update=_show_lightmap_only,
     )
     last_bake: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Last Bake",

@@ -70,8 +70,12 @@ def remember(scene: bpy.types.Scene, report: dict, folder: str) -> None:
 
 
 def forget(scene: bpy.types.Scene) -> None:
-    """Drop the scene's memory of its last bake."""
-    scene.radiosity.property_unset("last_bake")
+    """Drop the scene's memory of its last bake, and all trace of us where nothing else was set."""
+    group = scene.radiosity
+    group.property_unset("last_bake")
+    names = [prop.identifier for prop in group.bl_rna.properties if not prop.is_readonly]
+    if not any(map(group.is_property_set, names)):
+        scene.property_unset("radiosity")
 
 
 def last_bake(scene: bpy.types.Scene) -> LastBake | None:
