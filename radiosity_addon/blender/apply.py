@@ -89,6 +89,20 @@ def apply_lightmaps(
     _show(context, replacements)
 
 
+def check_targets(export: Export) -> None:
+    """Refuse before a bake what `apply_lightmaps` would refuse after it.
+
+    Raises
+    ------
+    SceneError
+        If an object to be baked has no room for another UV layer.
+    """
+    for source, target in zip(export.sources, export.bake_scene.objects, strict=True):
+        obj = bpy.data.objects.get((source.object_name, None))
+        if target.bake and obj is not None and isinstance(obj.data, bpy.types.Mesh):
+            check_room(obj.data, source.object_name)
+
+
 def _make_replacements(
     context: bpy.types.Context, export: Export, result: BakeResult
 ) -> list[_Replacement]:
@@ -206,4 +220,4 @@ def _new_stand_in(replacement: _Replacement) -> bpy.types.Object:
 def _nearly_equal(first: Matrix, second: Matrix) -> bool:
     """Whether two transforms agree to float32 rounding."""
     size = max(max(abs(value) for value in row) for row in second)
-    return all(abs(a - b) <= 1e-5 * size for p, q in zip(first, second, strict=True) for a, b in zip(p, q, strict=True))
+    return all(abs(first[i][j] - second[i][j]) <= 1e-5 * size for i in range(4) for j in range(4))

@@ -93,7 +93,7 @@ def unmark_made(datablock: bpy.types.ID) -> None:
 
 def is_made(datablock: bpy.types.ID) -> bool:
     """Whether a bake made this datablock."""
-    return MADE_MARKER in datablock.keys()
+    return datablock.get(MADE_MARKER) is not None
 
 
 def made_datablocks() -> Iterator[bpy.types.ID]:

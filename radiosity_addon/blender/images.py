@@ -16,6 +16,7 @@ import numpy as np
 
 from ..bake_scene import BakeResult, LightmapPage
 from ..errors import BakeError
+from ..report import LightmapFile
 from ..settings import BakeSettings
 from .bake_record import mark_made, remove_datablocks
 
@@ -108,6 +109,18 @@ def relative_path(path: Path) -> str:
 def image_scale(image: bpy.types.Image) -> float:
     """What a texel of the image must be multiplied by to get the quantity."""
     return float(image.get(SCALE_PROPERTY, 1.0))
+
+
+def lightmap_files(images: Sequence[bpy.types.Image], settings: BakeSettings) -> list[LightmapFile]:
+    """What the report says of the images: file names, and the scale where there is one."""
+    scaled = settings.format == "png16"
+    return [
+        LightmapFile(
+            Path(bpy.path.abspath(image.filepath_raw)).name or image.name,
+            image_scale(image) if scaled else None,
+        )
+        for image in images
+    ]
 
 
 def _new_image(page: LightmapPage, file_format: str, file_name: str) -> bpy.types.Image:

@@ -10,15 +10,17 @@ import bpy
 
 from .. import pipeline
 from ..bake_scene import BakeResult, Progress
+from ..report import BakeReport
 from ..settings import BakeSettings
+from . import runtime
 from .apply import apply_lightmaps, check_targets
+from .bake_record import remove_datablocks
 from .export import export_scene
 from .export_sources import Export
-from .images import set_folder, write_pages
+from .images import lightmap_files, set_folder, write_pages
 from .output import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, OutputFolder, save_copy
 from .preview import render_preview
 from .rebake import originals_shown, replacing_earlier
-from .report import BakeReport
 from .restore import restore
 
 BakeJob = Generator[Progress, None, BakeReport]
@@ -71,7 +73,7 @@ def run_bake(
         yield Progress("export", 0.0)
         with _timed(seconds, "export"), originals_shown(context):
             export = export_scene(context, settings)
-            check_targets(context, export)
+            check_targets(export)
         result = yield from _solve(export, settings)
         seconds.update(result.seconds)
         yield Progress("apply", APPLY)
@@ -79,10 +81,11 @@ def run_bake(
             return (yield from _deliver(context, settings, export, result, output, seconds))
         with replacing_earlier(context), _timed(seconds, "apply"):
             images = _show(context, settings, export, result, output)
-            report = BakeReport.of(export, result, images, settings, seconds)
+            report = BakeReport.of(result, lightmap_files(images, settings), seconds)
             if output is not None:
                 report.write(output.staging / REPORT_NAME)
                 output.publish()
+        runtime.remember(context.scene, report.as_dict(), "" if output is None else str(output.path))
     return report
 
 
@@ -112,18 +115,22 @@ def _deliver(
     with replacing_earlier(context), _timed(seconds, "apply"):
         images = _show(context, settings, export, result, output)
     try:
+        # The copy tells of its bake too; what is left to do is not in its times.
+        so_far = BakeReport.of(result, lightmap_files(images, settings), seconds)
+        runtime.remember(context.scene, so_far.as_dict(), "//")
         yield Progress("save", SAVE)
         with _timed(seconds, "save"):
-            save_copy(output.staging / BLEND_NAME)
+            save_copy(output.staging / BLEND_NAME, output.path)
         yield Progress("preview", PREVIEW)
         with _timed(seconds, "preview"):
             render_preview(context, output.staging / PREVIEW_NAME, settings)
-        report = BakeReport.of(export, result, images, settings, seconds)
+        report = BakeReport.of(result, lightmap_files(images, settings), seconds)
         report.write(output.staging / REPORT_NAME)
         yield Progress("write", 1.0)
         output.publish()
     except BaseException:
         restore(context)
+        runtime.forget(context.scene)
         raise
     return report
 
@@ -142,7 +149,7 @@ def _show(
             set_folder(images, output.path)
         apply_lightmaps(context, export, result, images, settings)
     except BaseException:
-        bpy.data.batch_remove(images)
+        remove_datablocks(images)
         raise
     return images
 

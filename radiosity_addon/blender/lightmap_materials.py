@@ -133,9 +133,8 @@ def set_lightmap_only(lightmap_only: bool) -> int:
     for material in bpy.data.materials:
         if is_made(material) and material.node_tree is not None:
             for node in material.node_tree.nodes:
-                if node.type == "GROUP" and node.node_tree is not None and is_made(node.node_tree):
-                    if LIGHTMAP_ONLY in node.inputs:
-                        node.inputs[LIGHTMAP_ONLY].default_value = float(lightmap_only)
+                if node.type == "GROUP" and node.node_tree is not None and LIGHTMAP_ONLY in node.inputs:
+                    node.inputs[LIGHTMAP_ONLY].default_value = float(lightmap_only)
             count += 1
     return count
 

@@ -57,7 +57,7 @@ def _dump_struct(struct: Any, above: tuple[int, ...]) -> Any:
         if prop.identifier not in _VOLATILE
     }
     if isinstance(struct, bpy.types.ID):
-        dump["<custom>"] = {key: _plain(struct[key]) for key in struct.keys()}
+        dump["<custom>"] = {key: _plain(value) for key, value in struct.items()}
     return dump
 
 

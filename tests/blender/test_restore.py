@@ -8,9 +8,6 @@ from pathlib import Path
 
 import bpy
 import pytest
-from tests.blender.file_dump import differences, dump_file
-from tests.blender.hand_bake import hand_result
-from tests.blender.zoo import build_zoo
 
 from radiosity_addon.blender import bake_record
 from radiosity_addon.blender.apply import apply_lightmaps
@@ -18,6 +15,9 @@ from radiosity_addon.blender.export import export_scene
 from radiosity_addon.blender.images import write_pages
 from radiosity_addon.blender.restore import restore
 from radiosity_addon.settings import BakeSettings
+from tests.blender.file_dump import differences, dump_file
+from tests.blender.hand_bake import hand_result
+from tests.blender.zoo import build_zoo
 
 
 @pytest.fixture(autouse=True)
