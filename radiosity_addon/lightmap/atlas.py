@@ -250,8 +250,8 @@ def _kept_as_they_are(group: list[_Layout], resolution: int, density: float | No
         size = density * np.sqrt(surface / flat)
         if not size <= MAX_RESOLUTION:
             raise BakeError(
-                f"a texel density of {density:g} px/m needs a page above {MAX_RESOLUTION} px for the kept UVs of "
-                f"{group[0].source.name}: lower the density"
+                f"a texel density of {density:g} px/m needs a page above {MAX_RESOLUTION} px for the kept "
+                f"UVs of {group[0].source.name}: lower the density"
             )
         resolution = max(4, 4 * int(np.ceil(size / 4)))
     return Packing(uv, resolution, resolution * float(np.sqrt(flat / surface)) if surface > 0 else 0.0)

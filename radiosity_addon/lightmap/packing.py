@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..errors import BakeError
 from ..settings import MAX_RESOLUTION
 from .flatten import signed_double_area
-from .shapes import Shapes, align, measure
+from .shapes import Shapes, align, measure, outline
 from .skyline import Placement, place
 
 Float = NDArray[np.float64]
@@ -38,7 +38,14 @@ FINEST = 2048
 """Cells along a page's side; larger pages are packed in cells of several texels."""
 
 FEW = 200
-"""Up to this many charts several orders and rules are tried at each scale."""
+"""Up to this many charts several orders, rules and stretches are tried."""
+
+STRETCHES = (1.0, 0.8, 0.85, 0.9, 0.95, 1.05, 1.1, 1.15, 1.2, 1.25)
+"""Texels per metre along u over those along v, the same for all charts of a page.
+
+A few large charts rarely fill a square; texels up to a quarter longer than wide do no harm and
+bring up to a quarter more of them.
+"""
 
 
 @dataclass(frozen=True)
@@ -51,7 +58,7 @@ class Packing:
         In [0, 1].
     resolution : int
     density : float
-        Texels per metre.
+        Texels per metre, the geometric mean of those along u and v.
     crowded : bool
         Whether the page is too small to keep the charts two texels apart.
     """
@@ -64,10 +71,12 @@ class Packing:
 
 @dataclass(frozen=True)
 class _Job:
-    """Aligned charts and the orders worth trying."""
+    """Aligned charts, their outlines, and the orders worth trying."""
 
     uv: Float
     chart: Int
+    edges: Float
+    owner: Int
     extent: Float
     orders: tuple[Int, ...]
     area: float
@@ -126,15 +135,33 @@ def _job(uv: Float, chart: Int) -> _Job:
         orders.append(np.lexsort((np.arange(count), -long, -extent.prod(axis=1))))
         orders.append(np.lexsort((np.arange(count), -long, -short)))
     area = float(0.5 * np.abs(signed_double_area(aligned)).sum())
-    return _Job(aligned, chart, extent, tuple(orders), area)
+    return _Job(aligned, chart, *outline(aligned, chart), extent, tuple(orders), area)
 
 
-def _shapes(job: _Job, scale: float, cell: int) -> tuple[Float, Shapes]:
-    """Return the charts in cells at `scale` texels per metre, and their shapes."""
+@dataclass(frozen=True)
+class _Scaled:
+    """Cells per metre (count, 2) of each chart and the shapes they have then.
+
+    For an even and for an odd number of quarter turns.
+    """
+
+    scale: tuple[Float, Float]
+    shapes: tuple[Shapes, Shapes]
+
+
+def _scaled(job: _Job, scale: float, cell: int, stretch: float = 1.0) -> _Scaled:
+    """Return the charts at `scale` texels per metre, stretched along the page's u."""
+    even = _measured(job, scale * np.array((stretch**0.5, stretch**-0.5)), cell)
+    odd = even if stretch == 1.0 else _measured(job, scale * np.array((stretch**-0.5, stretch**0.5)), cell)
+    return _Scaled((even[0], odd[0]), (even[1], odd[1]))
+
+
+def _measured(job: _Job, scale: Float, cell: int) -> tuple[Float, Shapes]:
+    """Return cells per metre (count, 2) at `scale` (2,) texels per metre, and the charts' shapes."""
     extent = job.extent * scale
     widen = np.where(extent < SMALLEST, SMALLEST / np.maximum(extent, 1e-30), 1.0)
-    local = job.uv * (scale / cell * widen[job.chart][:, None])
-    return local, measure(local, job.chart, len(job.extent))
+    cells = scale / cell * widen
+    return cells, measure(job.edges * cells[job.owner][:, None], job.owner, job.extent * cells)
 
 
 def _pack_into(job: _Job, resolution: int, page: int) -> Iterator[Packing]:
@@ -147,24 +174,31 @@ def _pack_into(job: _Job, resolution: int, page: int) -> Iterator[Packing]:
     count = len(job.extent)
     if side < 1:
         return
-    low, high = 0.0, resolution / np.sqrt(job.area)
-    scale = 0.85 * high
-    for _ in range(int(np.clip(6000 // count, 6, 40))):
-        local, shapes = _shapes(job, scale, cell)
-        placement, height = _place(job, shapes, side, cell)
-        if placement is not None:
-            low = scale
-            moved = _moved(local, job.chart, shapes, placement)
-            yield _packing(moved * cell, resolution, page, scale)
-            scale = float(np.sqrt(low * high))
-        else:
-            high = scale
-            guess = scale * np.sqrt(side / height) if height else 0.5 * scale
-            scale = float(np.sqrt(low * high)) if low else float(min(max(guess, 0.25 * scale), 0.97 * scale))
-        if low and high < low * 1.002:
+    full = resolution / float(np.sqrt(job.area))
+    low, scale, trials = 0.0, 0.85 * full, int(np.clip(6000 // count, 6, 40))
+    for stretch in STRETCHES if count <= FEW else (1.0,):
+        high = full
+        for _ in range(trials):
+            scaled = _scaled(job, scale, cell, stretch)
+            placement, height = _place(job, scaled.shapes, side, cell)
+            if placement is not None:
+                low = scale
+                yield _packing(_moved(job, scaled, placement) * cell, resolution, page, scale)
+            else:
+                high = scale
+            if low == 0.0:
+                if high * job.extent.max() < SMALLEST:
+                    break
+                guess = scale * np.sqrt(side / height) if height else 0.5 * scale
+                scale = float(np.clip(guess, 0.25 * scale, 0.97 * scale))
+            elif high < low * 1.002:
+                break
+            else:
+                scale = float(np.sqrt(low * high))
+        if low == 0.0:
             return
-        if not low and high * job.extent.max() < SMALLEST:
-            return
+        # Another stretch is worth a search only if it beats the best so far.
+        scale = low * 1.002
 
 
 def _pack_at(job: _Job, density: float) -> Packing:
@@ -180,10 +214,10 @@ def _pack_at(job: _Job, density: float) -> Packing:
             raise _too_dense(density)
         cell = -(-resolution // FINEST)
         side = resolution // cell - 2 * BORDER
-        local, shapes = _shapes(job, density, cell)
-        placement, _ = _place(job, shapes, side, cell) if side > 0 else (None, 0)
+        scaled = _scaled(job, density, cell)
+        placement, _ = _place(job, scaled.shapes, side, cell) if side > 0 else (None, 0)
         if placement is not None:
-            moved = _moved(local, job.chart, shapes, placement)
+            moved = _moved(job, scaled, placement)
             best = _packing(moved * cell, resolution, resolution, density)
             resolution = _multiple((too_small + best.resolution) / 2)
         else:
@@ -210,12 +244,13 @@ def _too_dense(density: float) -> BakeError:
     )
 
 
-def _place(job: _Job, shapes: Shapes, side: int, cell: int) -> tuple[Placement | None, int]:
+def _place(job: _Job, shapes: tuple[Shapes, Shapes], side: int, cell: int) -> tuple[Placement | None, int]:
     """Return the first placement within a square of `side` cells, else None and the height reached."""
     gap = -(-GAP // cell)
-    if (np.maximum(shapes.width, shapes.height) > side).any():
+    even = shapes[0]
+    if min(max(shape.width.max(), shape.height.max()) for shape in shapes) > side:
         return None, 0
-    if ((shapes.width + gap) * (shapes.height + gap) * shapes.boxy).sum() > (side + gap) ** 2:
+    if ((even.width + gap) * (even.height + gap) * even.boxy).sum() > 1.3 * (side + gap) ** 2:
         return None, 0
     few = len(job.extent) <= FEW
     for order in job.orders:
@@ -226,13 +261,17 @@ def _place(job: _Job, shapes: Shapes, side: int, cell: int) -> tuple[Placement |
     return None, placement.height if placement is not None else 0
 
 
-def _moved(local: Float, chart: Int, shapes: Shapes, placement: Placement) -> Float:
-    """Turn and move (n, 3, 2) chart corners to their place [cells]."""
+def _moved(job: _Job, scaled: _Scaled, placement: Placement) -> Float:
+    """Return (n, 3, 2) chart corners turned and moved to their place [cells]."""
+    chart = job.chart
+    quarter = placement.quarter[chart]
+    odd = (quarter % 2 == 1)[:, None]
+    local = job.uv * np.where(odd, scaled.scale[1][chart], scaled.scale[0][chart])[:, None]
     x, y = local[..., 0], local[..., 1]
-    width, height = (size[chart][:, None] for size in (shapes.width, shapes.height))
-    quarter = placement.quarter[chart][:, None]
-    u = np.choose(quarter, (x, height - y, width - x, y))
-    v = np.choose(quarter, (y, x, height - y, width - x))
+    even_box, odd_box = (np.stack((shape.width, shape.height), axis=-1)[chart] for shape in scaled.shapes)
+    width, height = (np.where(odd, odd_box, even_box)[:, k : k + 1] for k in (0, 1))
+    u = np.choose(quarter[:, None], (x, height - y, width - x, y))
+    v = np.choose(quarter[:, None], (y, x, height - y, width - x))
     corner = np.stack((placement.x, placement.y), axis=-1)[chart][:, None] + BORDER
     return np.asarray(np.stack((u, v), axis=-1) + corner)
 

@@ -16,6 +16,7 @@ import numpy as np
 from ..solver.local_pass import NOTHING, LocalPass, Resolver
 from ..solver.scene import Scene
 from ..solver.visibility import Hits
+from .crossings import Crossings
 from .interpolate import GatherPoints, fit
 from .sweeps import StoredLinks, TexelLight, sweep
 from .texel_geometry import NO_TEXEL, TexelGeometry
@@ -90,9 +91,10 @@ def _choose(points: GatherPoints, geometry: TexelGeometry, stride: int, support:
 
 def _resolver(local: LocalPass, geometry: TexelGeometry) -> Resolver:
     """Number hits: texels by their own number, leaf elements after the texels."""
+    crossings = Crossings(geometry, local.caster)
 
     def resolve(hits: Hits) -> np.ndarray:
-        texel = geometry.texel_at(hits)
+        texel = crossings.look_up(geometry.texel_at(hits), geometry.positions_of(hits))
         elsewhere = texel == NO_TEXEL
         rest = Hits(
             hits.triangle[elsewhere], hits.barycentric[elsewhere], hits.front[elsewhere], hits.distance[elsewhere]

@@ -63,14 +63,37 @@ class Shapes:
         return width - high, width - low, width
 
 
-def measure(local: Float, chart: Int, count: int) -> Shapes:
-    """Find the shapes of (n, 3, 2) triangles in cells, each chart's box starting at (0, 0)."""
-    extent = np.zeros((count, 2))
-    np.maximum.at(extent, chart, local.max(axis=1))
-    size = np.maximum(np.ceil(extent - _ROUNDING).astype(np.int64), 1)
-    start = local.reshape(-1, 2)
-    end = np.roll(local, -1, axis=1).reshape(-1, 2)
+def outline(uv: Float, chart: Int) -> tuple[Float, Int]:
+    """Return (e, 2, 2) edges that bound the charts of (n, 3, 2) triangles, and each edge's chart."""
+    edges = np.stack((uv, np.roll(uv, -1, axis=1)), axis=2).reshape(-1, 2, 2)
     owner = np.repeat(chart, 3)
+    corners = np.column_stack((np.repeat(chart, 3), uv.reshape(-1, 2)))
+    corner = np.unique(corners, axis=0, return_inverse=True)[1].reshape(-1, 3)
+    ends = np.sort(np.stack((corner, np.roll(corner, -1, axis=1)), axis=-1).reshape(-1, 2), axis=1)
+    key = ends[:, 0] * (int(corner.max()) + 1) + ends[:, 1]
+    _, first, times = np.unique(key, return_index=True, return_counts=True)
+    # A chart that is closed up in itself has no outline: all its edges are as good.
+    kept = np.sort(first[times == 1])
+    missing = np.setdiff1d(chart, owner[kept])
+    kept = np.union1d(kept, np.flatnonzero(np.isin(owner, missing)))
+    return edges[kept], owner[kept]
+
+
+def measure(edges: Float, owner: Int, extent: Float) -> Shapes:
+    """Find the shapes of charts.
+
+    Parameters
+    ----------
+    edges : (e, 2, 2) float64
+        The charts' outlines [cells], each chart's box starting at (0, 0).
+    owner : (e,) int64
+        The chart of each edge.
+    extent : (count, 2) float64
+        Width and height of each chart's box [cells].
+    """
+    count = len(extent)
+    size = np.maximum(np.ceil(extent - _ROUNDING).astype(np.int64), 1)
+    start, end = edges[:, 0], edges[:, 1]
     column_start, bottom, top = _profile(start, end, owner, size[:, 0], size[:, 1])
     row_start, left, right = _profile(start[:, ::-1], end[:, ::-1], owner, size[:, 1], size[:, 0])
     unused = size[:, 1].repeat(size[:, 0]) - (top - bottom)

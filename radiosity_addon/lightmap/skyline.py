@@ -110,22 +110,25 @@ def _hollows(x: int, floor: Int, ceiling: Int, least: int) -> Int:
 
 def _running_max(values: Int, width: int) -> Int:
     """Return the maximum over every window of `width` values."""
-    span, result = 1, values
+    span = 1
+    result: Int = values
     while 2 * span <= width:
         result = np.maximum(result[:-span], result[span:])
         span *= 2
     rest = width - span
-    return np.asarray(np.maximum(result[: len(result) - rest], result[rest:]) if rest else result)
+    widest: Int = np.maximum(result[: len(result) - rest], result[rest:])
+    return widest
 
 
 def place(
-    shapes: Shapes, order: Int, width: int, gap: int, limit: int | None, thrifty: bool
+    shapes: tuple[Shapes, Shapes], order: Int, width: int, gap: int, limit: int | None, thrifty: bool
 ) -> Placement | None:
     """Pack all charts, in the given order, into a strip.
 
     Parameters
     ----------
-    shapes : Shapes
+    shapes : pair of Shapes
+        As the charts are measured for an even and for an odd number of quarter turns.
     order : (count,) int64
     width : int
         Of the strip [cells].
@@ -143,23 +146,25 @@ def place(
     """
     count = len(order)
     x, y, quarter = (np.zeros(count, dtype=np.int64) for _ in range(3))
-    least = int(min(shapes.width.min(), shapes.height.min()))
+    least = int(min(min(shape.width.min(), shape.height.min()) for shape in shapes))
     strip = _Strip(np.zeros(width, dtype=np.int64), gap, least)
     height = 0
     for chart in order.tolist():
-        w, h = int(shapes.width[chart]), int(shapes.height[chart])
-        turns = [0] if w == h else [0, 1]
-        if not shapes.boxy[chart] and count <= ALL_TURNS:
-            turns = [0, 1, 2, 3]
+        boxes = [
+            (int(shapes[0].width[chart]), int(shapes[0].height[chart])),
+            (int(shapes[1].height[chart]), int(shapes[1].width[chart])),
+        ]
+        boxy = shapes[0].boxy[chart]
+        turns = range(4) if not boxy and count <= ALL_TURNS else range(1 + (boxes[0] != boxes[1]))
         best: tuple[int, int, int, int] | None = None
         for turn in turns:
-            box = (w, h) if turn % 2 == 0 else (h, w)
+            box = boxes[turn % 2]
             corner = strip.take_hole(*box) if turn < 2 and len(strip.holes) else None
             if corner is not None:
                 x[chart], y[chart], quarter[chart] = *corner, turn
                 break
             if box[0] <= width:
-                bottom, _, tall = shapes.turned(chart, turn)
+                bottom, _, tall = shapes[turn % 2].turned(chart, turn)
                 left, low, waste = strip.drop(bottom)
                 score = waste + len(bottom) * low if thrifty else low + tall
                 if best is None or score < best[0]:
@@ -168,7 +173,7 @@ def place(
             if best is None:
                 return None
             _, turn, left, low = best
-            bottom, top, tall = shapes.turned(chart, turn)
+            bottom, top, tall = shapes[turn % 2].turned(chart, turn)
             strip.put(left, low, bottom, top)
             x[chart], y[chart], quarter[chart] = left, low, turn
             height = max(height, low + tall)

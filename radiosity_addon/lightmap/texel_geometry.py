@@ -99,6 +99,12 @@ class TexelGeometry:
             grown[numbers[inside]] = image[1:-1, 1:-1][inside]
         return grown
 
+    def positions_of(self, hits: Hits) -> np.ndarray:
+        """Return (h, 3) where rays hit; meaningless without a hit."""
+        corners = self._scene.triangles[hits.triangle]
+        second, third = hits.barycentric[:, 0:1], hits.barycentric[:, 1:2]
+        return np.asarray((1 - second - third) * corners[:, 0] + second * corners[:, 1] + third * corners[:, 2])
+
     def texel_at(self, hits: Hits) -> np.ndarray:
         """Return (h,) int32: the texel under each ray's hit; NO_TEXEL on backs and unbaked surfaces."""
         found = np.full(len(hits.triangle), NO_TEXEL, dtype=np.int32)

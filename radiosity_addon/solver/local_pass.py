@@ -27,6 +27,9 @@ CHUNK_RAYS = 1 << 20
 MORE_SHADOW_RAYS = 8
 """Times as many shadow rays where the first disagree."""
 
+PENUMBRA_STEPS = 32
+"""How far, in neighbours, a penumbra is followed from where few rays found it."""
+
 Sampler = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """(rows, u (r, k, 2)) → (r, k, 3): points of the rows' footprints."""
 
@@ -43,7 +46,8 @@ class LocalPass:
 
     def __init__(self, state: HierarchicalState) -> None:
         self._state = state
-        self._caster = state.caster
+        self.caster = state.caster
+        """Casts this scene's rays."""
         self._seed = state.settings.seed
         self.emitters = EmitterGroup.of_faces(state.hierarchy.faces, state.caster)
 
@@ -118,17 +122,21 @@ class LocalPass:
     ) -> np.ndarray:
         """Return (n,) the unblocked share: few rays everywhere, many in penumbrae."""
         lit, total = np.zeros(len(points)), np.zeros(len(points))
-        rows = np.flatnonzero(facing)
-        self._shadow(light, points, normals, rows, keys, sampler, 0, rays, seed, lit, total)
-        doubtful = (lit > 0) & (lit < total * (1 - 1e-9))
-        if near is not None:
-            lightness = np.where(total > 0, lit / np.maximum(total, 1e-300), 0.0)
-            doubtful = near(doubtful) | (near(lightness > 0.5) & near(facing & (lightness <= 0.5)))
-        rows = np.flatnonzero(doubtful & facing)
-        more = rays * MORE_SHADOW_RAYS
-        lit[rows] = total[rows] = 0.0
-        self._shadow(light, points, normals, rows, keys, sampler, 0, more, seed, lit, total)
-        return np.asarray(np.where(total > 0, lit / np.maximum(total, 1e-300), 0.0))
+        self._shadow(light, points, normals, np.flatnonzero(facing), keys, sampler, rays, seed, lit, total)
+        # Few rays miss the faint ends of a penumbra: where many rays found one, ask around it.
+        many = np.zeros(len(points), dtype=bool)
+        for _ in range(PENUMBRA_STEPS):
+            share = lit / np.where(total > 0, total, 1.0)
+            partial = facing & (share > 1e-6) & (share < 1 - 1e-6)
+            if near is not None:
+                partial = near(partial) | (near(facing & (share > 0.5)) & near(facing & (share <= 0.5)))
+            rows = np.flatnonzero(partial & facing & ~many)
+            if len(rows) == 0:
+                break
+            many[rows] = True
+            lit[rows] = total[rows] = 0.0
+            self._shadow(light, points, normals, rows, keys, sampler, rays * MORE_SHADOW_RAYS, seed, lit, total)
+        return np.asarray(lit / np.where(total > 0, total, 1.0))
 
     def _shadow(
         self,
@@ -138,7 +146,6 @@ class LocalPass:
         rows: np.ndarray,
         keys: np.ndarray,
         sampler: Sampler | None,
-        first: int,
         count: int,
         seed: int,
         lit: np.ndarray,
@@ -149,21 +156,21 @@ class LocalPass:
         for begin in range(0, len(rows), step):
             chunk = rows[begin : begin + step]
             at, normal = points[chunk], normals[chunk]
-            unit = stratified_square(keys[chunk], count, seed + 1, first)
+            unit = stratified_square(keys[chunk], count, seed + 1)
             directions, distances, weights = light.shadow_rays(at, normal, unit)
             start = np.repeat(at[:, None], count, axis=1)
             if sampler is not None:
                 # The same lamp points, seen from points spread over the footprint.
-                start = sampler(chunk, stratified_square(keys[chunk], count, seed + 2, first))
+                start = sampler(chunk, stratified_square(keys[chunk], count, seed + 2))
                 finite = np.isfinite(distances)[..., None]
                 reach = np.where(finite, distances[..., None], 1.0)
                 along = np.where(finite, at[:, None] + directions * reach - start, directions)
                 length = np.linalg.norm(along, axis=2)
                 directions = along / np.maximum(length, 1e-300)[..., None]
                 distances = np.where(finite[..., 0], length, np.inf)
-            start = start + self._caster.surface_offset * normal[:, None]
+            start = start + self.caster.surface_offset * normal[:, None]
             point, sample = np.nonzero(weights > 0)
-            free = self._caster.visible(start[point, sample], directions[point, sample], distances[point, sample])
+            free = self.caster.visible(start[point, sample], directions[point, sample], distances[point, sample])
             lit[chunk] += np.bincount(point, free * weights[point, sample], minlength=len(chunk))
             total[chunk] += weights.sum(axis=1)
 
@@ -205,12 +212,12 @@ class LocalPass:
             start = np.repeat(points[rows][:, None], rays, axis=1)
             if sampler is not None:
                 start = sampler(rows, stratified_square(keys[rows], rays, self._seed + 4))
-            start = start + self._caster.surface_offset * surface_normals[rows][:, None]
-            hits = self._caster.first_hits(start.reshape(-1, 3), directions.reshape(-1, 3))
+            start = start + self.caster.surface_offset * surface_normals[rows][:, None]
+            hits = self.caster.first_hits(start.reshape(-1, 3), directions.reshape(-1, 3))
             found = np.where(hits.triangle < 0, SKY, resolve(hits))
             below = np.einsum("nrk,nk->nr", directions, surface_normals[rows]) <= 0
             sources[rows] = np.where(below, NOTHING, found.reshape(len(rows), rays))
-            inverse = 1.0 / np.maximum(hits.distance.reshape(len(rows), rays), self._caster.surface_offset)
+            inverse = 1.0 / np.maximum(hits.distance.reshape(len(rows), rays), self.caster.surface_offset)
             closeness[rows] = inverse.mean(axis=1)
         return sources, closeness
 
