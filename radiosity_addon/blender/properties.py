@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..errors import UsageError
 from ..settings import ATLASES, FORMATS, LIGHTS, MAX_RESOLUTION, QUALITIES, QUANTITIES, BakeSettings
 
 DEFAULTS = BakeSettings()
@@ -174,14 +175,17 @@ def settings_of(context: bpy.types.Context) -> BakeSettings:
     Raises
     ------
     UsageError
-        If a value is out of range.
+        If a value is out of range, or nothing is selected where the selection is asked for.
     """
     group = context.scene.radiosity
+    chosen = selected_meshes(context) if group.scope == "selected" else None
+    if chosen == ():
+        raise UsageError("no mesh is selected: select what is to get a lightmap, or switch to All")
     by_density = group.size_mode == "density"
     return BakeSettings(
         resolution=group.resolution,
         texel_density=group.texel_density if by_density else None,
-        objects=selected_meshes(context) if group.scope == "selected" else None,
+        objects=chosen,
         **{name: getattr(group, name) for name in SHARED_FIELDS},
     )
 

@@ -1,0 +1,224 @@
+"""The panel's buttons, and the one bake behind them, carried out in full."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+import radiosity_addon
+from radiosity_addon.blender import runtime
+from radiosity_addon.blender.bake_record import is_baked
+from radiosity_addon.blender.cornell import build_cornell_box
+from radiosity_addon.blender.job import run_bake
+from radiosity_addon.blender.output import OutputFolder
+from radiosity_addon.errors import BakeError, SceneError
+from radiosity_addon.settings import BakeSettings
+
+QUICK = BakeSettings(resolution=32, quality="draft")
+
+
+@pytest.fixture(autouse=True)
+def box() -> Iterator[bpy.types.Scene]:
+    """The Cornell box, with the panel set to a quick bake."""
+    radiosity_addon.register()
+    scene = build_cornell_box()
+    scene.radiosity.resolution = QUICK.resolution
+    scene.radiosity.quality = QUICK.quality
+    yield scene
+    radiosity_addon.unregister()
+
+
+def bake() -> set[str]:
+    return bpy.ops.radiosity.bake("EXEC_DEFAULT", True)
+
+
+def showing() -> dict[str, str]:
+    """The mesh that each object shows."""
+    return {obj.name: obj.data.name for obj in bpy.data.objects if obj.type == "MESH"}
+
+
+def made() -> list[str]:
+    """Every datablock there is, by kind and name."""
+    kinds = ("objects", "meshes", "materials", "images", "node_groups", "scenes", "cameras", "worlds")
+    return sorted(f"{kind}/{block.name}" for kind in kinds for block in getattr(bpy.data, kind))
+
+
+def test_an_unsaved_file_gets_packed_lightmaps(box: bpy.types.Scene) -> None:
+    assert bake() == {"FINISHED"}
+    images = [image for image in bpy.data.images if image.name.startswith("lightmap")]
+    assert [image.packed_file is not None for image in images] == [True]
+    assert tuple(images[0].size) == (32, 32)
+    last = runtime.last_bake(bpy.context.scene)
+    assert dict(last.figures)["Objects"] == "7"
+    assert last.folder == ""
+
+
+def test_a_saved_file_gets_a_folder_beside_it(tmp_path: Path) -> None:
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
+    assert bake() == {"FINISHED"}
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["lightmaps", "room.blend"]
+    folder = tmp_path / "lightmaps"
+    assert sorted(path.name for path in folder.iterdir()) == ["lightmap.exr", "report.json"]
+    image = bpy.data.images["lightmap.exr"]
+    assert image.filepath == "//lightmaps/lightmap.exr"
+    assert Path(bpy.path.abspath(runtime.last_bake(bpy.context.scene).folder)) == folder.resolve()
+    report = json.loads((folder / "report.json").read_text())
+    assert {entry["object"] for entry in report["objects"]} == set(showing())
+
+
+def test_only_selected_objects_get_a_lightmap(box: bpy.types.Scene) -> None:
+    box.radiosity.scope = "selected"
+    before = showing()
+    for name in ("Floor", "Tall Block"):
+        bpy.data.objects[name].select_set(True)
+    assert bake() == {"FINISHED"}
+    assert {name for name, mesh in showing().items() if mesh != before[name]} == {"Floor", "Tall Block"}
+
+
+def test_nothing_selected_is_an_error_message_and_no_change(box: bpy.types.Scene) -> None:
+    box.radiosity.scope = "selected"
+    bpy.ops.object.select_all(action="DESELECT")
+    before = made()
+    # Blender turns an operator's error report into this exception for Python callers.
+    with pytest.raises(RuntimeError, match="select"):
+        bake()
+    assert made() == before
+    assert not runtime.running.active
+
+
+def test_an_unwritable_folder_is_an_error_message(box: bpy.types.Scene, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    box.radiosity.output_folder = str(tmp_path / "file")
+    before = made()
+    with pytest.raises(RuntimeError, match="cannot write to the output folder"):
+        bake()
+    assert made() == before
+
+
+def test_undo_takes_one_step_and_redo_one(box: bpy.types.Scene) -> None:
+    bpy.ops.ed.undo_push(message="Cornell Box")
+    before = made()
+    bake()
+    after = made()
+    assert is_baked()
+    bpy.ops.ed.undo()
+    assert made() == before
+    assert runtime.last_bake(bpy.context.scene) is None
+    bpy.ops.ed.redo()
+    assert made() == after
+    assert dict(runtime.last_bake(bpy.context.scene).figures)["Objects"] == "7"
+
+
+def test_a_mesh_in_edit_mode_is_flushed(box: bpy.types.Scene) -> None:
+    floor = bpy.data.objects["Floor"]
+    bpy.context.view_layer.objects.active = floor
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.mesh.subdivide()
+    assert bake() == {"FINISHED"}
+    assert len(floor.data.polygons) == 4
+    assert "Lightmap" in floor.data.uv_layers
+
+
+def test_restore_brings_everything_back(box: bpy.types.Scene) -> None:
+    before = made(), showing()
+    assert bpy.ops.radiosity.restore() == {"CANCELLED"}
+    bake()
+    assert (made(), showing()) != before
+    assert bpy.ops.radiosity.restore() == {"FINISHED"}
+    assert (made(), showing()) == before
+    assert runtime.last_bake(box) is None
+
+
+def test_baking_twice_gives_the_same_pixels(box: bpy.types.Scene) -> None:
+    bake()
+    first, names = np.array(bpy.data.images["lightmap.exr"].pixels), made()
+    bake()
+    assert made() == names
+    np.testing.assert_array_equal(np.array(bpy.data.images["lightmap.exr"].pixels), first)
+
+
+def test_lightmap_only_is_kept_when_baking_again(box: bpy.types.Scene) -> None:
+    def switches() -> set[float]:
+        trees = [material.node_tree for material in bpy.data.materials if "Lightmap" in material.name]
+        groups = [node for tree in trees for node in tree.nodes if node.type == "GROUP"]
+        return {group.inputs["Lightmap Only"].default_value for group in groups}
+
+    bake()
+    assert switches() == {0.0}
+    box.radiosity.lightmap_only = True
+    assert switches() == {1.0}
+    bake()
+    assert switches() == {1.0}
+
+
+@pytest.mark.parametrize("again", [False, True], ids=["first bake", "over an earlier one"])
+def test_closing_the_bake_at_any_step_leaves_everything_as_it_was(tmp_path: Path, again: bool) -> None:
+    for obj in list(bpy.data.objects):
+        if obj.name not in {"Floor", "Lamp"}:
+            bpy.data.objects.remove(obj)
+    if again:
+        bake()
+    before = made(), showing(), bpy.context.scene.radiosity.last_bake
+    stages = []
+    while True:
+        job = run_bake(bpy.context, QUICK, OutputFolder(tmp_path / "out"))
+        steps = len(stages) + 1
+        progress = None
+        for _ in range(steps):
+            progress = next(job, None)
+        if progress is None:
+            break
+        stages.append(progress.stage)
+        job.close()
+        assert (made(), showing(), bpy.context.scene.radiosity.last_bake) == before
+        assert list(tmp_path.iterdir()) == []
+    assert {"export", "solve", "apply"} <= set(stages)
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["lightmap.exr", "report.json"]
+
+
+def test_progress_never_goes_back(tmp_path: Path) -> None:
+    job = run_bake(bpy.context, QUICK, OutputFolder(tmp_path / "out"), with_copy=True)
+    fractions = [progress.fraction for progress in job]
+    assert fractions[0] == 0.0
+    assert fractions[-1] == 1.0
+    assert (np.diff(fractions) >= 0).all()
+
+
+def test_a_failure_after_the_lightmaps_show_takes_them_off_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise BakeError("the disk is full")
+
+    before = made(), showing()
+    monkeypatch.setattr("radiosity_addon.blender.job.render_preview", fail)
+    with pytest.raises(BakeError, match="the disk is full"):
+        list(run_bake(bpy.context, QUICK, OutputFolder(tmp_path / "out"), with_copy=True))
+    assert (made(), showing()) == before
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_empty_scene_is_refused_by_name() -> None:
+    for obj in list(bpy.data.objects):
+        bpy.data.objects.remove(obj)
+    with pytest.raises(SceneError, match="nothing to bake"):
+        list(run_bake(bpy.context, QUICK, None))
+
+
+def test_the_cornell_box_goes_into_a_scene_of_its_own_beside_other_objects(box: bpy.types.Scene) -> None:
+    assert bpy.ops.radiosity.add_cornell_box() == {"FINISHED"}
+    assert len(bpy.data.scenes) == 2
+    assert bpy.context.scene != box
+    assert len(box.objects) == len(bpy.context.scene.objects) == 9
+
+
+def test_what_somebody_else_wrote_is_no_last_bake(box: bpy.types.Scene) -> None:
+    for text in ("", "{}", "[1]", "not json", '{"solver": {}, "seconds": "x"}'):
+        box.radiosity.last_bake = text
+        assert runtime.last_bake(box) is None
