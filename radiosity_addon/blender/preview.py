@@ -59,6 +59,7 @@ def render_preview(context: bpy.types.Context, path: Path, settings: BakeSetting
             bpy.data.images.remove(bpy.data.images["Render Result"])
     if not path.is_file():
         raise BakeError(f"cannot write the preview '{path}'")
+    path.write_bytes(_without_notes(path.read_bytes()))
 
 
 def _set_up(scene: bpy.types.Scene, path: Path, settings: BakeSettings) -> None:
@@ -119,6 +120,17 @@ def _bounds(context: bpy.types.Context) -> np.ndarray:
 def _showing(objects: Sequence[bpy.types.Object]) -> list[bpy.types.Object]:
     """Those of the objects that a render shows."""
     return [obj for obj in objects if not obj.hide_render]
+
+
+def _without_notes(png: bytes) -> bytes:
+    """Drop a PNG's text chunks: Blender's tell dates and render times, so no two files are the same."""
+    kept, start = [png[:8]], 8
+    while start < len(png):
+        length = int.from_bytes(png[start : start + 4], "big") + 12  # size, type and checksum
+        if png[start + 4 : start + 8] not in (b"tEXt", b"zTXt", b"iTXt", b"tIME"):
+            kept.append(png[start : start + length])
+        start += length
+    return b"".join(kept)
 
 
 @contextmanager

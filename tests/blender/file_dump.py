@@ -65,6 +65,8 @@ def _dump_property(struct: Any, prop: Any, above: tuple[int, ...]) -> Any:
     """Dump one property; references to what is dumped elsewhere become names."""
     if prop.identifier.startswith("radiosity"):
         return struct.is_property_set(prop.identifier)  # reading it would create it in 4.2
+    if prop.identifier == "data" and isinstance(struct, bpy.types.MeshUVLoopLayer):
+        return None  # `uv` tells the same, and reading the eighth layer's crashes 4.2
     value = getattr(struct, prop.identifier)
     if prop.type == "POINTER":
         return _dump_reference(value, above)
