@@ -14,7 +14,7 @@ from ..solver.lights import Light
 from .export_sources import ExportSource
 from .lamps import read_lamp
 from .materials import DEFAULT_GREY, Surface, read_material
-from .mesh_arrays import MeshArrays, read_mesh
+from .mesh_arrays import MeshArrays, all_finite, not_finite_message, read_mesh
 from .scene_objects import is_generated, materials_of, matrix_of, original_object, source_of, visible_objects
 from .world import read_world
 
@@ -111,10 +111,8 @@ class _Collector:
         shown = original_object(instance)
         matrix = matrix_of(instance)
         mesh = self._read(instance)
-        if mesh is None or not np.isfinite(matrix).all():
-            raise SceneError(
-                f"object '{shown.name}' has NaN or infinite coordinates; mend its mesh or transform"
-            )
+        if mesh is None or not all_finite(matrix):
+            raise SceneError(not_finite_message(shown.name))
         if len(mesh) == 0:
             return
         name = self._unique_name(instance)

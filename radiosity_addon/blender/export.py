@@ -14,7 +14,7 @@ from ..solver.lights import EnvironmentLight
 from ..solver.scene import Scene
 from .collect import Collected, Piece, collect
 from .export_sources import Export
-from .mesh_arrays import degenerate, world_from_object
+from .mesh_arrays import all_finite, degenerate, not_finite_message, world_from_object
 from .render_state import leave_edit_mode, render_depsgraph
 
 MAX_UV_LAYERS = 8
@@ -62,8 +62,8 @@ def _assemble(
     for piece in collected.pieces:
         mesh = piece.mesh
         world, world_normals, mirrored = world_from_object(mesh, piece.matrix)
-        if not np.isfinite(world).all():
-            raise SceneError(_not_finite(piece.source.object_name))
+        if not all_finite(world):
+            raise SceneError(not_finite_message(piece.source.object_name))
         flat = degenerate(world)
         if flat.any():
             warnings.append(_degenerate_warning(piece.source.name, int(flat.sum())))
@@ -168,10 +168,6 @@ def _no_light(context: bpy.types.Context) -> BakeWarning:
 
 def _nothing_to_bake(context: bpy.types.Context) -> str:
     return f"scene '{context.scene.name}' has nothing to bake: no mesh with faces is visible in renders"
-
-
-def _not_finite(name: str) -> str:
-    return f"object '{name}' has NaN or infinite coordinates; mend its mesh or transform"
 
 
 def _linked(piece: Piece) -> str:

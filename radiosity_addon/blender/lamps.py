@@ -11,6 +11,7 @@ from ..bake_scene import BakeWarning
 from ..errors import SceneError
 from ..solver.lights import AreaLight, Light, PointLight, SpotLight, SunLight
 from .materials import read_radiance, uses_nodes
+from .mesh_arrays import all_finite
 
 _SAME_SCALE = 1e-4  # relative difference of axes below which a scale counts as uniform
 
@@ -43,7 +44,7 @@ def read_lamp(
     warnings = _not_understood(lamp)
     strength, notes = _strength(name, data)
     warnings += notes
-    if not (np.isfinite(matrix_world).all() and np.isfinite(strength).all()):
+    if not (all_finite(matrix_world) and np.isfinite(strength).all()):
         raise SceneError(
             f"lamp '{name}' has a NaN or infinite position or power; mend its transform and strength"
         )

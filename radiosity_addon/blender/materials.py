@@ -6,6 +6,7 @@ understood. Everything else gives a warning that names the material and the valu
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import bpy
@@ -116,10 +117,11 @@ def uses_nodes(owner: bpy.types.ID) -> bool:
     """Tell whether a material, lamp or world is rendered by its node tree."""
     if owner.node_tree is None:
         return False
-    # Materials and worlds always use nodes from 5.0 on, and asking for it warns there.
-    if bpy.app.version >= (5, 0) and not isinstance(owner, bpy.types.Light):
-        return True
-    return bool(getattr(owner, "use_nodes", True))
+    # Always true for materials and worlds from 5.0 on and for lamps a little later, gone in
+    # 6.0; until then asking for it warns.
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        return bool(getattr(owner, "use_nodes", True))
 
 
 class _Reader:

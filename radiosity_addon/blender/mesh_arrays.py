@@ -9,6 +9,10 @@ import numpy as np
 
 from ..bake_scene import LIGHTMAP_UV_LAYER
 
+_INFINITE = 1e18
+"""What counts as infinite [m]: Blender stores an infinity it is given as the largest float,
+and squares of lengths above this overflow single precision."""
+
 
 @dataclass(frozen=True)
 class MeshArrays:
@@ -49,7 +53,7 @@ def read_mesh(mesh: bpy.types.Mesh) -> MeshArrays | None:
     Loose vertices and edges are left out: they neither reflect nor block.
     """
     positions = _read(mesh.vertices, "co", (len(mesh.vertices), 3), np.float32)
-    if not np.isfinite(positions).all():
+    if not all_finite(positions):
         return None
     mesh.calc_loop_triangles()
     count = len(mesh.loop_triangles)
@@ -71,6 +75,16 @@ def read_mesh(mesh: bpy.types.Mesh) -> MeshArrays | None:
         uv,
         len(mesh.uv_layers),
     )
+
+
+def all_finite(values: np.ndarray) -> bool:
+    """Tell whether positions of any shape are neither NaN nor infinite."""
+    return bool((np.abs(values) < _INFINITE).all())
+
+
+def not_finite_message(name: str) -> str:
+    """Say whose coordinates are no numbers, and the mend."""
+    return f"object '{name}' has NaN or infinite coordinates; mend its mesh or transform"
 
 
 def same_polygons(first: bpy.types.Mesh, second: bpy.types.Mesh) -> bool:

@@ -31,6 +31,7 @@ _SIMPLIFY_PAIRS = (
 
 def leave_edit_mode(context: bpy.types.Context) -> None:
     """Flush every mesh in edit mode: its edits are not in the mesh before it is left."""
+    context.view_layer.update()  # or removed objects are still listed, as None
     editing = [obj for obj in context.view_layer.objects if obj.mode == "EDIT"]
     if editing and bpy.ops.object.mode_set.poll():
         bpy.ops.object.mode_set(mode="OBJECT")

@@ -57,8 +57,19 @@ def visible_objects(depsgraph: bpy.types.Depsgraph) -> Iterator[bpy.types.Depsgr
     Curves, texts, surfaces and metaballs come as instances of the mesh they evaluate to.
     """
     for instance in depsgraph.object_instances:
-        if instance.show_self and instance.object.type in ("MESH", "LIGHT"):
-            yield instance
+        if not instance.show_self or instance.object.type not in ("MESH", "LIGHT"):
+            continue
+        if not instance.is_instance and _shown_by_parent(instance.object):
+            continue
+        yield instance
+
+
+def _shown_by_parent(obj: bpy.types.Object) -> bool:
+    """Tell whether an object appears on its parent's vertices or faces, and so not by itself.
+
+    Renders leave it out then; the viewport's graph does not.
+    """
+    return obj.parent is not None and obj.parent.instance_type in ("VERTS", "FACES")
 
 
 def original_object(instance: bpy.types.DepsgraphObjectInstance) -> bpy.types.Object:

@@ -1,0 +1,313 @@
+"""Materials come to one reflectance and one emission; what is not understood is told."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from radiosity_addon.blender.export import export_scene
+from radiosity_addon.blender.image_values import image_mean, linear_from_srgb
+from radiosity_addon.blender.materials import Surface, read_material
+from radiosity_addon.settings import BakeSettings
+from tests.blender.scenes import add_mesh, add_node, shader_material, with_nodes
+
+_RED = (0.6, 0.2, 0.1, 1.0)
+_BLUE = (0.1, 0.2, 0.8, 1.0)
+
+
+def _messages(surface: Surface) -> str:
+    return "\n".join(warning.message for warning in surface.warnings)
+
+
+def _output(tree: bpy.types.NodeTree) -> bpy.types.Node:
+    return tree.nodes.new("ShaderNodeOutputMaterial")
+
+
+def _check(surface: Surface, reflectance: Any, emission: Any = (0, 0, 0)) -> None:
+    np.testing.assert_allclose(surface.reflectance, reflectance, rtol=1e-6)
+    np.testing.assert_allclose(surface.emission, emission, rtol=1e-6)
+
+
+def test_no_material_is_cycles_grey() -> None:
+    surface = read_material(None)
+    _check(surface, (0.8, 0.8, 0.8))
+    assert surface.warnings == ()
+
+
+def test_diffuse() -> None:
+    surface = read_material(shader_material("M", "ShaderNodeBsdfDiffuse", Color=_RED))
+    _check(surface, _RED[:3])
+    assert surface.warnings == ()
+
+
+def test_principled_reflects_its_base_colour_metal_or_not() -> None:
+    for metallic in (0.0, 1.0):
+        surface = read_material(
+            shader_material("M", "ShaderNodeBsdfPrincipled", Base_Color=_RED, Metallic=metallic)
+        )
+        _check(surface, _RED[:3])
+        assert surface.warnings == ()
+
+
+def test_principled_emits_strength_times_colour() -> None:
+    surface = read_material(
+        shader_material(
+            "M", "ShaderNodeBsdfPrincipled", Base_Color=_RED, Emission_Color=_BLUE, Emission_Strength=2.0
+        )
+    )
+    _check(surface, _RED[:3], 2 * math.pi * np.array(_BLUE[:3]))
+
+
+def test_emission_is_radiance_times_pi_and_black() -> None:
+    _check(
+        read_material(shader_material("M", "ShaderNodeEmission", Color=_BLUE, Strength=3.0)),
+        (0, 0, 0),
+        3 * math.pi * np.array(_BLUE[:3]),
+    )
+
+
+@pytest.mark.parametrize("share", [0.0, 0.25, 1.0])
+def test_mixed_shaders(share: float) -> None:
+    material = shader_material("M", "ShaderNodeMixShader", Fac=share)
+    tree = material.node_tree
+    mix = next(node for node in tree.nodes if node.type == "MIX_SHADER")
+    tree.links.new(add_node(tree, "ShaderNodeBsdfDiffuse", Color=_RED).outputs[0], mix.inputs[1])
+    tree.links.new(add_node(tree, "ShaderNodeEmission", Color=_BLUE, Strength=2.0).outputs[0], mix.inputs[2])
+    surface = read_material(material)
+    _check(surface, (1 - share) * np.array(_RED[:3]), share * 2 * math.pi * np.array(_BLUE[:3]))
+    assert surface.warnings == ()
+
+
+def test_added_shaders() -> None:
+    material = shader_material("M", "ShaderNodeAddShader")
+    tree = material.node_tree
+    add = next(node for node in tree.nodes if node.type == "ADD_SHADER")
+    tree.links.new(add_node(tree, "ShaderNodeBsdfDiffuse", Color=_RED).outputs[0], add.inputs[0])
+    tree.links.new(add_node(tree, "ShaderNodeEmission", Color=_BLUE).outputs[0], add.inputs[1])
+    _check(read_material(material), _RED[:3], math.pi * np.array(_BLUE[:3]))
+
+
+def test_reroutes_and_muted_nodes_are_seen_through() -> None:
+    material = bpy.data.materials.new("M")
+    tree = with_nodes(material)
+    diffuse = add_node(tree, "ShaderNodeBsdfDiffuse", Color=_RED)
+    other = add_node(tree, "ShaderNodeEmission", Strength=9.0)
+    muted = tree.nodes.new("ShaderNodeMixShader")
+    reroute = tree.nodes.new("NodeReroute")
+    tree.links.new(diffuse.outputs[0], muted.inputs[1])
+    tree.links.new(other.outputs[0], muted.inputs[2])
+    tree.links.new(muted.outputs[0], reroute.inputs[0])
+    tree.links.new(reroute.outputs[0], _output(tree).inputs["Surface"])
+    muted.mute = True
+    _check(read_material(material), _RED[:3])
+
+
+def test_muted_links_do_not_count() -> None:
+    material = shader_material("M", "ShaderNodeBsdfDiffuse", Color=_RED)
+    tree = material.node_tree
+    link = tree.links.new(
+        add_node(tree, "ShaderNodeRGB").outputs[0], tree.nodes["Diffuse BSDF"].inputs["Color"]
+    )
+    link.is_muted = True
+    _check(read_material(material), _RED[:3])
+
+
+def _colour_group() -> bpy.types.NodeTree:
+    """A group: Diffuse of its input `Tint` times blue."""
+    group = bpy.data.node_groups.new("Tinted", "ShaderNodeTree")
+    group.interface.new_socket("Tint", in_out="INPUT", socket_type="NodeSocketColor")
+    group.interface.new_socket("Shader", in_out="OUTPUT", socket_type="NodeSocketShader")
+    entry, leave = group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
+    mix = group.nodes.new("ShaderNodeMix")
+    mix.data_type, mix.blend_type = "RGBA", "MULTIPLY"
+    sockets = {socket.identifier: socket for socket in mix.inputs}
+    sockets["Factor_Float"].default_value = 1.0
+    sockets["B_Color"].default_value = _BLUE
+    group.links.new(entry.outputs["Tint"], sockets["A_Color"])
+    diffuse = group.nodes.new("ShaderNodeBsdfDiffuse")
+    result = next(socket for socket in mix.outputs if socket.identifier == "Result_Color")
+    group.links.new(result, diffuse.inputs["Color"])
+    group.links.new(diffuse.outputs[0], leave.inputs["Shader"])
+    return group
+
+
+@pytest.mark.parametrize("linked", [False, True])
+def test_node_groups_are_entered_with_their_inputs(linked: bool) -> None:
+    material = bpy.data.materials.new("M")
+    tree = with_nodes(material)
+    group = tree.nodes.new("ShaderNodeGroup")
+    group.node_tree = _colour_group()
+    if linked:
+        colour = tree.nodes.new("ShaderNodeRGB")
+        colour.outputs[0].default_value = _RED
+        tree.links.new(colour.outputs[0], group.inputs["Tint"])
+    else:
+        group.inputs["Tint"].default_value = _RED
+    tree.links.new(group.outputs[0], _output(tree).inputs["Surface"])
+    surface = read_material(material)
+    _check(surface, np.array(_RED[:3]) * _BLUE[:3])
+    assert surface.warnings == ()
+
+
+def test_cycles_own_output_wins_and_eevees_does_not_count() -> None:
+    material = bpy.data.materials.new("M")
+    tree = with_nodes(material)
+    for target, colour in (("EEVEE", _BLUE), ("CYCLES", _RED)):
+        output = _output(tree)
+        output.target = target
+        tree.links.new(add_node(tree, "ShaderNodeBsdfDiffuse", Color=colour).outputs[0], output.inputs[0])
+    _check(read_material(material), _RED[:3])
+
+
+def test_a_material_without_surface_is_black_and_warns() -> None:
+    material = bpy.data.materials.new("Hollow")
+    _output(with_nodes(material))
+    surface = read_material(material)
+    _check(surface, (0, 0, 0))
+    assert "material 'Hollow': it has no surface shader" in _messages(surface)
+
+
+@pytest.mark.skipif(bpy.app.version >= (5, 0), reason="materials always have nodes here")
+def test_a_material_without_nodes_has_its_viewport_colour() -> None:
+    material = bpy.data.materials.new("M")
+    material.diffuse_color = _RED
+    _check(read_material(material), _RED[:3])
+
+
+def _image(name: str, colour_space: str, *, is_float: bool) -> tuple[bpy.types.Image, np.ndarray]:
+    image = bpy.data.images.new(name, 4, 2, float_buffer=is_float)
+    image.colorspace_settings.name = colour_space
+    pixels = np.ones((8, 4), dtype=np.float32)
+    pixels[:, :3] = np.linspace(0, 1, 24, dtype=np.float32).reshape(8, 3)
+    pixels[:, 3] = np.linspace(0, 1, 8, dtype=np.float32)
+    pixels = np.round(pixels * 255) / 255
+    image.pixels.foreach_set(pixels.ravel())
+    return image, pixels[:, :3].astype(np.float64)
+
+
+@pytest.mark.parametrize(
+    ("colour_space", "is_float"), [("sRGB", False), ("Non-Color", False), ("Linear Rec.709", True)]
+)
+def test_an_image_counts_with_its_linear_mean(colour_space: str, is_float: bool) -> None:
+    image, pixels = _image("Bricks", colour_space, is_float=is_float)
+    mean = (linear_from_srgb(pixels) if colour_space == "sRGB" else pixels).mean(axis=0)
+    np.testing.assert_allclose(image_mean(image)[:3], mean, rtol=1e-5)
+    material = shader_material("Wall", "ShaderNodeBsdfPrincipled")
+    tree = material.node_tree
+    texture = tree.nodes.new("ShaderNodeTexImage")
+    texture.image = image
+    tree.links.new(texture.outputs["Color"], tree.nodes["Principled BSDF"].inputs["Base Color"])
+    surface = read_material(material)
+    _check(surface, mean)
+    (warning,) = surface.warnings
+    assert warning.name == "Wall"
+    assert warning.message.startswith("material 'Wall': Base Color comes from image 'Bricks'; the mean (")
+
+
+def test_srgb_decodes_as_the_standard_says() -> None:
+    np.testing.assert_allclose(
+        linear_from_srgb(np.array([0.0, 0.04045, 0.5, 1.0])), [0, 0.0031308, 0.2140411, 1], rtol=1e-5
+    )
+
+
+@pytest.mark.parametrize("kind", ["ShaderNodeTexNoise", "ShaderNodeVertexColor", "ShaderNodeTexImage"])
+def test_what_varies_in_unknown_ways_falls_back_on_the_sockets_value(kind: str) -> None:
+    """Procedural textures, vertex colours and images that are missing."""
+    material = shader_material("Odd", "ShaderNodeBsdfDiffuse", Color=_RED)
+    tree = material.node_tree
+    node = tree.nodes.new(kind)
+    tree.links.new(node.outputs["Color"], tree.nodes["Diffuse BSDF"].inputs["Color"])
+    surface = read_material(material)
+    _check(surface, _RED[:3])
+    (warning,) = surface.warnings
+    assert warning.name == "Odd"
+    assert "(0.6, 0.2, 0.1) is used" in warning.message
+
+
+@pytest.mark.parametrize(
+    ("socket", "value", "words"),
+    [
+        ("Alpha", 0.5, "alpha is ignored"),
+        ("Transmission_Weight", 1.0, "transmission is ignored"),
+        ("Subsurface_Weight", 0.3, "subsurface scattering is ignored"),
+        ("Coat_Weight", 0.3, "the coat is ignored"),
+        ("Sheen_Weight", 0.3, "the sheen is ignored"),
+    ],
+)
+def test_what_principled_does_beyond_diffuse_warns(socket: str, value: float, words: str) -> None:
+    surface = read_material(
+        shader_material("Odd", "ShaderNodeBsdfPrincipled", Base_Color=_RED, **{socket: value})
+    )
+    _check(surface, _RED[:3])
+    assert f"material 'Odd': {words}" in _messages(surface)
+
+
+def test_reflectance_of_one_is_clamped_and_named() -> None:
+    surface = read_material(shader_material("White", "ShaderNodeBsdfDiffuse", Color=(1, 1, 0.5, 1)))
+    _check(surface, (0.99, 0.99, 0.5))
+    assert _messages(surface) == "material 'White': reflectance (1, 1, 0.5) is clamped to (0.99, 0.99, 0.5)"
+
+
+def test_negative_emission_is_none() -> None:
+    surface = read_material(shader_material("Thief", "ShaderNodeEmission", Strength=-1.0))
+    _check(surface, (0, 0, 0))
+    assert "material 'Thief': emission (-1, -1, -1) is not possible" in _messages(surface)
+
+
+def test_a_cut_out_is_baked_with_its_solid_shader() -> None:
+    material = shader_material("Leaf", "ShaderNodeMixShader", Fac=0.3)
+    tree = material.node_tree
+    mix = next(node for node in tree.nodes if node.type == "MIX_SHADER")
+    tree.links.new(tree.nodes.new("ShaderNodeBsdfTransparent").outputs[0], mix.inputs[1])
+    tree.links.new(add_node(tree, "ShaderNodeBsdfDiffuse", Color=_RED).outputs[0], mix.inputs[2])
+    surface = read_material(material)
+    _check(surface, _RED[:3])
+    assert "transparency is ignored" in _messages(surface)
+
+
+@pytest.mark.parametrize(
+    ("shader", "reflectance"),
+    [
+        ("ShaderNodeBsdfAnisotropic", _RED[:3]),
+        ("ShaderNodeBsdfTranslucent", _RED[:3]),
+        ("ShaderNodeBsdfGlass", (0, 0, 0)),
+        ("ShaderNodeBsdfTransparent", (0, 0, 0)),
+    ],
+)
+def test_other_shaders_warn_with_the_value_used(shader: str, reflectance: Any) -> None:
+    surface = read_material(shader_material("Odd", shader, Color=_RED))
+    _check(surface, reflectance)
+    (warning,) = surface.warnings
+    assert warning.name == "Odd"
+    assert "is used" in warning.message
+
+
+def test_each_triangle_has_its_slots_material_object_slots_before_mesh_slots() -> None:
+    obj = add_mesh(
+        "Two",
+        ((0, 0, 0), (1, 0, 0), (1, 1, 0), (2, 0, 0)),
+        ((0, 1, 2), (1, 3, 2)),
+        material=shader_material("Red", "ShaderNodeBsdfDiffuse", Color=_RED),
+    )
+    obj.data.materials.append(shader_material("Blue", "ShaderNodeBsdfDiffuse", Color=_BLUE))
+    obj.data.polygons.foreach_set("material_index", [1, 0])
+    obj.material_slots[0].link = "OBJECT"
+    obj.material_slots[0].material = shader_material("Own", "ShaderNodeEmission", Strength=1 / math.pi)
+    scene = export_scene(bpy.context, BakeSettings()).bake_scene.scene
+    np.testing.assert_allclose(scene.reflectance, [_BLUE[:3], (0, 0, 0)], rtol=1e-6)
+    np.testing.assert_allclose(scene.emission, [(0, 0, 0), (1, 1, 1)], rtol=1e-6)
+
+
+def test_an_empty_slot_is_grey_and_warns_and_a_missing_slot_is_the_last() -> None:
+    obj = add_mesh("Bare", ((0, 0, 0), (1, 0, 0), (1, 1, 0), (2, 0, 0)), ((0, 1, 2), (1, 3, 2)))
+    obj.data.materials.append(shader_material("Red", "ShaderNodeBsdfDiffuse", Color=_RED))
+    obj.data.materials.append(None)
+    obj.data.polygons.foreach_set("material_index", [0, 7])
+    baked = export_scene(bpy.context, BakeSettings(sky=True)).bake_scene
+    np.testing.assert_allclose(baked.scene.reflectance, [_RED[:3], (0.8, 0.8, 0.8)], rtol=1e-6)
+    (warning,) = baked.warnings
+    assert (warning.name, "empty material slot" in warning.message) == ("Bare", True)
