@@ -11,6 +11,7 @@ import fcntl
 import os
 import shutil
 import subprocess
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ from pathlib import Path
 from .errors import BuildError
 
 SUITE = "trixie"
-PACKAGES = ("blender", "libgl1-mesa-dri", "libegl-mesa0", "xvfb", "xauth", "imagemagick", "python3-venv")
+PACKAGES = ("blender", "libgl1-mesa-dri", "libegl-mesa0", "xvfb", "xauth", "imagemagick", "python3-numpy")
 
 # Where to put the folder, for who has little room in the home folder.
 FOLDER_VARIABLE = "RADIOSITY_REAL_BLENDER"
@@ -49,12 +50,11 @@ class RealBlender:
         """The name that a file below `root` has for Blender."""
         return f"/{path.relative_to(self.root)}"
 
-    def new_folder(self, name: str) -> Path:
-        """An empty folder to share with Blender; what an earlier run left there is removed."""
-        folder = self.root / "work" / name
-        shutil.rmtree(folder, ignore_errors=True)
-        folder.mkdir(parents=True)
-        return folder
+    @contextmanager
+    def shared_folder(self) -> Iterator[Path]:
+        """An empty folder to share with Blender, deleted at the end."""
+        with tempfile.TemporaryDirectory(prefix="shared-", dir=self.root / "tmp") as folder:
+            yield Path(folder)
 
     def run(
         self,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -30,17 +31,25 @@ def blender() -> RealBlender:
 
 
 @pytest.fixture(scope="session")
-def zips(blender: RealBlender) -> dict[str, Path]:
-    """Platform → its zip, made from the sources as they are, where Blender can read it."""
-    folder = blender.new_folder("zips")
+def shared_folder(blender: RealBlender) -> Iterator[Path]:
+    """A folder that Blender sees too."""
+    with blender.shared_folder() as folder:
+        yield folder
+
+
+@pytest.fixture(scope="session")
+def zips(shared_folder: Path) -> dict[str, Path]:
+    """Platform → its zip, made from the sources as they are."""
+    folder = shared_folder / "zips"
     made = extension.build(ROOT, Environment(ROOT, Path(sys.prefix)), folder)
     return dict(zip(extension.PIP_PLATFORMS, made, strict=True))
 
 
 @pytest.fixture(scope="session")
-def installed(blender: RealBlender, zips: dict[str, Path]) -> Installed:
+def installed(blender: RealBlender, shared_folder: Path, zips: dict[str, Path]) -> Installed:
     """Blender as a user has it after `Install from Disk`."""
-    folder = blender.new_folder("installed")
+    folder = shared_folder / "installed"
+    folder.mkdir()
     for script in SCRIPTS:
         shutil.copy(script, folder)
     made = Installed(blender, folder, folder / "user")
