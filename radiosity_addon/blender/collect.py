@@ -15,7 +15,15 @@ from .export_sources import ExportSource
 from .lamps import read_lamp
 from .materials import DEFAULT_GREY, Surface, read_material
 from .mesh_arrays import MeshArrays, all_finite, not_finite_message, read_mesh
-from .scene_objects import is_generated, materials_of, matrix_of, original_object, source_of, visible_objects
+from .scene_objects import (
+    is_generated,
+    materials_of,
+    matrix_of,
+    original_object,
+    source_of,
+    unknown_objects,
+    visible_objects,
+)
 from .world import read_world
 
 
@@ -79,6 +87,9 @@ def collect(depsgraph: bpy.types.Depsgraph) -> Collected:
         else:
             collector.mesh(instance)
     collector.world(depsgraph.scene_eval.world)
+    for name, kind in unknown_objects(depsgraph).items():
+        message = f"object '{name}' is {kind}; that is left out: it neither lights nor blocks"
+        collector.collected.warnings.append(BakeWarning(name, message))
     return collector.collected
 
 

@@ -33,13 +33,16 @@ def image_mean(image: bpy.types.Image, equirectangular: bool = False) -> np.ndar
     rows = flat.reshape(height, width, image.channels)
     # Only byte images hold encoded values; float buffers are linear in memory.
     encoded = not image.is_float and image.colorspace_settings.name in _ENCODED
+    linear = linear_from_srgb(np.arange(256) / 255.0)
     weights = _row_weights(height, equirectangular)
     mean = np.zeros(image.channels)
     for start in range(0, height, _BAND_ROWS):
-        band = rows[start : start + _BAND_ROWS].astype(np.float64)
+        band = rows[start : start + _BAND_ROWS]
+        means = band.mean(axis=1, dtype=np.float64)
         if encoded:
-            band[..., :3] = linear_from_srgb(band[..., :3])
-        mean += weights[start : start + _BAND_ROWS] @ band.mean(axis=1)
+            codes = np.rint(np.clip(band[..., :3], 0.0, 1.0) * 255.0).astype(np.uint8)
+            means[:, :3] = linear[codes].mean(axis=1)
+        mean += weights[start : start + _BAND_ROWS] @ means
     return _as_rgba(np.nan_to_num(mean, posinf=0.0, neginf=0.0))
 
 

@@ -13,6 +13,14 @@ from .render_state import render_depsgraph
 
 _NO_ID = 2**31 - 1  # fills the unused end of a persistent id
 
+_UNKNOWN_TYPES = {
+    "VOLUME": "a volume",
+    "CURVES": "hair",
+    "POINTCLOUD": "a point cloud",
+    "GPENCIL": "a grease pencil",
+    "GREASEPENCIL": "a grease pencil",
+}
+
 _KEEPS_POLYGONS = frozenset(
     {
         "ARMATURE",
@@ -62,6 +70,19 @@ def visible_objects(depsgraph: bpy.types.Depsgraph) -> Iterator[bpy.types.Depsgr
         if not instance.is_instance and _shown_by_parent(instance.object):
             continue
         yield instance
+
+
+def unknown_objects(depsgraph: bpy.types.Depsgraph) -> dict[str, str]:
+    """Return what a render would show and we leave out: object names, and what each is."""
+    unknown = {}
+    for instance in depsgraph.object_instances:
+        obj = instance.object
+        if obj.type in _UNKNOWN_TYPES and instance.show_self:
+            unknown[obj.name] = _UNKNOWN_TYPES[obj.type]
+        for particles in obj.particle_systems if obj.type == "MESH" else ():
+            if particles.settings.type == "HAIR" and particles.settings.render_type == "PATH":
+                unknown[obj.name] = "a mesh with hair"
+    return unknown
 
 
 def _shown_by_parent(obj: bpy.types.Object) -> bool:

@@ -219,6 +219,13 @@ def test_what_a_render_shows_is_exported_and_nothing_else_and_the_scene_is_left_
     assert state() == before
 
 
+def test_a_view_layers_material_override_counts() -> None:
+    add_mesh("Floor", material=shader_material("Red", "ShaderNodeBsdfDiffuse", Color=(1, 0, 0, 1)))
+    override = shader_material("Clay", "ShaderNodeBsdfDiffuse", Color=(0.25, 0.5, 0.75, 1))
+    bpy.context.view_layer.material_override = override
+    np.testing.assert_allclose(_export().bake_scene.scene.reflectance, [(0.25, 0.5, 0.75)] * 2, rtol=1e-6)
+
+
 def test_the_scene_is_put_back_when_the_export_fails() -> None:
     _cube("NoRender").hide_render = True
     with pytest.raises(SceneError, match="nothing to bake"):
@@ -312,6 +319,18 @@ def test_curves_texts_metaballs_and_surfaces_light_and_block_but_get_no_lightmap
     assert only_blocks.count > 0
     np.testing.assert_allclose(export.bake_scene.scene.emission[only_blocks.rows], math.pi, rtol=1e-6)
     assert ("Other", True) in [(w.name, "is not a mesh" in w.message) for w in export.bake_scene.warnings]
+
+
+def test_what_cannot_be_read_is_named() -> None:
+    tufted = _cube("Tufted")
+    tufted.modifiers.new("Hair", "PARTICLE_SYSTEM").particle_system.settings.type = "HAIR"
+    add_object("Fog", bpy.data.volumes.new("Fog"))
+    export = _export(sky=True)
+    assert {warning.name: warning.message for warning in export.bake_scene.warnings} == {
+        "Tufted": "object 'Tufted' is a mesh with hair; that is left out: it neither lights nor blocks",
+        "Fog": "object 'Fog' is a volume; that is left out: it neither lights nor blocks",
+    }
+    assert not export.sources[0].needs_evaluated_mesh
 
 
 # --- Instances
