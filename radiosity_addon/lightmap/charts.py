@@ -108,6 +108,7 @@ def _unwrap_piece(triangles: Float, polygon: Int, grow: GrowCharts | None) -> tu
     torn = _torn_polygons(uv, chart, faces, polygon, solid)
     own = torn[polygon]
     if own.any():
+        chart = _split_parts(uv, np.where(own, -1, chart))
         number = np.unique(polygon[own], return_inverse=True)[1].reshape(-1)
         uv[own] = project_polygons(triangles[own], number)
         chart[own] = chart.max() + 1 + number
@@ -117,6 +118,26 @@ def _unwrap_piece(triangles: Float, polygon: Int, grow: GrowCharts | None) -> tu
     chart[used] = np.unique(chart[used], return_inverse=True)[1].reshape(-1)
     uv[used] = _to_scale(uv[used], triangles[used], chart[used], own[used])
     return uv, chart
+
+
+def _split_parts(uv: Float, chart: Int) -> Int:
+    """Renumber charts so that what no longer hangs together becomes charts of their own."""
+    used = np.flatnonzero(chart >= 0)
+    if not len(used):
+        return chart
+    keys = np.column_stack((np.repeat(chart[used], 3), uv[used].reshape(-1, 2)))
+    corner = np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1, 3)
+    label = np.arange(int(corner.max()) + 1)
+    while True:
+        lowest = label.copy()
+        np.minimum.at(lowest, corner.reshape(-1), np.repeat(label[corner].min(axis=1), 3))
+        lowest = lowest[lowest]
+        if (lowest == label).all():
+            break
+        label = lowest
+    parts = np.full(len(chart), -1, dtype=np.int64)
+    parts[used] = np.unique(label[corner[:, 0]], return_inverse=True)[1].reshape(-1)
+    return parts
 
 
 def _has_area(triangles: Float) -> NDArray[np.bool_]:

@@ -8,6 +8,9 @@ from numpy.typing import NDArray
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
+_UNEVEN = 0.02
+"""A polygon with normals farther (chord length) from its own than this may overlap itself."""
+
 _UPRIGHT = 0.02
 """A triangle that keeps less of its area than this in its polygon's plane counts as folded."""
 
@@ -37,7 +40,13 @@ def project_polygons(triangles: Float, group: Int) -> Float:
     # Measured against the polygon, so that the rounding of a sliver is not taken for a fold.
     size = np.bincount(group, np.linalg.norm(cross, axis=1), count)[group]
     folded = signed_double_area(uv) < _UPRIGHT * np.linalg.norm(cross, axis=1) - 1e-9 * size
-    for polygon in np.unique(group[folded]):
+    unit = cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), np.finfo(float).tiny)
+    axis = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
+    uneven = np.zeros(count, dtype=np.bool_)
+    uneven[group[np.linalg.norm(unit - axis[group], axis=1) > _UNEVEN]] = True
+    suspects = np.flatnonzero(uneven[group])
+    overlapping = suspects[_overlapping(uv[suspects], group[suspects])]
+    for polygon in np.union1d(group[folded], group[overlapping]):
         rows = np.flatnonzero(group == polygon)
         layout = _convex_layout(triangles[rows])
         if layout is not None:
@@ -90,6 +99,31 @@ def undo_stretch(uv: Float, triangles: Float, chart: Int, count: int) -> Float:
     sums = np.stack([np.bincount(chart, part, count) for part in (along_u, along_v)], axis=-1)
     scale = np.sqrt(sums / np.where(total > 0, total, 1.0)[:, None])
     return np.asarray(uv * np.where(scale > 0, scale, 1.0)[chart, None, :])
+
+
+def _overlapping(uv: Float, group: Int) -> NDArray[np.intp]:
+    """Return triangles that lie over another one of their group, by separating sides.
+
+    Triangles are positively oriented; those that only touch do not count.
+    """
+    order = np.argsort(group, kind="stable")
+    found = []
+    step = 1
+    while len(pairs := np.flatnonzero(group[order[:-step]] == group[order[step:]])):
+        one, other = order[pairs], order[pairs + step]
+        apart = _separated(uv[one], uv[other]) | _separated(uv[other], uv[one])
+        found.append(one[~apart])
+        step += 1
+    return np.concatenate(found) if found else np.zeros(0, dtype=np.intp)
+
+
+def _separated(one: Float, other: Float) -> NDArray[np.bool_]:
+    """Return whether a side of `one` (p, 3, 2) has all of `other` (p, 3, 2) on its outer side."""
+    side = np.roll(one, -1, axis=1) - one
+    offset = other[:, None] - one[:, :, None]
+    inward = side[:, :, None, 0] * offset[..., 1] - side[:, :, None, 1] * offset[..., 0]
+    tolerance = 1e-9 * (side**2).sum(axis=(1, 2))
+    return np.asarray((inward <= tolerance[:, None, None]).all(axis=2).any(axis=1))
 
 
 def _cross(triangles: Float) -> Float:

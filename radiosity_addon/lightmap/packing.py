@@ -37,8 +37,8 @@ SMALLEST = 0.25
 FINEST = 2048
 """Cells along a page's side; larger pages are packed in cells of several texels."""
 
-FEW = 200
-"""Up to this many charts several orders, rules and stretches are tried."""
+FEW = 64
+"""Up to this many charts several orders, rules and stretches are tried; each costs a packing."""
 
 STRETCHES = (1.0, 0.8, 0.85, 0.9, 0.95, 1.05, 1.1, 1.15, 1.2, 1.25)
 """Texels per metre along u over those along v, the same for all charts of a page.

@@ -37,6 +37,10 @@ UNRESOLVED = 2.0**-23
 _CENTRE = 2.0
 """Added to the overlap of a pair that covers the centre, so that it beats every other overlap."""
 
+FOOTPRINT = 0.5
+"""Width of a texel's footprint, in texels, where its centre is covered. Cycles' bake spreads its samples
+over just this middle part of a texel, not over the whole of it (docs/decisions)."""
+
 _NOBODY = np.iinfo(np.int32).max
 
 
@@ -182,10 +186,12 @@ def sample_footprints(texels: Texels, u: Float) -> Float32:
     result = np.empty((*u.shape[:2], 3), dtype=np.float32)
     for start in range(0, len(texels), CHUNK):
         part = texels.take(slice(start, start + CHUNK))
-        polygon, origin, whole = _clip(part.uv, part.resolution, part.triangle, part.row, part.column)
+        width = np.where(part.centre_inside, FOOTPRINT, 1.0)
+        polygon, origin, whole = _clip(part.uv, part.resolution, part.triangle, part.row, part.column, width)
         points = np.array(u[start : start + CHUNK], dtype=np.float64)
         cut = np.flatnonzero(~whole)
         points[cut] = sample_polygons(polygon[cut], points[cut])
+        points[whole] = 0.5 + (points[whole] - 0.5) * width[whole, None, None]
         result[start : start + CHUNK] = _barycentric(points, origin)
     return result
 
@@ -274,9 +280,9 @@ def _edge_distances(
 
 
 def _clip(
-    uv: Float32, resolution: int, triangle: Int32, row: Int32, column: Int32
+    uv: Float32, resolution: int, triangle: Int32, row: Int32, column: Int32, width: Float | float = 1.0
 ) -> tuple[Float, Float, Bool]:
-    """Clip triangles to texels.
+    """Clip triangles to the middle `width` of texels, (t,) or one for all.
 
     Returns the (t, 7, 2) footprints and the (t, 3, 2) triangles, both with the texel's lower
     left corner as the origin, and which texels are covered whole.
@@ -287,7 +293,10 @@ def _clip(
     whole = (distance - reach >= 0).all(axis=1)
     polygon = np.empty((len(corners), 7, 2))
     polygon[whole] = ((0, 0), (1, 0), (1, 1), (0, 1), (0, 1), (0, 1), (0, 1))
-    polygon[~whole] = clip_to_unit_square(corners[~whole])
+    cut = np.flatnonzero(~whole)
+    # Clipped at the scale where the middle part is the unit square, and brought back.
+    middle = np.broadcast_to(width, len(corners))[cut, None, None]
+    polygon[cut] = 0.5 + (clip_to_unit_square(0.5 + (corners[cut] - 0.5) / middle) - 0.5) * middle
     return polygon, corners, whole
 
 

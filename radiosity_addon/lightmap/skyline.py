@@ -81,9 +81,10 @@ class _Strip:
     def put(self, x: int, y: int, bottom: Int, top: Int) -> None:
         """Raise the skyline over a chart, and its margin, and keep the hollows below it."""
         width, gap = len(bottom), self.gap
-        under = self.skyline[x : x + width]
-        ceiling = y + bottom - gap
-        self._keep(_hollows(x, under, ceiling, self.least))
+        # What hangs down must stay a gap away from a hollow beside it, too.
+        padded = np.pad(bottom, gap, constant_values=np.iinfo(np.int32).max)
+        ceiling = y - gap + sliding_window_view(padded, 2 * gap + 1).min(axis=1)
+        self._keep(_hollows(x, self.skyline[x : x + width], ceiling, self.least))
         wide = np.full(width + 2 * gap, -1, dtype=np.int64)
         for shift in range(2 * gap + 1):
             part = wide[shift : shift + width]
@@ -105,7 +106,7 @@ def _hollows(x: int, floor: Int, ceiling: Int, least: int) -> Int:
     ends = np.concatenate((cuts, [len(floor)]))
     height = np.minimum.reduceat(ceiling, starts) - floor[starts]
     kept = (height >= least) & (ends - starts >= least)
-    return np.stack((x + starts, floor[starts], ends - starts, height), axis=-1)[kept]
+    return np.asarray(np.stack((x + starts, floor[starts], ends - starts, height), axis=-1)[kept])
 
 
 def _running_max(values: Int, width: int) -> Int:
