@@ -17,15 +17,8 @@ import bpy
 MADE_MARKER = "radiosity_lightmaps"
 """Custom property of the datablocks that a bake made."""
 
-_TYPES = {
-    "objects": bpy.types.Object,
-    "collections": bpy.types.Collection,
-    "meshes": bpy.types.Mesh,
-    "materials": bpy.types.Material,
-    "node_groups": bpy.types.NodeTree,
-    "images": bpy.types.Image,
-}
-"""The collections of `bpy.data` that a bake adds to, users before what they use."""
+_MADE_KINDS = ("objects", "collections", "meshes", "materials", "node_groups", "images")
+"""The collections of `bpy.data` that a bake adds to."""
 
 
 class ModifierRecord(bpy.types.PropertyGroup):
@@ -72,7 +65,8 @@ def unregister() -> None:
 def recorded_objects() -> list[bpy.types.Object]:
     """Every object of the file that a bake touched and Restore can bring back."""
     # Asking first: before Blender 5.0 merely reading the record would leave one in the file.
-    touched = [obj for obj in bpy.data.objects if obj.is_property_set("radiosity_bake")]
+    local = [obj for obj in bpy.data.objects if obj.library is None]
+    touched = [obj for obj in local if obj.is_property_set("radiosity_bake")]
     return [obj for obj in touched if obj.radiosity_bake.is_baked or obj.radiosity_bake.is_hidden]
 
 
@@ -97,25 +91,19 @@ def is_made(datablock: bpy.types.ID) -> bool:
 
 
 def made_datablocks() -> Iterator[bpy.types.ID]:
-    """Yield every datablock that a bake made, users before what they use."""
-    for collection in _TYPES:
-        yield from [datablock for datablock in getattr(bpy.data, collection) if is_made(datablock)]
+    """Yield every datablock of this file that a bake made; linked ones are another file's."""
+    for kind in _MADE_KINDS:
+        yield from [block for block in getattr(bpy.data, kind) if is_made(block) and block.library is None]
 
 
 def remove_made() -> None:
     """Remove every datablock that a bake made."""
-    remove_datablocks(list(made_datablocks()))
+    remove_datablocks(made_datablocks())
 
 
 def remove_datablocks(datablocks: Iterable[bpy.types.ID]) -> None:
-    """Remove datablocks of the kinds that a bake makes, users before what they use.
-
-    One by one: before Blender 5.0 `batch_remove` forgets to release what the node tree of
-    a removed material used.
-    """
-    for datablock in datablocks:
-        kind = next(name for name, kind in _TYPES.items() if isinstance(datablock, kind))
-        getattr(bpy.data, kind).remove(datablock)
+    """Remove datablocks from the file, all at once."""
+    bpy.data.batch_remove(list(datablocks))
 
 
 def record_mesh_swap(obj: bpy.types.Object) -> None:

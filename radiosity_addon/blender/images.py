@@ -16,6 +16,7 @@ import numpy as np
 
 from ..bake_scene import BakeResult, LightmapPage
 from ..errors import BakeError
+from ..lightmap.encode import encode_png16, png16_scale
 from ..report import LightmapFile
 from ..settings import BakeSettings
 from .bake_record import mark_made, remove_datablocks
@@ -78,10 +79,11 @@ def write_pages(
     BakeError
         If a file cannot be written.
     """
+    scale = png16_scale(*[page.pixels for page in result.pages]) if settings.format == "png16" else None
     images: list[bpy.types.Image] = []
     try:
         for page, file_name in zip(result.pages, page_file_names(result, settings), strict=True):
-            images.append(_new_image(page, settings.format, file_name))
+            images.append(_new_image(page, settings.format, file_name, scale))
             _store(images[-1], folder, file_name)
     except BaseException:
         remove_datablocks(images)
@@ -123,19 +125,16 @@ def lightmap_files(images: Sequence[bpy.types.Image], settings: BakeSettings) ->
     ]
 
 
-def _new_image(page: LightmapPage, file_format: str, file_name: str) -> bpy.types.Image:
-    """Make an unsaved float image of a page."""
+def _new_image(page: LightmapPage, file_format: str, file_name: str, scale: float | None) -> bpy.types.Image:
+    """Make an unsaved float image of a page; `scale` is None where it is to hold the values themselves."""
     height, width = page.pixels.shape[:2]
     image = bpy.data.images.new(file_name, width, height, alpha=False, float_buffer=True, is_data=True)
     mark_made(image)
     image.file_format = _FILE_FORMATS[file_format][0]
-    scale = 1.0
-    if file_format == "png16":
-        # A black page has nothing to scale.
-        scale = float(page.pixels.max(initial=0.0)) or 1.0
+    if scale is not None:
         image[SCALE_PROPERTY] = scale
     pixels = np.ones((height, width, 4), dtype=np.float32)
-    pixels[..., :3] = page.pixels if scale == 1.0 else np.clip(page.pixels / scale, 0.0, 1.0)
+    pixels[..., :3] = page.pixels if scale is None else encode_png16(page.pixels, scale)
     image.pixels.foreach_set(pixels.ravel())
     image.update()
     return image

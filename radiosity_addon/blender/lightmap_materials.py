@@ -90,6 +90,7 @@ class LightmapMaterials:
     ) -> None:
         """Wire UV Map → Image → group → output; the transparent part stays so."""
         x, y = output.location
+        output.location = (x + 700, y + 300)
         uv_map = tree.nodes.new("ShaderNodeUVMap")
         uv_map.uv_map = LIGHTMAP_UV_LAYER
         uv_map.location = (x - 200, y + 450)

@@ -84,15 +84,15 @@ def _surface(material: bpy.types.Material, socket: bpy.types.NodeSocket) -> None
     tree.links.new(socket, tree.nodes["Material Output"].inputs["Surface"])
 
 
-def _seen(folder: Path, size: int = 2) -> np.ndarray:
-    """Render the square [-1, 1]² from above with Cycles: (size, size, 3) radiance, bottom row first."""
+def _seen(folder: Path, size: int = 2, engine: str = "CYCLES") -> np.ndarray:
+    """Render the square [-1, 1]² from above: (size, size, 3) radiance, bottom row first."""
     scene = bpy.context.scene
     camera = bpy.data.objects.new("Eye", bpy.data.cameras.new("Eye"))
     camera.data.type, camera.data.ortho_scale = "ORTHO", 2.0
     camera.location.z = 5.0
     scene.collection.objects.link(camera)
     scene.camera = camera
-    scene.render.engine = "CYCLES"
+    scene.render.engine = engine
     scene.cycles.samples, scene.cycles.use_denoising = 16, False
     scene.cycles.pixel_filter_type, scene.cycles.filter_width = "BOX", 1.0
     scene.render.resolution_x = scene.render.resolution_y = size
