@@ -52,7 +52,8 @@ def render_preview(context: bpy.types.Context, path: Path, settings: BakeSetting
     except (RuntimeError, TypeError) as error:
         raise BakeError(f"cannot render the preview '{path}': {' '.join(str(error).split())}") from error
     finally:
-        bpy.data.scenes.remove(scene)
+        # scenes.remove() asks the window for its scene, and Blender's --command has none: it crashes.
+        bpy.data.batch_remove([scene])
         if camera is not None:
             bpy.data.cameras.remove(camera)
         if not had_result and "Render Result" in bpy.data.images:
