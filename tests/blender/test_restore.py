@@ -14,6 +14,7 @@ from radiosity_addon.blender.apply import apply_lightmaps
 from radiosity_addon.blender.export import export_scene
 from radiosity_addon.blender.images import write_pages
 from radiosity_addon.blender.restore import restore
+from radiosity_addon.errors import BakeError
 from radiosity_addon.settings import BakeSettings
 from tests.blender.file_dump import differences, dump_file
 from tests.blender.hand_bake import hand_result
@@ -81,3 +82,85 @@ def test_restore_of_an_unbaked_file_does_nothing() -> None:
     before = _tidy_dump()
     assert restore(bpy.context) == 0
     assert differences(before, _tidy_dump()) == []
+
+
+def _cube() -> bpy.types.Object:
+    bpy.ops.mesh.primitive_cube_add()
+    return bpy.context.object
+
+
+def test_copies_that_the_user_made_of_a_baked_object_are_restored_too() -> None:
+    cube = _cube()
+    original = cube.data
+    _bake(None)
+    copy = cube.copy()
+    copy.data = cube.data.copy()
+    bpy.context.scene.collection.objects.link(copy)
+    assert restore(bpy.context) == 2
+    assert cube.data == copy.data == original
+    assert [mesh.name for mesh in bpy.data.meshes] == [original.name]
+
+
+def test_a_mesh_the_user_gave_a_baked_object_since_is_kept() -> None:
+    cube = _cube()
+    _bake(None)
+    cube.data = bpy.data.meshes.new("Mine")
+    restore(bpy.context)
+    assert cube.data.name == "Mine"
+
+
+def test_where_the_original_mesh_is_gone_the_copy_stays() -> None:
+    cube = _cube()
+    original = cube.data
+    _bake(None)
+    bpy.data.meshes.remove(original)
+    restore(bpy.context)
+    assert len(cube.data.polygons) == 6
+    assert not bake_record.is_baked()
+    assert list(bpy.data.images) == []
+
+
+def test_an_object_in_edit_mode_is_taken_out_of_it() -> None:
+    cube = _cube()
+    original = cube.data
+    _bake(None)
+    bpy.ops.object.mode_set(mode="EDIT")
+    restore(bpy.context)
+    assert (cube.mode, cube.data) == ("OBJECT", original)
+
+
+def test_baked_objects_linked_from_another_file_are_that_file_s(tmp_path: Path) -> None:
+    _cube().name = "Linked"
+    _bake(None)
+    path = str(tmp_path / "library.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    with bpy.data.libraries.load(path, link=True) as (_, wanted):
+        wanted.objects = ["Linked"]
+    bpy.context.scene.collection.objects.link(bpy.data.objects["Linked"])
+    assert not bake_record.is_baked()
+    assert restore(bpy.context) == 0
+    assert "Lightmap" in bpy.data.objects["Linked"].data.uv_layers
+
+
+def test_the_record_says_nothing_after_baking_and_restoring() -> None:
+    """Not even an empty group of properties stays behind on an object."""
+    cube = _cube()
+    _bake(None)
+    assert cube.is_property_set("radiosity_bake")
+    restore(bpy.context)
+    assert not cube.is_property_set("radiosity_bake")
+    assert list(cube.keys()) == []
+
+
+def test_an_error_after_apply_leaves_images_to_their_maker(tmp_path: Path) -> None:
+    """`apply_lightmaps` removes what it made itself, and only that."""
+    wanted = BakeSettings()
+    cube = _cube()
+    export = export_scene(bpy.context, wanted)
+    result = hand_result(export)
+    images = write_pages(result, wanted, tmp_path)
+    cube.data.clear_geometry()
+    with pytest.raises(BakeError):
+        apply_lightmaps(bpy.context, export, result, images, wanted)
+    assert [block.name for block in bake_record.made_datablocks()] == ["lightmap.exr"]
