@@ -117,7 +117,8 @@ def test_chunks_do_not_show(monkeypatch):
         np.testing.assert_array_equal(getattr(whole, name), getattr(cut, name))
 
 
-def test_samples_lie_in_triangle_and_texel_and_are_uniform():
+def test_samples_lie_in_triangle_and_texel_and_are_uniform(monkeypatch):
+    monkeypatch.setattr(module, "FOOTPRINT", 1.0)
     rng = np.random.default_rng(2)
     uv = random_triangles(21, 2)
     texels = rasterise(uv, 9)
@@ -138,7 +139,22 @@ def test_samples_lie_in_triangle_and_texel_and_are_uniform():
     np.testing.assert_allclose(np.cov(points[row].T), np.cov(trial.T), atol=2e-3)
 
 
-def test_whole_texels_take_the_sample_as_it_is():
+def test_samples_keep_to_the_middle_where_the_centre_is_covered():
+    uv = random_triangles(21, 2)
+    texels = rasterise(uv, 9)
+    u = np.random.default_rng(1).uniform(size=(len(texels), 64, 2))
+    weights = sample_footprints(texels, u).astype(float)
+    points = np.einsum("tkc,tcx->tkx", weights, uv[texels.triangle].astype(float) * 9)
+    away = np.abs(points - np.stack((texels.column, texels.row), axis=-1)[:, None] - 0.5).max(axis=(1, 2))
+    assert away[texels.centre_inside].max() <= module.FOOTPRINT / 2 + 1e-4
+    assert away[~texels.centre_inside].max() <= 0.5 + 1e-4
+    # They use the room they have: whole texels to the middle's corners, others past it.
+    assert away[texels.area == 1].min() > 0.95 * module.FOOTPRINT / 2
+    assert away[~texels.centre_inside].max() > module.FOOTPRINT / 2
+
+
+def test_whole_texels_take_the_sample_as_it_is(monkeypatch):
+    monkeypatch.setattr(module, "FOOTPRINT", 1.0)
     texels = rasterise(SQUARE, 4)
     corner = texels.take((texels.row == 0) & (texels.column == 3))
     weights = sample_footprints(corner, np.array([[[0.25, 0.75]]]))
