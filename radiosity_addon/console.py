@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import sys
 from collections.abc import Iterable
@@ -33,29 +34,28 @@ class Console:
 
     def __enter__(self) -> Console:
         self._stream = sys.stdout
+        _flush_everything()
         try:
-            redirected = sys.stdout.fileno() == 1
-        except (AttributeError, OSError, ValueError):
-            redirected = False
-        if redirected:
-            sys.stdout.flush()
             self._saved = os.dup(1)
-            self._stream = os.fdopen(
-                os.dup(1), "w", encoding=sys.stdout.encoding or "utf-8", errors="replace"
-            )
-            null = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(null, 1)
-            os.close(null)
+        except OSError:  # a process without standard output
+            return self
+        if _descriptor(sys.stdout) == 1:
+            encoding = sys.stdout.encoding or "utf-8"
+            self._stream = os.fdopen(os.dup(1), "w", encoding=encoding, errors="replace")
+        null = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null, 1)
+        os.close(null)
         return self
 
     def __exit__(self, *_: object) -> None:
         self._end_line()
         self._stream.flush()
         if self._saved is not None:
-            sys.stdout.flush()
+            _flush_everything()
             os.dup2(self._saved, 1)
             os.close(self._saved)
             self._saved = None
+        if self._stream is not sys.stdout:
             self._stream.close()
             self._stream = sys.stdout
 
@@ -88,6 +88,23 @@ class Console:
         if self._open_line:
             self._stream.write("\r\x1b[K")
             self._open_line = False
+
+
+def _descriptor(stream: TextIO) -> int | None:
+    """The file descriptor behind a stream; None if there is none."""
+    try:
+        return stream.fileno()
+    except (AttributeError, OSError, ValueError):
+        return None
+
+
+def _flush_everything() -> None:
+    """Empty Python's buffer of standard output, and C's, which would come out later."""
+    sys.stdout.flush()
+    try:
+        ctypes.CDLL(None).fflush(None)
+    except (OSError, TypeError, AttributeError):
+        return  # Windows: C's buffer is not to be had this way
 
 
 def summary(where: str, files: Iterable[tuple[str, str]], report: dict) -> list[str]:

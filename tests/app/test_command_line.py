@@ -1,0 +1,410 @@
+"""The command line on whole bakes: what it writes, what it says, and how it ends."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+import shutil
+import signal
+from collections.abc import Callable
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from .conftest import QUICK, add_lamp, add_quad, build_room, painted, save, start
+
+Run = Callable[..., object]
+
+
+def read_report(folder: Path) -> dict:
+    return json.loads((folder / "report.json").read_text(encoding="utf-8"))
+
+
+def read_pixels(path: Path) -> np.ndarray:
+    """The values of an image file as they are, (height, width, 3)."""
+    image = bpy.data.images.load(str(path))
+    image.colorspace_settings.name = "Non-Color"
+    width, height = image.size
+    pixels = np.empty(width * height * 4, dtype=np.float32)
+    image.pixels.foreach_get(pixels)
+    bpy.data.images.remove(image)
+    return pixels.reshape(height, width, 4)[..., :3]
+
+
+def digest(folder: Path) -> dict[str, str]:
+    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(folder.iterdir())}
+
+
+# --- what a bake leaves behind ---
+
+
+def test_the_bundled_box_with_one_command(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = run("bake", *QUICK)
+    assert (done.code, done.err) == (0, "")
+    folder = tmp_path / "out" / "cornell"
+    assert set(digest(folder)) == {"baked.blend", "lightmap.exr", "preview.png", "report.json"}
+    for part in (
+        "out/cornell",
+        "baked.blend",
+        "lightmap.exr",
+        "preview.png",
+        "report.json",
+        "solve",
+        " s\n",
+        "%]",
+    ):
+        assert part in done.out
+
+
+def test_the_report_keeps_its_contract(run: Run, room: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert run("bake", room, "--output", out, *QUICK, "--report", tmp_path / "copies" / "r.json").code == 0
+    report = read_report(out)
+    assert json.loads((tmp_path / "copies" / "r.json").read_text(encoding="utf-8")) == report
+    assert report["version"] == 1
+    assert {entry["object"] for entry in report["objects"]} == {"Floor", "Wall", "Cube"}
+    for entry in report["objects"]:
+        assert entry["uv_layer"] == "Lightmap"
+        assert entry["resolution"] == [32, 32]
+        assert entry["atlas"] == 0
+        assert (out / entry["image"]).is_file()
+    solver = report["solver"]
+    for name in ("elements", "links", "rays", "iterations", "residual", "closure_area_mean"):
+        assert isinstance(solver[name], int | float), name
+    assert set(solver["power_W"]) >= {"emitted", "absorbed", "escaped"}
+    assert all(seconds >= 0 for seconds in report["seconds"].values())
+    assert {"export", "unwrap", "solve", "light"} <= set(report["seconds"])
+
+
+def test_the_scene_file_is_not_touched(run: Run, room: Path, tmp_path: Path) -> None:
+    before = digest(room.parent), room.stat().st_mtime_ns
+    assert run("bake", room, "--output", tmp_path / "out", *QUICK).code == 0
+    assert (digest(room.parent), room.stat().st_mtime_ns) == before
+
+
+def test_baked_blend_shows_the_lightmaps_and_moves_with_its_folder(
+    run: Run, room: Path, tmp_path: Path
+) -> None:
+    assert run("bake", room, "--output", tmp_path / "out", *QUICK).code == 0
+    moved = tmp_path / "elsewhere"
+    shutil.move(tmp_path / "out", moved)
+    bpy.ops.wm.open_mainfile(filepath=str(moved / "baked.blend"))
+    image = bpy.data.images["lightmap.exr"]
+    assert image.filepath == "//lightmap.exr"
+    assert image.colorspace_settings.name == "Non-Color"
+    assert Path(bpy.path.abspath(image.filepath)).resolve() == (moved / "lightmap.exr").resolve()
+    for name in ("Floor", "Wall", "Cube"):
+        assert "Lightmap" in bpy.data.objects[name].data.uv_layers
+
+
+def test_restore_undoes_a_bake(run: Run, room: Path, tmp_path: Path) -> None:
+    assert run("bake", room, "--output", tmp_path / "out", *QUICK).code == 0
+    done = run("restore", tmp_path / "out" / "baked.blend", "--output", tmp_path / "back" / "room.blend")
+    assert (done.code, done.err) == (0, "")
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "back" / "room.blend"))
+    assert not any(image.name.startswith("lightmap") for image in bpy.data.images)
+    assert {obj.name: len(obj.data.uv_layers) for obj in bpy.data.objects if obj.type == "MESH"} == {
+        "Floor": 0,
+        "Wall": 0,
+        "Cube": 1,
+    }
+    assert bpy.data.objects["Cube"].modifiers["Bevel"].show_render
+
+
+# --- what the options do ---
+
+
+def test_texel_values_by_quantity_and_light(run: Run, room: Path, tmp_path: Path) -> None:
+    def texels(**options: str) -> np.ndarray:
+        out = tmp_path / "-".join(options.values())
+        words = [word for name, value in options.items() for word in (f"--{name}", value)]
+        assert run("bake", room, "--output", out, *QUICK, *words).code == 0
+        return read_pixels(out / "lightmap.exr")
+
+    over_pi = texels(quantity="irradiance_over_pi")
+    assert over_pi.max() > 0.1
+    np.testing.assert_allclose(texels(quantity="irradiance"), math.pi * over_pi, rtol=1e-5, atol=1e-6)
+    parts = texels(light="direct") + texels(light="indirect")
+    np.testing.assert_allclose(parts, over_pi, rtol=1e-4, atol=1e-5)
+
+
+def test_png16_holds_the_values_over_its_scale(run: Run, room: Path, tmp_path: Path) -> None:
+    for kind in ("exr", "png16"):
+        assert run("bake", room, "--output", tmp_path / kind, *QUICK, "--format", kind).code == 0
+    entry = read_report(tmp_path / "png16")["objects"][0]
+    assert entry["image"] == "lightmap.png"
+    exact = read_pixels(tmp_path / "exr" / "lightmap.exr")
+    stored = read_pixels(tmp_path / "png16" / "lightmap.png") * entry["scale"]
+    np.testing.assert_allclose(stored, exact, atol=entry["scale"] / 65535)
+
+
+def test_an_image_an_object(run: Run, room: Path, tmp_path: Path) -> None:
+    assert run("bake", room, "--output", tmp_path / "out", *QUICK, "--atlas", "per-object").code == 0
+    report = read_report(tmp_path / "out")
+    assert {entry["object"]: entry["image"] for entry in report["objects"]} == {
+        name: f"{name}.exr" for name in ("Floor", "Wall", "Cube")
+    }
+
+
+def test_only_named_objects_and_the_rest_still_blocks(run: Run, room: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert run("bake", room, "--output", out, *QUICK, "--objects", "Floor", "--light", "direct").code == 0
+    assert [entry["object"] for entry in read_report(out)["objects"]] == ["Floor"]
+    # The cube's shadow, on a page that is all floor.
+    pixels = read_pixels(out / "lightmap.exr")
+    assert pixels[8:24, 8:24].min() < 0.01 * pixels.max()
+
+
+def test_texel_density_sets_the_page(run: Run, room: Path, tmp_path: Path) -> None:
+    sizes = []
+    for density in (4, 16):
+        out = tmp_path / str(density)
+        words = ("--quality", "draft", "--texel-density", density)
+        assert run("bake", room, "--output", out, *words).code == 0
+        sizes.append(read_report(out)["objects"][0]["resolution"][0])
+    assert sizes[0] >= 4 * 4  # the floor is 4 m wide
+    assert sizes[1] >= 2 * sizes[0]
+
+
+def test_the_same_bytes_at_any_thread_count(run: Run, room: Path, tmp_path: Path) -> None:
+    files = []
+    for threads in (1, 2, 3):
+        out = tmp_path / str(threads)
+        assert run("bake", room, "--output", out, *QUICK, "--threads", threads, "--seed", 5).code == 0
+        files.append((out / "lightmap.exr").read_bytes())
+    assert files[0] == files[1] == files[2]
+
+
+def test_another_seed_is_another_sampling(run: Run, room: Path, tmp_path: Path) -> None:
+    for seed in (0, 1):
+        assert run("bake", room, "--output", tmp_path / str(seed), *QUICK, "--seed", seed).code == 0
+    zero, one = (read_pixels(tmp_path / name / "lightmap.exr") for name in "01")
+    assert (zero != one).any()
+    np.testing.assert_allclose(zero.mean(), one.mean(), rtol=0.02)
+
+
+def test_keep_uvs_keeps_the_layer(run: Run, tmp_path: Path) -> None:
+    build_room()
+    floor = bpy.data.objects["Floor"].data
+    layer = floor.uv_layers.new(name="Lightmap")
+    kept = [0.0, 0.0, 0.25, 0.0, 0.25, 0.25, 0.0, 0.25]
+    layer.uv.foreach_set("vector", kept)
+    scene = save(tmp_path / "kept.blend")
+    out = tmp_path / "out"
+    assert run("bake", scene, "--output", out, *QUICK, "--keep-uvs", "--objects", "Floor").code == 0
+    bpy.ops.wm.open_mainfile(filepath=str(out / "baked.blend"))
+    found = np.empty(8, dtype=np.float32)
+    bpy.data.objects["Floor"].data.uv_layers["Lightmap"].uv.foreach_get("vector", found)
+    np.testing.assert_allclose(found, kept, atol=1e-6)
+
+
+def test_quiet_prints_nothing(run: Run, room: Path, tmp_path: Path) -> None:
+    done = run("bake", room, "--output", tmp_path / "out", *QUICK, "--quiet")
+    assert (done.code, done.out, done.err) == (0, "", "")
+
+
+@pytest.mark.parametrize("kind", ["glb", "gltf", "obj"])
+def test_other_scene_files(kind: str, run: Run, tmp_path: Path) -> None:
+    build_room()
+    path = tmp_path / f"room.{kind}"
+    if kind == "obj":
+        bpy.ops.wm.obj_export(filepath=str(path))
+    else:
+        form = {"glb": "GLB", "gltf": "GLTF_SEPARATE"}[kind]
+        bpy.ops.export_scene.gltf(filepath=str(path), export_format=form, export_lights=True)
+    done = run("bake", path, "--output", tmp_path / "out", *QUICK, "--sky")
+    assert (done.code, done.err) == (0, "")
+    report = read_report(tmp_path / "out")
+    assert {entry["object"] for entry in report["objects"]} == {"Floor", "Wall", "Cube"}
+    assert read_pixels(tmp_path / "out" / "lightmap.exr").max() > 0.01
+
+
+# --- odd scenes that bake, with a warning ---
+
+
+def test_no_light_is_black_with_a_warning_and_sky_mends_it(run: Run, tmp_path: Path) -> None:
+    add_quad("Floor", ((-2, -2, 0), (2, -2, 0), (2, 2, 0), (-2, 2, 0)))
+    scene = save(tmp_path / "dark.blend")
+    assert run("bake", scene, "--output", tmp_path / "dark", *QUICK).code == 0
+    assert not read_pixels(tmp_path / "dark" / "lightmap.exr").any()
+    assert any("light" in warning["message"] for warning in read_report(tmp_path / "dark")["warnings"])
+    assert run("bake", scene, "--output", tmp_path / "sky", *QUICK, "--sky").code == 0
+    # A plane under a white sky of radiance 1: H/π = 1.
+    pixels = read_pixels(tmp_path / "sky" / "lightmap.exr")
+    np.testing.assert_allclose(pixels[pixels.any(axis=2)], 1.0, rtol=0.01)
+
+
+def test_odd_but_bakeable_scenes_warn_by_name(run: Run, tmp_path: Path) -> None:
+    floor = add_quad("Floor", ((-2, -2, 0), (2, -2, 0), (2, 2, 0), (-2, 2, 0)))
+    floor.data.materials.append(None)
+    needle = add_quad("Needle", ((0, 0, 1), (1, 0, 1), (2, 0, 1)))
+    needle.data.materials.append(painted("Too White", (1, 1, 1, 1)))
+    add_lamp()
+    scene = save(tmp_path / "odd.blend")
+    done = run("bake", scene, "--output", tmp_path / "out", *QUICK)
+    assert (done.code, done.err) == (0, "")
+    warned = {warning["name"] for warning in read_report(tmp_path / "out")["warnings"]}
+    assert {"Needle", "Too White"} <= warned
+    assert "Too White" in done.out
+
+
+# --- how it ends ---
+
+
+def bad_nothing() -> None:
+    add_lamp()
+
+
+def bad_ninth_layer() -> None:
+    quad = add_quad("Eight", ((-1, -1, 0), (1, -1, 0), (1, 1, 0)))
+    for index in range(8):
+        quad.data.uv_layers.new(name=f"UV{index}")
+
+
+def bad_nan() -> None:
+    add_quad("Broken", ((-1, -1, 0), (1, -1, float("nan")), (1, 1, 0)))
+
+
+def bad_inf() -> None:
+    add_quad("Endless", ((-1, -1, 0), (1, -1, float("inf")), (1, 1, 0)))
+
+
+@pytest.mark.parametrize(
+    ("build", "names", "mend"),
+    [
+        (bad_nothing, "nothing to bake", "mesh"),
+        (bad_ninth_layer, "Eight", "remove"),
+        (bad_nan, "Broken", ""),
+        (bad_inf, "Endless", ""),
+    ],
+)
+def test_scenes_that_cannot_be_baked(
+    build: Callable[[], None], names: str, mend: str, run: Run, tmp_path: Path
+) -> None:
+    build()
+    scene = save(tmp_path / "bad.blend")
+    done = run("bake", scene, "--output", tmp_path / "out", *QUICK)
+    assert done.code == 1
+    assert done.err.startswith("error: ")
+    assert done.err.count("\n") == 1
+    assert names in done.err
+    assert mend in done.err
+    assert not (tmp_path / "out").exists()
+
+
+def test_only_linked_objects_is_an_error(run: Run, room: Path, tmp_path: Path) -> None:
+    with bpy.data.libraries.load(str(room), link=True) as (_found, linked):
+        linked.objects = ["Floor", "Wall"]
+    for obj in linked.objects:
+        bpy.context.scene.collection.objects.link(obj)
+    scene = save(tmp_path / "linking.blend")
+    done = run("bake", scene, "--output", tmp_path / "out", *QUICK)
+    assert done.code == 1
+    assert done.err.count("\n") == 1
+    assert "link" in done.err
+
+
+@pytest.mark.parametrize("name", ["missing.blend", "empty.blend", "text.blend", "broken.glb", "scene.fbx"])
+def test_files_that_cannot_be_read(name: str, run: Run, tmp_path: Path) -> None:
+    path = tmp_path / name
+    if not name.startswith("missing"):
+        path.write_bytes(b"" if name.startswith("empty") else b"this is no scene")
+    done = run("bake", path, "--output", tmp_path / "out", *QUICK)
+    assert done.code == 1
+    assert done.err.startswith("error: ")
+    assert done.err.count("\n") == 1
+    assert name in done.err
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_output_that_is_a_file(run: Run, room: Path, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("mine")
+    done = run("bake", room, "--output", tmp_path / "file", *QUICK)
+    assert done.code == 1
+    assert str(tmp_path / "file") in done.err
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+def test_an_unknown_object_is_a_usage_error(run: Run, room: Path, tmp_path: Path) -> None:
+    done = run("bake", room, "--output", tmp_path / "out", *QUICK, "--objects", "Floor", "Nope")
+    assert done.code == 2
+    assert "Nope" in done.err
+    assert done.err.count("\n") == 1
+
+
+def test_the_scene_is_never_overwritten(run: Run, room: Path, tmp_path: Path) -> None:
+    assert run("bake", room, "--output", tmp_path / "out", *QUICK).code == 0
+    before = digest(tmp_path / "out")
+    done = run("bake", tmp_path / "out" / "baked.blend", "--output", tmp_path / "out", *QUICK)
+    assert done.code == 2
+    assert "baked.blend" in done.err
+    assert digest(tmp_path / "out") == before
+
+
+def test_restoring_what_shows_no_bake(run: Run, room: Path, tmp_path: Path) -> None:
+    done = run("restore", room, "--output", tmp_path / "back.blend")
+    assert done.code == 1
+    assert "room.blend" in done.err
+    assert not (tmp_path / "back.blend").exists()
+
+
+def test_a_baked_file_bakes_again_as_the_original_does(run: Run, room: Path, tmp_path: Path) -> None:
+    assert run("bake", room, "--output", tmp_path / "one", *QUICK).code == 0
+    assert run("bake", tmp_path / "one" / "baked.blend", "--output", tmp_path / "two", *QUICK).code == 0
+    first, second = ((tmp_path / name / "lightmap.exr").read_bytes() for name in ("one", "two"))
+    assert first == second
+
+
+def test_inside_a_blender_that_has_the_file_open(room: Path, tmp_path: Path) -> None:
+    """What `blender -b room.blend --command radiosity …` calls."""
+    from radiosity_addon.blender import cli_host
+
+    bpy.ops.wm.open_mainfile(filepath=str(room))
+    assert cli_host.run(["bake", "--output", str(tmp_path / "out"), *QUICK, "--quiet"]) == 0
+    assert {entry["object"] for entry in read_report(tmp_path / "out")["objects"]} == {
+        "Floor",
+        "Wall",
+        "Cube",
+    }
+    assert cli_host.run(["bake", "--resolution", "0"]) == 2
+    assert cli_host.run(["bake"]) == 2  # an open file needs --output
+    assert cli_host.run(["--help"]) == 0
+
+
+# --- in a process of its own ---
+
+
+def test_the_process_ends_with_the_code(room: Path, tmp_path: Path) -> None:
+    done = start("bake", room, "--output", "out", *QUICK, cwd=tmp_path)
+    out, err = done.communicate(timeout=300)
+    assert (done.returncode, err) == (0, "")
+    assert "3 objects baked into out" in out
+    assert "Fra:" not in out
+    failed = start("bake", "nowhere.blend", "--output", "out", cwd=tmp_path)
+    out, err = failed.communicate(timeout=300)
+    assert failed.returncode == 1
+    assert err.count("\n") == 1
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals are sent the POSIX way")
+@pytest.mark.parametrize("stage", ["export", "solve", "light", "preview"])
+def test_ctrl_c_leaves_the_previous_result_whole(stage: str, room: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "baked.blend").write_text("the previous result")
+    before = digest(out)
+    job = start("bake", room, "--output", out, "--resolution", "256", cwd=tmp_path)
+    for line in job.stdout:
+        if line.rstrip().endswith(stage):
+            os.killpg(job.pid, signal.SIGINT)
+            break
+    _, err = job.communicate(timeout=300)
+    assert job.returncode == 130
+    assert err.splitlines()[-1] == "error: interrupted; nothing was written"
+    assert "Traceback" not in err
+    assert digest(out) == before
