@@ -27,6 +27,7 @@ class Console:
     def __init__(self, quiet: bool = False) -> None:
         self.quiet = quiet
         self._stream: TextIO = sys.stdout
+        self._theirs: TextIO = sys.stdout
         self._saved: int | None = None
         self._stage = ""
         self._percent = -STEP
@@ -44,7 +45,8 @@ class Console:
             self._stream = os.fdopen(os.dup(1), "w", encoding=encoding, errors="replace")
         null = os.open(os.devnull, os.O_WRONLY)
         os.dup2(null, 1)
-        os.close(null)
+        # Blender's operators report through Python's own stream.
+        self._theirs, sys.stdout = sys.stdout, os.fdopen(null, "w", encoding="utf-8")
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -55,6 +57,8 @@ class Console:
             os.dup2(self._saved, 1)
             os.close(self._saved)
             self._saved = None
+            sys.stdout.close()
+            sys.stdout = self._theirs
         if self._stream is not sys.stdout:
             self._stream.close()
             self._stream = sys.stdout
