@@ -106,10 +106,12 @@ def _install(folder: Path, pins: list[Path]) -> None:
 
 def _works(folder: Path) -> bool:
     """Whether the environment's own Python starts and has pip: a half-made one does not."""
-    python = _interpreter(folder)
-    if not python.is_file():
+    try:
+        command = [str(_interpreter(folder)), "-c", "import pip"]
+        done = subprocess.run(command, capture_output=True, check=False)
+    except OSError:
         return False
-    return subprocess.run([str(python), "-c", "import pip"], capture_output=True, check=False).returncode == 0
+    return done.returncode == 0
 
 
 def _python_version(folder: Path) -> tuple[int, int] | None:

@@ -1,0 +1,144 @@
+"""build.py on machines that lack something, and the environments it makes."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from build_tools import environments, system
+from build_tools.environments import Environment
+from build_tools.errors import BuildError
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def run(*command: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, *command], cwd=ROOT, capture_output=True, text=True, check=False, timeout=300
+    )
+
+
+@pytest.fixture
+def checkout(tmp_path: Path) -> Path:
+    """A checkout whose pins are empty, so that its environments need no network."""
+    pins = tmp_path / "requirements"
+    pins.mkdir()
+    for name in ("bpy-4.2", "bpy-5.0", "bpy-5.2", "tools"):
+        (pins / f"{name}.txt").write_text("# nothing\n")
+    return tmp_path
+
+
+@pytest.mark.parametrize("version", [(2, 7), (3, 10), (3, 12), (3, 14)])
+def test_an_unsupported_python_is_told_what_to_do(version: tuple[int, int]) -> None:
+    pretend = f"import sys, runpy; sys.version_info = {(*version, 1, 'final', 0)}; "
+    start = "sys.argv = ['build.py', 'bake']; runpy.run_path('build.py', run_name='__main__')"
+    done = run("-c", pretend + start)
+    assert done.returncode == 1
+    assert done.stdout == ""
+    message = done.stderr.splitlines()
+    assert len(message) == 1
+    assert "this is {}.{};".format(*version) in message[0]
+    assert "`python3.11 build.py" in message[0]
+    assert "apt-get install" in message[0]
+
+
+def test_missing_libraries_are_named_with_their_packages(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "platform", "linux")
+    libraries = {"libnowhere.so.6": "libnowhere6", "libgone.so.1": "libgone1"}
+    monkeypatch.setattr(system, "DEBIAN_PACKAGE_OF_LIBRARY", libraries)
+    with pytest.raises(BuildError, match=r"run: apt-get install -y libnowhere6 libgone1$"):
+        system.require_libraries()
+
+
+def test_a_missing_venv_module_is_named_with_its_package(tmp_path: Path) -> None:
+    python = tmp_path / "python3.11"
+    python.write_text("#!/bin/sh\nexit 1\n")
+    python.chmod(0o755)
+    with pytest.raises(BuildError, match=r"run: apt-get install -y python3\.11-venv$"):
+        system.require_venv(str(python), (3, 11))
+
+
+def test_a_missing_python_is_named() -> None:
+    with pytest.raises(BuildError, match=r"^no python3\.99 found; install it"):
+        system.find_python((3, 99))
+
+
+def test_an_environment_is_made_once(checkout: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = environments.main_environment(checkout)
+    assert made.run("-c", "import pip") == 0
+    monkeypatch.setattr(environments, "_create", _must_not_be_called)
+    monkeypatch.setattr(environments, "_install", _must_not_be_called)
+    assert environments.main_environment(checkout) == made
+
+
+def test_changed_pins_and_interrupted_installations_are_brought_up_to_date_in_place(
+    checkout: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = environments.main_environment(checkout)
+    monkeypatch.setattr(environments, "_create", _must_not_be_called)
+    installed: list[Path] = []
+    monkeypatch.setattr(environments, "_install", lambda folder, _pins: installed.append(folder))
+
+    (checkout / "requirements" / "tools.txt").write_text("# something else\n")
+    environments.main_environment(checkout)
+    assert installed == [made.folder]
+
+    (made.folder / "pins.sha256").unlink()
+    environments.main_environment(checkout)
+    environments.main_environment(checkout)
+    assert installed == [made.folder, made.folder]
+
+
+def test_a_half_made_environment_is_made_anew(checkout: Path) -> None:
+    folder = checkout / ".venv"
+    (folder / "bin").mkdir(parents=True)
+    (folder / "bin" / "python").write_text("")
+    (folder / "pyvenv.cfg").write_text("home = /nowhere\n")
+    assert environments.main_environment(checkout).run("-c", "import pip") == 0
+
+
+def test_pip_that_fails_is_an_error_and_leaves_no_stamp(checkout: Path) -> None:
+    (checkout / "requirements" / "tools.txt").write_text("--no-index\nthere-is-no-such-package==1\n")
+    with pytest.raises(BuildError, match="pip could not install"):
+        environments.main_environment(checkout)
+    assert not (checkout / ".venv" / "pins.sha256").exists()
+
+
+def test_a_version_without_pins_is_an_error(checkout: Path) -> None:
+    with pytest.raises(BuildError, match=r"no pins for bpy 3\.6; there are 4\.2"):
+        environments.bpy_environment(checkout, "3.6")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [
+        (("-c", "raise SystemExit(7)"), 7),
+        (("-m", "radiosity_addon", "bake", "--resolution", "0"), 2),
+        (("-m", "radiosity_addon", "bake", "--help"), 0),
+        (("-m", "radiosity_addon", "restore"), 2),
+    ],
+)
+def test_exit_codes_come_through(arguments: tuple[str, ...], code: int, tmp_path: Path) -> None:
+    here = Environment(ROOT, Path(sys.prefix))
+    hand_over = "import sys; from pathlib import Path; from build_tools.environments import Environment; "
+    hand_over += "sys.exit(Environment(Path(sys.argv[1]), Path(sys.argv[2])).hand_over(*sys.argv[3:]))"
+    assert run("-c", hand_over, str(here.root), str(here.folder), *arguments).returncode == code
+
+
+@pytest.mark.parametrize("arguments", [(), ("frobnicate",), ("test", "--bpy")])
+def test_wrong_usage_is_exit_code_2(arguments: tuple[str, ...]) -> None:
+    assert run("build.py", *arguments).returncode == 2
+
+
+def test_help_lists_every_verb() -> None:
+    done = run("build.py", "--help")
+    assert done.returncode == 0
+    for verb in ("bake", "restore", "test", "check", "package", "real-blender"):
+        assert f"\n  {verb} " in done.stdout
+
+
+def _must_not_be_called(*arguments: object) -> None:
+    raise AssertionError(f"called with {arguments}")
