@@ -31,8 +31,10 @@ def register() -> None:
         unregister()
         raise
     # Blender as a Python module crashes or hangs at exit (4.2, 4.5) while Python classes
-    # of ours are still registered.
-    atexit.register(unregister)
+    # of ours are still registered. The application is gone when these callbacks run, and
+    # unregistering would crash it: it looks after its extensions itself.
+    if not bpy.app.binary_path:
+        atexit.register(unregister)
 
 
 def unregister() -> None:
