@@ -133,7 +133,8 @@ class AreaLight(Emitter):
     @property
     def _facing(self) -> Float64Array:
         """A vector along the side it shines to."""
-        return np.cross(np.asarray(self.edge_u), np.asarray(self.edge_v))
+        facing: Float64Array = np.cross(np.asarray(self.edge_u), np.asarray(self.edge_v))
+        return facing
 
     @property
     def flux(self) -> Float64Array:

@@ -187,9 +187,7 @@ def _area_vector(corners: Float64Array) -> Float64Array:
 
 def _dot(first: Float64Array, second: Float64Array) -> Float64Array:
     """Return the scalar products of (..., 3, m) coordinate arrays."""
-    product: Float64Array = (
-        first[..., 0, :] * second[..., 0, :]
-        + first[..., 1, :] * second[..., 1, :]
-        + first[..., 2, :] * second[..., 2, :]
-    )
+    product: Float64Array = np.multiply(first[..., 0, :], second[..., 0, :])
+    product += first[..., 1, :] * second[..., 1, :]
+    product += first[..., 2, :] * second[..., 2, :]
     return product

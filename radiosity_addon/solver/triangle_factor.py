@@ -26,6 +26,9 @@ TOLERANCE = 2e-5
 BLIND_ERROR = 1e-3
 """What quadrature may miss between its nodes beside an edge, in squares of the interval (measured)."""
 
+BLIND_BISECTIONS = 6
+"""Bisections on that suspicion alone; it would cut a needle's edges to dust."""
+
 MAX_BISECTIONS = 24
 """Ends the bisection at singular points; intervals there are below 1e-7 of their edge."""
 
@@ -232,10 +235,11 @@ def _outline_factor(outer: Float64Array, inner: Float64Array, area: Float64Array
             height = _edge_integrals(along, edge[part], inner[row[part]])
             value[part] = 0.5 * width * (height @ KRONROD_WEIGHTS)
             error[part] = np.abs(value[part] - 0.5 * width * (height @ GAUSS_WEIGHTS))
-            middle = start[part] + (from_t[part, None] + 0.5 * width) * edge[part]
-            square = width * width * np.einsum("ij,ij->i", edge[part], edge[part])
-            beside = _square_distances(middle, inner[row[part]]) < square
-            error[part] = np.maximum(error[part], np.where(beside, BLIND_ERROR * square, 0.0))
+            if bisection < BLIND_BISECTIONS:
+                middle = start[part] + (from_t[part, None] + 0.5 * width) * edge[part]
+                square = width * width * np.einsum("ij,ij->i", edge[part], edge[part])
+                beside = _square_distances(middle, inner[row[part]]) < square
+                error[part] = np.maximum(error[part], np.where(beside, BLIND_ERROR * square, 0.0))
         again = error > TOLERANCE * scale[row]
         if bisection == MAX_BISECTIONS:
             again[:] = False

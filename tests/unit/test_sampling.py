@@ -113,9 +113,7 @@ def test_the_basis_is_right_handed_also_at_the_poles() -> None:
     tangent, bitangent = sampling.orthonormal_basis(normals)
     frame = np.stack([tangent, bitangent, normals], axis=1)
     unity = np.broadcast_to(np.eye(3), frame.shape)
-    np.testing.assert_allclose(
-        frame @ frame.transpose(0, 2, 1), unity, atol=1e-12
-    )
+    np.testing.assert_allclose(frame @ frame.transpose(0, 2, 1), unity, atol=1e-12)
     np.testing.assert_allclose(np.linalg.det(frame), 1.0, atol=1e-12)
     local = rng.normal(size=(len(normals), 4, 3))
     world = sampling.to_world(local, normals)
