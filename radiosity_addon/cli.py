@@ -88,8 +88,9 @@ def settings_of(request: argparse.Namespace) -> BakeSettings:
 
 def bake_output(request: argparse.Namespace, loaded: Path | None) -> Path:
     """Return where the bake goes: a scene needs --output, the bundled one has a default."""
-    if request.output is not None:
-        return request.output
+    given: Path | None = request.output
+    if given is not None:
+        return given
     if request.scene is not None or loaded is not None:
         raise UsageError("bake needs --output DIR, the folder everything is written to")
     return BUNDLED_OUTPUT

@@ -6,7 +6,7 @@ import ctypes
 import os
 import sys
 from collections.abc import Iterable
-from typing import TextIO
+from typing import Any, TextIO
 
 STEP = 10
 """Without a terminal a stage prints a line again after this many per cent."""
@@ -111,7 +111,7 @@ def _flush_everything() -> None:
         return  # Windows: C's buffer is not to be had this way
 
 
-def summary(where: str, files: Iterable[tuple[str, str]], report: dict) -> list[str]:
+def summary(where: str, files: Iterable[tuple[str, str]], report: dict[str, Any]) -> list[str]:
     """Return the closing lines of a bake: where things are, how long, what to look at.
 
     Parameters

@@ -9,6 +9,7 @@ from contextlib import ExitStack, contextmanager
 import bpy
 
 from .. import pipeline
+from ..background import in_thread
 from ..bake_scene import BakeResult, Progress
 from ..report import BakeReport
 from ..settings import BakeSettings
@@ -33,7 +34,11 @@ WRITING_STAGES = frozenset({"apply", "save", "preview", "write"})
 
 
 def run_bake(
-    context: bpy.types.Context, settings: BakeSettings, output: OutputFolder | None, with_copy: bool = False
+    context: bpy.types.Context,
+    settings: BakeSettings,
+    output: OutputFolder | None,
+    with_copy: bool = False,
+    patient: bool = False,
 ) -> BakeJob:
     """Bake the context's scene and show the lightmaps on its objects.
 
@@ -50,6 +55,9 @@ def run_bake(
         None packs the lightmaps into the file and writes nothing.
     with_copy : bool
         Write `baked.blend` and `preview.png` into the output folder as well.
+    patient : bool
+        Return from every `next` within a moment, for a window: the steps between the
+        export and the lightmaps, which know nothing of Blender, run in a thread.
 
     Yields
     ------
@@ -74,7 +82,7 @@ def run_bake(
         with _timed(seconds, "export"), originals_shown(context):
             export = export_scene(context, settings)
             check_targets(export)
-        result = yield from _solve(export, settings)
+        result = yield from _solve(export, settings, patient)
         seconds.update(result.seconds)
         yield Progress("apply", APPLY)
         if with_copy and output is not None:
@@ -89,18 +97,22 @@ def run_bake(
     return report
 
 
-def _solve(export: Export, settings: BakeSettings) -> Generator[Progress, None, BakeResult]:
+def _solve(export: Export, settings: BakeSettings, patient: bool) -> Generator[Progress, None, BakeResult]:
     """Run the pipeline, its progress scaled to its share of the whole."""
     baking = pipeline.bake(export.bake_scene, settings)
+    steps = in_thread(baking) if patient else baking
+    shown = Progress("unwrap", SOLVE)
     try:
         while True:
             try:
-                progress = next(baking)
+                progress = next(steps)
             except StopIteration as done:
                 return done.value
-            yield Progress(progress.stage, SOLVE + (APPLY - SOLVE) * progress.fraction)
+            if progress is not None:
+                shown = Progress(progress.stage, SOLVE + (APPLY - SOLVE) * progress.fraction)
+            yield shown
     finally:
-        baking.close()
+        steps.close()
 
 
 def _deliver(

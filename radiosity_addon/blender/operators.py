@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Generator
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +38,9 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     _was_editing = False
-    _job: Generator[Any, None, Any] | None = None
+    # Blender evaluates annotations when it registers the class: no names of later imports.
+    _job: Any = None  # BakeJob while a bake runs
+    _report: Any = None  # BakeReport once it is done
     _timer: bpy.types.Timer | None = None
 
     @classmethod
@@ -56,7 +57,7 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Run the bake through."""
         try:
-            self._begin(context)
+            self._begin(context, patient=False)
             while not self._advance(float("inf")):
                 pass
         except RadiosityError as error:
@@ -71,7 +72,7 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
         if bpy.app.background or context.window is None:
             return self.execute(context)
         try:
-            self._begin(context)
+            self._begin(context, patient=True)
         except RadiosityError as error:
             return self._fail(context, error)
         manager = context.window_manager
@@ -106,7 +107,7 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
         """Blender ends the operator from outside: a window closes, or Blender quits."""
         self._end(context)
 
-    def _begin(self, context: bpy.types.Context) -> None:
+    def _begin(self, context: bpy.types.Context, patient: bool) -> None:
         from .job import run_bake
         from .output import OutputFolder
 
@@ -114,7 +115,8 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
         settings = settings_of(context)
         folder = output_folder(context)
         self._report = None
-        self._job = run_bake(context, settings, None if folder is None else OutputFolder(folder))
+        output = None if folder is None else OutputFolder(folder)
+        self._job = run_bake(context, settings, output, patient=patient)
         runtime.running.active = True
         runtime.running.stage, runtime.running.fraction = "Starting", 0.0
 
@@ -248,7 +250,8 @@ class RADIOSITY_OT_open_folder(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Open the folder."""
-        folder = bpy.path.abspath(runtime.last_bake(context.scene).folder)
+        last = runtime.last_bake(context.scene)
+        folder = bpy.path.abspath(last.folder) if last is not None else ""
         if not Path(folder).is_dir():
             self.report({"ERROR"}, f"The folder '{folder}' is not there any more")
             return {"CANCELLED"}

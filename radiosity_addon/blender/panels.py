@@ -98,7 +98,7 @@ class RADIOSITY_PT_last_bake(_Panel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the figures."""
-        last = runtime.last_bake(context.scene)
+        last = runtime.last_bake(context.scene) or runtime.LastBake()
         column = self.layout.column(align=True)
         for name, value in last.figures:
             split = column.split(factor=0.45)
@@ -124,7 +124,7 @@ class RADIOSITY_PT_warnings(_Panel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the warnings, the first ones of many."""
-        last = runtime.last_bake(context.scene)
+        last = runtime.last_bake(context.scene) or runtime.LastBake()
         for name, message in last.warnings[:SHOWN_WARNINGS]:
             _draw_text(self.layout.box(), f"{name}: {message}", "ERROR", context)
         hidden = last.warning_count - len(last.warnings[:SHOWN_WARNINGS])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 from collections.abc import Callable
+from functools import partial
 
 import bpy
 
@@ -24,7 +25,7 @@ def register() -> None:
             _undo.append(module.unregister)
         for cls in CLASSES:
             bpy.utils.register_class(cls)
-            _undo.append(lambda cls=cls: bpy.utils.unregister_class(cls))
+            _undo.append(partial(bpy.utils.unregister_class, cls))
         cli_host.register()
         _undo.append(cli_host.unregister)
     except BaseException:

@@ -182,6 +182,14 @@ def test_closing_the_bake_at_any_step_leaves_everything_as_it_was(tmp_path: Path
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["lightmap.exr", "report.json"]
 
 
+def test_a_patient_bake_gives_the_same_pixels(box: bpy.types.Scene) -> None:
+    bake()
+    expected = np.array(bpy.data.images["lightmap.exr"].pixels)
+    stages = [progress.stage for progress in run_bake(bpy.context, QUICK, None, patient=True)]
+    assert {"export", "solve", "light", "apply"} <= set(stages)
+    np.testing.assert_array_equal(np.array(bpy.data.images["lightmap.exr"].pixels), expected)
+
+
 def test_progress_never_goes_back(tmp_path: Path) -> None:
     job = run_bake(bpy.context, QUICK, OutputFolder(tmp_path / "out"), with_copy=True)
     fractions = [progress.fraction for progress in job]
