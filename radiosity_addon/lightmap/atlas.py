@@ -144,7 +144,7 @@ def build_atlas(
         packing = _kept_as_they_are(group, resolution, texel_density)
         if packing is None:
             for trial in _pack_page(group, resolution, texel_density):
-                packing = trial
+                packing = trial or packing
                 yield 0.7 + 0.3 * len(placed) / len(layouts)
         assert packing is not None
         if packing.crowded:
@@ -268,7 +268,7 @@ def _apart(layouts: list[Float32], resolution: int) -> bool:
     return not (taken > _OVERLAP).any()
 
 
-def _pack_page(group: list[_Layout], resolution: int, density: float | None) -> Iterator[Packing]:
+def _pack_page(group: list[_Layout], resolution: int, density: float | None) -> Iterator[Packing | None]:
     """Pack the charts of several objects together; triangles without area get a harmless place."""
     uv = np.concatenate([layout.charts.uv for layout in group])
     first = np.cumsum([0] + [layout.charts.count for layout in group])
@@ -283,6 +283,9 @@ def _pack_page(group: list[_Layout], resolution: int, density: float | None) -> 
         yield Packing(np.full(uv.shape, 0.5, dtype=np.float32), resolution if density is None else 4, 0.0)
         return
     for packing in pack(uv[used], chart[used], resolution, density):
+        if packing is None:
+            yield None
+            continue
         pages = np.empty(uv.shape, dtype=np.float32)
         pages[used] = packing.uv
         _park(pages, chart, [len(layout.source.triangles) for layout in group])

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .flatten import project, project_polygons, rescale_to_area, signed_double_area, undo_stretch
+from .overlap import overlapping_triangles
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -94,8 +95,14 @@ def _pieces(triangles: Float, polygon: Int) -> Iterator[NDArray[np.intp]]:
         waiting += [part[len(part) // 2 :], part[: len(part) // 2]]
 
 
-def _unwrap_piece(triangles: Float, polygon: Int, grow: GrowCharts | None) -> tuple[Float, Int]:
-    """Return uv (n, 3, 2) [m] and chart (n,) of one piece; charts are numbered without gaps."""
+def _unwrap_piece(
+    triangles: Float, polygon: Int, grow: GrowCharts | None, again: int = 2
+) -> tuple[Float, Int]:
+    """Return uv (n, 3, 2) [m] and chart (n,) of one piece; charts are numbered without gaps.
+
+    What overlaps within its chart is cut out and unwrapped by itself, `again` times by the
+    grower, at last polygon by polygon.
+    """
     count = len(triangles)
     polygon = np.unique(polygon, return_inverse=True)[1].reshape(-1)
     corners, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
@@ -117,7 +124,30 @@ def _unwrap_piece(triangles: Float, polygon: Int, grow: GrowCharts | None) -> tu
         return uv, chart
     chart[used] = np.unique(chart[used], return_inverse=True)[1].reshape(-1)
     uv[used] = _to_scale(uv[used], triangles[used], chart[used], own[used])
+    # Own charts were looked at already.
+    over = _overlapping_polygons(uv, np.where(own, -1, chart), polygon)
+    if not len(over):
+        return uv, chart
+    redone = _unwrap_piece(triangles[over], polygon[over], grow if again else None, again - 1)
+    chart[over] = -1
+    chart = _split_parts(uv, chart)
+    uv[over], chart[over] = redone[0], redone[1] + chart.max() + 1
+    chart[used] = np.unique(chart[used], return_inverse=True)[1].reshape(-1)
+    uv[used] = rescale_to_area(uv[used], triangles[used], chart[used], int(chart.max()) + 1)
     return uv, chart
+
+
+def _overlapping_polygons(uv: Float, chart: Int, polygon: Int) -> NDArray[np.intp]:
+    """Return the triangles to cut out until, as far as is seen, no chart overlaps itself."""
+    # Two triangles side by side cannot overlap.
+    left = np.flatnonzero(chart >= 0)
+    left = left[np.bincount(chart[left])[chart[left]] > 2] if len(left) else left
+    cut: list[NDArray[np.intp]] = []
+    while len(over := left[overlapping_triangles(uv[left], chart[left])]):
+        whole = np.isin(polygon[left], polygon[over])
+        cut.append(left[whole])
+        left = left[~whole]
+    return np.concatenate(cut) if cut else np.zeros(0, dtype=np.intp)
 
 
 def _split_parts(uv: Float, chart: Int) -> Int:

@@ -82,7 +82,7 @@ class _Job:
     area: float
 
 
-def pack(uv: Float, chart: Int, resolution: int, density: float | None) -> Iterator[Packing]:
+def pack(uv: Float, chart: Int, resolution: int, density: float | None) -> Iterator[Packing | None]:
     """Pack charts into a square page.
 
     Parameters
@@ -98,8 +98,8 @@ def pack(uv: Float, chart: Int, resolution: int, density: float | None) -> Itera
 
     Yields
     ------
-    Packing
-        The best so far, each at least as good as the one before (so a caller can breathe);
+    Packing or None
+        After each trial (so that a caller can breathe) the best so far, if there is one yet;
         the last one is the result.
 
     Raises
@@ -111,17 +111,12 @@ def pack(uv: Float, chart: Int, resolution: int, density: float | None) -> Itera
     if density is not None:
         yield _pack_at(job, density)
         return
-    found = False
-    for packing in _pack_into(job, resolution, resolution):
-        found = True
-        yield packing
-    finer = resolution
-    while not found:
+    packing, finer = None, resolution
+    while packing is None:
+        for packing in _pack_into(job, finer, resolution):
+            yield packing
         # Too small to keep the charts apart: pack a finer page and shrink it.
         finer *= 2
-        for packing in _pack_into(job, finer, resolution):
-            found = True
-            yield packing
 
 
 def _job(uv: Float, chart: Int) -> _Job:
@@ -164,8 +159,8 @@ def _measured(job: _Job, scale: Float, cell: int) -> tuple[Float, Shapes]:
     return cells, measure(job.edges * cells[job.owner][:, None], job.owner, job.extent * cells)
 
 
-def _pack_into(job: _Job, resolution: int, page: int) -> Iterator[Packing]:
-    """Look for the largest scale that fits a page of `resolution`; nothing if none does.
+def _pack_into(job: _Job, resolution: int, page: int) -> Iterator[Packing | None]:
+    """Look for the largest scale that fits a page of `resolution`; None as long as none does.
 
     `page` is the page's real size when `resolution` is a finer stand-in for it.
     """
@@ -175,6 +170,7 @@ def _pack_into(job: _Job, resolution: int, page: int) -> Iterator[Packing]:
     if side < 1:
         return
     full = resolution / float(np.sqrt(job.area))
+    best: Packing | None = None
     low, scale, trials = 0.0, 0.85 * full, int(np.clip(6000 // count, 6, 40))
     for stretch in STRETCHES if count <= FEW else (1.0,):
         high = full
@@ -183,9 +179,10 @@ def _pack_into(job: _Job, resolution: int, page: int) -> Iterator[Packing]:
             placement, height = _place(job, scaled.shapes, side, cell)
             if placement is not None:
                 low = scale
-                yield _packing(_moved(job, scaled, placement) * cell, resolution, page, scale)
+                best = _packing(_moved(job, scaled, placement) * cell, resolution, page, scale)
             else:
                 high = scale
+            yield best
             if low == 0.0:
                 if high * job.extent.max() < SMALLEST:
                     break

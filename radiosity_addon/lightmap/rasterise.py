@@ -196,8 +196,12 @@ def sample_footprints(texels: Texels, u: Float) -> Float32:
     return result
 
 
-def overlapping_pairs(uv: Float32, resolution: int) -> Iterator[_Pairs]:
-    """Yield, in chunks and by ascending triangle, every pair that overlaps by a positive area."""
+def overlapping_pairs(uv: Float32, resolution: int, centres_only: bool = False) -> Iterator[_Pairs]:
+    """Yield, in chunks and by ascending triangle, every pair that overlaps by a positive area.
+
+    With `centres_only`, and several times as fast, those whose centre lies well inside the
+    triangle; their area is given as 1.
+    """
     corners = uv.astype(np.float64) * resolution
     double_area = _double_area(corners)
     usable = np.flatnonzero(np.isfinite(corners).all(axis=(1, 2)) & (double_area != 0))
@@ -206,9 +210,20 @@ def overlapping_pairs(uv: Float32, resolution: int) -> Iterator[_Pairs]:
         for part in _chunks(count):
             repeat = np.repeat(np.arange(part.start, part.stop), count[part])
             column = first[repeat] + _ramp(count[part])
-            pairs = _overlaps(uv, resolution, triangle[repeat], row[repeat], column, double_area)
+            if centres_only:
+                pairs = _centred(uv, resolution, triangle[repeat], row[repeat], column)
+            else:
+                pairs = _overlaps(uv, resolution, triangle[repeat], row[repeat], column, double_area)
             if len(pairs.texel):
                 yield pairs
+
+
+def _centred(uv: Float32, resolution: int, triangle: Int32, row: Int32, column: Int32) -> _Pairs:
+    """Return those of the candidate pairs whose centre is inside, off the triangle's sides."""
+    distance, reach = _edge_distances(uv, resolution, triangle, row, column)
+    keep = (distance > 1e-3 * reach).all(axis=1)
+    texel = row[keep].astype(np.int64) * resolution + column[keep]
+    return _Pairs(texel, triangle[keep], np.ones(len(texel)), np.ones(len(texel), dtype=np.bool_))
 
 
 def _overlaps(

@@ -82,13 +82,17 @@ class _Strip:
         """Raise the skyline over a chart, and its margin, and keep the hollows below it."""
         width, gap = len(bottom), self.gap
         # What hangs down must stay a gap away from a hollow beside it, too.
-        padded = np.pad(bottom, gap, constant_values=np.iinfo(np.int32).max)
-        ceiling = y - gap + sliding_window_view(padded, 2 * gap + 1).min(axis=1)
-        self._keep(_hollows(x, self.skyline[x : x + width], ceiling, self.least))
+        ceiling, above = bottom + (y - gap), top + (y + gap)
         wide = np.full(width + 2 * gap, -1, dtype=np.int64)
-        for shift in range(2 * gap + 1):
-            part = wide[shift : shift + width]
-            np.maximum(part, y + top + gap, out=part)
+        wide[gap : gap + width] = above
+        for shift in range(1, gap + 1):
+            np.minimum(ceiling[shift:], bottom[:-shift] + (y - gap), out=ceiling[shift:])
+            np.minimum(ceiling[:-shift], bottom[shift:] + (y - gap), out=ceiling[:-shift])
+            for start in (gap - shift, gap + shift):
+                np.maximum(wide[start : start + width], above, out=wide[start : start + width])
+        under = self.skyline[x : x + width]
+        if int((ceiling - under).max()) >= self.least:
+            self._keep(_hollows(x, under, ceiling, self.least))
         left, right = max(x - gap, 0), min(x + width + gap, len(self.skyline))
         part = self.skyline[left:right]
         np.maximum(part, wide[left - x + gap : right - x + gap], out=part)
