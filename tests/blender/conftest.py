@@ -19,3 +19,16 @@ def empty_blender() -> Iterator[None]:
 
 def _empty_file() -> None:
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+
+
+@pytest.fixture
+def record() -> Iterator[None]:
+    """The type of what a bake remembers, registered without the rest of the add-on."""
+    from radiosity_addon.blender import bake_record
+
+    if hasattr(bpy.types.Object, "radiosity_bake"):
+        yield
+        return
+    bake_record.register()
+    yield
+    bake_record.unregister()

@@ -3,11 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
+import bpy
 import numpy as np
 
 from radiosity_addon.bake_scene import BakedObject, BakeResult, LightmapPage
+from radiosity_addon.blender.apply import apply_lightmaps
+from radiosity_addon.blender.export import export_scene
 from radiosity_addon.blender.export_sources import Export
+from radiosity_addon.blender.images import write_pages
+from radiosity_addon.settings import BakeSettings
+
+TEXEL = (0.25, 0.5, 3.0)
+BASE = (0.5, 0.25, 0.75)
+"""The base color of `principled_material`."""
 
 SOLVER = {
     "elements": 8, "links": 12, "rays": 345, "iterations": 3, "residual": 1e-4,
@@ -29,3 +39,74 @@ def hand_result(export: Export, colors: Sequence[Sequence[float]] = ((0.25, 0.5,
         for color in colors
     ]
     return BakeResult(tuple(pages), tuple(baked), SOLVER, (), {"solve": 0.5})
+
+
+def bake_by_hand(
+    colors: Sequence[Sequence[float]] = (TEXEL,), folder: Path | None = None, **settings: object
+) -> BakeResult:
+    """Export the open scene, pretend to bake it, and show the result."""
+    wanted = BakeSettings(**settings)
+    export = export_scene(bpy.context, wanted)
+    result = hand_result(export, colors)
+    apply_lightmaps(bpy.context, export, result, write_pages(result, wanted, folder), wanted)
+    return result
+
+
+def add_plane(name: str = "Plane", material: bpy.types.Material | None = None) -> bpy.types.Object:
+    """A square of side 2 that faces up."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], [], [(0, 1, 2, 3)])
+    if material is not None:
+        mesh.materials.append(material)
+    obj = bpy.data.objects.new(name, mesh)
+    bpy.context.scene.collection.objects.link(obj)
+    return obj
+
+
+def principled_material(*, name: str = "Paint", **inputs: object) -> bpy.types.Material:
+    """A Principled material; keywords are its inputs, with _ for a space."""
+    material = bpy.data.materials.new(name)
+    if bpy.app.version < (5, 0):
+        material.use_nodes = True
+    principled = material.node_tree.nodes["Principled BSDF"]
+    principled.inputs["Base Color"].default_value = (*BASE, 1.0)
+    for key, value in inputs.items():
+        principled.inputs[key.replace("_", " ")].default_value = value
+    return material
+
+
+def add_shader(material: bpy.types.Material, kind: str, **inputs: object) -> bpy.types.Node:
+    """Add a shader node; keywords are its inputs."""
+    node = material.node_tree.nodes.new(f"ShaderNode{kind}")
+    for key, value in inputs.items():
+        node.inputs[key].default_value = value
+    return node
+
+
+def link_surface(material: bpy.types.Material, socket: bpy.types.NodeSocket) -> None:
+    tree = material.node_tree
+    tree.links.new(socket, tree.nodes["Material Output"].inputs["Surface"])
+
+
+def seen_from_above(folder: Path, size: int = 2, engine: str = "CYCLES") -> np.ndarray:
+    """Render the square [-1, 1]² from above: (size, size, 3) radiance, bottom row first."""
+    scene = bpy.context.scene
+    camera = bpy.data.objects.new("Eye", bpy.data.cameras.new("Eye"))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 2.0
+    camera.location.z = 5.0
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    scene.render.engine = engine
+    scene.cycles.samples, scene.cycles.use_denoising = 16, False
+    scene.cycles.pixel_filter_type, scene.cycles.filter_width = "BOX", 1.0
+    scene.render.resolution_x = scene.render.resolution_y = size
+    scene.render.resolution_percentage = 100
+    if hasattr(scene.render.image_settings, "media_type"):
+        scene.render.image_settings.media_type = "IMAGE"
+    scene.render.image_settings.file_format = "OPEN_EXR"
+    scene.render.image_settings.color_depth = "32"
+    scene.render.filepath = str(folder / "seen.exr")
+    bpy.ops.render.render(write_still=True)
+    image = bpy.data.images.load(scene.render.filepath)
+    image.colorspace_settings.name = "Non-Color"
+    return np.array(image.pixels[:]).reshape(size, size, -1)[..., :3]

@@ -1,9 +1,7 @@
-"""Baked objects show base color × lightmap, on copies, for every quantity."""
+"""Baked objects get copies of meshes and materials; what is around them stays as it was."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,256 +9,28 @@ import bpy
 import numpy as np
 import pytest
 
-from radiosity_addon.bake_scene import BakedObject, BakeResult, LightmapPage
 from radiosity_addon.blender import bake_record
 from radiosity_addon.blender.apply import apply_lightmaps, check_targets
 from radiosity_addon.blender.export import export_scene
 from radiosity_addon.blender.images import write_pages
-from radiosity_addon.blender.lightmap_materials import set_lightmap_only
 from radiosity_addon.blender.node_group import GROUP_NAME
 from radiosity_addon.errors import BakeError, SceneError
 from radiosity_addon.settings import BakeSettings
 from tests.blender.file_dump import differences, dump_file
-from tests.blender.hand_bake import hand_result
+from tests.blender.hand_bake import add_plane, bake_by_hand, hand_result, principled_material
 from tests.blender.zoo import build_zoo
 
-TEXEL = (0.25, 0.5, 3.0)
-BASE = (0.5, 0.25, 0.75)
-
-
-@pytest.fixture(autouse=True)
-def record() -> Iterator[None]:
-    """The record's type, without the rest of the add-on."""
-    if hasattr(bpy.types.Object, "radiosity_bake"):
-        yield
-        return
-    bake_record.register()
-    yield
-    bake_record.unregister()
-
-
-def _bake(
-    colors: Sequence[Sequence[float]] = (TEXEL,), folder: Path | None = None, **settings: object
-) -> BakeResult:
-    wanted = BakeSettings(**settings)
-    export = export_scene(bpy.context, wanted)
-    result = hand_result(export, colors)
-    apply_lightmaps(bpy.context, export, result, write_pages(result, wanted, folder), wanted)
-    return result
-
-
-def _plane(name: str = "Plane", material: bpy.types.Material | None = None) -> bpy.types.Object:
-    """A square of side 2 that faces up."""
-    mesh = bpy.data.meshes.new(name)
-    mesh.from_pydata([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], [], [(0, 1, 2, 3)])
-    if material is not None:
-        mesh.materials.append(material)
-    obj = bpy.data.objects.new(name, mesh)
-    bpy.context.scene.collection.objects.link(obj)
-    return obj
-
-
-def _material(*, name: str = "Paint", **inputs: object) -> bpy.types.Material:
-    """A Principled material; keywords are its inputs, with _ for a space."""
-    material = bpy.data.materials.new(name)
-    if bpy.app.version < (5, 0):
-        material.use_nodes = True
-    principled = material.node_tree.nodes["Principled BSDF"]
-    principled.inputs["Base Color"].default_value = (*BASE, 1.0)
-    for key, value in inputs.items():
-        principled.inputs[key.replace("_", " ")].default_value = value
-    return material
-
-
-def _shader(material: bpy.types.Material, kind: str, **inputs: object) -> bpy.types.Node:
-    node = material.node_tree.nodes.new(f"ShaderNode{kind}")
-    for key, value in inputs.items():
-        node.inputs[key].default_value = value
-    return node
-
-
-def _surface(material: bpy.types.Material, socket: bpy.types.NodeSocket) -> None:
-    tree = material.node_tree
-    tree.links.new(socket, tree.nodes["Material Output"].inputs["Surface"])
-
-
-def _seen(folder: Path, size: int = 2, engine: str = "CYCLES") -> np.ndarray:
-    """Render the square [-1, 1]² from above: (size, size, 3) radiance, bottom row first."""
-    scene = bpy.context.scene
-    camera = bpy.data.objects.new("Eye", bpy.data.cameras.new("Eye"))
-    camera.data.type, camera.data.ortho_scale = "ORTHO", 2.0
-    camera.location.z = 5.0
-    scene.collection.objects.link(camera)
-    scene.camera = camera
-    scene.render.engine = engine
-    scene.cycles.samples, scene.cycles.use_denoising = 16, False
-    scene.cycles.pixel_filter_type, scene.cycles.filter_width = "BOX", 1.0
-    scene.render.resolution_x = scene.render.resolution_y = size
-    scene.render.resolution_percentage = 100
-    if hasattr(scene.render.image_settings, "media_type"):
-        scene.render.image_settings.media_type = "IMAGE"
-    scene.render.image_settings.file_format = "OPEN_EXR"
-    scene.render.image_settings.color_depth = "32"
-    scene.render.filepath = str(folder / "seen.exr")
-    bpy.ops.render.render(write_still=True)
-    image = bpy.data.images.load(scene.render.filepath)
-    image.colorspace_settings.name = "Non-Color"
-    return np.array(image.pixels[:]).reshape(size, size, -1)[..., :3]
-
-
-@pytest.mark.parametrize("file_format", ["exr", "png16"])
-@pytest.mark.parametrize(
-    ("quantity", "expected"),
-    [
-        ("irradiance_over_pi", np.multiply(BASE, TEXEL) + 0.5),
-        ("irradiance", np.multiply(BASE, TEXEL) / math.pi + 0.5),
-        ("radiosity", np.divide(TEXEL, math.pi)),
-    ],
-)
-def test_radiance_is_right_for_each_quantity(
-    tmp_path: Path, quantity: str, expected: np.ndarray, file_format: str
-) -> None:
-    _plane(material=_material(Emission_Color=(0.25, 0.25, 0.25, 1.0), Emission_Strength=2.0))
-    _bake(quantity=quantity, format=file_format, folder=tmp_path)
-    np.testing.assert_allclose(_seen(tmp_path)[0, 0], expected, rtol=1e-4)
-
-
-@pytest.mark.parametrize(
-    ("quantity", "factor"),
-    [("irradiance_over_pi", 1), ("irradiance", 1 / math.pi), ("radiosity", 1 / math.pi)],
-)
-def test_lightmap_only_shows_what_a_white_surface_would(tmp_path: Path, quantity: str, factor: float) -> None:
-    _plane(material=_material(Emission_Color=(1.0, 1.0, 1.0, 1.0), Emission_Strength=2.0))
-    _bake(quantity=quantity)
-    assert set_lightmap_only(True) == 1
-    np.testing.assert_allclose(_seen(tmp_path)[0, 0], np.multiply(TEXEL, factor), rtol=1e-4)
-
-
-def test_the_lightmap_lies_the_right_way_up(tmp_path: Path) -> None:
-    """Row 0 of a page is v = 0; the square's UVs are its x and y."""
-    plane = _plane()
-    settings = BakeSettings()
-    export = export_scene(bpy.context, settings)
-    target = export.bake_scene.objects[0]
-    corners = np.array([v.co[:2] for v in plane.data.vertices])
-    vertex = np.array([loop.vertex_index for loop in plane.data.loops])
-    uv = ((corners[vertex[target.loops]] + 1) / 2).astype(np.float32)
-    pixels = np.zeros((2, 2, 3), np.float32)
-    pixels[0, 0], pixels[0, 1], pixels[1, 0], pixels[1, 1] = (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1)
-    page = LightmapPage(pixels, np.ones((2, 2), bool))
-    result = BakeResult((page,), (BakedObject(target, uv, 0),), {}, ())
-    apply_lightmaps(bpy.context, export, result, write_pages(result, settings, tmp_path), settings)
-    seen = _seen(tmp_path, 4)
-    # The outer quarter of each half reads its texel alone; inwards it is filtered.
-    for row in (0, 1):
-        for column in (0, 1):
-            np.testing.assert_allclose(seen[3 * row, 3 * column], 0.8 * pixels[row, column], atol=1e-4)
-
-
-def test_every_way_to_say_base_color_is_read(tmp_path: Path) -> None:
-    """Diffuse in a node group, mixed half and half with another, plus an emission."""
-    material = _material()
-    nodes, links = material.node_tree.nodes, material.node_tree.links
-    group = bpy.data.node_groups.new("Wrapped", "ShaderNodeTree")
-    group.interface.new_socket("Tint", in_out="INPUT", socket_type="NodeSocketColor")
-    group.interface.new_socket("Shader", in_out="OUTPUT", socket_type="NodeSocketShader")
-    given, result = group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
-    diffuse = group.nodes.new("ShaderNodeBsdfDiffuse")
-    group.links.new(given.outputs["Tint"], diffuse.inputs["Color"])
-    group.links.new(diffuse.outputs["BSDF"], result.inputs["Shader"])
-    wrapped = nodes.new("ShaderNodeGroup")
-    wrapped.node_tree = group
-    wrapped.inputs["Tint"].default_value = (0.1, 0.2, 0.3, 1.0)
-    mix = _shader(material, "MixShader", Fac=0.25)
-    links.new(nodes["Principled BSDF"].outputs[0], mix.inputs[1])
-    links.new(wrapped.outputs["Shader"], mix.inputs[2])
-    emission = _shader(material, "Emission", Color=(1.0, 0.0, 0.5, 1.0), Strength=2.0)
-    add = nodes.new("ShaderNodeAddShader")
-    links.new(mix.outputs[0], add.inputs[0])
-    links.new(emission.outputs[0], add.inputs[1])
-    _surface(material, add.outputs[0])
-    _plane(material=material)
-    _bake()
-    base = 0.75 * np.array(BASE) + 0.25 * np.array((0.1, 0.2, 0.3))
-    np.testing.assert_allclose(_seen(tmp_path)[0, 0], base * TEXEL + (2.0, 0.0, 1.0), rtol=1e-4)
-
-
-def test_textures_keep_feeding_base_color_and_emission(tmp_path: Path) -> None:
-    material = _material(Emission_Strength=0.5)
-    rgb = material.node_tree.nodes.new("ShaderNodeRGB")
-    rgb.outputs[0].default_value = (0.3, 0.6, 0.9, 1.0)
-    reroute = material.node_tree.nodes.new("NodeReroute")
-    material.node_tree.links.new(rgb.outputs[0], reroute.inputs[0])
-    principled = material.node_tree.nodes["Principled BSDF"]
-    for name in ("Base Color", "Emission Color"):
-        material.node_tree.links.new(reroute.outputs[0], principled.inputs[name])
-    _plane(material=material)
-    _bake()
-    color = np.array((0.3, 0.6, 0.9))
-    np.testing.assert_allclose(_seen(tmp_path)[0, 0], color * TEXEL + 0.5 * color, rtol=1e-4)
-
-
-def test_transparency_is_kept(tmp_path: Path) -> None:
-    """Half of what is behind shows through: a second plane that emits."""
-    _plane(material=_material(Alpha=0.5))
-    behind = _plane("Behind", _material(name="Glow", Emission_Color=(1, 1, 1, 1), Emission_Strength=1.0))
-    behind.location.z = -1.0
-    _bake()
-    expected = 0.5 * np.multiply(BASE, TEXEL) + 0.5 * (np.multiply(BASE, TEXEL) + 1.0)
-    # Stochastic in alpha: one of two surfaces a sample, so only their mean is sharp.
-    seen = _seen(tmp_path, 16).mean(axis=(0, 1))
-    np.testing.assert_allclose(seen, expected, rtol=0.03)
-
-
-def test_a_mesh_without_material_is_grey(tmp_path: Path) -> None:
-    plane = _plane()
-    _bake()
-    assert [material.name for material in plane.data.materials] == ["No Material (Lightmap)"]
-    np.testing.assert_allclose(_seen(tmp_path)[0, 0], 0.8 * np.array(TEXEL), rtol=1e-4)
-
-
-def test_an_object_without_uvs_keeps_its_textures_in_place(tmp_path: Path) -> None:
-    """An image without a vector read (0, 0, 0) before, and does after; the group's image too."""
-    build = bpy.data.images.new("Corners", 2, 2)
-    build.pixels[:] = [0.25, 0.5, 1, 1, 1, 0, 0, 1, 0, 1, 0, 1, 1, 1, 1, 1]
-    build.colorspace_settings.name = "Non-Color"
-    build.pixels[:] = [0.25, 0.5, 1, 1, 1, 0, 0, 1, 0, 1, 0, 1, 1, 1, 1, 1]
-    build.pack()
-    material = _material()
-    tree = material.node_tree
-    texture = tree.nodes.new("ShaderNodeTexImage")
-    texture.image, texture.interpolation, texture.extension = build, "Closest", "EXTEND"
-    emission, group_user = _shader(material, "Emission"), tree.nodes.new("ShaderNodeGroup")
-    tree.links.new(texture.outputs["Color"], emission.inputs["Color"])
-    _surface(material, emission.outputs[0])
-    group = bpy.data.node_groups.new("Coordinates", "ShaderNodeTree")
-    group.interface.new_socket("UV", in_out="OUTPUT", socket_type="NodeSocketVector")
-    coordinates, result = group.nodes.new("ShaderNodeTexCoord"), group.nodes.new("NodeGroupOutput")
-    group.links.new(coordinates.outputs["UV"], result.inputs[0])
-    group_user.node_tree = group
-    plane = _plane(material=material)
-    before = _seen(tmp_path, 4)
-
-    for through_group in (False, True):
-        if through_group:
-            tree.links.new(group_user.outputs[0], texture.inputs["Vector"])
-        _bake(colors=((0.0, 0.0, 0.0),))
-        np.testing.assert_allclose(_seen(tmp_path, 4), before, atol=1e-5)
-        from radiosity_addon.blender.restore import restore
-
-        restore(bpy.context)
-    assert np.ptp(before, axis=(0, 1)).max() == 0.0
-    assert len(plane.data.uv_layers) == 0
+pytestmark = pytest.mark.usefixtures("record")
 
 
 def test_uv_layers_keep_names_order_and_roles() -> None:
-    plane = _plane()
+    plane = add_plane()
     for name in ("A", "B"):
         plane.data.uv_layers.new(name=name)
     plane.data.uv_layers["B"].active_render = True
     plane.data.uv_layers.active = plane.data.uv_layers["A"]
     original = plane.data
-    result = _bake()
+    result = bake_by_hand()
     layers = plane.data.uv_layers
     assert [(layer.name, layer.active, layer.active_render) for layer in layers] == [
         ("A", True, False),
@@ -279,7 +49,7 @@ def test_polygons_loops_and_slots_stay_without_generative_modifiers() -> None:
     build_zoo(bpy.context)
     cube = bpy.data.objects["Cube"]
     before = [(p.loop_start, p.loop_total, p.material_index, tuple(p.vertices)) for p in cube.data.polygons]
-    _bake()
+    bake_by_hand()
     after = [(p.loop_start, p.loop_total, p.material_index, tuple(p.vertices)) for p in cube.data.polygons]
     assert after == before
     assert len(cube.data.materials) == 3
@@ -287,12 +57,12 @@ def test_polygons_loops_and_slots_stay_without_generative_modifiers() -> None:
 
 
 def test_linked_duplicates_and_shared_materials_do_not_get_each_other_s_lightmaps(tmp_path: Path) -> None:
-    material = _material()
-    first = _plane("First", material)
+    material = principled_material()
+    first = add_plane("First", material)
     second = bpy.data.objects.new("Second", first.data)
-    third = _plane("Third", material)
+    third = add_plane("Third", material)
     bpy.context.scene.collection.objects.link(second)
-    result = _bake(colors=((1, 0, 0), (0, 1, 0)), folder=tmp_path)
+    result = bake_by_hand(colors=((1, 0, 0), (0, 1, 0)), folder=tmp_path)
     objects = [bpy.data.objects[baked.object.name] for baked in result.objects]
     assert len({obj.data for obj in (first, second, third)}) == 3
 
@@ -310,7 +80,7 @@ def test_linked_duplicates_and_shared_materials_do_not_get_each_other_s_lightmap
 
 def test_materials_linked_to_the_object_are_the_ones_copied() -> None:
     build_zoo(bpy.context)
-    _bake()
+    bake_by_hand()
     names = [slot.material.name for slot in bpy.data.objects["Duplicate"].material_slots]
     assert names[0] == "Of the Object (Lightmap)"
     assert {slot.link for slot in bpy.data.objects["Duplicate"].material_slots} == {"DATA"}
@@ -321,7 +91,7 @@ def test_stand_ins_stand_where_the_instances_were(tmp_path: Path) -> None:
     build_zoo(bpy.context)
     export = export_scene(bpy.context, BakeSettings())
     before = export.bake_scene.scene
-    _bake(folder=tmp_path)
+    bake_by_hand(folder=tmp_path)
     after = export_scene(bpy.context, BakeSettings()).bake_scene.scene
 
     def soup(scene: object) -> np.ndarray:
@@ -355,7 +125,7 @@ def test_an_instancer_s_other_instances_stay_visible() -> None:
 
 def test_modifiers_that_made_the_mesh_are_off() -> None:
     build_zoo(bpy.context)
-    _bake()
+    bake_by_hand()
     modified = bpy.data.objects["Modified"]
     assert len(modified.data.polygons) > 6
     assert not any(modifier.show_viewport or modifier.show_render for modifier in modified.modifiers)
@@ -363,10 +133,10 @@ def test_modifiers_that_made_the_mesh_are_off() -> None:
 
 def test_a_ninth_layer_is_refused_before_anything_changes() -> None:
     settings = BakeSettings()
-    full = _plane("Full of UVs")
+    full = add_plane("Full of UVs")
     for i in range(8):
         full.data.uv_layers.new(name=f"UV {i}")
-    _plane("Other")
+    add_plane("Other")
     full.hide_render = True
     export_without = export_scene(bpy.context, settings)
     full.hide_render = False
@@ -391,14 +161,14 @@ def test_a_ninth_layer_is_refused_before_anything_changes() -> None:
 
 
 def test_an_attribute_called_lightmap_is_refused() -> None:
-    _plane().data.attributes.new("Lightmap", "FLOAT", "POINT")
+    add_plane().data.attributes.new("Lightmap", "FLOAT", "POINT")
     with pytest.raises(SceneError, match="'Plane' has an attribute 'Lightmap'"):
         check_targets(export_scene(bpy.context, BakeSettings()))
 
 
 def test_an_object_that_went_away_is_named_and_nothing_changes() -> None:
-    _plane("Stays")
-    leaves = _plane("Leaves")
+    add_plane("Stays")
+    leaves = add_plane("Leaves")
     settings = BakeSettings()
     export = export_scene(bpy.context, settings)
     result = hand_result(export)
@@ -412,7 +182,7 @@ def test_an_object_that_went_away_is_named_and_nothing_changes() -> None:
 
 
 def test_a_mesh_that_changed_is_named() -> None:
-    plane = _plane()
+    plane = add_plane()
     settings = BakeSettings()
     export = export_scene(bpy.context, settings)
     target = export.bake_scene.objects[0]
@@ -424,17 +194,17 @@ def test_a_mesh_that_changed_is_named() -> None:
 
 
 def test_a_second_bake_on_top_of_the_first_is_refused() -> None:
-    _plane()
-    _bake()
+    add_plane()
+    bake_by_hand()
     with pytest.raises(BakeError, match="restore it"):
-        _bake()
+        bake_by_hand()
 
 
 def test_one_undo_step_takes_the_bake_back() -> None:
-    plane = _plane()
+    plane = add_plane()
     bpy.ops.ed.undo_push(message="before")
     name = plane.data.name
-    _bake()
+    bake_by_hand()
     bpy.ops.ed.undo_push(message="bake")
     bpy.ops.ed.undo()
     assert bpy.data.objects["Plane"].data.name == name

@@ -16,14 +16,15 @@ from pathlib import Path
 sys.path.insert(0, sys.argv[1])
 import bpy
 import numpy as np
-from tests.blender import test_apply as scenes
+from radiosity_addon.blender import bake_record
+from tests.blender import hand_bake as scenes
 bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-scenes.bake_record.register()
+bake_record.register()
 emission = dict(Emission_Color=(0.25, 0.25, 0.25, 1.0), Emission_Strength=2.0)
-scenes._plane(material=scenes._material(**emission))
-scenes._bake(folder=Path(sys.argv[2]))
+scenes.add_plane(material=scenes.principled_material(**emission))
+scenes.bake_by_hand(folder=Path(sys.argv[2]))
 engine = "BLENDER_EEVEE_NEXT" if bpy.app.version < (5, 0) else "BLENDER_EEVEE"
-print("seen", *scenes._seen(Path(sys.argv[2]), 8, engine)[4, 4])
+print("seen", *scenes.seen_from_above(Path(sys.argv[2]), 8, engine)[4, 4])
 sys.stdout.flush()
 os._exit(0)
 """

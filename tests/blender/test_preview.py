@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 
-from radiosity_addon.blender import bake_record
 from radiosity_addon.blender.apply import apply_lightmaps
 from radiosity_addon.blender.export import export_scene
 from radiosity_addon.blender.images import set_folder, write_pages
@@ -21,16 +19,7 @@ from radiosity_addon.settings import BakeSettings
 from tests.blender.file_dump import differences, dump_file
 from tests.blender.hand_bake import hand_result
 
-
-@pytest.fixture(autouse=True)
-def record() -> Iterator[None]:
-    """The record's type, without the rest of the add-on."""
-    if hasattr(bpy.types.Object, "radiosity_bake"):
-        yield
-        return
-    bake_record.register()
-    yield
-    bake_record.unregister()
+pytestmark = pytest.mark.usefixtures("record")
 
 
 def _square(z: float, size: float = 1.0) -> bpy.types.Object:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
@@ -12,6 +11,7 @@ import pytest
 from radiosity_addon.blender import bake_record
 from radiosity_addon.blender.apply import apply_lightmaps
 from radiosity_addon.blender.export import export_scene
+from radiosity_addon.blender.files import open_scene
 from radiosity_addon.blender.images import write_pages
 from radiosity_addon.blender.restore import restore
 from radiosity_addon.errors import BakeError
@@ -20,16 +20,7 @@ from tests.blender.file_dump import differences, dump_file
 from tests.blender.hand_bake import hand_result
 from tests.blender.zoo import build_zoo
 
-
-@pytest.fixture(autouse=True)
-def record() -> Iterator[None]:
-    """The record's type, without the rest of the add-on."""
-    if hasattr(bpy.types.Object, "radiosity_bake"):
-        yield
-        return
-    bake_record.register()
-    yield
-    bake_record.unregister()
+pytestmark = pytest.mark.usefixtures("record")
 
 
 def _bake(folder: Path | None, **settings: str) -> None:
@@ -46,17 +37,21 @@ def _tidy_dump() -> dict:
     return dump_file()
 
 
+def _differences_since(before: dict) -> list[str]:
+    found = differences(before, _tidy_dump())
+    if bpy.app.version < (5, 0):
+        # Material.copy() counts what its nodes use twice there, until the next load.
+        return [line for line in found if not re.match(r"/(images|node_groups)/.*/users: ", line)]
+    return found
+
+
 def test_restore_leaves_no_difference(tmp_path: Path) -> None:
     build_zoo(bpy.context)
     before = _tidy_dump()
     _bake(tmp_path)
     assert len(differences(before, dump_file())) > 100
     assert restore(bpy.context) > 0
-    found = differences(before, _tidy_dump())
-    if bpy.app.version < (5, 0):
-        # Material.copy() counts what its nodes use twice there, until the next load.
-        found = [line for line in found if not re.match(r"/(images|node_groups)/.*/users: ", line)]
-    assert found == []
+    assert _differences_since(before) == []
     assert not bake_record.is_baked()
 
 
@@ -75,6 +70,24 @@ def test_restore_after_save_and_reload_leaves_no_difference(tmp_path: Path) -> N
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.open_mainfile(filepath=path)
     assert differences(before, _tidy_dump()) == []
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        "godot-tests/test01/boxes.blend",
+        "godot-tests/test02/scene.blend",
+        "godot-tests/test03/leaks.blend",
+        "instancing/01_multiple_collection_instances.blend",
+        "instancing/32_gpu_instancing_with_instancing.blend",
+    ],
+)
+def test_restore_leaves_no_difference_in_other_people_s_scenes(shared_scenes: Path, scene: str) -> None:
+    open_scene(shared_scenes / scene)
+    before = _tidy_dump()
+    _bake(None)
+    assert restore(bpy.context) > 0
+    assert _differences_since(before) == []
 
 
 def test_restore_of_an_unbaked_file_does_nothing() -> None:
