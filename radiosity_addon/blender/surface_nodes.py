@@ -8,16 +8,16 @@ has to be a copy.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import bpy
 
 from .bake_record import mark_made
 from .node_group import socket_by_identifier
 
-Color = tuple[float, float, float]
-ColorSource = Color | bpy.types.NodeSocket
-FloatSource = float | bpy.types.NodeSocket
+Color: TypeAlias = tuple[float, float, float]
+ColorSource: TypeAlias = Color | bpy.types.NodeSocket
+FloatSource: TypeAlias = float | bpy.types.NodeSocket
 
 BLACK: Color = (0.0, 0.0, 0.0)
 
