@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Generator, Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 
 import bpy
 
@@ -21,7 +22,7 @@ from .export_sources import Export
 from .images import lightmap_files, set_folder, write_pages
 from .output import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, OutputFolder, save_copy
 from .preview import render_preview
-from .rebake import originals_shown, replacing_earlier
+from .rebake import originals_shown, replacing_earlier, seal
 from .restore import restore
 
 BakeJob = Generator[Progress, None, BakeReport]
@@ -79,10 +80,11 @@ def run_bake(
             # Opened first: a folder that cannot be written is no news for after the work.
             stack.enter_context(output)
         yield Progress("export", 0.0)
-        with _timed(seconds, "export"), originals_shown(context):
+        with _timed(seconds, "export"), originals_shown(context) as edited:
             export = export_scene(context, settings)
             check_targets(export)
         result = yield from _solve(export, settings, patient)
+        result = replace(result, warnings=(*edited, *result.warnings))
         seconds.update(result.seconds)
         yield Progress("apply", APPLY)
         if with_copy and output is not None:
@@ -160,6 +162,7 @@ def _show(
         if output is not None:
             set_folder(images, output.path)
         apply_lightmaps(context, export, result, images, settings)
+        seal()
     except BaseException:
         remove_datablocks(images)
         raise

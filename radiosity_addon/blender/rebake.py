@@ -7,14 +7,20 @@ the objects, its record into memory, and only success removes it for good.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
 import bpy
+import numpy as np
 
-from .bake_record import made_datablocks, mark_made, recorded_objects, remove_datablocks, unmark_made
+from ..bake_scene import BakeWarning
+from .bake_record import is_made, made_datablocks, mark_made, recorded_objects, remove_datablocks, unmark_made
 from .restore import leave_edit_modes, restore, show_original
+
+SHAPE = "radiosity_shape"
+"""Custom property of a baked copy: what its shape was."""
 
 _RECORD_FIELDS = (
     "is_baked",
@@ -86,12 +92,42 @@ class EarlierBake:
         self._context.view_layer.update()
 
 
+def seal() -> None:
+    """Remember the shape of every baked copy, to know later whether somebody edited it."""
+    for obj in recorded_objects():
+        if isinstance(obj.data, bpy.types.Mesh) and is_made(obj.data):
+            obj.data[SHAPE] = _shape(obj.data)
+
+
+def edited_copies() -> tuple[BakeWarning, ...]:
+    """Warn of copies edited since the bake: baking again starts from the originals and drops them."""
+    shown = [obj for obj in recorded_objects() if isinstance(obj.data, bpy.types.Mesh)]
+    return tuple(
+        BakeWarning(
+            obj.name,
+            "its mesh was edited while it showed a lightmap; the bake used the original mesh: "
+            "press Restore before editing",
+        )
+        for obj in shown
+        if SHAPE in obj.data.keys() and obj.data[SHAPE] != _shape(obj.data)  # noqa: SIM118 (an ID is no dict)
+    )
+
+
+def _shape(mesh: bpy.types.Mesh) -> str:
+    """A digest of the mesh's corners."""
+    corners = np.empty(3 * len(mesh.vertices), dtype=np.float32)
+    mesh.vertices.foreach_get("co", corners)
+    return hashlib.sha256(corners.tobytes()).hexdigest()
+
+
 @contextmanager
-def originals_shown(context: bpy.types.Context) -> Iterator[None]:
-    """Show the originals for a moment, as if nothing had been baked."""
+def originals_shown(context: bpy.types.Context) -> Iterator[tuple[BakeWarning, ...]]:
+    """Show the originals for a moment, as if nothing had been baked; yields what to warn of."""
+    leave_edit_modes(context, recorded_objects())
+    edited = edited_copies()
     earlier = EarlierBake(context)
     try:
-        yield
+        yield edited
     finally:
         earlier.put_back()
 

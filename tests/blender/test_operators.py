@@ -143,6 +143,18 @@ def test_baking_twice_gives_the_same_pixels(box: bpy.types.Scene) -> None:
     np.testing.assert_array_equal(np.array(bpy.data.images["lightmap.exr"].pixels), first)
 
 
+def test_editing_a_baked_copy_is_warned_of_when_it_is_dropped(box: bpy.types.Scene) -> None:
+    bake()
+    bake()
+    assert runtime.last_bake(box).warnings == ()
+    bpy.context.view_layer.objects.active = bpy.data.objects["Tall Block"]
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.transform.translate(value=(0, 0, 1))
+    bake()
+    assert [name for name, _ in runtime.last_bake(box).warnings] == ["Tall Block"]
+
+
 def test_lightmap_only_is_kept_when_baking_again(box: bpy.types.Scene) -> None:
     def switches() -> set[float]:
         trees = [material.node_tree for material in bpy.data.materials if "Lightmap" in material.name]
