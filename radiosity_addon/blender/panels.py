@@ -38,11 +38,11 @@ class RADIOSITY_PT_main(_Panel, bpy.types.Panel):
         column.operator("radiosity.bake", text="Bake Radiosity", icon="LIGHT_AREA")
         layout.operator("radiosity.restore", icon="LOOP_BACK")
         layout.prop(settings, "scope", expand=True)
+        layout.prop(settings, "size_mode", expand=True)
 
         layout.use_property_split = True
         layout.use_property_decorate = False
         column = layout.column()
-        column.row().prop(settings, "size_mode", expand=True)
         column.prop(settings, "resolution" if settings.size_mode == "resolution" else "texel_density")
         column = layout.column()
         column.prop(settings, "quality")

@@ -46,8 +46,9 @@ def script():
 
     bake_button = yield from events.click_down(HEADER, baking)
     seen["modal"] = True
+    yield 0.5  # for the progress bar to be drawn
     events.screenshot(ANSWER.with_name("panel-baking.png"))
-    seen["asked_while_baking"] = yield from events.until(not_baking, 120)
+    seen["asked_while_baking"], seen["longest_wait"] = yield from events.until(not_baking, 120)
     seen["lit"] = lit_objects()
     seen["images"] = [image.name for image in bpy.data.images if image.has_data or image.packed_file]
     yield from shaded("MATERIAL")

@@ -5,6 +5,7 @@ References to Blender's data do not outlive an undo, so everything here looks it
 """
 
 import subprocess
+import time
 import traceback
 
 import bpy
@@ -72,12 +73,15 @@ def click_down(below, happened):
 
 
 def until(happened, seconds):
-    """Wait for `happened()`; returns how many times it was asked."""
-    for asked in range(int(seconds / 0.05)):
-        if happened():
-            return asked
+    """Wait for `happened()`; returns how many times it was asked, and the longest time between two."""
+    start = before = time.monotonic()
+    asked, longest = 0, 0.0
+    while not happened():
+        assert before - start < seconds, f"not within {seconds} s: {happened.__doc__}"
         yield 0.05
-    raise AssertionError(f"not within {seconds} s: {happened.__doc__}")
+        now = time.monotonic()
+        asked, longest, before = asked + 1, max(longest, now - before), now
+    return asked, longest
 
 
 def screenshot(path):
