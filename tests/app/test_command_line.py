@@ -1,13 +1,10 @@
-"""The command line on whole bakes: what it writes, what it says, and how it ends."""
+"""The command line on whole bakes: what it writes, what its options do, and what it warns of."""
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
-import os
 import shutil
-import signal
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,28 +12,9 @@ import bpy
 import numpy as np
 import pytest
 
-from .conftest import QUICK, add_lamp, add_quad, build_room, painted, save, start
+from .conftest import QUICK, add_lamp, add_quad, build_room, digest, painted, read_pixels, read_report, save
 
 Run = Callable[..., object]
-
-
-def read_report(folder: Path) -> dict:
-    return json.loads((folder / "report.json").read_text(encoding="utf-8"))
-
-
-def read_pixels(path: Path) -> np.ndarray:
-    """The values of an image file as they are, (height, width, 3)."""
-    image = bpy.data.images.load(str(path))
-    image.colorspace_settings.name = "Non-Color"
-    width, height = image.size
-    pixels = np.empty(width * height * 4, dtype=np.float32)
-    image.pixels.foreach_get(pixels)
-    bpy.data.images.remove(image)
-    return pixels.reshape(height, width, 4)[..., :3]
-
-
-def digest(folder: Path) -> dict[str, str]:
-    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(folder.iterdir())}
 
 
 # --- what a bake leaves behind ---
@@ -251,160 +229,3 @@ def test_odd_but_bakeable_scenes_warn_by_name(run: Run, tmp_path: Path) -> None:
     warned = {warning["name"] for warning in read_report(tmp_path / "out")["warnings"]}
     assert {"Needle", "Too White"} <= warned
     assert "Too White" in done.out
-
-
-# --- how it ends ---
-
-
-def bad_nothing() -> None:
-    add_lamp()
-
-
-def bad_ninth_layer() -> None:
-    quad = add_quad("Eight", ((-1, -1, 0), (1, -1, 0), (1, 1, 0)))
-    for index in range(8):
-        quad.data.uv_layers.new(name=f"UV{index}")
-
-
-def bad_nan() -> None:
-    add_quad("Broken", ((-1, -1, 0), (1, -1, float("nan")), (1, 1, 0)))
-
-
-def bad_inf() -> None:
-    add_quad("Endless", ((-1, -1, 0), (1, -1, float("inf")), (1, 1, 0)))
-
-
-@pytest.mark.parametrize(
-    ("build", "names", "mend"),
-    [
-        (bad_nothing, "nothing to bake", "mesh"),
-        (bad_ninth_layer, "Eight", "remove"),
-        (bad_nan, "Broken", ""),
-        (bad_inf, "Endless", ""),
-    ],
-)
-def test_scenes_that_cannot_be_baked(
-    build: Callable[[], None], names: str, mend: str, run: Run, tmp_path: Path
-) -> None:
-    build()
-    scene = save(tmp_path / "bad.blend")
-    done = run("bake", scene, "--output", tmp_path / "out", *QUICK)
-    assert done.code == 1
-    assert done.err.startswith("error: ")
-    assert done.err.count("\n") == 1
-    assert names in done.err
-    assert mend in done.err
-    assert not (tmp_path / "out").exists()
-
-
-def test_only_linked_objects_is_an_error(run: Run, room: Path, tmp_path: Path) -> None:
-    with bpy.data.libraries.load(str(room), link=True) as (_found, linked):
-        linked.objects = ["Floor", "Wall"]
-    for obj in linked.objects:
-        bpy.context.scene.collection.objects.link(obj)
-    scene = save(tmp_path / "linking.blend")
-    done = run("bake", scene, "--output", tmp_path / "out", *QUICK)
-    assert done.code == 1
-    assert done.err.count("\n") == 1
-    assert "link" in done.err
-
-
-@pytest.mark.parametrize("name", ["missing.blend", "empty.blend", "text.blend", "broken.glb", "scene.fbx"])
-def test_files_that_cannot_be_read(name: str, run: Run, tmp_path: Path) -> None:
-    path = tmp_path / name
-    if not name.startswith("missing"):
-        path.write_bytes(b"" if name.startswith("empty") else b"this is no scene")
-    done = run("bake", path, "--output", tmp_path / "out", *QUICK)
-    assert done.code == 1
-    assert done.err.startswith("error: ")
-    assert done.err.count("\n") == 1
-    assert name in done.err
-    assert not (tmp_path / "out").exists()
-
-
-def test_an_output_that_is_a_file(run: Run, room: Path, tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("mine")
-    done = run("bake", room, "--output", tmp_path / "file", *QUICK)
-    assert done.code == 1
-    assert str(tmp_path / "file") in done.err
-    assert (tmp_path / "file").read_text() == "mine"
-
-
-def test_an_unknown_object_is_a_usage_error(run: Run, room: Path, tmp_path: Path) -> None:
-    done = run("bake", room, "--output", tmp_path / "out", *QUICK, "--objects", "Floor", "Nope")
-    assert done.code == 2
-    assert "Nope" in done.err
-    assert done.err.count("\n") == 1
-
-
-def test_the_scene_is_never_overwritten(run: Run, room: Path, tmp_path: Path) -> None:
-    assert run("bake", room, "--output", tmp_path / "out", *QUICK).code == 0
-    before = digest(tmp_path / "out")
-    done = run("bake", tmp_path / "out" / "baked.blend", "--output", tmp_path / "out", *QUICK)
-    assert done.code == 2
-    assert "baked.blend" in done.err
-    assert digest(tmp_path / "out") == before
-
-
-def test_restoring_what_shows_no_bake(run: Run, room: Path, tmp_path: Path) -> None:
-    done = run("restore", room, "--output", tmp_path / "back.blend")
-    assert done.code == 1
-    assert "room.blend" in done.err
-    assert not (tmp_path / "back.blend").exists()
-
-
-def test_a_baked_file_bakes_again_as_the_original_does(run: Run, room: Path, tmp_path: Path) -> None:
-    assert run("bake", room, "--output", tmp_path / "one", *QUICK).code == 0
-    assert run("bake", tmp_path / "one" / "baked.blend", "--output", tmp_path / "two", *QUICK).code == 0
-    first, second = ((tmp_path / name / "lightmap.exr").read_bytes() for name in ("one", "two"))
-    assert first == second
-
-
-def test_inside_a_blender_that_has_the_file_open(room: Path, tmp_path: Path) -> None:
-    """What `blender -b room.blend --command radiosity …` calls."""
-    from radiosity_addon.blender import cli_host
-
-    bpy.ops.wm.open_mainfile(filepath=str(room))
-    assert cli_host.run(["bake", "--output", str(tmp_path / "out"), *QUICK, "--quiet"]) == 0
-    assert {entry["object"] for entry in read_report(tmp_path / "out")["objects"]} == {
-        "Floor",
-        "Wall",
-        "Cube",
-    }
-    assert cli_host.run(["bake", "--resolution", "0"]) == 2
-    assert cli_host.run(["bake"]) == 2  # an open file needs --output
-    assert cli_host.run(["--help"]) == 0
-
-
-# --- in a process of its own ---
-
-
-def test_the_process_ends_with_the_code(room: Path, tmp_path: Path) -> None:
-    done = start("bake", room, "--output", "out", *QUICK, cwd=tmp_path)
-    out, err = done.communicate(timeout=300)
-    assert (done.returncode, err) == (0, "")
-    assert "3 objects baked into out" in out
-    assert "Fra:" not in out
-    failed = start("bake", "nowhere.blend", "--output", "out", cwd=tmp_path)
-    out, err = failed.communicate(timeout=300)
-    assert failed.returncode == 1
-    assert err.count("\n") == 1
-
-
-@pytest.mark.skipif(os.name == "nt", reason="signals are sent the POSIX way")
-@pytest.mark.parametrize("stage", ["export", "solve", "light", "preview"])
-def test_ctrl_c_leaves_the_previous_result_whole(stage: str, room: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    out.mkdir()
-    (out / "baked.blend").write_text("the previous result")
-    before = digest(out)
-    job = start("bake", room, "--output", out, "--resolution", "256", cwd=tmp_path)
-    for line in job.stdout:
-        if line.rstrip().endswith(stage):
-            os.killpg(job.pid, signal.SIGINT)
-            break
-    _, err = job.communicate(timeout=300)
-    assert job.returncode == 130
-    assert err.splitlines()[-1] == "error: interrupted; nothing was written"
-    assert "Traceback" not in err
-    assert digest(out) == before
