@@ -54,7 +54,7 @@ class TexelGeometry:
         self.triangle = np.concatenate([of[page.triangle] for of, page in zip(rows, texels, strict=True)]).astype(np.int32)
         weights = np.concatenate([page.centroid for page in texels]).astype(np.float64)
         self.barycentric = weights[:, 1:].astype(np.float32)
-        self.position = np.einsum("nc,nck->nk", weights, scene.triangles[self.triangle])
+        self.position = _at(scene.triangles[self.triangle], weights[:, None])[:, 0]
         self.surface_normal = scene.face_normals[self.triangle]
         shading = np.einsum("nc,nck->nk", weights, scene.normals[self.triangle])
         length = np.linalg.norm(shading, axis=1, keepdims=True)
@@ -84,7 +84,7 @@ class TexelGeometry:
                 continue
             local = rows[mine] - self._first[number]
             weights = sample_footprints(page.take(local), u[mine])
-            points[mine] = weights @ self._scene.triangles[self.triangle[rows[mine]]]
+            points[mine] = _at(self._scene.triangles[self.triangle[rows[mine]]], weights)
         return points
 
     def neighbourhood(self, chosen: np.ndarray) -> np.ndarray:
@@ -101,9 +101,8 @@ class TexelGeometry:
 
     def positions_of(self, hits: Hits) -> np.ndarray:
         """Return (h, 3) where rays hit; meaningless without a hit."""
-        corners = self._scene.triangles[hits.triangle]
-        second, third = hits.barycentric[:, 0:1], hits.barycentric[:, 1:2]
-        return np.asarray((1 - second - third) * corners[:, 0] + second * corners[:, 1] + third * corners[:, 2])
+        weights = np.concatenate([np.zeros((len(hits.triangle), 1)), hits.barycentric], axis=1)
+        return _at(self._scene.triangles[hits.triangle], weights[:, None])[:, 0]
 
     def texel_at(self, hits: Hits) -> np.ndarray:
         """Return (h,) int32: the texel under each ray's hit; NO_TEXEL on backs and unbaked surfaces."""
@@ -122,3 +121,13 @@ class TexelGeometry:
             at = np.clip((uv[mine] * size).astype(np.int64), 0, size - 1)
             found[rows[mine]] = numbers[at[:, 1], at[:, 0]]
         return found
+
+
+def _at(corners: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Return (n, k, 3) points at (n, k, 3) barycentric weights of (n, 3, 3) triangles.
+
+    Along the edges from the first corner, whose own weight is not used: float32 weights that
+    do not quite sum to 1 cannot lift a point off a plane far from the origin.
+    """
+    edges = corners[:, 1:] - corners[:, :1]
+    return np.asarray(corners[:, :1] + weights[:, :, 1:].astype(np.float64) @ edges)

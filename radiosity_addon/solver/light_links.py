@@ -8,15 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from .hierarchy import LEAF, Hierarchy, split_in_four
-from .lights import EnvironmentLight, Light
-from .links import points_in
-from .sampling import cosine_hemisphere, stratified_square, to_world
+from .lights import EnvironmentLight, Lamp, Light
+from .sampling import cosine_hemisphere, points_on_triangles, stratified_square, to_world
 from .visibility import RayCaster
 
 LAMP_SAMPLES = 4
-"""Lamp samples of each of an element's four sample points."""
+"""Shadow rays of each quarter of an element, each from a point of its own."""
 SKY_RAYS = 16
-"""Hemisphere rays of each of an element's four sample points."""
+"""Hemisphere rays of each quarter of an element."""
 CHUNK = 1 << 14
 """Elements measured at once; bounds the temporaries to some 60 MB."""
 
@@ -30,8 +29,8 @@ class LightLinks:
     receiver : (l,) int32
     light : (l,) int32
         Row of the scene's lights.
-    gain : (l,) float32
-        Area mean of irradiance per unit of strength, visibility included.
+    gain : (l, 4) float32
+        Irradiance per unit of strength on each quarter of the receiver, visibility included.
     """
 
     receiver: np.ndarray
@@ -42,13 +41,19 @@ class LightLinks:
         return len(self.receiver)
 
     def irradiance(self, strengths: np.ndarray, n_elements: int) -> np.ndarray:
-        """Return (n_elements, 3): each element's own share for (n_lights, 3) strengths."""
-        total = np.zeros((n_elements, 3))
+        """Return (n_elements, 4, 3): each element's own share on its quarters, for (n_lights, 3) strengths."""
+        total = np.zeros((n_elements, 4, 3))
         for channel in range(3):
-            total[:, channel] = np.bincount(
-                self.receiver, self.gain * strengths[self.light, channel], minlength=n_elements
-            )
+            for quarter in range(4):
+                arriving = self.gain[:, quarter] * strengths[self.light, channel]
+                total[:, quarter, channel] = np.bincount(self.receiver, arriving, minlength=n_elements)
         return total
+
+
+def no_light_links() -> LightLinks:
+    """Return an empty set of light links."""
+    none = np.zeros(0, dtype=np.int32)
+    return LightLinks(none, none, np.zeros((0, 4), dtype=np.float32))
 
 
 def light_strengths(lights: Sequence[Light]) -> np.ndarray:
@@ -85,7 +90,7 @@ def link_lights(
             split = (doubt * area * strength > misplaced_power) & (
                 (hierarchy.first_child[waiting] != LEAF) | (area >= 4 * min_area)
             )
-            kept = ~split & (gain > 0)
+            kept = ~split & (gain.max(axis=1) > 0)
             receivers.append(waiting[kept])
             gains.append(gain[kept])
             numbers.append(np.full(int(kept.sum()), number))
@@ -96,84 +101,98 @@ def link_lights(
     return LightLinks(
         np.concatenate(receivers or empty).astype(np.int32),
         np.concatenate(numbers or empty).astype(np.int32),
-        np.concatenate(gains or empty).astype(np.float32),
+        np.concatenate(gains or [np.zeros((0, 4))]).astype(np.float32),
     )
 
 
 def measure_light(
-    hierarchy: Hierarchy, light: Light, caster: RayCaster, elements: np.ndarray, seed: int
+    hierarchy: Hierarchy, light: Lamp | EnvironmentLight, caster: RayCaster, elements: np.ndarray, seed: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Measure one light's mean irradiance on elements, per unit of strength, and its doubt.
+    """Measure one light's irradiance on the quarters of elements, per unit of strength, and its doubt.
 
     Returns
     -------
-    gain, doubt : (n,) float64
+    gain : (n, 4) float64
+        On each quarter.
+    doubt : (n,) float64
     """
-    gain, doubt = np.empty(len(elements)), np.empty(len(elements))
+    gain, doubt = np.empty((len(elements), 4)), np.empty(len(elements))
     for first in range(0, len(elements), CHUNK):
         rows = slice(first, min(first + CHUNK, len(elements)))
         chosen = elements[rows]
-        quarters = split_in_four(hierarchy.corners[chosen])
-        points = points_in(quarters, stratified_square(chosen, 4, seed)).reshape(-1, 3)
         keys = (4 * chosen[:, None] + np.arange(4)).ravel()
+        quarters = split_in_four(hierarchy.corners[chosen]).reshape(-1, 3, 3)
         normals = np.repeat(hierarchy.normal[chosen], 4, axis=0)
         if isinstance(light, EnvironmentLight):
+            points = points_on_triangles(quarters, stratified_square(keys, SKY_RAYS, seed + 1))
             open_share = sky_visibility(points, normals, SKY_RAYS, caster, keys, seed)
             values = np.pi * open_share.reshape(-1, 4)
             # Expected noise of a quarter's mean is not a difference between quarters.
             noise = np.pi * np.sqrt(open_share * (1 - open_share) / SKY_RAYS).reshape(-1, 4).mean(axis=1)
-            gain[rows] = values.mean(axis=1)
+            gain[rows] = values
             doubt[rows] = np.maximum(values.std(axis=1) - noise, 0.0)
             continue
-        open_gain = light.unit_irradiance(points, normals)
-        share = lamp_visibility(light, points, normals, open_gain > 0, LAMP_SAMPLES, caster, keys, seed)
-        values = (open_gain * share).reshape(-1, 4)
-        gain[rows] = values.mean(axis=1)
-        missed = open_gain.reshape(-1, 4).mean(axis=1) / (4 * LAMP_SAMPLES + 2.0)
+        points = points_on_triangles(quarters, stratified_square(keys, LAMP_SAMPLES, seed + 1))
+        unit = stratified_square(keys, LAMP_SAMPLES, seed)
+        open_gain, share = lamp_light(light, points, normals, unit, caster)
+        values = (open_gain.mean(axis=1) * share).reshape(-1, 4)
+        gain[rows] = values
+        missed = open_gain.reshape(len(chosen), -1).mean(axis=1) / (4 * LAMP_SAMPLES + 2.0)
         doubt[rows] = np.hypot(values.std(axis=1), missed)
     return gain, doubt
 
 
-def lamp_visibility(
-    light: Light,
-    points: np.ndarray,
-    normals: np.ndarray,
-    facing: np.ndarray,
-    samples: int,
-    caster: RayCaster,
-    keys: np.ndarray,
-    seed: int,
-) -> np.ndarray:
-    """Return (n,) the share of each lit point's irradiance that is not blocked, by shadow rays.
+def lamp_light(
+    light: Lamp, points: np.ndarray, normals: np.ndarray, unit: np.ndarray, caster: RayCaster
+) -> tuple[np.ndarray, np.ndarray]:
+    """Ask for a lamp's light at points, one shadow ray each.
 
     Parameters
     ----------
-    facing : (n,) bool
-        Points the lamp can reach at all; the others return 0.
-    keys : (n,) int
-        With `seed`, what places each point's samples.
+    points : (n, k, 3) float64
+    normals : (n, 3) float64
+    unit : (n, k, 2) float
+        Places the point of the lamp each ray goes to.
+
+    Returns
+    -------
+    gain : (n, k) float64
+        Unoccluded irradiance per unit of strength.
+    share : (n,) float64
+        How much of it arrives, over the k points together.
     """
-    share = np.zeros(len(points))
-    rows = np.flatnonzero(facing)
-    if len(rows) == 0:
-        return share
-    unit = stratified_square(keys[rows], samples, seed)
-    directions, distances, weights = light.shadow_rays(points[rows], normals[rows], unit)
-    free = np.zeros(weights.shape, dtype=bool)
-    point, sample = np.nonzero(weights > 0)
-    start = points[rows][point] + caster.surface_offset * normals[rows][point]
-    free[point, sample] = caster.visible(start, directions[point, sample], distances[point, sample])
-    total = weights.sum(axis=1)
-    share[rows] = np.where(total > 0, (weights * free).sum(axis=1) / np.maximum(total, 1e-300), 0.0)
-    return share
+    flat = points.reshape(-1, 3)
+    facing = np.repeat(normals, points.shape[1], axis=0)
+    gain = light.unit_irradiance(flat, facing)
+    weights, passed = np.zeros(len(flat)), np.zeros(len(flat))
+    rows = np.flatnonzero(gain > 0)
+    directions, distances, above = light.shadow_rays(flat[rows], facing[rows], unit.reshape(-1, 1, 2)[rows])
+    start = flat[rows] + caster.surface_offset * facing[rows]
+    free = caster.visible(start, directions[:, 0], distances[:, 0])
+    # A lamp point below the horizon says nothing: the closed form has cut it off already.
+    weights[rows] = np.where(above[:, 0] > 0, gain[rows], 0.0)
+    passed[rows] = weights[rows] * free
+    shape = unit.shape[:2]
+    total = weights.reshape(shape).sum(axis=1)
+    share = np.where(total > 0, passed.reshape(shape).sum(axis=1) / np.where(total > 0, total, 1.0), 0.0)
+    return gain.reshape(shape), share
 
 
 def sky_visibility(
     points: np.ndarray, normals: np.ndarray, rays: int, caster: RayCaster, keys: np.ndarray, seed: int
 ) -> np.ndarray:
-    """Return (n,) the cosine-weighted share of each point's hemisphere that meets no surface."""
-    unit = stratified_square(keys, rays, seed)
-    directions = to_world(cosine_hemisphere(unit), normals).reshape(-1, 3)
-    start = np.repeat(points + caster.surface_offset * normals, rays, axis=0)
-    free = caster.visible(start, directions, np.full(len(start), np.inf))
-    return np.asarray(free.reshape(-1, rays).mean(axis=1))
+    """Return (n,) the cosine-weighted share of each hemisphere that meets no surface.
+
+    `points` are (n, 3), or (n, rays, 3) to start every ray elsewhere.
+    """
+    share = np.empty(len(points))
+    for first in range(0, len(points), CHUNK):
+        rows = slice(first, first + CHUNK)
+        unit = stratified_square(keys[rows], rays, seed)
+        directions = to_world(cosine_hemisphere(unit), normals[rows])
+        start = points[rows] if points.ndim == 3 else points[rows, None]
+        start = np.broadcast_to(start + caster.surface_offset * normals[rows, None], directions.shape)
+        endless = np.full(directions.shape[0] * rays, np.inf)
+        free = caster.visible(start.reshape(-1, 3), directions.reshape(-1, 3), endless)
+        share[rows] = free.reshape(-1, rays).mean(axis=1)
+    return share

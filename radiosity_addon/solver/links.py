@@ -17,7 +17,7 @@ import numpy as np
 
 from .form_factor import point_to_polygon, triangle_to_triangle
 from .hierarchy import Hierarchy, split_in_four
-from .sampling import hash_keys, stratified_square
+from .sampling import hash_keys, points_on_triangles, stratified_square
 from .visibility import RayCaster
 
 CHUNK = 1 << 15
@@ -65,6 +65,9 @@ class Links:
         Share of F_rs that is not blocked.
     doubt : (l,) float32
         Standard deviation of F·V over the samples and what too few rays may have missed.
+    to_quarter, of_quarter : (l, 4) float32
+        How F·V is shared out over the receiver's and the source's quarters, mean 1 each: so
+        leaves below an inner element do not all inherit the same (a cluster's are all 1).
     """
 
     receiver: np.ndarray
@@ -72,6 +75,8 @@ class Links:
     factor: np.ndarray
     visibility: np.ndarray
     doubt: np.ndarray
+    to_quarter: np.ndarray
+    of_quarter: np.ndarray
 
     def __len__(self) -> int:
         return len(self.receiver)
@@ -84,6 +89,8 @@ class Links:
             self.factor[rows],
             self.visibility[rows],
             self.doubt[rows],
+            self.to_quarter[rows],
+            self.of_quarter[rows],
         )
 
     def sorted_by_receiver(self) -> Links:
@@ -98,18 +105,19 @@ def no_links() -> Links:
 
 def join(parts: list[Links]) -> Links:
     """Concatenate sets of links."""
-    return Links(
-        *(
-            np.concatenate([getattr(part, name) for part in parts] or [np.zeros(0)]).astype(kind)
-            for name, kind in (
-                ("receiver", np.int32),
-                ("source", np.int32),
-                ("factor", np.float32),
-                ("visibility", np.float32),
-                ("doubt", np.float32),
-            )
-        )
-    )
+    joined = []
+    for name, kind, shape in (
+        ("receiver", np.int32, (0,)),
+        ("source", np.int32, (0,)),
+        ("factor", np.float32, (0,)),
+        ("visibility", np.float32, (0,)),
+        ("doubt", np.float32, (0,)),
+        ("to_quarter", np.float32, (0, 4)),
+        ("of_quarter", np.float32, (0, 4)),
+    ):
+        arrays = [getattr(part, name) for part in parts] or [np.zeros(shape)]
+        joined.append(np.concatenate(arrays).astype(kind, copy=False))
+    return Links(*joined)
 
 
 def measure_links(
@@ -188,8 +196,34 @@ def _measure_chunk(
         factor.astype(np.float32),
         visibility.astype(np.float32),
         doubt.astype(np.float32),
+        *_quarter_shares(hierarchy, receiver, source, samples, transfer * (free | ~traced)),
     )
     return links.take(factor > 0)
+
+
+def _quarter_shares(
+    hierarchy: Hierarchy, receiver: np.ndarray, source: np.ndarray, samples: _PairSamples, passed: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Share links out over their receiver's and source's quarters: two (n, 4) float32 of mean 1.
+
+    In proportion to Lambert's factor at the quarters' centroids, times what the samples
+    of each quarter saw.
+    """
+    open_to, open_of = samples.by_quarter(samples.transfer)
+    seen_to, seen_of = samples.by_quarter(passed)
+    shares = np.ones((2, len(receiver), 4))
+    single = np.flatnonzero(source >= hierarchy.n_clusters)
+    element = source[single] - hierarchy.n_clusters
+    for number, (on, toward) in enumerate(((receiver[single], element), (element, receiver[single]))):
+        points = split_in_four(hierarchy.corners[on]).mean(axis=2).reshape(-1, 3)
+        normals = np.repeat(hierarchy.normal[on], 4, axis=0)
+        polygons = np.repeat(hierarchy.corners[toward], 4, axis=0)
+        shares[number, single] = point_to_polygon(points, normals, polygons).reshape(-1, 4)
+    shares[0] *= np.where(open_to > 0, seen_to / np.maximum(open_to, 1e-300), 1.0)
+    shares[1, single] *= np.where(open_of > 0, seen_of / np.maximum(open_of, 1e-300), 1.0)[single]
+    mean = shares.mean(axis=2, keepdims=True)
+    shares = np.where(mean > 0, shares / np.where(mean > 0, mean, 1.0), 1.0).astype(np.float32)
+    return shares[0], shares[1]
 
 
 def _trace(
@@ -230,7 +264,7 @@ class _PairSamples:
         source_quarter = np.tile(np.arange(4), 4)[None] ^ ((turn[:, None] + np.repeat(np.arange(4), 4)) % 4)
         quarters = split_in_four(hierarchy.corners[receiver])
         jitter = stratified_square(pair, 16, seed + 1)
-        self.receiver_points = points_in(quarters[:, receiver_quarter], jitter)
+        self.receiver_points = _one_in_each(quarters[:, receiver_quarter], jitter)
         self.receiver_normals = hierarchy.faces.normal[hierarchy.face[receiver]]
 
         self.source_points = np.empty((count, 16, 3))
@@ -241,19 +275,20 @@ class _PairSamples:
         single = np.flatnonzero(~is_cluster)
         element = source[single] - hierarchy.n_clusters
         quarters = split_in_four(hierarchy.corners[element])
-        self.source_points[single] = points_in(
+        self.source_points[single] = _one_in_each(
             quarters[np.arange(len(single))[:, None], source_quarter[single]], jitter[single]
         )
         self.source_normals[single] = hierarchy.faces.normal[hierarchy.face[element]][:, None]
         grouped = np.flatnonzero(is_cluster)
         share = (source_quarter[grouped] + along[grouped]) / 4.0
         face = sample_clusters(hierarchy, source[grouped], share)
-        self.source_points[grouped] = points_in(hierarchy.faces.corners[face], jitter[grouped])
+        self.source_points[grouped] = _one_in_each(hierarchy.faces.corners[face], jitter[grouped])
         self.source_normals[grouped] = hierarchy.faces.normal[face]
 
         area = np.empty(count)
         area[single] = hierarchy.area[element]
         area[grouped] = hierarchy.clusters.area[source[grouped]]
+        self._source_quarter = np.where(is_cluster[:, None], -1, source_quarter)
         self.transfer = np.minimum(
             kernel(
                 self.receiver_points, self.receiver_normals[:, None], self.source_points, self.source_normals
@@ -261,6 +296,13 @@ class _PairSamples:
             * area[:, None],
             1.0,
         )
+
+
+    def by_quarter(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Average (n, 16) values over each of the receiver's and the source's quarters: two (n, 4)."""
+        to = values.reshape(-1, 4, 4).mean(axis=1)
+        of = np.stack([np.where(self._source_quarter == q, values, 0.0).sum(axis=1) for q in range(4)], axis=1)
+        return to, of / 4.0
 
 
 def kernel(
@@ -280,15 +322,10 @@ def kernel(
     return np.asarray(cos_r * cos_s / (np.pi * square * square))
 
 
-def points_in(corners: np.ndarray, unit: np.ndarray) -> np.ndarray:
-    """Map (…, 2) points of the unit square to uniform points of (…, 3, 3) triangles."""
-    root = np.sqrt(unit[..., :1])
-    second = root * unit[..., 1:]
-    return np.asarray(
-        (1.0 - root) * corners[..., 0, :]
-        + (root - second) * corners[..., 1, :]
-        + second * corners[..., 2, :]
-    )
+def _one_in_each(corners: np.ndarray, unit: np.ndarray) -> np.ndarray:
+    """Return (n, k, 3): a point in each of (n, k, 3, 3) triangles, placed by (n, k, 2)."""
+    points = points_on_triangles(corners.reshape(-1, 3, 3), unit.reshape(-1, 1, 2))
+    return points.reshape(*unit.shape[:2], 3)
 
 
 def sample_clusters(hierarchy: Hierarchy, cluster: np.ndarray, share: np.ndarray) -> np.ndarray:

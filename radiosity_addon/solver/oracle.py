@@ -6,53 +6,29 @@ import numpy as np
 
 from .hierarchy import LEAF, Hierarchy
 from .links import Links
-from .transport import node_radiosity, pull
+from .transport import node_radiosity
 
 
-BIAS = 8.0
-"""Power misplaced by a source's own variation counts this many times: it does not average out."""
-
-
-def misplaced_power(hierarchy: Hierarchy, links: Links, radiosity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Estimate the power each link may misplace [W], by cause; the largest channel.
+def misplaced_power(hierarchy: Hierarchy, links: Links, radiosity: np.ndarray) -> np.ndarray:
+    """Estimate the power each link may misplace [W]: B_s · A_r · doubt, the largest channel.
 
     The handout's Oracle2 compares the whole power B_s A_r F_rs with BF_ε. Weighed by its
     doubt, how much F·V varies or is unknown over the link, a large but certain transfer
-    stays coarse. What the link gets wrong because F·V and B vary together over the source
-    (a leaf near the receiver is brighter and sees more of it) has the same sign everywhere
-    and is weighed higher.
+    stays coarse. A source without radiosity gives 0 and is tested again every round.
 
     Parameters
     ----------
     radiosity : (e, 3) float64
-
-    Returns
-    -------
-    spread : (l,) float64
-        B_s · A_r · doubt. A source without radiosity gives 0 and is tested again every round.
-    bias : (l,) float64
-        σ(B_s) · A_r · doubt, times BIAS: the source should be split.
     """
     brightest = node_radiosity(hierarchy, radiosity).max(axis=1, initial=0.0)
-    varying = node_deviation(hierarchy, radiosity)
-    uncertain = hierarchy.area[links.receiver] * links.doubt
-    return np.asarray(brightest[links.source] * uncertain), np.asarray(BIAS * varying[links.source] * uncertain)
+    return np.asarray(brightest[links.source] * hierarchy.area[links.receiver] * links.doubt)
 
 
-def node_deviation(hierarchy: Hierarchy, radiosity: np.ndarray) -> np.ndarray:
-    """Return (n_nodes,) the standard deviation of the radiosity over each node's leaves [W/m²]."""
-    mean = node_radiosity(hierarchy, radiosity)
-    square = node_radiosity(hierarchy, pull(hierarchy, radiosity**2))
-    return np.asarray(np.sqrt(np.maximum(square - mean**2, 0.0)).max(axis=1, initial=0.0))
-
-
-def choose_side(
-    hierarchy: Hierarchy, links: Links, prefer_source: np.ndarray, min_area: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def choose_side(hierarchy: Hierarchy, links: Links, min_area: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Decide how each link would be refined.
 
-    Clusters open first; otherwise the source splits where it is preferred, else the larger
-    side, as the link varies most over it; the other one where that may not get children.
+    Clusters open first; otherwise the larger side splits, as the link varies most over it,
+    or the other one where the larger may not get children.
 
     Returns
     -------
@@ -70,12 +46,12 @@ def choose_side(
     receiver_may = ~open_source & (
         (hierarchy.first_child[links.receiver] != LEAF) | (receiver_area >= 4 * min_area)
     )
-    split_receiver = receiver_may & (((receiver_area >= source_area) & ~prefer_source) | ~source_may)
+    split_receiver = receiver_may & ((receiver_area >= source_area) | ~source_may)
     return open_source, source_may & ~split_receiver, split_receiver
 
 
 def children_of_links(
-    hierarchy: Hierarchy, links: Links, prefer_source: np.ndarray, min_area: float
+    hierarchy: Hierarchy, links: Links, min_area: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Replace links by links to or from their children (handout §4.2.1, RefineLink).
 
@@ -88,7 +64,7 @@ def children_of_links(
         The new pairs.
     replaced : (l,) bool
     """
-    open_source, split_source, split_receiver = choose_side(hierarchy, links, prefer_source, min_area)
+    open_source, split_source, split_receiver = choose_side(hierarchy, links, min_area)
     n_clusters = hierarchy.n_clusters
     parents = np.unique(
         np.concatenate([links.source[split_source] - n_clusters, links.receiver[split_receiver]])

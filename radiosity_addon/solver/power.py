@@ -53,7 +53,7 @@ def power_balance(state: HierarchicalState) -> dict[str, float]:
     faces = hierarchy.faces
     leaves = hierarchy.leaves
     emitted = float((faces.area @ faces.emission).mean()) if len(faces) else 0.0
-    gain = hierarchy.area[state.light_links.receiver] * state.light_links.gain
+    gain = hierarchy.area[state.light_links.receiver] * state.light_links.gain.mean(axis=1)
     for number, light in enumerate(scene.lights):
         if isinstance(light, SunLight | EnvironmentLight):
             arriving = float(gain[state.light_links.light == number].sum())

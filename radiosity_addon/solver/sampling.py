@@ -137,11 +137,13 @@ def points_on_triangles(triangles: FloatArray, u: FloatArray) -> FloatArray:
 
     Returns
     -------
-    points : (n, k, 3) float
+    points : (n, k, 3) float64
     """
-    smaller = 0.5 * np.minimum(u[..., 0], u[..., 1])
-    first = u[..., 0] - smaller
-    second = u[..., 1] - smaller
+    # In float64: weights that sum to 1 up to float32 only would lift points off a far plane.
+    unit = np.asarray(u, dtype=np.float64)
+    smaller = 0.5 * np.minimum(unit[..., 0], unit[..., 1])
+    first = unit[..., 0] - smaller
+    second = unit[..., 1] - smaller
     weights = np.stack([1.0 - first - second, first, second], axis=-1)
     points: FloatArray = weights @ triangles
     return points

@@ -31,7 +31,7 @@ class SolverSettings:
         0 means all cores; the result does not depend on it.
     """
 
-    error: float = 1e-5
+    error: float = 1e-4
     min_area: float = 2e-5
     rays_per_link: int = 4
     gather_rays: int = 144

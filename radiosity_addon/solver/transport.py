@@ -8,32 +8,47 @@ from .hierarchy import LEAF, Hierarchy
 from .links import Links
 
 
-def gather(links: Links, node_radiosity: np.ndarray, n_elements: int) -> np.ndarray:
+def gather(hierarchy: Hierarchy, links: Links, radiosity: np.ndarray) -> np.ndarray:
     """Collect the irradiance that arrives over each element's own links.
 
-    H_r = Σ_s F_rs V_rs B_s over the links of receiver r (handout §4.2, Gather).
+    H_r = Σ_s F_rs V_rs B_s over the links of receiver r (handout §4.2, Gather), shared out
+    over the receiver's quarters; B_s is the mean over the source's quarters by the link's
+    shares where the source has children.
 
     Parameters
     ----------
     links : Links
         Sorted by receiver.
-    node_radiosity : (n_nodes, 3) float64
-        Radiosity of clusters, then elements [W/m²].
-    n_elements : int
+    radiosity : (e, k) float64
+        Of every element [W/m²].
 
     Returns
     -------
-    irradiance : (n_elements, 3) float64
-        Each element's own share [W/m²]; `push` adds its ancestors'.
+    irradiance : (e, 4, k) float64
+        Each element's own share on its four quarters [W/m²]; `push` adds its ancestors'.
     """
-    irradiance = np.zeros((n_elements, 3))
+    irradiance = np.zeros((hierarchy.n_elements, 4, radiosity.shape[1]))
     if len(links) == 0:
         return irradiance
-    weight = links.factor * links.visibility
     first = np.flatnonzero(np.diff(links.receiver, prepend=-1))
-    for channel in range(3):
-        arriving = weight * node_radiosity[links.source, channel]
-        irradiance[links.receiver[first], channel] = np.add.reduceat(arriving, first)
+    receivers = links.receiver[first]
+    nodes = node_radiosity(hierarchy, radiosity)
+    child = np.full(len(nodes), LEAF, dtype=np.int64)
+    child[hierarchy.n_clusters :] = hierarchy.first_child
+    inner = np.flatnonzero(child[links.source] != LEAF)
+    children = child[links.source[inner]]
+    split = hierarchy.first_child[receivers] != LEAF
+    weight = links.factor * links.visibility
+    for channel in range(radiosity.shape[1]):
+        arriving = nodes[links.source, channel]
+        arriving[inner] = 0.0
+        for quarter in range(4):
+            arriving[inner] += 0.25 * links.of_quarter[inner, quarter] * radiosity[children + quarter, channel]
+        arriving *= weight
+        irradiance[receivers, :, channel] = np.add.reduceat(arriving, first)[:, None]
+        for quarter in range(4):
+            share = np.add.reduceat(arriving * links.to_quarter[:, quarter], first)
+            irradiance[receivers[split], quarter, channel] = share[split]
     return irradiance
 
 
@@ -42,18 +57,19 @@ def push(hierarchy: Hierarchy, own: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    own : (e, k) float64
+    own : (e, 4, k) float64
+        On the quarters of each element; child q inherits quarter q.
 
     Returns
     -------
     total : (e, k) float64
         Meaningful at the leaves.
     """
-    total = own.copy()
+    inherited = np.zeros((len(own), own.shape[2]))
     for parents in inner_by_level(hierarchy):
         children = hierarchy.first_child[parents][:, None] + np.arange(4)
-        total[children] += total[parents][:, None]
-    return total
+        inherited[children] = inherited[parents][:, None] + own[parents]
+    return np.asarray(inherited + own.mean(axis=1))
 
 
 def pull(hierarchy: Hierarchy, at_leaves: np.ndarray) -> np.ndarray:
@@ -76,14 +92,20 @@ def pull(hierarchy: Hierarchy, at_leaves: np.ndarray) -> np.ndarray:
 
 
 def push_pull(
-    hierarchy: Hierarchy, own_irradiance: np.ndarray, emission: np.ndarray, reflectance: np.ndarray
+    hierarchy: Hierarchy,
+    lights: np.ndarray,
+    gathered: np.ndarray,
+    emission: np.ndarray,
+    reflectance: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Push irradiance to the leaves, reflect it there, and pull radiosity up (handout §4.2).
 
     Parameters
     ----------
-    own_irradiance : (e, 3) float64
-        What each element gathered itself [W/m²].
+    lights : (e, 3) float64
+        What the leaves get straight from lamps [W/m²].
+    gathered : (e, 3) float64
+        What the leaves got over links, their ancestors' included [W/m²].
     emission, reflectance : (e, 3) float64
 
     Returns
@@ -92,7 +114,7 @@ def push_pull(
         Area means over the leaves below every element.
     radiosity : (e, 3) float64
     """
-    irradiance = push(hierarchy, own_irradiance)
+    irradiance = lights + gathered
     radiosity = pull(hierarchy, emission + reflectance * irradiance)
     return pull(hierarchy, irradiance), radiosity
 

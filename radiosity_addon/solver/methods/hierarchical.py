@@ -12,15 +12,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..conservation import Conservation
 from ..embree import EmbreeCaster
 from ..hierarchy import Hierarchy
-from ..light_links import LightLinks, light_strengths, link_lights
+from ..light_links import LightLinks, light_strengths, link_lights, no_light_links
 from ..links import Links, join, measure_links, no_links
 from ..oracle import children_of_links, misplaced_power
 from ..power import light_power
 from ..scene import Scene
 from ..settings import SolverSettings
-from ..transport import gather, node_radiosity, push_pull
+from ..transport import gather, pull, push, push_pull
 from ..visibility import RayCaster
 
 FIRST_SIZE = 0.4
@@ -28,6 +29,9 @@ FIRST_SIZE = 0.4
 
 COARSENING = (64.0, 16.0, 4.0, 1.0)
 """BF_ε of the rounds, in units of the final one: start coarse, tighten (our addition)."""
+
+LIGHT_SHARE = 0.25
+"""BF_ε of light links, in units of the links': they are few, and every bounce starts with them."""
 
 MAX_ITERATIONS = 1000
 
@@ -42,6 +46,7 @@ class HierarchicalState:
     caster: RayCaster
     light_links: LightLinks
     links: Links
+    conservation: Conservation
     power: float
     """The light's power Φ [W], the largest channel: the unit of BF_ε."""
     irradiance: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
@@ -63,7 +68,7 @@ def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float,
     caster = EmbreeCaster(scene.triangles, settings.threads)
     hierarchy = Hierarchy(scene)
     state = HierarchicalState(
-        scene, settings, hierarchy, caster, LightLinks(*np.zeros((3, 0), np.int32)), no_links(), 0.0
+        scene, settings, hierarchy, caster, no_light_links(), no_links(), Conservation(caster, settings.seed), 0.0
     )
     state.power = light_power(scene, hierarchy.faces)
     min_area = settings.min_area * float(hierarchy.faces.area.sum())
@@ -73,7 +78,7 @@ def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float,
         yield 1.0, state
         return
     state.light_links = link_lights(
-        hierarchy, scene.lights, caster, 4 * settings.error * state.power, min_area, settings.seed
+        hierarchy, scene.lights, caster, LIGHT_SHARE * settings.error * state.power, min_area, settings.seed
     )
     yield 0.1, state
     state.links = first_links(hierarchy, caster, settings.seed)
@@ -132,8 +137,7 @@ def first_links(hierarchy: Hierarchy, caster: RayCaster, seed: int) -> Links:
 def refine(state: HierarchicalState, threshold: float, min_area: float) -> int:
     """Replace every link that may misplace more than `threshold` watts; return how many."""
     hierarchy, links = state.hierarchy, state.links
-    spread, bias = misplaced_power(hierarchy, links, state.radiosity)
-    errors = np.maximum(spread, bias)
+    errors = misplaced_power(hierarchy, links, state.radiosity)
     chosen = np.flatnonzero(errors > threshold)
     room = max((state.settings.max_links - len(links)) // 3, 0)
     if len(chosen) > room:
@@ -144,9 +148,7 @@ def refine(state: HierarchicalState, threshold: float, min_area: float) -> int:
         return 0
     before = hierarchy.n_elements
     candidates = links.take(chosen)
-    receiver, source, replaced = children_of_links(
-        hierarchy, candidates, bias[chosen] > spread[chosen], min_area
-    )
+    receiver, source, replaced = children_of_links(hierarchy, candidates, min_area)
     if not replaced.any():
         return 0
     kept = np.ones(len(links), dtype=bool)
@@ -167,12 +169,15 @@ def iterate(state: HierarchicalState, tolerance: float) -> None:
     area = hierarchy.area[leaves][:, None]
     reflectance = hierarchy.faces.reflectance[hierarchy.face]
     emission = hierarchy.faces.emission[hierarchy.face]
-    direct = state.light_links.irradiance(light_strengths(state.scene.lights), hierarchy.n_elements)
+    lights = push(
+        hierarchy,
+        state.light_links.irradiance(light_strengths(state.scene.lights), hierarchy.n_elements),
+    )
+    scale = state.conservation.factors(hierarchy, state.links)
     for _ in range(MAX_ITERATIONS):
-        own = direct + gather(
-            state.links, node_radiosity(hierarchy, state.radiosity), hierarchy.n_elements
-        )
-        irradiance, radiosity = push_pull(hierarchy, own, emission, reflectance)
+        shooting = pull(hierarchy, scale * state.radiosity)
+        gathered = push(hierarchy, gather(hierarchy, state.links, shooting))
+        irradiance, radiosity = push_pull(hierarchy, lights, gathered, emission, reflectance)
         # One Jacobi step is the residual at the leaves: E + ρ K B − B.
         change = np.abs(radiosity[leaves] - state.radiosity[leaves])
         state.residual = float((area * change).sum(axis=0).max()) / state.power

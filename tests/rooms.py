@@ -1,0 +1,77 @@
+"""Scenes for the solver's tests, as arrays."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+FLOOR, CEILING, WALLS = 0, 1, 2
+
+
+def rectangle(corner: Any, edge_u: Any, edge_v: Any, n: int = 1) -> np.ndarray:
+    """Return (2 n², 3, 3) triangles of a grid; the front is where edge_u × edge_v points."""
+    corner, edge_u, edge_v = (np.asarray(v, dtype=float) for v in (corner, edge_u, edge_v))
+    i, j = np.meshgrid(np.arange(n), np.arange(n), indexing="ij")
+
+    def at(di: int, dj: int) -> np.ndarray:
+        return np.asarray(
+            corner + (i + di)[..., None] * edge_u / n + (j + dj)[..., None] * edge_v / n
+        ).reshape(-1, 3)
+
+    a, b, c, d = at(0, 0), at(1, 0), at(1, 1), at(0, 1)
+    return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+
+
+def box_room(size: Any = (1, 1, 1), n: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """Return the inward triangles of a closed box from the origin, and their surface.
+
+    The surface is FLOOR, CEILING, or WALLS and up: x = 0, x = size, y = 0, y = size.
+    """
+    x, y, z = np.diag(np.asarray(size, dtype=float))
+    parts = [
+        rectangle((0, 0, 0), x, y, n),
+        rectangle(z, y, x, n),
+        rectangle((0, 0, 0), y, z, n),
+        rectangle(x, z, y, n),
+        rectangle((0, 0, 0), z, x, n),
+        rectangle(y, x, z, n),
+    ]
+    return np.concatenate(parts), np.repeat(np.arange(6), 2 * n * n)
+
+
+def solid_box(lower: Any, upper: Any) -> np.ndarray:
+    """Return the (12, 3, 3) outward triangles of a closed box."""
+    lower, upper = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
+    inward, _ = box_room(upper - lower)
+    return np.ascontiguousarray(lower + inward[:, [0, 2, 1]])
+
+
+def sphere(subdivisions: int) -> np.ndarray:
+    """Return the inward triangles of an octahedron subdivided onto the unit sphere."""
+    x, y, z = np.eye(3)
+    triangles = np.array(
+        [
+            [sx * x, sy * y, sz * z] if sx * sy * sz < 0 else [sy * y, sx * x, sz * z]
+            for sx in (-1, 1)
+            for sy in (-1, 1)
+            for sz in (-1, 1)
+        ]
+    )
+    for _ in range(subdivisions):
+        a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+        ab, bc, ca = a + b, b + c, c + a
+        parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+        triangles = np.concatenate([np.stack(part, axis=1) for part in parts])
+        triangles /= np.linalg.norm(triangles, axis=2, keepdims=True)
+    return triangles
+
+
+def grey(count: int, value: float) -> np.ndarray:
+    """Return (count, 3) rows of one value."""
+    return np.full((count, 3), float(value))
+
+
+def area_mean(values: np.ndarray, areas: np.ndarray) -> np.ndarray:
+    """Return the (3,) area-weighted mean of (t, 3) values."""
+    return np.asarray(areas @ values / areas.sum())
