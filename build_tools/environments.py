@@ -70,23 +70,25 @@ def bpy_environment(root: Path, bpy: str) -> Environment:
 
 def _ready(root: Path, folder: Path, bpy: str) -> Environment:
     """Make or update the environment unless its stamp says that it holds these very pins."""
-    system.require_libraries()
     pins = [root / "requirements" / f"bpy-{bpy}.txt", root / "requirements" / "tools.txt"]
     stamp = folder / "pins.sha256"
     wanted = hashlib.sha256(b"".join(path.read_bytes() for path in pins)).hexdigest()
-    if stamp.is_file() and stamp.read_text() == wanted and _works(folder):
-        return Environment(root, folder)
-    if not _works(folder):
-        _create(folder, PYTHON_OF_BPY[bpy])
+    version = PYTHON_OF_BPY[bpy]
+    if _works(folder):
+        system.require(None, version)
+        if stamp.is_file() and stamp.read_text() == wanted:
+            return Environment(root, folder)
+    else:
+        python = system.find_python(version)
+        system.require(python, version)
+        _create(folder, python)
     _install(folder, pins)
     # Last, so that an interrupted installation is taken up again by the next call.
     stamp.write_text(wanted)
     return Environment(root, folder)
 
 
-def _create(folder: Path, version: tuple[int, int]) -> None:
-    python = system.find_python(version)
-    system.require_venv(python, version)
+def _create(folder: Path, python: str) -> None:
     print(f"making {folder} with {python}", file=sys.stderr, flush=True)
     if subprocess.run([python, "-m", "venv", "--clear", str(folder)], check=False).returncode != 0:
         raise BuildError(f"{python} could not make {folder} (its message is above); mend that, run again")

@@ -24,22 +24,21 @@ DEBIAN_PACKAGE_OF_LIBRARY = {
 }
 
 
-def require_libraries() -> None:
-    """Raise a BuildError that names the install command if bpy's libraries are not all there."""
-    if not sys.platform.startswith("linux"):
-        return
-    missing = [library for library in DEBIAN_PACKAGE_OF_LIBRARY if not _loads(library)]
+def require(python: str | None, version: tuple[int, int]) -> None:
+    """Raise a BuildError that names everything missing, and the one command that installs it.
+
+    Parameters
+    ----------
+    python : the interpreter to make an environment with, None if there is one already
+    version : its version
+    """
+    missing = dict(DEBIAN_PACKAGE_OF_LIBRARY) if sys.platform.startswith("linux") else {}
+    missing = {library: package for library, package in missing.items() if not _loads(library)}
+    if python is not None and not _makes_environments(python):
+        missing[f"the venv module of {python}"] = f"python{version[0]}.{version[1]}-venv"
     if missing:
-        packages = " ".join(DEBIAN_PACKAGE_OF_LIBRARY[library] for library in missing)
-        raise BuildError(f"Blender's module needs {', '.join(missing)}; run: apt-get install -y {packages}")
-
-
-def require_venv(python: str, version: tuple[int, int]) -> None:
-    """Raise a BuildError that names the install command if `python` cannot make environments."""
-    code = "import ensurepip, venv"
-    if subprocess.run([python, "-c", code], capture_output=True, check=False).returncode != 0:
-        package = f"python{version[0]}.{version[1]}-venv"
-        raise BuildError(f"{python} has no working venv module; run: apt-get install -y {package}")
+        command = f"apt-get install -y {' '.join(missing.values())}"
+        raise BuildError(f"this machine lacks {', '.join(missing)}; on Debian run: {command}")
 
 
 def find_python(version: tuple[int, int]) -> str:
@@ -65,6 +64,12 @@ def version_of(python: str) -> tuple[int, int] | None:
         return None
     major, minor = answer.stdout.split()
     return int(major), int(minor)
+
+
+def _makes_environments(python: str) -> bool:
+    # Debian ships venv without ensurepip, in a package apart.
+    done = subprocess.run([python, "-c", "import ensurepip, venv"], capture_output=True, check=False)
+    return done.returncode == 0
 
 
 def _loads(library: str) -> bool:

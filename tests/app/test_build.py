@@ -45,20 +45,26 @@ def test_an_unsupported_python_is_told_what_to_do(version: tuple[int, int]) -> N
     assert "apt-get install" in message[0]
 
 
-def test_missing_libraries_are_named_with_their_packages(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys, "platform", "linux")
-    libraries = {"libnowhere.so.6": "libnowhere6", "libgone.so.1": "libgone1"}
-    monkeypatch.setattr(system, "DEBIAN_PACKAGE_OF_LIBRARY", libraries)
-    with pytest.raises(BuildError, match=r"run: apt-get install -y libnowhere6 libgone1$"):
-        system.require_libraries()
-
-
-def test_a_missing_venv_module_is_named_with_its_package(tmp_path: Path) -> None:
+def test_all_that_is_missing_is_named_with_its_packages(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     python = tmp_path / "python3.11"
     python.write_text("#!/bin/sh\nexit 1\n")
     python.chmod(0o755)
-    with pytest.raises(BuildError, match=r"run: apt-get install -y python3\.11-venv$"):
-        system.require_venv(str(python), (3, 11))
+    monkeypatch.setattr(sys, "platform", "linux")
+    libraries = {"libnowhere.so.6": "libnowhere6", "libc.so.6": "libc6", "libgone.so.1": "libgone1"}
+    monkeypatch.setattr(system, "DEBIAN_PACKAGE_OF_LIBRARY", libraries)
+    with pytest.raises(BuildError) as missing:
+        system.require(str(python), (3, 11))
+    assert str(missing.value) == (
+        f"this machine lacks libnowhere.so.6, libgone.so.1, the venv module of {python}; "
+        "on Debian run: apt-get install -y libnowhere6 libgone1 python3.11-venv"
+    )
+
+
+def test_an_environment_that_is_there_needs_no_venv_module(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(system, "DEBIAN_PACKAGE_OF_LIBRARY", {"libc.so.6": "libc6"})
+    system.require(None, (3, 11))
 
 
 def test_a_missing_python_is_named() -> None:
