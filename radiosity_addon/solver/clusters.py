@@ -30,6 +30,8 @@ class Clusters:
     lower, upper : (c, 3) float64
         Bounding box [m].
     area : (c,) float64 [m²]
+    coherence : (c,) float64
+        Length of the area-weighted mean of the unit normals: 1 for a piece of one plane.
     area_before : (f + 1,) float64
         Running sum of the faces' areas along `order`.
     """
@@ -37,7 +39,7 @@ class Clusters:
     def __init__(self, order: np.ndarray, start: np.ndarray, end: np.ndarray, children: np.ndarray) -> None:
         self.order, self.start, self.end, self.children = order, start, end, children
         self.lower = self.upper = np.zeros((0, 3))
-        self.area = np.zeros(0)
+        self.area = self.coherence = np.zeros(0)
         self.area_before = np.zeros(1)
 
     def __len__(self) -> int:
@@ -51,6 +53,7 @@ class Clusters:
             return
         lower = faces.corners.min(axis=1)[self.order]
         upper = faces.corners.max(axis=1)[self.order]
+        self.coherence = np.linalg.norm(self.average(faces.normal, faces.area), axis=1)
         # reduceat over start, end pairs: every other result is the run itself.
         bounds = np.stack([self.start, self.end], axis=1).ravel()
         padded = np.minimum(bounds, len(self.order) - 1)

@@ -1,15 +1,15 @@
 """Let every leaf send out what it has: no more, no less.
 
-Links of different levels do not add up at a leaf. It has fine links to what is near and
-shares its ancestors' coarse links to what is far; in a corner the fine ones are strong and
-the shared ones then too strong. The face's mean is exact, a leaf's sum may be a quarter
-off, and as such leaves are also brighter or darker than the rest of their face, power is
-made or lost, more with every bounce (6 % at a reflectance of 0.9).
+Links of different levels do not add up at a leaf. It has fine links of its own to what is
+near and shares its ancestors' coarse links to what is far; in a corner the own ones are
+strong and the shared ones then too strong. The face's mean is exact, a leaf's sum may be a
+quarter off, and as such leaves are also brighter or darker than the rest of their face,
+power is made or lost, more with every bounce (6 % at a reflectance of 0.9).
 
 So rays find what share of each leaf's light arrives anywhere at all, in a closed scene
-simply all of it, and the radiosity a leaf shoots with is scaled by that share over the sum
-of its links. The factors in the links stay as they are: what they add up to, and so what a
-coarse visibility loses, is reported as the closure.
+simply all of it. What the leaf's own links leave of that is what it sends over shared ones:
+its radiosity is scaled when they take their mean. The factors in the links stay as they
+are: what they add up to, and so what a coarse visibility loses, is reported as the closure.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ RAYS = 32
 """Hemisphere rays of a leaf; in a closed scene they all agree, and there is no noise at all."""
 
 LIMIT = 2.0
-"""Largest factor either way: a leaf with hardly any links is not blown up."""
+"""Largest factor: a leaf with hardly any links is not blown up."""
 
 
 class Conservation:
@@ -38,13 +38,16 @@ class Conservation:
         self._arriving = np.zeros(0)
 
     def factors(self, hierarchy: Hierarchy, links: Links) -> np.ndarray:
-        """Return (e, 1) what to scale the radiosity of each leaf with when it shoots."""
+        """Return (e, 1) what to scale the radiosity of each leaf with in its ancestors' means."""
         self._measure(hierarchy)
         leaves = hierarchy.leaves
-        linked = push(hierarchy, sent(hierarchy, links))[leaves, 0]
-        factor = np.clip(self._arriving[leaves] / np.maximum(linked, 1e-300), 1.0 / LIMIT, LIMIT)
+        sums = sent(hierarchy, links)
+        own = sums[leaves].mean(axis=1)[:, 0]
+        shared = push(hierarchy, sums + self._from_clusters(hierarchy, links))[leaves, 0] - own
+        # Never below 0, and no leaf sends more than it has: so the iteration converges.
+        left = np.maximum(self._arriving[leaves] - own, 0.0)
         result = np.ones((hierarchy.n_elements, 1))
-        result[leaves, 0] = np.where(linked > 0, factor, 1.0)
+        result[leaves, 0] = np.where(shared > 0, np.minimum(left / np.maximum(shared, 1e-300), LIMIT), 1.0)
         return result
 
     def _measure(self, hierarchy: Hierarchy) -> None:
@@ -58,26 +61,34 @@ class Conservation:
         self._arriving[new] = 1.0 - sky_visibility(points, normals, RAYS, self._caster, new, self._seed + 42)
 
 
+    @staticmethod
+    def _from_clusters(hierarchy: Hierarchy, links: Links) -> np.ndarray:
+        """Return (e, 4, 1) the share that the links of the clusters above each face carry."""
+        clusters, n_clusters = hierarchy.clusters, hierarchy.n_clusters
+        total = np.zeros((hierarchy.n_elements, 4, 1))
+        grouped = links.source < n_clusters
+        if grouped.any():
+            power = (hierarchy.area[links.receiver] * links.factor * links.visibility)[grouped]
+            per_cluster = np.bincount(links.source[grouped], power, n_clusters) / clusters.area
+            # A run of faces each: what starts at its first and stops behind its last.
+            steps = np.bincount(clusters.start, per_cluster, len(clusters.order) + 1)
+            steps -= np.bincount(clusters.end, per_cluster, len(clusters.order) + 1)
+            total[clusters.order] = np.cumsum(steps)[:-1, None, None]
+        return total
+
+
 def sent(hierarchy: Hierarchy, links: Links) -> np.ndarray:
     """Return (e, 4, 1): the share of the light of each element's quarters that its own links carry.
 
-    The transpose of `gather` with reciprocity (handout (3.30)): Σ_r A_r F_rs V_rs / A_s.
-    Clusters' links are counted at the faces below them.
+    The transpose of `gather`, with reciprocity (handout (3.30)): Σ_r A_r F_rs V_rs / A_s.
     """
-    power = hierarchy.area[links.receiver] * links.factor * links.visibility
-    clusters, n_clusters = hierarchy.clusters, hierarchy.n_clusters
-    total = np.zeros((hierarchy.n_elements, 4))
-    grouped = links.source < n_clusters
-    if grouped.any():
-        per_cluster = np.bincount(links.source[grouped], power[grouped], n_clusters) / clusters.area
-        # A run of faces each: what starts at its first and stops behind its last.
-        steps = np.bincount(clusters.start, per_cluster, len(clusters.order) + 1)
-        steps -= np.bincount(clusters.end, per_cluster, len(clusters.order) + 1)
-        total[clusters.order] += np.cumsum(steps)[:-1, None]
-    element = links.source[~grouped] - n_clusters
-    per_element = power[~grouped] / hierarchy.area[element]
+    single = links.source >= hierarchy.n_clusters
+    element = links.source[single] - hierarchy.n_clusters
+    power = (hierarchy.area[links.receiver] * links.factor * links.visibility)[single]
+    per_element = power / hierarchy.area[element]
     inner = hierarchy.first_child[element] != LEAF
+    total = np.zeros((hierarchy.n_elements, 4, 1))
     for quarter in range(4):
-        share = np.where(inner, links.of_quarter[~grouped, quarter], 1.0)
-        total[:, quarter] += np.bincount(element, per_element * share, hierarchy.n_elements)
-    return total[:, :, None]
+        share = np.where(inner, links.of_quarter[single, quarter], 1.0)
+        total[:, quarter, 0] = np.bincount(element, per_element * share, hierarchy.n_elements)
+    return total

@@ -8,42 +8,49 @@ from .hierarchy import LEAF, Hierarchy
 from .links import Links
 
 
-def gather(hierarchy: Hierarchy, links: Links, radiosity: np.ndarray) -> np.ndarray:
+def gather(
+    hierarchy: Hierarchy, links: Links, radiosity: np.ndarray, scale: np.ndarray | float = 1.0
+) -> np.ndarray:
     """Collect the irradiance that arrives over each element's own links.
 
     H_r = Σ_s F_rs V_rs B_s over the links of receiver r (handout §4.2, Gather), shared out
-    over the receiver's quarters; B_s is the mean over the source's quarters by the link's
-    shares where the source has children.
+    over the receiver's quarters. Where the source has children, B_s is the mean over its
+    quarters by the link's shares.
 
     Parameters
     ----------
     links : Links
         Sorted by receiver.
     radiosity : (e, k) float64
-        Of every element [W/m²].
+        Of the leaves [W/m²]; other rows do not count.
+    scale : (e, 1) float64 or 1
+        What each leaf's radiosity is multiplied with in its ancestors' means (`conservation`).
 
     Returns
     -------
     irradiance : (e, 4, k) float64
         Each element's own share on its four quarters [W/m²]; `push` adds its ancestors'.
     """
-    irradiance = np.zeros((hierarchy.n_elements, 4, radiosity.shape[1]))
+    channels = radiosity.shape[1]
+    irradiance = np.zeros((hierarchy.n_elements, 4, channels))
     if len(links) == 0:
         return irradiance
     first = np.flatnonzero(np.diff(links.receiver, prepend=-1))
     receivers = links.receiver[first]
-    nodes = node_radiosity(hierarchy, radiosity)
+    means = pull(hierarchy, scale * radiosity)
+    nodes = node_radiosity(hierarchy, means)
+    nodes[hierarchy.n_clusters + hierarchy.leaves] = radiosity[hierarchy.leaves]
     child = np.full(len(nodes), LEAF, dtype=np.int64)
     child[hierarchy.n_clusters :] = hierarchy.first_child
     inner = np.flatnonzero(child[links.source] != LEAF)
     children = child[links.source[inner]]
     split = hierarchy.first_child[receivers] != LEAF
     weight = links.factor * links.visibility
-    for channel in range(radiosity.shape[1]):
+    for channel in range(channels):
         arriving = nodes[links.source, channel]
         arriving[inner] = 0.0
         for quarter in range(4):
-            arriving[inner] += 0.25 * links.of_quarter[inner, quarter] * radiosity[children + quarter, channel]
+            arriving[inner] += 0.25 * links.of_quarter[inner, quarter] * means[children + quarter, channel]
         arriving *= weight
         irradiance[receivers, :, channel] = np.add.reduceat(arriving, first)[:, None]
         for quarter in range(4):

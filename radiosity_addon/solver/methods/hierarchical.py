@@ -21,11 +21,17 @@ from ..oracle import children_of_links, misplaced_power
 from ..power import light_power
 from ..scene import Scene
 from ..settings import SolverSettings
-from ..transport import gather, pull, push, push_pull
+from ..transport import gather, push, push_pull
 from ..visibility import RayCaster
 
-FIRST_SIZE = 0.4
-"""First links go to clusters whose radius is at most this part of their distance."""
+FIRST_SIZE = 0.5
+"""First links go to clusters whose radius is at most this part of their distance, …"""
+
+MIXED_SIZE = 0.2
+"""… or this part where their faces look different ways: some may be bright and turned away."""
+
+COHERENT = 0.9
+"""From this mean normal on, a cluster's faces look the same way."""
 
 COARSENING = (64.0, 16.0, 4.0, 1.0)
 """BF_ε of the rounds, in units of the final one: start coarse, tighten (our addition)."""
@@ -107,6 +113,7 @@ def first_links(hierarchy: Hierarchy, caster: RayCaster, seed: int) -> Links:
     middle = 0.5 * (clusters.upper + clusters.lower)
     half = 0.5 * (clusters.upper - clusters.lower)
     centre = faces.corners.mean(axis=1)
+    size = np.where(clusters.coherence >= COHERENT, FIRST_SIZE, MIXED_SIZE)
     own_radius = np.linalg.norm(faces.corners - centre[:, None], axis=2).max(axis=1)
 
     receiver = np.repeat(np.arange(len(faces)), len(hierarchy.roots))
@@ -123,7 +130,7 @@ def first_links(hierarchy: Hierarchy, caster: RayCaster, seed: int) -> Links:
         above = rise > 0
         receiver, source, along = receiver[above], source[above], along[above]
         distance = np.linalg.norm(along, axis=1)
-        small = radius[source] + own_radius[receiver] <= FIRST_SIZE * distance
+        small = radius[source] + own_radius[receiver] <= size[source] * distance
         ready_receiver.append(receiver[small])
         ready_source.append(source[small])
         parts.append(
@@ -175,8 +182,7 @@ def iterate(state: HierarchicalState, tolerance: float) -> None:
     )
     scale = state.conservation.factors(hierarchy, state.links)
     for _ in range(MAX_ITERATIONS):
-        shooting = pull(hierarchy, scale * state.radiosity)
-        gathered = push(hierarchy, gather(hierarchy, state.links, shooting))
+        gathered = push(hierarchy, gather(hierarchy, state.links, state.radiosity, scale))
         irradiance, radiosity = push_pull(hierarchy, lights, gathered, emission, reflectance)
         # One Jacobi step is the residual at the leaves: E + ρ K B − B.
         change = np.abs(radiosity[leaves] - state.radiosity[leaves])
