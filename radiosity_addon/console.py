@@ -126,12 +126,11 @@ def summary(where: str, files: Iterable[tuple[str, str]], report: dict[str, Any]
     count = len(report["objects"])
     lines = [f"{count} object{'' if count == 1 else 's'} baked into {where}"]
     lines += [f"  {name:<24} {what}" for name, what in files]
-    lines.append(
-        f"{solver['elements']:,} elements, {solver['links']:,} links, {solver['rays']:,} rays, "
-        f"closure {solver['closure_area_mean']:.4f}"
-        if solver.get("closure_area_mean") is not None
-        else f"{solver['elements']:,} elements, {solver['links']:,} links, {solver['rays']:,} rays"
-    )
+    lines.append(f"{solver['elements']:,} elements, {solver['links']:,} links, {solver['rays']:,} rays")
+    if solver.get("closure_area_mean") is not None:
+        lines.append(
+            f"share of light that meets a surface: {solver['closure_area_mean']:.4f} (closed scenes: 1)"
+        )
     seconds = report["seconds"]
     lines += [f"  {stage:<24} {taken:7.2f} s" for stage, taken in seconds.items()]
     lines.append(f"  {'total':<24} {sum(seconds.values()):7.2f} s")

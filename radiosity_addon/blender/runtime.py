@@ -104,7 +104,8 @@ def _parse(text: str) -> LastBake | None:
         if solver.get("residual") is not None:
             figures.append(("Residual", f"{solver['residual']:.1e}"))
         if solver.get("closure_area_mean") is not None:
-            figures.append(("Closure", f"{solver['closure_area_mean']:.4f}"))
+            # The share of light that meets a surface: 1 in a closed scene, less where it may leave.
+            figures.append(("Meets a surface", f"{solver['closure_area_mean']:.2%}"))
         return LastBake(
             figures=tuple(figures),
             warnings=tuple((str(name), str(message)) for name, message in record["warnings"]),

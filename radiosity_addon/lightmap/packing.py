@@ -4,7 +4,7 @@ Charts keep their shape and their common scale; each box starts on a texel's bor
 the texels that any two charts cover at least `GAP` texels stay free, and one at the page's
 border, so neither bilinear filtering nor dilation mixes charts. The packer of xatlas was
 measured and left aside: it stretches every chart to whole texels, spills into more pages without
-a limit on time, and cannot be run twice on one atlas (docs/decisions).
+a limit on time, and cannot be run twice on one atlas (docs/decisions/0005).
 """
 
 from __future__ import annotations

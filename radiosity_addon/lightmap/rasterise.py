@@ -39,7 +39,7 @@ _CENTRE = 2.0
 
 FOOTPRINT = 0.5
 """Width of a texel's footprint, in texels, where its centre is covered. Cycles' bake spreads its samples
-over just this middle part of a texel, not over the whole of it (docs/decisions)."""
+over just this middle part of a texel, not over the whole of it (docs/decisions/0010)."""
 
 _NOBODY = np.iinfo(np.int32).max
 
