@@ -7,9 +7,9 @@ pipeline between them knows nothing of Blender.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
-import numpy as np
-
+from .solver.arrays import Array
 from .solver.scene import Scene
 
 LIGHTMAP_UV_LAYER = "Lightmap"
@@ -47,9 +47,9 @@ class BakeObject:
     first: int
     count: int
     bake: bool
-    polygon: np.ndarray
-    loops: np.ndarray
-    uv: np.ndarray | None = None
+    polygon: Array
+    loops: Array
+    uv: Array | None = None
 
     @property
     def rows(self) -> slice:
@@ -96,8 +96,8 @@ class LightmapPage:
         True where a triangle covers part of the texel; the rest was dilated.
     """
 
-    pixels: np.ndarray
-    coverage: np.ndarray
+    pixels: Array
+    coverage: Array
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ class BakedObject:
     """
 
     object: BakeObject
-    uv: np.ndarray
+    uv: Array
     page: int
 
 
@@ -137,6 +137,6 @@ class BakeResult:
 
     pages: tuple[LightmapPage, ...]
     objects: tuple[BakedObject, ...]
-    solver: dict
+    solver: dict[str, Any]
     warnings: tuple[BakeWarning, ...]
     seconds: dict[str, float] = field(default_factory=dict)

@@ -21,7 +21,7 @@ from .bake_scene import (
     LightmapPage,
     Progress,
 )
-from .errors import SceneError
+from .errors import BakeError, SceneError
 from .lightmap.atlas import Atlas, AtlasInput, build_atlas
 from .lightmap.dilate import dilate
 from .lightmap.encode import to_quantity
@@ -61,7 +61,6 @@ def bake(bake_scene: BakeScene, settings: BakeSettings) -> Generator[Progress, N
         If the lightmaps cannot be laid out.
     """
     seconds: dict[str, float] = {}
-    quality = quality_of(settings)
     baked = [item for item in bake_scene.objects if item.bake and item.count]
     if not baked:
         raise SceneError("nothing to bake: give the scene a render-visible mesh with faces")
@@ -81,9 +80,10 @@ def bake(bake_scene: BakeScene, settings: BakeSettings) -> Generator[Progress, N
     yield Progress("encode", ENCODE)
     with _timed(seconds, "encode"):
         pages = _encode(bake_scene, geometry, light, settings)
+        _check(solution, pages)
 
     report = solution.final_report()
-    warnings = (*bake_scene.warnings, *atlas.warnings, *_no_light(bake_scene, solution))
+    warnings = (*bake_scene.warnings, *atlas.warnings, *_no_light(solution))
     objects = tuple(
         BakedObject(item, placed.uv, placed.page) for item, placed in zip(baked, atlas.objects, strict=True)
     )
@@ -167,7 +167,16 @@ def _encode(
     return tuple(pages)
 
 
-def _no_light(bake_scene: BakeScene, solution: Solution) -> tuple[BakeWarning, ...]:
+def _check(solution: Solution, pages: tuple[LightmapPage, ...]) -> None:
+    """Refuse to hand out a result that is not finite: a defect must not look like a dark room."""
+    if not np.isfinite(solution.report["residual"]) or not all(np.isfinite(p.pixels).all() for p in pages):
+        raise BakeError(
+            "the solution is not finite: this is a defect of the solver; please report the scene, "
+            "and try another quality meanwhile"
+        )
+
+
+def _no_light(solution: Solution) -> tuple[BakeWarning, ...]:
     """Warn where the lightmaps are black because nothing shines."""
     if solution.report["power_W"]["emitted"] > 0:
         return ()

@@ -9,7 +9,6 @@ Otherwise each object's kept layout is packed, as one chart of unchanged shape, 
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -23,6 +22,7 @@ from .charts import Charts, unwrap
 from .flatten import rescale_to_area, signed_double_area
 from .packing import Packing, pack
 from .rasterise import coverage_sum
+from .resting import Resting
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -34,8 +34,8 @@ _PROBE = 1024
 _OVERLAP = 1.01
 """A texel filled to more than this holds triangles that lie over each other."""
 
-_XATLAS_SETTLES = 0.001
-"""Seconds between xatlas' last work and its end: without, 4 of 109,000 calls hung; with, none of 730,000."""
+_resting = Resting()
+"""The latest of xatlas' atlases: destroyed right after their work they may hang."""
 
 
 @dataclass(frozen=True)
@@ -201,9 +201,7 @@ def grow_charts(vertices: Float, faces: Int) -> tuple[Float, Int]:
     chart = chart_of_vertex[indices[:, 0]].astype(np.int64)
     chart[chart == np.iinfo(np.uint32).max] = -1
     scale = np.array((max(atlas.width, 1), max(atlas.height, 1)), dtype=np.float64)
-    # Its threads miss the call to end if it comes in the moment before they wait for work, and its
-    # destructor then waits for ever. Let them get there first.
-    time.sleep(_XATLAS_SETTLES)
+    _resting.keep(atlas)
     return uv[indices].astype(np.float64) * scale, chart
 
 

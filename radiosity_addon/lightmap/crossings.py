@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..solver.arrays import Array
 from ..solver.local_pass import NOTHING
 from ..solver.visibility import RayCaster
 from .texel_geometry import NO_TEXEL, TexelGeometry
@@ -38,7 +39,7 @@ class Crossings:
             start, end = corners[:, _SEGMENTS[:, 0]], corners[:, _SEGMENTS[:, 1]]
             self.crossed[rows] = ~self._free(start, end).all(axis=1)
 
-    def _free(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    def _free(self, start: Array, end: Array) -> Array:
         """Return (n, k) whether segments between (n, k, 3) points meet nothing."""
         along = (end - start).reshape(-1, 3)
         length = np.linalg.norm(along, axis=1)
@@ -46,7 +47,7 @@ class Crossings:
         free = self._caster.visible(start.reshape(-1, 3), directions, length)
         return free.reshape(start.shape[:2])
 
-    def look_up(self, texel: np.ndarray, position: np.ndarray) -> np.ndarray:
+    def look_up(self, texel: Array, position: Array) -> Array:
         """Replace crossed texels by whole neighbours on the hit's own side.
 
         Parameters
@@ -68,7 +69,7 @@ class Crossings:
             result[chunk] = self._neighbour(texel[chunk], position[chunk])
         return result
 
-    def _neighbour(self, texel: np.ndarray, position: np.ndarray) -> np.ndarray:
+    def _neighbour(self, texel: Array, position: Array) -> Array:
         """Return (h,) the nearest whole neighbour visible from each hit, or NOTHING."""
         geometry = self._geometry
         around = np.full((len(texel), len(_AROUND)), NO_TEXEL, dtype=np.int32)

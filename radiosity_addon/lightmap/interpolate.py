@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..solver.arrays import Array
 from .texel_geometry import NO_TEXEL, TexelGeometry
 
 REACH = 0.35
@@ -38,12 +39,12 @@ class GatherPoints:
         self._geometry = geometry
         self.texel = np.zeros(0, dtype=np.int32)
         self.closeness = np.zeros(0)
-        self._levels: list[tuple[int, list[np.ndarray]]] = []
+        self._levels: list[tuple[int, list[Array]]] = []
 
     def __len__(self) -> int:
         return len(self.texel)
 
-    def add(self, stride: int, texel: np.ndarray, closeness: np.ndarray) -> None:
+    def add(self, stride: int, texel: Array, closeness: Array) -> None:
         """Add a level of points that lie on the lattice of every `stride`-th texel."""
         numbers = np.full(len(self._geometry), -1, dtype=np.int32)
         numbers[texel] = len(self) + np.arange(len(texel), dtype=np.int32)
@@ -57,7 +58,7 @@ class GatherPoints:
         self.texel = np.concatenate([self.texel, texel])
         self.closeness = np.concatenate([self.closeness, closeness])
 
-    def candidates(self, texels: np.ndarray) -> np.ndarray:
+    def candidates(self, texels: Array) -> Array:
         """Return (n, c) int32: gather points on the lattices around n texels, −1 for none."""
         geometry = self._geometry
         found = []
@@ -75,7 +76,7 @@ class GatherPoints:
             found.append(points.reshape(len(texels), -1))
         return np.concatenate(found, axis=1)
 
-    def kernel(self, texels: np.ndarray, points: np.ndarray) -> np.ndarray:
+    def kernel(self, texels: Array, points: Array) -> Array:
         """Return (n, c) weights in [0, 1] of candidate points for texels; 0 out of reach."""
         geometry = self._geometry
         of = self.texel[points]
@@ -87,7 +88,7 @@ class GatherPoints:
         weight = np.maximum(1.0 - change / REACH, 0.0) ** 2
         return np.where(points >= 0, weight, 0.0)
 
-    def support(self, texels: np.ndarray) -> np.ndarray:
+    def support(self, texels: Array) -> Array:
         """Return (n,) the summed weights around texels: below 1 they need a point of their own."""
         total = np.empty(len(texels))
         for first in range(0, len(texels), CHUNK):
@@ -109,11 +110,11 @@ class Interpolation:
         The entries of a texel sum to 1.
     """
 
-    first: np.ndarray
-    point: np.ndarray
-    weight: np.ndarray
+    first: Array
+    point: Array
+    weight: Array
 
-    def __call__(self, values: np.ndarray) -> np.ndarray:
+    def __call__(self, values: Array) -> Array:
         """Carry (g, k) values of the gather points to (n, k) of the texels."""
         result = np.empty((len(self.first), values.shape[1]))
         for channel in range(values.shape[1]):
@@ -142,9 +143,7 @@ def fit(points: GatherPoints, geometry: TexelGeometry) -> Interpolation:
     )
 
 
-def _nearest(
-    points: GatherPoints, geometry: TexelGeometry, texels: np.ndarray, candidates: np.ndarray
-) -> np.ndarray:
+def _nearest(points: GatherPoints, geometry: TexelGeometry, texels: Array, candidates: Array) -> Array:
     """Return (n, c) 0/1 weights that pick the nearest candidate (point 0 if there is none)."""
     along = geometry.position[points.texel[candidates]] - geometry.position[texels][:, None]
     distance = np.where(candidates >= 0, np.linalg.norm(along, axis=2), np.inf)
@@ -156,10 +155,10 @@ def _nearest(
 def _linear_weights(
     points: GatherPoints,
     geometry: TexelGeometry,
-    texels: np.ndarray,
-    candidates: np.ndarray,
-    kernel: np.ndarray,
-) -> np.ndarray:
+    texels: Array,
+    candidates: Array,
+    kernel: Array,
+) -> Array:
     """Return (n, c) weights that reproduce linear functions of the position as far as damping allows."""
     along = geometry.position[points.texel[candidates]] - geometry.position[texels][:, None]
     total = kernel.sum(axis=1, keepdims=True)

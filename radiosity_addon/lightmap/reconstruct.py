@@ -10,9 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
+from ..solver.arrays import Array
 from ..solver.local_pass import NOTHING, LocalPass, Resolver
 from ..solver.scene import Scene
 from ..solver.visibility import Hits
@@ -50,13 +52,11 @@ def reconstruct(
 ) -> Generator[float, None, TexelLight]:
     """Compute direct and indirect irradiance of all texels; yields the fraction done."""
     keys = np.arange(len(geometry))
-    lamps = local.direct(
-        geometry.position, geometry.normal, keys, geometry.sample, geometry.neighbourhood
-    )
+    lamps = local.direct(geometry.position, geometry.normal, keys, geometry.sample, geometry.neighbourhood)
     yield 0.3
     resolve = _resolver(local, geometry)
     points = GatherPoints(geometry)
-    sources: list[np.ndarray] = []
+    sources: list[Array] = []
     for number, stride in enumerate(settings.strides):
         chosen = _choose(points, geometry, stride, settings.support)
         found, closeness = local.gather(
@@ -66,7 +66,7 @@ def reconstruct(
             chosen,
             settings.rays,
             resolve,
-            lambda rows, u, chosen=chosen: geometry.sample(chosen[rows], u),
+            partial(_sample_of, geometry, chosen),
         )
         points.add(stride, chosen, closeness)
         sources.append(found)
@@ -79,7 +79,12 @@ def reconstruct(
     return light
 
 
-def _choose(points: GatherPoints, geometry: TexelGeometry, stride: int, support: float) -> np.ndarray:
+def _sample_of(geometry: TexelGeometry, chosen: Array, rows: Array, u: Array) -> Array:
+    """Spread points over the footprints of some of the chosen texels."""
+    return geometry.sample(chosen[rows], u)
+
+
+def _choose(points: GatherPoints, geometry: TexelGeometry, stride: int, support: float) -> Array:
     """Return the texels on a lattice that no point so far reaches."""
     on_lattice = (geometry.row % stride == 0) & (geometry.column % stride == 0)
     candidates = np.flatnonzero(on_lattice)
@@ -93,13 +98,10 @@ def _resolver(local: LocalPass, geometry: TexelGeometry) -> Resolver:
     """Number hits: texels by their own number, leaf elements after the texels."""
     crossings = Crossings(geometry, local.caster)
 
-    def resolve(hits: Hits) -> np.ndarray:
+    def resolve(hits: Hits) -> Array:
         texel = crossings.look_up(geometry.texel_at(hits), geometry.positions_of(hits))
         elsewhere = texel == NO_TEXEL
-        rest = Hits(
-            hits.triangle[elsewhere], hits.barycentric[elsewhere], hits.front[elsewhere], hits.distance[elsewhere]
-        )
-        leaf = local.leaves_of(rest)
+        leaf = local.leaves_of(hits.take(elsewhere))
         texel[elsewhere] = np.where(leaf == NOTHING, NOTHING, leaf + len(geometry))
         return texel
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..solver.arrays import Array
 from ..solver.local_pass import LocalPass, Resolver
 from ..solver.scene import Scene
 from .interpolate import Interpolation
@@ -33,8 +34,8 @@ LEAF_SWEEPS = 24
 class TexelLight:
     """Irradiance of n texels [W/m²], (n, 3) float64 each; their sum is the whole."""
 
-    direct: np.ndarray
-    indirect: np.ndarray
+    direct: Array
+    indirect: Array
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ class StoredLinks:
     spread : Interpolation
     """
 
-    sources: np.ndarray
+    sources: Array
     spread: Interpolation
 
 
@@ -57,7 +58,7 @@ def sweep(
     local: LocalPass,
     geometry: TexelGeometry,
     links: StoredLinks,
-    lamps: np.ndarray,
+    lamps: Array,
     resolve: Resolver,
     sweeps: int,
 ) -> TexelLight:
@@ -98,10 +99,10 @@ class _Leaves:
     def __init__(
         self,
         local: LocalPass,
-        sources: np.ndarray,
+        sources: Array,
         texel_count: int,
         resolve: Resolver,
-        table: np.ndarray,
+        table: Array,
     ) -> None:
         met = np.zeros(len(table), dtype=bool)
         known = np.zeros(len(table), dtype=bool)
@@ -123,14 +124,14 @@ class _Leaves:
             self._reflectance = local.leaf_reflectance(self._rows - texel_count)
             self._lamps = local.leaf_direct(self._rows - texel_count)
 
-    def sweep(self, table: np.ndarray) -> None:
+    def sweep(self, table: Array) -> None:
         """Update the leaves' rows of the table of reflected radiosity, among themselves to convergence."""
         for _ in range(LEAF_SWEEPS if len(self._rows) else 0):
             irradiance = self._lamps + _mean(table, self._sources)
             table[self._rows] = self._reflectance * irradiance
 
 
-def _mean(table: np.ndarray, sources: np.ndarray) -> np.ndarray:
+def _mean(table: Array, sources: Array) -> Array:
     """Return (g, 3): the mean of the table's rows each gather point saw."""
     result = np.empty((len(sources), 3))
     for first in range(0, len(sources), CHUNK_ROWS):

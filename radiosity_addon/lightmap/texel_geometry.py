@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..solver.arrays import Array
 from ..solver.scene import Scene
 from ..solver.visibility import Hits
 from .rasterise import Texels, sample_footprints
@@ -40,10 +41,10 @@ class TexelGeometry:
     def __init__(
         self,
         scene: Scene,
-        uv: np.ndarray,
-        page_of_triangle: np.ndarray,
+        uv: Array,
+        page_of_triangle: Array,
         texels: Sequence[Texels],
-        rows: Sequence[np.ndarray],
+        rows: Sequence[Array],
     ) -> None:
         self._scene, self._uv, self._page_of_triangle = scene, uv, page_of_triangle
         self._texels = list(texels)
@@ -51,7 +52,8 @@ class TexelGeometry:
         self.page = np.repeat(np.arange(len(texels), dtype=np.int32), np.diff(self._first))
         self.row = np.concatenate([page.row for page in texels])
         self.column = np.concatenate([page.column for page in texels])
-        self.triangle = np.concatenate([of[page.triangle] for of, page in zip(rows, texels, strict=True)]).astype(np.int32)
+        triangles = [of[page.triangle] for of, page in zip(rows, texels, strict=True)]
+        self.triangle = np.concatenate(triangles).astype(np.int32)
         weights = np.concatenate([page.centroid for page in texels]).astype(np.float64)
         self.barycentric = weights[:, 1:].astype(np.float32)
         self.position = _at(scene.triangles[self.triangle], weights[:, None])[:, 0]
@@ -75,7 +77,7 @@ class TexelGeometry:
         """Return the number of a page's first texel."""
         return int(self._first[page])
 
-    def sample(self, rows: np.ndarray, u: np.ndarray) -> np.ndarray:
+    def sample(self, rows: Array, u: Array) -> Array:
         """Return (r, k, 3) points spread over the footprints of r texels by u (r, k, 2)."""
         points = np.empty((len(rows), u.shape[1], 3))
         for number, page in enumerate(self._texels):
@@ -87,7 +89,7 @@ class TexelGeometry:
             points[mine] = _at(self._scene.triangles[self.triangle[rows[mine]]], weights)
         return points
 
-    def neighbourhood(self, chosen: np.ndarray) -> np.ndarray:
+    def neighbourhood(self, chosen: Array) -> Array:
         """Grow a (n,) mask of texels by one texel in all eight directions of their page."""
         grown = np.zeros(len(self), dtype=bool)
         for numbers in self.index:
@@ -99,12 +101,12 @@ class TexelGeometry:
             grown[numbers[inside]] = image[1:-1, 1:-1][inside]
         return grown
 
-    def positions_of(self, hits: Hits) -> np.ndarray:
+    def positions_of(self, hits: Hits) -> Array:
         """Return (h, 3) where rays hit; meaningless without a hit."""
         weights = np.concatenate([np.zeros((len(hits.triangle), 1)), hits.barycentric], axis=1)
         return _at(self._scene.triangles[hits.triangle], weights[:, None])[:, 0]
 
-    def texel_at(self, hits: Hits) -> np.ndarray:
+    def texel_at(self, hits: Hits) -> Array:
         """Return (h,) int32: the texel under each ray's hit; NO_TEXEL on backs and unbaked surfaces."""
         found = np.full(len(hits.triangle), NO_TEXEL, dtype=np.int32)
         baked = (hits.triangle >= 0) & hits.front
@@ -123,7 +125,7 @@ class TexelGeometry:
         return found
 
 
-def _at(corners: np.ndarray, weights: np.ndarray) -> np.ndarray:
+def _at(corners: Array, weights: Array) -> Array:
     """Return (n, k, 3) points at (n, k, 3) barycentric weights of (n, 3, 3) triangles.
 
     Along the edges from the first corner, whose own weight is not used: float32 weights that

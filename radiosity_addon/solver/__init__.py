@@ -42,8 +42,10 @@ def solve(scene: Scene, settings: SolverSettings | None = None) -> Solution:
 
 def solve_progress(scene: Scene, settings: SolverSettings) -> Generator[float, None, Solution]:
     """Solve step by step: yields the fraction done, returns the `Solution`."""
-    state = None
-    for fraction, state in solve_steps(scene, settings):
+    steps = solve_steps(scene, settings)
+    fraction, state = next(steps)
+    yield fraction
+    # The solver works on one state all along.
+    for fraction, _ in steps:
         yield fraction
-    assert state is not None
     return Solution(state)

@@ -1,7 +1,7 @@
 """Clusters: one binary tree above the faces, so that n faces need not link n times n.
 
-The tree is split level by level at the median of the widest axis of (position, ½ · box
-diagonal · normal): neighbours that face the same way stay together, so that low clusters
+The tree is split level by level at the median of the widest axis of (position, a share of
+the cluster's own diagonal · normal): neighbours that face the same way stay together, so that low clusters
 are pieces of one wall and only high ones mix directions.
 """
 
@@ -12,8 +12,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .arrays import Array
+
 if TYPE_CHECKING:
     from .hierarchy import Faces
+
+NORMAL_WEIGHT = 0.25
+"""Opposite normals count like this share of the cluster's diagonal, twice."""
 
 
 class Clusters:
@@ -36,7 +41,7 @@ class Clusters:
         Running sum of the faces' areas along `order`.
     """
 
-    def __init__(self, order: np.ndarray, start: np.ndarray, end: np.ndarray, children: np.ndarray) -> None:
+    def __init__(self, order: Array, start: Array, end: Array, children: Array) -> None:
         self.order, self.start, self.end, self.children = order, start, end, children
         self.lower = self.upper = np.zeros((0, 3))
         self.area = self.coherence = np.zeros(0)
@@ -63,14 +68,14 @@ class Clusters:
         self.lower[last] = np.minimum(self.lower[last], lower[-1])
         self.upper[last] = np.maximum(self.upper[last], upper[-1])
 
-    def average(self, values: np.ndarray, areas: np.ndarray) -> np.ndarray:
+    def average(self, values: Array, areas: Array) -> Array:
         """Return the (c, 3) area-weighted means of (f, 3) face `values`."""
         weighted = (values * areas[:, None])[self.order]
         before = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(weighted, axis=0)])
-        return np.asarray((before[self.end] - before[self.start]) / self.area[:, None])
+        return np.asarray((before[self.end] - before[self.start]) / np.maximum(self.area, 1e-300)[:, None])
 
 
-def build_clusters(faces: Faces, groups: Sequence[np.ndarray]) -> tuple[Clusters, np.ndarray]:
+def build_clusters(faces: Faces, groups: Sequence[Array]) -> tuple[Clusters, Array]:
     """Build a tree over each group of faces.
 
     Parameters
@@ -85,9 +90,7 @@ def build_clusters(faces: Faces, groups: Sequence[np.ndarray]) -> tuple[Clusters
     roots : (r,) int64
         One node per non-empty group.
     """
-    lower, upper = faces.corners.min(axis=1), faces.corners.max(axis=1)
-    diagonal = np.linalg.norm(upper.max(axis=0) - lower.min(axis=0)) if len(faces) else 0.0
-    position = np.concatenate([faces.corners.mean(axis=1), 0.5 * diagonal * faces.normal], axis=1)
+    position = np.concatenate([faces.corners.mean(axis=1), faces.normal], axis=1)
 
     order = np.concatenate([np.asarray(group, dtype=np.int64) for group in groups])
     sizes = np.array([len(group) for group in groups], dtype=np.int64)
@@ -131,13 +134,14 @@ def build_clusters(faces: Faces, groups: Sequence[np.ndarray]) -> tuple[Clusters
     return clusters, roots.astype(np.int64)
 
 
-def _sort_runs(order: np.ndarray, position: np.ndarray, start: np.ndarray, end: np.ndarray) -> None:
-    """Sort each run of `order` along the widest of the six axes of its positions, in place."""
+def _sort_runs(order: Array, position: Array, start: Array, end: Array) -> None:
+    """Sort each run of `order` along the widest axis of position and weighed normal, in place."""
     length = end - start
     run = np.repeat(np.arange(len(start)), length)
     first = np.cumsum(length) - length
     slots = np.arange(len(run)) - first[run] + start[run]
     local = position[order[slots]]
     width = np.maximum.reduceat(local, first, axis=0) - np.minimum.reduceat(local, first, axis=0)
+    width[:, 3:] *= NORMAL_WEIGHT * np.linalg.norm(width[:, :3], axis=1, keepdims=True)
     key = local[np.arange(len(run)), width.argmax(axis=1)[run]]
     order[slots] = order[slots][np.lexsort((key, run))]

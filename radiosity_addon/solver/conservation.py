@@ -8,7 +8,9 @@ power is made or lost, more with every bounce (6 % at a reflectance of 0.9).
 
 So rays find what share of each leaf's light arrives anywhere at all, in a closed scene
 simply all of it. What the leaf's own links leave of that is what it sends over shared ones:
-its radiosity is scaled when they take their mean. The factors in the links stay as they
+its radiosity is scaled when they take their mean. Where its own links alone send more than
+it has (faces that lie in one another are all hit), those are scaled too: so no leaf ever
+sends more than it has, and the iteration converges whatever the scene. The factors in the links stay as they
 are: what they add up to, and so what a coarse visibility loses, is reported as the closure.
 """
 
@@ -16,6 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .arrays import Array
 from .hierarchy import LEAF, Hierarchy
 from .light_links import sky_visibility
 from .links import Links
@@ -37,17 +40,18 @@ class Conservation:
         self._caster, self._seed = caster, seed
         self._arriving = np.zeros(0)
 
-    def factors(self, hierarchy: Hierarchy, links: Links) -> np.ndarray:
-        """Return (e, 1) what to scale the radiosity of each leaf with in its ancestors' means."""
+    def factors(self, hierarchy: Hierarchy, links: Links) -> Array:
+        """Return (e, 2): what to scale leaves' radiosity with, over own links and over shared ones."""
         self._measure(hierarchy)
         leaves = hierarchy.leaves
         sums = sent(hierarchy, links)
         own = sums[leaves].mean(axis=1)[:, 0]
         shared = push(hierarchy, sums + self._from_clusters(hierarchy, links))[leaves, 0] - own
-        # Never below 0, and no leaf sends more than it has: so the iteration converges.
-        left = np.maximum(self._arriving[leaves] - own, 0.0)
-        result = np.ones((hierarchy.n_elements, 1))
-        result[leaves, 0] = np.where(shared > 0, np.minimum(left / np.maximum(shared, 1e-300), LIMIT), 1.0)
+        arriving = self._arriving[leaves]
+        left = np.maximum(arriving - own, 0.0)
+        result = np.ones((hierarchy.n_elements, 2))
+        result[leaves, 0] = np.minimum(1.0, arriving / np.maximum(own, 1e-300))
+        result[leaves, 1] = np.where(shared > 0, np.minimum(left / np.maximum(shared, 1e-300), LIMIT), 1.0)
         return result
 
     def _measure(self, hierarchy: Hierarchy) -> None:
@@ -60,9 +64,8 @@ class Conservation:
         normals = hierarchy.normal[new]
         self._arriving[new] = 1.0 - sky_visibility(points, normals, RAYS, self._caster, new, self._seed + 42)
 
-
     @staticmethod
-    def _from_clusters(hierarchy: Hierarchy, links: Links) -> np.ndarray:
+    def _from_clusters(hierarchy: Hierarchy, links: Links) -> Array:
         """Return (e, 4, 1) the share that the links of the clusters above each face carry."""
         clusters, n_clusters = hierarchy.clusters, hierarchy.n_clusters
         total = np.zeros((hierarchy.n_elements, 4, 1))
@@ -77,7 +80,7 @@ class Conservation:
         return total
 
 
-def sent(hierarchy: Hierarchy, links: Links) -> np.ndarray:
+def sent(hierarchy: Hierarchy, links: Links) -> Array:
     """Return (e, 4, 1): the share of the light of each element's quarters that its own links carry.
 
     The transpose of `gather`, with reciprocity (handout (3.30)): Σ_r A_r F_rs V_rs / A_s.

@@ -6,8 +6,11 @@ far from the origin keeps its precision), batches on threads, the first query si
 
 from __future__ import annotations
 
+from threading import Lock
+
 import numpy as np
 
+from .arrays import Array
 from .parallel import for_chunks
 from .visibility import NO_HIT, Hits, surface_offset
 
@@ -29,11 +32,12 @@ class EmbreeCaster:
         0 means all cores. Results do not depend on it.
     """
 
-    def __init__(self, triangles: np.ndarray, threads: int = 0) -> None:
+    def __init__(self, triangles: Array, threads: int = 0) -> None:
         from embreex.mesh_construction import TriangleMesh
         from embreex.rtcore_scene import EmbreeScene
 
         self.rays = 0
+        self._counting = Lock()
         self.surface_offset = surface_offset(triangles)
         self._threads = threads
         self._empty = len(triangles) == 0
@@ -49,13 +53,14 @@ class EmbreeCaster:
         # The first query builds the hierarchy; it must not race with another thread's.
         self._scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32), query="OCCLUDED")
 
-    def visible(self, origins: np.ndarray, directions: np.ndarray, distances: np.ndarray) -> np.ndarray:
+    def visible(self, origins: Array, directions: Array, distances: Array) -> Array:
         """Return (n,) bool: nothing lies within `distances` along the unit `directions`."""
         count = len(origins)
         free = np.ones(count, dtype=bool)
         if self._empty or count == 0:
             return free
-        self.rays += count
+        with self._counting:
+            self.rays += count
 
         def trace(rows: slice) -> None:
             start = (origins[rows] - self._centre).astype(np.float32)
@@ -67,7 +72,7 @@ class EmbreeCaster:
         for_chunks(trace, count, CHUNK, self._threads)
         return free
 
-    def first_hits(self, origins: np.ndarray, directions: np.ndarray) -> Hits:
+    def first_hits(self, origins: Array, directions: Array) -> Hits:
         """Return what each ray meets first."""
         count = len(origins)
         triangle = np.full(count, NO_HIT, dtype=np.int32)
@@ -76,7 +81,8 @@ class EmbreeCaster:
         distance = np.full(count, np.inf, dtype=np.float32)
         if self._empty or count == 0:
             return Hits(triangle, barycentric, front, distance)
-        self.rays += count
+        with self._counting:
+            self.rays += count
 
         def trace(rows: slice) -> None:
             start = (origins[rows] - self._centre).astype(np.float32)

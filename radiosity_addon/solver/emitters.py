@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .arrays import Array
 from .form_factor import point_to_polygon
 from .hierarchy import Faces
 from .sampling import points_on_triangles
@@ -26,8 +27,10 @@ class EmitterGroup:
         Shadow rays end this far off the surface, so that they do not meet it.
     """
 
-    def __init__(self, corners: np.ndarray, normals: np.ndarray, strength: np.ndarray, offset: float) -> None:
+    def __init__(self, corners: Array, normals: Array, strength: Array, offset: float) -> None:
         self._corners, self._normals, self._offset = corners, normals, offset
+        edges = corners[:, 1:] - corners[:, :1]
+        self._areas = 0.5 * np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
         self.strength = strength
 
     @staticmethod
@@ -45,7 +48,7 @@ class EmitterGroup:
             for g, colour in enumerate(colours)
         ]
 
-    def unit_irradiance(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    def unit_irradiance(self, points: Array, normals: Array) -> Array:
         """Return (n,) the unoccluded irradiance per unit of exitance: Σ_m F(point → face m)."""
         gain = np.empty(len(points))
         step = max(CHUNK_PAIRS // len(self._corners), 1)
@@ -54,9 +57,7 @@ class EmitterGroup:
             gain[rows] = self._factors(points[rows], normals[rows]).sum(axis=1)
         return gain
 
-    def shadow_rays(
-        self, points: np.ndarray, normals: np.ndarray, u: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def shadow_rays(self, points: Array, normals: Array, u: Array) -> tuple[Array, Array, Array]:
         """Aim (n, k) rays at the faces in proportion to their factors; equal weights.
 
         Returns
@@ -74,7 +75,8 @@ class EmitterGroup:
         width = np.maximum(factors[rows, face], 1e-300)
         inside = np.stack([np.clip((pick - below) / width, 0.0, 1.0), u[..., 1]], axis=-1)
         corners = self._corners[face]
-        targets = points_on_triangles(corners.reshape(-1, 3, 3), inside.reshape(-1, 1, 2)).reshape(*face.shape, 3)
+        targets = points_on_triangles(corners.reshape(-1, 3, 3), inside.reshape(-1, 1, 2))
+        targets = targets.reshape(*face.shape, 3)
         along = targets + self._offset * self._normals[face] - points[:, None]
         distances = np.linalg.norm(along, axis=2)
         directions = along / np.maximum(distances, 1e-300)[..., None]
@@ -82,13 +84,10 @@ class EmitterGroup:
         cos_r = np.einsum("nkc,nc->nk", directions, normals)
         cos_s = -np.einsum("nkc,nkc->nk", directions, self._normals[face])
         kernel = np.maximum(cos_r, 0) * np.maximum(cos_s, 0) / (np.pi * np.maximum(distances, 1e-300) ** 2)
-        areas = 0.5 * np.linalg.norm(
-            np.cross(corners[..., 1, :] - corners[..., 0, :], corners[..., 2, :] - corners[..., 0, :]), axis=-1
-        )
-        weights = np.where(total > 0, kernel * areas / width, 0.0)
+        weights = np.where(total > 0, kernel * self._areas[face] / width, 0.0)
         return directions, distances, weights
 
-    def _factors(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    def _factors(self, points: Array, normals: Array) -> Array:
         """Return (n, m) form factors from points to faces."""
         count, faces = len(points), len(self._corners)
         shape = (count, faces, 3)

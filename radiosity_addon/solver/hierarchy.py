@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .arrays import Array
 from .clusters import Clusters, build_clusters
 from .scene import Scene
 
@@ -77,11 +78,17 @@ class Hierarchy:
         self.area = self.faces.area.copy()
         emits = self.faces.emission.max(axis=1, initial=0.0) > 0
         # Emitters are grouped apart: averaged into a cluster of dark faces a small lamp is
-        # missed by a few samples.
+        # missed by a few samples. So are backs: each lies where its front lies, unseen from
+        # wherever the front is seen.
         self.clusters: Clusters
-        self.roots: np.ndarray
+        self.roots: Array
         self.clusters, self.roots = build_clusters(
-            self.faces, [np.flatnonzero(~emits), np.flatnonzero(emits)]
+            self.faces,
+            [
+                np.flatnonzero(~emits & self.faces.front),
+                np.flatnonzero(~emits & ~self.faces.front),
+                np.flatnonzero(emits),
+            ],
         )
         """roots: the nodes that together hold every face once; first links start from them"""
 
@@ -96,16 +103,16 @@ class Hierarchy:
         return len(self.face)
 
     @property
-    def leaves(self) -> np.ndarray:
+    def leaves(self) -> Array:
         """(l,) int: the elements without children; they tile all faces."""
         return np.flatnonzero(self.first_child == LEAF)
 
     @property
-    def normal(self) -> np.ndarray:
+    def normal(self) -> Array:
         """(e, 3) float64: the unit normal of every element."""
-        return self.faces.normal[self.face]
+        return np.asarray(self.faces.normal[self.face])
 
-    def subdivide(self, elements: np.ndarray) -> None:
+    def subdivide(self, elements: Array) -> None:
         """Give four children to each of the distinct leaf `elements` (handout §4.2, Subdiv)."""
         if len(elements) == 0:
             return
@@ -118,7 +125,7 @@ class Hierarchy:
         self.level = np.concatenate([self.level, np.repeat(self.level[elements] + 1, 4).astype(np.int32)])
         self.area = np.concatenate([self.area, np.repeat(self.area[elements] / 4, 4)])
 
-    def leaf_at(self, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+    def leaf_at(self, face: Array, barycentric: Array) -> Array:
         """Find the leaf element under points of faces.
 
         Parameters
@@ -148,7 +155,7 @@ class Hierarchy:
         return element
 
 
-def split_in_four(corners: np.ndarray) -> np.ndarray:
+def split_in_four(corners: Array) -> Array:
     """Join the midpoints of the edges of (n, 3, 3) triangles.
 
     Returns

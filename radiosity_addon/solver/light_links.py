@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .arrays import Array
 from .hierarchy import LEAF, Hierarchy, split_in_four
-from .lights import EnvironmentLight, Lamp, Light
+from .lights import EnvironmentLight, Lamp, Light, SpotLight
 from .sampling import cosine_hemisphere, points_on_triangles, stratified_square, to_world
 from .visibility import RayCaster
 
@@ -16,6 +17,13 @@ LAMP_SAMPLES = 4
 """Shadow rays of each quarter of an element, each from a point of its own."""
 SKY_RAYS = 16
 """Hemisphere rays of each quarter of an element."""
+COARSEST = 512
+"""An element larger than the scene's area over this is split before light is looked for on it."""
+
+NEAR = 0.5
+"""So is one that looks larger than this (radius over distance) from the lamp, or than this part
+of a spot's cone."""
+
 CHUNK = 1 << 14
 """Elements measured at once; bounds the temporaries to some 60 MB."""
 
@@ -33,15 +41,15 @@ class LightLinks:
         Irradiance per unit of strength on each quarter of the receiver, visibility included.
     """
 
-    receiver: np.ndarray
-    light: np.ndarray
-    gain: np.ndarray
+    receiver: Array
+    light: Array
+    gain: Array
 
     def __len__(self) -> int:
         return len(self.receiver)
 
-    def irradiance(self, strengths: np.ndarray, n_elements: int) -> np.ndarray:
-        """Return (n_elements, 4, 3): each element's own share on its quarters, for (n_lights, 3) strengths."""
+    def irradiance(self, strengths: Array, n_elements: int) -> Array:
+        """Return (n_elements, 4, 3): each element's share on its quarters, for (n_lights, 3) strengths."""
         total = np.zeros((n_elements, 4, 3))
         for channel in range(3):
             for quarter in range(4):
@@ -56,7 +64,7 @@ def no_light_links() -> LightLinks:
     return LightLinks(none, none, np.zeros((0, 4), dtype=np.float32))
 
 
-def light_strengths(lights: Sequence[Light]) -> np.ndarray:
+def light_strengths(lights: Sequence[Light]) -> Array:
     """Return (n_lights, 3): what each light's gain is multiplied with."""
     return np.array([light.strength for light in lights], dtype=np.float64).reshape(-1, 3)
 
@@ -79,17 +87,23 @@ def link_lights(
         A_ε [m²]: no element becomes smaller.
     """
     receivers, numbers, gains = [], [], []
+    coarse_area = float(hierarchy.faces.area.sum()) / COARSEST
     for number, light in enumerate(lights):
         strength = float(np.max(light.strength))
-        if strength <= 0.0:
+        if strength <= 0.0 or not isinstance(light, Lamp | EnvironmentLight):
             continue
         waiting = np.arange(len(hierarchy.faces))
         while len(waiting):
-            gain, doubt = measure_light(hierarchy, light, caster, waiting, seed + 101 * number)
             area = hierarchy.area[waiting]
-            split = (doubt * area * strength > misplaced_power) & (
-                (hierarchy.first_child[waiting] != LEAF) | (area >= 4 * min_area)
+            may_split = (hierarchy.first_child[waiting] != LEAF) | (area >= 4 * min_area)
+            # Where few samples may miss the light altogether, they are not asked.
+            blind = may_split & ((area > coarse_area) | too_near(light, hierarchy, waiting))
+            gain, doubt = np.zeros((len(waiting), 4)), np.zeros(len(waiting))
+            seeing = np.flatnonzero(~blind)
+            gain[seeing], doubt[seeing] = measure_light(
+                hierarchy, light, caster, waiting[seeing], seed + 101 * number
             )
+            split = blind | (may_split & (doubt * area * strength > misplaced_power))
             kept = ~split & (gain.max(axis=1) > 0)
             receivers.append(waiting[kept])
             gains.append(gain[kept])
@@ -105,9 +119,31 @@ def link_lights(
     )
 
 
+def too_near(light: Light, hierarchy: Hierarchy, elements: Array) -> Array:
+    """Return (n,) whether a lamp's pool of light may fall between the samples on elements."""
+    position = getattr(light, "position", None)
+    if position is None:
+        return np.zeros(len(elements), dtype=bool)
+    corners = hierarchy.corners[elements]
+    centre = corners.mean(axis=1)
+    radius = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
+    along = centre - np.asarray(position)
+    distance = np.linalg.norm(along, axis=1)
+    before = np.einsum("nk,nk->n", along, hierarchy.normal[elements]) < 0
+    near = radius > NEAR * distance
+    if isinstance(light, SpotLight):
+        # The element's bounding sphere, as the lamp sees it, touches the cone and is not small beside it.
+        seen = np.arcsin(np.clip(radius / np.maximum(distance, 1e-300), 0.0, 1.0))
+        axis = np.asarray(light.direction)
+        off = np.arccos(np.clip(along @ axis / np.maximum(distance, 1e-300), -1.0, 1.0))
+        half = 0.5 * light.angle
+        near |= (off - seen < half) & (seen > NEAR * half)
+    return np.asarray(before & near)
+
+
 def measure_light(
-    hierarchy: Hierarchy, light: Lamp | EnvironmentLight, caster: RayCaster, elements: np.ndarray, seed: int
-) -> tuple[np.ndarray, np.ndarray]:
+    hierarchy: Hierarchy, light: Lamp | EnvironmentLight, caster: RayCaster, elements: Array, seed: int
+) -> tuple[Array, Array]:
     """Measure one light's irradiance on the quarters of elements, per unit of strength, and its doubt.
 
     Returns
@@ -143,8 +179,8 @@ def measure_light(
 
 
 def lamp_light(
-    light: Lamp, points: np.ndarray, normals: np.ndarray, unit: np.ndarray, caster: RayCaster
-) -> tuple[np.ndarray, np.ndarray]:
+    light: Lamp, points: Array, normals: Array, unit: Array, caster: RayCaster
+) -> tuple[Array, Array]:
     """Ask for a lamp's light at points, one shadow ray each.
 
     Parameters
@@ -179,8 +215,8 @@ def lamp_light(
 
 
 def sky_visibility(
-    points: np.ndarray, normals: np.ndarray, rays: int, caster: RayCaster, keys: np.ndarray, seed: int
-) -> np.ndarray:
+    points: Array, normals: Array, rays: int, caster: RayCaster, keys: Array, seed: int
+) -> Array:
     """Return (n,) the cosine-weighted share of each hemisphere that meets no surface.
 
     `points` are (n, 3), or (n, rays, 3) to start every ray elsewhere.

@@ -15,8 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .arrays import Array
 from .form_factor import point_to_polygon, triangle_to_triangle
 from .hierarchy import Hierarchy, split_in_four
+from .parallel import for_chunks
 from .sampling import hash_keys, points_on_triangles, stratified_square
 from .visibility import RayCaster
 
@@ -70,18 +72,18 @@ class Links:
         leaves below an inner element do not all inherit the same (a cluster's are all 1).
     """
 
-    receiver: np.ndarray
-    source: np.ndarray
-    factor: np.ndarray
-    visibility: np.ndarray
-    doubt: np.ndarray
-    to_quarter: np.ndarray
-    of_quarter: np.ndarray
+    receiver: Array
+    source: Array
+    factor: Array
+    visibility: Array
+    doubt: Array
+    to_quarter: Array
+    of_quarter: Array
 
     def __len__(self) -> int:
         return len(self.receiver)
 
-    def take(self, rows: np.ndarray) -> Links:
+    def take(self, rows: Array) -> Links:
         """Return the links of a boolean mask or of row numbers."""
         return Links(
             self.receiver[rows],
@@ -123,9 +125,10 @@ def join(parts: list[Links]) -> Links:
 def measure_links(
     hierarchy: Hierarchy,
     caster: RayCaster,
-    receiver: np.ndarray,
-    source: np.ndarray,
+    receiver: Array,
+    source: Array,
     seed: int,
+    threads: int = 0,
 ) -> Links:
     """Compute factor, visibility and doubt of new links; pairs that face away are left out.
 
@@ -137,32 +140,34 @@ def measure_links(
         Elements and nodes.
     seed : int
         Places the samples, together with the pair's own numbers.
+    threads : int
+        0 means all cores; the links do not depend on it.
 
     Returns
     -------
     links : Links
         At most n.
     """
-    parts = []
-    for first in range(0, len(receiver), CHUNK):
-        rows = slice(first, first + CHUNK)
-        parts.append(_measure_chunk(hierarchy, caster, receiver[rows], source[rows], seed))
-    return join(parts)
+    parts: dict[int, Links] = {}
+
+    def measure(rows: slice) -> None:
+        parts[rows.start] = _measure_chunk(hierarchy, caster, receiver[rows], source[rows], seed)
+
+    for_chunks(measure, len(receiver), CHUNK, threads)
+    return join([parts[start] for start in sorted(parts)])
 
 
 def _measure_chunk(
     hierarchy: Hierarchy,
     caster: RayCaster,
-    receiver: np.ndarray,
-    source: np.ndarray,
+    receiver: Array,
+    source: Array,
     seed: int,
 ) -> Links:
     is_cluster = source < hierarchy.n_clusters
     factor = np.zeros(len(receiver))
     single = np.flatnonzero(~is_cluster)
-    factor[single] = element_factors(
-        hierarchy, receiver[single], source[single] - hierarchy.n_clusters
-    )
+    factor[single] = element_factors(hierarchy, receiver[single], source[single] - hierarchy.n_clusters)
     kept = np.flatnonzero(is_cluster | (factor > 0))
     receiver, source, factor, is_cluster = receiver[kept], source[kept], factor[kept], is_cluster[kept]
 
@@ -202,8 +207,8 @@ def _measure_chunk(
 
 
 def _quarter_shares(
-    hierarchy: Hierarchy, receiver: np.ndarray, source: np.ndarray, samples: _PairSamples, passed: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+    hierarchy: Hierarchy, receiver: Array, source: Array, samples: _PairSamples, passed: Array
+) -> tuple[Array, Array]:
     """Share links out over their receiver's and source's quarters: two (n, 4) float32 of mean 1.
 
     In proportion to Lambert's factor at the quarters' centroids, times what the samples
@@ -229,10 +234,10 @@ def _quarter_shares(
 def _trace(
     caster: RayCaster,
     samples: _PairSamples,
-    rows: np.ndarray,
+    rows: Array,
     columns: slice,
-    traced: np.ndarray,
-    free: np.ndarray,
+    traced: Array,
+    free: Array,
 ) -> None:
     """Trace the samples of some links that carry light, and note the outcome."""
     chosen = np.zeros(traced.shape, dtype=bool)
@@ -253,9 +258,7 @@ class _PairSamples:
     Columns 0 to 3 already touch every quarter of both sides once.
     """
 
-    def __init__(
-        self, hierarchy: Hierarchy, receiver: np.ndarray, source: np.ndarray, seed: int
-    ) -> None:
+    def __init__(self, hierarchy: Hierarchy, receiver: Array, source: Array, seed: int) -> None:
         count = len(receiver)
         # Column 4a + q joins the receiver's quarter q to the source's quarter q xor (turn + a).
         pair = receiver.astype(np.int64) << 32 | source.astype(np.int64)
@@ -297,20 +300,19 @@ class _PairSamples:
             1.0,
         )
 
-
-    def by_quarter(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def by_quarter(self, values: Array) -> tuple[Array, Array]:
         """Average (n, 16) values over each of the receiver's and the source's quarters: two (n, 4)."""
         to = values.reshape(-1, 4, 4).mean(axis=1)
-        of = np.stack([np.where(self._source_quarter == q, values, 0.0).sum(axis=1) for q in range(4)], axis=1)
-        return to, of / 4.0
+        of = [np.where(self._source_quarter == q, values, 0.0).sum(axis=1) / 4.0 for q in range(4)]
+        return to, np.stack(of, axis=1)
 
 
 def kernel(
-    receiver_points: np.ndarray,
-    receiver_normals: np.ndarray,
-    source_points: np.ndarray,
-    source_normals: np.ndarray,
-) -> np.ndarray:
+    receiver_points: Array,
+    receiver_normals: Array,
+    source_points: Array,
+    source_normals: Array,
+) -> Array:
     """Return κ = G/π = cosθ_r cosθ_s / (π r²) [1/m²] without visibility (handout (2.20), (2.25)).
 
     All arguments (…, 3), broadcast against each other; 0 where either side faces away.
@@ -322,22 +324,23 @@ def kernel(
     return np.asarray(cos_r * cos_s / (np.pi * square * square))
 
 
-def _one_in_each(corners: np.ndarray, unit: np.ndarray) -> np.ndarray:
+def _one_in_each(corners: Array, unit: Array) -> Array:
     """Return (n, k, 3): a point in each of (n, k, 3, 3) triangles, placed by (n, k, 2)."""
     points = points_on_triangles(corners.reshape(-1, 3, 3), unit.reshape(-1, 1, 2))
     return points.reshape(*unit.shape[:2], 3)
 
 
-def sample_clusters(hierarchy: Hierarchy, cluster: np.ndarray, share: np.ndarray) -> np.ndarray:
+def sample_clusters(hierarchy: Hierarchy, cluster: Array, share: Array) -> Array:
     """Return the faces at (n, k) shares in [0, 1) of n clusters' areas."""
     clusters = hierarchy.clusters
     low = clusters.area_before[clusters.start[cluster]][:, None]
-    slot = np.searchsorted(clusters.area_before, low + share * clusters.area[cluster][:, None], side="right") - 1
+    at = low + share * clusters.area[cluster][:, None]
+    slot = np.searchsorted(clusters.area_before, at, side="right") - 1
     slot = np.clip(slot, clusters.start[cluster][:, None], clusters.end[cluster][:, None] - 1)
     return np.asarray(clusters.order[slot])
 
 
-def element_factors(hierarchy: Hierarchy, receiver: np.ndarray, source: np.ndarray) -> np.ndarray:
+def element_factors(hierarchy: Hierarchy, receiver: Array, source: Array) -> Array:
     """Return the unoccluded form factors F_rs between n pairs of elements (handout (3.27)).
 
     0 where either lies behind the other. Near pairs are exact, the others Lambert's formula,

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .arrays import Array
 from .emitters import EmitterGroup
-from .lights import EnvironmentLight, Light
+from .lights import EnvironmentLight, Lamp
 from .sampling import cosine_hemisphere, points_on_triangles, stratified_square, to_world
 from .visibility import Hits
 
@@ -30,10 +31,10 @@ MORE_SHADOW_RAYS = 8
 PENUMBRA_STEPS = 32
 """How far, in neighbours, a penumbra is followed from where few rays found it."""
 
-Sampler = Callable[[np.ndarray, np.ndarray], np.ndarray]
+Sampler = Callable[[Array, Array], Array]
 """(rows, u (r, k, 2)) → (r, k, 3): points of the rows' footprints."""
 
-Resolver = Callable[[Hits], np.ndarray]
+Resolver = Callable[[Hits], Array]
 """Hits → (n,) int32: the number under which a hit's radiosity will be looked up; SKY for none."""
 
 SKY = -1
@@ -53,13 +54,13 @@ class LocalPass:
 
     def direct(
         self,
-        points: np.ndarray,
-        normals: np.ndarray,
-        keys: np.ndarray,
+        points: Array,
+        normals: Array,
+        keys: Array,
         sampler: Sampler | None = None,
-        near: Callable[[np.ndarray], np.ndarray] | None = None,
+        near: Callable[[Array], Array] | None = None,
         rays: int | None = None,
-    ) -> np.ndarray:
+    ) -> Array:
         """Return the irradiance straight from lamps and emissive surfaces, the sky's apart.
 
         Parameters
@@ -83,7 +84,7 @@ class LocalPass:
         total = np.zeros((len(points), 3))
         shadow_rays = rays or self._state.settings.shadow_rays
         for number, light in enumerate(self._state.scene.lights):
-            if isinstance(light, EnvironmentLight) or not light.strength.any():
+            if not isinstance(light, Lamp) or not light.strength.any():
                 continue
             seed = self._seed + 31 + 7 * number
             gain = self._mean_gain(light, points, normals, keys, sampler, seed)
@@ -97,8 +98,8 @@ class LocalPass:
         return total
 
     def _mean_gain(
-        self, light: Light, points: np.ndarray, normals: np.ndarray, keys: np.ndarray, sampler: Sampler | None, seed: int
-    ) -> np.ndarray:
+        self, light: Lamp, points: Array, normals: Array, keys: Array, sampler: Sampler | None, seed: int
+    ) -> Array:
         """Return (n,) the unoccluded irradiance per unit of strength, a mean over the footprint."""
         if sampler is None:
             return light.unit_irradiance(points, normals)
@@ -110,16 +111,16 @@ class LocalPass:
 
     def _share(
         self,
-        light: Light | EmitterGroup,
-        points: np.ndarray,
-        normals: np.ndarray,
-        facing: np.ndarray,
-        keys: np.ndarray,
+        light: Lamp | EmitterGroup,
+        points: Array,
+        normals: Array,
+        facing: Array,
+        keys: Array,
         sampler: Sampler | None,
-        near: Callable[[np.ndarray], np.ndarray] | None,
+        near: Callable[[Array], Array] | None,
         rays: int,
         seed: int,
-    ) -> np.ndarray:
+    ) -> Array:
         """Return (n,) the unblocked share: few rays everywhere, many in penumbrae."""
         lit, total = np.zeros(len(points)), np.zeros(len(points))
         self._shadow(light, points, normals, np.flatnonzero(facing), keys, sampler, rays, seed, lit, total)
@@ -135,21 +136,22 @@ class LocalPass:
                 break
             many[rows] = True
             lit[rows] = total[rows] = 0.0
-            self._shadow(light, points, normals, rows, keys, sampler, rays * MORE_SHADOW_RAYS, seed, lit, total)
+            more = rays * MORE_SHADOW_RAYS
+            self._shadow(light, points, normals, rows, keys, sampler, more, seed, lit, total)
         return np.asarray(lit / np.where(total > 0, total, 1.0))
 
     def _shadow(
         self,
-        light: Light | EmitterGroup,
-        points: np.ndarray,
-        normals: np.ndarray,
-        rows: np.ndarray,
-        keys: np.ndarray,
+        light: Lamp | EmitterGroup,
+        points: Array,
+        normals: Array,
+        rows: Array,
+        keys: Array,
         sampler: Sampler | None,
         count: int,
         seed: int,
-        lit: np.ndarray,
-        total: np.ndarray,
+        lit: Array,
+        total: Array,
     ) -> None:
         """Add `count` shadow rays a row to the sums of unblocked and of all weights."""
         step = max(CHUNK_RAYS // count, 1)
@@ -170,20 +172,21 @@ class LocalPass:
                 distances = np.where(finite[..., 0], length, np.inf)
             start = start + self.caster.surface_offset * normal[:, None]
             point, sample = np.nonzero(weights > 0)
-            free = self.caster.visible(start[point, sample], directions[point, sample], distances[point, sample])
+            at = (point, sample)
+            free = self.caster.visible(start[at], directions[at], distances[at])
             lit[chunk] += np.bincount(point, free * weights[point, sample], minlength=len(chunk))
             total[chunk] += weights.sum(axis=1)
 
     def gather(
         self,
-        points: np.ndarray,
-        normals: np.ndarray,
-        surface_normals: np.ndarray,
-        keys: np.ndarray,
+        points: Array,
+        normals: Array,
+        surface_normals: Array,
+        keys: Array,
         rays: int,
         resolve: Resolver,
         sampler: Sampler | None = None,
-    ) -> tuple[np.ndarray, np.ndarray]:
+    ) -> tuple[Array, Array]:
         """Trace cosine-distributed rays and keep what they hit: links at the finest level.
 
         Parameters
@@ -221,7 +224,7 @@ class LocalPass:
             closeness[rows] = inverse.mean(axis=1)
         return sources, closeness
 
-    def leaves_of(self, hits: Hits) -> np.ndarray:
+    def leaves_of(self, hits: Hits) -> Array:
         """Return (n,) int32: the leaf element under each hit; SKY for none or a black back."""
         hierarchy = self._state.hierarchy
         face = hierarchy.faces.of_triangle[(~hits.front).astype(np.int8), hits.triangle]
@@ -230,21 +233,19 @@ class LocalPass:
         leaf[on_face] = hierarchy.leaf_at(face[on_face], hits.barycentric[on_face])
         return leaf
 
-    def reflected(self) -> np.ndarray:
+    def reflected(self) -> Array:
         """Return (e, 3): the part of every element's radiosity it does not emit itself [W/m²]."""
         hierarchy = self._state.hierarchy
         return np.asarray(hierarchy.faces.reflectance[hierarchy.face] * self._state.irradiance)
 
-    def reflected_at(self, triangle: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+    def reflected_at(self, triangle: Array, barycentric: Array) -> Array:
         """Return (n, 3): the same at points of triangles' fronts, (n, 2) weights of corners 2 and 3."""
         hierarchy = self._state.hierarchy
         face = hierarchy.faces.of_triangle[0, triangle]
         leaf = hierarchy.leaf_at(np.maximum(face, 0), barycentric)
         return np.where((face >= 0)[:, None], self.reflected()[leaf], 0.0)
 
-    def gather_at_leaves(
-        self, leaves: np.ndarray, rays: int, resolve: Resolver
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def gather_at_leaves(self, leaves: Array, rays: int, resolve: Resolver) -> tuple[Array, Array]:
         """Gather over whole leaf elements instead of points: (l, rays) sources and (l,) closeness."""
         corners = self._state.hierarchy.corners[leaves]
         normals = self._state.hierarchy.normal[leaves]
@@ -258,13 +259,13 @@ class LocalPass:
             lambda rows, u: points_on_triangles(corners[rows], u),
         )
 
-    def leaf_reflectance(self, leaves: np.ndarray) -> np.ndarray:
+    def leaf_reflectance(self, leaves: Array) -> Array:
         """Return (l, 3) the reflectance of leaf elements."""
         hierarchy = self._state.hierarchy
         return np.asarray(hierarchy.faces.reflectance[hierarchy.face[leaves]])
 
-    def leaf_direct(self, leaves: np.ndarray) -> np.ndarray:
-        """Return (l, 3) the irradiance of leaf elements straight from lamps and emissive faces, the sky's apart."""
+    def leaf_direct(self, leaves: Array) -> Array:
+        """Return (l, 3) the irradiance of leaf elements straight from lamps and emissive faces."""
         corners = self._state.hierarchy.corners[leaves]
         return self.direct(
             corners.mean(axis=1),
@@ -274,9 +275,8 @@ class LocalPass:
             rays=16,
         )
 
-    def sky(self) -> np.ndarray:
+    def sky(self) -> Array:
         """Return (3,) the radiosity equivalent πL of the sky [W/m²]."""
         lights = self._state.scene.lights
-        return sum(
-            (np.pi * light.strength for light in lights if isinstance(light, EnvironmentLight)), np.zeros(3)
-        )
+        skies = [light.strength for light in lights if isinstance(light, EnvironmentLight)]
+        return np.asarray(np.pi * np.sum(skies, axis=0)) if skies else np.zeros(3)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from .arrays import Array
 from .hierarchy import LEAF, Hierarchy
 from .links import Links
 from .transport import node_radiosity
 
 
-def misplaced_power(hierarchy: Hierarchy, links: Links, radiosity: np.ndarray) -> np.ndarray:
+def misplaced_power(hierarchy: Hierarchy, links: Links, radiosity: Array) -> Array:
     """Estimate the power each link may misplace [W]: B_s · A_r · doubt, the largest channel.
 
     The handout's Oracle2 compares the whole power B_s A_r F_rs with BF_ε. Weighed by its
@@ -24,7 +25,7 @@ def misplaced_power(hierarchy: Hierarchy, links: Links, radiosity: np.ndarray) -
     return np.asarray(brightest[links.source] * hierarchy.area[links.receiver] * links.doubt)
 
 
-def choose_side(hierarchy: Hierarchy, links: Links, min_area: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def choose_side(hierarchy: Hierarchy, links: Links, min_area: float) -> tuple[Array, Array, Array]:
     """Decide how each link would be refined.
 
     Clusters open first; otherwise the larger side splits, as the link varies most over it,
@@ -40,9 +41,7 @@ def choose_side(hierarchy: Hierarchy, links: Links, min_area: float) -> tuple[np
     source_area = hierarchy.area[element]
     receiver_area = hierarchy.area[links.receiver]
     # Subdiv: "has children or may get them".
-    source_may = ~open_source & (
-        (hierarchy.first_child[element] != LEAF) | (source_area >= 4 * min_area)
-    )
+    source_may = ~open_source & ((hierarchy.first_child[element] != LEAF) | (source_area >= 4 * min_area))
     receiver_may = ~open_source & (
         (hierarchy.first_child[links.receiver] != LEAF) | (receiver_area >= 4 * min_area)
     )
@@ -50,9 +49,7 @@ def choose_side(hierarchy: Hierarchy, links: Links, min_area: float) -> tuple[np
     return open_source, source_may & ~split_receiver, split_receiver
 
 
-def children_of_links(
-    hierarchy: Hierarchy, links: Links, min_area: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def children_of_links(hierarchy: Hierarchy, links: Links, min_area: float) -> tuple[Array, Array, Array]:
     """Replace links by links to or from their children (handout §4.2.1, RefineLink).
 
     Elements that have none yet get children. A link whose two sides are too small is not

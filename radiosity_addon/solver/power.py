@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .arrays import Array
 from .hierarchy import Faces, Hierarchy
-from .lights import AreaLight, EnvironmentLight, PointLight, SpotLight, SunLight
+from .light_base import Emitter
+from .lights import EnvironmentLight, SunLight
 from .sampling import cosine_hemisphere, points_on_triangles, stratified_square, to_world
 from .scene import Scene
 
@@ -39,7 +41,7 @@ def light_power(scene: Scene, faces: Faces) -> float:
             total = total + light.strength * float(np.abs(np.asarray(light.direction)) @ sides)
         elif isinstance(light, EnvironmentLight):
             total = total + np.pi * light.strength * float(sides.sum())
-        else:
+        elif isinstance(light, Emitter):
             total = total + light.flux
     return float(np.max(total))
 
@@ -58,7 +60,7 @@ def power_balance(state: HierarchicalState) -> dict[str, float]:
         if isinstance(light, SunLight | EnvironmentLight):
             arriving = float(gain[state.light_links.light == number].sum())
             emitted += arriving * float(light.strength.mean())
-        else:
+        elif isinstance(light, Emitter):
             emitted += float(light.flux.mean())
 
     kept = (1.0 - faces.reflectance[hierarchy.face[leaves]]) * state.irradiance[leaves]
@@ -98,7 +100,7 @@ def _follow_lamps(state: HierarchicalState) -> tuple[float, float]:
     black_total = escaped_total = 0.0
     count = ESCAPE_RAYS // 8
     for number, light in enumerate(state.scene.lights):
-        if not isinstance(light, PointLight | SpotLight | AreaLight) or not light.flux.any():
+        if not isinstance(light, Emitter) or not light.flux.any():
             continue
         seed = state.settings.seed + 21 + 2 * number
         place = stratified_square(np.zeros(1, np.int64), count, seed)[0]
@@ -111,7 +113,7 @@ def _follow_lamps(state: HierarchicalState) -> tuple[float, float]:
     return black_total, escaped_total
 
 
-def _fate(state: HierarchicalState, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _fate(state: HierarchicalState, origins: Array, directions: Array) -> tuple[Array, Array]:
     """Return (n,) whether rays end on a black back, and whether they leave the scene."""
     hits = state.caster.first_hits(origins, directions)
     escaped = hits.triangle < 0
@@ -119,7 +121,7 @@ def _fate(state: HierarchicalState, origins: np.ndarray, directions: np.ndarray)
     return ~escaped & (face < 0), escaped
 
 
-def closure(hierarchy: Hierarchy, state: HierarchicalState) -> np.ndarray:
+def closure(hierarchy: Hierarchy, state: HierarchicalState) -> Array:
     """Return (f,) the area mean over each face's leaves of ΣFV over own and inherited links.
 
     1 in a closed scene: all that leaves a face arrives somewhere.

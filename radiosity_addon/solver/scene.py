@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import SceneError
+from .arrays import Array
 from .lights import Light
 
 MAX_REFLECTANCE = 0.99
@@ -39,12 +40,12 @@ class Scene:
 
     def __init__(
         self,
-        triangles: np.ndarray,
-        reflectance: np.ndarray,
-        emission: np.ndarray,
-        two_sided: bool | np.ndarray = False,
+        triangles: Array,
+        reflectance: Array,
+        emission: Array,
+        two_sided: bool | Array = False,
         lights: Sequence[Light] = (),
-        normals: np.ndarray | None = None,
+        normals: Array | None = None,
     ) -> None:
         self.triangles = np.ascontiguousarray(triangles, dtype=np.float64)
         if self.triangles.ndim != 3 or self.triangles.shape[1:] != (3, 3):
@@ -52,7 +53,10 @@ class Scene:
         count = len(self.triangles)
         self.reflectance = np.minimum(_rgb_rows("reflectance", reflectance, count), MAX_REFLECTANCE)
         self.emission = _rgb_rows("emission", emission, count)
-        self.two_sided = np.broadcast_to(np.asarray(two_sided, dtype=bool), (count,)).copy()
+        sides = np.asarray(two_sided, dtype=bool)
+        if sides.shape not in ((), (count,)):
+            raise SceneError(f"two_sided has shape {sides.shape}; a bool or ({count},) is needed")
+        self.two_sided = np.broadcast_to(sides, (count,)).copy()
         self.lights = tuple(lights)
         if not np.isfinite(self.triangles).all():
             row = int(np.flatnonzero(~np.isfinite(self.triangles).all(axis=(1, 2)))[0])
@@ -72,13 +76,15 @@ class Scene:
             self.normals = np.ascontiguousarray(normals, dtype=np.float64)
             if self.normals.shape != self.triangles.shape:
                 raise SceneError(f"normals have shape {self.normals.shape}; {self.triangles.shape} is needed")
+            if not np.isfinite(self.normals).all():
+                raise SceneError("normals hold a value that is NaN or infinite")
         """(t, 3, 3) float64: shading normals at the corners"""
 
     def __len__(self) -> int:
         return len(self.triangles)
 
 
-def _rgb_rows(name: str, values: np.ndarray, count: int) -> np.ndarray:
+def _rgb_rows(name: str, values: Array, count: int) -> Array:
     """Return `values` as (count, 3) float64, refusing what is not finite and non-negative."""
     rows = np.asarray(values, dtype=np.float64)
     if rows.shape != (count, 3):

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from .arrays import Array
 from .local_pass import NOTHING, SKY, LocalPass
 from .methods.hierarchical import HierarchicalState
 from .power import closure, power_balance
@@ -62,7 +63,7 @@ class Solution:
         """The local pass over this solution: direct light and gather rays at points."""
         return LocalPass(self._state)
 
-    def irradiance(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    def irradiance(self, points: Array, normals: Array) -> Array:
         """Return the irradiance at points, direct and indirect.
 
         Parameters
@@ -87,7 +88,7 @@ class Solution:
         assert (NOTHING, SKY) == (-2, -1)  # they index the two rows appended
         return np.asarray(direct + radiosity[sources].mean(axis=1))
 
-    def _by_side(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _by_side(self, values: Array) -> tuple[Array, Array]:
         """Spread (f, k) face values over the triangles' fronts and backs: two (t, k)."""
         faces = self._state.hierarchy.faces
         sides = np.zeros((2, faces.of_triangle.shape[1], values.shape[1]))

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from .arrays import Array
 from .hierarchy import LEAF, Hierarchy
 from .links import Links
 
 
-def gather(
-    hierarchy: Hierarchy, links: Links, radiosity: np.ndarray, scale: np.ndarray | float = 1.0
-) -> np.ndarray:
+def gather(hierarchy: Hierarchy, links: Links, radiosity: Array, scale: Array | None = None) -> Array:
     """Collect the irradiance that arrives over each element's own links.
 
     H_r = Σ_s F_rs V_rs B_s over the links of receiver r (handout §4.2, Gather), shared out
@@ -23,8 +22,9 @@ def gather(
         Sorted by receiver.
     radiosity : (e, k) float64
         Of the leaves [W/m²]; other rows do not count.
-    scale : (e, 1) float64 or 1
-        What each leaf's radiosity is multiplied with in its ancestors' means (`conservation`).
+    scale : (e, 2) float64 or None
+        What each leaf's radiosity is multiplied with over its own links, and in its
+        ancestors' means (`conservation`).
 
     Returns
     -------
@@ -37,9 +37,11 @@ def gather(
         return irradiance
     first = np.flatnonzero(np.diff(links.receiver, prepend=-1))
     receivers = links.receiver[first]
-    means = pull(hierarchy, scale * radiosity)
+    scale = np.ones((len(radiosity), 2)) if scale is None else scale
+    means = pull(hierarchy, scale[:, 1:] * radiosity)
     nodes = node_radiosity(hierarchy, means)
-    nodes[hierarchy.n_clusters + hierarchy.leaves] = radiosity[hierarchy.leaves]
+    leaves = hierarchy.leaves
+    nodes[hierarchy.n_clusters + leaves] = scale[leaves, :1] * radiosity[leaves]
     child = np.full(len(nodes), LEAF, dtype=np.int64)
     child[hierarchy.n_clusters :] = hierarchy.first_child
     inner = np.flatnonzero(child[links.source] != LEAF)
@@ -59,7 +61,7 @@ def gather(
     return irradiance
 
 
-def push(hierarchy: Hierarchy, own: np.ndarray) -> np.ndarray:
+def push(hierarchy: Hierarchy, own: Array) -> Array:
     """Add to every element what its ancestors receive; radiosity is per area, so no factors.
 
     Parameters
@@ -79,7 +81,7 @@ def push(hierarchy: Hierarchy, own: np.ndarray) -> np.ndarray:
     return np.asarray(inherited + own.mean(axis=1))
 
 
-def pull(hierarchy: Hierarchy, at_leaves: np.ndarray) -> np.ndarray:
+def pull(hierarchy: Hierarchy, at_leaves: Array) -> Array:
     """Average the leaves' values upwards; the four children of an element have equal areas.
 
     Parameters
@@ -100,11 +102,11 @@ def pull(hierarchy: Hierarchy, at_leaves: np.ndarray) -> np.ndarray:
 
 def push_pull(
     hierarchy: Hierarchy,
-    lights: np.ndarray,
-    gathered: np.ndarray,
-    emission: np.ndarray,
-    reflectance: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
+    lights: Array,
+    gathered: Array,
+    emission: Array,
+    reflectance: Array,
+) -> tuple[Array, Array]:
     """Push irradiance to the leaves, reflect it there, and pull radiosity up (handout §4.2).
 
     Parameters
@@ -126,14 +128,14 @@ def push_pull(
     return pull(hierarchy, irradiance), radiosity
 
 
-def inner_by_level(hierarchy: Hierarchy) -> list[np.ndarray]:
+def inner_by_level(hierarchy: Hierarchy) -> list[Array]:
     """Return the elements with children, the coarsest level first."""
     inner = np.flatnonzero(hierarchy.first_child != LEAF)
     level = hierarchy.level[inner]
     return [inner[level == depth] for depth in range(int(level.max(initial=-1)) + 1)]
 
 
-def node_radiosity(hierarchy: Hierarchy, radiosity: np.ndarray) -> np.ndarray:
+def node_radiosity(hierarchy: Hierarchy, radiosity: Array) -> Array:
     """Put the clusters' area means above the elements' radiosity: (n_nodes, 3)."""
     faces = len(hierarchy.faces)
     clusters = hierarchy.clusters.average(radiosity[:faces], hierarchy.faces.area)

@@ -12,6 +12,8 @@ from typing import Protocol
 
 import numpy as np
 
+from .arrays import Array
+
 OFFSET_STEPS = 64
 """Ray origins leave the surface by this many float32 steps at the scene's border."""
 
@@ -34,10 +36,14 @@ class Hits:
         Along the unit direction [m]; infinite without a hit.
     """
 
-    triangle: np.ndarray
-    barycentric: np.ndarray
-    front: np.ndarray
-    distance: np.ndarray
+    triangle: Array
+    barycentric: Array
+    front: Array
+    distance: Array
+
+    def take(self, rows: Array) -> Hits:
+        """Return the hits of a boolean mask or of row numbers."""
+        return Hits(self.triangle[rows], self.barycentric[rows], self.front[rows], self.distance[rows])
 
 
 class RayCaster(Protocol):
@@ -48,16 +54,16 @@ class RayCaster(Protocol):
     rays: int
     """Rays traced so far."""
 
-    def visible(self, origins: np.ndarray, directions: np.ndarray, distances: np.ndarray) -> np.ndarray:
+    def visible(self, origins: Array, directions: Array, distances: Array) -> Array:
         """Return (n,) bool: nothing lies within `distances` along the unit `directions`."""
         ...
 
-    def first_hits(self, origins: np.ndarray, directions: np.ndarray) -> Hits:
+    def first_hits(self, origins: Array, directions: Array) -> Hits:
         """Return what each ray meets first."""
         ...
 
 
-def surface_offset(triangles: np.ndarray) -> float:
+def surface_offset(triangles: Array) -> float:
     """Return the distance [m] by which ray origins leave the surface of (t, 3, 3) `triangles`."""
     if len(triangles) == 0:
         return 1e-6
@@ -69,7 +75,7 @@ def surface_offset(triangles: np.ndarray) -> float:
 class BruteForceCaster:
     """Tests every ray against every triangle (Möller and Trumbore 1997): slow, obvious, the reference."""
 
-    def __init__(self, triangles: np.ndarray) -> None:
+    def __init__(self, triangles: Array) -> None:
         self._corner = np.asarray(triangles, dtype=np.float64)[:, 0]
         self._edge_1 = triangles[:, 1] - self._corner
         self._edge_2 = triangles[:, 2] - self._corner
@@ -77,11 +83,11 @@ class BruteForceCaster:
         self.surface_offset = surface_offset(triangles)
         self.rays = 0
 
-    def visible(self, origins: np.ndarray, directions: np.ndarray, distances: np.ndarray) -> np.ndarray:
+    def visible(self, origins: Array, directions: Array, distances: Array) -> Array:
         """See `RayCaster.visible`."""
         return np.asarray(self.first_hits(origins, directions).distance >= distances)
 
-    def first_hits(self, origins: np.ndarray, directions: np.ndarray) -> Hits:
+    def first_hits(self, origins: Array, directions: Array) -> Hits:
         """See `RayCaster.first_hits`."""
         self.rays += len(origins)
         cross_2 = np.cross(directions[:, None], self._edge_2[None])

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..arrays import Array
 from ..conservation import Conservation
 from ..embree import EmbreeCaster
 from ..hierarchy import Hierarchy
@@ -25,13 +26,20 @@ from ..transport import gather, push, push_pull
 from ..visibility import RayCaster
 
 FIRST_SIZE = 0.5
-"""First links go to clusters whose radius is at most this part of their distance, …"""
+"""First links go to clusters whose radius, with the face's own, is at most this part of their distance, …"""
 
-MIXED_SIZE = 0.2
+MIXED_SIZE = 0.3
 """… or this part where their faces look different ways: some may be bright and turned away."""
 
 COHERENT = 0.9
-"""From this mean normal on, a cluster's faces look the same way."""
+"""From this length of the mean normal on, a cluster's faces look the same way."""
+
+FIRST_FACES = 25_000
+"""Beyond so many faces each can afford fewer links, and the two sizes grow with the root of
+their number, …"""
+
+LARGEST_SIZE = 1.2
+"""… up to this."""
 
 COARSENING = (64.0, 16.0, 4.0, 1.0)
 """BF_ε of the rounds, in units of the final one: start coarse, tighten (our addition)."""
@@ -55,9 +63,9 @@ class HierarchicalState:
     conservation: Conservation
     power: float
     """The light's power Φ [W], the largest channel: the unit of BF_ε."""
-    irradiance: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    irradiance: Array = field(default_factory=lambda: np.zeros((0, 3)))
     """(e, 3) float64: area means over every element [W/m²]."""
-    radiosity: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    radiosity: Array = field(default_factory=lambda: np.zeros((0, 3)))
     """(e, 3) float64 [W/m²]"""
     iterations: int = 0
     residual: float = 0.0
@@ -74,9 +82,15 @@ def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float,
     caster = EmbreeCaster(scene.triangles, settings.threads)
     hierarchy = Hierarchy(scene)
     state = HierarchicalState(
-        scene, settings, hierarchy, caster, no_light_links(), no_links(), Conservation(caster, settings.seed), 0.0
+        scene=scene,
+        settings=settings,
+        hierarchy=hierarchy,
+        caster=caster,
+        light_links=no_light_links(),
+        links=no_links(),
+        conservation=Conservation(caster, settings.seed),
+        power=light_power(scene, hierarchy.faces),
     )
-    state.power = light_power(scene, hierarchy.faces)
     min_area = settings.min_area * float(hierarchy.faces.area.sum())
     yield 0.02, state
     if state.power == 0.0 or len(hierarchy.faces) == 0:
@@ -87,7 +101,7 @@ def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float,
         hierarchy, scene.lights, caster, LIGHT_SHARE * settings.error * state.power, min_area, settings.seed
     )
     yield 0.1, state
-    state.links = first_links(hierarchy, caster, settings.seed)
+    state.links = first_links(hierarchy, caster, settings)
     _reset(state)
     yield 0.3, state
 
@@ -103,7 +117,7 @@ def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float,
     yield 1.0, state
 
 
-def first_links(hierarchy: Hierarchy, caster: RayCaster, seed: int) -> Links:
+def first_links(hierarchy: Hierarchy, caster: RayCaster, settings: SolverSettings) -> Links:
     """Link every face to clusters that look small from it, and to single faces nearby.
 
     Starts from one pair per face and root; a cluster that looks too large is opened.
@@ -113,8 +127,10 @@ def first_links(hierarchy: Hierarchy, caster: RayCaster, seed: int) -> Links:
     middle = 0.5 * (clusters.upper + clusters.lower)
     half = 0.5 * (clusters.upper - clusters.lower)
     centre = faces.corners.mean(axis=1)
-    size = np.where(clusters.coherence >= COHERENT, FIRST_SIZE, MIXED_SIZE)
+    crowd = max(len(faces) / FIRST_FACES, 1.0) ** 0.5
     own_radius = np.linalg.norm(faces.corners - centre[:, None], axis=2).max(axis=1)
+    size = np.where(clusters.coherence >= COHERENT, FIRST_SIZE, MIXED_SIZE)
+    size = np.minimum(size * crowd, LARGEST_SIZE)
 
     receiver = np.repeat(np.arange(len(faces)), len(hierarchy.roots))
     source = np.tile(hierarchy.roots, len(faces))
@@ -133,9 +149,8 @@ def first_links(hierarchy: Hierarchy, caster: RayCaster, seed: int) -> Links:
         small = radius[source] + own_radius[receiver] <= size[source] * distance
         ready_receiver.append(receiver[small])
         ready_source.append(source[small])
-        parts.append(
-            measure_links(hierarchy, caster, np.concatenate(ready_receiver), np.concatenate(ready_source), seed)
-        )
+        pairs = np.concatenate(ready_receiver), np.concatenate(ready_source)
+        parts.append(measure_links(hierarchy, caster, *pairs, settings.seed, settings.threads))
         receiver = np.repeat(receiver[~small], 2)
         source = clusters.children[source[~small]].ravel()
     return join(parts).sorted_by_receiver()
@@ -160,7 +175,8 @@ def refine(state: HierarchicalState, threshold: float, min_area: float) -> int:
         return 0
     kept = np.ones(len(links), dtype=bool)
     kept[chosen[replaced]] = False
-    new = measure_links(hierarchy, state.caster, receiver, source, state.settings.seed)
+    settings = state.settings
+    new = measure_links(hierarchy, state.caster, receiver, source, settings.seed, settings.threads)
     state.links = join([links.take(kept), new]).sorted_by_receiver()
     # Children start with their parent's radiosity; a batch only ever adds one level.
     parents = hierarchy.parent[before:]

@@ -1,0 +1,53 @@
+"""Objects that must not be destroyed right after their work: they rest for a while first.
+
+xatlas ends its threads with a call that one of them misses if it is just about to wait for more
+work, and its destructor then waits for that thread for ever, with Python's lock held: the whole
+of Blender hangs. The moment is some ten instructions long, but a busy machine may suspend a thread
+just there: 4 of 109,000 atlases that were destroyed at once hung, and a rest of 1 ms was not enough.
+A thread that has been runnable for half a second has had its turn.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections import deque
+from collections.abc import Callable
+
+REST = 0.5
+"""Seconds."""
+
+MOST = max(8, min(256, 1024 // (os.cpu_count() or 1)))
+"""So many rest at once: each keeps as many threads as the machine has cores."""
+
+
+class Resting:
+    """Keeps objects alive until they have rested; older ones go whenever a new one comes.
+
+    Parameters
+    ----------
+    rest : float
+        Seconds that each is kept at least.
+    most : int
+        With more than this, `keep` waits for the oldest.
+    clock, sleep : callables
+        The time [s], and waiting for so many seconds.
+    """
+
+    def __init__(
+        self,
+        rest: float = REST,
+        most: int = MOST,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self._rest, self._most, self._clock, self._sleep = rest, most, clock, sleep
+        self._kept: deque[tuple[float, object]] = deque()
+
+    def keep(self, worked: object) -> None:
+        """Hold on to what has just done its work, and let go of what has rested."""
+        self._kept.append((self._clock() + self._rest, worked))
+        if len(self._kept) > self._most:
+            self._sleep(max(self._kept[0][0] - self._clock(), 0.0))
+        while self._kept and self._kept[0][0] <= self._clock():
+            self._kept.popleft()
