@@ -20,15 +20,15 @@ class Quality:
 QUALITIES = {
     "draft": Quality(
         SolverSettings(error=1e-3, min_area=1e-4, shadow_rays=4),
-        GatherSettings(strides=(8, 4, 2, 1), support=0.25, rays=128, sweeps=3),
+        GatherSettings(strides=(8, 4, 2, 1), support=0.25, rays=128),
     ),
     "medium": Quality(
         SolverSettings(error=1e-4, min_area=2e-5, shadow_rays=8),
-        GatherSettings(strides=(4, 2, 1), support=1.0, rays=256, sweeps=5),
+        GatherSettings(strides=(4, 2, 1), support=1.0, rays=256),
     ),
     "high": Quality(
         SolverSettings(error=3e-5, min_area=1e-5, shadow_rays=16),
-        GatherSettings(strides=(4, 2, 1), support=2.0, rays=1024, sweeps=8),
+        GatherSettings(strides=(4, 2, 1), support=2.0, rays=1024, sweeps=128),
     ),
 }
 

@@ -20,6 +20,9 @@ CHUNK = 1 << 16
 LIFT = 2.0
 """Segments run this many surface offsets above the surface."""
 
+INSET = 0.96
+"""Corners are drawn in to this part: a texel that ends at a wall is not crossed by it."""
+
 _CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]], dtype=np.float32)
 _SEGMENTS = np.array([[0, 2], [1, 3], [0, 1], [1, 2], [2, 3], [3, 0]])
 _AROUND = np.array([[r, c] for r in (-1, 0, 1) for c in (-1, 0, 1) if r or c])
@@ -34,7 +37,10 @@ class Crossings:
         """(n,) bool"""
         for first in range(0, len(geometry), CHUNK):
             rows = np.arange(first, min(first + CHUNK, len(geometry)))
-            corners = geometry.sample(rows, np.broadcast_to(_CORNERS, (len(rows), 4, 2)))
+            # The whole texel: hits land all over it, though its light comes from the middle.
+            corners = geometry.sample(rows, np.broadcast_to(_CORNERS, (len(rows), 4, 2)), 1.0)
+            centre = geometry.position[rows][:, None]
+            corners = centre + INSET * (corners - centre)
             corners += LIFT * caster.surface_offset * geometry.surface_normal[rows][:, None]
             start, end = corners[:, _SEGMENTS[:, 0]], corners[:, _SEGMENTS[:, 1]]
             self.crossed[rows] = ~self._free(start, end).all(axis=1)

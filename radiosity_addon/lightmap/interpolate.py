@@ -3,7 +3,8 @@
 A gather point may speak for a texel as far as irradiance can be expected to stay the
 same: distance times the mean closeness of what the point sees, plus the turn of the
 normal (the split-sphere estimate of Ward, Rubinstein and Clear 1988). Near a contact that
-reach goes to zero, so nothing is carried through a wall or across an edge.
+reach goes to zero. It must also see the texel, just above the surface: in the open the
+reach is long, and a wall thin.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..solver.arrays import Array
+from ..solver.visibility import RayCaster
 from .texel_geometry import NO_TEXEL, TexelGeometry
 
 REACH = 0.35
@@ -20,6 +22,12 @@ REACH = 0.35
 
 SLOPE_DAMPING = 0.05
 """Pull of the fitted slopes towards zero, relative to the spread of the points."""
+
+LIFT = 2.0
+"""Lines of sight run this many surface offsets above the surface, …"""
+
+SAGITTA = 0.4
+"""… and this part of distance · √(1 − cos of the turn) more: twice what a sphere needs."""
 
 CHUNK = 1 << 15
 """Texels whose candidates are weighed at once; bounds the temporaries to some 120 MB."""
@@ -35,8 +43,8 @@ class GatherPoints:
         Mean inverse distance seen from each point [1/m].
     """
 
-    def __init__(self, geometry: TexelGeometry) -> None:
-        self._geometry = geometry
+    def __init__(self, geometry: TexelGeometry, caster: RayCaster) -> None:
+        self._geometry, self._caster = geometry, caster
         self.texel = np.zeros(0, dtype=np.int32)
         self.closeness = np.zeros(0)
         self._levels: list[tuple[int, list[Array]]] = []
@@ -82,11 +90,20 @@ class GatherPoints:
         of = self.texel[points]
         along = geometry.position[of] - geometry.position[texels][:, None]
         turn = np.einsum("nck,nk->nc", geometry.normal[of], geometry.normal[texels])
-        change = np.linalg.norm(along, axis=2) * self.closeness[points]
-        change += np.sqrt(np.maximum(1.0 - turn, 0.0))
-        # A point below the texel's surface or above it by its distance lies round an edge.
-        weight = np.maximum(1.0 - change / REACH, 0.0) ** 2
-        return np.where(points >= 0, weight, 0.0)
+        distance = np.linalg.norm(along, axis=2)
+        bend = np.sqrt(np.maximum(1.0 - turn, 0.0))
+        change = distance * self.closeness[points] + bend
+        weight = np.where(points >= 0, np.maximum(1.0 - change / REACH, 0.0) ** 2, 0.0)
+        row, column = np.nonzero((weight > 0) & (distance > 0))
+        # Over a bulge the straight line dips below the surface, by an eighth of the distance
+        # times the turn of the normal: start and end that much higher.
+        lift = LIFT * self._caster.surface_offset + SAGITTA * (distance * bend)[row, column]
+        start = geometry.position[texels][row] + lift[:, None] * geometry.normal[texels][row]
+        end = geometry.position[of[row, column]] + lift[:, None] * geometry.normal[of[row, column]]
+        length = np.linalg.norm(end - start, axis=1)
+        directions = (end - start) / np.maximum(length, 1e-300)[:, None]
+        weight[row, column] *= self._caster.visible(start, directions, length)
+        return weight
 
     def support(self, texels: Array) -> Array:
         """Return (n,) the summed weights around texels: below 1 they need a point of their own."""

@@ -166,7 +166,7 @@ def coverage_sum(uv: Float32, resolution: int) -> Float:
     return total.reshape(resolution, resolution)
 
 
-def sample_footprints(texels: Texels, u: Float) -> Float32:
+def sample_footprints(texels: Texels, u: Float, width: float = FOOTPRINT) -> Float32:
     """Place area-uniform points in each texel's footprint.
 
     Parameters
@@ -177,6 +177,8 @@ def sample_footprints(texels: Texels, u: Float) -> Float32:
         Points of the unit square; stratified ones give stratified points, because the map
         from the square to the footprint keeps areas and is continuous within each triangle of
         the footprint's fan (whole texels take the square as it is).
+    width : float
+        Of the footprint where the centre is covered, in texels.
 
     Returns
     -------
@@ -186,7 +188,7 @@ def sample_footprints(texels: Texels, u: Float) -> Float32:
     result = np.empty((*u.shape[:2], 3), dtype=np.float32)
     for start in range(0, len(texels), CHUNK):
         part = texels.take(slice(start, start + CHUNK))
-        width = np.where(part.centre_inside, FOOTPRINT, 1.0)
+        width = np.where(part.centre_inside, width, 1.0)
         polygon, origin, whole = _clip(part.uv, part.resolution, part.triangle, part.row, part.column, width)
         points = np.array(u[start : start + CHUNK], dtype=np.float64)
         cut = np.flatnonzero(~whole)

@@ -38,13 +38,13 @@ class GatherSettings:
     rays : int
         A gather point.
     sweeps : int
-        Jacobi sweeps over the texels.
+        Jacobi sweeps over the texels, at most.
     """
 
     strides: tuple[int, ...] = (4, 2, 1)
     support: float = 1.0
     rays: int = 256
-    sweeps: int = 4
+    sweeps: int = 64
 
 
 def reconstruct(
@@ -55,7 +55,7 @@ def reconstruct(
     lamps = local.direct(geometry.position, geometry.normal, keys, geometry.sample, geometry.neighbourhood)
     yield 0.3
     resolve = _resolver(local, geometry)
-    points = GatherPoints(geometry)
+    points = GatherPoints(geometry, local.caster)
     sources: list[Array] = []
     for number, stride in enumerate(settings.strides):
         chosen = _choose(points, geometry, stride, settings.support)

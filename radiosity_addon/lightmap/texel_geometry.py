@@ -9,7 +9,7 @@ import numpy as np
 from ..solver.arrays import Array
 from ..solver.scene import Scene
 from ..solver.visibility import Hits
-from .rasterise import Texels, sample_footprints
+from .rasterise import FOOTPRINT, Texels, sample_footprints
 
 NO_TEXEL = -1
 
@@ -77,15 +77,15 @@ class TexelGeometry:
         """Return the number of a page's first texel."""
         return int(self._first[page])
 
-    def sample(self, rows: Array, u: Array) -> Array:
-        """Return (r, k, 3) points spread over the footprints of r texels by u (r, k, 2)."""
+    def sample(self, rows: Array, u: Array, width: float = FOOTPRINT) -> Array:
+        """Return (r, k, 3) points spread over the middle `width` of r texels by u (r, k, 2)."""
         points = np.empty((len(rows), u.shape[1], 3))
         for number, page in enumerate(self._texels):
             mine = np.flatnonzero(self.page[rows] == number)
             if len(mine) == 0:
                 continue
             local = rows[mine] - self._first[number]
-            weights = sample_footprints(page.take(local), u[mine])
+            weights = sample_footprints(page.take(local), u[mine], width)
             points[mine] = _at(self._scene.triangles[self.triangle[rows[mine]]], weights)
         return points
 

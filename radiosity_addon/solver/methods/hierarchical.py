@@ -25,7 +25,7 @@ from ..settings import SolverSettings
 from ..transport import gather, push, push_pull
 from ..visibility import RayCaster
 
-FIRST_SIZE = 0.5
+FIRST_SIZE = 0.4
 """First links go to clusters whose radius, with the face's own, is at most this part of their distance, …"""
 
 MIXED_SIZE = 0.3
