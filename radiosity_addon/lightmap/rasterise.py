@@ -188,12 +188,12 @@ def sample_footprints(texels: Texels, u: Float, width: float = FOOTPRINT) -> Flo
     result = np.empty((*u.shape[:2], 3), dtype=np.float32)
     for start in range(0, len(texels), CHUNK):
         part = texels.take(slice(start, start + CHUNK))
-        width = np.where(part.centre_inside, width, 1.0)
-        polygon, origin, whole = _clip(part.uv, part.resolution, part.triangle, part.row, part.column, width)
+        widths = np.where(part.centre_inside, width, 1.0)
+        polygon, origin, whole = _clip(part.uv, part.resolution, part.triangle, part.row, part.column, widths)
         points = np.array(u[start : start + CHUNK], dtype=np.float64)
         cut = np.flatnonzero(~whole)
         points[cut] = sample_polygons(polygon[cut], points[cut])
-        points[whole] = 0.5 + (points[whole] - 0.5) * width[whole, None, None]
+        points[whole] = 0.5 + (points[whole] - 0.5) * widths[whole, None, None]
         result[start : start + CHUNK] = _barycentric(points, origin)
     return result
 

@@ -81,7 +81,8 @@ def test_error_falls_with_the_threshold() -> None:
     errors = []
     for error in (1e-2, 1e-4):
         solution = solve(scene, SolverSettings(error=error))
-        means = [area_mean(solution.triangle_radiosity[surface == s], scene.areas[surface == s])[0] for s in range(6)]
+        rows = [surface == s for s in range(6)]
+        means = [area_mean(solution.triangle_radiosity[r], scene.areas[r])[0] for r in rows]
         exact = [CUBE_WITH_EMITTING_CEILING[min(s, WALLS)] for s in range(6)]
         errors.append(np.abs(np.array(means) - exact).max())
     assert errors[1] < 0.4 * errors[0]
@@ -150,7 +151,8 @@ def test_the_sides_of_a_wall_are_apart() -> None:
     front, back = solution.triangle_irradiance[-2:], solution.back_irradiance[-2:]
     assert (front > 1.0).all()  # the lit side faces +x
     assert back.max() < 1e-4 * front.min()
-    dark = solution.irradiance(np.array([[0.5, 0.5, 0.0], [0.0, 0.5, 0.5]]), np.array([[0, 0, 1.0], [1, 0, 0]]))
+    facing = np.array([[0, 0, 1.0], [1, 0, 0]])
+    dark = solution.irradiance(np.array([[0.5, 0.5, 0.0], [0.0, 0.5, 0.5]]), facing)
     lit = solution.irradiance(np.array([[1.5, 0.5, 0.0]]), np.array([[0, 0, 1.0]]))
     assert dark.max() < 0.02 * lit.min()
 
