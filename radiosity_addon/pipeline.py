@@ -83,7 +83,7 @@ def bake(bake_scene: BakeScene, settings: BakeSettings) -> Generator[Progress, N
         _check(solution, pages)
 
     report = solution.final_report()
-    warnings = (*bake_scene.warnings, *atlas.warnings, *_no_light(solution))
+    warnings = (*bake_scene.warnings, *atlas.warnings, *_of_solution(solution))
     objects = tuple(
         BakedObject(item, placed.uv, placed.page) for item, placed in zip(baked, atlas.objects, strict=True)
     )
@@ -176,17 +176,26 @@ def _check(solution: Solution, pages: tuple[LightmapPage, ...]) -> None:
         )
 
 
-def _no_light(solution: Solution) -> tuple[BakeWarning, ...]:
-    """Warn where the lightmaps are black because nothing shines."""
-    if solution.report["power_W"]["emitted"] > 0:
-        return ()
-    return (
-        BakeWarning(
-            "scene",
-            "no lamp, emissive material or world light reaches anything: the lightmaps are black; "
-            "add a lamp, or bake with a sky",
-        ),
-    )
+def _of_solution(solution: Solution) -> tuple[BakeWarning, ...]:
+    """Warn where nothing shines, or the solver had to stop at its budget of links."""
+    warnings = []
+    if solution.report["power_W"]["emitted"] == 0:
+        warnings.append(
+            BakeWarning(
+                "scene",
+                "no lamp, emissive material or world light reaches anything: the lightmaps are black; "
+                "add a lamp, or bake with a sky",
+            )
+        )
+    if solution.over_budget > 0:
+        warnings.append(
+            BakeWarning(
+                "scene",
+                f"refinement stopped at its budget of links; single links may misplace up to "
+                f"{solution.over_budget:.2%} of the light: bake at a lower quality, or fewer objects",
+            )
+        )
+    return tuple(warnings)
 
 
 @contextmanager

@@ -26,8 +26,8 @@ SLOPE_DAMPING = 0.05
 LIFT = 2.0
 """Lines of sight run this many surface offsets above the surface, …"""
 
-SAGITTA = 0.4
-"""… and this part of distance · √(1 − cos of the turn) more: twice what a sphere needs."""
+SAGITTA = 0.6
+"""… and this part of distance · √(1 − cos of the turn) more: what a sphere of few facets needs."""
 
 CHUNK = 1 << 15
 """Texels whose candidates are weighed at once; bounds the temporaries to some 120 MB."""

@@ -54,6 +54,11 @@ class Solution:
             "closure_area_mean": mean,
         }
 
+    @property
+    def over_budget(self) -> float:
+        """Largest share of the light's power a link may misplace that the link budget left; 0 if none."""
+        return self._state.over_budget
+
     def final_report(self) -> dict[str, Any]:
         """Return the report with the rays counted that were traced since solving."""
         return {**self.report, "rays": self._state.caster.rays}
