@@ -1,0 +1,110 @@
+"""Every leaf sends out what it has: the sums over links after scaling, and what follows from them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from radiosity_addon.solver import Scene
+from radiosity_addon.solver.conservation import LIMIT, Conservation, sent
+from radiosity_addon.solver.hierarchy import LEAF
+from radiosity_addon.solver.methods.hierarchical import HierarchicalState
+from radiosity_addon.solver.transport import gather
+from tests.rooms import CEILING, box_room, grey
+from tests.unit.solved_rooms import furnished, solved
+
+
+@pytest.fixture(scope="module")
+def closed() -> HierarchicalState:
+    return solved(furnished(), error=1e-3)
+
+
+def received(state: HierarchicalState, scale: np.ndarray | None) -> np.ndarray:
+    """Return (l,) the share of each leaf's light that all elements gather, by lighting one by one."""
+    hierarchy = state.hierarchy
+    leaves = hierarchy.leaves
+    radiosity = np.zeros((hierarchy.n_elements, len(leaves)))
+    radiosity[leaves, np.arange(len(leaves))] = 1.0
+    arriving = gather(hierarchy, state.links, radiosity, scale).mean(axis=1)
+    return np.asarray(hierarchy.area @ arriving / hierarchy.area[leaves])
+
+
+def test_every_leaf_sends_what_arrives(closed: HierarchicalState) -> None:
+    """In a closed scene all of it, but where there are too few shared links to carry the rest; never more."""
+    factor = closed.conservation.factors(closed.hierarchy, closed.links)[closed.hierarchy.leaves]
+    share = received(closed, closed.conservation.factors(closed.hierarchy, closed.links))
+    assert share.max() < 1 + 1e-4
+    enough = (factor[:, 1] < LIMIT) & (factor[:, 1] != 1)
+    assert enough.mean() > 0.8
+    np.testing.assert_allclose(share[enough], 1.0, atol=1e-4)
+
+
+def test_scaling_brings_the_sums_nearer_to_what_arrives(closed: HierarchicalState) -> None:
+    """And the area mean, which push and pull need, near to 1."""
+    hierarchy = closed.hierarchy
+    factor = closed.conservation.factors(hierarchy, closed.links)
+    area = hierarchy.area[hierarchy.leaves]
+    plain, scaled = received(closed, None), received(closed, factor)
+    assert area @ np.abs(scaled - 1) < 0.2 * (area @ np.abs(plain - 1))
+    assert area @ scaled / area.sum() == pytest.approx(1.0, abs=0.005)
+    assert area @ plain / area.sum() == pytest.approx(1.0, abs=0.02)
+
+
+def test_factors_are_bounded_and_only_the_leaves(closed: HierarchicalState) -> None:
+    hierarchy = closed.hierarchy
+    factor = closed.conservation.factors(hierarchy, closed.links)
+    assert factor.shape == (hierarchy.n_elements, 2)
+    assert (factor >= 0).all()
+    assert (factor <= [1.0, LIMIT]).all()
+    assert (factor[hierarchy.first_child != LEAF] == 1).all()
+
+
+def test_sent_is_the_transpose_of_gather(closed: HierarchicalState) -> None:
+    """Σ_r A_r F_rs V_rs / A_s, checked by lighting one leaf source after another."""
+    hierarchy, links = closed.hierarchy, closed.links
+    n = hierarchy.n_clusters
+    leaves = hierarchy.leaves
+    own = links.take((links.source >= n) & (hierarchy.first_child[np.maximum(links.source - n, 0)] == LEAF))
+    radiosity = np.zeros((hierarchy.n_elements, len(leaves)))
+    radiosity[leaves, np.arange(len(leaves))] = 1.0
+    arriving = gather(hierarchy, own, radiosity).mean(axis=1)
+    expected = hierarchy.area @ arriving / hierarchy.area[leaves]
+    shares = sent(hierarchy, links)[leaves, :, 0]
+    np.testing.assert_allclose(shares.mean(axis=1), expected, rtol=1e-4, atol=1e-7)
+
+
+def test_open_scene_sends_less() -> None:
+    """Without its ceiling a cube loses what goes up: F to it from the floor is 0.19982."""
+    room, surface = box_room()
+    kept = surface != CEILING
+    emission = grey(len(room), 0.0)
+    emission[surface == 0] = 1.0
+    state = solved(Scene(room[kept], grey(10, 0.5), emission[kept]), error=1e-3)
+    factor = state.conservation.factors(state.hierarchy, state.links)
+    share = received(state, factor)
+    hierarchy = state.hierarchy
+    face = hierarchy.face[hierarchy.leaves]
+    floor = face < 2
+    area = hierarchy.area[hierarchy.leaves]
+    assert area[floor] @ share[floor] / area[floor].sum() == pytest.approx(1 - 0.19982, abs=0.01)
+
+
+@pytest.mark.parametrize("reflectance", [0.9, 0.99])
+def test_the_iteration_converges_and_keeps_the_power(reflectance: float) -> None:
+    """No leaf sends more than it has, so a hundred bounces neither blow up nor fade."""
+    scene = furnished(reflectance)
+    state = solved(scene, error=1e-2, tolerance=1e-4)
+    assert state.residual < 1e-4
+    leaves = state.hierarchy.leaves
+    absorbed = (1 - reflectance) * state.hierarchy.area[leaves] @ state.irradiance[leaves]
+    emitted = scene.areas @ scene.emission
+    np.testing.assert_allclose(absorbed, emitted, rtol=0.02)
+
+
+def test_factors_do_not_depend_on_when_leaves_appeared() -> None:
+    """Rays of a leaf are placed by its own number: measured at once or as the solver refines, the same."""
+    state = solved(furnished(), error=2e-3)
+    fresh = Conservation(state.caster, state.settings.seed)
+    np.testing.assert_array_equal(
+        fresh.factors(state.hierarchy, state.links), state.conservation.factors(state.hierarchy, state.links)
+    )
