@@ -117,13 +117,12 @@ def test_chunks_do_not_show(monkeypatch):
         np.testing.assert_array_equal(getattr(whole, name), getattr(cut, name))
 
 
-def test_samples_lie_in_triangle_and_texel_and_are_uniform(monkeypatch):
-    monkeypatch.setattr(module, "FOOTPRINT", 1.0)
+def test_samples_lie_in_triangle_and_texel_and_are_uniform():
     rng = np.random.default_rng(2)
     uv = random_triangles(21, 2)
     texels = rasterise(uv, 9)
     u = np.stack(np.meshgrid((np.arange(24) + 0.5) / 24, (np.arange(24) + 0.5) / 24), axis=-1).reshape(-1, 2)
-    weights = sample_footprints(texels, np.broadcast_to(u, (len(texels), *u.shape))).astype(float)
+    weights = sample_footprints(texels, np.broadcast_to(u, (len(texels), *u.shape)), 1.0).astype(float)
     assert (weights >= 0).all()
     np.testing.assert_allclose(weights.sum(axis=2), 1, atol=1e-6)
     points = np.einsum("tkc,tcx->tkx", weights, uv[texels.triangle].astype(float) * 9)
@@ -153,11 +152,10 @@ def test_samples_keep_to_the_middle_where_the_centre_is_covered():
     assert away[~texels.centre_inside].max() > module.FOOTPRINT / 2
 
 
-def test_whole_texels_take_the_sample_as_it_is(monkeypatch):
-    monkeypatch.setattr(module, "FOOTPRINT", 1.0)
+def test_whole_texels_take_the_sample_as_it_is():
     texels = rasterise(SQUARE, 4)
     corner = texels.take((texels.row == 0) & (texels.column == 3))
-    weights = sample_footprints(corner, np.array([[[0.25, 0.75]]]))
+    weights = sample_footprints(corner, np.array([[[0.25, 0.75]]]), 1.0)
     np.testing.assert_allclose(weights[0, 0] @ SQUARE[0] * 4, (3.25, 0.75), atol=1e-6)
 
 

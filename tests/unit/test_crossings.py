@@ -1,0 +1,108 @@
+"""Texels that geometry cuts in two, and where their hits are looked up instead."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from radiosity_addon.lightmap.crossings import Crossings
+from radiosity_addon.lightmap.texel_geometry import NO_TEXEL
+from radiosity_addon.solver import Scene
+from radiosity_addon.solver.embree import EmbreeCaster
+from radiosity_addon.solver.local_pass import NOTHING
+from tests.rooms import grey, rectangle, solid_box
+from tests.unit.texel_scenes import QUAD_UV, texel_geometry
+
+SIZE = 16
+FLOOR = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0))
+
+
+def crossings_of(*others: np.ndarray) -> Crossings:
+    """A floor of 16 × 16 texels over the unit square, with other things on it that have no lightmap."""
+    triangles = np.concatenate([FLOOR, *others])
+    scene = Scene(triangles, grey(len(triangles), 0.5), grey(len(triangles), 0.0))
+    uv = np.zeros((len(triangles), 3, 2), dtype=np.float32)
+    uv[:2] = QUAD_UV
+    pages = np.full(len(triangles), -1)
+    pages[:2] = 0
+    return Crossings(texel_geometry(scene, uv, SIZE, pages), EmbreeCaster(triangles))
+
+
+def image(crossings: Crossings) -> np.ndarray:
+    return crossings.crossed[crossings._geometry.index[0]]
+
+
+def test_an_empty_floor_has_none() -> None:
+    assert not crossings_of().crossed.any()
+    # What hangs above, hides or covers does not cut.
+    assert not crossings_of(rectangle((-1, -1, 0.1), (3, 0, 0), (0, 3, 0))).crossed.any()
+
+
+@pytest.mark.parametrize("column", [0, 6, 16])
+def test_texels_that_end_at_a_wall_are_whole(column: int) -> None:
+    """Nothing cuts the border texels of a room's floor, nor those a wall parts from each other."""
+    at = column / SIZE
+    crossings = crossings_of(rectangle((at, -1, 0), (0, 3, 0), (0, 0, 1)))
+    assert not crossings.crossed.any()
+
+
+def test_a_wall_cuts_the_texels_it_stands_on() -> None:
+    at = 6.5 / SIZE
+    cut = image(crossings_of(rectangle((at, -1, -0.5), (0, 3, 0), (0, 0, 1))))
+    assert cut[:, 6].all()
+    assert cut.sum() == SIZE
+
+
+def test_the_rim_of_a_box_cuts_and_its_inside_does_not() -> None:
+    low, high = 4.5 / SIZE, 11.5 / SIZE
+    cut = image(crossings_of(solid_box((low, low, 0), (high, high, 0.5))))
+    expected = np.zeros((SIZE, SIZE), dtype=bool)
+    expected[4:12, 4:12] = True
+    expected[5:11, 5:11] = False
+    np.testing.assert_array_equal(cut, expected)
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_hits_on_a_cut_texel_go_to_their_own_side(side: int) -> None:
+    at = 6.5 / SIZE
+    crossings = crossings_of(rectangle((at, -1, -0.5), (0, 3, 0), (0, 0, 1)))
+    numbers = crossings._geometry.index[0]
+    rng = np.random.default_rng(1)
+    count = 200
+    row = rng.integers(0, SIZE, count)
+    position = np.stack(
+        [
+            at + side * rng.uniform(0.02, 0.48, count) / SIZE,
+            (row + rng.uniform(0.05, 0.95, count)) / SIZE,
+            0 * row,
+        ],
+        axis=1,
+    )
+    found = crossings.look_up(numbers[row, 6], position)
+    assert (found >= 0).all()
+    column = crossings._geometry.column[found]
+    assert (column == 6 + side).all()
+    assert (np.abs(crossings._geometry.row[found] - row) <= 1).all()
+
+
+def test_whole_texels_and_none_are_left_alone() -> None:
+    crossings = crossings_of(rectangle((6.5 / SIZE, -1, -0.5), (0, 3, 0), (0, 0, 1)))
+    geometry = crossings._geometry
+    whole = np.flatnonzero(~crossings.crossed).astype(np.int32)
+    texel = np.append(whole, NO_TEXEL).astype(np.int32)
+    position = np.append(geometry.position[whole], np.zeros((1, 3)), axis=0)
+    given = texel.copy()
+    np.testing.assert_array_equal(crossings.look_up(texel, position), given)
+    np.testing.assert_array_equal(texel, given)
+
+
+def test_without_a_whole_neighbour_there_is_nothing() -> None:
+    """Inside a box narrower than a texel no whole texel can be seen."""
+    low, high = 6.3 / SIZE, 6.7 / SIZE
+    crossings = crossings_of(solid_box((low, low, -0.1), (high, high, 0.5)))
+    texel = crossings._geometry.index[0][6, 6]
+    assert crossings.crossed[texel]
+    inside, outside = np.array([[6.5 / SIZE, 6.5 / SIZE, 0], [6.1 / SIZE, 6.5 / SIZE, 0]])
+    found = crossings.look_up(np.array([texel, texel], dtype=np.int32), np.stack([inside, outside]))
+    assert found[0] == NOTHING
+    assert found[1] == crossings._geometry.index[0][6, 5]

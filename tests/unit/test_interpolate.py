@@ -1,0 +1,180 @@
+"""Interpolating between gather points: what it reproduces, and what it never reaches across."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from radiosity_addon.lightmap.interpolate import GatherPoints, Interpolation, fit
+from radiosity_addon.lightmap.texel_geometry import TexelGeometry
+from radiosity_addon.solver import Scene
+from radiosity_addon.solver.embree import EmbreeCaster
+from tests.rooms import grey, rectangle, sphere
+from tests.unit.texel_scenes import QUAD_UV, in_cell, texel_geometry
+
+SIZE = 24
+
+
+def caster_of(geometry: TexelGeometry) -> EmbreeCaster:
+    return EmbreeCaster(geometry._scene.triangles)
+
+
+def geometry_of(*parts: np.ndarray, uv: np.ndarray | None = None) -> TexelGeometry:
+    triangles = np.concatenate(parts)
+    scene = Scene(triangles, grey(len(triangles), 0.5), grey(len(triangles), 0.0))
+    return texel_geometry(scene, QUAD_UV if uv is None else uv, SIZE)
+
+
+def points_of(geometry: TexelGeometry, *strides: int, closeness: float = 0.2) -> GatherPoints:
+    """Gather points on lattices, each level where the earlier ones are not."""
+    points = GatherPoints(geometry, caster_of(geometry))
+    for stride in strides:
+        chosen = np.flatnonzero((geometry.row % stride == 0) & (geometry.column % stride == 0))
+        chosen = np.setdiff1d(chosen, points.texel)
+        points.add(stride, chosen.astype(np.int32), np.full(len(chosen), closeness))
+    return points
+
+
+def weights_of(spread: Interpolation, points: GatherPoints, texels: int) -> np.ndarray:
+    """Return the (n, g) operator."""
+    matrix = np.zeros((texels, len(points)))
+    ends = np.append(spread.first[1:], len(spread.point))
+    for texel, (start, end) in enumerate(zip(spread.first, ends, strict=True)):
+        np.add.at(matrix[texel], spread.point[start:end], spread.weight[start:end])
+    return matrix
+
+
+PLANE = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0.5))
+
+
+@pytest.mark.parametrize("strides", [(4,), (4, 2), (4, 2, 1)])
+def test_constants_are_reproduced_and_every_texel_has_a_row(strides: tuple[int, ...]) -> None:
+    geometry = geometry_of(PLANE)
+    points = points_of(geometry, *strides)
+    spread = fit(points, geometry)
+    assert len(spread.first) == len(geometry)
+    assert (np.diff(np.append(spread.first, len(spread.point))) >= 1).all()
+    constant = spread(np.full((len(points), 3), 7.0))
+    np.testing.assert_allclose(constant, 7.0, rtol=1e-5)
+    matrix = weights_of(spread, points, len(geometry))
+    np.testing.assert_allclose(matrix.sum(axis=1), 1.0, atol=1e-5)
+    values = np.random.default_rng(0).normal(size=(len(points), 2))
+    np.testing.assert_allclose(spread(values), matrix @ values, atol=1e-5)
+
+
+def test_linear_fields_are_nearly_reproduced() -> None:
+    """Damped slopes: within a twelfth of what the field changes between two gather points."""
+    geometry = geometry_of(PLANE)
+    points = points_of(geometry, 4)
+    field = geometry.position @ np.array([[1.0], [-2.0], [0.5]])
+    got = fit(points, geometry)(field[points.texel])
+    step = (
+        np.abs(field[geometry.index[0][0, 4]] - field[geometry.index[0][0, 0]]).item()
+        + np.abs(field[geometry.index[0][4, 0]] - field[geometry.index[0][0, 0]]).item()
+    )
+    inside = (geometry.row < SIZE - 4) & (geometry.column < SIZE - 4)
+    assert np.abs(got - field)[inside].max() < 0.08 * step
+    # Without the fit a one-sided mean of the points is off by a good part of a step.
+    assert np.abs(got - field).max() < 0.4 * step
+
+
+def test_a_texel_that_is_a_point_of_a_dense_lattice_keeps_nearly_its_value() -> None:
+    geometry = geometry_of(PLANE)
+    points = points_of(geometry, 1, closeness=50.0)  # so close to something that no neighbour counts
+    matrix = weights_of(fit(points, geometry), points, len(geometry))
+    np.testing.assert_allclose(matrix[points.texel, np.arange(len(points))], 1.0, atol=1e-6)
+
+
+def test_nothing_is_carried_around_an_edge() -> None:
+    """Floor and wall side by side on the page: their normals turn by a right angle."""
+    floor = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0))
+    wall = rectangle((1, 0, 0), (0, 0, 1), (0, 1, 0))
+    uv = np.concatenate([in_cell((0, 0), (0.5, 1)), in_cell((0.5, 0), (1, 1))])
+    geometry = geometry_of(floor, wall, uv=uv)
+    points = points_of(geometry, 4, 2)
+    matrix = weights_of(fit(points, geometry), points, len(geometry))
+    on_floor = geometry.triangle < 2
+    across = matrix[np.ix_(on_floor, ~on_floor[points.texel])]
+    assert (on_floor[points.texel].any(), (~on_floor)[points.texel].any()) == (True, True)
+    assert not across.any()
+    assert not matrix[np.ix_(~on_floor, on_floor[points.texel])].any()
+
+
+@pytest.mark.parametrize("closeness", [0.0, 0.3])
+def test_nothing_is_carried_through_a_wall(closeness: float) -> None:
+    """However far a point in the open may speak, it does not for what it cannot see."""
+    wall = rectangle((0.4, -1, -0.5), (0, 3, 0), (0, 0, 1))
+    triangles = np.concatenate([rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0)), wall])
+    scene = Scene(triangles, grey(4, 0.5), grey(4, 0.0))
+    uv = np.concatenate([QUAD_UV, np.zeros_like(QUAD_UV)])
+    geometry = texel_geometry(scene, uv, SIZE, pages=np.array([0, 0, -1, -1]))
+    points = points_of(geometry, 8, 4, closeness=closeness)
+    left = geometry.position[:, 0] < 0.4
+    got = fit(points, geometry)(left[points.texel, None].astype(float))
+    np.testing.assert_allclose(got[:, 0], left, atol=1e-5)
+
+
+def test_over_a_dome_neighbours_see_each_other() -> None:
+    """A bulge between two points is no wall: seen whole, or the eye sees facets."""
+    dome = sphere(4)[:, [0, 2, 1]]
+    cell = np.stack(np.divmod(np.arange(len(dome)), 46), axis=1)[:, None] / 46
+    uv = np.zeros((len(dome), 3, 2))
+    uv[:, 1, 0] = uv[:, 2, 1] = 0.99 / 46
+    scene = Scene(dome, grey(len(dome), 0.5), grey(len(dome), 0.0), normals=dome)
+    geometry = texel_geometry(scene, (uv + cell).astype(np.float32), 46)
+    assert len(geometry) == len(dome)
+    points = GatherPoints(geometry, caster_of(geometry))
+    points.add(1, np.arange(len(geometry), dtype=np.int32), np.zeros(len(geometry)))
+    some = np.arange(0, len(geometry), 50)
+    away = np.linalg.norm(geometry.position[:, None] - geometry.position[some], axis=2)
+    near = np.argsort(away, axis=0)[1:9].T.astype(np.int32)
+    turn = np.einsum("nck,nk->nc", geometry.normal[near], geometry.normal[some])
+    reached = np.sqrt(1 - turn) < 0.3
+    assert reached.mean() > 0.9
+    assert (points.kernel(some, near)[reached] > 0).all()
+
+
+def test_charts_beside_each_other_on_the_page_and_far_apart_in_the_world_do_not_mix() -> None:
+    here, there = PLANE, PLANE + np.array([50.0, 0, 0])
+    uv = np.concatenate([in_cell((0, 0), (0.5, 1)), in_cell((0.5, 0), (1, 1))])
+    geometry = geometry_of(here, there, uv=uv)
+    points = points_of(geometry, 4, 2)
+    got = fit(points, geometry)((geometry.triangle[points.texel, None] < 2).astype(float))
+    np.testing.assert_allclose(got[:, 0], geometry.triangle < 2, atol=1e-5)
+
+
+def test_pages_do_not_mix() -> None:
+    triangles = np.concatenate([PLANE, PLANE + np.array([0, 0, 0.01])])
+    scene = Scene(triangles, grey(4, 0.5), grey(4, 0.0))
+    uv = np.concatenate([QUAD_UV, QUAD_UV])
+    geometry = texel_geometry(scene, uv, SIZE, pages=np.array([0, 0, 1, 1]))
+    points = points_of(geometry, 4)
+    got = fit(points, geometry)((geometry.page[points.texel, None] == 0).astype(float))
+    np.testing.assert_allclose(got[:, 0], geometry.page == 0, atol=1e-5)
+
+
+def test_support_falls_with_distance_and_closeness() -> None:
+    geometry = geometry_of(PLANE)
+    at = geometry.index[0][12, 8:17]
+    supports = []
+    for closeness in (0.2, 1.0, 5.0):
+        points = GatherPoints(geometry, caster_of(geometry))
+        points.add(4, np.array([at[0]], dtype=np.int32), np.array([closeness]))
+        support = points.support(at)
+        assert support[0] == pytest.approx(1.0, abs=1e-6)
+        assert (np.diff(support) <= 0).all()
+        supports.append(support)
+    assert (supports[0] >= supports[1]).all()
+    assert (supports[1] >= supports[2]).all()
+    assert supports[0][3] > supports[1][3] > supports[2][3]
+
+
+def test_a_texel_out_of_reach_takes_the_nearest_point() -> None:
+    geometry = geometry_of(PLANE)
+    points = points_of(geometry, 4, closeness=100.0)
+    matrix = weights_of(fit(points, geometry), points, len(geometry))
+    assert ((matrix > 0).sum(axis=1) == 1).all()
+    off = geometry.position[:, None] - geometry.position[points.texel][None]
+    nearest = np.linalg.norm(off, axis=2).min(axis=1)
+    chosen = np.linalg.norm(off, axis=2)[np.arange(len(geometry)), matrix.argmax(axis=1)]
+    np.testing.assert_allclose(chosen, nearest, rtol=1e-6)

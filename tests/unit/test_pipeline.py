@@ -1,0 +1,243 @@
+"""Whole bakes of hand-made scenes, without Blender."""
+
+from __future__ import annotations
+
+import gc
+import threading
+from collections.abc import Generator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from radiosity_addon.bake_scene import BakeResult, BakeScene, Progress
+from radiosity_addon.errors import SceneError
+from radiosity_addon.pipeline import bake
+from radiosity_addon.settings import BakeSettings
+from radiosity_addon.solver import EnvironmentLight, PointLight, Scene
+from tests.rooms import FLOOR, box_room, grey, rectangle, solid_box
+from tests.unit.texel_scenes import QUAD_UV, bake_object, bake_scene, in_cell
+
+
+def run(scene: BakeScene, **settings: Any) -> BakeResult:
+    steps = bake(scene, BakeSettings(**{"quality": "draft", "resolution": 48, **settings}))
+    fractions = []
+    while True:
+        try:
+            fractions.append(next(steps).fraction)
+        except StopIteration as done:
+            assert fractions == sorted(fractions)
+            assert fractions[0] >= 0
+            assert fractions[-1] <= 1
+            result: BakeResult = done.value
+            return result
+
+
+def texels(result: BakeResult, page: int = 0) -> np.ndarray:
+    """The (n, 3) covered texels of a page."""
+    return result.pages[page].pixels[result.pages[page].coverage]
+
+
+def lit_room(reflectance: float = 0.5, emission: float = 0.0, **changed: Any) -> BakeScene:
+    triangles, _ = box_room()
+    scene = Scene(triangles, grey(12, reflectance), grey(12, emission), **changed)
+    return bake_scene(scene, ("Room", 12))
+
+
+LAMP = PointLight((0.5, 0.4, 0.6), (10.0, 5.0, 2.0), radius=0.05)
+
+
+def test_uniform_enclosure_is_constant() -> None:
+    """Walls that emit E = 1 and reflect a half: H = 2, so H/π = 2/π in every texel."""
+    result = run(lit_room(emission=1.0))
+    np.testing.assert_allclose(texels(result), 2 / np.pi, rtol=0.01)
+    # Dilation carries the constant on.
+    np.testing.assert_allclose(result.pages[0].pixels, 2 / np.pi, rtol=0.01)
+    assert set(result.seconds) == {"unwrap", "rasterise", "solve", "light", "encode"}
+    assert result.warnings == ()
+
+
+def test_open_floor_under_a_sky_and_what_a_box_covers() -> None:
+    """L = 1: the open floor sees H = π, the floor under the closed box nothing at all."""
+    floor = rectangle((-4, -4, 0), (8, 0, 0), (0, 8, 0))
+    triangles = np.concatenate([floor, solid_box((-1, -1, 0), (1, 1, 1))])
+    scene = Scene(triangles, grey(14, 0.0), grey(14, 0.0), two_sided=True, lights=[EnvironmentLight(1.0)])
+    result = run(bake_scene(scene, ("Floor", 2, QUAD_UV), ("Box", 12, None, False)), resolution=64)
+    pixels = np.pi * result.pages[0].pixels
+    centre = (np.arange(64) + 0.5) / 8 - 4
+    reach = np.maximum(np.abs(centre)[:, None], np.abs(centre)[None, :])
+    assert not pixels[reach < 0.9].any()
+    np.testing.assert_allclose(pixels[reach > 3.9], np.pi, rtol=0.04)
+    assert (pixels[reach > 1.1] > 1.4).all()
+    # Texels away from the box see all of the sky but what the box hides; from the corner 0.5 %.
+    corners = pixels[[0, 0, -1, -1], [0, -1, 0, -1]]
+    np.testing.assert_allclose(corners, np.pi, rtol=0.02)
+
+
+def test_direct_and_indirect_are_parts_of_all() -> None:
+    every, direct, indirect = (
+        run(lit_room(lights=[LAMP]), light=light) for light in ("all", "direct", "indirect")
+    )
+    total = texels(direct).astype(float) + texels(indirect)
+    np.testing.assert_allclose(total, texels(every), rtol=1e-6, atol=1e-7)
+    assert texels(direct).max() > 0
+    assert (texels(indirect) > 0).all()
+
+
+@pytest.mark.parametrize("light", ["all", "direct", "indirect"])
+def test_quantities_relate_exactly(light: str) -> None:
+    """irradiance = π × irradiance_over_pi, radiosity = E + ρ × irradiance (E is no indirect light)."""
+    triangles, surface = box_room()
+    reflectance = np.tile([0.2, 0.5, 0.8], (12, 1))
+    emission = grey(12, 0.0)
+    emission[surface == FLOOR] = (1.0, 2.0, 3.0)
+    uv = np.tile(QUAD_UV, (6, 1, 1)) / 3 + np.stack([surface % 3, surface // 3], axis=1)[:, None] / 3
+    scene = bake_scene(
+        Scene(triangles, reflectance, emission, lights=[LAMP]), ("Room", 12, uv.astype(np.float32))
+    )
+    over_pi, irradiance, radiosity = (
+        run(scene, light=light, quantity=quantity, resolution=24).pages[0].pixels.astype(float)
+        for quantity in ("irradiance_over_pi", "irradiance", "radiosity")
+    )
+    np.testing.assert_allclose(irradiance, np.pi * over_pi, rtol=1e-6)
+    inner = np.zeros((24, 24), dtype=bool)
+    inner[:16] = True  # the six cells fill the lower two thirds: no dilated texel there
+    emitted = np.zeros((24, 24, 3))
+    emitted[:8, :8] = (1.0, 2.0, 3.0) if light != "indirect" else 0.0
+    expected = emitted + irradiance * [0.2, 0.5, 0.8]
+    np.testing.assert_allclose(radiosity[inner], expected[inner], rtol=1e-6, atol=1e-7)
+
+
+def test_no_seam_between_coplanar_charts() -> None:
+    """Two halves of one wall in charts of their own: across the joint they differ no more than inside."""
+    room, _ = box_room((2, 1, 1))
+    halves = [rectangle((x, 0, 0), (1, 0, 0), (0, 1, 0)) for x in (0, 1)]
+    triangles = np.concatenate([*halves, room[2:]])
+    lamp = PointLight((0.9, 0.5, 0.5), 10.0, radius=0.05)
+    scene = Scene(triangles, grey(14, 0.7), grey(14, 0.0), lights=[lamp])
+    uv = [in_cell((0, 0), (0.5, 0.5)), in_cell((0.5, 0.5), (1, 1))]
+    parts = (("Left", 2, uv[0]), ("Right", 2, uv[1]), ("Rest", 10, None, False))
+    pixels = run(bake_scene(scene, *parts), resolution=64, quality="medium").pages[0].pixels
+    left, right = pixels[:32, :32], pixels[32:, 32:]
+    step = np.maximum(np.abs(left[:, -1] - left[:, -2]), np.abs(right[:, 1] - right[:, 0])).mean()
+    joint = np.abs(right[:, 0] - left[:, -1]).mean()
+    assert joint < 1.5 * step
+    assert joint < 0.05 * pixels[:32].mean()
+
+
+def test_a_sealed_room_inside_a_lit_one_stays_black() -> None:
+    """Walls of a single plane, two-sided: no texel inside gets more than a thousandth of the mean outside."""
+    outer, _ = box_room((3, 3, 3))
+    inner, _ = box_room((1, 1, 1))
+    inner = inner + np.array([1.0, 1.0, 0.0])  # it stands on the floor, which runs on inside
+    triangles = np.concatenate([outer, inner[2:]])
+    count = len(triangles)
+    lamp = PointLight((0.5, 0.5, 2.5), 100.0, radius=0.1)
+    scene = Scene(triangles, grey(count, 0.8), grey(count, 0.0), two_sided=True, lights=[lamp])
+    floor = in_cell((0, 0), (0.75, 0.75))
+    uv = np.concatenate([floor, np.zeros((count - 2, 3, 2), np.float32)])
+    sides = count - 12
+    # The inner room's fronts look inwards, so its lightmap is that of the dark side.
+    parts = (("Floor", 2, uv[:2]), ("Outer", 10, None, False), ("Inner", sides))
+    result = run(bake_scene(scene, *parts), resolution=64, atlas="per-object")
+    floor_page, inner_page = result.pages
+    mean = texels(result).mean()
+    assert mean > 0.1
+    assert inner_page.pixels[inner_page.coverage].max() < 1e-3 * mean
+    # Texels of the floor that lie wholly inside the walls.
+    centre = (np.arange(64) + 0.5) / 64 / 0.75 * 3
+    inside = (np.abs(centre - 1.5) < 0.5 - 2 * 3 / 48) & (centre < 3)
+    covered = floor_page.pixels[np.ix_(inside, inside)]
+    assert covered.size > 0
+    assert covered.max() < 1e-3 * mean
+
+
+def test_threads_change_no_byte_and_the_seed_does() -> None:
+    scene = lit_room(lights=[LAMP, EnvironmentLight(0.1)])
+    one, two, other = (run(scene, threads=threads, seed=seed) for threads, seed in ((1, 0), (2, 0), (2, 1)))
+    assert one.pages[0].pixels.tobytes() == two.pages[0].pixels.tobytes()
+    assert one.solver == two.solver
+    assert one.objects[0].uv.tobytes() == two.objects[0].uv.tobytes()
+    assert one.pages[0].pixels.tobytes() != other.pages[0].pixels.tobytes()
+
+
+def three_objects() -> BakeScene:
+    room, _ = box_room((3, 3, 3))
+    boxes = [solid_box((x, 1, 0.5), (x + 0.5, 1.5, 1)) for x in (0.5, 2.0)]
+    triangles = np.concatenate([room, *boxes])
+    scene = Scene(triangles, grey(36, 0.5), grey(36, 0.0), lights=[PointLight((1.5, 1.5, 2.5), 50.0)])
+    return bake_scene(scene, ("Room", 12), ("Idle", 12, None, False), ("Box", 12))
+
+
+def test_a_page_an_object_or_one_for_all() -> None:
+    apart, shared = run(three_objects(), atlas="per-object"), run(three_objects(), atlas="shared")
+    assert [(item.object.name, item.page) for item in apart.objects] == [("Room", 0), ("Box", 1)]
+    assert [(item.object.name, item.page) for item in shared.objects] == [("Room", 0), ("Box", 0)]
+    assert len(apart.pages) == 2
+    assert len(shared.pages) == 1
+    for result in (apart, shared):
+        for page in result.pages:
+            assert page.pixels.shape == (48, 48, 3)
+            assert page.pixels.dtype == np.float32
+            assert np.isfinite(page.pixels).all()
+            assert page.coverage.any()
+        for item in result.objects:
+            assert item.uv.shape == (item.object.count, 3, 2)
+            assert item.uv.min() >= 0
+            assert item.uv.max() <= 1
+    # The same light on the same surfaces, whatever the page.
+    assert texels(apart, 0).mean() == pytest.approx(texels(shared).mean(), rel=0.15)
+
+
+def test_kept_uvs_come_back_bit_for_bit() -> None:
+    uv = in_cell((0.1, 0.2), (0.7, 0.9))
+    floor = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0))
+    scene = Scene(floor, grey(2, 0.5), grey(2, 0.0), lights=[EnvironmentLight(1.0)])
+    result = run(bake_scene(scene, ("Floor", 2, uv)), resolution=20)
+    np.testing.assert_array_equal(result.objects[0].uv, uv)
+    rows, columns = np.nonzero(result.pages[0].coverage)
+    assert (rows.min(), rows.max(), columns.min(), columns.max()) == (4, 17, 2, 13)
+
+
+@pytest.mark.parametrize("steps", [1, 3, 6, 12])
+def test_closing_the_generator_leaves_nothing_running(steps: int) -> None:
+    before = {thread.ident for thread in threading.enumerate()}
+    running: Generator[Progress, None, BakeResult] = bake(
+        lit_room(lights=[LAMP]), BakeSettings(quality="draft", resolution=32)
+    )
+    stages = [next(running).stage for _ in range(steps)]
+    assert stages[0] == "unwrap"
+    running.close()
+    gc.collect()
+    assert {thread.ident for thread in threading.enumerate()} <= before
+    with pytest.raises(StopIteration):
+        next(running)
+
+
+def test_without_light_it_is_black_and_says_so() -> None:
+    result = run(lit_room())
+    assert not result.pages[0].pixels.any()
+    assert [warning.name for warning in result.warnings] == ["scene"]
+    assert "black" in result.warnings[0].message
+
+
+def test_nothing_to_bake_is_an_error() -> None:
+    triangles, _ = box_room()
+    scene = Scene(triangles, grey(12, 0.5), grey(12, 0.0))
+    empty = bake_object("Empty", 12, 0)
+    for objects in (
+        (),
+        (bake_object("Room", 0, 12, bake=False),),
+        (bake_object("Room", 0, 12, bake=False), empty),
+    ):
+        with pytest.raises(SceneError, match="nothing to bake"):
+            run(BakeScene(scene, objects))
+
+
+def test_triangles_without_area_do_no_harm() -> None:
+    triangles, _ = box_room()
+    flat = np.concatenate([triangles, np.zeros((2, 3, 3)), triangles[:1, [0, 0, 1]]])
+    scene = Scene(flat, grey(15, 0.5), grey(15, 0.0), lights=[LAMP])
+    result = run(bake_scene(scene, ("Room", 15)))
+    assert np.isfinite(result.pages[0].pixels).all()
+    assert texels(result).mean() == pytest.approx(texels(run(lit_room(lights=[LAMP]))).mean(), rel=0.02)

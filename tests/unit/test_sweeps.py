@@ -1,0 +1,131 @@
+"""Jacobi sweeps along stored hits: their fixed point, the sky, and elements without texels."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from radiosity_addon.lightmap.interpolate import Interpolation
+from radiosity_addon.lightmap.reconstruct import GatherSettings, reconstruct
+from radiosity_addon.lightmap.sweeps import StoredLinks, TexelLight, sweep
+from radiosity_addon.lightmap.texel_geometry import TexelGeometry
+from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, SolverSettings, solve
+from radiosity_addon.solver.local_pass import NOTHING, SKY
+from tests.rooms import box_room, grey, rectangle
+from tests.unit.texel_scenes import QUAD_UV, texel_geometry
+
+
+def reconstructed(scene: Scene, geometry: TexelGeometry, **settings: int) -> TexelLight:
+    steps = reconstruct(
+        scene,
+        solve(scene, SolverSettings(error=1e-3)).local_pass,
+        geometry,
+        GatherSettings(strides=(2, 1), rays=64, **settings),
+    )
+    while True:
+        try:
+            next(steps)
+        except StopIteration as done:
+            return done.value
+
+
+def room_with_texels(reflectance: float = 0.5, size: int = 18, **changed) -> tuple[Scene, TexelGeometry]:
+    """A closed room; its six sides lie in a 3 × 2 pattern of cells on one page."""
+    triangles, surface = box_room()
+    scene = Scene(triangles, grey(12, reflectance), **{"emission": grey(12, 0.0), **changed})
+    cell = np.stack([surface % 3 / 3, surface // 3 / 3], axis=1)[:, None]
+    uv = (np.tile(QUAD_UV, (6, 1, 1)) / 3 + cell).astype(np.float32)
+    # Both triangles of each rectangle: `rectangle` lists (a, b, c), then (a, c, d).
+    return scene, texel_geometry(scene, uv, size)
+
+
+def identity(count: int) -> Interpolation:
+    return Interpolation(np.arange(count), np.arange(count, dtype=np.int32), np.ones(count, dtype=np.float32))
+
+
+def test_sweeps_converge_to_the_solution_of_the_stored_links() -> None:
+    """H = direct + mean of ρ H over the hits, as a dense solve gives it."""
+    scene, geometry = room_with_texels(0.5, lights=[PointLight((0.5, 0.5, 0.5), 10.0)])
+    local = solve(scene, SolverSettings(error=1e-2)).local_pass
+    rng = np.random.default_rng(1)
+    count, rays = len(geometry), 8
+    sources = rng.integers(0, count, (count, rays)).astype(np.int32)
+    sources[rng.uniform(size=sources.shape) < 0.1] = NOTHING
+    lamps = rng.uniform(0, 5, (count, 3))
+    light = sweep(
+        scene, local, geometry, StoredLinks(sources, identity(count)), lamps, _never, 40, tolerance=0.0
+    )
+    matrix = np.zeros((count, count))
+    for ray in range(rays):
+        hit = sources[:, ray] >= 0
+        np.add.at(matrix, (np.flatnonzero(hit), sources[hit, ray]), 0.5 / rays)
+    expected = np.linalg.solve(np.eye(count) - matrix, lamps)
+    np.testing.assert_array_equal(light.direct, lamps)
+    np.testing.assert_allclose(light.direct + light.indirect, expected, rtol=1e-3)
+
+
+def test_the_skys_share_of_the_rays_is_direct_light() -> None:
+    scene, geometry = room_with_texels(0.5, lights=[EnvironmentLight((1.0, 2.0, 0.0))])
+    local = solve(scene, SolverSettings(error=1e-2)).local_pass
+    count = len(geometry)
+    sources = np.full((count, 4), NOTHING, dtype=np.int32)
+    sources[:, :3] = SKY
+    lamps = np.zeros((count, 3))
+    light = sweep(scene, local, geometry, StoredLinks(sources, identity(count)), lamps, _never, sweeps=3)
+    np.testing.assert_allclose(light.direct, np.tile([0.75 * np.pi, 1.5 * np.pi, 0.0], (count, 1)), rtol=1e-6)
+    assert not light.indirect.any()
+
+
+def _never(hits) -> np.ndarray:
+    raise AssertionError("no leaf was met, so no ray should be traced")
+
+
+@pytest.mark.parametrize("reflectance", [0.0, 0.5, 0.9])
+def test_a_uniform_enclosure_is_uniform(reflectance: float) -> None:
+    """Every side emits 1: H = 1 / (1 − ρ), of which 1 is direct."""
+    scene, geometry = room_with_texels(reflectance, emission=grey(12, 1.0))
+    light = reconstructed(scene, geometry)
+    total = light.direct + light.indirect
+    # At edges and corners emitters are seen from within a rounding of their planes.
+    np.testing.assert_allclose(light.direct, 1.0, rtol=2e-3)
+    np.testing.assert_allclose(total, 1 / (1 - reflectance), rtol=0.01 if reflectance < 0.9 else 0.02)
+
+
+@pytest.mark.parametrize("reflectance", [0.5, 0.8])
+def test_a_closed_room_keeps_its_power(reflectance: float) -> None:
+    """A lamp of 12 W in a unit cube: the mean of all light is 2 / (1 − ρ), whatever is lit where."""
+    scene, geometry = room_with_texels(reflectance, lights=[PointLight((0.5, 0.4, 0.6), 12.0)], size=48)
+    light = reconstructed(scene, geometry, sweeps=40)
+    np.testing.assert_allclose(light.direct.mean(axis=0), 2.0, rtol=2e-3)
+    np.testing.assert_allclose((light.direct + light.indirect).mean(axis=0), 2 / (1 - reflectance), rtol=0.01)
+
+
+def test_surfaces_without_texels_reflect_all_the_same() -> None:
+    """Texels on the floor only: the walls are elements, and give what they give with texels of their own."""
+    lights = [PointLight((0.5, 0.5, 0.6), 10.0)]
+    scene, everywhere = room_with_texels(0.7, lights=lights, size=24)
+    uv = np.zeros((12, 3, 2), dtype=np.float32)
+    uv[:2] = QUAD_UV / 3
+    floor_only = texel_geometry(scene, uv, 24, np.array([0, 0] + [-1] * 10))
+    alone = reconstructed(scene, floor_only, sweeps=12)
+    whole = reconstructed(scene, everywhere, sweeps=12)
+    on_floor = everywhere.triangle < 2
+    assert on_floor.sum() == len(floor_only)
+    assert alone.indirect.mean() == pytest.approx(whole.indirect[on_floor].mean(), rel=0.02)
+    np.testing.assert_allclose(alone.indirect, whole.indirect[on_floor], rtol=0.15)
+
+
+def test_direct_and_indirect_are_apart() -> None:
+    """A lit floor and a shadowed wall behind its back: only the bounce reaches it."""
+    floor = rectangle((0, 0, 0), (2, 0, 0), (0, 2, 0))
+    wall = rectangle((0, 0, 0), (0, 2, 0), (0, 0, 2))  # looks along +x, the lamp stands behind its plane
+    triangles = np.concatenate([floor, wall])
+    lamp = PointLight((-0.5, 1, 3.0), 100.0)
+    scene = Scene(triangles, grey(4, 0.5), grey(4, 0.0), lights=[lamp])
+    uv = np.concatenate([QUAD_UV * [0.5, 1], QUAD_UV * [0.5, 1] + np.array([0.5, 0])]).astype(np.float32)
+    light = reconstructed(scene, texel_geometry(scene, uv, 16))
+    on_wall = texel_geometry(scene, uv, 16).triangle >= 2
+    assert not light.direct[on_wall].any()
+    assert (light.indirect[on_wall].max(axis=1) > 0).all()
+    # The floor gets its second bounce from the wall, which is dark but for the first.
+    assert light.direct[~on_wall].mean() > 5 * light.indirect[~on_wall].mean()
