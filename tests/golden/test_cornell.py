@@ -18,8 +18,8 @@ from radiosity_addon.pipeline import bake
 from radiosity_addon.settings import BakeSettings
 from tests.golden.cornell_reference import FILE, Reference, load, relative_rmse, write_layout
 
-RELATIVE_RMSE = 0.02
-"""Half of what is promised; about 1.2 % is measured."""
+RELATIVE_RMSE = 0.015
+"""Promised are 4 %; about 1 % is measured."""
 
 MEAN, WALL_MEAN = 0.01, 0.02
 
@@ -103,7 +103,7 @@ def test_no_texel_glows_where_cycles_has_none(comparison: Comparison) -> None:
     """Under the blocks and on their bottoms it is black."""
     dark = comparison.compared & (comparison.reference.mean.max(axis=2) == 0)
     assert dark.sum() > 2000
-    assert comparison.ours[dark].max() < 0.01 * comparison.reference.mean[comparison.compared].mean()
+    assert comparison.ours[dark].max() < 1e-3 * comparison.reference.mean[comparison.compared].mean()
 
 
 def test_picture_for_the_eye(comparison: Comparison) -> None:
