@@ -24,7 +24,7 @@ QUALITIES = {
     ),
     "medium": Quality(
         SolverSettings(error=1e-4, min_area=2e-5, shadow_rays=8),
-        GatherSettings(strides=(4, 2, 1), support=3.0, rays=256),
+        GatherSettings(strides=(4, 2, 1), support=2.0, rays=256),
     ),
     "high": Quality(
         SolverSettings(error=3e-5, min_area=1e-5, shadow_rays=16),

@@ -15,7 +15,8 @@ import numpy as np
 
 from ..solver.arrays import Array
 from ..solver.visibility import RayCaster
-from .texel_geometry import NO_TEXEL, TexelGeometry
+from .point_grid import PointGrid
+from .texel_geometry import TexelGeometry
 
 REACH = 0.35
 """Largest split-sphere change at which a gather point still counts."""
@@ -43,46 +44,37 @@ class GatherPoints:
         Mean inverse distance seen from each point [1/m].
     """
 
-    def __init__(self, geometry: TexelGeometry, caster: RayCaster) -> None:
-        self._geometry, self._caster = geometry, caster
+    def __init__(self, geometry: TexelGeometry, caster: RayCaster, crossed: Array) -> None:
+        self._geometry, self._caster, self._crossed = geometry, caster, crossed
         self.texel = np.zeros(0, dtype=np.int32)
         self.closeness = np.zeros(0)
-        self._levels: list[tuple[int, list[Array]]] = []
+        self._grids: list[PointGrid] = []
+        self._number = np.full(len(geometry), -1, dtype=np.int32)
 
     def __len__(self) -> int:
         return len(self.texel)
 
     def add(self, stride: int, texel: Array, closeness: Array) -> None:
-        """Add a level of points that lie on the lattice of every `stride`-th texel."""
-        numbers = np.full(len(self._geometry), -1, dtype=np.int32)
-        numbers[texel] = len(self) + np.arange(len(texel), dtype=np.int32)
-        images = []
-        for index in self._geometry.index:
-            image = np.full(index.shape, -1, dtype=np.int32)
-            inside = index != NO_TEXEL
-            image[inside] = numbers[index[inside]]
-            images.append(image)
-        self._levels.append((stride, images))
+        """Add a level of points, about `stride` texels apart."""
+        geometry = self._geometry
+        numbers = len(self) + np.arange(len(texel), dtype=np.int32)
+        size = max(stride, 1.5) * geometry.texel_size
+        self._grids.append(PointGrid(geometry.position[texel], geometry.normal[texel], numbers, size))
+        self._number[texel] = numbers
         self.texel = np.concatenate([self.texel, texel])
         self.closeness = np.concatenate([self.closeness, closeness])
 
     def candidates(self, texels: Array) -> Array:
-        """Return (n, c) int32: gather points on the lattices around n texels, −1 for none."""
-        geometry = self._geometry
-        found = []
-        for stride, images in self._levels:
-            reach = np.arange(-1, 3) if stride > 1 else np.arange(-1, 2)
-            row = (geometry.row[texels] // stride)[:, None] + reach
-            col = (geometry.column[texels] // stride)[:, None] + reach
-            points = np.full((len(texels), len(reach), len(reach)), -1, dtype=np.int32)
-            for page, image in enumerate(images):
-                mine = np.flatnonzero(geometry.page[texels] == page)
-                r, c = row[mine] * stride, col[mine] * stride
-                inside = ((r >= 0) & (r < len(image)))[:, :, None] & ((c >= 0) & (c < len(image)))[:, None, :]
-                r, c = np.clip(r, 0, len(image) - 1), np.clip(c, 0, len(image) - 1)
-                points[mine] = np.where(inside, image[r[:, :, None], c[:, None, :]], -1)
-            found.append(points.reshape(len(texels), -1))
-        return np.concatenate(found, axis=1)
+        """Return (n, c) int32: gather points of all levels around n texels, −1 for none.
+
+        In the world, not on the page: the next chart or object goes on where one ends.
+        """
+        position, normal = self._geometry.position[texels], self._geometry.normal[texels]
+        found = np.concatenate([grid.near(position, normal) for grid in self._grids], axis=1)
+        own = self._number[texels][:, None]
+        found = np.sort(np.concatenate([found, own], axis=1), axis=1)
+        found[:, 1:][found[:, 1:] == found[:, :-1]] = -1
+        return found
 
     def kernel(self, texels: Array, points: Array) -> Array:
         """Return (n, c) weights in [0, 1] of candidate points for texels; 0 out of reach."""
@@ -94,7 +86,10 @@ class GatherPoints:
         bend = np.sqrt(np.maximum(1.0 - turn, 0.0))
         change = distance * self.closeness[points] + bend
         weight = np.where(points >= 0, np.maximum(1.0 - change / REACH, 0.0) ** 2, 0.0)
-        row, column = np.nonzero((weight > 0) & (distance > 0))
+        # A texel that geometry cuts in two speaks for itself alone, and nobody for it.
+        other = of != texels[:, None]
+        weight[other & (self._crossed[of] | self._crossed[texels][:, None])] = 0.0
+        row, column = np.nonzero((weight > 0) & other)
         # Over a bulge the straight line dips below the surface, by an eighth of the distance
         # times the turn of the normal: start and end that much higher.
         lift = LIFT * self._caster.surface_offset + SAGITTA * (distance * bend)[row, column]
@@ -140,15 +135,22 @@ class Interpolation:
 
 
 def fit(points: GatherPoints, geometry: TexelGeometry) -> Interpolation:
-    """Weigh the gather points around every texel: a local linear fit, evaluated at the texel."""
+    """Weigh the gather points around every texel: a local linear fit, evaluated at the texel.
+
+    Raises
+    ------
+    ValueError
+        If nothing speaks for a texel: it should have become a gather point itself.
+    """
     counts, numbers, weights = [], [], []
     for begin in range(0, len(geometry), CHUNK):
         texels = np.arange(begin, min(begin + CHUNK, len(geometry)), dtype=np.int64)
         candidates = points.candidates(texels)
         kernel = points.kernel(texels, candidates)
-        # Where nothing reaches, the nearest candidate has to do.
-        lost = np.flatnonzero(kernel.sum(axis=1) == 0)
-        kernel[lost] = _nearest(points, geometry, texels[lost], candidates[lost])
+        if not (kernel.sum(axis=1) > 0).all():
+            raise ValueError(
+                "a texel has no gather point in reach: the last level must take all that lack one"
+            )
         linear = _linear_weights(points, geometry, texels, candidates, kernel)
         used = linear != 0
         counts.append(used.sum(axis=1))
@@ -158,15 +160,6 @@ def fit(points: GatherPoints, geometry: TexelGeometry) -> Interpolation:
     return Interpolation(
         np.cumsum(count) - count, np.concatenate(numbers).astype(np.int32), np.concatenate(weights)
     )
-
-
-def _nearest(points: GatherPoints, geometry: TexelGeometry, texels: Array, candidates: Array) -> Array:
-    """Return (n, c) 0/1 weights that pick the nearest candidate (point 0 if there is none)."""
-    along = geometry.position[points.texel[candidates]] - geometry.position[texels][:, None]
-    distance = np.where(candidates >= 0, np.linalg.norm(along, axis=2), np.inf)
-    weight = np.zeros(candidates.shape)
-    weight[np.arange(len(texels)), distance.argmin(axis=1)] = 1.0
-    return weight
 
 
 def _linear_weights(

@@ -32,7 +32,7 @@ class GatherSettings:
     ----------
     strides : tuple of int
         Lattices of gather points, coarse to fine, in texels; finer ones are used only where
-        coarser points do not reach.
+        coarser points do not reach. The last is 1, so that every texel is reached.
     support : float
         A texel whose coarser points weigh less than this together becomes a point itself.
     rays : int
@@ -54,8 +54,9 @@ def reconstruct(
     keys = np.arange(len(geometry))
     lamps = local.direct(geometry.position, geometry.normal, keys, geometry.sample, geometry.neighbourhood)
     yield 0.3
-    resolve = _resolver(local, geometry)
-    points = GatherPoints(geometry, local.caster)
+    crossings = Crossings(geometry, local.caster)
+    resolve = _resolver(local, geometry, crossings)
+    points = GatherPoints(geometry, local.caster, crossings.crossed)
     sources: list[Array] = []
     for number, stride in enumerate(settings.strides):
         chosen = _choose(points, geometry, stride, settings.support)
@@ -94,9 +95,8 @@ def _choose(points: GatherPoints, geometry: TexelGeometry, stride: int, support:
     return candidates.astype(np.int32)
 
 
-def _resolver(local: LocalPass, geometry: TexelGeometry) -> Resolver:
+def _resolver(local: LocalPass, geometry: TexelGeometry, crossings: Crossings) -> Resolver:
     """Number hits: texels by their own number, leaf elements after the texels."""
-    crossings = Crossings(geometry, local.caster)
 
     def resolve(hits: Hits) -> Array:
         texel = crossings.look_up(geometry.texel_at(hits), geometry.positions_of(hits))

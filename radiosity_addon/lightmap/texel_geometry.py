@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -72,6 +73,17 @@ class TexelGeometry:
 
     def __len__(self) -> int:
         return len(self.page)
+
+    @cached_property
+    def texel_size(self) -> float:
+        """Width of a texel in the world [m], the median."""
+        if not len(self):
+            return 1.0
+        edges = self._uv[self.triangle, 1:].astype(np.float64) - self._uv[self.triangle, :1]
+        flat = 0.5 * np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
+        size = np.array([len(numbers) for numbers in self.index])[self.page]
+        area = self._scene.areas[self.triangle] / np.maximum(flat * size * size, 1e-300)
+        return float(np.sqrt(np.median(area)))
 
     def first(self, page: int) -> int:
         """Return the number of a page's first texel."""
