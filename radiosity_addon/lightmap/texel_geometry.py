@@ -9,10 +9,13 @@ import numpy as np
 
 from ..solver.arrays import Array
 from ..solver.scene import Scene
-from ..solver.visibility import Hits
+from ..solver.visibility import Hits, surface_offset
 from .rasterise import FOOTPRINT, Texels, sample_footprints
 
 NO_TEXEL = -1
+
+EDGE_OFFSETS = 4.0
+"""Points keep this many ray offsets from the edges of their triangles."""
 
 
 class TexelGeometry:
@@ -55,7 +58,9 @@ class TexelGeometry:
         self.column = np.concatenate([page.column for page in texels])
         triangles = [of[page.triangle] for of, page in zip(rows, texels, strict=True)]
         self.triangle = np.concatenate(triangles).astype(np.int32)
-        weights = np.concatenate([page.centroid for page in texels]).astype(np.float64)
+        self._inset = _edge_inset(scene)
+        centroid = np.concatenate([page.centroid for page in texels]).astype(np.float64)
+        weights = self._drawn_in(centroid[:, None], self.triangle)[:, 0]
         self.barycentric = weights[:, 1:].astype(np.float32)
         self.position = _at(scene.triangles[self.triangle], weights[:, None])[:, 0]
         self.surface_normal = scene.face_normals[self.triangle]
@@ -98,8 +103,15 @@ class TexelGeometry:
                 continue
             local = rows[mine] - self._first[number]
             weights = sample_footprints(page.take(local), u[mine], width)
+            weights = self._drawn_in(weights, self.triangle[rows[mine]])
             points[mine] = _at(self._scene.triangles[self.triangle[rows[mine]]], weights)
         return points
+
+    def _drawn_in(self, weights: Array, triangle: Array) -> Array:
+        """Move (n, k, 3) barycentric points that lie on an edge of their triangle off it by a hair."""
+        inside = np.maximum(weights, self._inset[triangle][:, None])
+        moved = (inside != weights).any(axis=2, keepdims=True)
+        return np.asarray(np.where(moved, inside / inside.sum(axis=2, keepdims=True), weights))
 
     def neighbourhood(self, chosen: Array) -> Array:
         """Grow a (n,) mask of texels by one texel in all eight directions of their page."""
@@ -135,6 +147,18 @@ class TexelGeometry:
             at = np.clip((uv[mine] * size).astype(np.int64), 0, size - 1)
             found[rows[mine]] = numbers[at[:, 1], at[:, 0]]
         return found
+
+
+def _edge_inset(scene: Scene) -> Array:
+    """Return (t, 3) float64: the least barycentric weights of a point a few ray offsets inside.
+
+    A point on the very edge of a wall, lifted off it, would start in or behind the next wall
+    and see out of a closed room.
+    """
+    edges = np.roll(scene.triangles, -1, axis=1) - np.roll(scene.triangles, 1, axis=1)
+    heights = 2.0 * scene.areas[:, None] / np.maximum(np.linalg.norm(edges, axis=2), 1e-300)
+    inset = EDGE_OFFSETS * surface_offset(scene.triangles) / np.maximum(heights, 1e-300)
+    return np.asarray(np.minimum(inset, 0.25))
 
 
 def _at(corners: Array, weights: Array) -> Array:
