@@ -1,7 +1,7 @@
 """Walk shader node trees: from a socket to the node or the constant that feeds it.
 
 Reroutes, muted nodes and links, and node groups at any depth are seen through. Values
-are constants only: what varies over the surface is replaced by its mean (images) or
+are constants only: what varies over the surface is replaced by its mean (images, checkers) or
 refused (`NotConstantError`), and the caller falls back on the socket's own default.
 """
 
@@ -138,6 +138,15 @@ def _image(node: bpy.types.Node, output: bpy.types.NodeSocket, _stack: Stack) ->
     return Value(rgb, (f"image '{image.name}'",))
 
 
+def _checker(node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -> Value:
+    # Half of its cells each; the one texture whose mean takes no sampling.
+    note = (f"node '{node.bl_label}'",)
+    if output.name != "Color":
+        return Value(np.full(3, 0.5), note)
+    one, other = (evaluate(node.inputs[name], stack) for name in ("Color1", "Color2"))
+    return Value(0.5 * (one.rgb + other.rgb), _merge(note, one.notes, other.notes))
+
+
 def _light_path(_: bpy.types.Node, output: bpy.types.NodeSocket, _stack: Stack) -> Value:
     # A lightmap sees diffuse bounces only.
     known = {"Is Camera Ray": 0.0, "Is Diffuse Ray": 1.0, "Is Glossy Ray": 0.0, "Is Transmission Ray": 0.0}
@@ -197,6 +206,7 @@ _COMPUTE = {
     "VALUE": _constant,
     "TEX_IMAGE": _image,
     "TEX_ENVIRONMENT": _image,
+    "TEX_CHECKER": _checker,
     "LIGHT_PATH": _light_path,
     "MIX": _mix,
     "MIX_RGB": _mix,

@@ -208,6 +208,17 @@ def test_an_image_counts_with_its_linear_mean(colour_space: str, is_float: bool)
     assert warning.message.startswith("material 'Wall': Base Color comes from image 'Bricks'; the mean (")
 
 
+def test_a_checker_is_half_and_half() -> None:
+    material = shader_material("Floor", "ShaderNodeBsdfDiffuse", Color=(1, 1, 1, 1))
+    tree = material.node_tree
+    checker = tree.nodes.new("ShaderNodeTexChecker")
+    checker.inputs["Color1"].default_value, checker.inputs["Color2"].default_value = _RED, _BLUE
+    tree.links.new(checker.outputs["Color"], tree.nodes["Diffuse BSDF"].inputs["Color"])
+    surface = read_material(material)
+    _check(surface, (0.35, 0.2, 0.45))
+    assert "Color comes from node 'Checker Texture'; the mean (" in _messages(surface)
+
+
 def test_srgb_decodes_as_the_standard_says() -> None:
     np.testing.assert_allclose(
         linear_from_srgb(np.array([0.0, 0.04045, 0.5, 1.0])), [0, 0.0031308, 0.2140411, 1], rtol=1e-5
