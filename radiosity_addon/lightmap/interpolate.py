@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..solver.arrays import Array
+from ..solver.parallel import for_chunks
 from ..solver.visibility import RayCaster
 from .point_grid import PointGrid
 from .texel_geometry import TexelGeometry
@@ -30,7 +31,7 @@ LIFT = 2.0
 SAGITTA = 0.6
 """… and this part of distance · √(1 − cos of the turn) more: what a sphere of few facets needs."""
 
-CHUNK = 1 << 15
+CHUNK = 1 << 14
 """Texels whose candidates are weighed at once; bounds the temporaries to some 120 MB."""
 
 
@@ -44,7 +45,9 @@ class GatherPoints:
         Mean inverse distance seen from each point [1/m].
     """
 
-    def __init__(self, geometry: TexelGeometry, caster: RayCaster, crossed: Array) -> None:
+    def __init__(self, geometry: TexelGeometry, caster: RayCaster, crossed: Array, threads: int = 0) -> None:
+        self.threads = threads
+        """0 means all cores."""
         self._geometry, self._caster, self._crossed = geometry, caster, crossed
         self.texel = np.zeros(0, dtype=np.int32)
         self.closeness = np.zeros(0)
@@ -103,9 +106,11 @@ class GatherPoints:
     def support(self, texels: Array) -> Array:
         """Return (n,) the summed weights around texels: below 1 they need a point of their own."""
         total = np.empty(len(texels))
-        for first in range(0, len(texels), CHUNK):
-            rows = texels[first : first + CHUNK]
-            total[first : first + CHUNK] = self.kernel(rows, self.candidates(rows)).sum(axis=1)
+
+        def weigh(rows: slice) -> None:
+            total[rows] = self.kernel(texels[rows], self.candidates(texels[rows])).sum(axis=1)
+
+        for_chunks(weigh, len(texels), CHUNK, self.threads)
         return total
 
 
@@ -142,9 +147,10 @@ def fit(points: GatherPoints, geometry: TexelGeometry) -> Interpolation:
     ValueError
         If nothing speaks for a texel: it should have become a gather point itself.
     """
-    counts, numbers, weights = [], [], []
-    for begin in range(0, len(geometry), CHUNK):
-        texels = np.arange(begin, min(begin + CHUNK, len(geometry)), dtype=np.int64)
+    parts: dict[int, tuple[Array, Array, Array]] = {}
+
+    def weigh(rows: slice) -> None:
+        texels = np.arange(rows.start, rows.stop, dtype=np.int64)
         candidates = points.candidates(texels)
         kernel = points.kernel(texels, candidates)
         if not (kernel.sum(axis=1) > 0).all():
@@ -153,13 +159,12 @@ def fit(points: GatherPoints, geometry: TexelGeometry) -> Interpolation:
             )
         linear = _linear_weights(points, geometry, texels, candidates, kernel)
         used = linear != 0
-        counts.append(used.sum(axis=1))
-        numbers.append(candidates[used])
-        weights.append(linear[used].astype(np.float32))
+        parts[rows.start] = used.sum(axis=1), candidates[used], linear[used].astype(np.float32)
+
+    for_chunks(weigh, len(geometry), CHUNK, points.threads)
+    counts, numbers, weights = zip(*(parts[start] for start in sorted(parts)), strict=True)
     count = np.concatenate(counts)
-    return Interpolation(
-        np.cumsum(count) - count, np.concatenate(numbers).astype(np.int32), np.concatenate(weights)
-    )
+    return Interpolation(np.cumsum(count) - count, np.concatenate(numbers), np.concatenate(weights))
 
 
 def _linear_weights(

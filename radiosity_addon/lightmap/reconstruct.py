@@ -56,7 +56,7 @@ def reconstruct(
     yield 0.3
     crossings = Crossings(geometry, local.caster)
     resolve = _resolver(local, geometry, crossings)
-    points = GatherPoints(geometry, local.caster, crossings.crossed)
+    points = GatherPoints(geometry, local.caster, crossings.crossed, local.threads)
     sources: list[Array] = []
     for number, stride in enumerate(settings.strides):
         chosen = _choose(points, geometry, stride, settings.support)

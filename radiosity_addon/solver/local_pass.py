@@ -16,14 +16,15 @@ import numpy as np
 from .arrays import Array
 from .emitters import EmitterGroup
 from .lights import EnvironmentLight, Lamp
+from .parallel import for_chunks
 from .sampling import cosine_hemisphere, points_on_triangles, stratified_square, to_world
 from .visibility import Hits
 
 if TYPE_CHECKING:
     from .methods.hierarchical import HierarchicalState
 
-CHUNK_RAYS = 1 << 20
-"""Rays traced at once; bounds the temporaries to about 150 MB."""
+CHUNK_RAYS = 1 << 18
+"""Rays a thread prepares at once; bounds its temporaries to about 40 MB."""
 
 MORE_SHADOW_RAYS = 8
 """Times as many shadow rays where the first disagree."""
@@ -50,6 +51,8 @@ class LocalPass:
         self.caster = state.caster
         """Casts this scene's rays."""
         self._seed = state.settings.seed
+        self.threads = state.settings.threads
+        """0 means all cores."""
         self.emitters = EmitterGroup.of_faces(state.hierarchy.faces, state.caster)
 
     def direct(
@@ -154,9 +157,9 @@ class LocalPass:
         total: Array,
     ) -> None:
         """Add `count` shadow rays a row to the sums of unblocked and of all weights."""
-        step = max(CHUNK_RAYS // count, 1)
-        for begin in range(0, len(rows), step):
-            chunk = rows[begin : begin + step]
+
+        def trace(part: slice) -> None:
+            chunk = rows[part]
             at, normal = points[chunk], normals[chunk]
             unit = stratified_square(keys[chunk], count, seed + 1)
             directions, distances, weights = light.shadow_rays(at, normal, unit)
@@ -176,6 +179,8 @@ class LocalPass:
             free = self.caster.visible(start[at], directions[at], distances[at])
             lit[chunk] += np.bincount(point, free * weights[point, sample], minlength=len(chunk))
             total[chunk] += weights.sum(axis=1)
+
+        for_chunks(trace, len(rows), max(CHUNK_RAYS // count, 1), self.threads)
 
     def gather(
         self,
@@ -207,9 +212,9 @@ class LocalPass:
         """
         sources = np.empty((len(points), rays), dtype=np.int32)
         closeness = np.empty(len(points))
-        step = max(CHUNK_RAYS // rays, 1)
-        for begin in range(0, len(points), step):
-            rows = np.arange(begin, min(begin + step, len(points)))
+
+        def trace(part: slice) -> None:
+            rows = np.arange(part.start, part.stop)
             unit = stratified_square(keys[rows], rays, self._seed + 3)
             directions = to_world(cosine_hemisphere(unit), normals[rows])
             start = np.repeat(points[rows][:, None], rays, axis=1)
@@ -222,6 +227,8 @@ class LocalPass:
             sources[rows] = np.where(below, NOTHING, found.reshape(len(rows), rays))
             inverse = 1.0 / np.maximum(hits.distance.reshape(len(rows), rays), self.caster.surface_offset)
             closeness[rows] = inverse.mean(axis=1)
+
+        for_chunks(trace, len(points), max(CHUNK_RAYS // rays, 1), self.threads)
         return sources, closeness
 
     def leaves_of(self, hits: Hits) -> Array:
