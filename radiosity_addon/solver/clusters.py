@@ -53,7 +53,7 @@ class Clusters:
     def measure(self, faces: Faces) -> None:
         """Fill in areas and boxes."""
         self.area_before = np.concatenate([[0.0], np.cumsum(faces.area[self.order])])
-        self.area = self.area_before[self.end] - self.area_before[self.start]
+        self.area = self._run_sums(faces.area)
         if len(self) == 0:
             return
         lower = faces.corners.min(axis=1)[self.order]
@@ -70,9 +70,20 @@ class Clusters:
 
     def average(self, values: Array, areas: Array) -> Array:
         """Return the (c, 3) area-weighted means of (f, 3) face `values`."""
-        weighted = (values * areas[:, None])[self.order]
-        before = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(weighted, axis=0)])
-        return np.asarray((before[self.end] - before[self.start]) / np.maximum(self.area, 1e-300)[:, None])
+        return np.asarray(self._run_sums(values * areas[:, None]) / self.area[:, None])
+
+    def _run_sums(self, values: Array) -> Array:
+        """Return the (c, …) sums of (f, …) face values over each cluster's run.
+
+        Each run is added up by itself: in differences of one running sum the rounding of the
+        large faces would drown clusters of tiny ones.
+        """
+        padded = np.concatenate([values[self.order], np.zeros((1, *values.shape[1:]))])
+        bounds = np.stack([self.start, self.end], axis=1).ravel()
+        if len(bounds) == 0:
+            return np.zeros((0, *values.shape[1:]))
+        # Over pairs of start and end every other result is the run itself.
+        return np.asarray(np.add.reduceat(padded, bounds, axis=0)[::2])
 
 
 def build_clusters(faces: Faces, groups: Sequence[Array]) -> tuple[Clusters, Array]:

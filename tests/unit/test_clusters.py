@@ -117,3 +117,19 @@ def test_faces_in_one_place_do_not_stop_the_tree() -> None:
     clusters, roots = build_clusters(faces, [np.arange(16)])
     assert len(clusters) == 15
     assert sorted(members(clusters, roots[0])) == list(range(16))
+
+
+def test_tiny_faces_keep_their_means_beside_large_ones() -> None:
+    """Areas 10^20 apart: the mean of a cluster of tiny faces is theirs, not the rounding of the large."""
+    large = rectangle((0, 0, 0), (1e3, 0, 0), (0, 1e3, 0))
+    tiny = rectangle((0, 0, 1), (1e-7, 0, 0), (0, 1e-7, 0), 2)
+    triangles = np.concatenate([large, tiny])
+    hierarchy = Hierarchy(Scene(triangles, grey(len(triangles), 0.5), grey(len(triangles), 0.0)))
+    values = np.where(np.arange(len(triangles))[:, None] < 2, 1e6, [1.0, 2.0, 3.0])
+    means = hierarchy.clusters.average(values, hierarchy.faces.area)
+    clusters = hierarchy.clusters
+    of_tiny = [
+        c for c in range(len(clusters)) if (clusters.order[clusters.start[c] : clusters.end[c]] >= 2).all()
+    ]
+    assert of_tiny
+    np.testing.assert_allclose(means[of_tiny], np.tile([1.0, 2.0, 3.0], (len(of_tiny), 1)), rtol=1e-12)
