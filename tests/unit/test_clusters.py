@@ -7,7 +7,7 @@ import pytest
 
 from radiosity_addon.solver import Scene
 from radiosity_addon.solver.clusters import Clusters, build_clusters
-from radiosity_addon.solver.hierarchy import Faces
+from radiosity_addon.solver.hierarchy import Faces, Hierarchy
 from tests.rooms import box_room, grey, rectangle
 
 
