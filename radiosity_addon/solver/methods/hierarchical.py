@@ -34,6 +34,16 @@ MIXED_SIZE = 0.3
 COHERENT = 0.9
 """From this length of the mean normal on, a cluster's faces look the same way."""
 
+FIRST_FACES = 21_000
+"""Beyond so many faces each can afford fewer links: the two sizes grow with the square of their
+number, which keeps first links at a few millions, …"""
+
+LARGEST_SIZE = 2.0
+"""… up to this."""
+
+COHERENT = 0.9
+"""From this length of the mean normal on, a cluster's faces look the same way."""
+
 FIRST_FACES = 25_000
 """Beyond so many faces each can afford fewer links, and the two sizes grow with the root of
 their number, …"""
@@ -127,7 +137,7 @@ def first_links(hierarchy: Hierarchy, caster: RayCaster, settings: SolverSetting
     middle = 0.5 * (clusters.upper + clusters.lower)
     half = 0.5 * (clusters.upper - clusters.lower)
     centre = faces.corners.mean(axis=1)
-    crowd = max(len(faces) / FIRST_FACES, 1.0) ** 0.5
+    crowd = max(len(faces) / FIRST_FACES, 1.0) ** 2
     own_radius = np.linalg.norm(faces.corners - centre[:, None], axis=2).max(axis=1)
     size = np.where(clusters.coherence >= COHERENT, FIRST_SIZE, MIXED_SIZE)
     size = np.minimum(size * crowd, LARGEST_SIZE)
