@@ -16,12 +16,8 @@ class SolverSettings:
         misplace exceeds it (handout §4.2.1, Oracle2).
     min_area : float
         A_ε as a fraction of the scene's lit area: no element becomes smaller.
-    rays_per_link : int
-        Visibility rays of a new link; four times as many where the first disagree.
-    gather_rays : int
-        Hemisphere rays of a point in the local pass.
     shadow_rays : int
-        Rays a point and lamp in the local pass, four times as many in penumbrae.
+        Rays a point and lamp in the local pass, eight times as many in penumbrae.
     max_links : int
         Refinement stops at this budget, the largest errors served first.
     tolerance : float
@@ -33,8 +29,6 @@ class SolverSettings:
 
     error: float = 1e-4
     min_area: float = 2e-5
-    rays_per_link: int = 4
-    gather_rays: int = 144
     shadow_rays: int = 4
     max_links: int = 6_000_000
     tolerance: float = 1e-4
