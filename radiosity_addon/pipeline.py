@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
+from typing import TypeVar
 
 import numpy as np
 
@@ -32,6 +33,8 @@ from .lightmap.texel_geometry import TexelGeometry
 from .quality import quality_of
 from .settings import BakeSettings
 from .solver import Solution, solve_progress
+
+T = TypeVar("T")
 
 UNWRAP, RASTERISE, SOLVE, LIGHT, ENCODE = 0.0, 0.15, 0.2, 0.5, 0.97
 """How far the whole is when each stage begins; rough, from bakes at medium quality."""
@@ -61,6 +64,7 @@ def bake(bake_scene: BakeScene, settings: BakeSettings) -> Generator[Progress, N
         If the lightmaps cannot be laid out.
     """
     seconds: dict[str, float] = {}
+    quality = quality_of(settings)
     baked = [item for item in bake_scene.objects if item.bake and item.count]
     if not baked:
         raise SceneError("nothing to bake: give the scene a render-visible mesh with faces")
@@ -73,10 +77,12 @@ def bake(bake_scene: BakeScene, settings: BakeSettings) -> Generator[Progress, N
         geometry = _texels(bake_scene, baked, atlas)
     yield Progress("solve", SOLVE)
     with _timed(seconds, "solve"):
-        solution = yield from _solve(bake_scene, settings)
+        steps = solve_progress(bake_scene.scene, quality.solver)
+        solution = yield from _staged(steps, "solve", SOLVE, LIGHT)
     yield Progress("light", LIGHT)
     with _timed(seconds, "light"):
-        light = yield from _light(bake_scene, solution, geometry, settings)
+        texels = reconstruct(bake_scene.scene, solution.local_pass, geometry, quality.gather)
+        light = yield from _staged(texels, "light", LIGHT, ENCODE)
     yield Progress("encode", ENCODE)
     with _timed(seconds, "encode"):
         pages = _encode(bake_scene, geometry, light, settings)
@@ -118,30 +124,17 @@ def _texels(bake_scene: BakeScene, baked: list[BakeObject], atlas: Atlas) -> Tex
     return TexelGeometry(bake_scene.scene, uv, page_of_triangle, texels, rows)
 
 
-def _solve(bake_scene: BakeScene, settings: BakeSettings) -> Generator[Progress, None, Solution]:
-    """Run the hierarchical solver."""
-    steps = solve_progress(bake_scene.scene, quality_of(settings).solver)
+def _staged(
+    steps: Generator[float, None, T], stage: str, begin: float, end: float
+) -> Generator[Progress, None, T]:
+    """Run steps that yield the fraction they have done as one stage, from `begin` to `end` of the whole."""
     while True:
         try:
             fraction = next(steps)
         except StopIteration as done:
-            solution: Solution = done.value
-            return solution
-        yield Progress("solve", SOLVE + (LIGHT - SOLVE) * fraction)
-
-
-def _light(
-    bake_scene: BakeScene, solution: Solution, geometry: TexelGeometry, settings: BakeSettings
-) -> Generator[Progress, None, TexelLight]:
-    """Compute the irradiance of every texel."""
-    steps = reconstruct(bake_scene.scene, solution.local_pass, geometry, quality_of(settings).gather)
-    while True:
-        try:
-            fraction = next(steps)
-        except StopIteration as done:
-            light: TexelLight = done.value
-            return light
-        yield Progress("light", LIGHT + (ENCODE - LIGHT) * fraction)
+            result: T = done.value
+            return result
+        yield Progress(stage, begin + (end - begin) * fraction)
 
 
 def _encode(
