@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from radiosity_addon.solver import PointLight, Scene
+
 FLOOR, CEILING, WALLS = 0, 1, 2
 
 
@@ -75,3 +77,14 @@ def grey(count: int, value: float) -> np.ndarray:
 def area_mean(values: np.ndarray, areas: np.ndarray) -> np.ndarray:
     """Return the (3,) area-weighted mean of (t, 3) values."""
     return np.asarray(areas @ values / areas.sum())
+
+
+def coloured_room() -> Scene:
+    """A closed room with a box in it, a lamp, and walls of three colours, one of them black."""
+    room, surface = box_room((3, 2, 2))
+    triangles = np.concatenate([room, solid_box((0.5, 0.5, 0.3), (1.2, 1.2, 1.0))])
+    reflectance = grey(len(triangles), 0.6)
+    reflectance[:12][surface == 2] = (0.9, 0.1, 0.0)
+    reflectance[:12][surface == 3] = 0.0
+    lamp = PointLight((2.5, 1.5, 1.5), 50.0)
+    return Scene(triangles, reflectance, grey(len(triangles), 0.0), lights=[lamp])

@@ -1,4 +1,4 @@
-"""Hierarchical radiosity on arrays: no bpy, no files.
+"""Radiosity on arrays: no bpy, no files.
 
 >>> from radiosity_addon.solver import PointLight, Scene, SolverSettings, solve
 >>> solution = solve(Scene(triangles, reflectance, emission, lights=[PointLight((0, 0, 2), 100.0)]))
@@ -10,10 +10,11 @@ from __future__ import annotations
 from collections.abc import Generator
 
 from .lights import AreaLight, EnvironmentLight, PointLight, SpotLight, SunLight
-from .methods.hierarchical import solve_steps
+from .methods import steps_of
 from .scene import Scene
 from .settings import SolverSettings
 from .solution import Solution
+from .state import SolverState
 
 __all__ = [
     "AreaLight",
@@ -22,6 +23,7 @@ __all__ = [
     "Scene",
     "Solution",
     "SolverSettings",
+    "SolverState",
     "SpotLight",
     "SunLight",
     "solve",
@@ -30,7 +32,7 @@ __all__ = [
 
 
 def solve(scene: Scene, settings: SolverSettings | None = None) -> Solution:
-    """Solve the radiosity equation of a scene by refined hierarchical radiosity (handout §4.2.1)."""
+    """Solve the radiosity equation of a scene by the method the settings name."""
     steps = solve_progress(scene, settings or SolverSettings())
     while True:
         try:
@@ -40,12 +42,12 @@ def solve(scene: Scene, settings: SolverSettings | None = None) -> Solution:
             return solution
 
 
-def solve_progress(scene: Scene, settings: SolverSettings) -> Generator[float, None, Solution]:
-    """Solve step by step: yields the fraction done, returns the `Solution`."""
-    steps = solve_steps(scene, settings)
-    fraction, state = next(steps)
-    yield fraction
-    # The solver works on one state all along.
-    for fraction, _ in steps:
-        yield fraction
+def solve_progress(
+    scene: Scene, settings: SolverSettings
+) -> Generator[tuple[float, SolverState], None, Solution]:
+    """Solve step by step: yields the fraction done and the state so far, returns the `Solution`."""
+    state = None
+    for fraction, state in steps_of(scene, settings):
+        yield fraction, state
+    assert state is not None  # every method yields at least once
     return Solution(state)

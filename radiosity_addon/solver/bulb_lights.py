@@ -8,8 +8,19 @@ import numpy as np
 import numpy.typing as npt
 
 from .curved_factor import cap_cosine
+from .geometry_term import ray_geometry_term
 from .light_base import Emitter, Float64Array, Rays, Samples, directions_to, row_cosines
+from .radiometry import (
+    HEMISPHERE,
+    cone_solid_angle,
+    intensity_of_flux,
+    irradiance_from_point,
+    radiance_of_disc,
+)
 from .sampling import concentric_disk, cosine_hemisphere, to_world, uniform_cone
+
+_INTENSITY = intensity_of_flux(1.0)
+"""Of a lamp per power it sends out [1/sr]."""
 
 _EDGE_SAMPLES = 16
 """Samples across a spot's disk, each way, that average the cone's edge over it."""
@@ -54,13 +65,12 @@ class _Bulb(Emitter):
         effective = cap_cosine(cosine, self.radius / reach)
         if not self.soft_falloff:
             effective = np.where(distance < self.radius, 1.0, effective)
-        irradiance: Float64Array = effective / (4.0 * np.pi * reach * reach)
-        return irradiance
+        return irradiance_from_point(_INTENSITY, effective, reach)
 
     def shadow_rays(self, points: Float64Array, normals: Float64Array, u: Samples) -> Rays:
         """Return rays to samples of the disk or sphere (see `Lamp.shadow_rays`)."""
         directions, distances, weights = self._plain_rays(points, normals, u)
-        return directions, distances, weights * self._attenuation(-directions) / (4.0 * np.pi * u.shape[1])
+        return directions, distances, weights * self._attenuation(-directions) * (_INTENSITY / u.shape[1])
 
     def _plain_rays(self, points: Float64Array, normals: Float64Array, u: Samples) -> Rays:
         """Return rays whose weights leave the attenuation out and average to irradiance per intensity."""
@@ -78,8 +88,8 @@ class _Bulb(Emitter):
         directions, distances = directions_to(to_world(np.concatenate([on_disk, depth], axis=-1), toward))
         cosine = row_cosines(directions, normals)
         facing = np.einsum("ikj,ij->ik", directions, toward)
-        square = distances * distances
-        return directions, distances, cosine * facing / np.where(square > 0.0, square, np.inf)
+        # The disk's radiance times its area is the intensity.
+        return directions, distances, ray_geometry_term(cosine, facing, distances)
 
     def _sphere_rays(
         self, toward: Float64Array, distance: Float64Array, normals: Float64Array, u: Samples
@@ -96,9 +106,9 @@ class _Bulb(Emitter):
         half_chord = np.sqrt(np.maximum(self.radius**2 - distance[:, None] ** 2 + ahead * ahead, 0.0))
         distances = np.where(inside[:, None], ahead + half_chord, ahead - half_chord)
         cosine = row_cosines(directions, normals)
-        # Ω / (π r²) per unit of intensity, with Ω = 2π (1 − cosα).
-        weights = np.where(inside[:, None], 1.0, 2.0 * drop[:, None] * cosine) / self.radius**2
-        return directions, distances, weights
+        # Radiance times solid angle times cosine; from inside the directions hold the cosine.
+        seen = np.where(inside[:, None], HEMISPHERE, cone_solid_angle(drop)[:, None] * cosine)
+        return directions, distances, seen * radiance_of_disc(1.0, self.radius)
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +191,7 @@ class SpotLight(_Bulb):
     @property
     def flux(self) -> Float64Array:
         """(3,) RGB power inside the cone [W]: the smoothstep's mean is a half."""
-        return 0.5 * self.strength * self._opening * (1.0 - 0.5 * self.blend)
+        return intensity_of_flux(self.strength) * cone_solid_angle(self._opening) * (1.0 - 0.5 * self.blend)
 
     @property
     def _opening(self) -> float:

@@ -19,15 +19,21 @@ from __future__ import annotations
 import numpy as np
 
 from .arrays import Array
+from .cluster_links import ClusterLinks
 from .hierarchy import LEAF, Hierarchy
-from .light_links import sky_visibility
 from .links import Links
-from .sampling import points_on_triangles, stratified_square
+from .node_samples import node_samples
+from .parallel import for_chunks
+from .sampling import cosine_hemisphere, stratified_square, to_world
 from .transport import push
+from .tree_top import TreeTop
 from .visibility import RayCaster
 
 RAYS = 32
 """Hemisphere rays of a leaf; in a closed scene they all agree, and there is no noise at all."""
+
+CHUNK = 1 << 13
+"""Leaves measured at once: their rays take about 30 MB a thread."""
 
 LIMIT = 2.0
 """Largest factor: a leaf with hardly any links is not blown up."""
@@ -36,17 +42,18 @@ LIMIT = 2.0
 class Conservation:
     """Remembers what share of each leaf's light arrives, leaf by leaf as they appear."""
 
-    def __init__(self, caster: RayCaster, seed: int) -> None:
-        self._caster, self._seed = caster, seed
+    def __init__(self, caster: RayCaster, min_area: float, seed: int, threads: int = 0) -> None:
+        self._caster, self._min_area, self._seed, self._threads = caster, min_area, seed, threads
         self._arriving = np.zeros(0)
 
-    def factors(self, hierarchy: Hierarchy, links: Links) -> Array:
+    def factors(self, hierarchy: Hierarchy, top: TreeTop, links: Links, cluster_links: ClusterLinks) -> Array:
         """Return (e, 2): what to scale leaves' radiosity with, over own links and over shared ones."""
         self._measure(hierarchy)
         leaves = hierarchy.leaves
         sums = sent(hierarchy, links)
         own = sums[leaves].mean(axis=1)[:, 0]
-        shared = push(hierarchy, sums + self._from_clusters(hierarchy, links))[leaves, 0] - own
+        sums = sums + sent_to_clusters(hierarchy, cluster_links)
+        shared = push(hierarchy, sums + _from_clusters(hierarchy, top, links, cluster_links))[leaves, 0] - own
         arriving = self._arriving[leaves]
         left = np.maximum(arriving - own, 0.0)
         result = np.ones((hierarchy.n_elements, 2))
@@ -60,24 +67,66 @@ class Conservation:
         self._arriving = np.concatenate([self._arriving, np.full(hierarchy.n_elements - known, np.nan)])
         leaves = hierarchy.leaves
         new = leaves[np.isnan(self._arriving[leaves])]
-        points = points_on_triangles(hierarchy.corners[new], stratified_square(new, RAYS, self._seed + 41))
-        normals = hierarchy.normal[new]
-        self._arriving[new] = 1.0 - sky_visibility(points, normals, RAYS, self._caster, new, self._seed + 42)
+        faces = new[new < len(hierarchy.faces)]
+        if len(faces):
+            # Neighbours that together are no larger than an element may be share their rays.
+            large = np.flatnonzero(hierarchy.clusters.area > self._min_area)
+            top = TreeTop(hierarchy, large)
+            share = self._share(hierarchy, top.tips)
+            self._arriving[faces] = share[top.tip[faces] - top.n_inner]
+        below = new[len(faces) :]
+        self._arriving[below] = self._share(hierarchy, hierarchy.n_clusters + below)
 
-    @staticmethod
-    def _from_clusters(hierarchy: Hierarchy, links: Links) -> Array:
-        """Return (e, 4, 1) the share that the links of the clusters above each face carry."""
-        clusters, n_clusters = hierarchy.clusters, hierarchy.n_clusters
-        total = np.zeros((hierarchy.n_elements, 4, 1))
-        grouped = links.source < n_clusters
-        if grouped.any():
-            power = (hierarchy.area[links.receiver] * links.factor * links.visibility)[grouped]
-            per_cluster = np.bincount(links.source[grouped], power, n_clusters) / clusters.area
-            # A run of faces each: what starts at its first and stops behind its last.
-            steps = np.bincount(clusters.start, per_cluster, len(clusters.order) + 1)
-            steps -= np.bincount(clusters.end, per_cluster, len(clusters.order) + 1)
-            total[clusters.order] = np.cumsum(steps)[:-1, None, None]
+    def _share(self, hierarchy: Hierarchy, nodes: Array) -> Array:
+        """Return (n,) the share of the light of nodes that arrives anywhere."""
+        share = np.empty(len(nodes))
+
+        def measure(rows: slice) -> None:
+            chosen = nodes[rows]
+            quarter = np.broadcast_to(np.arange(RAYS) % 4, (len(chosen), RAYS))
+            points, normals = node_samples(hierarchy, chosen, quarter, chosen, self._seed + 41)
+            unit = stratified_square(chosen, RAYS, self._seed + 42)
+            normals = normals.reshape(-1, 3)
+            directions = to_world(cosine_hemisphere(unit).reshape(-1, 1, 3), normals)[:, 0]
+            start = points.reshape(-1, 3) + self._caster.surface_offset * normals
+            escapes = self._caster.visible(start, directions, np.full(len(start), np.inf))
+            share[rows] = 1.0 - escapes.reshape(-1, RAYS).mean(axis=1)
+
+        for_chunks(measure, len(nodes), CHUNK, self._threads)
+        return share
+
+
+def _from_clusters(hierarchy: Hierarchy, top: TreeTop, links: Links, cluster_links: ClusterLinks) -> Array:
+    """Return (e, 4, 1) the share that the links of the clusters above each face carry."""
+    clusters, faces, count = hierarchy.clusters, hierarchy.faces, hierarchy.n_clusters
+    total = np.zeros((hierarchy.n_elements, 4, 1))
+    if count == 0:
         return total
+    # Linear in the face's place: (1, y) times four numbers a cluster, as `gather_at_clusters` sends.
+    share = np.zeros((top.n_rows, 4))
+    for some, area in ((links, hierarchy.area), (cluster_links, clusters.area)):
+        grouped = np.flatnonzero(some.source < count)
+        source = some.source[grouped]
+        size = area[some.receiver[grouped]] / clusters.area[source]
+        share[:, 0] += top.spread(source, size * (some.factor * some.visibility)[grouped])
+        if isinstance(some, ClusterLinks):
+            slope = size[:, None] * some.gradient[grouped]
+            share[:, 0] += top.spread(source, np.einsum("lk,lk->l", slope, clusters.centre[source]))
+            for axis in range(3):
+                share[:, 1 + axis] -= top.spread(source, slope[:, axis])
+    carried = np.zeros(len(faces))
+    for term, pushed in zip((np.ones(1), *faces.centre.T), top.push(share).T, strict=True):
+        carried += term * pushed[top.tip]
+    total[: len(faces)] = np.maximum(carried, 0.0)[:, None, None]
+    return total
+
+
+def sent_to_clusters(hierarchy: Hierarchy, links: ClusterLinks) -> Array:
+    """Return (e, 1, 1): the share of the light of each element that its own links to clusters carry."""
+    single = links.source >= hierarchy.n_clusters
+    element = links.source[single] - hierarchy.n_clusters
+    power = (hierarchy.clusters.area[links.receiver] * links.factor * links.visibility)[single]
+    return np.bincount(element, power / hierarchy.area[element], hierarchy.n_elements)[:, None, None]
 
 
 def sent(hierarchy: Hierarchy, links: Links) -> Array:

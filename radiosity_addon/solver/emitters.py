@@ -6,7 +6,9 @@ import numpy as np
 
 from .arrays import Array
 from .form_factor import point_to_polygon
+from .geometry_term import ray_geometry_term, throughput
 from .hierarchy import Faces
+from .radiometry import radiance_of_radiosity
 from .sampling import points_on_triangles
 from .visibility import RayCaster
 
@@ -80,11 +82,11 @@ class EmitterGroup:
         along = targets + self._offset * self._normals[face] - points[:, None]
         distances = np.linalg.norm(along, axis=2)
         directions = along / np.maximum(distances, 1e-300)[..., None]
-        # A uniform point of a face stands for the kernel there over the face's mean.
+        # A uniform point of a face stands for what the whole face would send, were it all there.
         cos_r = np.einsum("nkc,nc->nk", directions, normals)
         cos_s = -np.einsum("nkc,nkc->nk", directions, self._normals[face])
-        kernel = np.maximum(cos_r, 0) * np.maximum(cos_s, 0) / (np.pi * np.maximum(distances, 1e-300) ** 2)
-        weights = np.where(total > 0, kernel * self._areas[face] / width, 0.0)
+        thrown = throughput(ray_geometry_term(cos_r, cos_s, distances), 1.0, self._areas[face])
+        weights = np.where(total > 0, radiance_of_radiosity(thrown) / width, 0.0)
         return directions, distances, weights
 
     def _factors(self, points: Array, normals: Array) -> Array:

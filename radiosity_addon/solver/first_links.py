@@ -1,65 +1,213 @@
-"""The first links: from every face to what it sees, coarsely, without pairing all with all."""
+"""The first links: from one pair of roots down to pairs that look small from each other.
+
+Nowhere are all faces paired with all: a pair of nodes is dropped once one lies behind the
+other, linked once both look small, and opened on its larger side otherwise. Faces far
+smaller than the smallest element that is asked for are never told apart: clusters below A_ε
+are linked however near they are.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
+from .arrays import Array
+from .cluster_links import ClusterLinks
+from .cluster_pairs import measure_cluster_links
 from .hierarchy import Hierarchy
-from .links import Links, join, measure_links
+from .links import Links, measure_links
+from .node_shapes import NodeShapes
 from .settings import SolverSettings
 from .visibility import RayCaster
 
-FIRST_SIZE = 0.4
-"""First links go to clusters whose radius, with the face's own, is at most this part of their distance, …"""
+SIZE = 0.5
+"""Nodes are linked where their radii together are at most this part of their distance, …"""
 
-MIXED_SIZE = 0.3
-"""… or this part where their faces look different ways: some may be bright and turned away."""
+MIXED_SIZE = 0.4
+"""… or this part where the source's faces look different ways: some may be bright and turned away, …"""
 
-COHERENT = 0.9
-"""From this length of the mean normal on, a cluster's faces look the same way."""
+FACE_SIZE = 0.4
+"""… or this part where a single face receives: its links do not know where in the source the light is."""
 
-FIRST_FACES = 21_000
-"""Beyond so many faces each can afford fewer links: the two sizes grow with the square of their
-number, which keeps first links at a few millions, …"""
+CONE = 0.35
+"""Faces receive together while none is turned further than this from their mean [rad]."""
 
-LARGEST_SIZE = 2.0
-"""… up to this."""
+BUDGET = 0.4
+"""First links may take this part of `SolverSettings.max_links`; refinement needs the rest …"""
+
+FEWEST = 200_000
+"""… but so many in any case: loosened further they would mean nothing."""
+
+FAINT = 1e-7
+"""Where there are more, pairs that exchange less than this share of all area are linked however large
+they look; where that does not do, …"""
+
+FAINTER, WIDER = 2.0, 1.25
+"""… than so many times more, again and again; and from `LEAST_FAINT` on the cone widens as well."""
+
+LEAST_FAINT = 1e-4
+"""As in a clutter of more small curved things than there may be links."""
+
+THINNED = 1 << 14
+"""How many first links there will be is estimated by following so many pairs at a time."""
+
+SLACK = 1.25
+"""First links may be so many times more than estimated."""
+
+BLOCK = 1 << 16
+"""Pairs looked at together: their temporaries, some 20 MB, stay near the processor."""
 
 
-def first_links(hierarchy: Hierarchy, caster: RayCaster, settings: SolverSettings) -> Links:
-    """Link every face to clusters that look small from it, and to single faces nearby.
+def first_links(
+    hierarchy: Hierarchy, shapes: NodeShapes, caster: RayCaster, settings: SolverSettings, max_links: int
+) -> tuple[Links, ClusterLinks, float]:
+    """Link all that may see each other, coarsely.
 
-    Starts from one pair per face and root; a cluster that looks too large is opened.
+    Parameters
+    ----------
+    max_links : int
+        The whole budget of links, of which these take `BUDGET`.
+
+    Returns
+    -------
+    links : Links
+        To faces, sorted by receiver.
+    cluster_links : ClusterLinks
+        To clusters.
+    faint : float
+        Pairs that exchange less than this share of all area had to be linked however large they
+        look, to keep within the budget; 0 if none.
     """
-    clusters, faces = hierarchy.clusters, hierarchy.faces
-    radius = 0.5 * np.linalg.norm(clusters.upper - clusters.lower, axis=1)
-    middle = 0.5 * (clusters.upper + clusters.lower)
-    half = 0.5 * (clusters.upper - clusters.lower)
-    centre = faces.corners.mean(axis=1)
-    crowd = max(len(faces) / FIRST_FACES, 1.0) ** 2
-    own_radius = np.linalg.norm(faces.corners - centre[:, None], axis=2).max(axis=1)
-    size = np.where(clusters.coherence >= COHERENT, FIRST_SIZE, MIXED_SIZE)
-    size = np.minimum(size * crowd, LARGEST_SIZE)
+    most = max(int(BUDGET * max_links), FEWEST)
+    limits, pairs = _Limits(float(hierarchy.faces.area.sum()), settings.min_area), None
+    while True:
+        while _estimate(hierarchy, shapes, limits) > most:
+            limits = limits.looser()
+        pairs = _first_pairs(hierarchy, shapes, limits, int(SLACK * most))
+        if pairs is not None:
+            break
+        limits = limits.looser()
+    count, (to, of) = hierarchy.n_clusters, pairs
+    single = to >= count
+    chance = settings.seed, settings.threads
+    to_faces = measure_links(hierarchy, caster, to[single] - count, of[single], *chance)
+    to_clusters = measure_cluster_links(hierarchy, shapes, caster, to[~single], of[~single], *chance)
+    return to_faces.sorted_by_receiver(), to_clusters, limits.faint
 
-    receiver = np.repeat(np.arange(len(faces)), len(hierarchy.roots))
-    source = np.tile(hierarchy.roots, len(faces))
-    parts: list[Links] = []
+
+@dataclass(frozen=True)
+class _Limits:
+    """How large, how near and how curved nodes may be that are linked as they are.
+
+    `area` is all faces' [m²]; `tiny`, of nodes, and `faint`, of what a pair exchanges, are shares of it.
+    """
+
+    area: float
+    tiny: float
+    faint: float = 0.0
+    cone: float = CONE
+
+    def looser(self) -> _Limits:
+        if self.faint == 0.0:
+            return replace(self, faint=FAINT)
+        wider = WIDER if self.faint >= LEAST_FAINT else 1.0
+        return replace(self, faint=FAINTER * self.faint, cone=wider * self.cone)
+
+
+def _first_pairs(
+    hierarchy: Hierarchy, shapes: NodeShapes, limits: _Limits, most: int
+) -> tuple[Array, Array] | None:
+    """Return the (n,) receivers and sources of the first links; None if there are more than `most`."""
+    waiting = [_root_pairs(hierarchy)]
+    to, of, found = [], [], 0
+    while waiting:
+        # The latest first, block by block: what waits never grows to a whole generation.
+        receiver, source = waiting.pop()
+        if len(receiver) > BLOCK:
+            waiting.append((receiver[BLOCK:], source[BLOCK:]))
+            receiver, source = receiver[:BLOCK], source[:BLOCK]
+        ready, opened = _judge(hierarchy, shapes, receiver, source, limits)
+        to.append(ready[0].astype(np.int32))
+        of.append(ready[1].astype(np.int32))
+        found += len(ready[0])
+        if found > most:
+            return None
+        if len(opened[0]):
+            waiting.append(opened)
+    return np.concatenate(to), np.concatenate(of)
+
+
+def _estimate(hierarchy: Hierarchy, shapes: NodeShapes, limits: _Limits) -> float:
+    """Estimate how many first links there are, from some of the pairs on the way to them.
+
+    Whenever more than `THINNED` pairs are to be opened, that many are drawn, and stand for all.
+    """
+    chance = np.random.default_rng(0)
+    receiver, source = _root_pairs(hierarchy)
+    total, weight = 0.0, 1.0
     while len(receiver):
-        is_cluster = source < len(clusters)
-        ready_receiver, ready_source = [receiver[~is_cluster]], [source[~is_cluster]]
-        receiver, source = receiver[is_cluster], source[is_cluster]
-        # A cluster wholly behind the receiver's plane sends it nothing: exactly so.
-        along = middle[source] - centre[receiver]
-        normal = faces.normal[receiver]
-        rise = np.einsum("nk,nk->n", along, normal) + np.einsum("nk,nk->n", half[source], np.abs(normal))
-        above = rise > 0
-        receiver, source, along = receiver[above], source[above], along[above]
-        distance = np.linalg.norm(along, axis=1)
-        small = radius[source] + own_radius[receiver] <= size[source] * distance
-        ready_receiver.append(receiver[small])
-        ready_source.append(source[small])
-        pairs = np.concatenate(ready_receiver), np.concatenate(ready_source)
-        parts.append(measure_links(hierarchy, caster, *pairs, settings.seed, settings.threads))
-        receiver = np.repeat(receiver[~small], 2)
-        source = clusters.children[source[~small]].ravel()
-    return join(parts).sorted_by_receiver()
+        ready, (receiver, source) = _judge(hierarchy, shapes, receiver, source, limits)
+        total += weight * len(ready[0])
+        if len(receiver) > THINNED:
+            drawn = chance.choice(len(receiver), THINNED, replace=False)
+            weight *= len(receiver) / THINNED
+            receiver, source = receiver[drawn], source[drawn]
+    return total
+
+
+def _root_pairs(hierarchy: Hierarchy) -> tuple[Array, Array]:
+    """Return the (n,) receivers and sources to begin with: every root with every root."""
+    count = len(hierarchy.roots)
+    return np.repeat(hierarchy.roots, count), np.tile(hierarchy.roots, count)
+
+
+def _judge(
+    hierarchy: Hierarchy, shapes: NodeShapes, receiver: Array, source: Array, limits: _Limits
+) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+    """Return the pairs to link as they are, and those that come of opening the others."""
+    may = shapes.may_see(receiver, source)
+    receiver, source = receiver[may], source[may]
+    coarse = _looks_small(shapes, receiver, source, limits)
+    wide = shapes.cone[receiver] > limits.cone
+    ready = coarse & ~wide
+    # Where only its many directions keep the receiver from being linked, opening the source is no use.
+    opened = _open_larger(
+        hierarchy, shapes, receiver[~ready], source[~ready], limits.cone, (coarse & wide)[~ready]
+    )
+    return (receiver[ready], source[ready]), opened
+
+
+def _looks_small(shapes: NodeShapes, receiver: Array, source: Array, limits: _Limits) -> Array:
+    """Return (n,) which pairs are linked as they are, if the receiver's faces look much the same way."""
+    to_face, of_face = receiver >= shapes.count, source >= shapes.count
+    of_mixed = shapes.cone[source] > CONE
+    size = np.where(of_mixed, MIXED_SIZE, SIZE)
+    size = np.where(to_face, np.minimum(size, FACE_SIZE), size)
+    far = ~shapes.looks_large(receiver, source, size)
+    # A face beside a cluster is told apart from it: samples would scatter there.
+    tiny = limits.tiny * limits.area
+    small = (shapes.area[receiver] <= tiny) & (shapes.area[source] <= tiny) & ~to_face & ~of_mixed
+    if limits.faint > 0.0:
+        far |= shapes.exchange_bound(receiver, source) <= limits.faint * limits.area
+    return np.asarray(far | small | (to_face & of_face))
+
+
+def _open_larger(
+    hierarchy: Hierarchy,
+    shapes: NodeShapes,
+    receiver: Array,
+    source: Array,
+    cone: float,
+    only_receiver: Array,
+) -> tuple[Array, Array]:
+    """Replace pairs by pairs with the two children of their larger cluster."""
+    count, children = hierarchy.n_clusters, hierarchy.clusters.children
+    # What looks many ways is opened rather: it may not receive.
+    weight = np.where(shapes.cone[receiver] > cone, 2.0, 1.0)
+    larger = weight * shapes.radius[receiver] >= shapes.radius[source]
+    opened = (receiver < count) & ((source >= count) | larger | only_receiver)
+    return (
+        np.concatenate([children[receiver[opened]].ravel(), np.repeat(receiver[~opened], 2)]),
+        np.concatenate([np.repeat(source[opened], 2), children[source[~opened]].ravel()]),
+    )

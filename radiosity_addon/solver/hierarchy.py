@@ -2,7 +2,7 @@
 
 A *face* is one side of one triangle: the two sides receive, reflect and emit apart. Every
 face is the root of a quadtree of *elements*, made by joining the midpoints of the edges;
-its first element has the face's own index. *Clusters* group faces and are only sources.
+its first element has the face's own index. *Clusters* group faces.
 
 Nodes are numbered clusters first: node n < n_clusters is a cluster, node n ≥ n_clusters is
 element n − n_clusters. So a link's source may be either and its receiver is an element.
@@ -36,6 +36,8 @@ class Faces:
         corners[~self.front] = corners[~self.front][:, [0, 2, 1]]
         self.corners = corners
         """(f, 3, 3) float64, counter-clockwise as seen from the side's own half-space"""
+        self.centre = corners.mean(axis=1)
+        """(f, 3) float64: the centroids [m]"""
         sign = np.where(self.front, 1.0, -1.0)[:, None]
         self.normal = scene.face_normals[self.triangle] * sign
         """(f, 3) float64"""

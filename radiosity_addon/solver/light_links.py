@@ -10,6 +10,8 @@ import numpy as np
 from .arrays import Array
 from .hierarchy import LEAF, Hierarchy, split_in_four
 from .lights import EnvironmentLight, Lamp, Light, SpotLight
+from .parallel import for_chunks
+from .radiometry import irradiance_under_sky
 from .sampling import cosine_hemisphere, points_on_triangles, stratified_square, to_world
 from .visibility import RayCaster
 
@@ -24,8 +26,14 @@ NEAR = 0.5
 """So is one that looks larger than this (radius over distance) from the lamp, or than this part
 of a spot's cone."""
 
-CHUNK = 1 << 14
-"""Elements measured at once; bounds the temporaries to some 60 MB."""
+SMALL, SMALL_DIVISOR = 2e-5, 4
+"""Elements below this share of all area get so many times fewer samples: there are many of them."""
+
+TINY = 2.5e-6
+"""Those below this share get a quarter of that, over the whole element."""
+
+CHUNK = 1 << 13
+"""Elements measured at once; bounds the temporaries to some 30 MB a thread."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +84,7 @@ def link_lights(
     misplaced_power: float,
     min_area: float,
     seed: int,
+    threads: int = 0,
 ) -> LightLinks:
     """Link every light to the elements it reaches, splitting where its light varies.
 
@@ -101,7 +110,7 @@ def link_lights(
             gain, doubt = np.zeros((len(waiting), 4)), np.zeros(len(waiting))
             seeing = np.flatnonzero(~blind)
             gain[seeing], doubt[seeing] = measure_light(
-                hierarchy, light, caster, waiting[seeing], seed + 101 * number
+                hierarchy, light, caster, waiting[seeing], seed + 101 * number, threads
             )
             split = blind | (may_split & (doubt * area * strength > misplaced_power))
             kept = ~split & (gain.max(axis=1) > 0)
@@ -129,7 +138,7 @@ def too_near(light: Light, hierarchy: Hierarchy, elements: Array) -> Array:
     radius = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
     along = centre - np.asarray(position)
     distance = np.linalg.norm(along, axis=1)
-    before = np.einsum("nk,nk->n", along, hierarchy.normal[elements]) < 0
+    before = np.einsum("nk,nk->n", along, hierarchy.faces.normal[hierarchy.face[elements]]) < 0
     near = radius > NEAR * distance
     if isinstance(light, SpotLight):
         # The element's bounding sphere, as the lamp sees it, touches the cone and is not small beside it.
@@ -142,7 +151,12 @@ def too_near(light: Light, hierarchy: Hierarchy, elements: Array) -> Array:
 
 
 def measure_light(
-    hierarchy: Hierarchy, light: Lamp | EnvironmentLight, caster: RayCaster, elements: Array, seed: int
+    hierarchy: Hierarchy,
+    light: Lamp | EnvironmentLight,
+    caster: RayCaster,
+    elements: Array,
+    seed: int,
+    threads: int = 0,
 ) -> tuple[Array, Array]:
     """Measure one light's irradiance on the quarters of elements, per unit of strength, and its doubt.
 
@@ -153,29 +167,72 @@ def measure_light(
     doubt : (n,) float64
     """
     gain, doubt = np.empty((len(elements), 4)), np.empty(len(elements))
-    for first in range(0, len(elements), CHUNK):
-        rows = slice(first, min(first + CHUNK, len(elements)))
-        chosen = elements[rows]
-        keys = (4 * chosen[:, None] + np.arange(4)).ravel()
-        quarters = split_in_four(hierarchy.corners[chosen]).reshape(-1, 3, 3)
-        normals = np.repeat(hierarchy.normal[chosen], 4, axis=0)
-        if isinstance(light, EnvironmentLight):
-            points = points_on_triangles(quarters, stratified_square(keys, SKY_RAYS, seed + 1))
-            open_share = sky_visibility(points, normals, SKY_RAYS, caster, keys, seed)
-            values = np.pi * open_share.reshape(-1, 4)
-            # Expected noise of a quarter's mean is not a difference between quarters.
-            noise = np.pi * np.sqrt(open_share * (1 - open_share) / SKY_RAYS).reshape(-1, 4).mean(axis=1)
-            gain[rows] = values
-            doubt[rows] = np.maximum(values.std(axis=1) - noise, 0.0)
-            continue
-        points = points_on_triangles(quarters, stratified_square(keys, LAMP_SAMPLES, seed + 1))
-        unit = stratified_square(keys, LAMP_SAMPLES, seed)
-        open_gain, share = lamp_light(light, points, normals, unit, caster)
-        values = (open_gain.mean(axis=1) * share).reshape(-1, 4)
-        gain[rows] = values
-        missed = open_gain.reshape(len(chosen), -1).mean(axis=1) / (4 * LAMP_SAMPLES + 2.0)
-        doubt[rows] = np.hypot(values.std(axis=1), missed)
+    area = hierarchy.area[elements]
+    share = area / float(hierarchy.faces.area.sum())
+    tiny, small = share < TINY, share < SMALL
+    for chosen, pieces, divisor in (
+        (~small, 4, 1),
+        (small & ~tiny, 4, SMALL_DIVISOR),
+        (tiny, 1, SMALL_DIVISOR),
+    ):
+        rows_of = np.flatnonzero(chosen)
+
+        def measure(
+            piece: slice, rows_of: Array = rows_of, pieces: int = pieces, divisor: int = divisor
+        ) -> None:
+            rows = rows_of[piece]
+            asked = _pieces(hierarchy, elements[rows], pieces)
+            if isinstance(light, EnvironmentLight):
+                gain[rows], doubt[rows] = _measure_sky(asked, caster, seed, divisor)
+            else:
+                gain[rows], doubt[rows] = _measure_lamp(asked, light, caster, seed, divisor)
+
+        for_chunks(measure, len(rows_of), CHUNK, threads)
     return gain, doubt
+
+
+@dataclass(frozen=True)
+class _Pieces:
+    """Quarters of n elements, or the elements whole: their keys, corners and normals."""
+
+    count: int
+    keys: Array
+    corners: Array
+    normals: Array
+
+
+def _pieces(hierarchy: Hierarchy, elements: Array, count: int) -> _Pieces:
+    keys = (4 * elements[:, None] + np.arange(count)).ravel()
+    corners = hierarchy.corners[elements]
+    if count == 4:
+        corners = split_in_four(corners).reshape(-1, 3, 3)
+    normals = hierarchy.faces.normal[hierarchy.face[elements]]
+    return _Pieces(count, keys, corners, np.repeat(normals, count, axis=0))
+
+
+def _measure_sky(asked: _Pieces, caster: RayCaster, seed: int, divisor: int) -> tuple[Array, Array]:
+    """Measure the sky on pieces of elements (see `measure_light`); whole ones have a column only."""
+    rays = SKY_RAYS // divisor
+    points = points_on_triangles(asked.corners, stratified_square(asked.keys, rays, seed + 1))
+    open_share = sky_visibility(points, asked.normals, rays, caster, asked.keys, seed)
+    values = irradiance_under_sky(open_share.reshape(-1, asked.count))
+    # Expected noise of a quarter's mean is not a difference between quarters.
+    spread = np.sqrt(open_share * (1 - open_share) / rays).reshape(-1, asked.count)
+    noise = irradiance_under_sky(spread.mean(axis=1))
+    return values, np.maximum(values.std(axis=1) - noise, 0.0)
+
+
+def _measure_lamp(
+    asked: _Pieces, light: Lamp, caster: RayCaster, seed: int, divisor: int
+) -> tuple[Array, Array]:
+    """Measure a lamp on pieces of elements (see `measure_light`); whole ones have a column only."""
+    samples = LAMP_SAMPLES // divisor
+    points = points_on_triangles(asked.corners, stratified_square(asked.keys, samples, seed + 1))
+    unit = stratified_square(asked.keys, samples, seed)
+    open_gain, share = lamp_light(light, points, asked.normals, unit, caster)
+    values = (open_gain.mean(axis=1) * share).reshape(-1, asked.count)
+    missed = open_gain.reshape(len(values), -1).mean(axis=1) / (asked.count * samples + 2.0)
+    return values, np.hypot(values.std(axis=1), missed)
 
 
 def lamp_light(

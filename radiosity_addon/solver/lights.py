@@ -14,8 +14,10 @@ import numpy.typing as npt
 
 from .bulb_lights import PointLight, SpotLight
 from .curved_factor import cap_cosine, point_to_ellipse
+from .geometry_term import ray_geometry_term, throughput
 from .light_base import Emitter, Float64Array, Lamp, Light, Rays, Samples, directions_to, row_cosines
 from .point_factor import point_to_polygon
+from .radiometry import radiance_of_flux
 from .sampling import concentric_disk, cosine_hemisphere, to_world, uniform_cone
 
 __all__ = [
@@ -159,10 +161,11 @@ class AreaLight(Emitter):
         """Return rays to samples uniform over the lamp (see `Lamp.shadow_rays`)."""
         samples = self._points(np.asarray(u, dtype=np.float64))
         directions, distances = directions_to(samples - points[:, None])
-        facing = np.maximum(-(directions @ (self._facing / np.linalg.norm(self._facing))), 0.0)
-        spread = np.pi * distances * distances * directions.shape[1]
-        weights = row_cosines(directions, normals) * facing / np.where(spread > 0.0, spread, np.inf)
-        return directions, distances, weights
+        facing = -(directions @ (self._facing / np.linalg.norm(self._facing)))
+        geometry = ray_geometry_term(row_cosines(directions, normals), facing, distances)
+        # Each ray stands for a k-th of the lamp: radiance times what it throws on a square metre.
+        thrown = throughput(geometry, 1.0, self.area / directions.shape[1])
+        return directions, distances, radiance_of_flux(1.0, self.area) * thrown
 
     def _points(self, square: Float64Array) -> Float64Array:
         """Map (…, 2) points of the unit square to uniform points of the lamp, (…, 3)."""

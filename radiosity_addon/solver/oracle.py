@@ -5,12 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from .arrays import Array
+from .cluster_links import ClusterLinks
 from .hierarchy import LEAF, Hierarchy
 from .links import Links
 from .transport import node_radiosity
+from .tree_top import TreeTop
 
 
-def misplaced_power(hierarchy: Hierarchy, links: Links, radiosity: Array) -> Array:
+def misplaced_power(
+    hierarchy: Hierarchy, links: Links, radiosity: Array, top: TreeTop | None = None
+) -> Array:
     """Estimate the power each link may misplace [W]: B_s · A_r · doubt, the largest channel.
 
     The handout's Oracle2 compares the whole power B_s A_r F_rs with BF_ε. Weighed by its
@@ -21,8 +25,16 @@ def misplaced_power(hierarchy: Hierarchy, links: Links, radiosity: Array) -> Arr
     ----------
     radiosity : (e, 3) float64
     """
-    brightest = node_radiosity(hierarchy, radiosity).max(axis=1, initial=0.0)
+    brightest = node_radiosity(hierarchy, radiosity, top).max(axis=1, initial=0.0)
     return np.asarray(brightest[links.source] * hierarchy.area[links.receiver] * links.doubt)
+
+
+def misplaced_at_clusters(
+    hierarchy: Hierarchy, links: ClusterLinks, radiosity: Array, top: TreeTop | None = None
+) -> Array:
+    """Estimate the power each link to a cluster may misplace [W] (see `misplaced_power`)."""
+    brightest = node_radiosity(hierarchy, radiosity, top).max(axis=1, initial=0.0)
+    return np.asarray(brightest[links.source] * hierarchy.clusters.area[links.receiver] * links.doubt)
 
 
 def choose_side(hierarchy: Hierarchy, links: Links, min_area: float) -> tuple[Array, Array, Array]:
@@ -87,3 +99,22 @@ def children_of_links(hierarchy: Hierarchy, links: Links, min_area: float) -> tu
         ]
     )
     return receiver, source, open_source | split_source | split_receiver
+
+
+def children_of_cluster_links(hierarchy: Hierarchy, links: ClusterLinks) -> tuple[Array, Array]:
+    """Replace links to clusters by links to or from the two children of their larger cluster.
+
+    Returns
+    -------
+    receiver, source : (n,) int
+        The new pairs, both of them nodes.
+    """
+    clusters, count = hierarchy.clusters, hierarchy.n_clusters
+    of_cluster = links.source < count
+    source_area = np.where(of_cluster, clusters.area[np.where(of_cluster, links.source, 0)], 0.0)
+    opens_source = source_area > clusters.area[links.receiver]
+    opened, source = links.receiver[~opens_source], links.source[~opens_source]
+    return (
+        np.concatenate([np.repeat(links.receiver[opens_source], 2), clusters.children[opened].ravel()]),
+        np.concatenate([clusters.children[links.source[opens_source]].ravel(), np.repeat(source, 2)]),
+    )

@@ -8,7 +8,7 @@ threads are enough.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from concurrent.futures import ThreadPoolExecutor
 
 
@@ -22,7 +22,17 @@ def thread_count(threads: int) -> int:
 
 
 def for_chunks(work: Callable[[slice], None], rows: int, chunk: int, threads: int) -> None:
-    """Call `work` on slices of at most `chunk` rows that cover 0 … rows.
+    """Call `work` on slices of at most `chunk` rows that cover 0 … rows (see `chunk_steps`)."""
+    for _ in chunk_steps(work, rows, chunk, threads):
+        pass
+
+
+def chunk_steps(
+    work: Callable[[slice], None], rows: int, chunk: int, threads: int
+) -> Generator[float, None, None]:
+    """Do the same in steps, and yield the fraction done after each.
+
+    Closed early, it lets the slices in hand end and leaves out the others.
 
     Parameters
     ----------
@@ -35,9 +45,13 @@ def for_chunks(work: Callable[[slice], None], rows: int, chunk: int, threads: in
     slices = [slice(start, min(start + chunk, rows)) for start in range(0, rows, chunk)]
     workers = min(thread_count(threads), len(slices))
     if workers <= 1:
-        for piece in slices:
+        for number, piece in enumerate(slices):
             work(piece)
+            yield (number + 1) / len(slices)
         return
-    with ThreadPoolExecutor(workers) as pool:
-        for _ in pool.map(work, slices):
-            pass
+    pool = ThreadPoolExecutor(workers)
+    try:
+        for number, _ in enumerate(pool.map(work, slices)):
+            yield (number + 1) / len(slices)
+    finally:
+        pool.shutdown(cancel_futures=True)

@@ -12,14 +12,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .arrays import Array
+from .cluster_links import ClusterLinks, gather_at_clusters
 from .hierarchy import Faces, Hierarchy
 from .light_base import Emitter
 from .lights import EnvironmentLight, SunLight
+from .links import Links
+from .radiometry import irradiance_under_sky
 from .sampling import cosine_hemisphere, points_on_triangles, stratified_square, to_world
 from .scene import Scene
+from .tree_top import TreeTop
 
 if TYPE_CHECKING:
-    from .methods.hierarchical import HierarchicalState
+    from .state import SolverState
 
 ESCAPE_RAYS = 1 << 17
 """Rays that follow the light surfaces send out."""
@@ -40,13 +44,13 @@ def light_power(scene: Scene, faces: Faces) -> float:
         if isinstance(light, SunLight):
             total = total + light.strength * float(np.abs(np.asarray(light.direction)) @ sides)
         elif isinstance(light, EnvironmentLight):
-            total = total + np.pi * light.strength * float(sides.sum())
+            total = total + irradiance_under_sky(light.strength) * float(sides.sum())
         elif isinstance(light, Emitter):
             total = total + light.flux
     return float(np.max(total))
 
 
-def power_balance(state: HierarchicalState) -> dict[str, float]:
+def power_balance(state: SolverState) -> dict[str, float]:
     """Return the emitted, absorbed and escaped power [W].
 
     Lamps and emission count over all their sides, sun and sky what arrives at the faces.
@@ -74,7 +78,7 @@ def power_balance(state: HierarchicalState) -> dict[str, float]:
     }
 
 
-def _follow_surfaces(state: HierarchicalState) -> tuple[float, float]:
+def _follow_surfaces(state: SolverState) -> tuple[float, float]:
     """Return the power [W] that leaves the surfaces onto black backs, and out of the scene."""
     hierarchy = state.hierarchy
     leaves = hierarchy.leaves
@@ -95,7 +99,7 @@ def _follow_surfaces(state: HierarchicalState) -> tuple[float, float]:
     return total * float(black.mean()), total * float(escaped.mean())
 
 
-def _follow_lamps(state: HierarchicalState) -> tuple[float, float]:
+def _follow_lamps(state: SolverState) -> tuple[float, float]:
     """Return the power [W] that leaves the lamps onto black backs, and out of the scene."""
     black_total = escaped_total = 0.0
     count = ESCAPE_RAYS // 8
@@ -113,7 +117,7 @@ def _follow_lamps(state: HierarchicalState) -> tuple[float, float]:
     return black_total, escaped_total
 
 
-def _fate(state: HierarchicalState, origins: Array, directions: Array) -> tuple[Array, Array]:
+def _fate(state: SolverState, origins: Array, directions: Array) -> tuple[Array, Array]:
     """Return (n,) whether rays end on a black back, and whether they leave the scene."""
     hits = state.caster.first_hits(origins, directions)
     escaped = hits.triangle < 0
@@ -121,13 +125,17 @@ def _fate(state: HierarchicalState, origins: Array, directions: Array) -> tuple[
     return ~escaped & (face < 0), escaped
 
 
-def closure(hierarchy: Hierarchy, state: HierarchicalState) -> Array:
+def link_closure(hierarchy: Hierarchy, links: Links, cluster_links: ClusterLinks | None = None) -> Array:
     """Return (f,) the area mean over each face's leaves of ΣFV over own and inherited links.
 
     1 in a closed scene: all that leaves a face arrives somewhere.
     """
-    links = state.links
     own = np.bincount(links.receiver, links.factor * links.visibility, minlength=hierarchy.n_elements)
     # An element's own links count for its whole area: exactly the mean over its leaves.
-    per_face = np.bincount(hierarchy.face, own * hierarchy.area, minlength=len(hierarchy.faces))
-    return np.asarray(per_face / hierarchy.faces.area)
+    held = np.bincount(hierarchy.face, own * hierarchy.area, minlength=len(hierarchy.faces))
+    per_face = np.asarray(held / hierarchy.faces.area)
+    if cluster_links is not None:
+        top = TreeTop(hierarchy, cluster_links.receiver, cluster_links.source)
+        everywhere = np.ones((hierarchy.n_clusters + hierarchy.n_elements, 1))
+        per_face += np.maximum(gather_at_clusters(hierarchy, top, cluster_links, everywhere)[:, 0], 0.0)
+    return per_face

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from functools import cached_property
 from typing import Any
 
@@ -9,8 +10,9 @@ import numpy as np
 
 from .arrays import Array
 from .local_pass import NOTHING, SKY, LocalPass
-from .methods.hierarchical import HierarchicalState
-from .power import closure, power_balance
+from .power import power_balance
+from .residual import Residual
+from .state import SolverState
 
 POINT_RAYS = 1024
 """Hemisphere rays of a single point in `Solution.irradiance`."""
@@ -28,15 +30,16 @@ class Solution:
     triangle_closure, back_closure : (t,) float64
         Area mean of ΣFV: the share of what leaves a side that arrives at another.
     report : dict
-        "elements", "links", "rays", "iterations", "residual", "power_W" (emitted, absorbed,
-        escaped), "closure_area_mean" (over the sides that receive light).
+        "method", "elements", "links", "rays", "iterations", "residual", "power_W" (emitted,
+        absorbed, escaped), "closure_area_mean" (over the sides that receive light),
+        "history" (a dict for each `HistoryEntry`), and what the method itself has to tell.
     """
 
-    def __init__(self, state: HierarchicalState) -> None:
+    def __init__(self, state: SolverState) -> None:
         self._state = state
         hierarchy = state.hierarchy
         face_count = len(hierarchy.faces)
-        shares = closure(hierarchy, state)
+        shares = state.closure()
         self.triangle_radiosity, self.back_radiosity = self._by_side(state.radiosity[:face_count])
         self.triangle_irradiance, self.back_irradiance = self._by_side(state.irradiance[:face_count])
         fronts, backs = self._by_side(shares[:, None])
@@ -45,19 +48,27 @@ class Solution:
         lit_area = hierarchy.faces.area * lit
         mean = float(lit_area @ shares / lit_area.sum()) if lit.any() else 0.0
         self.report: dict[str, Any] = {
+            "method": state.settings.method,
             "elements": hierarchy.n_elements,
-            "links": len(state.links) + len(state.light_links),
+            "links": state.n_links,
             "rays": state.caster.rays,
             "iterations": state.iterations,
             "residual": state.residual,
             "power_W": power_balance(state),
             "closure_area_mean": mean,
+            "history": [asdict(entry) for entry in state.history],
+            **state.details,
         }
 
     @property
     def over_budget(self) -> float:
         """Largest share of the light's power a link may misplace that the link budget left; 0 if none."""
         return self._state.over_budget
+
+    @property
+    def first_faint(self) -> float:
+        """Exchange, as a share of all area, below which first links are coarse for want of them; or 0."""
+        return float(self.report.get("hierarchical", {}).get("first_faint", 0.0))
 
     def final_report(self) -> dict[str, Any]:
         """Return the report with the rays counted that were traced since solving."""
@@ -67,6 +78,11 @@ class Solution:
     def local_pass(self) -> LocalPass:
         """The local pass over this solution: direct light and gather rays at points."""
         return LocalPass(self._state)
+
+    @property
+    def element_residual(self) -> Residual:
+        """The residual of the elements' radiosity."""
+        return Residual(self._state)
 
     def irradiance(self, points: Array, normals: Array) -> Array:
         """Return the irradiance at points, direct and indirect.
@@ -92,6 +108,42 @@ class Solution:
         radiosity = np.concatenate([local.reflected(), np.zeros((1, 3)), local.sky()[None]])
         assert (NOTHING, SKY) == (-2, -1)  # they index the two rows appended
         return np.asarray(direct + radiosity[sources].mean(axis=1))
+
+    def residual(
+        self, triangle: Array, barycentric: Array, front: bool | Array = True, rays: int | None = None
+    ) -> Array:
+        """Return r(x) = B̂ − E − ρ(H_lamps + ∫ B̂ κ V dA') at points of triangles (handout (3.5)).
+
+        Parameters
+        ----------
+        triangle : (n,) int
+        barycentric : (n, 2) float
+            Weights of the triangle's second and third corner.
+        front : bool or (n,) bool
+            Which side of it.
+        rays : int or None
+            None sums over all elements, point by point; a number gathers with so many rays.
+
+        Returns
+        -------
+        residual : (n, 3) float64 [W/m²]
+            Positive where the solution is too bright for what arrives there.
+
+        Raises
+        ------
+        ValueError
+            If a triangle has no such side.
+        """
+        triangle = np.asarray(triangle)
+        side = np.where(np.broadcast_to(front, triangle.shape), 0, 1)
+        face = self._state.hierarchy.faces.of_triangle[side, triangle]
+        if (face < 0).any():
+            row = int(np.flatnonzero(face < 0)[0])
+            raise ValueError(f"triangle {triangle[row]} has no area or no such side")
+        residual = self.element_residual
+        if rays is None:
+            return residual.at(face, barycentric)
+        return residual.by_rays(face, barycentric, rays, self.local_pass)
 
     def _by_side(self, values: Array) -> tuple[Array, Array]:
         """Spread (f, k) face values over the triangles' fronts and backs: two (t, k)."""

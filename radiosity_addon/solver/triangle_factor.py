@@ -182,8 +182,20 @@ def _cubature(outer: Float64Array, outer_normal: Float64Array, inner: Float64Arr
     spread = (count, len(_CUBATURE_WEIGHTS), 3)
     normals = np.broadcast_to(outer_normal[:, None], spread).reshape(-1, 3)
     factors = point_to_polygon(points, normals, np.repeat(inner, spread[1], axis=0))
-    mean: Float64Array = factors.reshape(count, -1) @ _CUBATURE_WEIGHTS
+    mean: Float64Array = weighted_sums(factors.reshape(count, -1), _CUBATURE_WEIGHTS)
     return mean
+
+
+def weighted_sums(values: Float64Array, weights: Float64Array) -> Float64Array:
+    """Return (m,) Σ_k values_mk weights_k, the same bits for a row whatever rows stand beside it.
+
+    A matrix product promises no such thing: it treats the last rows of an array differently,
+    and a pair's factor must not depend on what it was asked together with.
+    """
+    total: Float64Array = values[:, 0] * weights[0]
+    for column in range(1, len(weights)):
+        total = total + values[:, column] * weights[column]
+    return total
 
 
 def _clip(polygons: Float64Array, heights: Float64Array) -> Float64Array:
@@ -233,8 +245,8 @@ def _outline_factor(outer: Float64Array, inner: Float64Array, area: Float64Array
             nodes = from_t[part, None] + 0.5 * width * (1.0 + KRONROD_NODES)
             along = start[part, None] + nodes[..., None] * edge[part, None]
             height = _edge_integrals(along, edge[part], inner[row[part]])
-            value[part] = 0.5 * width * (height @ KRONROD_WEIGHTS)
-            error[part] = np.abs(value[part] - 0.5 * width * (height @ GAUSS_WEIGHTS))
+            value[part] = 0.5 * width * weighted_sums(height, KRONROD_WEIGHTS)
+            error[part] = np.abs(value[part] - 0.5 * width * weighted_sums(height, GAUSS_WEIGHTS))
             if bisection < BLIND_BISECTIONS:
                 middle = start[part] + (from_t[part, None] + 0.5 * width) * edge[part]
                 square = width * width * np.einsum("ij,ij->i", edge[part], edge[part])

@@ -58,6 +58,19 @@ def test_a_long_step_does_not_hold_the_caller() -> None:
     assert finish(steps) == (["done"], None)
 
 
+def test_the_steps_go_on_while_the_caller_does_something_else() -> None:
+    arrived = threading.Event()
+
+    def work() -> Generator[int, None, None]:
+        yield from range(3)
+        arrived.set()
+
+    steps = in_thread(work())
+    first = next(steps)
+    assert arrived.wait(60)
+    assert (first, finish(steps)) in [(0, ([1, 2], None)), (None, ([0, 1, 2], None))]
+
+
 def test_closing_in_a_step_returns_at_once_and_closes_the_work_after_it() -> None:
     go_on, closed, goes_on = threading.Event(), threading.Event(), []
 

@@ -65,11 +65,13 @@ def test_every_option_arrives(verbs: list[tuple]) -> None:
     line = (
         "bake s.glb --output o --texel-density 12.5 --atlas per-object --quality high --quantity radiosity "
         "--light indirect --format png16 --objects Floor Wall --sky --keep-uvs --seed 7 --threads 2 "
-        "--quiet --report r.json"
+        "--quiet --report r.json --plot p.PNG --method two-level --elements 900 --patches 30 --contrast 0.25 "
+        "--memory-limit 0.5"
     )
     assert cli.main(line.split()) == 0
-    (_, scene, _, output, settings, report, console, _) = verbs[0]
-    assert (scene, output, report, console.quiet) == (Path("s.glb"), Path("o"), Path("r.json"), True)
+    (_, scene, _, output, settings, report, plot, console, _) = verbs[0]
+    assert (scene, output, console.quiet) == (Path("s.glb"), Path("o"), True)
+    assert (report, plot) == (Path("r.json"), Path("p.PNG"))
     assert settings == BakeSettings(
         texel_density=12.5,
         atlas="per-object",
@@ -82,7 +84,29 @@ def test_every_option_arrives(verbs: list[tuple]) -> None:
         keep_uvs=True,
         seed=7,
         threads=2,
+        method="two-level",
+        elements=900,
+        patches=30,
+        contrast=0.25,
+        memory_limit=0.5,
     )
+
+
+@pytest.mark.parametrize(
+    ("line", "given"),
+    [
+        ("hierarchical --link-error 1e-3", {"error": 1e-3}),
+        ("hierarchical --min-area 1e-4 --max-links 5000", {"min_area": 1e-4, "max_links": 5000}),
+        ("multi-level --form-factor-error 0", {"form_factor_error": 0.0}),
+        ("shooting --ambient --max-iterations 90", {"ambient": True, "max_iterations": 90}),
+        ("gauss-seidel --assembly linear --tolerance 1e-9", {"assembly": "linear", "tolerance": 1e-9}),
+        ("conjugate-gradient --assembly galerkin", {"assembly": "galerkin"}),
+        ("dense --elements 12", {"elements": 12}),
+    ],
+)
+def test_a_method_and_its_settings_arrive(line: str, given: dict, verbs: list[tuple]) -> None:
+    assert cli.main(["bake", "--method", *line.split()]) == 0
+    assert verbs[0][4] == BakeSettings(method=line.split()[0], **given)
 
 
 def test_the_bundled_scene_has_a_default_output(verbs: list[tuple]) -> None:
@@ -121,6 +145,18 @@ def test_restore(verbs: list[tuple]) -> None:
         ("bake --format jpg", "jpg"),
         ("bake --threads -1", "threads -1"),
         ("bake --seed -1", "seed -1"),
+        ("bake --method best", "best"),
+        ("bake --elements 5", "--elements does not apply to --method hierarchical; it takes --link-error"),
+        (
+            "bake --method jacobi --ambient",
+            "--ambient does not apply to --method jacobi; it takes --elements, --assembly, --tolerance, "
+            "--max-iterations, --memory-limit",
+        ),
+        ("bake --method conjugate-gradient --assembly collocation", "--assembly galerkin"),
+        ("bake --method dense --assembly finite", "galerkin, collocation, linear"),
+        ("bake --method dense --elements many", "many"),
+        ("bake --link-error 0", "--link-error 0.0 is not above 0"),
+        ("bake --plot history.jpg", "history.jpg"),
         ("bake --objects", "--objects"),
         ("bake --res 5", "--res"),
         ("restore a.blend", "--output"),
@@ -272,14 +308,27 @@ def test_summary_says_where_how_long_and_what_to_look_at() -> None:
 
     report = {
         "objects": [{"object": "Floor"}],
-        "solver": {"elements": 1200, "links": 34000, "rays": 5, "closure_area_mean": 0.99871},
+        "solver": {
+            "method": "hierarchical",
+            "elements": 1200,
+            "links": 34000,
+            "rays": 5,
+            "closure_area_mean": 0.99871,
+        },
         "seconds": {"export": 0.25, "solve": 1.5},
         "warnings": [{"name": "Glass", "message": "not understood; grey used instead"}],
     }
     text = "\n".join(summary("out/x", [("baked.blend", "the scene")], report))
-    for part in ("1 object baked into out/x", "baked.blend", "1,200 elements", "34,000 links", "0.9987"):
+    for part in (
+        "1 object baked into out/x",
+        "baked.blend",
+        "hierarchical: 1,200 elements",
+        "34,000 links",
+        "0.9987",
+    ):
         assert part in text
     for part in (
+        "0.9987",
         "export",
         "0.25 s",
         "solve",

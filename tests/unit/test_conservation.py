@@ -6,17 +6,28 @@ import numpy as np
 import pytest
 
 from radiosity_addon.solver import Scene
+from radiosity_addon.solver.cluster_links import gather_at_clusters
 from radiosity_addon.solver.conservation import LIMIT, Conservation, sent
 from radiosity_addon.solver.hierarchy import LEAF
 from radiosity_addon.solver.methods.hierarchical import HierarchicalState
-from radiosity_addon.solver.transport import gather
+from radiosity_addon.solver.transport import gather, node_radiosity, pull
 from tests.rooms import CEILING, box_room, grey
-from tests.unit.solved_rooms import furnished, solved
+from tests.unit.solved_rooms import corridor, furnished, solved
 
 
-@pytest.fixture(scope="module")
-def closed() -> HierarchicalState:
-    return solved(furnished(), error=1e-3)
+@pytest.fixture(scope="module", params=["few faces", "many faces"])
+def closed(request: pytest.FixtureRequest) -> HierarchicalState:
+    """A closed scene whose links go to elements, and one where most go to clusters."""
+    if request.param == "few faces":
+        return solved(furnished(), error=1e-3)
+    state = solved(corridor(), error=5e-3)
+    assert len(state.cluster_links) > 200
+    return state
+
+
+def factors(state: HierarchicalState, conservation: Conservation | None = None) -> np.ndarray:
+    conservation = conservation or state.conservation
+    return conservation.factors(state.hierarchy, state.top, state.links, state.cluster_links)
 
 
 def received(state: HierarchicalState, scale: np.ndarray | None) -> np.ndarray:
@@ -26,13 +37,17 @@ def received(state: HierarchicalState, scale: np.ndarray | None) -> np.ndarray:
     radiosity = np.zeros((hierarchy.n_elements, len(leaves)))
     radiosity[leaves, np.arange(len(leaves))] = 1.0
     arriving = gather(hierarchy, state.links, radiosity, scale).mean(axis=1)
+    means = pull(hierarchy, radiosity if scale is None else scale[:, 1:] * radiosity)
+    sent_to = node_radiosity(hierarchy, means)
+    count = len(hierarchy.faces)
+    arriving[:count] += gather_at_clusters(hierarchy, state.top, state.cluster_links, sent_to)
     return np.asarray(hierarchy.area @ arriving / hierarchy.area[leaves])
 
 
 def test_every_leaf_sends_what_arrives(closed: HierarchicalState) -> None:
     """In a closed scene all of it, but where there are too few shared links to carry the rest; never more."""
-    factor = closed.conservation.factors(closed.hierarchy, closed.links)[closed.hierarchy.leaves]
-    share = received(closed, closed.conservation.factors(closed.hierarchy, closed.links))
+    factor = factors(closed)[closed.hierarchy.leaves]
+    share = received(closed, factors(closed))
     assert share.max() < 1 + 1e-4
     enough = (factor[:, 1] < LIMIT) & (factor[:, 1] != 1)
     assert enough.mean() > 0.8
@@ -42,9 +57,8 @@ def test_every_leaf_sends_what_arrives(closed: HierarchicalState) -> None:
 def test_scaling_brings_the_sums_nearer_to_what_arrives(closed: HierarchicalState) -> None:
     """And the area mean, which push and pull need, near to 1."""
     hierarchy = closed.hierarchy
-    factor = closed.conservation.factors(hierarchy, closed.links)
     area = hierarchy.area[hierarchy.leaves]
-    plain, scaled = received(closed, None), received(closed, factor)
+    plain, scaled = received(closed, None), received(closed, factors(closed))
     assert area @ np.abs(scaled - 1) < 0.2 * (area @ np.abs(plain - 1))
     assert area @ scaled / area.sum() == pytest.approx(1.0, abs=0.005)
     assert area @ plain / area.sum() == pytest.approx(1.0, abs=0.02)
@@ -52,7 +66,7 @@ def test_scaling_brings_the_sums_nearer_to_what_arrives(closed: HierarchicalStat
 
 def test_factors_are_bounded_and_only_the_leaves(closed: HierarchicalState) -> None:
     hierarchy = closed.hierarchy
-    factor = closed.conservation.factors(hierarchy, closed.links)
+    factor = factors(closed)
     assert factor.shape == (hierarchy.n_elements, 2)
     assert (factor >= 0).all()
     assert (factor <= [1.0, LIMIT]).all()
@@ -80,7 +94,7 @@ def test_open_scene_sends_less() -> None:
     emission = grey(len(room), 0.0)
     emission[surface == 0] = 1.0
     state = solved(Scene(room[kept], grey(10, 0.5), emission[kept]), error=1e-3)
-    factor = state.conservation.factors(state.hierarchy, state.links)
+    factor = factors(state)
     share = received(state, factor)
     hierarchy = state.hierarchy
     face = hierarchy.face[hierarchy.leaves]
@@ -104,7 +118,6 @@ def test_the_iteration_converges_and_keeps_the_power(reflectance: float) -> None
 def test_factors_do_not_depend_on_when_leaves_appeared() -> None:
     """Rays of a leaf are placed by its own number: measured at once or as the solver refines, the same."""
     state = solved(furnished(), error=2e-3)
-    fresh = Conservation(state.caster, state.settings.seed)
-    np.testing.assert_array_equal(
-        fresh.factors(state.hierarchy, state.links), state.conservation.factors(state.hierarchy, state.links)
-    )
+    min_area = state.settings.min_area * float(state.hierarchy.faces.area.sum())
+    fresh = Conservation(state.caster, min_area, state.settings.seed, threads=1)
+    np.testing.assert_array_equal(factors(state, fresh), factors(state))

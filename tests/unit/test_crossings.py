@@ -10,6 +10,7 @@ from radiosity_addon.lightmap.texel_geometry import NO_TEXEL
 from radiosity_addon.solver import Scene
 from radiosity_addon.solver.embree import EmbreeCaster
 from radiosity_addon.solver.local_pass import NOTHING
+from radiosity_addon.solver.visibility import Hits
 from tests.rooms import grey, rectangle, solid_box
 from tests.unit.texel_scenes import QUAD_UV, texel_geometry
 
@@ -26,6 +27,15 @@ def crossings_of(*others: np.ndarray) -> Crossings:
     pages = np.full(len(triangles), -1)
     pages[:2] = 0
     return Crossings(texel_geometry(scene, uv, SIZE, pages), EmbreeCaster(triangles))
+
+
+def on_floor(position: np.ndarray) -> Hits:
+    """Hits at points of the unit square."""
+    x, y = position[:, 0], position[:, 1]
+    upper = y > x  # FLOOR is (a, b, c), then (a, c, d)
+    weights = np.where(upper[:, None], np.stack([x, y - x], axis=1), np.stack([x - y, y], axis=1))
+    count = len(position)
+    return Hits(upper.astype(np.int32), weights, np.ones(count, dtype=bool), np.ones(count))
 
 
 def image(crossings: Crossings) -> np.ndarray:
@@ -78,7 +88,7 @@ def test_hits_on_a_cut_texel_go_to_their_own_side(side: int) -> None:
         ],
         axis=1,
     )
-    found = crossings.look_up(numbers[row, 6], position)
+    found = crossings.look_up(numbers[row, 6], on_floor(position))
     assert (found >= 0).all()
     column = crossings._geometry.column[found]
     assert (column == 6 + side).all()
@@ -92,7 +102,7 @@ def test_whole_texels_and_none_are_left_alone() -> None:
     texel = np.append(whole, NO_TEXEL).astype(np.int32)
     position = np.append(geometry.position[whole], np.zeros((1, 3)), axis=0)
     given = texel.copy()
-    np.testing.assert_array_equal(crossings.look_up(texel, position), given)
+    np.testing.assert_array_equal(crossings.look_up(texel, on_floor(position)), given)
     np.testing.assert_array_equal(texel, given)
 
 
@@ -103,6 +113,38 @@ def test_without_a_whole_neighbour_there_is_nothing() -> None:
     texel = crossings._geometry.index[0][6, 6]
     assert crossings.crossed[texel]
     inside, outside = np.array([[6.5 / SIZE, 6.5 / SIZE, 0], [6.1 / SIZE, 6.5 / SIZE, 0]])
-    found = crossings.look_up(np.array([texel, texel], dtype=np.int32), np.stack([inside, outside]))
+    found = crossings.look_up(np.array([texel, texel], dtype=np.int32), on_floor(np.stack([inside, outside])))
     assert found[0] == NOTHING
     assert found[1] == crossings._geometry.index[0][6, 5]
+
+
+@pytest.mark.parametrize("part", [0.01, 0.99])
+def test_hits_beyond_the_wall_a_texel_ends_at_go_to_the_other_side(part: float) -> None:
+    """The wall cuts off a hundredth of the texels: they are whole, but no hit on that part is theirs."""
+    at = (6 + part) / SIZE
+    crossings = crossings_of(rectangle((at, -1, -0.5), (0, 3, 0), (0, 0, 1)))
+    assert not crossings.crossed.any()
+    numbers = crossings._geometry.index[0]
+    np.testing.assert_array_equal(crossings.touched[numbers], np.arange(SIZE) == np.full((SIZE, 1), 6))
+    row = np.arange(SIZE)
+    y = (row + 0.3) / SIZE
+    for x, column in ((6 + 0.5 * part + (part < 0.5) * 0.5, 6), (6 + part / 2, 5), (6.5 + part / 2, 7)):
+        if (column == 5 and part > 0.5) or (column == 7 and part < 0.5):
+            continue
+        hits = on_floor(np.stack([np.full(SIZE, x / SIZE), y], axis=1))
+        found = crossings.look_up(numbers[row, 6], hits)
+        np.testing.assert_array_equal(crossings._geometry.column[found], column)
+
+
+def test_a_wall_beyond_the_triangle_that_owns_a_texel_touches_it() -> None:
+    """On the floor's diagonal hits land on either triangle, and the wall stands on one of them."""
+    crossings = crossings_of(rectangle((-1, -1 + 0.5 / SIZE, -0.5), (3, 3, 0), (0, 0, 1)))
+    texel = np.diagonal(crossings._geometry.index[0])
+    assert (crossings._geometry.triangle[texel] == 0).all()
+    assert crossings.touched[texel].all()
+    # Hits on the other triangle beyond the wall are not theirs; those before it are.
+    middle = (np.arange(SIZE) + 0.5) / SIZE
+    for shift, own in ((0.4, False), (0.2, True), (-0.4, True)):
+        position = np.stack([middle - shift / SIZE, middle + shift / SIZE], axis=1)
+        found = crossings.look_up(texel, on_floor(position))
+        np.testing.assert_array_equal(found == texel, own)

@@ -133,7 +133,8 @@ def test_over_a_dome_neighbours_see_each_other() -> None:
     turn = np.einsum("nck,nk->nc", geometry.normal[near], geometry.normal[some])
     reached = np.sqrt(1 - turn) < 0.3
     assert reached.mean() > 0.9
-    assert (points.kernel(some, near)[reached] > 0).all()
+    weight = points.kernel(np.repeat(some, near.shape[1]), near.ravel())
+    assert (weight.reshape(near.shape)[reached] > 0).all()
 
 
 def test_charts_beside_each_other_on_the_page_and_far_apart_in_the_world_do_not_mix() -> None:

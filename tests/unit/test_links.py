@@ -8,8 +8,10 @@ import pytest
 from radiosity_addon.solver import Scene, links
 from radiosity_addon.solver.embree import EmbreeCaster
 from radiosity_addon.solver.form_factor import triangle_to_triangle
+from radiosity_addon.solver.geometry_term import kernel
 from radiosity_addon.solver.hierarchy import Hierarchy, split_in_four
-from radiosity_addon.solver.links import Links, element_factors, join, kernel, measure_links, no_links
+from radiosity_addon.solver.links import Links, join, measure_links, no_links
+from radiosity_addon.solver.pairs import element_factors
 from tests.rooms import box_room, grey, rectangle, solid_box
 
 

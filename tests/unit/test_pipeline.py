@@ -12,9 +12,11 @@ import pytest
 
 from radiosity_addon.bake_scene import BakeResult, BakeScene, Progress
 from radiosity_addon.errors import SceneError
+from radiosity_addon.methods import METHODS
 from radiosity_addon.pipeline import bake
+from radiosity_addon.quality import quality_of
 from radiosity_addon.settings import BakeSettings
-from radiosity_addon.solver import EnvironmentLight, PointLight, Scene
+from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, solve
 from tests.rooms import FLOOR, box_room, grey, rectangle, solid_box
 from tests.unit.texel_scenes import QUAD_UV, bake_object, bake_scene, in_cell
 
@@ -152,13 +154,49 @@ def test_a_sealed_room_inside_a_lit_one_stays_black() -> None:
     assert covered.max() < 1e-3 * mean
 
 
+@pytest.mark.parametrize("wall", [0.0, 0.01])
+@pytest.mark.parametrize("height", [0.0, 0.4])
+def test_no_texel_in_a_sealed_box_is_lit(wall: float, height: float) -> None:
+    """Askew on the floor, which its own then lies in, or above it; of a single plane, or 1 cm thick."""
+    room, _ = box_room((4, 3, 2.5))
+    inner, _ = box_room((1, 1, 1))
+    shells = [inner] + ([solid_box((-wall,) * 3, (1 + wall,) * 3)] if wall else [])
+    cosine, sine = np.cos(0.5), np.sin(0.5)
+    turn = np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]])
+    boxes = [shell @ turn + np.array([1.7, 0.8, height + wall]) for shell in shells]
+    triangles = np.concatenate([room, *boxes])
+    count = len(triangles)
+    lamp = PointLight((0.5, 1.5, 2.0), 100.0, radius=0.05)
+    scene = Scene(
+        triangles, grey(count, 0.8), grey(count, 0), two_sided=True, lights=[lamp, EnvironmentLight(0.2)]
+    )
+    parts = (("Room", 12), ("Inner", 12), ("Outer", 12, None, False))
+    pages = run(bake_scene(scene, *parts[: 1 + len(shells)]), resolution=64, atlas="per-object").pages
+    assert pages[0].pixels[pages[0].coverage].mean() > 1
+    assert not pages[1].pixels.any()
+
+
+def test_light_takes_many_short_steps() -> None:
+    """A window stays alive, and a bar moves, while texels are lit."""
+    steps = bake(lit_room(lights=[LAMP]), BakeSettings(resolution=256))
+    stages = [step.stage for step in steps]
+    assert stages.count("light") > 40
+
+
 def test_threads_change_no_byte_and_the_seed_does() -> None:
     scene = lit_room(lights=[LAMP, EnvironmentLight(0.1)])
     one, two, other = (run(scene, threads=threads, seed=seed) for threads, seed in ((1, 0), (2, 0), (2, 1)))
     assert one.pages[0].pixels.tobytes() == two.pages[0].pixels.tobytes()
-    assert one.solver == two.solver
+    assert without_seconds(one.solver) == without_seconds(two.solver)
     assert one.objects[0].uv.tobytes() == two.objects[0].uv.tobytes()
     assert one.pages[0].pixels.tobytes() != other.pages[0].pixels.tobytes()
+
+
+def without_seconds(solver: dict[str, Any]) -> dict[str, Any]:
+    """What the solver tells, but for how long it took."""
+    history = [{**entry, "seconds": None} for entry in solver["history"]]
+    assert history
+    return {**solver, "history": history}
 
 
 def three_objects() -> BakeScene:
@@ -199,6 +237,38 @@ def test_kept_uvs_come_back_bit_for_bit() -> None:
     assert (rows.min(), rows.max(), columns.min(), columns.max()) == (4, 17, 2, 13)
 
 
+@pytest.mark.parametrize("method", sorted(METHODS))
+def test_pictures_tile_the_room_and_the_last_one_is_the_solution(
+    method: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("radiosity_addon.pipeline.PICTURE_SECONDS", 0.0)
+    room = lit_room(lights=[LAMP], two_sided=True)
+    given = {"elements": 60} if "elements" in METHODS[method].settings else {}
+    settings = BakeSettings(quality="draft", resolution=16, method=method, **given)
+    pictures = [step.picture for step in bake(room, settings) if step.picture is not None]
+    assert len(pictures) >= 2
+    scene = room.scene
+    for picture in pictures:
+        edges = picture.corners[:, 1:] - picture.corners[:, :1]
+        normals = np.cross(edges[:, 0], edges[:, 1]).astype(np.float64) / 2
+        area = np.linalg.norm(normals, axis=1)
+        for side, sign in ((picture.front, 1), (~picture.front, -1)):
+            tiled = np.bincount(picture.triangle[side], area[side], minlength=len(scene))
+            np.testing.assert_allclose(tiled, scene.areas, rtol=1e-5)
+            facing = (normals[side] * scene.face_normals[picture.triangle[side]]).sum(axis=1)
+            np.testing.assert_allclose(sign * facing, area[side], rtol=1e-4)
+    solution = solve(scene, quality_of(settings).solver)
+    for side, radiosity in (
+        (picture.front, solution.triangle_radiosity),
+        (~picture.front, solution.back_radiosity),
+    ):
+        power = (area[:, None] * picture.radiosity)[side]
+        mean = np.stack(
+            [np.bincount(picture.triangle[side], column, len(scene)) for column in power.T], axis=1
+        )
+        np.testing.assert_allclose(mean / scene.areas[:, None], radiosity, rtol=1e-4, atol=1e-6)
+
+
 @pytest.mark.parametrize("steps", [1, 3, 6, 12])
 def test_closing_the_generator_leaves_nothing_running(steps: int) -> None:
     before = {thread.ident for thread in threading.enumerate()}
@@ -219,6 +289,19 @@ def test_without_light_it_is_black_and_says_so() -> None:
     assert not result.pages[0].pixels.any()
     assert [warning.name for warning in result.warnings] == ["scene"]
     assert "black" in result.warnings[0].message
+
+
+@pytest.mark.parametrize("method", ["jacobi", "gauss-seidel", "shooting", "multi-level", "hierarchical"])
+def test_a_solution_short_of_its_tolerance_says_so(method: str) -> None:
+    scene = lit_room(lights=[LAMP], reflectance=0.9)
+    few = {"elements": 48} if "elements" in METHODS[method].settings else {}
+    short = run(scene, method=method, max_iterations=1, **few)
+    assert [warning.name for warning in short.warnings] == ["scene"]
+    assert f"{method} method stopped after 1 iteration" in short.warnings[0].message
+    assert short.solver["residual"] > short.solver["settings"]["tolerance"]
+    done = run(scene, method=method, **few)
+    assert done.warnings == ()
+    assert done.solver["residual"] <= done.solver["settings"]["tolerance"]
 
 
 def test_nothing_to_bake_is_an_error() -> None:

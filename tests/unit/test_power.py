@@ -7,7 +7,7 @@ import pytest
 
 from radiosity_addon.solver import AreaLight, EnvironmentLight, PointLight, Scene, SpotLight, SunLight
 from radiosity_addon.solver.hierarchy import Faces
-from radiosity_addon.solver.power import closure, light_power, power_balance
+from radiosity_addon.solver.power import light_power, link_closure, power_balance
 from tests.rooms import CEILING, box_room, grey, rectangle
 from tests.unit.solved_rooms import furnished, solved
 
@@ -112,7 +112,7 @@ def test_closure_counts_own_and_inherited_links() -> None:
     """Per face Σ F V over the links of all its elements, by area: near 1 in a closed scene."""
     state = solved(furnished(), error=1e-3)
     hierarchy, links = state.hierarchy, state.links
-    shares = closure(hierarchy, state)
+    shares = link_closure(hierarchy, state.links)
     np.testing.assert_allclose(shares, 1.0, atol=0.03)
     expected = np.zeros(len(hierarchy.faces))
     weight = links.factor.astype(float) * links.visibility

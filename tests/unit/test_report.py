@@ -11,7 +11,8 @@ import pytest
 
 from radiosity_addon.bake_scene import BakeResult, BakeWarning, LightmapPage
 from radiosity_addon.errors import BakeError
-from radiosity_addon.report import BakeReport, LightmapFile
+from radiosity_addon.report import MAX_HISTORY, BakeReport, LightmapFile, solver_part, thinned
+from tests.unit.texel_scenes import bake_object
 
 SOLVER = {
     "closure_area_mean": np.float32(0.5),
@@ -21,7 +22,10 @@ SOLVER = {
     "iterations": 3,
     "residual": float("nan"),
     "power_W": {"emitted": np.array([1.0, 2.0, 3.0]), "absorbed": 0.75, "escaped": 0.25},
-    "something_else": object(),
+    "method": "jacobi",
+    "settings": {"elements": np.int64(8), "tolerance": 1e-4},
+    "matrix": {"condition": np.float64(3.5), "dominance": float("inf")},
+    "history": [{"seconds": 0.5, "iteration": i, "residual": 2.0**-i} for i in range(3)],
 }
 
 
@@ -56,6 +60,14 @@ def test_the_file_holds_what_the_format_promises(tmp_path: Path) -> None:
             "residual": None,
             "power_W": {"emitted": [1.0, 2.0, 3.0], "absorbed": 0.75, "escaped": 0.25},
             "closure_area_mean": 0.5,
+            "method": "jacobi",
+            "settings": {"elements": 8, "tolerance": 1e-4},
+            "matrix": {"condition": 3.5, "dominance": None},
+            "history": [
+                {"seconds": 0.5, "iteration": 0, "residual": 1.0},
+                {"seconds": 0.5, "iteration": 1, "residual": 0.5},
+                {"seconds": 0.5, "iteration": 2, "residual": 0.25},
+            ],
         },
         "warnings": [{"name": "B", "message": "something is odd"}],
         "seconds": {"export": 0.1235, "solve": 2.0},
@@ -72,3 +84,35 @@ def test_a_report_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     with pytest.raises(BakeError, match=r"gone.report\.json"):
         report.write(tmp_path / "gone" / "report.json")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("count", [0, 1, 199, 200, 201, 399, 100_000])
+def test_a_history_keeps_both_ends_and_even_steps(count: int) -> None:
+    kept = thinned(range(count))
+    assert len(kept) == min(count, MAX_HISTORY)
+    assert kept[:1] + kept[-1:] == list(range(count))[:1] + list(range(count))[-1:]
+    steps = np.diff(kept)
+    if len(steps):
+        assert steps.min() >= 1
+        assert steps.max() - steps.min() <= 1
+
+
+def test_the_solver_part_tells_method_settings_and_whose_the_blocks_are() -> None:
+    objects = [bake_object("Left", 0, 4), bake_object("Empty", 4, 0), bake_object("Right", 4, 3)]
+    found = {
+        "method": "dense",
+        "elements": 7,
+        "independent_sets": [
+            {"elements": 4, "area_m2": 2.0, "triangles": [3, 0]},
+            {"elements": 3, "area_m2": 1.0, "triangles": [6, 4, 2]},
+        ],
+    }
+    assert solver_part(found, {"elements": 7, "assembly": "galerkin"}, objects) == {
+        "method": "dense",
+        "settings": {"elements": 7, "assembly": "galerkin"},
+        "elements": 7,
+        "independent_sets": [
+            {"objects": ["Left"], "elements": 4, "area_m2": 2.0},
+            {"objects": ["Left", "Right"], "elements": 3, "area_m2": 1.0},
+        ],
+    }

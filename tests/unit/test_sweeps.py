@@ -7,10 +7,11 @@ import pytest
 
 from radiosity_addon.lightmap.interpolate import Interpolation
 from radiosity_addon.lightmap.reconstruct import GatherSettings, reconstruct
-from radiosity_addon.lightmap.sweeps import StoredLinks, TexelLight, sweep
+from radiosity_addon.lightmap.sweeps import StoredLinks, TexelLight, sweep_steps
 from radiosity_addon.lightmap.texel_geometry import TexelGeometry
 from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, SolverSettings, solve
 from radiosity_addon.solver.local_pass import NOTHING, SKY
+from radiosity_addon.solver.steps import drain
 from tests.rooms import box_room, grey, rectangle
 from tests.unit.texel_scenes import QUAD_UV, texel_geometry
 
@@ -52,9 +53,8 @@ def test_sweeps_converge_to_the_solution_of_the_stored_links() -> None:
     sources = rng.integers(0, count, (count, rays)).astype(np.int32)
     sources[rng.uniform(size=sources.shape) < 0.1] = NOTHING
     lamps = rng.uniform(0, 5, (count, 3))
-    light = sweep(
-        scene, local, geometry, StoredLinks(sources, identity(count)), lamps, _never, 40, tolerance=0.0
-    )
+    links = StoredLinks(sources, identity(count))
+    light = drain(sweep_steps(scene, local, geometry, links, lamps, _never, 40, tolerance=0.0))
     matrix = np.zeros((count, count))
     for ray in range(rays):
         hit = sources[:, ray] >= 0
@@ -71,7 +71,8 @@ def test_the_skys_share_of_the_rays_is_direct_light() -> None:
     sources = np.full((count, 4), NOTHING, dtype=np.int32)
     sources[:, :3] = SKY
     lamps = np.zeros((count, 3))
-    light = sweep(scene, local, geometry, StoredLinks(sources, identity(count)), lamps, _never, sweeps=3)
+    links = StoredLinks(sources, identity(count))
+    light = drain(sweep_steps(scene, local, geometry, links, lamps, _never, sweeps=3))
     np.testing.assert_allclose(light.direct, np.tile([0.75 * np.pi, 1.5 * np.pi, 0.0], (count, 1)), rtol=1e-6)
     assert not light.indirect.any()
 

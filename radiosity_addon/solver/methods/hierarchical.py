@@ -8,55 +8,77 @@ refined and the residual is small.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..anderson import Anderson
 from ..arrays import Array
+from ..bounce import bounce, reflect, relative_residual
+from ..cluster_links import ClusterLinks, join_cluster_links, no_cluster_links
+from ..cluster_pairs import measure_cluster_links
 from ..conservation import Conservation
-from ..embree import EmbreeCaster
 from ..first_links import first_links
-from ..hierarchy import Hierarchy
-from ..light_links import LightLinks, light_strengths, link_lights, no_light_links
+from ..light_links import link_lights
+from ..link_census import elements_by_level, leaves_by_level, linked_leaves, links_by_level
 from ..links import Links, join, measure_links, no_links
-from ..oracle import children_of_links, misplaced_power
-from ..power import light_power
+from ..node_shapes import NodeShapes
+from ..oracle import (
+    children_of_cluster_links,
+    children_of_links,
+    misplaced_at_clusters,
+    misplaced_power,
+)
+from ..power import link_closure
 from ..scene import Scene
 from ..settings import SolverSettings
-from ..transport import gather, push, push_pull
-from ..visibility import RayCaster
+from ..state import SolverState, begin
+from ..tree_top import TreeTop
 
 COARSENING = (64.0, 16.0, 4.0, 1.0)
 """BF_ε of the rounds, in units of the final one: start coarse, tighten (our addition)."""
 
+ROUGH = 0.03
+"""Residual of the rounds before the last one: enough to tell which links matter."""
+
+FEW = 1e-3
+"""So small a share of links refined is not worth a gather: their children are judged before it, and
+what else it would show is left to the next round, if there is one."""
+
 LIGHT_SHARE = 0.25
 """BF_ε of light links, in units of the links': they are few, and every bounce starts with them."""
 
-MAX_ITERATIONS = 1000
+LINK_BYTES = 200
+"""Memory a link takes while links are sorted and gathered over (52 bytes at rest, 44 to a cluster), …"""
+
+FACE_BYTES = 1500
+"""… that a face takes with its element and the cluster above it, …"""
+
+ELEMENT_BYTES = 500
+"""… and an element below a face, while light is gathered (see docs/solver.md)."""
 
 
 @dataclass
-class HierarchicalState:
-    """What the solver works on; complete when `solve_steps` is exhausted."""
+class HierarchicalState(SolverState):
+    """What the refined hierarchy works on."""
 
-    scene: Scene
-    settings: SolverSettings
-    hierarchy: Hierarchy
-    caster: RayCaster
-    light_links: LightLinks
-    links: Links
-    conservation: Conservation
-    power: float
-    """The light's power Φ [W], the largest channel: the unit of BF_ε."""
-    irradiance: Array = field(default_factory=lambda: np.zeros((0, 3)))
-    """(e, 3) float64: area means over every element [W/m²]."""
-    radiosity: Array = field(default_factory=lambda: np.zeros((0, 3)))
-    """(e, 3) float64 [W/m²]"""
-    iterations: int = 0
-    residual: float = 0.0
-    """Σ A |E + ρ K B − B| over the leaves, relative to the light's power."""
-    over_budget: float = 0.0
-    """Largest misplaced power left unrefined for want of links, relative to Φ; 0 if none."""
+    links: Links = field(default_factory=no_links)
+    """To elements, sorted by receiver."""
+    cluster_links: ClusterLinks = field(default_factory=no_cluster_links)
+    faint: float = 0.0
+    """Above 0 first links had to be made coarser (see `first_links`)."""
+    top: TreeTop | None = None
+    """The clusters that the links use."""
+    conservation: Conservation | None = None
+
+    @property
+    def n_links(self) -> int:
+        """Links between elements and clusters, and from lamps."""
+        return len(self.links) + len(self.cluster_links) + len(self.light_links)
+
+    def closure(self) -> Array:
+        """Return (f,) the area mean over each face's leaves of ΣFV over own and inherited links."""
+        return link_closure(self.hierarchy, self.links, self.cluster_links)
 
 
 def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float, HierarchicalState]]:
@@ -64,99 +86,170 @@ def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float,
 
     The last state yielded is the solution.
     """
-    caster = EmbreeCaster(scene.triangles, settings.threads)
-    hierarchy = Hierarchy(scene)
-    state = HierarchicalState(
-        scene=scene,
-        settings=settings,
-        hierarchy=hierarchy,
-        caster=caster,
-        light_links=no_light_links(),
-        links=no_links(),
-        conservation=Conservation(caster, settings.seed),
-        power=light_power(scene, hierarchy.faces),
-    )
+    state = begin(scene, settings, HierarchicalState)
+    hierarchy, caster = state.hierarchy, state.caster
     min_area = settings.min_area * float(hierarchy.faces.area.sum())
+    state.conservation = Conservation(caster, min_area, settings.seed, settings.threads)
     yield 0.02, state
-    if state.power == 0.0 or len(hierarchy.faces) == 0:
-        _reset(state)
+    if not state.has_light:
         yield 1.0, state
         return
+    light_threshold = LIGHT_SHARE * settings.error * state.power
     state.light_links = link_lights(
-        hierarchy, scene.lights, caster, LIGHT_SHARE * settings.error * state.power, min_area, settings.seed
+        hierarchy, scene.lights, caster, light_threshold, min_area, settings.seed, settings.threads
     )
     yield 0.1, state
-    state.links = first_links(hierarchy, caster, settings)
-    _reset(state)
+    shapes = NodeShapes(hierarchy)
+    state.links, state.cluster_links, state.faint = first_links(
+        hierarchy, shapes, caster, settings, link_budget(state)
+    )
+    state.reset()
     yield 0.3, state
 
+    rounds: list[dict[str, float]] = []
     for done, coarsening in enumerate(COARSENING):
-        threshold = coarsening * settings.error * state.power
+        error = coarsening * settings.error
+        links_refined = 0
         while True:
-            iterate(state, settings.tolerance if coarsening == 1.0 else 0.03)
-            refined = refine(state, threshold, min_area)
+            iterate(state, settings.tolerance if coarsening == 1.0 else ROUGH)
+            refined = 0 if exhausted(state) else settle(state, shapes, error * state.power, min_area)
+            links_refined += refined
             yield 0.3 + 0.65 * (done + 0.5) / len(COARSENING), state
-            if not refined:
+            if not refined or (coarsening > 1.0 and refined <= FEW * state.n_links):
                 break
-    iterate(state, settings.tolerance)
+        rounds.append({"error": error, "links_refined": links_refined, "links": len(state.links)})
+    iterate(state, settings.tolerance, last=True)
+    tell(state, rounds)
     yield 1.0, state
 
 
-def refine(state: HierarchicalState, threshold: float, min_area: float) -> int:
-    """Replace every link that may misplace more than `threshold` watts; return how many."""
-    hierarchy, links = state.hierarchy, state.links
-    errors = misplaced_power(hierarchy, links, state.radiosity)
+def settle(state: HierarchicalState, shapes: NodeShapes, threshold: float, min_area: float) -> int:
+    """Refine links, and few links' children too, by the radiosity there is; return how many."""
+    total = 0
+    while True:
+        refined = refine(state, shapes, threshold, min_area)
+        total += refined
+        if refined == 0 or refined > FEW * state.n_links:
+            return total
+        state.top = _top(state)
+
+
+def _top(state: HierarchicalState) -> TreeTop:
+    """Return the part of the cluster tree that the links use as they are now."""
+    links, cluster_links = state.links, state.cluster_links
+    return TreeTop(state.hierarchy, links.source, cluster_links.receiver, cluster_links.source)
+
+
+def refine(state: HierarchicalState, shapes: NodeShapes, threshold: float, min_area: float) -> int:
+    """Replace every link that may misplace more than `threshold` watts; return how many.
+
+    Links to clusters come first, as theirs may become links to elements.
+    """
+    hierarchy, settings = state.hierarchy, state.settings
+    chance = settings.seed, settings.threads
+    chosen = _over(
+        state, misplaced_at_clusters(hierarchy, state.cluster_links, state.radiosity, state.top), threshold
+    )
+    refined = len(chosen)
+    new: list[Links] = []
+    if refined:
+        receiver, source = children_of_cluster_links(hierarchy, state.cluster_links.take(chosen))
+        single = receiver >= hierarchy.n_clusters
+        to_element = receiver[single] - hierarchy.n_clusters
+        new.append(measure_links(hierarchy, state.caster, to_element, source[single], *chance))
+        others = measure_cluster_links(
+            hierarchy, shapes, state.caster, receiver[~single], source[~single], *chance
+        )
+        kept = np.delete(np.arange(len(state.cluster_links)), chosen)
+        state.cluster_links = join_cluster_links([state.cluster_links.take(kept), others])
+
+    errors = misplaced_power(hierarchy, state.links, state.radiosity, state.top)
+    chosen = _over(state, errors, threshold)
+    if len(chosen):
+        before = hierarchy.n_elements
+        receiver, source, replaced = children_of_links(hierarchy, state.links.take(chosen), min_area)
+        new.append(measure_links(hierarchy, state.caster, receiver, source, *chance))
+        kept = np.delete(np.arange(len(state.links)), chosen[replaced])
+        state.links = state.links.take(kept)
+        refined += int(replaced.sum())
+        # Children start with their parent's radiosity; a batch only ever adds one level.
+        parents = hierarchy.parent[before:]
+        state.radiosity = np.concatenate([state.radiosity, state.radiosity[parents]])
+        state.irradiance = np.concatenate([state.irradiance, state.irradiance[parents]])
+    if new:
+        state.links = join([state.links, *new]).sorted_by_receiver()
+    return refined
+
+
+def _over(state: HierarchicalState, errors: Array, threshold: float) -> Array:
+    """Return the rows of the links above the threshold, the worst of them if the budget is short."""
     chosen = np.flatnonzero(errors > threshold)
-    room = max((state.settings.max_links - len(links)) // 3, 0)
+    room = max((link_budget(state) - state.n_links) // 3, 0)
     if len(chosen) > room:
         order = np.argsort(errors[chosen], kind="stable")[::-1]
-        state.over_budget = float(errors[chosen[order[room:]]].max(initial=0.0)) / state.power
+        left = float(errors[chosen[order[room:]]].max(initial=0.0)) / state.power
+        state.over_budget = max(state.over_budget, left)
         chosen = np.sort(chosen[order[:room]])
-    if len(chosen) == 0:
-        return 0
-    before = hierarchy.n_elements
-    candidates = links.take(chosen)
-    receiver, source, replaced = children_of_links(hierarchy, candidates, min_area)
-    if not replaced.any():
-        return 0
-    kept = np.ones(len(links), dtype=bool)
-    kept[chosen[replaced]] = False
-    settings = state.settings
-    new = measure_links(hierarchy, state.caster, receiver, source, settings.seed, settings.threads)
-    state.links = join([links.take(kept), new]).sorted_by_receiver()
-    # Children start with their parent's radiosity; a batch only ever adds one level.
-    parents = hierarchy.parent[before:]
-    state.radiosity = np.concatenate([state.radiosity, state.radiosity[parents]])
-    state.irradiance = np.concatenate([state.irradiance, state.irradiance[parents]])
-    return int(replaced.sum())
+    return chosen
 
 
-def iterate(state: HierarchicalState, tolerance: float) -> None:
-    """Gather and push-pull in Jacobi order until the residual is below `tolerance`."""
-    hierarchy = state.hierarchy
+def link_budget(state: HierarchicalState) -> int:
+    """Return how many links there may be: `max_links`, or what faces and elements leave of the memory."""
+    hierarchy, settings = state.hierarchy, state.settings
+    faces = len(hierarchy.faces)
+    taken = FACE_BYTES * faces + ELEMENT_BYTES * (hierarchy.n_elements - faces)
+    return min(settings.max_links, max(int((settings.memory_limit * 2**30 - taken) / LINK_BYTES), 0))
+
+
+def iterate(state: HierarchicalState, tolerance: float, last: bool = False) -> None:
+    """Gather and push-pull, accelerated, until the residual is below `tolerance`.
+
+    Each step tells the residual of the radiosity before it; that of the `last` one is measured
+    for the radiosity that is left in the state.
+    """
+    hierarchy, links, cluster_links = state.hierarchy, state.links, state.cluster_links
+    assert state.conservation is not None  # set when the state was made
+    lights = state.direct()
+    state.top = top = _top(state)
+    scale = state.conservation.factors(hierarchy, top, links, cluster_links)
     leaves = hierarchy.leaves
-    area = hierarchy.area[leaves][:, None]
-    reflectance = hierarchy.faces.reflectance[hierarchy.face]
-    emission = hierarchy.faces.emission[hierarchy.face]
-    lights = push(
-        hierarchy,
-        state.light_links.irradiance(light_strengths(state.scene.lights), hierarchy.n_elements),
-    )
-    scale = state.conservation.factors(hierarchy, state.links)
-    for _ in range(MAX_ITERATIONS):
-        gathered = push(hierarchy, gather(hierarchy, state.links, state.radiosity, scale))
-        irradiance, radiosity = push_pull(hierarchy, lights, gathered, emission, reflectance)
-        # One Jacobi step is the residual at the leaves: E + ρ K B − B.
-        change = np.abs(radiosity[leaves] - state.radiosity[leaves])
-        state.residual = float((area * change).sum(axis=0).max()) / state.power
-        state.irradiance, state.radiosity = irradiance, radiosity
-        state.iterations += 1
-        if state.residual < tolerance:
+    least = state.emission[leaves]
+    mixer = Anderson(hierarchy.area[leaves])
+    while not exhausted(state):
+        before = state.radiosity[leaves]
+        bounce(state, links, lights, scale, cluster_links, top)
+        state.note()
+        if state.residual < tolerance or exhausted(state):
             break
+        # What a mixture guesses below the emission is no radiosity.
+        state.radiosity[leaves] = np.maximum(mixer.next(before, state.radiosity[leaves]), least)
+    if last:
+        _, after = reflect(state, links, lights, scale, cluster_links, top)
+        state.residual = relative_residual(state, after)
+        state.history[-1:] = [replace(entry, residual=state.residual) for entry in state.history[-1:]]
 
 
-def _reset(state: HierarchicalState) -> None:
-    """Start from what the surfaces emit themselves."""
-    hierarchy = state.hierarchy
-    state.irradiance = np.zeros((hierarchy.n_elements, 3))
-    state.radiosity = hierarchy.faces.emission[hierarchy.face].copy()
+def exhausted(state: HierarchicalState) -> bool:
+    """Whether all iterations allowed are done: what is not lit by then may not be judged."""
+    return state.iterations >= state.settings.max_iterations
+
+
+def tell(state: HierarchicalState, rounds: list[dict[str, float]]) -> None:
+    """Put into the report how BF_ε fell, and what lies on which level.
+
+    Parameters
+    ----------
+    rounds : list of {"error", "links_refined", "links"}
+        For each BF_ε, as a share of the light's power: how many links were refined for it, and
+        how many there were afterwards.
+    """
+    hierarchy, links = state.hierarchy, state.links
+    n_links = len(links) + len(state.cluster_links)
+    state.details["hierarchical"] = {
+        "rounds": rounds,
+        "first_faint": state.faint,
+        "links_per_leaf": n_links / max(linked_leaves(hierarchy, links, state.cluster_links), 1),
+        "elements_by_level": elements_by_level(hierarchy),
+        "leaves_by_level": leaves_by_level(hierarchy),
+        "links_by_level": links_by_level(hierarchy, links.receiver, links.source),
+    }

@@ -1,0 +1,200 @@
+"""Rays aimed at the few elements that are far brighter than the rest.
+
+A small bright patch, the wall beside a lamp, is hit by few of a point's cosine-distributed
+rays, and each hit is a speck. So the patch's elements are asked apart, like lamps: rays aimed
+at them in proportion to what each would send. What is aimed at, cosine rays leave out; which
+elements those are depends on the point alone, so that the two together are unbiased.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .arrays import Array
+from .geometry_term import ray_geometry_term, throughput
+from .hierarchy import Hierarchy
+from .radiometry import radiance_of_radiosity
+from .sampling import points_on_triangles
+from .visibility import Hits
+
+CONTRAST = 6.0
+"""Elements are bright from this many times the mean reflected radiosity …"""
+
+MOST = 128
+"""… and so many at most, the brightest: all are tried at every point."""
+
+FAR = 0.05
+"""Aimed at are elements that fill less than this of the hemisphere: others many rays hit anyway."""
+
+NOISE = 0.002
+"""Nothing is aimed at where chance hits on bright elements would disturb irradiance by less than this."""
+
+
+@dataclass(frozen=True)
+class AimedRays:
+    """Rays from some of the gather points to bright elements.
+
+    Attributes
+    ----------
+    row : (a,) int
+        The gather points.
+    sources : (a, k) int32
+        What was hit, numbered as the hits of all other rays; NOTHING where something is in the way.
+    weights : (a, k) float32
+        What each source's radiosity counts for.
+    """
+
+    row: Array
+    sources: Array
+    weights: Array
+
+    @staticmethod
+    def none() -> AimedRays:
+        """Return no rays."""
+        return AimedRays(np.zeros(0, np.int64), np.zeros((0, 1), np.int32), np.zeros((0, 1), np.float32))
+
+    @staticmethod
+    def joined(parts: list[AimedRays], first: list[int]) -> AimedRays:
+        """Put lists of rays together; `first` is added to the rows of each."""
+        kept = [(part, start) for part, start in zip(parts, first, strict=True) if len(part.row)]
+        if not kept:
+            return AimedRays.none()
+        return AimedRays(
+            np.concatenate([part.row + start for part, start in kept]),
+            np.concatenate([part.sources for part, _ in kept]),
+            np.concatenate([part.weights for part, _ in kept]),
+        )
+
+
+@dataclass(frozen=True)
+class Aim:
+    """r rows of k rays: where to, at which element, and what each stands for.
+
+    Attributes
+    ----------
+    row : (r,) int
+        The points that aim.
+    directions : (r, k, 3) float64, unit
+    element : (r, k) int32
+    weights : (r, k) float64
+    """
+
+    row: Array
+    directions: Array
+    element: Array
+    weights: Array
+
+
+class BrightElements:
+    """The leaf elements whose reflected light is far above the mean, the brightest first.
+
+    Parameters
+    ----------
+    hierarchy : Hierarchy
+    reflected : (e, 3) float64
+        Every element's reflected radiosity [W/m²].
+    """
+
+    def __init__(self, hierarchy: Hierarchy, reflected: Array) -> None:
+        leaves = hierarchy.leaves
+        level, area = reflected[leaves].mean(axis=1), hierarchy.area[leaves]
+        mean = float(level @ area) / max(float(area.sum()), 1e-300)
+        bright = np.flatnonzero(level > CONTRAST * mean)
+        bright = bright[np.argsort(-level[bright], kind="stable")[:MOST]]
+        self.element = leaves[bright].astype(np.int32)
+        """(m,) int32"""
+        self._level, self._area = level[bright], area[bright]
+        self._corners = hierarchy.corners[self.element]
+        self._normals = hierarchy.normal[self.element]
+        self._hosts = np.zeros(hierarchy.faces.of_triangle.shape[1], dtype=bool)
+        self._hosts[hierarchy.faces.triangle[hierarchy.face[self.element]]] = True
+        self._number = np.full(hierarchy.n_elements, -1, dtype=np.int32)
+        self._number[self.element] = np.arange(len(bright))
+
+    def __len__(self) -> int:
+        return len(self.element)
+
+    def shares(self, points: Array, normals: Array, rays: int, irradiance: Array) -> Array:
+        """Return (n, m) what each element would send to points [W/m²], roughly; 0 is left to chance.
+
+        Parameters
+        ----------
+        points, normals : (n, 3) float64
+        rays : int
+            Cosine-distributed ones that a point would have.
+        irradiance : (n,) float64 [W/m²]
+            What noise is measured by.
+        """
+        along = self._corners.mean(axis=1)[None] - points[:, None]
+        square = np.einsum("nmk,nmk->nm", along, along)
+        cos_r = np.einsum("nmk,nk->nm", along, normals)
+        cos_s = np.einsum("mk,nk->nm", self._normals, points) - np.einsum(
+            "mk,mk->m", self._normals, self._corners[:, 0]
+        )
+        # Seen whole: no corner below the horizon.
+        lowest = (normals @ self._corners.reshape(-1, 3).T).reshape(len(points), -1, 3).min(axis=2)
+        lowest -= np.einsum("nk,nk->n", points, normals)[:, None]
+        far = (lowest > 0) & (cos_s > 0) & (self._area < FAR * np.pi * square)
+        factor = np.where(far, self._area * cos_r * cos_s / np.maximum(np.pi * square * square, 1e-300), 0.0)
+        noise = factor @ (self._level**2) / rays
+        factor[noise <= (NOISE * irradiance) ** 2] = 0.0
+        return np.asarray(factor * self._level)
+
+    def left_out(self, shares: Array, hits: Hits, leaves_of: Callable[[Hits], Array]) -> Array:
+        """Return (n · k,) bool: which hits are on what is aimed at from their point.
+
+        Parameters
+        ----------
+        shares : (n, m) float64
+        hits : Hits
+            k of each point, one point after the other.
+        leaves_of : callable
+            Tells the leaf elements hit.
+        """
+        out = np.zeros(len(hits.triangle), dtype=bool)
+        aims = np.repeat(shares.any(axis=1), len(out) // len(shares))
+        ray = np.flatnonzero(aims & (hits.triangle >= 0) & self._hosts[hits.triangle])
+        leaf = leaves_of(hits.take(ray))
+        number = np.where(leaf >= 0, self._number[leaf], -1)
+        ray, number = ray[number >= 0], number[number >= 0]
+        out[ray] = shares[ray // (len(out) // len(shares)), number] > 0
+        return out
+
+    def aim(self, points: Array, normals: Array, shares: Array, u: Array) -> Aim:
+        """Aim rays from points (r, k, 3), of which row i shares `shares[i]` among the elements.
+
+        Parameters
+        ----------
+        points : (n, k, 3) float64
+            Where the rays start.
+        normals : (n, 3) float64
+        shares : (n, m) float64
+            Rows without any are left out.
+        u : (n, k, 2) float
+        """
+        running = np.cumsum(shares, axis=1)
+        row = np.flatnonzero(running[:, -1] > 0)
+        running, shares = running[row], shares[row]
+        total = running[:, -1:]
+        # One search for all rows: row i's running shares lie in (i, i + 1].
+        flat = (running / total + np.arange(len(row))[:, None]).ravel()
+        wanted = np.asarray(u[row, :, 0], dtype=np.float64)
+        found = np.searchsorted(flat, wanted + np.arange(len(row))[:, None], side="right")
+        pick = np.minimum(found - running.shape[1] * np.arange(len(row))[:, None], running.shape[1] - 1)
+        share = np.take_along_axis(shares, pick, axis=1)
+        below = (np.take_along_axis(running, pick, axis=1) - share) / total
+        part = np.maximum(share / total, 1e-300)
+        inside = np.stack([np.clip((wanted - below) / part, 0.0, 1.0), u[row, :, 1]], axis=-1)
+        corners = self._corners[pick].reshape(-1, 3, 3)
+        targets = points_on_triangles(corners, inside.reshape(-1, 1, 2)).reshape(*pick.shape, 3)
+        along = targets - points[row]
+        distance = np.linalg.norm(along, axis=2)
+        directions = along / np.maximum(distance, 1e-300)[..., None]
+        cos_r = np.einsum("nkc,nc->nk", directions, normals[row])
+        cos_s = -np.einsum("nkc,nkc->nk", directions, self._normals[pick])
+        thrown = throughput(ray_geometry_term(cos_r, cos_s, distance), 1.0, self._area[pick])
+        weights = radiance_of_radiosity(thrown) / (part * u.shape[1])
+        return Aim(row, directions, self.element[pick], np.where(share > 0, weights, 0.0))

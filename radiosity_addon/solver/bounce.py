@@ -1,0 +1,76 @@
+"""One step of the hierarchical methods' iteration: Gather, then PushPull (handout §4.2)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .arrays import Array
+from .cluster_links import ClusterLinks, gather_at_clusters
+from .links import Links
+from .state import SolverState
+from .transport import gather, node_radiosity, pull, push, push_pull
+from .tree_top import TreeTop
+
+
+def reflect(
+    state: SolverState,
+    links: Links,
+    lights: Array,
+    scale: Array | None = None,
+    cluster_links: ClusterLinks | None = None,
+    top: TreeTop | None = None,
+) -> tuple[Array, Array]:
+    """Gather over all links from the state's radiosity, then push and pull; the state stays.
+
+    Parameters
+    ----------
+    links : Links
+        Sorted by receiver.
+    lights : (e, 3) float64
+        What the leaves get straight from lamps [W/m²].
+    scale : (e, 2) float64 or None
+        See `transport.gather`.
+    cluster_links : ClusterLinks or None
+        What the faces of clusters receive together.
+    top : TreeTop or None
+        With all clusters of both sets of links; needed for the second.
+
+    Returns
+    -------
+    irradiance, radiosity : (e, 3) float64 [W/m²]
+    """
+    hierarchy = state.hierarchy
+    own = gather(hierarchy, links, state.radiosity, scale, top)
+    if cluster_links is not None and top is not None:
+        shared = state.radiosity if scale is None else scale[:, 1:] * state.radiosity
+        sent = node_radiosity(hierarchy, pull(hierarchy, shared), top)
+        # A face that looks past the horizon of what its neighbours see gets nothing, not less.
+        shared = np.maximum(gather_at_clusters(hierarchy, top, cluster_links, sent), 0.0)
+        own[: len(hierarchy.faces)] += shared[:, None]
+    gathered = push(hierarchy, own)
+    return push_pull(hierarchy, lights, gathered, state.emission, state.reflectance)
+
+
+def relative_residual(state: SolverState, radiosity: Array) -> float:
+    """Return Σ A |E + ρ K B − B| / Φ of the state's radiosity, given what it is reflected as."""
+    leaves = state.hierarchy.leaves
+    change = np.abs(radiosity[leaves] - state.radiosity[leaves])
+    return float((state.hierarchy.area[leaves] @ change).max()) / state.power
+
+
+def bounce(
+    state: SolverState,
+    links: Links,
+    lights: Array,
+    scale: Array | None = None,
+    cluster_links: ClusterLinks | None = None,
+    top: TreeTop | None = None,
+) -> None:
+    """Move the state's irradiance and radiosity on by one step (see `reflect`), and count it.
+
+    The step's change at the leaves is taken as the residual, that of the radiosity before.
+    """
+    irradiance, radiosity = reflect(state, links, lights, scale, cluster_links, top)
+    state.residual = relative_residual(state, radiosity)
+    state.irradiance, state.radiosity = irradiance, radiosity
+    state.iterations += 1

@@ -1,0 +1,156 @@
+"""Rays from points over their hemispheres, whose hits are kept: links at the finest level.
+
+Cosine-distributed, each stands for the same form factor; besides, rays aimed at the few
+elements that are far brighter than the rest (`aiming.py`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+
+import numpy as np
+
+from .aiming import AimedRays, BrightElements
+from .arrays import Array
+from .parallel import chunk_steps
+from .sampling import cosine_hemisphere, orthonormal_basis, stratified_square
+from .shadow_share import Footprints
+from .visibility import Hits, RayCaster
+
+CHUNK_RAYS = 1 << 17
+"""Rays a thread prepares at once; bounds its temporaries to about 20 MB."""
+
+AIMED_PART = 4
+"""One ray is aimed for so many cosine-distributed ones, where any are aimed."""
+
+Resolver = Callable[[Hits], Array]
+"""Hits → (n,) int32: the number under which a hit's radiosity will be looked up; SKY for none."""
+
+SKY = -1
+NOTHING = -2
+"""A gather ray that left through the surface it started on: it carries no light."""
+
+
+@dataclass(frozen=True)
+class Gathered:
+    """What the rays of n points met.
+
+    Attributes
+    ----------
+    sources : (n, rays) int32
+        What the resolver said; SKY where nothing was hit, NOTHING below the surface and where
+        aimed rays ask instead.
+    closeness : (n,) float64
+        Mean of 1/distance over the rays [1/m]: how quickly irradiance may change.
+    aimed : AimedRays
+    """
+
+    sources: Array
+    closeness: Array
+    aimed: AimedRays
+
+
+class Gathering:
+    """Traces the rays of some points.
+
+    Parameters
+    ----------
+    caster : RayCaster
+    at : Footprints
+        `near` is not used.
+    surface_normals : (n, 3) float64
+        Rays that dip below carry nothing, where `at.normals` shade.
+    rays : int
+        Cosine-distributed ones a point; each stands for a form factor of 1 / rays.
+    resolve, leaves_of : callable
+        Number the hits, and tell the leaf elements hit.
+    seed, threads : int
+    """
+
+    def __init__(
+        self,
+        caster: RayCaster,
+        at: Footprints,
+        surface_normals: Array,
+        rays: int,
+        resolve: Resolver,
+        leaves_of: Resolver,
+        seed: int,
+        threads: int,
+    ) -> None:
+        self._caster, self._at, self._surface_normals, self._rays = caster, at, surface_normals, rays
+        self._resolve, self._leaves_of = resolve, leaves_of
+        self._seed, self._threads = seed, threads
+        self._sources = np.empty((len(at), rays), dtype=np.int32)
+        self._closeness = np.empty(len(at))
+        self._aimed: dict[int, AimedRays] = {}
+
+    def steps(self, bright: BrightElements | None, irradiance: Array) -> Generator[float, None, Gathered]:
+        """Trace all; yields the fraction done.
+
+        Parameters
+        ----------
+        bright : BrightElements or None
+            What is aimed at.
+        irradiance : (n,) float64 [W/m²]
+            What is about expected: noise is measured by it.
+        """
+
+        def trace(part: slice) -> None:
+            rows = np.arange(part.start, part.stop)
+            shares = None
+            if bright is not None and len(bright):
+                shares = bright.shares(
+                    self._at.points[rows], self._at.normals[rows], self._rays, irradiance[rows]
+                )
+                if not shares.any():
+                    shares = None
+            self._cosine(rows, bright, shares)
+            if bright is not None and shares is not None:
+                self._aimed[part.start] = self._aim(rows, bright, shares)
+
+        yield from chunk_steps(trace, len(self._at), max(CHUNK_RAYS // self._rays, 1), self._threads)
+        starts = sorted(self._aimed)
+        aimed = AimedRays.joined([self._aimed[start] for start in starts], starts)
+        return Gathered(self._sources, self._closeness, aimed)
+
+    def _cosine(self, rows: Array, bright: BrightElements | None, shares: Array | None) -> None:
+        """Trace the cosine-distributed rays of some rows, and keep what they hit."""
+        rays, normals = self._rays, self._at.normals[rows]
+        local = cosine_hemisphere(stratified_square(self._at.keys[rows], rays, self._seed + 3))
+        frame = np.stack([*orthonormal_basis(normals), normals], axis=1).astype(np.float32)
+        directions = local @ frame
+        start = self._starts(rows, rays, self._seed + 4)
+        hits = self._caster.first_hits(start.reshape(-1, 3), directions.reshape(-1, 3))
+        found = np.where(hits.triangle < 0, SKY, self._resolve(hits)).reshape(len(rows), rays)
+        surface = self._surface_normals[rows].astype(np.float32)
+        found[(directions @ surface[:, :, None])[:, :, 0] <= 0] = NOTHING
+        if bright is not None and shares is not None:
+            found[bright.left_out(shares, hits, self._leaves_of).reshape(found.shape)] = NOTHING
+        self._sources[rows] = found
+        inverse = 1.0 / np.maximum(hits.distance.reshape(len(rows), rays), self._caster.surface_offset)
+        self._closeness[rows] = inverse.mean(axis=1)
+
+    def _aim(self, rows: Array, bright: BrightElements, shares: Array) -> AimedRays:
+        """Trace the rays that some rows aim at bright elements."""
+        count = max(self._rays // AIMED_PART, 1)
+        start = self._starts(rows, count, self._seed + 6)
+        unit = stratified_square(self._at.keys[rows], count, self._seed + 5)
+        aim = bright.aim(start, self._at.normals[rows], shares, unit)
+        hits = self._caster.first_hits(start[aim.row].reshape(-1, 3), aim.directions.reshape(-1, 3))
+        arrived = self._leaves_of(hits) == aim.element.ravel()
+        arrived &= np.einsum("nrk,nk->nr", aim.directions, self._surface_normals[rows[aim.row]]).ravel() > 0
+        sources = np.full(len(arrived), NOTHING, dtype=np.int32)
+        sources[arrived] = self._resolve(hits.take(arrived))
+        return AimedRays(aim.row, sources.reshape(aim.element.shape), aim.weights.astype(np.float32))
+
+    def _starts(self, rows: Array, rays: int, seed: int) -> Array:
+        """Return (r, rays, 3) where rays start, just above the footprints."""
+        at = self._at
+        lift = self._caster.surface_offset * self._surface_normals[rows][:, None]
+        if at.sampler is None:
+            return np.repeat(at.points[rows][:, None] + lift, rays, axis=1)
+        some = min(at.starts or rays, rays)
+        starts = at.sampler(rows, stratified_square(at.keys[rows], some, seed)) + lift
+        return np.asarray(starts[:, np.arange(rays) * some // rays])

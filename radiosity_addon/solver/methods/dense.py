@@ -1,0 +1,56 @@
+"""Direct solution: Gaussian elimination, the oracle of truth for all other methods (handout §3.4)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...errors import BakeError
+from ..arrays import Array
+from ..linear_system import LinearSystem
+from ..scene import Scene
+from ..settings import SolverSettings
+from ..state import SolverState
+from .matrix import Iterate, solve_matrix
+
+
+def dense(system: LinearSystem) -> Array:
+    """Solve K B = E exactly, up to rounding.
+
+    Returns
+    -------
+    radiosity : (n, 3) float64 [W/m²]
+
+    Raises
+    ------
+    BakeError
+        If K is singular: a closed part of the scene reflects all light for ever.
+    """
+    radiosity = np.empty((len(system), 3))
+    solved = np.zeros(3, dtype=bool)
+    for channel in range(3):
+        if solved[channel]:
+            continue
+        # Channels of the same reflectance have the same matrix.
+        same = (system.reflectance == system.reflectance[:, channel, None]).all(axis=0) & ~solved
+        try:
+            radiosity[:, same] = np.linalg.solve(system.matrix(channel), system.emission[:, same])
+        except np.linalg.LinAlgError:
+            raise BakeError(
+                "the radiosity matrix is singular: a closed room of reflectance 1 keeps its light for ever; "
+                "lower the reflectance"
+            ) from None
+        solved |= same
+    return radiosity
+
+
+def steps(system: LinearSystem) -> Iterator[Iterate]:
+    """Yield (B, Σ A |E − K B|) once: there is nothing to iterate."""
+    radiosity = dense(system)
+    yield radiosity, system.residual_power(radiosity)
+
+
+def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float, SolverState]]:
+    """Solve step by step: yields (fraction done, state); the last state is the solution."""
+    yield from solve_matrix(scene, settings, steps, copies=3)

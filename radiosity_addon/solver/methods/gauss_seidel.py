@@ -1,0 +1,44 @@
+"""Gauss–Seidel iteration: each element gathers the newest radiosities (handout §3.4.1, (3.36))."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..arrays import Array
+from ..linear_system import LinearSystem
+from ..scene import Scene
+from ..settings import SolverSettings
+from ..state import SolverState
+from .matrix import Iterate, solve_matrix
+
+
+def gauss_seidel(system: LinearSystem, start: Array | None = None) -> Iterator[Iterate]:
+    """Iterate B_i ← (E_i − Σ_{j≠i} K_ij B_j) / K_ii without end, with values already updated in this sweep.
+
+    One row's update is gathering light to one element. See `jacobi.jacobi` for what is yielded.
+
+    Parameters
+    ----------
+    start : (n, 3) float or None
+        None starts from B = E.
+    """
+    radiosity = (system.emission if start is None else start).copy()
+    while True:
+        yield radiosity.copy(), system.residual_power(radiosity)
+        sweep(system, radiosity)
+
+
+def sweep(system: LinearSystem, radiosity: Array) -> None:
+    """Update every row once, in order, in place; the three channels together."""
+    diagonal = system.diagonal()
+    # ρ_i / A_i, so that a row costs one product with T.
+    scale = system.reflectance / system.area[:, None]
+    for row in range(len(system)):
+        residual = system.emission[row] + scale[row] * (system.exchange[row] @ radiosity)
+        residual -= radiosity[row] if system.mass is None else system.mass[row] @ radiosity
+        radiosity[row] += residual / diagonal[row]
+
+
+def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float, SolverState]]:
+    """Solve step by step: yields (fraction done, state); the last state is the solution."""
+    yield from solve_matrix(scene, settings, gauss_seidel, copies=2)

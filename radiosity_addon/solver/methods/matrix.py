@@ -1,0 +1,264 @@
+"""What the matrix methods share: elements, memory, assembly, independent blocks, and the way back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...errors import UsageError
+from ..arrays import Array
+from ..assembly import collocation_steps, galerkin_steps, linear_steps, share_overlaps, with_lamps
+from ..basis import Basis, constant_basis
+from ..elements import subdivide_evenly
+from ..independent_sets import describe_sets, independent_sets
+from ..linear_system import LinearSystem
+from ..matrix_properties import matrix_properties
+from ..overlaps import OVERLAP
+from ..point_light import lamp_irradiance
+from ..scene import Scene
+from ..settings import SolverSettings
+from ..state import SolverState, begin
+from ..vertex_basis import vertex_basis
+
+Iterate = tuple[Array, Array]
+"""Radiosity (n, 3) [W/m²], and its residual power Σ A |E − K B| (3,) [W]."""
+
+Solver = Callable[[LinearSystem], Iterator[Iterate]]
+"""Yields one iterate after another, from iteration 0 on; ends when there is no better one."""
+
+ASSEMBLIES = {"galerkin": galerkin_steps, "collocation": collocation_steps, "linear": linear_steps}
+
+GIB = float(1 << 30)
+
+ASSEMBLY_SHARE = 0.8
+"""Part of the work that is assembly, as progress is shown."""
+
+
+@dataclass
+class MatrixState(SolverState):
+    """What a matrix method works on."""
+
+    entries: int = 0
+    """Form factors that are not 0."""
+    share: Array = field(default_factory=lambda: np.zeros(0))
+    """(f,) ΣFV of every face, an area mean"""
+    basis: Basis | None = None
+    """What the unknowns stand for."""
+    values: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    """(n, 3) B of the unknowns [W/m²]; `basis.evaluate` gives B̂ at points."""
+
+    @property
+    def n_links(self) -> int:
+        """Form factors that are not 0."""
+        return self.entries
+
+    def approximation(self) -> tuple[Basis, Array]:
+        """Return the basis and the unknowns: hats at vertices where the elements are linear."""
+        return super().approximation() if self.basis is None else (self.basis, self.values)
+
+    def closure(self) -> Array:
+        """Return (f,) the area mean over each face of ΣFV: 1 in a closed scene."""
+        return self.share if len(self.share) else super().closure()
+
+
+def solve_matrix(
+    scene: Scene, settings: SolverSettings, solver: Solver, copies: int
+) -> Iterator[tuple[float, MatrixState]]:
+    """Assemble the system of a scene, solve it block by block, and set the state.
+
+    Parameters
+    ----------
+    solver : callable
+        Iterates on one block.
+    copies : int
+        Matrices of n × n numbers that the method holds at once, the system's own included.
+
+    Yields
+    ------
+    fraction : float
+    state : MatrixState
+        The same one all along.
+
+    Raises
+    ------
+    UsageError
+        If the system would need more than the memory limit; nothing is allocated then.
+    """
+    state = begin(scene, settings, MatrixState)
+    yield 0.0, state
+    if not state.has_light:
+        yield 1.0, state
+        return
+    is_linear = settings.assembly == "linear"
+    # With more faces than elements asked for the faces are the elements. A mesh of triangles
+    # has half as many vertices at least.
+    faces = len(state.hierarchy.faces)
+    elements = max(faces, settings.elements)
+    check_memory(elements // 2 if is_linear else elements, copies, settings, faces)
+    subdivide_evenly(state.hierarchy, settings.elements)
+    state.link_lights_to_leaves()
+    basis = state.basis = vertex_basis(state.hierarchy) if is_linear else constant_basis(state.hierarchy)
+    needed = check_memory(len(basis), copies + is_linear, settings, faces)
+    state.reset()
+    yield 0.02, state
+
+    system, direct = yield from _assemble(state, basis)
+    overlapping = np.count_nonzero(system.exchange.sum(axis=1) > OVERLAP * system.area)
+    system, sends = share_overlaps(system)
+    sets, alone = independent_sets(system)
+    _describe(state, basis, system, sends, sets, alone, needed)
+    state.details["matrix"]["overlapping"] = int(overlapping)
+    # Right for what sees nothing else; the others' blocks have their own first iterate.
+    state.values = system.emission / system.diagonal()
+    blocks = [_Block(rows, system.take(rows), sends[rows, None]) for rows in sets]
+    # A block by itself is a copy: the whole matrix need not outlive it.
+    del system
+    yield ASSEMBLY_SHARE, state
+    yield from _solve_blocks(state, basis, blocks, solver)
+    _finish(state, basis, blocks, direct)
+    yield 1.0, state
+
+
+def check_memory(unknowns: int, copies: int, settings: SolverSettings, faces: int) -> float:
+    """Return the GiB that `copies` matrices of a system take; refuse more than the limit.
+
+    Parameters
+    ----------
+    faces : int
+        The scene's; there are no fewer elements, whatever is asked for.
+
+    Raises
+    ------
+    UsageError
+        Names the size, what it would need, the limit and the methods that do without.
+    """
+    needed = copies * 8.0 * float(unknowns) ** 2 / GIB
+    if needed > settings.memory_limit:
+        fewer = "ask for fewer elements, or " if settings.elements > faces else ""
+        raise UsageError(
+            f"{settings.method} with {unknowns} unknowns needs {needed:.3g} GiB for its matrix, more than "
+            f"the memory limit of {settings.memory_limit:g} GiB: {fewer}take the method hierarchical, or "
+            "shooting, which needs no matrix"
+        )
+    return needed
+
+
+def _assemble(
+    state: MatrixState, basis: Basis
+) -> Generator[tuple[float, MatrixState], None, tuple[LinearSystem, Array]]:
+    """Assemble the system; yields progress, returns it with the lamps' (n, 3) irradiance in it."""
+    settings, hierarchy = state.settings, state.hierarchy
+    steps = ASSEMBLIES[settings.assembly](hierarchy, state.caster, basis, settings.seed, settings.threads)
+    while True:
+        try:
+            fraction = next(steps)
+        except StopIteration as done:
+            direct = _lamps(state, basis)
+            return with_lamps(done.value, direct), direct
+        yield 0.02 + (ASSEMBLY_SHARE - 0.02) * fraction, state
+
+
+def _lamps(state: MatrixState, basis: Basis) -> Array:
+    """Return (n, 3) the lamps' irradiance: area means of constant elements, or at the nodes."""
+    if basis.is_constant:
+        return state.direct()[basis.leaf]
+    normals = state.hierarchy.faces.normal[basis.faces(state.hierarchy)]
+    points = basis.points(state.hierarchy)
+    settings = state.settings
+    return lamp_irradiance(state.scene.lights, points, normals, state.caster, settings.seed, settings.threads)
+
+
+def _describe(
+    state: MatrixState,
+    basis: Basis,
+    system: LinearSystem,
+    sends: Array,
+    sets: list[Array],
+    alone: Array,
+    needed: float,
+) -> None:
+    """Put the matrix's properties and its independent sets into the report."""
+    hierarchy = state.hierarchy
+    state.entries = int(np.count_nonzero(system.exchange))
+    from_node = np.asarray(sends * system.exchange.sum(axis=1) / system.area)
+    on_leaf = basis.leaf_means(from_node[:, None])[:, 0]
+    face = hierarchy.face[basis.leaf]
+    power = np.bincount(face, on_leaf * hierarchy.area[basis.leaf], minlength=len(hierarchy.faces))
+    state.share = power / hierarchy.faces.area
+    state.details["matrix"] = {
+        "assembly": state.settings.assembly,
+        **matrix_properties(system).report(),
+        "memory_GiB": needed,
+        "blocks": len(sets),
+        "alone": len(alone),
+    }
+    triangle = hierarchy.faces.triangle[face]
+    area = hierarchy.area[basis.leaf]
+    state.details["independent_sets"] = describe_sets(sets, area, basis.corner[:, 0], triangle)
+
+
+@dataclass
+class _Block:
+    """One independent set, and how far its solution is."""
+
+    rows: Array
+    """(k,) int: its unknowns."""
+    system: LinearSystem
+    sends: Array
+    """(k, 1) the share of its radiosity that each sends, by which the system's unknowns differ from B."""
+    residual: Array = field(default_factory=lambda: np.zeros(3))
+
+
+def _solve_blocks(
+    state: MatrixState, basis: Basis, blocks: list[_Block], solver: Solver
+) -> Iterator[tuple[float, MatrixState]]:
+    """Run the solver on all independent sets side by side until the residual is small enough."""
+    settings = state.settings
+    # Each block may keep its share of the residual allowed, by the light that starts in it.
+    light = np.array([(block.system.area @ block.system.emission).max() for block in blocks])
+    allowed = settings.tolerance * state.power * light / max(float(light.sum()), 1e-300)
+    waiting = [(block, solver(block.system), limit) for block, limit in zip(blocks, allowed, strict=True)]
+    first = 0.0
+    while True:
+        waiting = [entry for entry in waiting if _advance(state, *entry)]
+        residual = sum((block.residual for block in blocks), np.zeros(3))
+        state.residual = float(residual.max()) / state.power
+        means = basis.leaf_means(state.values)
+        state.set_leaves(np.zeros_like(means), means)
+        state.note()
+        first = first or state.residual
+        if not waiting or state.iterations >= settings.max_iterations:
+            break
+        done = _progress(first, state.residual, settings.tolerance)
+        yield ASSEMBLY_SHARE + (1.0 - ASSEMBLY_SHARE) * done, state
+        state.iterations += 1
+    state.details["matrix"]["converged"] = not waiting
+
+
+def _advance(state: MatrixState, block: _Block, iterates: Iterator[Iterate], allowed: float) -> bool:
+    """Take a block's next iterate; return whether it needs another one."""
+    following = next(iterates, None)
+    if following is None:
+        return False
+    unknowns, block.residual = following
+    state.values[block.rows] = unknowns / block.sends
+    return bool(block.residual.max() > allowed)
+
+
+def _finish(state: MatrixState, basis: Basis, blocks: list[_Block], direct: Array) -> None:
+    """Take the unknowns' radiosities, and the irradiance that goes with them, over to the elements."""
+    irradiance = direct.copy()
+    for block in blocks:
+        irradiance[block.rows] += block.system.gather(block.sends * state.values[block.rows])
+    # A hat may dip below 0 between its node and the rim; light does not.
+    means = np.maximum(basis.leaf_means(basis.from_nodes(irradiance)), 0.0)
+    state.set_leaves(means, np.maximum(basis.leaf_means(state.values), 0.0))
+
+
+def _progress(first: float, now: float, last: float) -> float:
+    """Return how far a residual has come from `first` to `last`, on the scale of its exponent."""
+    if not 0.0 < last < first:
+        return 0.0
+    return float(np.clip(np.log(first / max(now, last)) / np.log(first / last), 0.0, 1.0))

@@ -1,0 +1,28 @@
+"""Surfaces that lie in one another: no element sends or sees more than there is.
+
+Where two surfaces lie in one plane and face the same way, no ray tells which of them is in
+front. Both are seen, ΣFV comes to 2, and light would grow without end. So an element sends only
+the share 1 / ΣFV of its radiosity: matrix methods, shooting and two-level alike, hence they still
+agree. Assemblies that are not reciprocal scale what an element receives.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .arrays import Array
+
+OVERLAP = 1.1
+"""ΣFV above this is no rounding and no want of rays: something is seen twice."""
+
+
+def shares(sums: Array, limit: float = OVERLAP) -> Array:
+    """Return (n,) the share of its light that each element exchanges: 1 / ΣFV above `limit`, else 1.
+
+    Parameters
+    ----------
+    sums : (n,) float64
+        ΣFV of each element.
+    """
+    over = sums > limit
+    return np.where(over, 1.0 / np.where(over, sums, 1.0), 1.0)

@@ -1,0 +1,128 @@
+"""A sealed box in a lit room: no texel inside gets any light, exactly.
+
+Not a small number but 0: light reaches a texel only along rays that were traced, no ray passes
+a wall, and where no chain of rays leads to a lamp the hierarchy's solution is not used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from radiosity_addon.bake_scene import BakedObject, BakeResult, BakeScene, LightmapPage
+from radiosity_addon.pipeline import bake
+from radiosity_addon.settings import BakeSettings
+from radiosity_addon.solver import EnvironmentLight, PointLight, Scene
+from tests.rooms import CEILING, box_room, grey, solid_box
+from tests.unit.texel_scenes import bake_scene
+
+ON_FLOOR = (1.03, 0.97, 0.0), (1.97, 2.11, 1.0)
+"""Off every lattice of texels, over the floor's diagonal, and without a floor of its own."""
+
+HANGING = (1.03, 0.97, 0.51), (1.97, 2.11, 1.5)
+
+
+def sealed_box(
+    low: Sequence[float], high: Sequence[float], thickness: float, light: str, floor_baked: bool = True
+) -> BakeScene:
+    """A room 3 m wide, and in it a box whose inner walls face inwards; `Inner` is the dark side."""
+    room, surface = box_room((3, 3, 3))
+    emission = grey(12, 0.0)
+    lights: list[PointLight | EnvironmentLight] = []
+    if light == "emissive":
+        emission[2:] = 1.0  # all but the floor, which runs on inside
+    elif light == "sky":
+        room, emission = room[surface != CEILING], emission[surface != CEILING]
+        lights = [EnvironmentLight(1.0)]
+    else:
+        lights = [PointLight((0.5, 0.5, 2.5), 100.0, radius=0.1)]
+    bottom, top = np.array(low), np.array(high)
+    stands = low[2] == 0
+    inner = box_room(top - bottom)[0][2 * stands :] + bottom
+    parts, triangles = [("Room", len(room), None, floor_baked), ("Inner", len(inner))], [room, inner]
+    if thickness:
+        out = np.array([thickness, thickness, 0 if stands else thickness])
+        shell = solid_box(bottom - out, top + thickness)[2 * stands :]
+        parts.append(("Shell", len(shell)))
+        triangles.append(shell)
+    every = np.concatenate(triangles)
+    glow = np.zeros((len(every), 3))
+    glow[: len(room)] = emission
+    scene = Scene(every, grey(len(every), 0.8), glow, two_sided=True, lights=lights)
+    return bake_scene(scene, *parts)
+
+
+def run(scene: BakeScene, quality: str) -> BakeResult:
+    steps = bake(scene, BakeSettings(quality=quality, resolution=64, atlas="per-object"))
+    while True:
+        try:
+            next(steps)
+        except StopIteration as done:
+            result: BakeResult = done.value
+            return result
+
+
+def filtered(page: LightmapPage, item: BakedObject) -> np.ndarray:
+    """Bilinear look-ups all over an object's triangles, their edges and corners too."""
+    weights = np.concatenate([np.random.default_rng(1).dirichlet([0.5] * 3, 500), np.eye(3)])
+    spots = np.einsum("kc,tcx->tkx", weights, item.uv.astype(float)).reshape(-1, 2)
+    spots = spots * len(page.pixels) - 0.5
+    corner = np.floor(spots).astype(int)
+    share = spots - corner
+    last = len(page.pixels) - 1
+    value = np.zeros((len(spots), 3))
+    for right in (0, 1):
+        for up in (0, 1):
+            x, y = np.clip(corner + np.array([right, up]), 0, last).T
+            weight = np.abs(1 - right - share[:, 0]) * np.abs(1 - up - share[:, 1])
+            value += weight[:, None] * page.pixels[y, x]
+    return value
+
+
+def assert_sealed(scene: BakeScene, quality: str) -> None:
+    result = run(scene, quality)
+    names = [item.object.name for item in result.objects]
+    dark = names.index("Inner")
+    for number, page in enumerate(result.pages):
+        if number != dark:
+            assert page.pixels[page.coverage].mean() > 0.1
+    page = result.pages[dark]
+    assert page.coverage.sum() > 1000
+    assert not page.pixels.any()
+    assert not filtered(page, result.objects[dark]).any()
+    if "Room" in names:
+        assert_dark_floor(scene, result, names.index("Room"))
+
+
+def assert_dark_floor(scene: BakeScene, result: BakeResult, number: int) -> None:
+    """Texels of the room's floor that lie wholly inside a box standing on it."""
+    if scene.scene.triangles[scene.objects[1].rows][..., 2].min() > 0:
+        return
+    page, uv = result.pages[number].pixels, result.objects[number].uv[:2].astype(float)
+    # The floor is the first two triangles: its UVs are an affine map of x and y.
+    world = scene.scene.triangles[:2].reshape(-1, 3).copy()
+    world[:, 2] = 1.0
+    mapping = np.linalg.lstsq(world, uv.reshape(-1, 2), rcond=None)[0]
+    rows, columns = np.indices(page.shape[:2])
+    corners = np.stack([np.stack([columns + i, rows + j], axis=-1) for i in (0, 1) for j in (0, 1)], axis=2)
+    at = (corners / len(page) - mapping[2]) @ np.linalg.inv(mapping[:2])
+    low, high = np.array(ON_FLOOR)[:, :2]
+    whole = ((at > low) & (at < high)).all(axis=(2, 3))
+    assert whole.sum() > 20
+    assert not page[whole].any()
+
+
+@pytest.mark.parametrize("light", ["lamp", "emissive", "sky"])
+@pytest.mark.parametrize("thickness", [0.0, 0.01], ids=["plane", "1cm"])
+@pytest.mark.parametrize("place", [ON_FLOOR, HANGING], ids=["standing", "hanging"])
+def test_no_texel_in_a_sealed_box_is_lit(
+    place: tuple[tuple[float, ...], tuple[float, ...]], thickness: float, light: str
+) -> None:
+    assert_sealed(sealed_box(*place, thickness, light), "draft")
+
+
+@pytest.mark.parametrize(("thickness", "light"), [(0.0, "sky"), (0.01, "lamp")])
+def test_nor_at_medium_quality(thickness: float, light: str) -> None:
+    assert_sealed(sealed_box(*ON_FLOOR, thickness, light), "medium")

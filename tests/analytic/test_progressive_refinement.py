@@ -1,0 +1,166 @@
+"""Shooting against the dense solution, and against gathering at the same cost (handout §3.4.1, §3.4.2)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from radiosity_addon.solver import PointLight, Scene, SolverSettings, solve
+from radiosity_addon.solver.assembly import galerkin, with_lamps
+from radiosity_addon.solver.elements import subdivide_evenly
+from radiosity_addon.solver.embree import EmbreeCaster
+from radiosity_addon.solver.hierarchy import Hierarchy
+from radiosity_addon.solver.linear_system import LinearSystem
+from radiosity_addon.solver.methods import steps_of
+from radiosity_addon.solver.methods.shooting import solve_steps
+from radiosity_addon.solver.state import SolverState
+from tests.cornell import cornell_box
+from tests.rooms import CEILING, FLOOR, box_room, coloured_room, grey
+
+ELEMENTS = 90
+
+
+def by(method: str, scene: Scene, **changes: object) -> SolverState:
+    settings = SolverSettings(method=method, elements=ELEMENTS, **changes)
+    *_, (_, state) = steps_of(scene, settings)
+    return state
+
+
+@pytest.mark.parametrize("scene", [cornell_box, coloured_room])
+def test_converged_shooting_is_the_dense_solution(scene) -> None:
+    """The same elements, the same exchange of each pair: to 1e-6 of the brightest."""
+    dense = by("dense", scene())
+    shot = by("shooting", scene(), tolerance=2e-8, max_iterations=100_000)
+    assert shot.residual < 2e-8
+    for name in ("radiosity", "irradiance"):
+        exact, found = getattr(dense, name), getattr(shot, name)
+        np.testing.assert_allclose(found, exact, rtol=0, atol=1e-6 * exact.max())
+    np.testing.assert_allclose(shot.closure(), dense.closure(), rtol=0, atol=1e-9)
+
+
+def test_cube_with_emitting_ceiling() -> None:
+    """Area means of radiosity, ρ = 0.5, from exact Galerkin solutions extrapolated over grids."""
+    triangles, surface = box_room()
+    emission = grey(12, 1.0) * (surface == CEILING)[:, None]
+    settings = SolverSettings(method="shooting", elements=192, tolerance=1e-4)
+    solution = solve(Scene(triangles, grey(12, 0.5), emission), settings)
+    for number in range(6):
+        expected = {FLOOR: 0.17122, CEILING: 1.1044}.get(number, 0.18110)
+        mean = solution.triangle_radiosity[surface == number].mean(axis=0)
+        np.testing.assert_allclose(mean, expected, rtol=0.004)
+    power = solution.report["power_W"]
+    # What is not yet absorbed is unshot.
+    assert power["absorbed"] == pytest.approx(power["emitted"], rel=3e-4)
+
+
+@pytest.mark.parametrize(("reflectance", "indirect"), [(0.2, 26.04), (0.5, 104.17)])
+def test_cie_171_5_8(reflectance: float, indirect: float) -> None:
+    """Closed cube of edge 4 m, isotropic point source of 10 000 lm: mean indirect illuminance [lx]."""
+    triangles, _ = box_room((4, 4, 4))
+    lamp = PointLight((2, 2, 2), 10_000.0)
+    scene = Scene(triangles, grey(12, reflectance), grey(12, 0.0), lights=[lamp])
+    solution = solve(scene, SolverSettings(method="shooting", elements=192, tolerance=1e-4))
+    mean = solution.triangle_irradiance.mean() - 10_000.0 / 96.0
+    assert mean == pytest.approx(indirect, rel=0.002)
+
+
+def cornell_system() -> LinearSystem:
+    scene = cornell_box()
+    hierarchy = Hierarchy(scene)
+    subdivide_evenly(hierarchy, ELEMENTS)
+    return galerkin(hierarchy, EmbreeCaster(scene.triangles))
+
+
+def relax(system: LinearSystem, residual: np.ndarray, row: int) -> None:
+    """Make row's equation true by S_row += r_row, and bring the residual E − K S up to date."""
+    change = residual[row].copy()
+    column = system.exchange[:, row] / system.area
+    residual[row] = 0.0
+    residual += system.reflectance * column[:, None] * change
+
+
+def test_shooting_is_never_behind_gathering_of_the_same_cost() -> None:
+    """Σ A |E − K S| after k shots is at most that after k rows of cyclic gathers, for every k.
+
+    Both relax one row a step, from S = 0 in the Cornell box: shooting in the order of unshot
+    power, Gauss–Seidel in the order of rows. K is an M-matrix, so no order makes r negative.
+    """
+    system = cornell_system()
+    gathering = system.emission.copy()
+    expected = [system.area @ gathering]
+    for step in range(5 * len(system)):
+        relax(system, gathering, step % len(system))
+        expected.append(system.area @ gathering)
+        assert gathering.min() >= 0
+
+    found = []
+    settings = SolverSettings(elements=ELEMENTS, tolerance=0.0, max_iterations=5 * len(system))
+    for _, state in solve_steps(cornell_box(), settings):
+        if len(state.leaves) and len(found) <= state.iterations:
+            found.append(state.unshot_power())
+    found, cyclic = np.array(found), np.array(expected)
+    assert found.shape == cyclic.shape
+    assert (found <= cyclic * (1 + 1e-12)).all()
+    # And far ahead for the first pictures: a third of the steps until half is left.
+    halved = [int(np.argmax(each.max(axis=1) < 0.5 * each[0].max())) for each in (found, cyclic)]
+    assert 3 * halved[0] < halved[1]
+
+
+def test_a_shot_is_the_relaxation_of_a_row() -> None:
+    """The method's ΔB, computed from columns on the fly, is the matrix's relaxation in its order."""
+    system = cornell_system()
+    residual = system.emission.copy()
+    settings = SolverSettings(elements=ELEMENTS, tolerance=0.0, max_iterations=300)
+    shots_before = np.zeros(len(system), dtype=int)
+    for _, state in solve_steps(cornell_box(), settings):
+        if len(state.leaves) and state.shots_of.sum() > shots_before.sum():
+            relax(system, residual, int(np.argmax(state.shots_of - shots_before)))
+            shots_before = state.shots_of.copy()
+            np.testing.assert_allclose(state.unshot, residual, rtol=0, atol=1e-12 * 30)
+    assert shots_before.sum() == 300
+
+
+def test_shots_gather_the_bounces_from_below() -> None:
+    """B only rises while shooting, towards the dense solution, and never past it."""
+    dense = by("dense", cornell_box()).radiosity
+    before = np.zeros_like(dense)
+    for _, state in solve_steps(cornell_box(), SolverSettings(elements=ELEMENTS, tolerance=1e-3)):
+        if len(state.leaves) == 0:
+            continue
+        assert (state.radiosity >= before * (1 - 1e-14)).all()
+        assert (state.radiosity <= dense + 1e-12 * dense.max()).all()
+        before = state.radiosity
+    leaves = state.leaves
+    error = state.hierarchy.area[leaves] @ (dense - before)[leaves] / state.power
+    # Σ A (B∞ − B) = Σ A Σ_k (ρF)^k ρF ΔB ≤ ρ / (1 − ρ) Σ A ΔB.
+    assert (error <= 0.78 / (1 - 0.78) * state.residual).all()
+    assert (error > 0).all()
+
+
+def test_the_ambient_term_anticipates_the_mean() -> None:
+    """In a closed room of one reflectance the mean shown is the solution's from the first picture on."""
+    triangles, surface = box_room((3, 3, 2))
+    emission = grey(12, 5.0) * (surface == 1)[:, None]
+    scene = Scene(triangles, grey(12, 0.7), emission)
+    dense = by("dense", scene)
+    area = dense.hierarchy.area[dense.hierarchy.leaves]
+    exact = area @ dense.radiosity[dense.hierarchy.leaves] / area.sum()
+    settings = SolverSettings(elements=ELEMENTS, tolerance=1e-3, ambient=True)
+    behind = []
+    for _, state in solve_steps(scene, settings):
+        if len(state.leaves):
+            shown = area @ state.shown()[state.leaves] / area.sum()
+            # One ρ in a closed room: the mean is exact but for what closure is off.
+            np.testing.assert_allclose(shown, exact, rtol=3e-3)
+            plain = area @ state.radiosity[state.leaves] / area.sum()
+            behind.append(float((1.0 - plain / exact).max()))
+    assert behind[0] > 0.5
+    assert behind[-1] < 3e-3
+
+
+def test_lamps_are_emission() -> None:
+    """The system of the lamps' light as E' = E + ρ H_direct has the same first residual."""
+    scene = coloured_room()
+    *_, (_, state) = solve_steps(scene, SolverSettings(elements=ELEMENTS, max_iterations=0))
+    system = with_lamps(galerkin(state.hierarchy, state.caster), state.received)
+    assert state.unshot.tobytes() == system.emission.tobytes()

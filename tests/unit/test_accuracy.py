@@ -1,0 +1,98 @@
+"""Texels lit to an error asked for: the estimate, and the settings that follow an error."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from radiosity_addon.errors import UsageError
+from radiosity_addon.lightmap import accuracy
+from radiosity_addon.lightmap.interpolate import Interpolation
+from radiosity_addon.lightmap.reconstruct import GatherSettings
+from radiosity_addon.lightmap.sweeps import StoredLinks, TexelLight, estimated_error
+from radiosity_addon.quality import ERRORS, QUALITIES, for_error
+from radiosity_addon.settings import BakeSettings
+
+
+def links_of(sources: np.ndarray) -> StoredLinks:
+    """Every texel is a gather point of its own."""
+    count = len(sources)
+    own = np.arange(count)
+    return StoredLinks(sources.astype(np.int32), Interpolation(own, own, np.ones(count)))
+
+
+@pytest.mark.parametrize("rays", [16, 64, 256])
+def test_the_estimate_is_the_noise_of_random_rays(rays: int) -> None:
+    """Hits drawn at random from a known table: the true error of each mean is known."""
+    rng = np.random.default_rng(7)
+    table = rng.gamma(0.5, 2.0, (5000, 1)).repeat(3, axis=1).astype(np.float32)
+    sources = rng.integers(0, len(table), (4000, rays))
+    found = table[sources].mean(axis=1)
+    true = np.sqrt(((found - table.mean(axis=0)) ** 2).mean()) / table.mean()
+    estimate = estimated_error(links_of(sources), table, found.astype(np.float64))
+    assert estimate == pytest.approx(true, rel=0.05)
+
+
+def test_rays_that_agree_have_no_error() -> None:
+    table = np.ones((10, 3), dtype=np.float32)
+    sources = np.random.default_rng(1).integers(0, 10, (50, 32))
+    assert estimated_error(links_of(sources), table, np.ones((50, 3))) == pytest.approx(0.0, abs=1e-7)
+
+
+def test_darkness_has_no_error() -> None:
+    assert estimated_error(links_of(np.zeros((3, 4))), np.zeros((1, 3), np.float32), np.zeros((3, 3))) == 0.0
+
+
+@pytest.mark.parametrize("name", sorted(ERRORS))
+def test_a_quality_is_what_reaches_its_error(name: str) -> None:
+    found = for_error(ERRORS[name])
+    assert found.gather.rays == QUALITIES[name].gather.rays
+    assert found.gather.support == pytest.approx(QUALITIES[name].gather.support)
+    assert found.solver.error == pytest.approx(QUALITIES[name].solver.error)
+    assert found.solver.shadow_rays == QUALITIES[name].solver.shadow_rays
+
+
+def test_smaller_errors_take_no_fewer_rays() -> None:
+    found = [for_error(error) for error in np.geomspace(0.2, 0.002, 30)]
+    rays = [quality.gather.rays for quality in found]
+    assert rays == sorted(rays)
+    assert rays[-1] > 4 * rays[0]
+    errors = [quality.solver.error for quality in found]
+    assert errors == sorted(errors, reverse=True)
+
+
+def test_it_looks_harder_until_the_error_is_reached(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Errors that fall like rays^-1/2, but are three times those of the table."""
+    asked = []
+
+    def light(_scene, _local, _geometry, settings):  # type: ignore[no-untyped-def]
+        asked.append(settings.rays)
+        yield 0.5
+        return TexelLight(np.ones((1, 3)), np.ones((1, 3)), 0.48 / settings.rays**0.5)
+
+    monkeypatch.setattr(accuracy, "reconstruct", light)
+    steps = accuracy.light_within(
+        None, None, None, lambda error: GatherSettings(rays=int((0.16 / error) ** 2)), 0.02
+    )
+    fractions = []
+    while True:
+        try:
+            fractions.append(next(steps))
+        except StopIteration as done:
+            result = done.value
+            break
+    assert result.error <= 0.02
+    assert asked == [64, 711]
+    assert fractions == sorted(fractions)
+    assert fractions[-1] < 1.0
+
+
+@pytest.mark.parametrize("error", [0.0, 0.001, 0.3, float("nan")])
+def test_impossible_errors_are_refused(error: float) -> None:
+    with pytest.raises(UsageError, match="between"):
+        BakeSettings(relative_error=error)
+
+
+def test_an_error_picture_has_no_error_to_reach() -> None:
+    with pytest.raises(UsageError, match="residual"):
+        BakeSettings(relative_error=0.02, quantity="residual")

@@ -1,0 +1,96 @@
+"""First links: how many there will be, and what becomes of scenes that ask for too many."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from radiosity_addon.solver import Scene, SolverSettings, first_links
+from radiosity_addon.solver.cluster_links import ClusterLinks
+from radiosity_addon.solver.embree import EmbreeCaster
+from radiosity_addon.solver.hierarchy import Hierarchy
+from radiosity_addon.solver.links import Links
+from radiosity_addon.solver.methods import hierarchical
+from radiosity_addon.solver.node_shapes import NodeShapes
+from tests.rooms import box_room, grey, sphere
+
+
+@pytest.fixture(scope="module")
+def clutter() -> Scene:
+    """Forty small balls in a room, from one shining wall: 5,132 triangles."""
+    chance = np.random.default_rng(5)
+    balls = [0.06 * sphere(2)[:, ::-1] + chance.uniform(0.1, 0.9, 3) for _ in range(40)]
+    triangles = np.concatenate([box_room()[0], *balls])
+    emission = grey(len(triangles), 0.0)
+    emission[:2] = 1.0
+    return Scene(triangles, grey(len(triangles), 0.5), emission)
+
+
+def limits_of(hierarchy: Hierarchy, **given: float) -> first_links._Limits:
+    return first_links._Limits(float(hierarchy.faces.area.sum()), SolverSettings().min_area, **given)
+
+
+@pytest.mark.parametrize("faint", [0.0, 1e-5, 1e-3])
+def test_the_estimate_tells_how_many_links_there_are(
+    clutter: Scene, faint: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whole if nothing is thinned, and within five standard errors or so if most is."""
+    hierarchy = Hierarchy(clutter)
+    shapes, limits = NodeShapes(hierarchy), limits_of(hierarchy, faint=faint)
+    pairs = first_links._first_pairs(hierarchy, shapes, limits, 10**9)
+    assert pairs is not None
+    monkeypatch.setattr(first_links, "THINNED", 10**9)
+    assert first_links._estimate(hierarchy, shapes, limits) == len(pairs[0])
+    monkeypatch.setattr(first_links, "THINNED", 1 << 12)
+    assert first_links._estimate(hierarchy, shapes, limits) == pytest.approx(len(pairs[0]), rel=0.15)
+
+
+def test_the_order_in_which_pairs_are_walked_changes_none(
+    clutter: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hierarchy = Hierarchy(clutter)
+    shapes, limits = NodeShapes(hierarchy), limits_of(hierarchy)
+    found = []
+    for block in (10**9, 1000):
+        monkeypatch.setattr(first_links, "BLOCK", block)
+        pairs = first_links._first_pairs(hierarchy, shapes, limits, 10**9)
+        assert pairs is not None
+        found.append(np.sort(pairs[0].astype(np.int64) << 32 | pairs[1]))
+    np.testing.assert_array_equal(*found)
+    assert len(np.unique(found[0])) == len(found[0])
+
+
+def made(scene: Scene, max_links: int) -> tuple[Links, ClusterLinks, float]:
+    hierarchy = Hierarchy(scene)
+    caster = EmbreeCaster(scene.triangles, 1)
+    return first_links.first_links(hierarchy, NodeShapes(hierarchy), caster, SolverSettings(), max_links)
+
+
+def test_a_small_budget_makes_links_coarse_and_says_so(
+    clutter: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    *_, faint = made(clutter, 10**9)
+    assert faint == 0.0
+    monkeypatch.setattr(first_links, "FEWEST", 1)
+    told = []
+    for budget in (400_000, 100_000):
+        links, together, faint = made(clutter, budget)
+        assert len(links) + len(together) <= first_links.SLACK * first_links.BUDGET * budget
+        told.append(faint)
+    assert 0 < told[0] < told[1] < 0.1
+
+
+def test_coarse_first_links_still_send_what_there_is(clutter: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every leaf sends no more than it has, and the mean light is that of the fine links."""
+    *_, (_, fine) = hierarchical.solve_steps(clutter, SolverSettings(error=1e-3))
+    monkeypatch.setattr(first_links, "FEWEST", 1)
+    settings = SolverSettings(error=1e-3, max_links=150_000)
+    *_, (_, coarse) = hierarchical.solve_steps(clutter, settings)
+    assert fine.details["hierarchical"]["first_faint"] == 0.0 < coarse.details["hierarchical"]["first_faint"]
+    assert coarse.n_links <= 150_000
+    assert coarse.residual < settings.tolerance
+    means = [
+        state.hierarchy.faces.area @ state.irradiance[: len(state.hierarchy.faces), 0]
+        for state in (fine, coarse)
+    ]
+    assert means[1] == pytest.approx(means[0], rel=0.02)

@@ -1,0 +1,67 @@
+"""Surfaces that lie in one another: no method makes light of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from radiosity_addon.methods import METHODS
+from radiosity_addon.solver import Scene, SolverSettings, solve
+from radiosity_addon.solver.methods import steps_of
+from radiosity_addon.solver.overlaps import OVERLAP, shares
+from tests.rooms import CEILING, FLOOR, area_mean, box_room, grey
+
+
+def test_sums_below_the_limit_are_left_alone() -> None:
+    sums = np.array([0.0, 0.5, 1.0, OVERLAP, 2.0, 4.0])
+    assert shares(sums).tolist() == [1.0, 1.0, 1.0, 1.0, 0.5, 0.25]
+
+
+def room_with_its_floor(times: int) -> Scene:
+    """A closed cube whose ceiling shines, all floors in one plane and facing up."""
+    triangles, surface = box_room()
+    floor = np.flatnonzero(surface == FLOOR)
+    triangles = np.concatenate([triangles, *[triangles[floor]] * (times - 1)])
+    emission = grey(len(triangles), 0.0)
+    emission[: len(surface)][surface == CEILING] = 1.0
+    return Scene(triangles, grey(len(triangles), 0.8), emission)
+
+
+@pytest.mark.parametrize("method", sorted(METHODS))
+def test_a_doubled_floor_makes_no_light(method: str) -> None:
+    """All methods converge, and the room is no brighter than with one floor; how dark differs."""
+    settings = SolverSettings(
+        method=method, elements=200, patches=60, contrast=10.0, tolerance=1e-4, min_area=2e-3, error=1e-3
+    )
+    single, double = solve(room_with_its_floor(1), settings), solve(room_with_its_floor(2), settings)
+    assert double.report["residual"] <= 1e-4
+    walls, areas = slice(4, 12), np.ones(8)
+    one = area_mean(single.triangle_irradiance[walls], areas)
+    two = area_mean(double.triangle_irradiance[walls], areas)
+    assert (two < one).all()
+    assert (two > 0.65 * one).all()
+
+
+def leaf_radiosity(scene: Scene, **settings: object) -> np.ndarray:
+    *_, (_, state) = steps_of(scene, SolverSettings(**{"elements": 28, "tolerance": 1e-8, **settings}))
+    return state.radiosity[state.hierarchy.leaves]
+
+
+@pytest.mark.parametrize("two_sided", [False, True])
+def test_the_methods_agree_on_overlapping_surfaces_too(two_sided: bool) -> None:
+    """The same elements, to 1e-6: where ΣFV is too large all let an element send the same share."""
+    room = room_with_its_floor(2)
+    scene = Scene(room.triangles, room.reflectance, room.emission, two_sided=two_sided)
+    dense = leaf_radiosity(scene, method="dense")
+    for method in ("jacobi", "gauss-seidel", "conjugate-gradient", "shooting"):
+        np.testing.assert_allclose(leaf_radiosity(scene, method=method), dense, rtol=1e-6)
+    one_a_patch = leaf_radiosity(scene, method="two-level", patches=28, contrast=100.0)
+    np.testing.assert_allclose(one_a_patch, dense, rtol=1e-10)
+
+
+def test_shared_light_keeps_reflecting_the_same() -> None:
+    """The share is of what is sent on: each copy of a doubled room is E / (1 − ρ) bright."""
+    room = box_room()[0]
+    twice = Scene(np.concatenate([room, room]), grey(24, 0.8), grey(24, 2.0))
+    for method in ("dense", "conjugate-gradient", "shooting"):
+        np.testing.assert_allclose(leaf_radiosity(twice, method=method), 10.0, rtol=1e-3)
