@@ -29,7 +29,7 @@ Float32 = NDArray[np.float32]
 Int = NDArray[np.int64]
 
 _PROBE = 1024
-"""Kept UVs are searched for overlaps at no more than this resolution."""
+"""Kept UVs are searched for overlaps at no more than this resolution: a finer one finds no larger ones."""
 
 _OVERLAP = 1.01
 """A texel filled to more than this holds triangles that lie over each other."""
@@ -133,9 +133,11 @@ def build_atlas(
     layouts: list[_Layout] = []
     total = sum(len(source.triangles) for source in objects)
     done = 0
+    # A density's page is not known yet, and may be as large as any.
+    probe = _PROBE if texel_density is not None else min(resolution, _PROBE)
     for source in objects:
         layout = None
-        for layout in _lay_flat(source, warnings):
+        for layout in _lay_flat(source, probe, warnings):
             share = float((layout.charts.chart >= 0).mean()) if len(source.triangles) else 0.0
             yield 0.7 * (done + share * len(source.triangles)) / max(total, 1)
         assert layout is not None
@@ -205,11 +207,11 @@ def grow_charts(vertices: Float, faces: Int) -> tuple[Float, Int]:
     return uv[indices].astype(np.float64) * scale, chart
 
 
-def _lay_flat(source: AtlasInput, warnings: list[BakeWarning]) -> Iterator[_Layout]:
+def _lay_flat(source: AtlasInput, probe: int, warnings: list[BakeWarning]) -> Iterator[_Layout]:
     """Cut one object into charts, or take the UVs it has."""
     triangles = np.asarray(source.triangles, dtype=np.float64).reshape(-1, 3, 3)
     if source.uv is not None:
-        kept = _kept_charts(source, triangles, warnings)
+        kept = _kept_charts(source, triangles, probe, warnings)
         if kept is not None:
             yield _Layout(source, kept, kept=True)
             return
@@ -220,8 +222,13 @@ def _lay_flat(source: AtlasInput, warnings: list[BakeWarning]) -> Iterator[_Layo
         yield _Layout(source, charts, kept=False)
 
 
-def _kept_charts(source: AtlasInput, triangles: Float, warnings: list[BakeWarning]) -> Charts | None:
-    """Take an object's UVs as one chart at world scale; None, with a warning, if they are useless."""
+def _kept_charts(
+    source: AtlasInput, triangles: Float, probe: int, warnings: list[BakeWarning]
+) -> Charts | None:
+    """Take an object's UVs as one chart at world scale; None, with a warning, if they are useless.
+
+    Overlaps are searched for on a page of `probe` texels a side.
+    """
     assert source.uv is not None
     uv = source.uv.astype(np.float64)
     if not np.isfinite(uv).all() or not (signed_double_area(uv) != 0).any():
@@ -233,7 +240,7 @@ def _kept_charts(source: AtlasInput, triangles: Float, warnings: list[BakeWarnin
         warnings.append(
             BakeWarning(source.name, "its Lightmap UVs leave the unit square; what is outside gets no light")
         )
-    elif (coverage_sum(source.uv, _PROBE) > _OVERLAP).any():
+    elif (coverage_sum(source.uv, probe) > _OVERLAP).any():
         warnings.append(
             BakeWarning(source.name, "its Lightmap UVs overlap; faces that share texels show the same light")
         )

@@ -7,11 +7,15 @@ on a crossed texel is looked up in a whole neighbour that the hit point can see.
 
 from __future__ import annotations
 
+from collections.abc import Generator
+
 import numpy as np
 
 from ..solver.arrays import Array
-from ..solver.local_pass import NOTHING
-from ..solver.visibility import RayCaster
+from ..solver.gathering import NOTHING
+from ..solver.parallel import chunk_steps
+from ..solver.steps import drain
+from ..solver.visibility import Hits, RayCaster
 from .texel_geometry import NO_TEXEL, TexelGeometry
 
 CHUNK = 1 << 16
@@ -21,47 +25,44 @@ LIFT = 2.0
 """Segments run this many surface offsets above the surface."""
 
 INSET = 0.96
-"""Corners are drawn in to this part: a texel that ends at a wall is not crossed by it."""
+"""Corners are drawn in to this part: a texel that ends at a wall is not crossed by it, …"""
+
+OUTSET = 1.01
+"""… but touched, if the wall crosses corners drawn out so far."""
 
 _CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]], dtype=np.float32)
-_SEGMENTS = np.array([[0, 2], [1, 3], [0, 1], [1, 2], [2, 3], [3, 0]])
+_EDGES = np.array([[0, 1], [1, 2], [2, 3], [3, 0]])
+_DIAGONALS = np.array([[0, 2], [1, 3]])
 _AROUND = np.array([[r, c] for r in (-1, 0, 1) for c in (-1, 0, 1) if r or c])
 
 
 class Crossings:
-    """Which texels are crossed, and where their hits are looked up instead."""
+    """Which texels are crossed, and where their hits are looked up instead.
 
-    def __init__(self, geometry: TexelGeometry, caster: RayCaster) -> None:
+    Parameters
+    ----------
+    geometry : TexelGeometry
+    caster : RayCaster
+    found : pair of (n,) bool, or None
+        What `crossing_steps` found; None finds it.
+    """
+
+    def __init__(
+        self, geometry: TexelGeometry, caster: RayCaster, found: tuple[Array, Array] | None = None
+    ) -> None:
         self._geometry, self._caster = geometry, caster
-        self.crossed = np.zeros(len(geometry), dtype=bool)
-        """(n,) bool"""
-        for first in range(0, len(geometry), CHUNK):
-            rows = np.arange(first, min(first + CHUNK, len(geometry)))
-            # The whole texel: hits land all over it, though its light comes from the middle.
-            corners = geometry.sample(rows, np.broadcast_to(_CORNERS, (len(rows), 4, 2)), 1.0)
-            centre = geometry.position[rows][:, None]
-            corners = centre + INSET * (corners - centre)
-            corners += LIFT * caster.surface_offset * geometry.surface_normal[rows][:, None]
-            start, end = corners[:, _SEGMENTS[:, 0]], corners[:, _SEGMENTS[:, 1]]
-            self.crossed[rows] = ~self._free(start, end).all(axis=1)
+        self.crossed, self.touched = drain(crossing_steps(geometry, caster)) if found is None else found
+        """(n,) bool each; none is both"""
 
-    def _free(self, start: Array, end: Array) -> Array:
-        """Return (n, k) whether segments between (n, k, 3) points meet nothing."""
-        along = (end - start).reshape(-1, 3)
-        length = np.linalg.norm(along, axis=1)
-        directions = along / np.maximum(length, 1e-300)[:, None]
-        free = self._caster.visible(start.reshape(-1, 3), directions, length)
-        return free.reshape(start.shape[:2])
-
-    def look_up(self, texel: Array, position: Array) -> Array:
-        """Replace crossed texels by whole neighbours on the hit's own side.
+    def look_up(self, texel: Array, hits: Hits) -> Array:
+        """Replace crossed texels, and touched ones from beyond, by whole neighbours on the hit's side.
 
         Parameters
         ----------
         texel : (h,) int32
             NO_TEXEL is left alone.
-        position : (h, 3) float64
-            Where the rays hit.
+        hits : Hits
+            Where the rays hit them.
 
         Returns
         -------
@@ -69,11 +70,19 @@ class Crossings:
             NOTHING where no whole neighbour can be seen.
         """
         result = texel.copy()
-        rows = np.flatnonzero((texel != NO_TEXEL) & self.crossed[texel])
+        rows = np.flatnonzero((texel != NO_TEXEL) & (self.crossed[texel] | self.touched[texel]))
         for first in range(0, len(rows), CHUNK):
             chunk = rows[first : first + CHUNK]
-            result[chunk] = self._neighbour(texel[chunk], position[chunk])
+            position = self._geometry.positions_of(hits.take(chunk))
+            apart = self.crossed[texel[chunk]] | ~self._sees_centre(texel[chunk], position)
+            result[chunk[apart]] = self._neighbour(texel[chunk[apart]], position[apart])
         return result
+
+    def _sees_centre(self, texel: Array, position: Array) -> Array:
+        """Return (h,) whether nothing is between points and the centres of their texels."""
+        lift = LIFT * self._caster.surface_offset * self._geometry.surface_normal[texel]
+        start, end = position + lift, self._geometry.position[texel] + lift
+        return _free(self._caster, start[:, None], end[:, None])[:, 0]
 
     def _neighbour(self, texel: Array, position: Array) -> Array:
         """Return (h,) the nearest whole neighbour visible from each hit, or NOTHING."""
@@ -99,8 +108,53 @@ class Crossings:
         end = geometry.position[around] + lift * geometry.surface_normal[around]
         seen = np.zeros(whole.shape, dtype=bool)
         hit, which = np.nonzero(whole)
-        seen[hit, which] = self._free(start[hit, which][:, None], end[hit, which][:, None])[:, 0]
+        seen[hit, which] = _free(self._caster, start[hit, which][:, None], end[hit, which][:, None])[:, 0]
         size = np.where(seen, size, np.inf)
         best = size.argmin(axis=1)
         every = np.arange(len(texel))
         return np.where(np.isfinite(size[every, best]), around[every, best], NOTHING)
+
+
+def crossing_steps(
+    geometry: TexelGeometry, caster: RayCaster, threads: int = 0
+) -> Generator[float, None, tuple[Array, Array]]:
+    """Find the texels that geometry cuts, and those that end at it; yields the fraction done.
+
+    Returns
+    -------
+    crossed, touched : (n,) bool
+    """
+    crossed, touched = np.zeros(len(geometry), dtype=bool), np.zeros(len(geometry), dtype=bool)
+
+    def find(part: slice) -> None:
+        rows = np.arange(part.start, part.stop)
+        # The whole texel: hits land all over it, though its light comes from the middle.
+        corners = geometry.sample(rows, np.broadcast_to(_CORNERS, (len(rows), 4, 2)), 1.0)
+        lift = LIFT * caster.surface_offset * geometry.surface_normal[rows][:, None]
+        centre = geometry.position[rows][:, None] + lift
+        from_centre = corners + lift - centre
+        cut = ~_segments_free(caster, centre + INSET * from_centre, _EDGES)
+        # Of the texel on the page: hits land on the part outside its triangle as well.
+        square = geometry.squares(rows) + lift
+        middle = square.mean(axis=1, keepdims=True)
+        doubtful = ~_segments_free(caster, middle + OUTSET * (square - middle), _DIAGONALS) & ~cut
+        some = np.flatnonzero(doubtful)
+        cut[some] = ~_segments_free(caster, centre[some] + INSET * from_centre[some], _DIAGONALS)
+        crossed[rows], touched[rows] = cut, doubtful & ~cut
+
+    yield from chunk_steps(find, len(geometry), CHUNK // 4, threads)
+    return crossed, touched
+
+
+def _segments_free(caster: RayCaster, corners: Array, segments: Array) -> Array:
+    """Return (n,) whether all segments, pairs of (n, 4, 3) corners, meet nothing."""
+    return np.asarray(_free(caster, corners[:, segments[:, 0]], corners[:, segments[:, 1]]).all(axis=1))
+
+
+def _free(caster: RayCaster, start: Array, end: Array) -> Array:
+    """Return (n, k) whether segments between (n, k, 3) points meet nothing."""
+    along = (end - start).reshape(-1, 3)
+    length = np.linalg.norm(along, axis=1)
+    directions = along / np.maximum(length, 1e-300)[:, None]
+    free = caster.visible(start.reshape(-1, 3), directions, length)
+    return free.reshape(start.shape[:2])

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import BakeError, UsageError
+from ..solver.radiometry import brdf_of_reflectance, reflected_radiance
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -22,7 +23,8 @@ def to_quantity(irradiance: Float, reflectance: Float, emission: Float, quantity
         ρ and the self-emitted exitance E [W/m²] at the same points.
     quantity : str
         "irradiance_over_pi": H/π [W/m²/sr], what Cycles' diffuse bake without colour holds;
-        "irradiance": H [W/m²]; "radiosity": B = E + ρH [W/m²].
+        "irradiance": H [W/m²]; "radiosity": B = E + ρH [W/m²]. A residual is not made of
+        irradiance: see `error_picture`.
 
     Raises
     ------
@@ -30,7 +32,8 @@ def to_quantity(irradiance: Float, reflectance: Float, emission: Float, quantity
         If the quantity is unknown.
     """
     if quantity == "irradiance_over_pi":
-        return np.asarray(irradiance / np.pi)
+        white = brdf_of_reflectance(1.0)
+        return reflected_radiance(white, irradiance)
     if quantity == "irradiance":
         return np.asarray(irradiance)
     if quantity == "radiosity":

@@ -9,12 +9,14 @@ reach is long, and a wall thin.
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..solver.arrays import Array
-from ..solver.parallel import for_chunks
+from ..solver.parallel import chunk_steps
+from ..solver.steps import drain
 from ..solver.visibility import RayCaster
 from .point_grid import PointGrid
 from .texel_geometry import TexelGeometry
@@ -31,8 +33,8 @@ LIFT = 2.0
 SAGITTA = 0.6
 """… and this part of distance · √(1 − cos of the turn) more: what a sphere of few facets needs."""
 
-CHUNK = 1 << 14
-"""Texels whose candidates are weighed at once; bounds the temporaries to some 120 MB."""
+CHUNK = 1 << 13
+"""Texels whose neighbours are weighed at once; bounds the temporaries to some 40 MB a thread."""
 
 
 class GatherPoints:
@@ -67,50 +69,57 @@ class GatherPoints:
         self.texel = np.concatenate([self.texel, texel])
         self.closeness = np.concatenate([self.closeness, closeness])
 
-    def candidates(self, texels: Array) -> Array:
-        """Return (n, c) int32: gather points of all levels around n texels, −1 for none.
+    def pairs(self, texels: Array) -> tuple[Array, Array]:
+        """Return rows of `texels` and gather points of all levels around them, sorted by row, then point.
 
         In the world, not on the page: the next chart or object goes on where one ends.
         """
         position, normal = self._geometry.position[texels], self._geometry.normal[texels]
-        found = np.concatenate([grid.near(position, normal) for grid in self._grids], axis=1)
-        own = self._number[texels][:, None]
-        found = np.sort(np.concatenate([found, own], axis=1), axis=1)
-        found[:, 1:][found[:, 1:] == found[:, :-1]] = -1
-        return found
+        own = self._number[texels]
+        keys = [np.flatnonzero(own >= 0) * len(self) + own[own >= 0]]
+        for grid in self._grids:
+            found = grid.near(position, normal)
+            row, column = np.nonzero(found >= 0)
+            keys.append(row * len(self) + found[row, column])
+        return np.divmod(np.unique(np.concatenate(keys)), max(len(self), 1))
 
-    def kernel(self, texels: Array, points: Array) -> Array:
-        """Return (n, c) weights in [0, 1] of candidate points for texels; 0 out of reach."""
+    def kernel(self, texels: Array, point: Array) -> Array:
+        """Return (p,) weights in [0, 1] of gather points for texels (p,), pair by pair; 0 out of reach."""
         geometry = self._geometry
-        of = self.texel[points]
-        along = geometry.position[of] - geometry.position[texels][:, None]
-        turn = np.einsum("nck,nk->nc", geometry.normal[of], geometry.normal[texels])
-        distance = np.linalg.norm(along, axis=2)
+        of = self.texel[point]
+        along = geometry.position[of] - geometry.position[texels]
+        turn = np.einsum("pk,pk->p", geometry.normal[of], geometry.normal[texels])
+        distance = np.sqrt(np.einsum("pk,pk->p", along, along))
         bend = np.sqrt(np.maximum(1.0 - turn, 0.0))
-        change = distance * self.closeness[points] + bend
-        weight = np.where(points >= 0, np.maximum(1.0 - change / REACH, 0.0) ** 2, 0.0)
+        weight = np.maximum(1.0 - (distance * self.closeness[point] + bend) / REACH, 0.0) ** 2
         # A texel that geometry cuts in two speaks for itself alone, and nobody for it.
-        other = of != texels[:, None]
-        weight[other & (self._crossed[of] | self._crossed[texels][:, None])] = 0.0
-        row, column = np.nonzero((weight > 0) & other)
+        other = of != texels
+        weight[other & (self._crossed[of] | self._crossed[texels])] = 0.0
+        row = np.flatnonzero((weight > 0) & other)
         # Over a bulge the straight line dips below the surface, by an eighth of the distance
         # times the turn of the normal: start and end that much higher.
-        lift = LIFT * self._caster.surface_offset + SAGITTA * (distance * bend)[row, column]
-        start = geometry.position[texels][row] + lift[:, None] * geometry.normal[texels][row]
-        end = geometry.position[of[row, column]] + lift[:, None] * geometry.normal[of[row, column]]
+        lift = LIFT * self._caster.surface_offset + SAGITTA * (distance * bend)[row]
+        start = geometry.position[texels[row]] + lift[:, None] * geometry.normal[texels[row]]
+        end = geometry.position[of[row]] + lift[:, None] * geometry.normal[of[row]]
         length = np.linalg.norm(end - start, axis=1)
         directions = (end - start) / np.maximum(length, 1e-300)[:, None]
-        weight[row, column] *= self._caster.visible(start, directions, length)
-        return weight
+        weight[row] *= self._caster.visible(start, directions, length)
+        return np.asarray(weight)
 
     def support(self, texels: Array) -> Array:
         """Return (n,) the summed weights around texels: below 1 they need a point of their own."""
+        return drain(self.support_steps(texels))
+
+    def support_steps(self, texels: Array) -> Generator[float, None, Array]:
+        """Compute the same; yields the fraction done."""
         total = np.empty(len(texels))
 
         def weigh(rows: slice) -> None:
-            total[rows] = self.kernel(texels[rows], self.candidates(texels[rows])).sum(axis=1)
+            row, point = self.pairs(texels[rows])
+            weight = self.kernel(texels[rows][row], point)
+            total[rows] = np.bincount(row, weight, minlength=len(texels[rows]))
 
-        for_chunks(weigh, len(texels), CHUNK, self.threads)
+        yield from chunk_steps(weigh, len(texels), CHUNK, self.threads)
         return total
 
 
@@ -138,9 +147,22 @@ class Interpolation:
             result[:, channel] = np.add.reduceat(values[self.point, channel] * self.weight, self.first)
         return result
 
+    def any_of(self, chosen: Array) -> Array:
+        """Return (n,) bool: which texels take from any of the chosen points, (g,) bool."""
+        return np.asarray(np.logical_or.reduceat(chosen[self.point], self.first))
+
 
 def fit(points: GatherPoints, geometry: TexelGeometry) -> Interpolation:
+    """Weigh the gather points around every texel (see `fit_steps`)."""
+    return drain(fit_steps(points, geometry))
+
+
+def fit_steps(points: GatherPoints, geometry: TexelGeometry) -> Generator[float, None, Interpolation]:
     """Weigh the gather points around every texel: a local linear fit, evaluated at the texel.
+
+    Yields
+    ------
+    fraction : float
 
     Raises
     ------
@@ -150,40 +172,48 @@ def fit(points: GatherPoints, geometry: TexelGeometry) -> Interpolation:
     parts: dict[int, tuple[Array, Array, Array]] = {}
 
     def weigh(rows: slice) -> None:
-        texels = np.arange(rows.start, rows.stop, dtype=np.int64)
-        candidates = points.candidates(texels)
-        kernel = points.kernel(texels, candidates)
-        if not (kernel.sum(axis=1) > 0).all():
+        row, point = points.pairs(np.arange(rows.start, rows.stop, dtype=np.int64))
+        kernel = points.kernel(row + rows.start, point)
+        reached = kernel > 0
+        row, point, kernel = row[reached], point[reached], kernel[reached]
+        count = np.bincount(row, minlength=rows.stop - rows.start)
+        if not count.all():
             raise ValueError(
                 "a texel has no gather point in reach: the last level must take all that lack one"
             )
-        linear = _linear_weights(points, geometry, texels, candidates, kernel)
-        used = linear != 0
-        parts[rows.start] = used.sum(axis=1), candidates[used], linear[used].astype(np.float32)
+        along = geometry.position[points.texel[point]] - geometry.position[row + rows.start]
+        parts[rows.start] = count, point.astype(np.int32), _linear_weights(along, kernel, count)
 
-    for_chunks(weigh, len(geometry), CHUNK, points.threads)
+    yield from chunk_steps(weigh, len(geometry), CHUNK, points.threads)
     counts, numbers, weights = zip(*(parts[start] for start in sorted(parts)), strict=True)
     count = np.concatenate(counts)
     return Interpolation(np.cumsum(count) - count, np.concatenate(numbers), np.concatenate(weights))
 
 
-def _linear_weights(
-    points: GatherPoints,
-    geometry: TexelGeometry,
-    texels: Array,
-    candidates: Array,
-    kernel: Array,
-) -> Array:
-    """Return (n, c) weights that reproduce linear functions of the position as far as damping allows."""
-    along = geometry.position[points.texel[candidates]] - geometry.position[texels][:, None]
-    total = kernel.sum(axis=1, keepdims=True)
-    share = kernel / total
-    mean = np.einsum("nc,nck->nk", share, along)
-    offset = along - mean[:, None]
+def _linear_weights(along: Array, kernel: Array, count: Array) -> Array:
+    """Return (p,) float32 weights that reproduce linear functions of the position as far as damping allows.
+
+    Parameters
+    ----------
+    along : (p, 3) float64
+        From the texel to the point of each pair.
+    kernel : (p,) float64
+    count : (n,) int
+        How many pairs, one after the other, each texel has.
+    """
+    first = np.cumsum(count) - count
+    share = kernel / np.repeat(np.add.reduceat(kernel, first), count)
+    mean = np.add.reduceat(share[:, None] * along, first, axis=0)
+    offset = along - np.repeat(mean, count, axis=0)
     # Least-norm slope in three dimensions: damping makes the flat direction harmless.
-    moment = np.einsum("nc,nck,ncl->nkl", share, offset, offset)
+    moment = np.empty((len(count), 3, 3))
+    for one in range(3):
+        for other in range(one, 3):
+            product = np.add.reduceat(share * offset[:, one] * offset[:, other], first)
+            moment[:, one, other] = moment[:, other, one] = product
     damping = SLOPE_DAMPING * np.trace(moment, axis1=1, axis2=2) + 1e-18
     moment += damping[:, None, None] * np.eye(3)
     slope = np.linalg.solve(moment, -mean[:, :, None])[:, :, 0]
-    weights = share * (1.0 + np.einsum("nck,nk->nc", offset, slope))
-    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
+    weights = share * (1.0 + np.einsum("pk,pk->p", offset, np.repeat(slope, count, axis=0)))
+    weights /= np.repeat(np.add.reduceat(weights, first), count)
+    return np.asarray(weights, dtype=np.float32)

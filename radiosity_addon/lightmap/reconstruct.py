@@ -14,14 +14,25 @@ from functools import partial
 
 import numpy as np
 
+from ..solver.aiming import AimedRays
 from ..solver.arrays import Array
-from ..solver.local_pass import NOTHING, LocalPass, Resolver
+from ..solver.local_pass import NOTHING, Footprints, Gathered, LocalPass, Resolver
 from ..solver.scene import Scene
+from ..solver.steps import scaled
 from ..solver.visibility import Hits
-from .crossings import Crossings
-from .interpolate import GatherPoints, fit
-from .sweeps import StoredLinks, TexelLight, sweep
+from .crossings import Crossings, crossing_steps
+from .interpolate import GatherPoints, fit_steps
+from .sweeps import StoredLinks, TexelLight, sweep_steps
 from .texel_geometry import NO_TEXEL, TexelGeometry
+
+DIRECT, CROSSED, GATHERED = 0.25, 0.3, 0.85
+"""How much is done when a part ends; rough, from rooms at medium quality."""
+
+STARTS = 16
+"""Points of a texel's footprint that its gather rays start from."""
+
+FIT = 0.15
+"""The part of gathering that weighs the points."""
 
 
 @dataclass(frozen=True)
@@ -51,33 +62,61 @@ def reconstruct(
     scene: Scene, local: LocalPass, geometry: TexelGeometry, settings: GatherSettings
 ) -> Generator[float, None, TexelLight]:
     """Compute direct and indirect irradiance of all texels; yields the fraction done."""
-    keys = np.arange(len(geometry))
-    lamps = local.direct(geometry.position, geometry.normal, keys, geometry.sample, geometry.neighbourhood)
-    yield 0.3
-    crossings = Crossings(geometry, local.caster)
+    lamps = yield from scaled(local.direct_steps(footprints(geometry)), 0.0, DIRECT)
+    found = crossing_steps(geometry, local.caster, local.threads)
+    crossings = Crossings(geometry, local.caster, (yield from scaled(found, DIRECT, CROSSED)))
     resolve = _resolver(local, geometry, crossings)
-    points = GatherPoints(geometry, local.caster, crossings.crossed, local.threads)
-    sources: list[Array] = []
-    for number, stride in enumerate(settings.strides):
-        chosen = _choose(points, geometry, stride, settings.support)
-        found, closeness = local.gather(
-            geometry.position[chosen],
-            geometry.normal[chosen],
-            geometry.surface_normal[chosen],
-            chosen,
-            settings.rays,
-            resolve,
-            partial(_sample_of, geometry, chosen),
-        )
-        points.add(stride, chosen, closeness)
-        sources.append(found)
-        yield 0.3 + 0.5 * (number + 1) / len(settings.strides)
-    spread = fit(points, geometry)
-    yield 0.85
-    stored = StoredLinks(np.concatenate(sources), spread)
-    light = sweep(scene, local, geometry, stored, lamps, resolve, settings.sweeps)
+    stored = gather_texels(local, geometry, settings, crossings, resolve)
+    links = yield from scaled(stored, CROSSED, GATHERED)
+    swept = sweep_steps(scene, local, geometry, links, lamps, resolve, settings.sweeps)
+    light = yield from scaled(swept, GATHERED, 1.0)
     yield 1.0
     return light
+
+
+def footprints(geometry: TexelGeometry) -> Footprints:
+    """Return where all texels ask for light."""
+    return Footprints(
+        geometry.position,
+        geometry.normal,
+        np.arange(len(geometry)),
+        geometry.sample,
+        geometry.neighbourhood,
+    )
+
+
+def gather_texels(
+    local: LocalPass,
+    geometry: TexelGeometry,
+    settings: GatherSettings,
+    crossings: Crossings,
+    resolve: Resolver,
+) -> Generator[float, None, StoredLinks]:
+    """Gather at few texels, densely where others do not reach; yields the fraction done."""
+    points = GatherPoints(geometry, local.caster, crossings.crossed, local.threads)
+    found: list[Gathered] = []
+    first: list[int] = []
+    width = (1.0 - FIT) / len(settings.strides)
+    for number, stride in enumerate(settings.strides):
+        begin = number * width
+        choice = _choose(points, geometry, stride, settings.support)
+        chosen = yield from scaled(choice, begin, begin + 0.2 * width)
+        at = Footprints(
+            geometry.position[chosen],
+            geometry.normal[chosen],
+            chosen,
+            partial(_sample_of, geometry, chosen),
+            starts=STARTS,
+        )
+        expected = local.irradiance_at(geometry.triangle[chosen], geometry.barycentric[chosen])
+        rays = local.gather_steps(at, geometry.surface_normal[chosen], settings.rays, resolve, expected)
+        gathered = yield from scaled(rays, begin + 0.2 * width, begin + width)
+        first.append(len(points))
+        points.add(stride, chosen, gathered.closeness)
+        found.append(gathered)
+    spread = yield from scaled(fit_steps(points, geometry), 1.0 - FIT, 1.0)
+    sources = np.concatenate([gathered.sources for gathered in found])
+    return StoredLinks(sources, spread, AimedRays.joined([gathered.aimed for gathered in found], first))
 
 
 def _sample_of(geometry: TexelGeometry, chosen: Array, rows: Array, u: Array) -> Array:
@@ -85,13 +124,16 @@ def _sample_of(geometry: TexelGeometry, chosen: Array, rows: Array, u: Array) ->
     return geometry.sample(chosen[rows], u)
 
 
-def _choose(points: GatherPoints, geometry: TexelGeometry, stride: int, support: float) -> Array:
-    """Return the texels on a lattice that no point so far reaches."""
+def _choose(
+    points: GatherPoints, geometry: TexelGeometry, stride: int, support: float
+) -> Generator[float, None, Array]:
+    """Find the texels on a lattice that no point so far reaches; yields the fraction done."""
     on_lattice = (geometry.row % stride == 0) & (geometry.column % stride == 0)
     candidates = np.flatnonzero(on_lattice)
     if len(points):
         candidates = np.setdiff1d(candidates, points.texel, assume_unique=True)
-        candidates = candidates[points.support(candidates) < support]
+        reached = yield from points.support_steps(candidates)
+        candidates = candidates[reached < support]
     return candidates.astype(np.int32)
 
 
@@ -99,7 +141,7 @@ def _resolver(local: LocalPass, geometry: TexelGeometry, crossings: Crossings) -
     """Number hits: texels by their own number, leaf elements after the texels."""
 
     def resolve(hits: Hits) -> Array:
-        texel = crossings.look_up(geometry.texel_at(hits), geometry.positions_of(hits))
+        texel = crossings.look_up(geometry.texel_at(hits), hits)
         elsewhere = texel == NO_TEXEL
         leaf = local.leaves_of(hits.take(elsewhere))
         texel[elsewhere] = np.where(leaf == NOTHING, NOTHING, leaf + len(geometry))

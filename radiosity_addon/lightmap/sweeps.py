@@ -7,18 +7,22 @@ hierarchy smeared across a wall's foot or into a closed box does not come back.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Generator
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..solver.aiming import AimedRays
 from ..solver.arrays import Array
 from ..solver.local_pass import LocalPass, Resolver
+from ..solver.parallel import chunk_steps
 from ..solver.scene import Scene
+from ..solver.steps import drain, scaled
 from .interpolate import Interpolation
 from .texel_geometry import TexelGeometry
 
-CHUNK_ROWS = 1 << 13
-"""Gather points averaged at once; bounds the temporaries to about 60 MB."""
+CHUNK_HITS = 1 << 18
+"""Hits averaged at once: their values stay in the processor's cache."""
 
 TOLERANCE = 2e-4
 """Largest change of any texel, relative to the mean, at which the sweeps end. Most texels are there
@@ -31,16 +35,28 @@ LEAF_RAYS = 64
 LEAF_ROUNDS = 3
 """Rounds of asking the leaves that leaves met; beyond, the hierarchy's values stand."""
 
+SWEPT = 0.7
+"""A sweep takes the other part of the progress left: how many there will be is not known."""
+
 LEAF_SWEEPS = 24
 """Sweeps among the leaves for each over the texels: they are few."""
 
 
 @dataclass(frozen=True)
 class TexelLight:
-    """Irradiance of n texels [W/m²], (n, 3) float64 each; their sum is the whole."""
+    """Irradiance of n texels.
+
+    Attributes
+    ----------
+    direct, indirect : (n, 3) float64 [W/m²]
+        Their sum is the whole.
+    error : float
+        Estimate of the whole's RMS error, relative to its mean.
+    """
 
     direct: Array
     indirect: Array
+    error: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -52,13 +68,26 @@ class StoredLinks:
     sources : (g, rays) int32
         Texels by number, leaf elements after them, NOTHING and SKY negative.
     spread : Interpolation
+    aimed : AimedRays
+        What some of the points ask apart.
     """
 
     sources: Array
     spread: Interpolation
+    aimed: AimedRays = field(default_factory=AimedRays.none)
+
+    def irradiance_steps(self, table: Array, threads: int = 0) -> Generator[float, None, Array]:
+        """Compute (n, 3) what a table of radiosity sends to the texels; yields the fraction done."""
+        mean = yield from mean_steps(table, self.sources, threads)
+        aimed = self.aimed
+        for channel in range(table.shape[1] if len(aimed.row) else 0):
+            values = table[:, channel][aimed.sources]
+            values[aimed.sources < 0] = 0.0
+            mean[aimed.row, channel] += np.einsum("ak,ak->a", values, aimed.weights)
+        return self.spread(mean)
 
 
-def sweep(
+def sweep_steps(
     scene: Scene,
     local: LocalPass,
     geometry: TexelGeometry,
@@ -67,7 +96,7 @@ def sweep(
     resolve: Resolver,
     sweeps: int,
     tolerance: float = TOLERANCE,
-) -> TexelLight:
+) -> Generator[float, None, TexelLight]:
     """Iterate H = direct + Σ ρ H over the stored hits, started from the hierarchy's solution.
 
     Parameters
@@ -78,78 +107,168 @@ def sweep(
         At most so many, …
     tolerance : float
         … or until no texel changes by more than this part of the mean.
+
+    Yields
+    ------
+    fraction : float
+        Of an unknown number of sweeps: each takes its part of what is left.
     """
     texel_count = len(geometry)
     reflectance = scene.reflectance[geometry.triangle]
-    # Rows: texels, leaves, then NOTHING (−2) and SKY (−1).
-    table = np.zeros((texel_count + len(local.reflected()) + 2, 3), dtype=np.float32)
+    # Rows: texels, leaves, then NOTHING (−2) and SKY (−1). Columns lie one after the other in memory.
+    table = np.zeros((texel_count + len(local.reflected()) + 2, 3), dtype=np.float32, order="F")
     sky = local.sky()
     table[-1] = sky
     direct = lamps
     if sky.any():
         # The sky's light is direct: its share of the same rays.
-        direct = lamps + np.maximum(links.spread(_mean(table, links.sources)), 0.0)
+        from_sky = yield from scaled(links.irradiance_steps(table, local.threads), 0.0, 0.1)
+        direct = lamps + np.maximum(from_sky, 0.0)
 
     table[:texel_count] = local.reflected_at(geometry.triangle, geometry.barycentric)
     table[texel_count:-2] = local.reflected()
-    leaves = _Leaves(local, links.sources, texel_count, resolve, table)
-    indirect = np.zeros_like(direct)
+    leaves = _Leaves(local, texel_count)
+    yield from scaled(leaves.gather_steps(links, resolve, len(table)), 0.1, 0.2)
+    table[: len(table) - 2][~_reached(links, leaves, direct)] = 0.0
+    indirect, left = np.zeros_like(direct), 0.8
     for _ in range(sweeps):
         leaves.sweep(table)
         table[-1] = 0.0
-        indirect = np.maximum(links.spread(_mean(table, links.sources)), 0.0)
+        irradiance = links.irradiance_steps(table, local.threads)
+        arriving = yield from scaled(irradiance, 1.0 - left, 1.0 - SWEPT * left)
+        left *= SWEPT
+        indirect = np.maximum(arriving, 0.0)
         table[-1] = sky
         radiosity = (reflectance * (direct + indirect)).astype(np.float32)
         change = np.abs(radiosity - table[:texel_count]).max(initial=0.0)
         table[:texel_count] = radiosity
         if change <= tolerance * radiosity.mean():
             break
-    return TexelLight(direct, indirect)
+    return TexelLight(direct, indirect, estimated_error(links, table, direct + indirect, local.threads))
+
+
+def estimated_error(links: StoredLinks, table: Array, irradiance: Array, threads: int = 0) -> float:
+    """Estimate the RMS error of texels' irradiance, relative to its mean: the noise of the gather rays.
+
+    Half of a point's rays guess its irradiance with √2 times the noise of all of them, and share
+    that half with the whole: so the two differ by about the noise of the whole. Spread over the
+    texels as the irradiance is, noise that interpolation averages away drops out.
+
+    Parameters
+    ----------
+    links : StoredLinks
+    table : (rows, 3) float32
+        The radiosity that the links' sources had in the end, the sky's among it.
+    irradiance : (n, 3) float64
+        Of the texels, direct and indirect.
+    """
+    mean = float(irradiance.mean()) if len(irradiance) else 0.0
+    if mean <= 0.0:
+        return 0.0
+    half = links.sources.shape[1] // 2
+    whole = drain(mean_steps(table, links.sources, threads))
+    part = drain(mean_steps(table, np.ascontiguousarray(links.sources[:, :half]), threads))
+    noise = links.spread(part - whole)
+    return float(np.sqrt((noise**2).mean())) / mean
+
+
+def _reached(links: StoredLinks, leaves: _Leaves, direct: Array) -> Array:
+    """Return (table rows − 2,) bool: what light can get to along the links, after any number of bounces.
+
+    The sweeps' fixed point is 0 elsewhere. Found outright, because from what the hierarchy leaked into
+    a sealed box they would only fade, by the reflectance a sweep.
+    """
+    reached = leaves.lit_or_unknown(direct)
+    padded = np.append(reached, [False, False])  # NOTHING and SKY, whose light is direct
+    aims = np.zeros(len(links.sources), dtype=bool)
+    while True:
+        dark, step = np.flatnonzero(~aims), max(CHUNK_HITS // links.sources.shape[1], 1)
+        for first in range(0, len(dark), step):
+            some = dark[first : first + step]
+            aims[some] = padded[links.sources[some]].any(axis=1)
+        aims[links.aimed.row[padded[links.aimed.sources].any(axis=1)]] = True
+        more = ~padded[: len(direct)] & links.spread.any_of(aims)
+        padded[: len(direct)] |= more
+        if not (leaves.reach(padded) or more.any()):
+            return padded[:-2]
 
 
 class _Leaves:
     """The leaf elements that gather rays met, and what they see in turn."""
 
-    def __init__(
-        self,
-        local: LocalPass,
-        sources: Array,
-        texel_count: int,
-        resolve: Resolver,
-        table: Array,
-    ) -> None:
-        met = np.zeros(len(table), dtype=bool)
-        known = np.zeros(len(table), dtype=bool)
-        met[sources.ravel()] = True
-        seen, rows = [], []
-        for _ in range(LEAF_ROUNDS):
+    def __init__(self, local: LocalPass, texel_count: int) -> None:
+        self._local, self._texel_count = local, texel_count
+        self._rows = np.zeros(0, dtype=np.int64)
+        self._elements = len(local.reflected())
+
+    def gather_steps(
+        self, links: StoredLinks, resolve: Resolver, table_rows: int
+    ) -> Generator[float, None, None]:
+        """Look from the leaves the links met, and from those that these met; yields the fraction done."""
+        local, texel_count = self._local, self._texel_count
+        met = np.zeros(table_rows, dtype=bool)
+        known = np.zeros(table_rows, dtype=bool)
+        met[links.sources.ravel()] = True
+        met[links.aimed.sources.ravel()] = True
+        seen, rows, parts = [], [], LEAF_ROUNDS + 1
+        for turn in range(LEAF_ROUNDS):
             row = np.flatnonzero(met[:-2] & ~known[:-2])
             row = row[row >= texel_count]
             if len(row) == 0:
                 break
             known[row] = True
-            found, _ = local.gather_at_leaves(row - texel_count, LEAF_RAYS, resolve)
+            rays = local.gather_at_leaves(row - texel_count, LEAF_RAYS, resolve)
+            found = yield from scaled(rays, turn / parts, (turn + 1) / parts)
             met[found.ravel()] = True
             rows.append(row)
             seen.append(found)
-        self._rows = np.concatenate(rows) if rows else np.zeros(0, dtype=np.int64)
-        if len(self._rows):
+        if rows:
+            self._rows = np.concatenate(rows)
             self._sources = np.concatenate(seen)
             self._reflectance = local.leaf_reflectance(self._rows - texel_count)
-            self._lamps = local.leaf_direct(self._rows - texel_count)
+            lamps = local.leaf_direct(self._rows - texel_count)
+            self._lamps = yield from scaled(lamps, LEAF_ROUNDS / parts, 1.0)
+
+    def lit_or_unknown(self, direct: Array) -> Array:
+        """Return (texels + elements,) bool: what direct light (n, 3) meets, and elements that gather none."""
+        lit = np.ones(self._texel_count + self._elements, dtype=bool)
+        lit[: self._texel_count] = direct.any(axis=1)
+        if len(self._rows):
+            lit[self._rows] = self._lamps.any(axis=1)
+        return lit
+
+    def reach(self, reached: Array) -> bool:
+        """Mark the leaves that see something marked in a (table rows,) mask; False if they all were."""
+        dark = np.flatnonzero(~reached[self._rows])
+        if len(dark) == 0:
+            return False
+        seen = reached[self._sources[dark]].any(axis=1)
+        reached[self._rows[dark[seen]]] = True
+        return bool(seen.any())
 
     def sweep(self, table: Array) -> None:
         """Update the leaves' rows of the table of reflected radiosity, among themselves to convergence."""
         for _ in range(LEAF_SWEEPS if len(self._rows) else 0):
-            irradiance = self._lamps + _mean(table, self._sources)
+            irradiance = self._lamps + mean_of_sources(table, self._sources)
             table[self._rows] = self._reflectance * irradiance
 
 
-def _mean(table: Array, sources: Array) -> Array:
+def mean_of_sources(table: Array, sources: Array) -> Array:
     """Return (g, 3): the mean of the table's rows each gather point saw."""
-    result = np.empty((len(sources), 3))
-    for first in range(0, len(sources), CHUNK_ROWS):
-        rows = slice(first, first + CHUNK_ROWS)
-        for channel in range(3):
-            result[rows, channel] = table[sources[rows], channel].mean(axis=1)
+    return drain(mean_steps(table, sources, 1))
+
+
+def mean_steps(table: Array, sources: Array, threads: int) -> Generator[float, None, Array]:
+    """Compute the same; yields the fraction done."""
+    result = np.empty((len(sources), table.shape[1]))
+    columns = [np.ascontiguousarray(table[:, channel]) for channel in range(table.shape[1])]
+
+    def average(rows: slice) -> None:
+        # Negative numbers count from the end, which `take` does not know.
+        seen = sources[rows].astype(np.intp)
+        seen[seen < 0] += len(table)
+        for channel, column in enumerate(columns):
+            result[rows, channel] = column.take(seen).mean(axis=1)
+
+    yield from chunk_steps(average, len(sources), max(CHUNK_HITS // max(sources.shape[1], 1), 1), threads)
     return result

@@ -17,6 +17,8 @@ NO_TEXEL = -1
 EDGE_OFFSETS = 4.0
 """Points keep this many ray offsets from the edges of their triangles."""
 
+_SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+
 
 class TexelGeometry:
     """The n covered texels of all pages, numbered page by page.
@@ -35,7 +37,11 @@ class TexelGeometry:
 
     Attributes
     ----------
+    uv, page_of_triangle, triangles, face_normals
+        Of every scene triangle, as given.
     page, row, column, triangle : (n,) int32
+    centre_inside : (n,) bool
+        Whether the texel's centre is on its triangle.
     barycentric : (n, 2) float32
         Weights of the triangle's second and third corner at the centre of the footprint.
     position, normal, surface_normal : (n, 3) float64
@@ -50,12 +56,15 @@ class TexelGeometry:
         texels: Sequence[Texels],
         rows: Sequence[Array],
     ) -> None:
-        self._scene, self._uv, self._page_of_triangle = scene, uv, page_of_triangle
+        self._scene = scene
+        self.uv, self.page_of_triangle = uv, page_of_triangle
+        self.triangles, self.face_normals = scene.triangles, scene.face_normals
         self._texels = list(texels)
         self._first = np.cumsum([0] + [len(page) for page in texels])
         self.page = np.repeat(np.arange(len(texels), dtype=np.int32), np.diff(self._first))
         self.row = np.concatenate([page.row for page in texels])
         self.column = np.concatenate([page.column for page in texels])
+        self.centre_inside = np.concatenate([page.centre_inside for page in texels])
         triangles = [of[page.triangle] for of, page in zip(rows, texels, strict=True)]
         self.triangle = np.concatenate(triangles).astype(np.int32)
         self._inset = _edge_inset(scene)
@@ -84,7 +93,7 @@ class TexelGeometry:
         """Width of a texel in the world [m], the median."""
         if not len(self):
             return 1.0
-        edges = self._uv[self.triangle, 1:].astype(np.float64) - self._uv[self.triangle, :1]
+        edges = self.uv[self.triangle, 1:].astype(np.float64) - self.uv[self.triangle, :1]
         flat = 0.5 * np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
         size = np.array([len(numbers) for numbers in self.index])[self.page]
         area = self._scene.areas[self.triangle] / np.maximum(flat * size * size, 1e-300)
@@ -96,16 +105,31 @@ class TexelGeometry:
 
     def sample(self, rows: Array, u: Array, width: float = FOOTPRINT) -> Array:
         """Return (r, k, 3) points spread over the middle `width` of r texels by u (r, k, 2)."""
-        points = np.empty((len(rows), u.shape[1], 3))
+        return _at(self._scene.triangles[self.triangle[rows]], self.sample_weights(rows, u, width))
+
+    def squares(self, rows: Array) -> Array:
+        """Return (r, 4, 3) the corners of whole texels, in their triangles' planes but not cut by them."""
+        place = self._places[self.triangle[rows]].astype(np.float64)
+        first, second = place[:, None, 2:4], place[:, None, 4:6]
+        origin = np.stack([self.column[rows], self.row[rows]], axis=1)[:, None]
+        at = origin + _SQUARE - place[:, None, :2]
+        whole = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
+        along = (at[..., 0] * second[..., 1] - at[..., 1] * second[..., 0]) / whole
+        across = (first[..., 0] * at[..., 1] - first[..., 1] * at[..., 0]) / whole
+        weights = np.stack([1.0 - along - across, along, across], axis=-1)
+        return _at(self._scene.triangles[self.triangle[rows]], weights)
+
+    def sample_weights(self, rows: Array, u: Array, width: float = FOOTPRINT) -> Array:
+        """Return (r, k, 3) the barycentric weights of the same points in the texels' triangles."""
+        weights = np.empty((len(rows), u.shape[1], 3))
         for number, page in enumerate(self._texels):
             mine = np.flatnonzero(self.page[rows] == number)
             if len(mine) == 0:
                 continue
             local = rows[mine] - self._first[number]
-            weights = sample_footprints(page.take(local), u[mine], width)
-            weights = self._drawn_in(weights, self.triangle[rows[mine]])
-            points[mine] = _at(self._scene.triangles[self.triangle[rows[mine]]], weights)
-        return points
+            inside = sample_footprints(page.take(local), u[mine], width)
+            weights[mine] = self._drawn_in(inside, self.triangle[rows[mine]])
+        return weights
 
     def _drawn_in(self, weights: Array, triangle: Array) -> Array:
         """Move (n, k, 3) barycentric points that lie on an edge of their triangle off it by a hair."""
@@ -134,19 +158,30 @@ class TexelGeometry:
         """Return (h,) int32: the texel under each ray's hit; NO_TEXEL on backs and unbaked surfaces."""
         found = np.full(len(hits.triangle), NO_TEXEL, dtype=np.int32)
         baked = (hits.triangle >= 0) & hits.front
-        baked &= self._page_of_triangle[hits.triangle] >= 0
+        baked &= self.page_of_triangle[hits.triangle] >= 0
         rows = np.flatnonzero(baked)
         triangle = hits.triangle[rows]
-        second, third = hits.barycentric[rows, 0:1], hits.barycentric[rows, 1:2]
-        corners = self._uv[triangle]
-        uv = (1 - second - third) * corners[:, 0] + second * corners[:, 1] + third * corners[:, 2]
-        page = self._page_of_triangle[triangle]
+        place = self._places.take(triangle, axis=0)
+        second, third = hits.barycentric[rows, 0], hits.barycentric[rows, 1]
+        column = place[:, 0] + second * place[:, 2] + third * place[:, 4]
+        row = place[:, 1] + second * place[:, 3] + third * place[:, 5]
+        page = self.page_of_triangle[triangle] if len(self.index) > 1 else None
         for number, numbers in enumerate(self.index):
-            mine = page == number
-            size = len(numbers)
-            at = np.clip((uv[mine] * size).astype(np.int64), 0, size - 1)
-            found[rows[mine]] = numbers[at[:, 1], at[:, 0]]
+            mine = slice(None) if page is None else np.flatnonzero(page == number)
+            last = np.float32(len(numbers) - 1)
+            at = np.clip(row[mine], 0, last).astype(np.int64) * len(numbers)
+            at += np.clip(column[mine], 0, last).astype(np.int64)
+            found[rows[mine]] = numbers.ravel()[at]
         return found
+
+    @cached_property
+    def _places(self) -> Array:
+        """(t, 6) float32: each triangle's first corner on its page and its edges from there, in texels."""
+        sizes = np.array([len(numbers) for numbers in self.index], dtype=np.float64)
+        corners = self.uv * sizes[np.maximum(self.page_of_triangle, 0)][:, None, None]
+        edges = corners[:, 1:] - corners[:, :1]
+        places = np.concatenate([corners[:, 0], edges[:, 0], edges[:, 1]], axis=1)
+        return np.asarray(places, dtype=np.float32)
 
 
 def _edge_inset(scene: Scene) -> Array:

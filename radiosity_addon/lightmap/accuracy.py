@@ -1,0 +1,49 @@
+"""Light texels to an error that was asked for: look harder until the estimate says it is reached."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+
+from ..solver.local_pass import LocalPass
+from ..solver.scene import Scene
+from ..solver.steps import scaled
+from .reconstruct import GatherSettings, reconstruct
+from .sweeps import TexelLight
+from .texel_geometry import TexelGeometry
+
+TRIES = 4
+"""Times the texels are lit at most: each time the error is known better."""
+
+MARGIN = 0.9
+"""The next try aims at this part of what would just do."""
+
+
+def light_within(
+    scene: Scene,
+    local: LocalPass,
+    geometry: TexelGeometry,
+    settings_for: Callable[[float], GatherSettings],
+    error: float,
+) -> Generator[float, None, TexelLight]:
+    """Light the texels so that their estimated relative RMS error is at most `error`, if that can be had.
+
+    Parameters
+    ----------
+    settings_for : callable
+        How densely to gather for an error; at its limits it returns the same again.
+
+    Yields
+    ------
+    fraction : float
+        How many tries there will be is not known: each takes half of what is left.
+    """
+    goal, left = error, 1.0
+    settings = settings_for(goal)
+    for _ in range(TRIES):
+        light = yield from scaled(reconstruct(scene, local, geometry, settings), 1.0 - left, 1.0 - 0.5 * left)
+        left *= 0.5
+        goal *= MARGIN * error / max(light.error, 1e-9)
+        before, settings = settings, settings_for(goal)
+        if light.error <= error or settings == before:
+            break
+    return light
