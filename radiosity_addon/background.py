@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor
+from queue import Empty, SimpleQueue
+from threading import Event
 from typing import TypeVar
 
 T = TypeVar("T")
@@ -17,40 +19,52 @@ def in_thread(steps: Generator[T, None, R]) -> Generator[T | None, None, R]:
     """Advance a generator in a thread of its own, one step after the other.
 
     Only for generators of plain arrays: Blender's data must not be touched from a thread.
+    The thread does not wait for the caller, who may be drawing a window: what it yields must
+    not change afterwards.
 
     Parameters
     ----------
     steps : generator
-        What it yields, returns or raises comes through as it is.
+        What it yields, returns or raises comes through as it is, in order.
 
     Yields
     ------
-    what the generator yields; None while its step is still going on
+    what the generator yields; None while there is nothing new
 
     Notes
     -----
     Closed in the middle of a step, this returns at once; the step ends by itself and the
     generator is closed after it, in the thread.
     """
+    yielded: SimpleQueue[T] = SimpleQueue()
+    closed = Event()
     thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="radiosity")
+    running = thread.submit(_run, steps, yielded, closed)
     try:
         while True:
-            step = thread.submit(_next, steps)
-            while not wait((step,), timeout=PATIENCE).done:
+            over = running.done()
+            try:
+                value = yielded.get(timeout=0.0 if over else PATIENCE)
+            except Empty:
+                if over:
+                    return running.result()
                 yield None
-            yielded, value = step.result()
-            if not yielded:
-                return value  # type: ignore[return-value]
-            yield value  # type: ignore[misc]
+            else:
+                yield value
     finally:
-        thread.submit(steps.close)
+        closed.set()
         thread.shutdown(wait=False)
 
 
-def _next(steps: Generator[T, None, R]) -> tuple[bool, T | R]:
-    """Take a step: (True, what it yields) or, at the end, (False, what it returns)."""
+def _run(steps: Generator[T, None, R], yielded: SimpleQueue[T], closed: Event) -> R:
+    """Take all steps and return what the generator returns; stop after the one in which it is closed."""
     try:
-        return True, next(steps)
-    except StopIteration as end:
-        # A future cannot carry a StopIteration.
-        return False, end.value
+        while not closed.is_set():
+            try:
+                yielded.put(next(steps))
+            except StopIteration as end:
+                result: R = end.value
+                return result
+    finally:
+        steps.close()
+    raise GeneratorExit

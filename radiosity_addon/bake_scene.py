@@ -77,11 +77,45 @@ class BakeScene:
 
 
 @dataclass(frozen=True)
+class Picture:
+    """What the solution looks like so far: its elements, to be drawn as they are.
+
+    Parameters
+    ----------
+    corners : (n, 3, 3) float32
+        World space, counter-clockwise from the side that is seen.
+    radiosity : (n, 3) float32 [W/m²]
+    triangle : (n,) int32
+        The scene's triangle that each is a part of.
+    front : (n,) bool
+        Whether it is on the triangle's front.
+    """
+
+    corners: Array
+    radiosity: Array
+    triangle: Array
+    front: Array
+
+    def __len__(self) -> int:
+        return len(self.radiosity)
+
+    def only(self, elements: Array) -> Picture:
+        """Return the picture of some of its elements, given as (n,) bool."""
+        return Picture(
+            self.corners[elements], self.radiosity[elements], self.triangle[elements], self.front[elements]
+        )
+
+
+@dataclass(frozen=True)
 class Progress:
-    """Where a bake is: the stage's name and the overall fraction done, 0 to 1."""
+    """Where a bake is: the stage's name and the overall fraction done, 0 to 1.
+
+    While the scene is being solved some come with a picture of the solution so far.
+    """
 
     stage: str
     fraction: float
+    picture: Picture | None = None
 
 
 @dataclass(frozen=True)
@@ -127,8 +161,9 @@ class BakeResult:
     pages : tuple of LightmapPage
     objects : tuple of BakedObject
     solver : dict
-        The solver's report: "elements", "links", "rays", "iterations", "residual",
-        "power_W", "closure_area_mean".
+        What the report says of the solver: "method", its "settings", "elements", "links", "rays",
+        "iterations", "residual", "power_W", "closure_area_mean", "history", and what the method
+        itself has to tell.
     warnings : tuple of BakeWarning
         The scene's and the bake's own.
     seconds : dict of str to float

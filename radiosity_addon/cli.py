@@ -15,6 +15,7 @@ from typing import Any, NoReturn
 from .console import Console
 from .errors import RadiosityError, UsageError
 from .interrupts import Interrupts
+from .methods import METHODS, SETTINGS
 from .settings import ATLASES, FORMATS, LIGHTS, QUALITIES, QUANTITIES, BakeSettings
 
 EXIT_DONE = 0
@@ -23,8 +24,8 @@ EXIT_USAGE = 2
 EXIT_INTERRUPTED = 130
 
 SHARED_FIELDS = (
-    *("texel_density", "atlas", "quality", "quantity", "light", "format"),
-    *("sky", "keep_uvs", "seed", "threads"),
+    *("texel_density", "atlas", "quality", "relative_error", "quantity", "light", "format"),
+    *("sky", "keep_uvs", "seed", "threads", "method", *SETTINGS),
 )
 """Settings whose option says exactly what the field says."""
 
@@ -59,6 +60,7 @@ def main(
         settings = settings_of(request) if request.verb == "bake" else None
         if settings is not None:
             request.output = bake_output(request, loaded)
+            check_plot(request.plot)
     except RadiosityError as error:
         return _fail(str(error), error.exit_code)
     except SystemExit as help_was_asked:
@@ -94,6 +96,12 @@ def bake_output(request: argparse.Namespace, loaded: Path | None) -> Path:
     if request.scene is not None or loaded is not None:
         raise UsageError("bake needs --output DIR, the folder everything is written to")
     return BUNDLED_OUTPUT
+
+
+def check_plot(plot: Path | None) -> None:
+    """Refuse to draw the history into a file of another kind."""
+    if plot is not None and plot.suffix.lower() != ".png":
+        raise UsageError(f"--plot {plot} is not a .png file")
 
 
 class _Parser(argparse.ArgumentParser):
@@ -132,9 +140,22 @@ def _add_bake(parser: argparse.ArgumentParser) -> None:
         metavar="PX_PER_M",
         help="pixels per metre; the page size follows from the surface",
     )
+    accuracy = parser.add_mutually_exclusive_group()
+    accuracy.add_argument(
+        "--quality",
+        choices=QUALITIES,
+        default=default.quality,
+        help=f"how fine the solution is (default {default.quality})",
+    )
+    accuracy.add_argument(
+        "--error",
+        type=float,
+        dest="relative_error",
+        metavar="E",
+        help="the error to reach instead, such as 0.02: RMS, relative to the mean of the light",
+    )
     for name, choices, text in (
         ("atlas", ATLASES, "one image for all objects, or one for each"),
-        ("quality", QUALITIES, "how fine the solution is"),
         ("quantity", QUANTITIES, "what a texel holds"),
         ("light", LIGHTS, "which light is baked"),
         ("format", FORMATS, "kind of image file"),
@@ -155,6 +176,31 @@ def _add_bake(parser: argparse.ArgumentParser) -> None:
     add("--threads", type=int, default=default.threads, metavar="N", help="threads (default: all cores)")
     _add_common(parser)
     add("--report", type=Path, metavar="FILE", help="second copy of report.json")
+    add("--plot", type=Path, metavar="FILE.png", help="draw the history of residual, elements and links")
+    _add_method(parser)
+
+
+def _add_method(parser: argparse.ArgumentParser) -> None:
+    """Add the method, and an option for each setting that some methods have."""
+    group = parser.add_argument_group("method", "Settings not given come from the quality.")
+    chosen = BakeSettings().method
+    group.add_argument(
+        "--method",
+        choices=tuple(METHODS),
+        default=chosen,
+        help=f"how the radiosity equation is solved (default {chosen})",
+    )
+    for name, setting in SETTINGS.items():
+        of = [method for method in METHODS if name in METHODS[method].settings]
+        what = setting.description
+        what = what[0].lower() + what[1:] if what[1].islower() else what
+        text = f"{what} (for {', '.join(of) if len(of) < len(METHODS) else 'all methods'})"
+        if setting.kind is bool:
+            group.add_argument(setting.option, dest=name, action="store_const", const=True, help=text)
+        else:
+            # Choices are checked with the rest of the settings.
+            metavar = setting.metavar or "{" + ",".join(setting.choices) + "}"
+            group.add_argument(setting.option, dest=name, type=setting.kind, metavar=metavar, help=text)
 
 
 def _add_restore(parser: argparse.ArgumentParser) -> None:
@@ -188,9 +234,8 @@ def _run(
     try:
         with Console(quiet=request.quiet) as console:
             if settings is not None:
-                commands.bake(
-                    request.scene, loaded, request.output, settings, request.report, console, interrupts
-                )
+                files = request.output, settings, request.report, request.plot
+                commands.bake(request.scene, loaded, *files, console, interrupts)
             else:
                 commands.restore(request.scene, loaded, request.output, console)
     except KeyboardInterrupt:

@@ -126,7 +126,12 @@ def summary(where: str, files: Iterable[tuple[str, str]], report: dict[str, Any]
     count = len(report["objects"])
     lines = [f"{count} object{'' if count == 1 else 's'} baked into {where}"]
     lines += [f"  {name:<24} {what}" for name, what in files]
-    lines.append(f"{solver['elements']:,} elements, {solver['links']:,} links, {solver['rays']:,} rays")
+    lines.append(
+        f"{solver['method']}: {solver['elements']:,} elements, {solver['links']:,} links, "
+        f"{solver['rays']:,} rays"
+    )
+    if solver.get("estimated_error") is not None:
+        lines.append(f"estimated error: {solver['estimated_error']:.2%} of the mean light (RMS)")
     if solver.get("closure_area_mean") is not None:
         lines.append(
             f"share of light that meets a surface: {solver['closure_area_mean']:.4f} (closed scenes: 1)"

@@ -20,24 +20,33 @@ from .bake_scene import (
     BakeScene,
     BakeWarning,
     LightmapPage,
+    Picture,
     Progress,
 )
 from .errors import BakeError, SceneError
+from .lightmap.accuracy import light_within
 from .lightmap.atlas import Atlas, AtlasInput, build_atlas
 from .lightmap.dilate import dilate
 from .lightmap.encode import to_quantity
+from .lightmap.error_picture import summary, texel_residual
 from .lightmap.rasterise import rasterise
-from .lightmap.reconstruct import reconstruct
-from .lightmap.sweeps import TexelLight
+from .lightmap.reconstruct import GatherSettings, reconstruct
+from .lightmap.seams import Seams, find_seams
+from .lightmap.stitch import stitch_pages
 from .lightmap.texel_geometry import TexelGeometry
-from .quality import quality_of
+from .quality import for_error, quality_of, used_settings
+from .report import solver_part
 from .settings import BakeSettings
-from .solver import Solution, solve_progress
+from .solver import Solution, SolverSettings, SolverState, solve_progress
+from .solver.arrays import Array
 
 T = TypeVar("T")
 
 UNWRAP, RASTERISE, SOLVE, LIGHT, ENCODE = 0.0, 0.15, 0.2, 0.5, 0.97
 """How far the whole is when each stage begins; rough, from bakes at medium quality."""
+
+PICTURE_SECONDS = 0.25
+"""Time between two pictures of the solution: often enough to watch, too rarely to cost much."""
 
 
 def bake(bake_scene: BakeScene, settings: BakeSettings) -> Generator[Progress, None, BakeResult]:
@@ -77,19 +86,22 @@ def bake(bake_scene: BakeScene, settings: BakeSettings) -> Generator[Progress, N
         geometry = _texels(bake_scene, baked, atlas)
     yield Progress("solve", SOLVE)
     with _timed(seconds, "solve"):
-        steps = solve_progress(bake_scene.scene, quality.solver)
-        solution = yield from _staged(steps, "solve", SOLVE, LIGHT)
+        solution = yield from _solve(bake_scene, quality.solver)
     yield Progress("light", LIGHT)
     with _timed(seconds, "light"):
-        texels = reconstruct(bake_scene.scene, solution.local_pass, geometry, quality.gather)
-        light = yield from _staged(texels, "light", LIGHT, ENCODE)
+        steps = _texel_values(bake_scene, solution, geometry, quality.gather, settings)
+        values, error = yield from _staged(steps, "light", LIGHT, ENCODE)
     yield Progress("encode", ENCODE)
     with _timed(seconds, "encode"):
-        pages = _encode(bake_scene, geometry, light, settings)
+        pages = _pages(geometry, values, _seams(bake_scene, solution, geometry, settings))
         _check(solution, pages)
 
-    report = solution.final_report()
-    warnings = (*bake_scene.warnings, *atlas.warnings, *_of_solution(solution))
+    report = solver_part(solution.final_report(), used_settings(quality.solver), bake_scene.objects)
+    if error is not None:
+        report["estimated_error"] = error
+    if settings.quantity == "residual":
+        report["error_picture"] = summary(values)
+    warnings = (*bake_scene.warnings, *atlas.warnings, *_of_solution(solution, quality.solver))
     objects = tuple(
         BakedObject(item, placed.uv, placed.page) for item, placed in zip(baked, atlas.objects, strict=True)
     )
@@ -124,6 +136,41 @@ def _texels(bake_scene: BakeScene, baked: list[BakeObject], atlas: Atlas) -> Tex
     return TexelGeometry(bake_scene.scene, uv, page_of_triangle, texels, rows)
 
 
+def _solve(bake_scene: BakeScene, settings: SolverSettings) -> Generator[Progress, None, Solution]:
+    """Solve, with a picture of the solution at first, now and then, and at the end."""
+    steps = solve_progress(bake_scene.scene, settings)
+    state: SolverState | None = None
+    next_picture = 0.0
+    while True:
+        try:
+            fraction, state = next(steps)
+        except StopIteration as done:
+            if state is not None:
+                yield Progress("solve", LIGHT, _picture(state))
+            solution: Solution = done.value
+            return solution
+        picture = None
+        if time.perf_counter() >= next_picture:
+            picture = _picture(state)
+            next_picture = time.perf_counter() + PICTURE_SECONDS
+        yield Progress("solve", SOLVE + (LIGHT - SOLVE) * fraction, picture)
+
+
+def _picture(state: SolverState) -> Picture | None:
+    """Return what the solution looks like now; None while new elements have no radiosity yet."""
+    hierarchy, radiosity = state.hierarchy, state.shown()
+    if len(radiosity) < hierarchy.n_elements:
+        return None
+    leaves = hierarchy.leaves
+    face = hierarchy.face[leaves]
+    return Picture(
+        hierarchy.corners[leaves].astype(np.float32),
+        radiosity[leaves].astype(np.float32),
+        hierarchy.faces.triangle[face],
+        hierarchy.faces.front[face],
+    )
+
+
 def _staged(
     steps: Generator[float, None, T], stage: str, begin: float, end: float
 ) -> Generator[Progress, None, T]:
@@ -137,10 +184,22 @@ def _staged(
         yield Progress(stage, begin + (end - begin) * fraction)
 
 
-def _encode(
-    bake_scene: BakeScene, geometry: TexelGeometry, light: TexelLight, settings: BakeSettings
-) -> tuple[LightmapPage, ...]:
-    """Turn irradiance into pages of the quantity asked for, filled past the charts' borders."""
+def _texel_values(
+    bake_scene: BakeScene,
+    solution: Solution,
+    geometry: TexelGeometry,
+    gather: GatherSettings,
+    settings: BakeSettings,
+) -> Generator[float, None, tuple[Array, float | None]]:
+    """Compute (n, 3) the quantity asked for at all texels, and estimate the light's relative error."""
+    if settings.quantity == "residual":
+        residual = yield from texel_residual(solution, geometry, gather)
+        return residual, None
+    where = bake_scene.scene, solution.local_pass, geometry
+    if settings.relative_error is None:
+        light = yield from reconstruct(*where, gather)
+    else:
+        light = yield from light_within(*where, lambda e: for_error(e).gather, settings.relative_error)
     irradiance = {
         "all": light.direct + light.indirect,
         "direct": light.direct,
@@ -151,13 +210,31 @@ def _encode(
     if settings.light == "indirect":
         emission = np.zeros_like(emission)
     values = to_quantity(irradiance, scene.reflectance[geometry.triangle], emission, settings.quantity)
+    return values, light.error
+
+
+def _seams(
+    bake_scene: BakeScene, solution: Solution, geometry: TexelGeometry, settings: BakeSettings
+) -> Seams | None:
+    """Find the seams to stitch; None for an error picture, which is to show what is there."""
+    if settings.quantity == "residual":
+        return None
+    seams = find_seams(bake_scene.scene, geometry, solution.local_pass.caster)
+    return seams if settings.quantity != "radiosity" else seams.of_one_material(bake_scene.scene)
+
+
+def _pages(geometry: TexelGeometry, values: Array, seams: Seams | None) -> tuple[LightmapPage, ...]:
+    """Put texels' values on their pages, filled past the charts' borders, and stitch the seams."""
     pages = []
     for number, index in enumerate(geometry.index):
         pixels = np.zeros((*index.shape, 3), dtype=np.float32)
         coverage = index >= 0
         pixels[coverage] = values[geometry.page == number][index[coverage] - geometry.first(number)]
         pages.append(LightmapPage(dilate(pixels, coverage), coverage))
-    return tuple(pages)
+    if seams is None or not len(seams):
+        return tuple(pages)
+    stitched = stitch_pages([page.pixels for page in pages], geometry, seams)
+    return tuple(LightmapPage(pixels, page.coverage) for pixels, page in zip(stitched, pages, strict=True))
 
 
 def _check(solution: Solution, pages: tuple[LightmapPage, ...]) -> None:
@@ -169,8 +246,8 @@ def _check(solution: Solution, pages: tuple[LightmapPage, ...]) -> None:
         )
 
 
-def _of_solution(solution: Solution) -> tuple[BakeWarning, ...]:
-    """Warn where nothing shines, or the solver had to stop at its budget of links."""
+def _of_solution(solution: Solution, settings: SolverSettings) -> tuple[BakeWarning, ...]:
+    """Warn where nothing shines, or the solver had to stop early."""
     warnings = []
     if solution.report["power_W"]["emitted"] == 0:
         warnings.append(
@@ -186,6 +263,25 @@ def _of_solution(solution: Solution) -> tuple[BakeWarning, ...]:
                 "scene",
                 f"refinement stopped at its budget of links; single links may misplace up to "
                 f"{solution.over_budget:.2%} of the light: bake at a lower quality, or fewer objects",
+            )
+        )
+    if solution.first_faint > settings.error:
+        warnings.append(
+            BakeWarning(
+                "scene",
+                f"so many small surfaces that links begin coarse, between parts that may exchange up to "
+                f"{solution.first_faint:.2%} of all light: single small faces may be lit unevenly; "
+                "raise the most links and the memory limit, or bake fewer objects",
+            )
+        )
+    residual, tolerance = solution.report["residual"], used_settings(settings).get("tolerance", np.inf)
+    if residual > tolerance:
+        warnings.append(
+            BakeWarning(
+                "scene",
+                f"the {settings.method} method stopped after {solution.report['iterations']:,} iterations "
+                f"at a residual of {residual:.1e}, above the tolerance of {tolerance:.1e}: allow more "
+                "iterations, or a larger tolerance",
             )
         )
     return tuple(warnings)

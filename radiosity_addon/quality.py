@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 from .lightmap.reconstruct import GatherSettings
+from .methods import METHODS
 from .settings import BakeSettings
 from .solver.settings import SolverSettings
 
@@ -19,21 +22,113 @@ class Quality:
 
 QUALITIES = {
     "draft": Quality(
-        SolverSettings(error=1e-3, min_area=1e-4, shadow_rays=4),
-        GatherSettings(strides=(8, 4, 2, 1), support=0.25, rays=128),
+        SolverSettings(
+            shadow_rays=4,
+            error=1e-3,
+            min_area=1e-4,
+            form_factor_error=0.02,
+            elements=500,
+            patches=100,
+            contrast=0.2,
+        ),
+        GatherSettings(strides=(4, 2, 1), support=0.5, rays=96),
     ),
     "medium": Quality(
-        SolverSettings(error=1e-4, min_area=2e-5, shadow_rays=8),
-        GatherSettings(strides=(4, 2, 1), support=2.0, rays=256),
+        SolverSettings(
+            shadow_rays=8,
+            error=1e-4,
+            min_area=2e-5,
+            form_factor_error=0.01,
+            elements=1500,
+            patches=200,
+            contrast=0.1,
+        ),
+        GatherSettings(strides=(4, 2, 1), support=1.5, rays=192),
     ),
     "high": Quality(
-        SolverSettings(error=3e-5, min_area=1e-5, shadow_rays=16),
-        GatherSettings(strides=(4, 2, 1), support=6.0, rays=1024, sweeps=128),
+        SolverSettings(
+            shadow_rays=16,
+            error=3e-5,
+            min_area=1e-5,
+            form_factor_error=0.002,
+            elements=4000,
+            patches=400,
+            contrast=0.05,
+        ),
+        GatherSettings(strides=(4, 2, 1), support=6.0, rays=384, sweeps=128),
     ),
 }
 
 
+ERRORS = {"draft": 0.012, "medium": 0.0077, "high": 0.0057}
+"""Relative RMS errors of the qualities in the Cornell box at 256², against Cycles (docs/decisions/0017)."""
+
+FEWEST_RAYS, MOST_RAYS = 32, 2048
+"""A gather point's rays, whatever error is asked for."""
+
+
+def for_error(error: float) -> Quality:
+    """Return what would reach a relative RMS error in the Cornell box: between the qualities, and beyond.
+
+    Every number follows a power of the error, from one quality to the next; other scenes take
+    more or less, which the estimate of the error then tells.
+    """
+    names = ("draft", "medium") if error > ERRORS["medium"] else ("medium", "high")
+    low, high = (QUALITIES[name] for name in names)
+    part = math.log(error / ERRORS[names[0]]) / math.log(ERRORS[names[1]] / ERRORS[names[0]])
+
+    def between(one: float, other: float) -> float:
+        return float(one * (other / one) ** part)
+
+    rays = min(max(between(low.gather.rays, high.gather.rays), FEWEST_RAYS), MOST_RAYS)
+    solver = replace(
+        low.solver,
+        error=min(max(between(low.solver.error, high.solver.error), 1e-5), 3e-3),
+        min_area=min(max(between(low.solver.min_area, high.solver.min_area), 5e-6), 3e-4),
+        shadow_rays=round(min(max(between(low.solver.shadow_rays, high.solver.shadow_rays), 2), 64)),
+    )
+    gather = replace(
+        high.gather,
+        support=min(max(between(low.gather.support, high.gather.support), 0.2), 16.0),
+        rays=16 * round(rays / 16),
+    )
+    return Quality(solver, gather)
+
+
+MULTI_LEVEL_AREA = 0.3
+"""A_ε of the multi-level method in units of its F_ε. It splits receivers first: were they allowed to
+get much smaller, each would take less than F_ε of what a whole face sends, and no source would ever
+be split."""
+
+
+SHOOTING_TOLERANCES = {"draft": 0.02, "medium": 0.005, "high": 0.001}
+"""Residuals at which shooting stops: each further tenth takes two shots an element (Cornell box)."""
+
+
 def quality_of(settings: BakeSettings) -> Quality:
-    """Return the presets of a bake, with its seed and threads."""
+    """Return the presets of a bake, with its method, its seed and threads, and what was given.
+
+    A preset gives way to what was given: patches never outnumber elements.
+    """
     preset = QUALITIES[settings.quality]
-    return replace(preset, solver=replace(preset.solver, seed=settings.seed, threads=settings.threads))
+    if settings.relative_error is not None:
+        preset = for_error(settings.relative_error)
+    given = settings.method_settings()
+    solver = replace(
+        preset.solver, method=settings.method, seed=settings.seed, threads=settings.threads, **given
+    )
+    if settings.method == "shooting" and "tolerance" not in given:
+        solver = replace(solver, tolerance=SHOOTING_TOLERANCES[settings.quality])
+    if "elements" in given and "patches" not in given:
+        solver = replace(solver, patches=min(solver.patches, solver.elements))
+    if "patches" in given and "elements" not in given:
+        solver = replace(solver, elements=max(solver.patches, solver.elements))
+    if settings.method == "multi-level" and "min_area" not in given:
+        area = max(MULTI_LEVEL_AREA * solver.form_factor_error, solver.min_area)
+        solver = replace(solver, min_area=area)
+    return replace(preset, solver=solver)
+
+
+def used_settings(solver: SolverSettings) -> dict[str, Any]:
+    """Return the settings that the method listens to, as a bake used them."""
+    return {name: getattr(solver, name) for name in METHODS[solver.method].settings}

@@ -5,18 +5,22 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Sequence
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from .bake_scene import LIGHTMAP_UV_LAYER, BakeResult
+from .bake_scene import LIGHTMAP_UV_LAYER, BakeObject, BakeResult
 from .errors import BakeError
 
+T = TypeVar("T")
+
 VERSION = 1
-_SOLVER_KEYS = ("elements", "links", "rays", "iterations", "residual", "power_W", "closure_area_mean")
+MAX_HISTORY = 200
+"""Entries of the solver's history that a report keeps; shooting makes one a shot."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +72,8 @@ class BakeReport:
             if file.scale is not None:
                 entry["scale"] = file.scale
             objects.append(entry)
-        solver = {key: result.solver[key] for key in _SOLVER_KEYS if key in result.solver}
+        solver = {key: value for key, value in result.solver.items() if key != "history"}
+        solver["history"] = thinned(result.solver.get("history", ()))
         return cls(
             {
                 "version": VERSION,
@@ -98,6 +103,41 @@ class BakeReport:
         except OSError as error:
             aside.unlink(missing_ok=True)
             raise BakeError(f"cannot write the report '{path}': {error.strerror}") from error
+
+
+def solver_part(
+    found: Mapping[str, Any], settings: Mapping[str, Any], objects: Sequence[BakeObject]
+) -> dict[str, Any]:
+    """Return what a report says of the solver.
+
+    Parameters
+    ----------
+    found : mapping
+        The report of the `Solution`.
+    settings : mapping
+        The method's settings, as they were used.
+    objects : sequence of BakeObject
+        Whose triangles they are; independent sets are told by the names of their objects.
+    """
+    told = {"method": found.get("method"), "settings": dict(settings), **found}
+    if "independent_sets" in found:
+        told["independent_sets"] = [_named(block, objects) for block in found["independent_sets"]]
+    return told
+
+
+def _named(block: Mapping[str, Any], objects: Sequence[BakeObject]) -> dict[str, Any]:
+    """Replace the triangles of an independent set by the names of the objects they belong to."""
+    firsts = [item.first for item in objects]
+    owners = sorted({bisect_right(firsts, triangle) - 1 for triangle in block["triangles"]})
+    names = list(dict.fromkeys(objects[owner].name for owner in owners))
+    return {"objects": names, **{key: value for key, value in block.items() if key != "triangles"}}
+
+
+def thinned(history: Sequence[T], most: int = MAX_HISTORY) -> list[T]:
+    """Return at most `most` entries of a history, evenly spaced, the first and the last among them."""
+    if len(history) <= most:
+        return list(history)
+    return [history[round(place * (len(history) - 1) / (most - 1))] for place in range(most)]
 
 
 def _plain(value: Any) -> Any:

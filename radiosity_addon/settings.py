@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from .errors import UsageError
+from .methods import SETTINGS, check_method
 
 QUALITIES = ("draft", "medium", "high")
-QUANTITIES = ("irradiance_over_pi", "irradiance", "radiosity")
+QUANTITIES = ("irradiance_over_pi", "irradiance", "radiosity", "residual")
 LIGHTS = ("all", "direct", "indirect")
 ATLASES = ("shared", "per-object")
 FORMATS = ("exr", "png16")
 
 MAX_RESOLUTION = 16384
+MIN_ERROR, MAX_ERROR = 0.002, 0.2
 
 
 @dataclass(frozen=True)
@@ -28,9 +31,13 @@ class BakeSettings:
         Exclusive with an explicit resolution (the front doors see to that).
     atlas : "shared" or "per-object"
     quality : "draft", "medium" or "high"
+    relative_error : float or None
+        The RMS error to reach, relative to the mean of the light, 0.002 to 0.2; replaces the
+        quality.
     quantity : what texels hold
         "irradiance_over_pi" H/π [W/m²/sr] as Cycles' diffuse bake without colour,
-        "irradiance" H [W/m²], or "radiosity" B = E + ρH [W/m²].
+        "irradiance" H [W/m²], "radiosity" B = E + ρH [W/m²], or "residual" r [W/m²], the error
+        picture: by how much the elements miss the radiosity equation, signed.
     light : "all", "direct" or "indirect"
     format : "exr" or "png16"
     objects : names of what gets a lightmap, or None for every render-visible mesh
@@ -42,17 +49,23 @@ class BakeSettings:
     seed : int
     threads : int
         0 means all cores. The result does not depend on it.
+    method : str
+        How the radiosity equation is solved: a name of `methods.METHODS`.
+    elements, assembly, patches, contrast, form_factor_error, error, min_area, max_links, \
+    ambient, tolerance, max_iterations, memory_limit : optional
+        Settings of the method, see `SolverSettings`; None takes what the quality says.
 
     Raises
     ------
     UsageError
-        If a value is out of its range.
+        If a value is out of its range, or a setting does not apply to the method.
     """
 
     resolution: int = 512
     texel_density: float | None = None
     atlas: str = "shared"
     quality: str = "medium"
+    relative_error: float | None = None
     quantity: str = "irradiance_over_pi"
     light: str = "all"
     format: str = "exr"
@@ -61,12 +74,29 @@ class BakeSettings:
     keep_uvs: bool = False
     seed: int = 0
     threads: int = 0
+    method: str = "hierarchical"
+    elements: int | None = None
+    assembly: str | None = None
+    patches: int | None = None
+    contrast: float | None = None
+    form_factor_error: float | None = None
+    error: float | None = None
+    min_area: float | None = None
+    max_links: int | None = None
+    ambient: bool | None = None
+    tolerance: float | None = None
+    max_iterations: int | None = None
+    memory_limit: float | None = None
 
     def __post_init__(self) -> None:
         if not 1 <= self.resolution <= MAX_RESOLUTION:
             raise UsageError(f"resolution {self.resolution} is not between 1 and {MAX_RESOLUTION} pixels")
         if self.texel_density is not None and not 0 < self.texel_density < float("inf"):
             raise UsageError(f"texel density {self.texel_density} is not a positive number of pixels a metre")
+        if self.relative_error is not None and not MIN_ERROR <= self.relative_error <= MAX_ERROR:
+            raise UsageError(f"error {self.relative_error} is not between {MIN_ERROR} and {MAX_ERROR}")
+        if self.relative_error is not None and self.quantity == "residual":
+            raise UsageError("a residual is an error picture: leave --error out, or bake another quantity")
         if self.threads < 0:
             raise UsageError(f"threads {self.threads} is negative; 0 means all cores")
         if self.seed < 0:
@@ -80,3 +110,22 @@ class BakeSettings:
         ):
             if value not in allowed:
                 raise UsageError(f"{name} {value!r} is not one of {', '.join(allowed)}")
+        if self.quantity == "residual":
+            self._check_residual()
+        check_method(self.method, self.method_settings())
+
+    def _check_residual(self) -> None:
+        """Refuse what an error picture cannot be."""
+        if self.format != "exr":
+            raise UsageError(
+                f"a residual has negative values, which format {self.format} cannot hold: take format exr"
+            )
+        if self.light != "all":
+            raise UsageError(
+                f"a residual is of the whole solution, not of its {self.light} light: take light all"
+            )
+
+    def method_settings(self) -> dict[str, Any]:
+        """Return the settings of the method that were given, by name."""
+        values = {name: getattr(self, name) for name in SETTINGS}
+        return {name: value for name, value in values.items() if value is not None}

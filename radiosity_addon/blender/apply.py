@@ -103,9 +103,7 @@ def check_targets(export: Export) -> None:
             check_room(obj.data, source.object_name)
 
 
-def _make_replacements(
-    context: bpy.types.Context, export: Export, result: BakeResult
-) -> list[_Replacement]:
+def _make_replacements(context: bpy.types.Context, export: Export, result: BakeResult) -> list[_Replacement]:
     """Copy the meshes of all that will be shown anew."""
     lightmaps = {id(baked.object): baked for baked in result.objects}
     pairs = [

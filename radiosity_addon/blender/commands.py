@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,6 +26,7 @@ def bake(
     output: Path,
     settings: BakeSettings,
     report_copy: Path | None,
+    plot: Path | None,
     console: Console,
     interrupts: Interrupts,
 ) -> None:
@@ -41,6 +43,8 @@ def bake(
     settings : BakeSettings
     report_copy : Path or None
         Second copy of the report.
+    plot : Path or None
+        Where the history is drawn to.
     console : Console
     interrupts : Interrupts
     """
@@ -51,9 +55,9 @@ def bake(
         source = scene or loaded
         if source is not None and _same_file(source, output / BLEND_NAME):
             raise UsageError(f"--output {output} would overwrite the scene '{source}'; choose another folder")
-        if report_copy is not None:
+        for path in filter(None, (report_copy, plot)):
             # Now, not after all the work.
-            _make_folder_of(report_copy)
+            _check_writable(path)
         console.progress("open", 0.0)
         _open(scene, loaded)
         job = run_bake(bpy.context, settings, OutputFolder(output), with_copy=True)
@@ -72,7 +76,14 @@ def bake(
             job.close()
         if report_copy is not None:
             report.write(report_copy)
-        console.lines(summary(str(output), _files(report.as_dict()), report.as_dict()))
+        files = _files(report.as_dict())
+        if plot is not None:
+            from .plot import render_plot
+
+            console.progress("plot", 1.0)
+            render_plot(report.as_dict(), plot.resolve())
+            files.append((str(plot), "how it was solved"))
+        console.lines(summary(str(output), files, report.as_dict()))
 
 
 def restore(scene: Path | None, loaded: Path | None, output: Path, console: Console) -> None:
@@ -137,6 +148,25 @@ def _make_folder_of(path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise BakeError(f"cannot write '{path}': its folder cannot be made ({error.strerror})") from error
+
+
+def _check_writable(path: Path) -> None:
+    """Make the folder of a file to be written later, and see that files can be written there.
+
+    Raises
+    ------
+    BakeError
+        If not.
+    """
+    _make_folder_of(path)
+    if path.is_dir():
+        raise BakeError(f"cannot write '{path}': it is a folder")
+    aside = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        aside.touch()
+        aside.unlink()
+    except OSError as error:
+        raise BakeError(f"cannot write '{path}': {error.strerror}") from error
 
 
 def _same_file(one: Path, other: Path) -> bool:

@@ -12,6 +12,8 @@ from collections.abc import Sequence
 import bpy
 import numpy as np
 
+from ..solver.radiometry import flux_of_radiance
+
 METRES_PER_UNIT = 0.01
 
 REFLECTANCE = {
@@ -79,7 +81,7 @@ def build_cornell_box(scene: bpy.types.Scene | None = None) -> bpy.types.Scene:
 def lamp_power() -> np.ndarray:
     """Return the lamp's power, (3,) RGB [W]: P = π A L of a one-sided diffuse emitter."""
     width, depth = _lamp_size()
-    return np.pi * width * depth * np.array(LAMP_RADIANCE)
+    return flux_of_radiance(np.array(LAMP_RADIANCE), width * depth)
 
 
 def _scene_to_fill() -> bpy.types.Scene:

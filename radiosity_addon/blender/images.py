@@ -56,9 +56,7 @@ def sanitised_stem(name: str) -> str:
     return f"_{stem}" if not stem or _RESERVED_NAMES.fullmatch(stem) else stem
 
 
-def write_pages(
-    result: BakeResult, settings: BakeSettings, folder: Path | None
-) -> list[bpy.types.Image]:
+def write_pages(result: BakeResult, settings: BakeSettings, folder: Path | None) -> list[bpy.types.Image]:
     """Make an image of each page, saved into `folder` or packed into the .blend.
 
     Parameters

@@ -14,12 +14,14 @@ from ..background import in_thread
 from ..bake_scene import BakeResult, Progress
 from ..report import BakeReport
 from ..settings import BakeSettings
+from ..solver.arrays import Array
 from . import runtime
 from .apply import apply_lightmaps, check_targets
 from .bake_record import remove_datablocks
 from .export import export_scene
 from .export_sources import Export
 from .images import lightmap_files, set_folder, write_pages
+from .live_picture import seen_triangles
 from .output import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, OutputFolder, save_copy
 from .preview import render_preview
 from .rebake import originals_shown, replacing_earlier, seal
@@ -63,7 +65,7 @@ def run_bake(
     Yields
     ------
     progress : Progress
-        The stage that begins or goes on.
+        The stage that begins or goes on. A picture holds what the viewports show as surfaces.
 
     Returns
     -------
@@ -83,7 +85,8 @@ def run_bake(
         with _timed(seconds, "export"), originals_shown(context) as edited:
             export = export_scene(context, settings)
             check_targets(export)
-        result = yield from _solve(export, settings, patient)
+            seen = seen_triangles(context, export)
+        result = yield from _solve(export, settings, seen, patient)
         result = replace(result, warnings=(*edited, *result.warnings))
         seconds.update(result.seconds)
         yield Progress("apply", APPLY)
@@ -99,8 +102,10 @@ def run_bake(
     return report
 
 
-def _solve(export: Export, settings: BakeSettings, patient: bool) -> Generator[Progress, None, BakeResult]:
-    """Run the pipeline, its progress scaled to its share of the whole."""
+def _solve(
+    export: Export, settings: BakeSettings, seen: Array, patient: bool
+) -> Generator[Progress, None, BakeResult]:
+    """Run the pipeline, its progress scaled to its share of the whole, its pictures to what is `seen`."""
     baking = pipeline.bake(export.bake_scene, settings)
     steps = in_thread(baking) if patient else baking
     shown = Progress("unwrap", SOLVE)
@@ -110,9 +115,12 @@ def _solve(export: Export, settings: BakeSettings, patient: bool) -> Generator[P
                 progress = next(steps)
             except StopIteration as done:
                 return done.value
+            picture = None
             if progress is not None:
                 shown = Progress(progress.stage, SOLVE + (APPLY - SOLVE) * progress.fraction)
-            yield shown
+                picture = progress.picture
+            # Each picture comes once, however long the step after it takes.
+            yield shown if picture is None else replace(shown, picture=picture.only(seen[picture.triangle]))
     finally:
         steps.close()
 

@@ -10,6 +10,7 @@ import numpy as np
 from ..bake_scene import BakeWarning
 from ..errors import SceneError
 from ..solver.lights import AreaLight, Light, PointLight, SpotLight, SunLight
+from ..solver.radiometry import cone_projected_solid_angle, sphere_area
 from .materials import read_radiance, uses_nodes
 from .mesh_arrays import all_finite
 
@@ -113,7 +114,7 @@ def _sun(
     name: str, data: bpy.types.Light, matrix: np.ndarray, strength: np.ndarray
 ) -> tuple[Light, list[BakeWarning]]:
     if not getattr(data, "normalize", True):
-        strength = strength * math.pi * math.sin(data.angle / 2.0) ** 2  # its projected solid angle
+        strength = strength * cone_projected_solid_angle(data.angle / 2.0)  # it was a radiance
     return SunLight(_backward(matrix), strength, angle=data.angle, name=name), []
 
 
@@ -146,7 +147,7 @@ def _sphere_area(data: bpy.types.Light) -> float:
     """Return what an unnormalised point or spot lamp's power is multiplied by (measured)."""
     if getattr(data, "normalize", True):
         return 1.0
-    return 4.0 * math.pi * data.shadow_soft_size**2
+    return sphere_area(data.shadow_soft_size)
 
 
 def _is_portal(data: bpy.types.Light) -> bool:

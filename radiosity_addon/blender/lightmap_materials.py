@@ -6,21 +6,27 @@ which these are the same. The originals are never edited.
 
 from __future__ import annotations
 
-import math
-
 import bpy
 
 from ..bake_scene import LIGHTMAP_UV_LAYER
+from ..solver.radiometry import brdf_of_reflectance, radiance_of_radiosity
 from .bake_record import is_made, mark_made
+from .false_colors import false_colors
 from .images import image_scale
 from .materials import read_material, uses_nodes
 from .node_group import BASE_COLOR, EMISSION, LIGHTMAP, LIGHTMAP_ONLY, SCALE, SHADER, lightmap_group
 from .surface_nodes import BLACK, Surface, feed_color, feed_float, read_surface
 from .uv_pin import pin_uvs
 
-RADIANCE_PER_TEXEL = {"irradiance_over_pi": 1.0, "irradiance": 1.0 / math.pi, "radiosity": 1.0 / math.pi}
+RADIANCE_PER_TEXEL = {
+    "irradiance_over_pi": 1.0,
+    "irradiance": brdf_of_reflectance(1.0),
+    "radiosity": radiance_of_radiosity(1.0),
+    "residual": 10.0 * radiance_of_radiosity(1.0),
+}
 """What a texel of 1 makes a surface send out [W/m²/sr]: of a white one for the irradiances
-(L = H/π), of the surface itself for radiosity (L = B/π, reflection and emission included)."""
+(L = H/π), of the surface itself for radiosity (L = B/π, reflection and emission included). A
+residual is shown ten times its size: an error of a tenth looks as bright as the light itself."""
 
 
 class LightmapMaterials:
@@ -60,7 +66,8 @@ class LightmapMaterials:
             copy.name = f"{material.name} (Lightmap)"
         mark_made(copy)
         constant = read_material(material)
-        plain = Surface(tuple(constant.reflectance.tolist()), tuple((constant.emission / math.pi).tolist()))
+        radiance = radiance_of_radiosity(constant.emission)
+        plain = Surface(tuple(constant.reflectance.tolist()), tuple(radiance.tolist()))
 
         if material is None or not uses_nodes(material):
             _enable_nodes(copy)
@@ -104,11 +111,14 @@ class LightmapMaterials:
         group.name = group.label = group.node_tree.name
         group.location = (x + 300, y + 300)
         tree.links.new(uv_map.outputs["UV"], texture.inputs["Vector"])
-        tree.links.new(texture.outputs["Color"], group.inputs[LIGHTMAP])
+        texel = texture.outputs["Color"]
+        if self._quantity == "residual":
+            texel = false_colors(tree, texel)
+        tree.links.new(texel, group.inputs[LIGHTMAP])
         group.inputs[SCALE].default_value = RADIANCE_PER_TEXEL[self._quantity] * image_scale(image)
 
-        # Radiosity already holds what the surface reflects and emits.
-        if self._quantity != "radiosity":
+        # Radiosity already holds what the surface reflects and emits, and so does its error.
+        if self._quantity not in ("radiosity", "residual"):
             feed_color(tree, group.inputs[BASE_COLOR], surface.base)
             feed_color(tree, group.inputs[EMISSION], surface.emission)
 

@@ -13,6 +13,7 @@ import bpy
 import numpy as np
 
 from ..bake_scene import BakeWarning
+from ..solver.radiometry import radiosity_of_radiance
 from ..solver.scene import MAX_REFLECTANCE
 from .shader_nodes import NotConstantError, Stack, Value, default_rgb, evaluate, feed_of, output_node
 
@@ -82,7 +83,7 @@ def read_material(material: bpy.types.Material | None) -> Surface:
         shader = reader.material(material.node_tree)
     return Surface(
         reader.clamped_reflectance(shader.reflectance),
-        np.pi * reader.not_negative("emission", shader.radiance),
+        radiosity_of_radiance(reader.not_negative("emission", shader.radiance)),
         tuple(reader.warnings),
     )
 

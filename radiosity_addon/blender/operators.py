@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 
 from ..errors import RadiosityError
-from . import runtime
+from . import live_view, runtime
 from .properties import settings_of
 
 TICK = 0.03
@@ -57,7 +57,7 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Run the bake through."""
         try:
-            self._begin(context, patient=False)
+            self._begin(context, in_window=False)
             while not self._advance(float("inf")):
                 pass
         except RadiosityError as error:
@@ -72,7 +72,7 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
         if bpy.app.background or context.window is None:
             return self.execute(context)
         try:
-            self._begin(context, patient=True)
+            self._begin(context, in_window=True)
         except RadiosityError as error:
             return self._fail(context, error)
         manager = context.window_manager
@@ -107,7 +107,7 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
         """Blender ends the operator from outside: a window closes, or Blender quits."""
         self._end(context)
 
-    def _begin(self, context: bpy.types.Context, patient: bool) -> None:
+    def _begin(self, context: bpy.types.Context, in_window: bool) -> None:
         from .job import run_bake
         from .output import OutputFolder
 
@@ -116,9 +116,12 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
         folder = output_folder(context)
         self._report = None
         output = None if folder is None else OutputFolder(folder)
-        self._job = run_bake(context, settings, output, patient=patient)
+        self._job = run_bake(context, settings, output, patient=in_window)
         runtime.running.active = True
+        runtime.running.stop = lambda: self._end(bpy.context)
         runtime.running.stage, runtime.running.fraction = "Starting", 0.0
+        if in_window and context.scene.radiosity.show_while_solving:
+            live_view.begin(context.scene)
 
     def _advance(self, seconds: float) -> bool:
         """Bake for about so long; True once it is done."""
@@ -130,6 +133,8 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
                 self._report = done.value
                 return True
             runtime.running.stage, runtime.running.fraction = progress.stage, progress.fraction
+            if progress.picture is not None:
+                live_view.show(progress.picture)
         return False
 
     def _show_progress(self, context: bpy.types.Context) -> None:
@@ -174,7 +179,8 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
             if job is not None:
                 job.close()
         finally:
-            runtime.running.active = False
+            runtime.running.active, runtime.running.stop = False, None
+            live_view.end()
             if self._timer is not None:
                 context.window_manager.event_timer_remove(self._timer)
                 context.window_manager.progress_end()

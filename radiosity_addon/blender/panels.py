@@ -7,7 +7,9 @@ from typing import Any
 import bpy
 
 from . import runtime
+from .method_properties import AUTOMATIC, shown_settings
 from .operators import output_folder
+from .properties import BY_ERROR
 
 SHOWN_WARNINGS = 12
 
@@ -46,6 +48,8 @@ class RADIOSITY_PT_main(_Panel, bpy.types.Panel):
         column.prop(settings, "resolution" if settings.size_mode == "resolution" else "texel_density")
         column = layout.column()
         column.prop(settings, "quality")
+        if settings.quality == BY_ERROR[0]:
+            column.prop(settings, "relative_error")
         column.prop(settings, "atlas")
         column = layout.column()
         column.prop(settings, "output_folder")
@@ -81,7 +85,31 @@ class RADIOSITY_PT_advanced(_Panel, bpy.types.Panel):
         column = layout.column(align=True)
         column.prop(settings, "seed")
         column.prop(settings, "threads")
-        layout.column(heading="Viewport").prop(settings, "show_result")
+        column = layout.column(heading="Viewport")
+        column.prop(settings, "show_while_solving")
+        column.prop(settings, "show_result")
+
+
+class RADIOSITY_PT_solver(_Panel, bpy.types.Panel):
+    """How the light's balance is solved."""
+
+    bl_idname = "RADIOSITY_PT_solver"
+    bl_label = "Solver"
+    bl_parent_id = "RADIOSITY_PT_main"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the method, and of the settings those that apply to it."""
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.enabled = not runtime.running.active
+        settings = context.scene.radiosity
+        layout.prop(settings, "method")
+        column = layout.column()
+        for name in shown_settings(settings.method):
+            column.prop(settings, name)
+        layout.label(text=AUTOMATIC, icon="INFO")
 
 
 class RADIOSITY_PT_last_bake(_Panel, bpy.types.Panel):
@@ -161,4 +189,10 @@ def _wrapped(text: str, width: int) -> list[str]:
     return lines
 
 
-CLASSES = (RADIOSITY_PT_main, RADIOSITY_PT_advanced, RADIOSITY_PT_last_bake, RADIOSITY_PT_warnings)
+CLASSES = (
+    RADIOSITY_PT_main,
+    RADIOSITY_PT_solver,
+    RADIOSITY_PT_advanced,
+    RADIOSITY_PT_last_bake,
+    RADIOSITY_PT_warnings,
+)

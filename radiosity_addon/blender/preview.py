@@ -14,6 +14,7 @@ from mathutils import Vector
 from ..errors import BakeError
 from ..settings import BakeSettings
 from .bake_record import is_made
+from .png import render_png
 
 SAMPLES = 32
 MAX_SIDE = 960
@@ -46,9 +47,9 @@ def render_preview(context: bpy.types.Context, path: Path, settings: BakeSetting
     try:
         if scene.camera is None or scene.camera.type != "CAMERA":
             camera = _framing_camera(context, scene)
-        _set_up(scene, path, settings)
+        _fit(scene.render)
         with _lightmaps_at(path.parent):
-            bpy.ops.render.render(write_still=True, scene=scene.name)
+            render_png(scene, path, SAMPLES, settings.seed, settings.threads)
     except (RuntimeError, TypeError) as error:
         raise BakeError(f"cannot render the preview '{path}': {' '.join(str(error).split())}") from error
     finally:
@@ -60,35 +61,13 @@ def render_preview(context: bpy.types.Context, path: Path, settings: BakeSetting
             bpy.data.images.remove(bpy.data.images["Render Result"])
     if not path.is_file():
         raise BakeError(f"cannot write the preview '{path}'")
-    path.write_bytes(_without_notes(path.read_bytes()))
 
 
-def _set_up(scene: bpy.types.Scene, path: Path, settings: BakeSettings) -> None:
-    """Set the preview scene's render settings."""
-    scene.render.engine = "CYCLES"
-    scene.cycles.device = "CPU"
-    scene.cycles.samples = SAMPLES
-    scene.cycles.seed = settings.seed
-    scene.cycles.use_adaptive_sampling = False
-    scene.cycles.use_denoising = False
-    render = scene.render
-    if settings.threads:
-        render.threads_mode = "FIXED"
-        render.threads = settings.threads
+def _fit(render: bpy.types.RenderSettings) -> None:
+    """Scale the picture down where it is larger than a preview needs."""
     share = min(1.0, MAX_SIDE / max(render.resolution_x, render.resolution_y))
     render.resolution_x = max(4, round(render.resolution_x * share))
     render.resolution_y = max(4, round(render.resolution_y * share))
-    render.resolution_percentage = 100
-    render.use_border = render.use_multiview = render.use_stamp = False
-    render.use_compositing = render.use_sequencer = render.use_simplify = False
-    render.use_motion_blur = render.film_transparent = False
-    render.filepath = str(path)
-    render.use_file_extension = False
-    if hasattr(render.image_settings, "media_type"):
-        render.image_settings.media_type = "IMAGE"
-    render.image_settings.file_format = "PNG"
-    render.image_settings.color_mode = "RGB"
-    render.image_settings.color_depth = "8"
 
 
 def _framing_camera(context: bpy.types.Context, scene: bpy.types.Scene) -> bpy.types.Camera:
@@ -121,17 +100,6 @@ def _bounds(context: bpy.types.Context) -> np.ndarray:
 def _showing(objects: Sequence[bpy.types.Object]) -> list[bpy.types.Object]:
     """Those of the objects that a render shows."""
     return [obj for obj in objects if not obj.hide_render]
-
-
-def _without_notes(png: bytes) -> bytes:
-    """Drop a PNG's text chunks: Blender's tell dates and render times, so no two files are the same."""
-    kept, start = [png[:8]], 8
-    while start < len(png):
-        length = int.from_bytes(png[start : start + 4], "big") + 12  # size, type and checksum
-        if png[start + 4 : start + 8] not in (b"tEXt", b"zTXt", b"iTXt", b"tIME"):
-            kept.append(png[start : start + length])
-        start += length
-    return b"".join(kept)
 
 
 @contextmanager

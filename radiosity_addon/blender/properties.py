@@ -5,12 +5,23 @@ from __future__ import annotations
 import bpy
 
 from ..errors import UsageError
-from ..settings import ATLASES, FORMATS, LIGHTS, MAX_RESOLUTION, QUALITIES, QUANTITIES, BakeSettings
+from ..settings import (
+    ATLASES,
+    FORMATS,
+    LIGHTS,
+    MAX_ERROR,
+    MAX_RESOLUTION,
+    MIN_ERROR,
+    QUALITIES,
+    QUANTITIES,
+    BakeSettings,
+)
+from .method_properties import MethodProperties, given_settings
 
 DEFAULTS = BakeSettings()
 
 SHARED_FIELDS = (
-    *("atlas", "quality", "quantity", "light", "format"),
+    *("atlas", "quantity", "light", "format"),
     *("sky", "keep_uvs", "seed", "threads"),
 )
 """Settings of the panel that a bake takes as they are."""
@@ -29,12 +40,20 @@ _LABELS = {
     ),
     "irradiance": ("Irradiance", "The light that arrives [W/m²], as three.js adds it"),
     "radiosity": ("Radiosity", "The light that leaves: own emission and what is reflected [W/m²]"),
+    "residual": (
+        "Residual",
+        "The error picture: by how much the solution misses the radiosity equation, signed [W/m²]",
+    ),
     "all": ("All", "Direct and indirect light"),
     "direct": ("Direct", "Only the light that comes straight from lamps, emitters and world"),
     "indirect": ("Indirect", "Only the light that was reflected, for lamps that stay dynamic"),
     "exr": ("OpenEXR", "Linear floating point, exact"),
     "png16": ("PNG 16 bit", "Scaled to the brightest texel; the scale is in the report"),
 }
+
+
+BY_ERROR = ("error", "By Error", "As fine as it takes to reach the error below")
+"""The quality that is not a preset."""
 
 
 def _items(values: tuple[str, ...]) -> list[tuple[str, str, str]]:
@@ -51,7 +70,7 @@ def _show_lightmap_only(settings: RadiositySettings, _context: bpy.types.Context
     set_lightmap_only(settings.lightmap_only)
 
 
-class RadiositySettings(bpy.types.PropertyGroup):
+class RadiositySettings(MethodProperties, bpy.types.PropertyGroup):
     """`scene.radiosity`: what the next bake from the panel does."""
 
     scope: bpy.props.EnumProperty(  # type: ignore[valid-type]
@@ -99,8 +118,18 @@ class RadiositySettings(bpy.types.PropertyGroup):
     quality: bpy.props.EnumProperty(  # type: ignore[valid-type]
         name="Quality",
         description="How fine the light is computed",
-        items=_items(QUALITIES),
+        items=[*_items(QUALITIES), BY_ERROR],
         default=DEFAULTS.quality,
+    )
+    relative_error: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="Error",
+        description="How far the light may be off: RMS, relative to its mean. Texels are lit again, "
+        "with more rays, until the estimate is below it",
+        default=0.02,
+        min=MIN_ERROR,
+        max=MAX_ERROR,
+        step=0.1,
+        precision=3,
     )
     quantity: bpy.props.EnumProperty(  # type: ignore[valid-type]
         name="Quantity",
@@ -151,6 +180,12 @@ class RadiositySettings(bpy.types.PropertyGroup):
         subtype="DIR_PATH",
         options=_RELATIVE_PATH,
     )
+    show_while_solving: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Show While Solving",
+        description="Draw the elements over the objects in the viewports while a bake is solving, as bright "
+        "as they are at that moment",
+        default=True,
+    )
     show_result: bpy.props.BoolProperty(  # type: ignore[valid-type]
         name="Show Result",
         description="Switch the viewport from solid to material preview when the bake is done",
@@ -181,12 +216,15 @@ def settings_of(context: bpy.types.Context) -> BakeSettings:
     chosen = selected_meshes(context) if group.scope == "selected" else None
     if chosen == ():
         raise UsageError("no mesh is selected: select what is to get a lightmap, or switch to All")
-    by_density = group.size_mode == "density"
+    by_density, by_error = group.size_mode == "density", group.quality == BY_ERROR[0]
     return BakeSettings(
         resolution=group.resolution,
         texel_density=group.texel_density if by_density else None,
+        quality=DEFAULTS.quality if by_error else group.quality,
+        relative_error=group.relative_error if by_error else None,
         objects=chosen,
         **{name: getattr(group, name) for name in SHARED_FIELDS},
+        **given_settings(group),
     )
 
 

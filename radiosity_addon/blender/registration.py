@@ -8,7 +8,7 @@ from functools import partial
 
 import bpy
 
-from . import bake_record, cli_host, operators, panels, properties
+from . import bake_record, cli_host, operators, panels, properties, runtime
 
 CLASSES = (*operators.CLASSES, *panels.CLASSES)
 
@@ -26,6 +26,7 @@ def register() -> None:
         for cls in CLASSES:
             bpy.utils.register_class(cls)
             _undo.append(partial(bpy.utils.unregister_class, cls))
+        _undo.append(runtime.stop_running)
         cli_host.register()
         _undo.append(cli_host.unregister)
     except BaseException:

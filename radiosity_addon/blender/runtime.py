@@ -7,9 +7,12 @@ for each new text the scene holds.
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import bpy
+
+from ..methods import METHODS
 
 MAX_WARNINGS = 100
 """A scene keeps this many of the last bake's warnings; the report has them all."""
@@ -20,9 +23,10 @@ class Running:
     """The bake that is going on in this Blender, if any."""
 
     active: bool = False
-    cancel: bool = False
     stage: str = ""
     fraction: float = 0.0
+    stop: Callable[[], None] | None = None
+    """Ends it from outside its operator."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +49,12 @@ running = Running()
 _cache = _Cache()
 
 
+def stop_running() -> None:
+    """End the bake that is going on, if any, as the extension is switched off under it."""
+    if running.stop is not None:
+        running.stop()
+
+
 def remember(scene: bpy.types.Scene, report: dict, folder: str) -> None:
     """Keep what the panel shows of a finished bake with the scene.
 
@@ -60,7 +70,7 @@ def remember(scene: bpy.types.Scene, report: dict, folder: str) -> None:
         {
             "objects": len(report["objects"]),
             "images": len({entry["image"] for entry in report["objects"]}),
-            "solver": report["solver"],
+            "solver": {key: value for key, value in report["solver"].items() if key != "history"},
             "seconds": sum(report["seconds"].values()),
             "warnings": [[w["name"], w["message"]] for w in report["warnings"][:MAX_WARNINGS]],
             "warning_count": len(report["warnings"]),
@@ -94,6 +104,7 @@ def _parse(text: str) -> LastBake | None:
         record = json.loads(text)
         solver = record["solver"]
         figures = [
+            ("Method", METHODS[solver["method"]].label),
             ("Time", f"{record['seconds']:.1f} s"),
             ("Objects", f"{record['objects']:,}"),
             ("Images", f"{record['images']:,}"),
@@ -101,8 +112,13 @@ def _parse(text: str) -> LastBake | None:
             ("Links", f"{solver['links']:,}"),
             ("Rays", f"{solver['rays']:,}"),
         ]
+        if solver.get("iterations"):
+            figures.append(("Iterations", f"{solver['iterations']:,}"))
         if solver.get("residual") is not None:
             figures.append(("Residual", f"{solver['residual']:.1e}"))
+        if len(solver.get("independent_sets", ())) > 1:
+            # Parts that exchange no light, such as closed rooms, each solved by itself.
+            figures.append(("Separate parts", f"{len(solver['independent_sets']):,}"))
         if solver.get("closure_area_mean") is not None:
             # The share of light that meets a surface: 1 in a closed scene, less where it may leave.
             figures.append(("Meets a surface", f"{solver['closure_area_mean']:.2%}"))
