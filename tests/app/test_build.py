@@ -26,7 +26,7 @@ def checkout(tmp_path: Path) -> Path:
     """A checkout whose pins are empty, so that its environments need no network."""
     pins = tmp_path / "requirements"
     pins.mkdir()
-    for name in ("bpy-4.2", "bpy-5.0", "bpy-5.2", "tools"):
+    for name in ("bpy-4.2", "bpy-5.0", "bpy-5.2", "docs", "tools"):
         (pins / f"{name}.txt").write_text("# nothing\n")
     return tmp_path
 
@@ -67,6 +67,16 @@ def test_an_environment_that_is_there_needs_no_venv_module(monkeypatch: pytest.M
     system.require(None, (3, 11))
 
 
+def test_the_documentation_needs_no_library_of_blenders(
+    checkout: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.setattr(system, "DEBIAN_PACKAGE_OF_LIBRARY", {"libnowhere.so.6": "libnowhere6"})
+    made = environments.docs_environment(checkout)
+    assert made.folder == checkout / ".envs" / "docs"
+    assert made.run("-c", "import pip") == 0
+
+
 def test_a_missing_python_is_named() -> None:
     with pytest.raises(BuildError, match=r"^no python3\.99 found; install it"):
         system.find_python((3, 99))
@@ -78,6 +88,26 @@ def test_an_environment_is_made_once(checkout: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(environments, "_create", _must_not_be_called)
     monkeypatch.setattr(environments, "_install", _must_not_be_called)
     assert environments.main_environment(checkout) == made
+
+
+def test_what_only_the_benchmarks_need_lies_beside_the_main_environment(
+    checkout: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (checkout / "requirements" / "bench.txt").write_text("# nothing\n")
+    asked: list[tuple[str, ...]] = []
+
+    def install(folder: Path, pins: list[Path], *how: str) -> None:
+        if how:
+            (checkout / ".envs" / "bench").mkdir(parents=True, exist_ok=True)
+            (checkout / ".envs" / "bench" / "only_here.py").write_text("raise SystemExit(3)")
+            asked.append(how)
+
+    monkeypatch.setattr(environments, "_install", install)
+    made = environments.bench_environment(checkout)
+    assert made.folder == environments.main_environment(checkout).folder
+    assert made.run("-c", "import only_here") == 3
+    environments.bench_environment(checkout)
+    assert asked == [("--no-deps", "--target", str(checkout / ".envs" / "bench"))]
 
 
 def test_changed_pins_and_interrupted_installations_are_brought_up_to_date_in_place(
@@ -142,7 +172,7 @@ def test_wrong_usage_is_exit_code_2(arguments: tuple[str, ...]) -> None:
 def test_help_lists_every_verb() -> None:
     done = run("build.py", "--help")
     assert done.returncode == 0
-    for verb in ("bake", "restore", "test", "check", "package", "real-blender"):
+    for verb in ("bake", "restore", "test", "bench", "check", "figures", "docs", "package", "real-blender"):
         assert f"\n  {verb} " in done.stdout
 
 

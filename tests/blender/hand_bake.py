@@ -33,9 +33,7 @@ def hand_result(export: Export, colors: Sequence[Sequence[float]] = ((0.25, 0.5,
         for i, target in enumerate(t for t in export.bake_scene.objects if t.bake)
     ]
     pages = [
-        LightmapPage(
-            np.broadcast_to(np.array(color, np.float32), (4, 8, 3)).copy(), np.ones((4, 8), bool)
-        )
+        LightmapPage(np.broadcast_to(np.array(color, np.float32), (4, 8, 3)).copy(), np.ones((4, 8), bool))
         for color in colors
     ]
     return BakeResult(tuple(pages), tuple(baked), SOLVER, (), {"solve": 0.5})

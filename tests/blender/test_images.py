@@ -59,6 +59,14 @@ def test_exr_holds_the_exact_values(tmp_path: Path) -> None:
     assert lightmap_files([image], BakeSettings())[0].scale is None
 
 
+def test_exr_holds_negative_values(tmp_path: Path) -> None:
+    page = _page()
+    page.pixels[:2] *= -1
+    (image,) = write_pages(_result(page), BakeSettings(quantity="residual"), tmp_path)
+    np.testing.assert_array_equal(_read_back(tmp_path / "lightmap.exr"), page.pixels)
+    np.testing.assert_array_equal(_pixels(image), page.pixels)
+
+
 def test_png_holds_values_over_scale_to_half_a_step(tmp_path: Path) -> None:
     page, settings = _page(), BakeSettings(format="png16")
     (image,) = write_pages(_result(page), settings, tmp_path)

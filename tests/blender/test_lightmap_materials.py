@@ -58,6 +58,18 @@ def test_lightmap_only_shows_what_a_white_surface_would(tmp_path: Path, quantity
     np.testing.assert_allclose(seen_from_above(tmp_path)[0, 0], np.multiply(TEXEL, factor), rtol=1e-4)
 
 
+@pytest.mark.parametrize(("texel", "shown"), [((0.2, 0.3, 0.1), (2, 0, 0)), ((-0.5, 0.1, -0.5), (0, 0, 3))])
+def test_a_residual_is_red_where_positive_and_blue_where_negative(
+    tmp_path: Path, texel: tuple[float, ...], shown: tuple[float, ...]
+) -> None:
+    """Ten times the channels' mean over π, whatever the material; nothing shines negatively."""
+    add_plane(material=principled_material(Emission_Color=(1.0, 1.0, 1.0, 1.0), Emission_Strength=2.0))
+    bake_by_hand((texel,), quantity="residual", folder=tmp_path)
+    for lightmap_only in (False, True):
+        set_lightmap_only(lightmap_only)
+        np.testing.assert_allclose(seen_from_above(tmp_path)[0, 0], np.divide(shown, math.pi), atol=1e-5)
+
+
 def test_the_lightmap_lies_the_right_way_up(tmp_path: Path) -> None:
     """Row 0 of a page is v = 0; the square's UVs are its x and y."""
     plane = add_plane()

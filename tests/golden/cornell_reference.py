@@ -1,14 +1,11 @@
-"""The Cornell box's reference by Cycles: how it is kept, and how a bake is measured against it."""
+"""The Cornell box's reference by Cycles: how it is kept."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
 
-import bpy
 import numpy as np
-
-from radiosity_addon.bake_scene import LIGHTMAP_UV_LAYER
 
 FILE = Path(__file__).parent / "cornell_box_cycles.npz"
 
@@ -66,17 +63,3 @@ def load(path: Path = FILE) -> Reference:
             pages.append(page)
         uv = {key.removeprefix("uv "): file[key] for key in file.files if key.startswith("uv ")}
     return Reference(uv, pages[0], pages[1], coverage)
-
-
-def write_layout(uv: dict[str, np.ndarray]) -> None:
-    """Give the scene's meshes the reference's UV layer."""
-    for name, corners in uv.items():
-        layer = bpy.data.objects[name].data.uv_layers.new(name=LIGHTMAP_UV_LAYER)
-        layer.data.foreach_set("uv", np.ascontiguousarray(corners, dtype=np.float32).ravel())
-
-
-def relative_rmse(values: np.ndarray, first: np.ndarray, second: np.ndarray) -> float:
-    """Return √(mean (x − r₁)(x − r₂)) / mean r: the product of independent errors has no noise floor."""
-    x, r_1, r_2 = (array.astype(np.float64) for array in (values, first, second))
-    square = ((x - r_1) * (x - r_2)).mean()
-    return float(np.sqrt(max(square, 0.0)) / (0.5 * (r_1 + r_2)).mean())

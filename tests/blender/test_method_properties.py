@@ -1,0 +1,121 @@
+"""The panel's method: what is drawn, and what a bake gets of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from types import SimpleNamespace
+
+import bpy
+import pytest
+
+import radiosity_addon
+from radiosity_addon.blender import panels
+from radiosity_addon.blender.properties import settings_of
+from radiosity_addon.methods import METHODS, SETTINGS
+from radiosity_addon.settings import BakeSettings
+
+
+class Layout:
+    """Stands for Blender's layout, which needs a window; notes what is drawn."""
+
+    def __init__(self) -> None:
+        self.drawn: list[str] = []
+
+    def column(self, **_: object) -> Layout:
+        return self
+
+    def prop(self, owner: object, name: str) -> None:
+        assert name in owner.bl_rna.properties
+        self.drawn.append(name)
+
+    def label(self, **_: object) -> None:
+        pass
+
+
+@pytest.fixture(autouse=True)
+def group() -> Iterator[bpy.types.PropertyGroup]:
+    """The panel's settings."""
+    radiosity_addon.register()
+    yield bpy.context.scene.radiosity
+    radiosity_addon.unregister()
+
+
+def drawn() -> list[str]:
+    """Names of what the Solver panel shows."""
+    layout = Layout()
+    panels.RADIOSITY_PT_solver.draw(SimpleNamespace(layout=layout), bpy.context)
+    return layout.drawn
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_only_what_applies_is_drawn_and_given(method: str, group: bpy.types.PropertyGroup) -> None:
+    for name, setting in SETTINGS.items():
+        if setting.kind is bool:
+            setattr(group, name, True)
+        elif setting.kind is not str:
+            setattr(group, name, 5 if setting.kind is int else 0.1)
+    group.patches = 4
+    group.method = method
+    applies = [
+        name for name in METHODS[method].settings if (method, name) != ("conjugate-gradient", "assembly")
+    ]
+    assert drawn() == ["method", *applies]
+    settings = settings_of(bpy.context)
+    assert settings.method == method
+    # Single precision is made what was typed.
+    kinds = {int: 5, float: 0.1, bool: True, str: "galerkin"}
+    expected = {name: kinds[SETTINGS[name].kind] for name in applies}
+    expected.update({"patches": 4} if "patches" in applies else {})
+    assert settings.method_settings() == expected
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_untouched_settings_come_from_the_quality(method: str, group: bpy.types.PropertyGroup) -> None:
+    group.method = method
+    given = settings_of(bpy.context).method_settings()
+    assert set(given) <= {"assembly"}
+
+
+def test_the_panel_as_it_comes_bakes_the_defaults() -> None:
+    assert settings_of(bpy.context) == BakeSettings()
+
+
+@pytest.mark.parametrize("name", [name for name, setting in SETTINGS.items() if setting.kind in (int, float)])
+def test_a_number_keeps_to_its_range(name: str, group: bpy.types.PropertyGroup) -> None:
+    setting = SETTINGS[name]
+    group.method = next(method for method in METHODS if name in METHODS[method].settings)
+    for value in (2 * setting.high, setting.high):
+        setattr(group, name, min(value, 2**31 - 1) if setting.kind is int else value)
+        assert settings_of(bpy.context).method_settings()[name] == pytest.approx(setting.high)
+    setattr(group, name, -1)
+    assert name not in settings_of(bpy.context).method_settings()
+
+
+def test_the_assembly_is_given_as_chosen(group: bpy.types.PropertyGroup) -> None:
+    group.method, group.assembly = "jacobi", "linear"
+    assert settings_of(bpy.context).assembly == "linear"
+    group.method = "conjugate-gradient"
+    assert settings_of(bpy.context).assembly is None
+
+
+def test_the_last_bake_tells_how_it_was_solved() -> None:
+    from radiosity_addon.blender import runtime
+
+    solver = {
+        "method": "gauss-seidel",
+        "elements": 1200,
+        "links": 34000,
+        "rays": 5,
+        "iterations": 17,
+        "residual": 2.5e-5,
+        "independent_sets": [{"objects": ["A"]}, {"objects": ["B"]}],
+        "history": [{"seconds": 0.1}] * 100,
+    }
+    report = {"objects": [], "solver": solver, "seconds": {"solve": 1.0}, "warnings": []}
+    runtime.remember(bpy.context.scene, report, "")
+    assert "history" not in bpy.context.scene.radiosity.last_bake
+    figures = dict(runtime.last_bake(bpy.context.scene).figures)
+    assert figures["Method"] == "Gauss-Seidel"
+    assert figures["Iterations"] == "17"
+    assert figures["Residual"] == "2.5e-05"
+    assert figures["Separate parts"] == "2"
