@@ -33,7 +33,11 @@ usage: python3 build.py VERB [arguments]
   restore SCENE [options]    take a bake out of a .blend again
   test [--bpy VERSION] ...   run the tests; what follows goes to pytest
                              --bpy 4.2 or 5.2: with that bpy, in an environment of its own
+  bench [--case NAME] ...    measure against Cycles into bench/results and the README; --small tries
+                             all of it out in a minute
   check                      lint, layer rule and types
+  figures [--check] [NAME…]  compute the figures of docs/theory, or only assert their numbers
+  docs                       build docs/ to a static site in out/site
   package                    make the extension's zips in dist/, one a platform
   real-blender               install the Blender that the tests with a window use (root on Debian)
 """
@@ -49,7 +53,10 @@ def main(arguments: list[str]) -> int:
         "bake": bake,
         "restore": restore,
         "test": test,
+        "bench": bench,
         "check": check,
+        "figures": figures,
+        "docs": docs,
         "package": package,
         "real-blender": prepare_real_blender,
     }
@@ -57,7 +64,7 @@ def main(arguments: list[str]) -> int:
         print(f"build.py: error: no verb {verb!r}; there are {', '.join(verbs)}", file=sys.stderr)
         return 2
     try:
-        if rest and verb in ("package", "real-blender"):
+        if rest and verb in ("docs", "package", "real-blender"):
             raise BuildError(f"{verb} takes no arguments, got {rest[0]!r}")
         return verbs[verb](rest)
     except BuildError as error:
@@ -90,6 +97,11 @@ def test(arguments: list[str]) -> int:
     return environment.hand_over("-m", "pytest", *arguments)
 
 
+def bench(arguments: list[str]) -> int:
+    """Measure speed and accuracy, against Cycles' bake and with growing scenes."""
+    return environments.bench_environment(ROOT).hand_over("-m", "bench", *arguments)
+
+
 def check(arguments: list[str]) -> int:
     """Lint, layers and types; all are run even if one fails."""
     environment = environments.main_environment(ROOT)
@@ -105,6 +117,20 @@ def check(arguments: list[str]) -> int:
     ]
     print(f"check: {', '.join(failures)} failed" if failures else "check: ruff, layers and mypy are content")
     return 1 if failures else 0
+
+
+def figures(arguments: list[str]) -> int:
+    """Compute, check and draw the figures of the theory pages."""
+    return environments.docs_environment(ROOT).hand_over(str(ROOT / "docs" / "figures"), *arguments)
+
+
+def docs(_: list[str]) -> int:
+    """Build the documentation's site; a broken link fails."""
+    os.chdir(ROOT)
+    code = environments.docs_environment(ROOT).run("-m", "mkdocs", "build", "--strict")
+    if code == 0:
+        print(f"the site is in {ROOT / 'out' / 'site'}; open index.html")
+    return code
 
 
 def package(_: list[str]) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import shutil
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -25,10 +26,12 @@ class Environment:
     ----------
     root : the checkout, which commands import the project from
     folder : the virtual environment
+    beside : folders of further packages, which it imports too
     """
 
     root: Path
     folder: Path
+    beside: tuple[Path, ...] = ()
 
     @property
     def python(self) -> Path:
@@ -47,7 +50,7 @@ class Environment:
         return self.run(*arguments)
 
     def _variables(self) -> dict[str, str]:
-        paths = [str(self.root), *filter(None, [os.environ.get("PYTHONPATH")])]
+        paths = [str(self.root), *map(str, self.beside), *filter(None, [os.environ.get("PYTHONPATH")])]
         return {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
 
 
@@ -58,29 +61,55 @@ def main_environment(root: Path) -> Environment:
     if python not in BPY_OF_PYTHON:
         made_with = f"{python[0]}.{python[1]}"
         raise BuildError(f"{folder} was made with Python {made_with}; delete it and run this again")
-    return _ready(root, folder, BPY_OF_PYTHON[python])
+    return _with_bpy(root, folder, BPY_OF_PYTHON[python])
 
 
 def bpy_environment(root: Path, bpy: str) -> Environment:
     """`.envs/bpy-VERSION`, whose Python may be another than the caller's."""
     if bpy not in PYTHON_OF_BPY:
         raise BuildError(f"no pins for bpy {bpy}; there are {', '.join(PYTHON_OF_BPY)}")
-    return _ready(root, root / ".envs" / f"bpy-{bpy}", bpy)
+    return _with_bpy(root, root / ".envs" / f"bpy-{bpy}", bpy)
 
 
-def _ready(root: Path, folder: Path, bpy: str) -> Environment:
-    """Make or update the environment unless its stamp says that it holds these very pins."""
+def docs_environment(root: Path) -> Environment:
+    """`.envs/docs`, which draws the figures and builds the site: the solver's packages, but no bpy."""
+    folder = root / ".envs" / "docs"
+    version = _python_version(folder) or sys.version_info[:2]
+    return _ready(root, folder, [root / "requirements" / "docs.txt"], version, with_blender=False)
+
+
+def bench_environment(root: Path) -> Environment:
+    """The main environment, and beside it in `.envs/bench` what only the benchmarks need."""
+    main = main_environment(root)
+    pins, folder = root / "requirements" / "bench.txt", root / ".envs" / "bench"
+    stamp = folder / "pins.sha256"
+    wanted = hashlib.sha256(pins.read_bytes() + str(_python_version(main.folder)).encode()).hexdigest()
+    if not stamp.is_file() or stamp.read_text() != wanted:
+        shutil.rmtree(folder, ignore_errors=True)
+        # Their own dependencies would bring another NumPy than Blender's.
+        _install(main.folder, [pins], "--no-deps", "--target", str(folder))
+        stamp.write_text(wanted)
+    return Environment(root, main.folder, (folder,))
+
+
+def _with_bpy(root: Path, folder: Path, bpy: str) -> Environment:
     pins = [root / "requirements" / f"bpy-{bpy}.txt", root / "requirements" / "tools.txt"]
+    return _ready(root, folder, pins, PYTHON_OF_BPY[bpy], with_blender=True)
+
+
+def _ready(
+    root: Path, folder: Path, pins: list[Path], version: tuple[int, int], with_blender: bool
+) -> Environment:
+    """Make or update the environment unless its stamp says that it holds these very pins."""
     stamp = folder / "pins.sha256"
     wanted = hashlib.sha256(b"".join(path.read_bytes() for path in pins)).hexdigest()
-    version = PYTHON_OF_BPY[bpy]
     if _works(folder):
-        system.require(None, version)
+        system.require(None, version, with_blender)
         if stamp.is_file() and stamp.read_text() == wanted:
             return Environment(root, folder)
     else:
         python = system.find_python(version)
-        system.require(python, version)
+        system.require(python, version, with_blender)
         _create(folder, python)
     _install(folder, pins)
     # Last, so that an interrupted installation is taken up again by the next call.
@@ -94,11 +123,12 @@ def _create(folder: Path, python: str) -> None:
         raise BuildError(f"{python} could not make {folder} (its message is above); mend that, run again")
 
 
-def _install(folder: Path, pins: list[Path]) -> None:
+def _install(folder: Path, pins: list[Path], *how: str) -> None:
     names = " and ".join(path.name for path in pins)
-    print(f"installing the pinned packages of {names}, about 1 GB", file=sys.stderr, flush=True)
+    size = "1 GB" if any(path.name.startswith("bpy") for path in pins) else "250 MB"
+    print(f"installing the pinned packages of {names}, about {size}", file=sys.stderr, flush=True)
     command = [str(_interpreter(folder)), "-m", "pip", "install", "--disable-pip-version-check"]
-    command += ["--no-input"]
+    command += ["--no-input", *how]
     command += [] if sys.stderr.isatty() else ["-qq"]
     command += [word for path in pins for word in ("-r", str(path))]
     # What pip says belongs to the set-up, not to the verb's own output.

@@ -24,15 +24,17 @@ DEBIAN_PACKAGE_OF_LIBRARY = {
 }
 
 
-def require(python: str | None, version: tuple[int, int]) -> None:
+def require(python: str | None, version: tuple[int, int], with_blender: bool = True) -> None:
     """Raise a BuildError that names everything missing, and the one command that installs it.
 
     Parameters
     ----------
     python : the interpreter to make an environment with, None if there is one already
     version : its version
+    with_blender : whether bpy is to run, which links to the libraries
     """
-    missing = dict(DEBIAN_PACKAGE_OF_LIBRARY) if sys.platform.startswith("linux") else {}
+    needed = with_blender and sys.platform.startswith("linux")
+    missing = dict(DEBIAN_PACKAGE_OF_LIBRARY) if needed else {}
     missing = {library: package for library, package in missing.items() if not _loads(library)}
     if python is not None and not _makes_environments(python):
         missing[f"the venv module of {python}"] = f"python{version[0]}.{version[1]}-venv"

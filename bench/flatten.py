@@ -1,0 +1,97 @@
+"""The open scene as a bake sees it: plain triangles with one diffuse colour a material, lamps, an even sky.
+
+What is approximated on export (images by their means, gloss as matte) would count as our error against Cycles
+although no solver could help it. So both programs bake the scene after this: modifiers applied, instances
+real, every surface a Diffuse BSDF of the exported reflectance, with an emission where it glows.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from radiosity_addon.bake_scene import BakeObject
+from radiosity_addon.blender.export import export_scene
+from radiosity_addon.settings import BakeSettings
+from radiosity_addon.solver.lights import EnvironmentLight
+from radiosity_addon.solver.scene import Scene
+
+
+def flatten(sky: tuple[float, float, float] | None) -> None:
+    """Replace the open scene's meshes and materials; `sky` lights it instead of the sky it has."""
+    scene = bpy.context.scene
+    bake_scene = export_scene(bpy.context, BakeSettings()).bake_scene
+    solved = bake_scene.scene
+    even = [light.radiance for light in solved.lights if isinstance(light, EnvironmentLight)]
+    _set_sky(scene, sky or (tuple(np.broadcast_to(even[0], 3)) if even else (0.0, 0.0, 0.0)))
+    lamps = [obj for obj in scene.objects if obj.type == "LIGHT" and not obj.hide_render]
+    places = [obj.matrix_world.copy() for obj in lamps]
+    for obj in list(bpy.data.objects):
+        if obj not in lamps:
+            bpy.data.objects.remove(obj)
+    for lamp, place in zip(lamps, places, strict=True):
+        lamp.parent = None
+        lamp.matrix_world = place
+    materials: dict[tuple[float, ...], bpy.types.Material] = {}
+    for item in bake_scene.objects:
+        if item.count:
+            _add(scene, item, solved, materials)
+
+
+def _add(
+    scene: bpy.types.Scene,
+    item: BakeObject,
+    solved: Scene,
+    materials: dict[tuple[float, ...], bpy.types.Material],
+) -> None:
+    triangles = solved.triangles[item.rows]
+    mesh = bpy.data.meshes.new(item.name)
+    faces = np.arange(3 * len(triangles)).reshape(-1, 3)
+    mesh.from_pydata(triangles.reshape(-1, 3).tolist(), [], faces.tolist())
+    surfaces = np.concatenate([solved.reflectance[item.rows], solved.emission[item.rows]], axis=1)
+    kinds, which = np.unique(np.round(surfaces, 6), axis=0, return_inverse=True)
+    for kind in kinds:
+        mesh.materials.append(_material(tuple(float(v) for v in kind), materials))
+    mesh.polygons.foreach_set("material_index", which.ravel().astype(np.int32))
+    normals, flat = solved.normals[item.rows], solved.face_normals[item.rows, None]
+    if np.abs(normals - flat).max() > 1e-4:
+        mesh.polygons.foreach_set("use_smooth", np.ones(len(triangles), dtype=bool))
+        mesh.normals_split_custom_set(normals.reshape(-1, 3).tolist())
+    mesh.update()
+    scene.collection.objects.link(bpy.data.objects.new(item.name, mesh))
+
+
+def _material(
+    surface: tuple[float, ...], materials: dict[tuple[float, ...], bpy.types.Material]
+) -> bpy.types.Material:
+    """Return the material of a reflectance and an emission [W/m²]."""
+    if surface in materials:
+        return materials[surface]
+    material = bpy.data.materials.new("Surface")
+    if bpy.app.version < (5, 0):
+        material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    output, diffuse = tree.nodes.new("ShaderNodeOutputMaterial"), tree.nodes.new("ShaderNodeBsdfDiffuse")
+    diffuse.inputs["Color"].default_value = (*surface[:3], 1.0)
+    shader = diffuse
+    strength = max(surface[3:]) / np.pi
+    if strength > 0:
+        glow, shader = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeAddShader")
+        glow.inputs["Color"].default_value = (*(value / max(surface[3:]) for value in surface[3:]), 1.0)
+        glow.inputs["Strength"].default_value = strength
+        tree.links.new(diffuse.outputs[0], shader.inputs[0])
+        tree.links.new(glow.outputs[0], shader.inputs[1])
+    tree.links.new(shader.outputs[0], output.inputs["Surface"])
+    materials[surface] = material
+    return material
+
+
+def _set_sky(scene: bpy.types.Scene, radiance: tuple[float, ...]) -> None:
+    world = bpy.data.worlds.new("Even Sky")
+    if bpy.app.version < (5, 0):
+        world.use_nodes = True
+    background = next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
+    background.inputs["Color"].default_value = (*radiance, 1.0)
+    background.inputs["Strength"].default_value = 1.0
+    scene.world = world

@@ -1,0 +1,1 @@
+"""An office with windows, lamps, furniture and plants, built by this package alone."""

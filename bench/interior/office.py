@@ -1,0 +1,238 @@
+"""The office put together as a Blender scene: a room of 10 m × 7 m, its lamps, its sky and a camera."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import bpy
+import numpy as np
+
+from . import furniture
+from .shapes import Shape, box, join, polygon, wall_with_holes
+
+WIDTH, DEPTH, HEIGHT = 10.0, 7.0, 2.9
+WINDOWS = tuple((x, 0.9, x + 1.8, 2.5) for x in (0.7, 3.0, 5.3, 7.6))
+"""x₀, z₀, x₁, z₁ in the wall y = 0."""
+REVEAL = 0.25
+
+DESKS = tuple((x, y) for y in (1.7, 3.7) for x in (1.6, 4.0, 6.4))
+TABLE = (8.3, 5.0)
+PANELS = tuple((x, y) for y in (1.8, 4.4) for x in (1.8, 4.4, 7.0))
+
+SKY = (2.6, 3.4, 4.6)
+"""Radiance [W/m²/sr]."""
+PANEL_POWER, DESK_LAMP_POWER, BULB_RADIANCE, SCREEN_RADIANCE = 55.0, 4.0, 90.0, 1.5
+
+COLOURS = {
+    "Wall": (0.76, 0.74, 0.70),
+    "Accent": (0.30, 0.42, 0.50),
+    "Ceiling": (0.82, 0.82, 0.82),
+    "Floor": (0.36, 0.25, 0.16),
+    "Carpet": (0.42, 0.16, 0.13),
+    "Oak": (0.48, 0.33, 0.19),
+    "White": (0.74, 0.74, 0.73),
+    "Paper": (0.68, 0.63, 0.54),
+    "Steel": (0.45, 0.46, 0.48),
+    "Black": (0.05, 0.05, 0.055),
+    "Blue Cloth": (0.08, 0.16, 0.36),
+    "Green": (0.14, 0.30, 0.17),
+    "Leaf": (0.10, 0.32, 0.07),
+    "Clay": (0.52, 0.27, 0.18),
+    "Red": (0.55, 0.09, 0.06),
+    "Yellow": (0.72, 0.50, 0.10),
+}
+GLOWS = {"Bulb": BULB_RADIANCE, "Screen": SCREEN_RADIANCE}
+
+
+def build_office(detail: float = 1.0) -> bpy.types.Scene:
+    """Fill the empty open file.
+
+    Parameters
+    ----------
+    detail : float
+        1 for 39,000 triangles; less makes round things coarser and leaves furniture out.
+    """
+    scene = bpy.context.scene
+    scene.name = "Office"
+    materials = {name: _diffuse(name, colour) for name, colour in COLOURS.items()}
+    materials |= {name: _glowing(name, radiance) for name, radiance in GLOWS.items()}
+    for name, shape in _pieces(detail):
+        _add_mesh(scene, name, shape, materials)
+    _add_lamps(scene, detail)
+    _add_sky(scene)
+    _add_camera(scene)
+    return scene
+
+
+def _pieces(detail: float) -> Iterator[tuple[str, Shape]]:
+    """Yield every object's name and shape."""
+    random = np.random.default_rng(4)
+    around = max(6, 2 * round(12 * detail**0.5))
+    yield from _room()
+    for number, (x, y) in enumerate(_some(DESKS, detail)):
+        top = 0.74
+        yield f"Desk {number}", furniture.desk().at(x, y)
+        turn = random.uniform(-35, 35)
+        chair = furniture.office_chair(around).turned(turn)
+        yield f"Chair {number}", chair.at(x + random.uniform(-0.15, 0.05), y - 0.75)
+        yield f"Monitor {number}", furniture.monitor().at(x - 0.1, y + 0.2, top)
+        things = [furniture.keyboard(around).at(x - 0.1, y - 0.12, top)]
+        things.append(furniture.mug(min(around, 16)).at(x + 0.35, y - 0.05, top))
+        papers = box("Paper", (0.21, 0.3, 0.012 + 0.05 * random.random()), False)
+        things.append(papers.turned(random.uniform(-20, 20)).at(x - 0.58, y - 0.1, top))
+        yield f"On Desk {number}", join(things)
+        if number % 2 == 0:
+            yield f"Desk Lamp {number}", furniture.desk_lamp(around).at(x - 0.7, y + 0.25, top)
+    for number in range(3 if detail >= 0.5 else 1):
+        case = (
+            furniture.bookcase(random, max(1, round(5 * detail)))
+            .turned(180)
+            .at(3.1 + 1.05 * number, DEPTH - 0.002)
+        )
+        yield f"Bookcase {number}", case
+    yield "Pendant", furniture.pendant(2 * around).at(*TABLE, HEIGHT)
+    if detail < 0.5:
+        return
+    places = ((9.4, 0.7), (0.6, 6.3), (6.6, 6.4))
+    for number, (x, y) in enumerate(_some(places, detail)):
+        yield f"Plant {number}", furniture.plant(random, max(4, round(46 * detail))).at(x, y)
+    yield "Round Table", furniture.round_table(2 * around).at(*TABLE)
+    for number, angle in enumerate(_some((20, 110, 200, 290), detail)):
+        seat = furniture.office_chair(around).turned(90).at(x=0.95).turned(angle)
+        yield f"Visitor Chair {number}", seat.at(*TABLE)
+    yield "Sofa", furniture.sofa(around).turned(-90).at(0.5, 4.9)
+    for number, window in enumerate(_some(WINDOWS, detail)):
+        x = (window[0] + window[2]) / 2
+        yield f"Radiator {number}", furniture.radiator(max(4, round(18 * detail))).at(x, 0.1)
+        if number % 2:
+            yield f"Blind {number}", furniture.blind(24, 1.76).at(x, -0.06, 2.49)
+    yield "Bin", furniture.waste_bin(around).at(2.75, 1.9)
+    yield "Picture", furniture.picture(1.4, 0.9, "Yellow").turned(90).at(WIDTH, 3.4, 1.2)
+    yield "Door", furniture.door().turned(90).at(WIDTH - 0.001, 6.1)
+
+
+def _room() -> Iterator[tuple[str, Shape]]:
+    """Yield the shell, single faces that meet at their edges, seen from inside, and what is built in.
+
+    Nothing lies in the shell's planes: it stands a millimetre off, or goes a centimetre through.
+    """
+    x, y, z = WIDTH, DEPTH, HEIGHT
+    yield "Floor", polygon("Floor", (0, 0, 0), (x, 0, 0), (x, y, 0), (0, y, 0))
+    yield "Ceiling", polygon("Ceiling", (0, 0, z), (0, y, z), (x, y, z), (x, 0, z))
+    yield "Back Wall", polygon("Wall", (0, y, 0), (x, y, 0), (x, y, z), (0, y, z))
+    yield "Left Wall", polygon("Accent", (0, 0, 0), (0, y, 0), (0, y, z), (0, 0, z))
+    yield "Right Wall", polygon("Wall", (x, 0, 0), (x, 0, z), (x, y, z), (x, y, 0))
+    yield "Window Wall", join([wall_with_holes("Wall", x, z, WINDOWS), *map(_reveal, WINDOWS)])
+    frames = []
+    for x_0, z_0, x_1, z_1 in WINDOWS:
+        middle, width, height = (x_0 + x_1) / 2, x_1 - x_0, z_1 - z_0
+        upright = box("White", (0.06, 0.06, height + 0.02))
+        across = box("White", (width + 0.02, 0.05, 0.06))
+        frames += [upright.at(left, -0.2, z_0 - 0.01) for left in (x_0 + 0.031, middle, x_1 - 0.031)]
+        frames += [across.at(middle, -0.2, low) for low in (z_0 + 0.001, z_1 - 0.061)]
+        frames.append(box("White", (width + 0.1, 0.2, 0.03)).at(middle, 0.101, z_0 - 0.04))
+    yield "Window Frames", join(frames)
+    yield "Pillar", box("Wall", (0.4, 0.4, HEIGHT + 0.01), bottom=False).at(7.9, 2.9)
+    yield "Carpet", box("Carpet", (2.8, 2.6, 0.015), bottom=False).at(*TABLE)
+    yield "Housings", join([furniture.lamp_housing().at(*at, HEIGHT) for at in PANELS])
+
+
+def _reveal(window: tuple[float, float, float, float]) -> Shape:
+    """Return the four inner sides of a window's opening."""
+    x_0, z_0, x_1, z_1 = window
+    d = -REVEAL
+    return join(
+        [
+            polygon("Wall", (x_0, d, z_0), (x_1, d, z_0), (x_1, 0, z_0), (x_0, 0, z_0)),
+            polygon("Wall", (x_0, 0, z_1), (x_1, 0, z_1), (x_1, d, z_1), (x_0, d, z_1)),
+            polygon("Wall", (x_0, 0, z_0), (x_0, 0, z_1), (x_0, d, z_1), (x_0, d, z_0)),
+            polygon("Wall", (x_1, d, z_0), (x_1, d, z_1), (x_1, 0, z_1), (x_1, 0, z_0)),
+        ]
+    )
+
+
+def _some(places: tuple, detail: float) -> tuple:
+    return places[: max(1, round(len(places) * min(detail, 1.0)))]
+
+
+def _add_mesh(
+    scene: bpy.types.Scene, name: str, shape: Shape, materials: dict[str, bpy.types.Material]
+) -> None:
+    used = list(dict.fromkeys(shape.paint))
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(shape.vertices.tolist(), [], shape.faces)
+    for paint in used:
+        mesh.materials.append(materials[paint])
+    mesh.polygons.foreach_set("material_index", [used.index(paint) for paint in shape.paint])
+    mesh.update()
+    scene.collection.objects.link(bpy.data.objects.new(name, mesh))
+
+
+def _add_lamps(scene: bpy.types.Scene, detail: float) -> None:
+    for number, (x, y) in enumerate(PANELS):
+        lamp = bpy.data.lights.new("Panel", "AREA")
+        lamp.shape, lamp.size, lamp.size_y = "RECTANGLE", 1.2, 0.28
+        lamp.energy, lamp.color = PANEL_POWER, (1.0, 0.9, 0.76)
+        _add(scene, f"Panel {number}", lamp, (x, y, HEIGHT - 0.061))
+    for number, (x, y) in enumerate(_some(DESKS, detail)):
+        if number % 2 == 0:
+            lamp = bpy.data.lights.new("Desk Lamp", "POINT")
+            lamp.energy, lamp.shadow_soft_size, lamp.color = DESK_LAMP_POWER, 0.03, (1.0, 0.8, 0.55)
+            _add(scene, f"Bulb {number}", lamp, (x - 0.4, y + 0.25, 0.74 + 0.45))
+
+
+def _add(
+    scene: bpy.types.Scene, name: str, data: bpy.types.ID, place: tuple[float, float, float]
+) -> bpy.types.Object:
+    obj = bpy.data.objects.new(name, data)
+    obj.location = place
+    scene.collection.objects.link(obj)
+    return obj
+
+
+def _add_sky(scene: bpy.types.Scene) -> None:
+    world = bpy.data.worlds.new("Sky")
+    if bpy.app.version < (5, 0):
+        world.use_nodes = True
+    background = next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
+    background.inputs["Color"].default_value = (*SKY, 1.0)
+    background.inputs["Strength"].default_value = 1.0
+    scene.world = world
+
+
+def _add_camera(scene: bpy.types.Scene) -> None:
+    camera = bpy.data.cameras.new("Camera")
+    camera.lens = 19.0
+    obj = _add(scene, "Camera", camera, (0.35, 6.75, 1.75))
+    obj.rotation_euler = (np.radians(80), 0.0, np.radians(-127))
+    scene.camera = obj
+    scene.view_settings.view_transform = "Standard"
+    scene.view_settings.look = "None"
+    scene.view_settings.exposure = -1.0
+    scene.render.resolution_x, scene.render.resolution_y = 960, 600
+
+
+def _diffuse(name: str, colour: tuple[float, float, float]) -> bpy.types.Material:
+    return _material(name, "ShaderNodeBsdfDiffuse", colour)
+
+
+def _glowing(name: str, radiance: float) -> bpy.types.Material:
+    colour = (0.6, 0.8, 1.0) if name == "Screen" else (1.0, 0.78, 0.5)
+    material = _material(name, "ShaderNodeEmission", colour)
+    next(node for node in material.node_tree.nodes if node.type == "EMISSION").inputs[
+        "Strength"
+    ].default_value = radiance
+    return material
+
+
+def _material(name: str, kind: str, colour: tuple[float, float, float]) -> bpy.types.Material:
+    material = bpy.data.materials.new(name)
+    if bpy.app.version < (5, 0):
+        material.use_nodes = True
+    material.diffuse_color = (*colour, 1.0)
+    tree = material.node_tree
+    tree.nodes.clear()
+    output, shader = tree.nodes.new("ShaderNodeOutputMaterial"), tree.nodes.new(kind)
+    shader.inputs["Color"].default_value = (*colour, 1.0)
+    tree.links.new(shader.outputs[0], output.inputs["Surface"])
+    return material

@@ -1,0 +1,39 @@
+"""The lightmap UVs that both bakers use."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from radiosity_addon.bake_scene import LIGHTMAP_UV_LAYER
+from radiosity_addon.blender.export import export_scene
+from radiosity_addon.lightmap.atlas import AtlasInput, run_atlas
+from radiosity_addon.settings import BakeSettings
+
+
+def lay_out(resolution: int) -> dict[str, np.ndarray]:
+    """Return each object's lightmap UVs by mesh corner, as a bake of the open scene lays them out."""
+    export = export_scene(bpy.context, BakeSettings(resolution=resolution))
+    bake_scene = export.bake_scene
+    baked = [item for item in bake_scene.objects if item.bake]
+    inputs = [AtlasInput(item.name, bake_scene.scene.triangles[item.rows], item.polygon) for item in baked]
+    layout = {}
+    for item, placed in zip(baked, run_atlas(inputs, resolution).objects, strict=True):
+        corners = np.zeros((len(bpy.data.objects[item.name].data.loops), 2), dtype=np.float32)
+        corners[item.loops] = placed.uv
+        layout[item.name] = corners
+    return layout
+
+
+def write_layout(uv: dict[str, np.ndarray]) -> None:
+    """Give the scene's meshes this UV layer, and make it the active one."""
+    for name, corners in uv.items():
+        layers = bpy.data.objects[name].data.uv_layers
+        layer = layers.get(LIGHTMAP_UV_LAYER) or layers.new(name=LIGHTMAP_UV_LAYER)
+        layer.data.foreach_set("uv", np.ascontiguousarray(corners, dtype=np.float32).ravel())
+        layer.active = True
+
+
+def objects_with_layout(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """Return the meshes that are baked."""
+    return [obj for obj in scene.objects if obj.type == "MESH" and LIGHTMAP_UV_LAYER in obj.data.uv_layers]

@@ -1,0 +1,149 @@
+"""The single measurements, each the work of a process of its own."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Generator, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+
+class Stopwatch:
+    """Wall-clock and processor time of one block."""
+
+    def __init__(self) -> None:
+        self.figures: dict[str, float] = {}
+
+    @contextmanager
+    def running(self) -> Iterator[None]:
+        wall, processor = time.perf_counter(), time.process_time()
+        yield
+        self.figures = {
+            "seconds": time.perf_counter() - wall,
+            "cpu_seconds": time.process_time() - processor,
+        }
+
+
+def prepare(job: dict[str, Any]) -> dict[str, Any]:
+    from .prepare import prepare as prepare_case
+
+    return prepare_case(job)
+
+
+def cycles(job: dict[str, Any]) -> dict[str, Any]:
+    """Bake with Cycles: `samples`, `seed`; the pixels go to `pixels`."""
+    from . import cycles as baking
+    from .prepare import case_of, open_prepared
+
+    case = case_of(job)
+    scene = open_prepared(Path(job["folder"]))
+    baking.set_up(scene, job["threads"])
+    watch = Stopwatch()
+    with watch.running():
+        pixels = baking.bake_light(scene, case.resolution, job["samples"], job["seed"])
+    save_whole(Path(job["pixels"]), pixels)
+    return watch.figures
+
+
+def ours(job: dict[str, Any]) -> dict[str, Any]:
+    """Bake with the add-on: `run` holds the settings; the pixels go to `pixels`."""
+    import bpy
+
+    from radiosity_addon.blender.export import export_scene
+    from radiosity_addon.pipeline import bake
+
+    from .prepare import case_of, open_prepared
+
+    settings = settings_of(
+        job["run"], resolution=case_of(job).resolution, threads=job["threads"], keep_uvs=True
+    )
+    open_prepared(Path(job["folder"]))
+    watch = Stopwatch()
+    with watch.running():
+        bake_scene = export_scene(bpy.context, settings).bake_scene
+        result, leaves = exhaust(bake(bake_scene, settings))
+    if len(result.pages) != 1 or any(
+        not np.array_equal(placed.uv, placed.object.uv) for placed in result.objects
+    ):
+        raise RuntimeError("the bake did not keep the layout: its texels are others than Cycles'")
+    save_whole(Path(job["pixels"]), result.pages[0].pixels)
+    return {**watch.figures, **solver_figures(result.solver, leaves), "stages": result.seconds,
+            "warnings": [warning.message for warning in result.warnings]}  # fmt: skip
+
+
+def oidn(job: dict[str, Any]) -> dict[str, Any]:
+    """Denoise a bake of Cycles'; the pixels of both filters go to `pixels`."""
+    from .oidn import denoised
+
+    noisy = np.load(job["noisy"])
+    coverage = np.load(job["texels"])["compared"] | (noisy.max(axis=2) > 0)
+    found: dict[str, Any] = {"filters": {}}
+    pages = {}
+    for name in ("RTLightmap", "RT"):
+        watch = Stopwatch()
+        with watch.running():
+            pages[name] = denoised(noisy, coverage, name)
+        found["filters"][name] = watch.figures
+    np.savez(job["pixels"], **pages)
+    return found
+
+
+def room(job: dict[str, Any]) -> dict[str, Any]:
+    """Solve a closed room of `triangles`, or bake it where there is a `resolution`."""
+    from . import rooms
+
+    settings = settings_of({"quality": job["quality"]}, threads=job["threads"], keep_uvs=True,
+                           resolution=job.get("resolution", 64))  # fmt: skip
+    work: Callable[..., dict[str, Any]] = rooms.bake_room if "resolution" in job else rooms.solve_room
+    return work(job["triangles"], settings)
+
+
+TASKS = {"prepare": prepare, "cycles": cycles, "ours": ours, "oidn": oidn, "room": room}
+
+
+def settings_of(run: dict[str, Any], **more: Any) -> Any:
+    """Return the `BakeSettings` of one of our bakes; what it says of solver and gather becomes the preset."""
+    from radiosity_addon import quality
+    from radiosity_addon.settings import BakeSettings
+
+    given = {name: value for name, value in run.items() if name not in ("solver", "gather")}
+    settings = BakeSettings(**given, **more)
+    preset = quality.QUALITIES[settings.quality]
+    solver, gather = replace(preset.solver, **run.get("solver", {})), run.get("gather", {})
+    gather = {name: tuple(value) if isinstance(value, list) else value for name, value in gather.items()}
+    quality.QUALITIES[settings.quality] = replace(
+        preset, solver=solver, gather=replace(preset.gather, **gather)
+    )
+    return settings
+
+
+def exhaust(steps: Generator[Any, None, Any]) -> tuple[Any, int]:
+    """Run a bake; return its result and the number of leaf elements its last picture shows."""
+    leaves = 0
+    while True:
+        try:
+            progress = next(steps)
+        except StopIteration as done:
+            return done.value, leaves
+        if progress.picture is not None:
+            leaves = len(progress.picture)
+
+
+def solver_figures(report: dict[str, Any], leaves: int) -> dict[str, Any]:
+    """Return what the results keep of a solver's report."""
+    names = ("elements", "links", "rays", "iterations", "residual", "closure_area_mean", "power_W",
+             "estimated_error", "over_budget")  # fmt: skip
+    kept = {name: report[name] for name in names if name in report}
+    leaves = leaves or report.get("leaves", 0)
+    return {**kept, "leaves": leaves, "links_per_leaf": report["links"] / max(leaves, 1)}
+
+
+def save_whole(path: Path, pixels: np.ndarray) -> None:
+    """Write an array so that a file that is there is complete."""
+    aside = path.with_name(f".{path.name}.part.npy")
+    np.save(aside, pixels.astype(np.float32))
+    aside.replace(path)

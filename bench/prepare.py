@@ -1,0 +1,104 @@
+"""Making a case's scene file: built or opened, laid out, and which of its texels are compared."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+from radiosity_addon.bake_scene import LIGHTMAP_UV_LAYER
+from radiosity_addon.blender.cornell import build_cornell_box
+from radiosity_addon.blender.export import export_scene
+from radiosity_addon.blender.files import empty_scene, open_scene
+from radiosity_addon.lightmap.rasterise import rasterise
+from radiosity_addon.settings import BakeSettings
+from tests.golden import cornell_reference
+
+from . import cycles
+from .cases import CASES, SMALL_CASES, Case, Lamp
+from .flatten import flatten
+from .interior.office import build_office
+from .layout import lay_out, write_layout
+
+SCENE, TEXELS = "scene.blend", "texels.npz"
+
+
+def case_of(job: dict[str, Any]) -> Case:
+    """Return the case a job names."""
+    return (SMALL_CASES if job["small"] else CASES)[job["case"]]
+
+
+def reference_path(folder: Path, samples: int, seed: int) -> Path:
+    """Return where a reference is kept."""
+    return folder / f"reference-{samples}-bounces-{cycles.BOUNCES}-seed-{seed}.npy"
+
+
+def prepare(job: dict[str, Any]) -> dict[str, Any]:
+    """Write a case's scene, with its UV layer, and its compared texels into `job["folder"]`."""
+    case, folder = case_of(job), Path(job["folder"])
+    golden = _build(case)
+    layout = golden.uv if golden is not None else lay_out(case.resolution)
+    write_layout(layout)
+    folder.mkdir(parents=True, exist_ok=True)
+    bpy.context.preferences.filepaths.save_version = 0
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / SCENE), compress=True)
+    triangle, uv = _centre_inside(case)
+    scene = bpy.context.scene
+    cycles.set_up(scene, job["threads"])
+    compared = (triangle >= 0) & cycles.covered(scene, case.resolution)
+    if golden is not None:
+        for seed, pixels in enumerate((golden.first, golden.second), start=1):
+            np.save(reference_path(folder, 2048, seed), pixels)
+    # Last: that it is there means that all is.
+    np.savez_compressed(folder / TEXELS, compared=compared, triangle=triangle, triangles=len(uv))
+    return {"texels": int(compared.sum()), "triangles": len(uv)}
+
+
+def _build(case: Case) -> cornell_reference.Reference | None:
+    """Have the case as the open scene; return the layout and references that are there already."""
+    if case.builder == "cornell":
+        empty_scene()
+        build_cornell_box()
+        golden = cornell_reference.load()
+        return golden if golden.resolution == case.resolution else None
+    if case.builder == "interior":
+        empty_scene()
+        build_office(**case.parameters)
+        return None
+    assert case.file is not None
+    open_scene(case.file)
+    if case.lamp is not None:
+        _add_lamp(case.lamp)
+    flatten(case.sky)
+    return None
+
+
+def _add_lamp(lamp: Lamp) -> None:
+    data = bpy.data.lights.new("Added", lamp.kind)
+    data.energy, data.shadow_soft_size = lamp.energy, lamp.radius
+    obj = bpy.data.objects.new("Added", data)
+    obj.location = lamp.place
+    bpy.context.scene.collection.objects.link(obj)
+
+
+def _centre_inside(case: Case) -> tuple[np.ndarray, np.ndarray]:
+    """Return (n, n) the reflecting triangle over a texel's centre, −1 for none; and the triangles' UVs."""
+    scene = export_scene(bpy.context, BakeSettings(resolution=case.resolution, keep_uvs=True)).bake_scene
+    uv = np.concatenate(
+        [np.zeros((item.count, 3, 2), np.float32) if item.uv is None else item.uv for item in scene.objects]
+    )
+    texels = rasterise(uv, case.resolution)
+    inside = texels.centre_inside & (scene.scene.reflectance[texels.triangle].min(axis=1) > 0)
+    triangle = np.full((case.resolution, case.resolution), -1, dtype=np.int32)
+    triangle[texels.row[inside], texels.column[inside]] = texels.triangle[inside]
+    return triangle, uv
+
+
+def open_prepared(folder: Path) -> bpy.types.Scene:
+    """Open a case's scene file."""
+    open_scene(folder / SCENE)
+    scene = bpy.context.scene
+    assert any(LIGHTMAP_UV_LAYER in o.data.uv_layers for o in scene.objects if o.type == "MESH")
+    return scene
