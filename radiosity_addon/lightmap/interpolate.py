@@ -18,7 +18,7 @@ from ..solver.arrays import Array
 from ..solver.parallel import chunk_steps
 from ..solver.steps import drain
 from ..solver.visibility import RayCaster
-from .point_grid import PointGrid
+from .point_grid import NONE, PointGrid
 from .texel_geometry import TexelGeometry
 
 REACH = 0.35
@@ -70,40 +70,45 @@ class GatherPoints:
         self.closeness = np.concatenate([self.closeness, closeness])
 
     def pairs(self, texels: Array) -> tuple[Array, Array]:
-        """Return rows of `texels` and gather points of all levels around them, sorted by row, then point.
+        """Return rows of `texels` and gather points of all levels around them, sorted by row.
 
         In the world, not on the page: the next chart or object goes on where one ends.
         """
         position, normal = self._geometry.position[texels], self._geometry.normal[texels]
+        found = np.concatenate([grid.near(position, normal) for grid in self._grids], axis=1)
+        # Its own point each texel has, should others crowd it out of its cell.
         own = self._number[texels]
-        keys = [np.flatnonzero(own >= 0) * len(self) + own[own >= 0]]
-        for grid in self._grids:
-            found = grid.near(position, normal)
-            row, column = np.nonzero(found >= 0)
-            keys.append(row * len(self) + found[row, column])
-        return np.divmod(np.unique(np.concatenate(keys)), max(len(self), 1))
+        own[(found == own[:, None]).any(axis=1)] = NONE
+        found = np.concatenate([own[:, None], found], axis=1)
+        row, column = np.nonzero(found != NONE)
+        return row, found[row, column]
 
     def kernel(self, texels: Array, point: Array) -> Array:
         """Return (p,) weights in [0, 1] of gather points for texels (p,), pair by pair; 0 out of reach."""
         geometry = self._geometry
-        of = self.texel[point]
-        along = geometry.position[of] - geometry.position[texels]
-        turn = np.einsum("pk,pk->p", geometry.normal[of], geometry.normal[texels])
+        of = self.texel.take(point)
+        along = geometry.position.take(of, axis=0) - geometry.position.take(texels, axis=0)
         distance = np.sqrt(np.einsum("pk,pk->p", along, along))
-        bend = np.sqrt(np.maximum(1.0 - turn, 0.0))
-        weight = np.maximum(1.0 - (distance * self.closeness[point] + bend) / REACH, 0.0) ** 2
+        change = distance * self.closeness.take(point)
         # A texel that geometry cuts in two speaks for itself alone, and nobody for it.
-        other = of != texels
-        weight[other & (self._crossed[of] | self._crossed[texels])] = 0.0
-        row = np.flatnonzero((weight > 0) & other)
+        apart = self._crossed.take(of) | self._crossed.take(texels)
+        weight = np.where(of == texels, np.maximum(1.0 - change / REACH, 0.0) ** 2, 0.0)
+        row = np.flatnonzero((of != texels) & (change < REACH) & ~apart)
+        start, end = texels.take(row), of.take(row)
+        normal, other = geometry.normal.take(start, axis=0), geometry.normal.take(end, axis=0)
+        bend = np.sqrt(np.maximum(1.0 - np.einsum("pk,pk->p", normal, other), 0.0))
+        spoken = np.maximum(1.0 - (change[row] + bend) / REACH, 0.0) ** 2
         # Over a bulge the straight line dips below the surface, by an eighth of the distance
         # times the turn of the normal: start and end that much higher.
-        lift = LIFT * self._caster.surface_offset + SAGITTA * (distance * bend)[row]
-        start = geometry.position[texels[row]] + lift[:, None] * geometry.normal[texels[row]]
-        end = geometry.position[of[row]] + lift[:, None] * geometry.normal[of[row]]
-        length = np.linalg.norm(end - start, axis=1)
-        directions = (end - start) / np.maximum(length, 1e-300)[:, None]
-        weight[row] *= self._caster.visible(start, directions, length)
+        lift = LIFT * self._caster.surface_offset + SAGITTA * distance[row] * bend
+        begin = geometry.position.take(start, axis=0) + lift[:, None] * normal
+        directions = along.take(row, axis=0) + lift[:, None] * (other - normal)
+        length = np.sqrt(np.einsum("pk,pk->p", directions, directions))
+        directions /= np.maximum(length, 1e-300)[:, None]
+        heard = spoken > 0
+        weight[row[heard]] = spoken[heard] * self._caster.visible(
+            begin[heard], directions[heard], length[heard]
+        )
         return np.asarray(weight)
 
     def support(self, texels: Array) -> Array:
