@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..solver.arrays import Array
-from ..solver.parallel import chunk_steps
+from ..solver.parallel import chunk_steps, for_chunks
 from ..solver.steps import drain
 from ..solver.visibility import RayCaster
 from .point_grid import NONE, PointGrid
@@ -145,11 +145,20 @@ class Interpolation:
     point: Array
     weight: Array
 
-    def __call__(self, values: Array) -> Array:
+    def __call__(self, values: Array, threads: int = 1) -> Array:
         """Carry (g, k) values of the gather points to (n, k) of the texels."""
         result = np.empty((len(self.first), values.shape[1]))
-        for channel in range(values.shape[1]):
-            result[:, channel] = np.add.reduceat(values[self.point, channel] * self.weight, self.first)
+        ends = np.append(self.first, len(self.point))
+        columns = [np.ascontiguousarray(values[:, channel]) for channel in range(values.shape[1])]
+
+        def spread(rows: slice) -> None:
+            entries = slice(ends[rows.start], ends[rows.stop])
+            point, weight = self.point[entries].astype(np.intp), self.weight[entries]
+            first = self.first[rows] - entries.start
+            for channel, column in enumerate(columns):
+                result[rows, channel] = np.add.reduceat(column.take(point) * weight, first)
+
+        for_chunks(spread, len(self.first), CHUNK, threads)
         return result
 
     def any_of(self, chosen: Array) -> Array:

@@ -62,7 +62,7 @@ def reconstruct(
     scene: Scene, local: LocalPass, geometry: TexelGeometry, settings: GatherSettings
 ) -> Generator[float, None, TexelLight]:
     """Compute direct and indirect irradiance of all texels; yields the fraction done."""
-    lamps = yield from scaled(local.direct_steps(footprints(geometry)), 0.0, DIRECT)
+    lamps = yield from scaled(local.direct_steps(footprints(geometry, local)), 0.0, DIRECT)
     found = crossing_steps(geometry, local.caster, local.threads)
     crossings = Crossings(geometry, local.caster, (yield from scaled(found, DIRECT, CROSSED)))
     resolve = _resolver(local, geometry, crossings)
@@ -74,14 +74,15 @@ def reconstruct(
     return light
 
 
-def footprints(geometry: TexelGeometry) -> Footprints:
-    """Return where all texels ask for light."""
+def footprints(geometry: TexelGeometry, local: LocalPass) -> Footprints:
+    """Return where all texels ask for light, and how much the elements lead them to expect."""
     return Footprints(
         geometry.position,
         geometry.normal,
         np.arange(len(geometry)),
         geometry.sample,
         geometry.neighbourhood,
+        expected=local.irradiance_at(geometry.triangle, geometry.barycentric),
     )
 
 

@@ -139,15 +139,22 @@ class TexelGeometry:
 
     def neighbourhood(self, chosen: Array) -> Array:
         """Grow a (n,) mask of texels by one texel in all eight directions of their page."""
-        grown = np.zeros(len(self), dtype=bool)
-        for numbers in self.index:
-            inside = numbers != NO_TEXEL
-            image = np.zeros(np.array(numbers.shape) + 2, dtype=bool)
-            image[1:-1, 1:-1][inside] = chosen[numbers[inside]]
+        grown = np.empty(len(self), dtype=bool)
+        for page, (numbers, inside) in enumerate(zip(self.index, self._framed, strict=True)):
+            mine = slice(self._first[page], self._first[page + 1])
+            image = np.zeros((len(numbers) + 2, numbers.shape[1] + 2), dtype=bool)
+            image.ravel()[inside] = chosen[mine]
             image[1:-1] = image[1:-1] | image[:-2] | image[2:]
             image[:, 1:-1] = image[:, 1:-1] | image[:, :-2] | image[:, 2:]
-            grown[numbers[inside]] = image[1:-1, 1:-1][inside]
+            grown[mine] = image.ravel().take(inside)
         return grown
+
+    @cached_property
+    def _framed(self) -> list[Array]:
+        """Per page, where its texels lie in a page that is one texel larger all around, row by row."""
+        return [
+            (page.row.astype(np.int64) + 1) * (page.resolution + 2) + page.column + 1 for page in self._texels
+        ]
 
     def positions_of(self, hits: Hits) -> Array:
         """Return (h, 3) where rays hit; meaningless without a hit."""

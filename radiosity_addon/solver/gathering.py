@@ -13,9 +13,9 @@ import numpy as np
 
 from .aiming import AimedRays, BrightElements
 from .arrays import Array
+from .footprints import Footprints
 from .parallel import chunk_steps
 from .sampling import cosine_hemisphere, orthonormal_basis, stratified_square
-from .shadow_share import Footprints
 from .visibility import Hits, RayCaster
 
 CHUNK_RAYS = 1 << 17

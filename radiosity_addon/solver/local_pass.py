@@ -17,11 +17,12 @@ import numpy as np
 from .aiming import BrightElements
 from .arrays import Array
 from .emitters import EmitterGroup
+from .footprints import Footprints, Sampler, SpreadPoints
 from .gathering import NOTHING, SKY, Gathered, Gathering, Resolver
 from .lights import EnvironmentLight, Lamp
 from .radiometry import radiosity_of_radiance
 from .sampling import points_on_triangles
-from .shadow_share import Footprints, Sampler, ShadowShare
+from .shadow_share import ShadowShare
 from .steps import drain, scaled
 from .visibility import Hits
 
@@ -79,14 +80,15 @@ class LocalPass:
         seeds += [self._seed + 17 + 7 * number for number in range(len(self.emitters))]
         count = len(seeds)
         lights: list[Lamp | EmitterGroup] = [*lamps, *self.emitters]
+        spread = SpreadPoints(at, self._seed + 2, self.threads)
         for done, (light, seed) in enumerate(zip(lights, seeds, strict=True)):
+            begin, end = done / count, (done + 1) / count
             if isinstance(light, EmitterGroup):
                 gain = light.unit_irradiance(at.points, at.normals)
             else:
-                gain = at.mean_gain(light, seed)
-            yield (done + 0.1) / count
-            share = ShadowShare(self.caster, light, at, seed, self.threads).steps(gain > 0, shadow_rays)
-            unblocked = yield from scaled(share, (done + 0.1) / count, (done + 1) / count)
+                gain = yield from scaled(spread.gain_steps(light), begin, begin + 0.1 / count)
+            share = ShadowShare(self.caster, light, spread, seed, self.threads).steps(gain, shadow_rays)
+            unblocked = yield from scaled(share, begin + 0.1 / count, end)
             total += (gain * unblocked)[:, None] * light.strength
         return total
 
@@ -184,7 +186,11 @@ class LocalPass:
         corners = self._state.hierarchy.corners[leaves]
         normals = self._state.hierarchy.normal[leaves]
         return Footprints(
-            corners.mean(axis=1), normals, leaves, lambda rows, u: points_on_triangles(corners[rows], u)
+            corners.mean(axis=1),
+            normals,
+            leaves,
+            lambda rows, u: points_on_triangles(corners[rows], u),
+            expected=self._state.irradiance[leaves].mean(axis=1),
         )
 
     def leaf_reflectance(self, leaves: Array) -> Array:
