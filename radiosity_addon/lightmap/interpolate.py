@@ -54,6 +54,7 @@ class GatherPoints:
         self.texel = np.zeros(0, dtype=np.int32)
         self.closeness = np.zeros(0)
         self._grids: list[PointGrid] = []
+        self._weighed = _Weighed.nothing()
         self._number = np.full(len(geometry), -1, dtype=np.int32)
 
     def __len__(self) -> int:
@@ -69,13 +70,15 @@ class GatherPoints:
         self.texel = np.concatenate([self.texel, texel])
         self.closeness = np.concatenate([self.closeness, closeness])
 
-    def pairs(self, texels: Array) -> tuple[Array, Array]:
-        """Return rows of `texels` and gather points of all levels around them, sorted by row.
+    def pairs(self, texels: Array, level: int = 0) -> tuple[Array, Array]:
+        """Return rows of `texels` and gather points around them of all levels from `level`, sorted by row.
 
         In the world, not on the page: the next chart or object goes on where one ends.
         """
         position, normal = self._geometry.position[texels], self._geometry.normal[texels]
-        found = np.concatenate([grid.near(position, normal) for grid in self._grids], axis=1)
+        grids = self._grids[level:]
+        near = [np.full((len(texels), 0), NONE, np.int32)] + [grid.near(position, normal) for grid in grids]
+        found = np.concatenate(near, axis=1)
         # Its own point each texel has, should others crowd it out of its cell.
         own = self._number[texels]
         own[(found == own[:, None]).any(axis=1)] = NONE
@@ -118,14 +121,79 @@ class GatherPoints:
     def support_steps(self, texels: Array) -> Generator[float, None, Array]:
         """Compute the same; yields the fraction done."""
         total = np.empty(len(texels))
+        parts: dict[int, tuple[Array, Array, Array]] = {}
 
         def weigh(rows: slice) -> None:
             row, point = self.pairs(texels[rows])
             weight = self.kernel(texels[rows][row], point)
             total[rows] = np.bincount(row, weight, minlength=len(texels[rows]))
+            reached = np.flatnonzero(weight)
+            parts[rows.start] = texels[rows][row[reached]], point[reached], weight[reached]
 
         yield from chunk_steps(weigh, len(texels), CHUNK, self.threads)
+        self._weighed = _Weighed.joined(len(self._grids), texels, [parts[start] for start in sorted(parts)])
         return total
+
+    def weights_of(self, texels: slice) -> tuple[Array, Array, Array]:
+        """Return rows, points and weights above 0 for a run of all texels, sorted by row.
+
+        What `support_steps` weighed last is not weighed again.
+        """
+        known = self._weighed
+        run = np.arange(texels.start, texels.stop)
+        mine = slice(*np.searchsorted(known.texels, [texels.start, texels.stop]))
+        old = np.zeros(len(run), dtype=bool)
+        old[known.texels[mine] - texels.start] = True
+        found = [self._fresh(run[~old], 0), self._fresh(run[old], known.levels), known.pairs_of(texels)]
+        texel, point, weight = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        row = texel - texels.start
+        order = np.argsort(row.astype(np.int16 if len(run) < 1 << 15 else np.int64), kind="stable")
+        return row[order], point[order], weight[order]
+
+    def _fresh(self, texels: Array, level: int) -> tuple[Array, Array, Array]:
+        """Weigh the points of all levels from `level` for texels: (p,) texels, points, weights above 0."""
+        row, point = self.pairs(texels, level)
+        weight = self.kernel(texels[row], point)
+        reached = np.flatnonzero(weight)
+        return texels[row[reached]], point[reached], weight[reached].astype(np.float32)
+
+
+@dataclass(frozen=True)
+class _Weighed:
+    """What was weighed when the first `levels` levels of points were there.
+
+    Attributes
+    ----------
+    levels : int
+    texels : (n,) int
+        Ascending; they were no points themselves.
+    texel, point, weight : (p,) int, int32, float32
+        Pairs with a weight above 0, sorted by texel.
+    """
+
+    levels: int
+    texels: Array
+    texel: Array
+    point: Array
+    weight: Array
+
+    @staticmethod
+    def nothing() -> _Weighed:
+        none = np.zeros(0, dtype=np.int32)
+        return _Weighed(0, none, none, none, np.zeros(0, dtype=np.float32))
+
+    @staticmethod
+    def joined(levels: int, texels: Array, parts: list[tuple[Array, Array, Array]]) -> _Weighed:
+        """Put the chunks' pairs together; nothing if `texels` are not in order."""
+        if not parts or (np.diff(texels) <= 0).any():
+            return _Weighed.nothing()
+        texel, point, weight = (np.concatenate(chunks) for chunks in zip(*parts, strict=True))
+        return _Weighed(levels, texels, texel, point, weight.astype(np.float32))
+
+    def pairs_of(self, texels: slice) -> tuple[Array, Array, Array]:
+        """Return texels, points and weights of a run of texels."""
+        part = slice(*np.searchsorted(self.texel, [texels.start, texels.stop]))
+        return self.texel[part], self.point[part], self.weight[part]
 
 
 @dataclass(frozen=True)
@@ -186,10 +254,7 @@ def fit_steps(points: GatherPoints, geometry: TexelGeometry) -> Generator[float,
     parts: dict[int, tuple[Array, Array, Array]] = {}
 
     def weigh(rows: slice) -> None:
-        row, point = points.pairs(np.arange(rows.start, rows.stop, dtype=np.int64))
-        kernel = points.kernel(row + rows.start, point)
-        reached = kernel > 0
-        row, point, kernel = row[reached], point[reached], kernel[reached]
+        row, point, kernel = points.weights_of(rows)
         count = np.bincount(row, minlength=rows.stop - rows.start)
         if not count.all():
             raise ValueError(

@@ -40,8 +40,8 @@ class TexelGeometry:
     uv, page_of_triangle, triangles, face_normals
         Of every scene triangle, as given.
     page, row, column, triangle : (n,) int32
-    centre_inside : (n,) bool
-        Whether the texel's centre is on its triangle.
+    centre_inside, whole : (n,) bool
+        Whether the texel's centre, and all of the texel, is on its triangle.
     barycentric : (n, 2) float32
         Weights of the triangle's second and third corner at the centre of the footprint.
     position, normal, surface_normal : (n, 3) float64
@@ -65,6 +65,7 @@ class TexelGeometry:
         self.row = np.concatenate([page.row for page in texels])
         self.column = np.concatenate([page.column for page in texels])
         self.centre_inside = np.concatenate([page.centre_inside for page in texels])
+        self.whole = np.concatenate([page.area for page in texels]) >= 1.0
         triangles = [of[page.triangle] for of, page in zip(rows, texels, strict=True)]
         self.triangle = np.concatenate(triangles).astype(np.int32)
         self._inset = _edge_inset(scene)
