@@ -31,7 +31,7 @@ QUALITIES = {
             patches=100,
             contrast=0.2,
         ),
-        GatherSettings(strides=(4, 2, 1), support=0.5, rays=96),
+        GatherSettings(strides=(4, 2, 1), support=0.5, rays=96, tolerance=8e-4),
     ),
     "medium": Quality(
         SolverSettings(
@@ -43,7 +43,7 @@ QUALITIES = {
             patches=200,
             contrast=0.1,
         ),
-        GatherSettings(strides=(4, 2, 1), support=1.5, rays=192),
+        GatherSettings(strides=(4, 2, 1), support=1.5, rays=192, tolerance=4e-4),
     ),
     "high": Quality(
         SolverSettings(
@@ -55,7 +55,7 @@ QUALITIES = {
             patches=400,
             contrast=0.05,
         ),
-        GatherSettings(strides=(4, 2, 1), support=6.0, rays=384, sweeps=128),
+        GatherSettings(strides=(4, 2, 1), support=6.0, rays=384, sweeps=128, tolerance=2e-4),
     ),
 }
 
@@ -91,6 +91,7 @@ def for_error(error: float) -> Quality:
         high.gather,
         support=min(max(between(low.gather.support, high.gather.support), 0.2), 16.0),
         rays=16 * round(rays / 16),
+        tolerance=min(max(between(low.gather.tolerance, high.gather.tolerance), 1e-4), 2e-3),
     )
     return Quality(solver, gather)
 

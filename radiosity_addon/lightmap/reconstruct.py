@@ -49,13 +49,16 @@ class GatherSettings:
     rays : int
         A gather point.
     sweeps : int
-        Jacobi sweeps over the texels, at most.
+        Jacobi sweeps over the texels, at most, …
+    tolerance : float
+        … or until no texel changes by more than this part of the mean.
     """
 
     strides: tuple[int, ...] = (4, 2, 1)
     support: float = 1.0
     rays: int = 256
     sweeps: int = 64
+    tolerance: float = 2e-4
 
 
 def reconstruct(
@@ -68,7 +71,7 @@ def reconstruct(
     resolve = _resolver(local, geometry, crossings)
     stored = gather_texels(local, geometry, settings, crossings, resolve)
     links = yield from scaled(stored, CROSSED, GATHERED)
-    swept = sweep_steps(scene, local, geometry, links, lamps, resolve, settings.sweeps)
+    swept = sweep_steps(scene, local, geometry, links, lamps, resolve, settings.sweeps, settings.tolerance)
     light = yield from scaled(swept, GATHERED, 1.0)
     yield 1.0
     return light

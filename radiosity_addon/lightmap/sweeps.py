@@ -25,8 +25,8 @@ CHUNK_HITS = 1 << 18
 """Hits averaged at once: their values stay in the processor's cache."""
 
 TOLERANCE = 2e-4
-"""Largest change of any texel, relative to the mean, at which the sweeps end. Most texels are there
-at once; a dark closet next to a bright room, into which the hierarchy's elements leak across the
+"""Largest change of any texel, relative to the mean, at which the sweeps end by default. Most texels are
+there at once; a dark closet next to a bright room, into which the hierarchy's elements leak across the
 wall's foot, takes as many sweeps as light would bounce in it."""
 
 LEAF_RAYS = 64

@@ -106,19 +106,41 @@ class TexelGeometry:
 
     def sample(self, rows: Array, u: Array, width: float = FOOTPRINT) -> Array:
         """Return (r, k, 3) points spread over the middle `width` of r texels by u (r, k, 2)."""
-        return _at(self._scene.triangles[self.triangle[rows]], self.sample_weights(rows, u, width))
+        points = np.empty((len(rows), u.shape[1], 3))
+        # The middle of a texel that is whole on its triangle needs no clipping.
+        inner = self.whole[rows] & (width < 1.0)
+        plain, cut = np.flatnonzero(inner), np.flatnonzero(~inner)
+        points[plain] = self._in_plane(rows[plain], 0.5 + (u[plain].astype(np.float64) - 0.5) * width)
+        corners = self._scene.triangles[self.triangle[rows[cut]]]
+        points[cut] = _at(corners, self.sample_weights(rows[cut], u[cut], width))
+        return points
 
     def squares(self, rows: Array) -> Array:
         """Return (r, 4, 3) the corners of whole texels, in their triangles' planes but not cut by them."""
-        place = self._places[self.triangle[rows]].astype(np.float64)
-        first, second = place[:, None, 2:4], place[:, None, 4:6]
-        origin = np.stack([self.column[rows], self.row[rows]], axis=1)[:, None]
-        at = origin + _SQUARE - place[:, None, :2]
-        whole = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
-        along = (at[..., 0] * second[..., 1] - at[..., 1] * second[..., 0]) / whole
-        across = (first[..., 0] * at[..., 1] - first[..., 1] * at[..., 0]) / whole
-        weights = np.stack([1.0 - along - across, along, across], axis=-1)
-        return _at(self._scene.triangles[self.triangle[rows]], weights)
+        return self._in_plane(rows, np.broadcast_to(_SQUARE, (len(rows), 4, 2)))
+
+    def _in_plane(self, rows: Array, spots: Array) -> Array:
+        """Return (r, k, 3) points in the triangles' planes at places (r, k, 2) of texels as unit squares."""
+        triangle = self.triangle[rows]
+        start = np.stack([self.column[rows], self.row[rows]], axis=1) - self._places[triangle, :2]
+        across, up = self._texel_edges
+        points = spots[..., :1] * across[triangle, None]
+        points += spots[..., 1:] * up[triangle, None]
+        first = self._scene.triangles[triangle, 0]
+        points += (first + start[:, :1] * across[triangle] + start[:, 1:] * up[triangle])[:, None]
+        return np.asarray(points)
+
+    @cached_property
+    def _texel_edges(self) -> tuple[Array, Array]:
+        """(t, 3) float64 twice: the way to the next texel of the row, and of the column; 0 without area."""
+        edges = self._scene.triangles[:, 1:] - self._scene.triangles[:, :1]
+        place = self._places.astype(np.float64)
+        first, second = place[:, 2:4], place[:, 4:6]
+        whole = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+        part = np.where(whole == 0.0, 0.0, 1.0 / np.where(whole == 0.0, 1.0, whole))[:, None]
+        across = (second[:, 1:] * edges[:, 0] - first[:, 1:] * edges[:, 1]) * part
+        up = (first[:, :1] * edges[:, 1] - second[:, :1] * edges[:, 0]) * part
+        return across, up
 
     def sample_weights(self, rows: Array, u: Array, width: float = FOOTPRINT) -> Array:
         """Return (r, k, 3) the barycentric weights of the same points in the texels' triangles."""
