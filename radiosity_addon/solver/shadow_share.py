@@ -28,6 +28,10 @@ MORE_RAYS = 16
 MAIN_PART = 0.6
 """… and a lamp gives this part of the light, or more."""
 
+FEWEST = 2
+"""Shadow rays of a lamp that adds hardly anything. A single one would tell the share of the lamp that is
+seen, not that of its light: 0.40 for 0.44 behind a plate half way to a near lamp; two tell 0.43."""
+
 STARTS = 16
 """Points of a footprint that the many rays start from, each of them a run that is stratified by itself."""
 
@@ -162,6 +166,6 @@ class ShadowShare:
 
 
 def _power_of_two(wanted: Array, most: int) -> Array:
-    """Return (n,) int64: powers of two no less than what is wanted, from 1 to `most` (itself any number)."""
-    exponent = np.ceil(np.log2(np.maximum(wanted, 1.0)))
+    """Return (n,) int64 powers of two no less than what is wanted, from `FEWEST` up to `most` itself."""
+    exponent = np.ceil(np.log2(np.maximum(wanted, FEWEST)))
     return np.asarray(np.minimum(2.0**exponent, most), dtype=np.int64)
