@@ -114,6 +114,10 @@ class Hierarchy:
         """(e, 3) float64: the unit normal of every element."""
         return np.asarray(self.faces.normal[self.face])
 
+    def normal_of(self, elements: Array) -> Array:
+        """Return (n, 3) float64: the unit normals of some elements."""
+        return np.asarray(self.faces.normal[self.face[elements]])
+
     def subdivide(self, elements: Array) -> None:
         """Give four children to each of the distinct leaf `elements` (handout §4.2, Subdiv)."""
         if len(elements) == 0:
