@@ -173,3 +173,8 @@ def split_in_four(corners: Array) -> Array:
     ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
     children = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (bc, ca, ab)]
     return np.stack([np.stack(child, axis=1) for child in children], axis=1)
+
+
+def split_in_sixteen(corners: Array) -> Array:
+    """Return (n, 16, 3, 3) the grandchildren of (n, 3, 3) triangles."""
+    return split_in_four(split_in_four(corners).reshape(-1, 3, 3)).reshape(-1, 16, 3, 3)

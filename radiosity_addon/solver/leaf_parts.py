@@ -12,7 +12,7 @@ import numpy as np
 
 from .arrays import Array
 from .gathering import NOTHING
-from .hierarchy import Hierarchy, split_in_four
+from .hierarchy import Hierarchy, split_in_sixteen
 from .sampling import points_on_triangles
 from .shadow_share import Footprints
 from .visibility import Hits, RayCaster, sees
@@ -79,7 +79,7 @@ class LeafParts:
 
     def _cells_at(self, leaf: Array, position: Array, normal: Array) -> Array:
         """Return (h,) the cells of leaves whose anchors lifted points see, or NOTHING."""
-        cells = _sixteenths(self._hierarchy.corners[leaf])
+        cells = split_in_sixteen(self._hierarchy.corners[leaf])
         anchors = np.einsum("c,hkcx->hkx", ANCHOR, cells) + self._lift(normal)[:, None]
         order = np.linalg.norm(anchors - position[:, None], axis=2).argsort(axis=1, kind="stable")
         found = np.full(len(leaf), NOTHING, dtype=np.int32)
@@ -97,7 +97,7 @@ class LeafParts:
         corners = self._hierarchy.corners[self.leaf_of(part)]
         count = self._hierarchy.n_elements
         small = np.flatnonzero(part >= count)
-        cells = _sixteenths(corners[small])
+        cells = split_in_sixteen(corners[small])
         corners[small] = cells[np.arange(len(small)), (part[small] - count) % CELLS]
         return corners
 
@@ -110,9 +110,3 @@ class LeafParts:
 
     def _lift(self, normal: Array) -> Array:
         return np.asarray(LIFT * self._caster.surface_offset * normal)
-
-
-def _sixteenths(corners: Array) -> Array:
-    """Return (n, 16, 3, 3) the grandchildren of (n, 3, 3) triangles."""
-    children = split_in_four(corners).reshape(-1, 3, 3)
-    return split_in_four(children).reshape(-1, CELLS, 3, 3)

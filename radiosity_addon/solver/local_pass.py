@@ -143,7 +143,15 @@ class LocalPass:
 
     @cached_property
     def _bright(self) -> BrightElements:
-        return BrightElements(self._state.hierarchy, self.reflected())
+        return BrightElements(self._state.hierarchy, self.reflected(), self._unshadowed)
+
+    def _unshadowed(self, points: Array, normals: Array) -> Array:
+        """Return (n,) the irradiance straight from lamps were nothing in the way, a mean of the channels."""
+        total = np.zeros(len(points))
+        for light in self._state.scene.lights:
+            if isinstance(light, Lamp):
+                total += light.unit_irradiance(points, normals) * light.strength.mean()
+        return total
 
     def leaves_of(self, hits: Hits) -> Array:
         """Return (n,) int32: the leaf element under each hit; SKY for none or a black back."""
