@@ -99,7 +99,7 @@ class LeafParts:
         small = np.flatnonzero(part >= count)
         cells = split_in_sixteen(corners[small])
         corners[small] = cells[np.arange(len(small)), (part[small] - count) % CELLS]
-        return corners
+        return np.asarray(corners)
 
     def _positions(self, hits: Hits) -> Array:
         """Return (h, 3) where rays hit."""
