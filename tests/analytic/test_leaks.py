@@ -149,6 +149,22 @@ def test_a_wall_across_surfaces_without_lightmaps_makes_two_rooms() -> None:
     np.testing.assert_allclose(lit, expected, rtol=0.01)
 
 
+def test_a_box_that_reaches_through_the_floor_is_dark_above_it() -> None:
+    """It is open below, where the sky shines in: the backs of its walls run on from there into the dark."""
+    room, surface = box_room((3, 3, 3))
+    room = room[surface != CEILING]
+    (left, front, _), (right, back, _) = ON_FLOOR
+    box = solid_box((left, front, -0.4), (right, back, 0.6))[2:]
+    triangles = np.concatenate([room, box])
+    count = len(triangles)
+    sky = [EnvironmentLight(1.0)]
+    scene = Scene(triangles, grey(count, 0.8), grey(count, 0.0), two_sided=True, lights=sky)
+    whole = bake_scene(scene, ("Room", len(room)), ("Box", len(box)))
+    result = run(whole, "draft")
+    assert result.pages[0].pixels.max() > 0.5
+    assert_dark_floor(whole, result, 0)
+
+
 def _ceilings(ends: Sequence[float], around: np.ndarray) -> tuple[LightmapPage, ...]:
     """Bake ceilings 1 m wide and high, from each x to the next; a lamp hangs at x = 0.3."""
     above = [rectangle((x, 0, 1), (0, 1, 0), (end - x, 0, 0)) for x, end in pairwise(ends)]
