@@ -23,6 +23,9 @@ CELLS = 16
 ANCHOR = np.array([0.3595, 0.3218, 0.3187])
 """Barycentric weights. Near the centroid, but off it: walls stand on round fractions of a floor."""
 
+STARTS = 16
+"""Points of a part that its gather rays start from: each costs a ray to the anchor."""
+
 LIFT = 2.0
 """Points see each other this many surface offsets above their element."""
 
@@ -75,7 +78,7 @@ class LeafParts:
             # What lies behind a wall is not of this part.
             return np.asarray(np.where(seen.reshape(*points.shape[:2], 1), points, back))
 
-        return Footprints(anchor, normal, part, sample)
+        return Footprints(anchor, normal, part, sample, starts=STARTS)
 
     def _cells_at(self, leaf: Array, position: Array, normal: Array) -> Array:
         """Return (h,) the cells of leaves whose anchors lifted points see, or NOTHING."""
