@@ -84,10 +84,12 @@ def test_coarse_first_links_still_send_what_there_is(clutter: Scene, monkeypatch
     """Every leaf sends no more than it has, and the mean light is that of the fine links."""
     *_, (_, fine) = hierarchical.solve_steps(clutter, SolverSettings(error=1e-3))
     monkeypatch.setattr(first_links, "FEWEST", 1)
-    settings = SolverSettings(error=1e-3, max_links=150_000)
+    settings = SolverSettings(error=1e-3, max_links=50_000)
     *_, (_, coarse) = hierarchical.solve_steps(clutter, settings)
-    assert fine.details["hierarchical"]["first_faint"] == 0.0 < coarse.details["hierarchical"]["first_faint"]
-    assert coarse.n_links <= 150_000
+    # Finer than BF_ε asks for none need be; a short budget alone makes them coarser.
+    assert fine.details["hierarchical"]["first_faint"] <= 1e-3
+    assert coarse.details["hierarchical"]["first_faint"] > fine.details["hierarchical"]["first_faint"]
+    assert coarse.n_links <= 50_000
     assert coarse.residual < settings.tolerance
     means = [
         state.hierarchy.faces.area @ state.irradiance[: len(state.hierarchy.faces), 0]

@@ -100,7 +100,9 @@ def test_the_budget_is_what_all_else_leaves() -> None:
     less, more = (link_budget(hierarchy, settings, 0) for settings in (one, two))
     assert more - less == pytest.approx(2**30 / LINK_BYTES, abs=1)
     assert less * LINK_BYTES + faces * FACE_BYTES < 2**30
-    assert less - link_budget(hierarchy, one, 1000) == pytest.approx(1000 * LIGHT_LINK_BYTES / LINK_BYTES, abs=1)
+    assert less - link_budget(hierarchy, one, 1000) == pytest.approx(
+        1000 * LIGHT_LINK_BYTES / LINK_BYTES, abs=1
+    )
     hierarchy.subdivide(np.arange(faces))
     split = link_budget(hierarchy, one, 0)
     assert less - split == pytest.approx(4 * faces * ELEMENT_BYTES / LINK_BYTES, abs=1)

@@ -74,7 +74,6 @@ class HierarchicalState(SolverState):
         """Return (f,) the area mean over each face's leaves of ΣFV over own and inherited links."""
         return link_closure(self.hierarchy, self.links, self.cluster_links)
 
-
     def balanced_closure(self) -> Array:
         """Return (f,) ΣFV as light was sent and received in the end, scaled (see `conservation`)."""
         if self.balance is None or self.top is None:
