@@ -39,9 +39,13 @@ BUDGET = 0.4
 FEWEST = 200_000
 """… but so many in any case: loosened further they would mean nothing."""
 
-WANTED = 8000.0
-"""Over the square root of BF_ε: more first links than that are not wanted while they are finer than BF_ε
-asks for, as refinement adds those that carry light."""
+WANTED = 6000.0
+"""Over the square root of BF_ε: more first links than that are not wanted, as refinement adds those that
+carry light, …"""
+
+COARSEST_FAINT = 8.0
+"""… unless pairs that exchange more than this times BF_ε, as a share of all area, went into one link: then
+only the budget has it. A link's doubt is about an eighth of its factor, and more where it is refined."""
 
 FAINT = 1e-7
 """Where there are more, pairs that exchange less than this share of all area are linked however large
@@ -86,8 +90,8 @@ def first_links(
     while True:
         while True:
             count = _estimate(hierarchy, shapes, limits)
-            finer = FAINTER * limits.faint <= settings.error
-            if count <= min(wanted, most) or (count <= most and not finer):
+            may_be_coarser = FAINTER * limits.faint <= COARSEST_FAINT * settings.error
+            if count <= min(wanted, most) or (count <= most and not may_be_coarser):
                 break
             limits = limits.looser()
         pairs = _first_pairs(hierarchy, shapes, limits, int(SLACK * most))

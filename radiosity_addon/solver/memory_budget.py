@@ -24,7 +24,7 @@ LIGHT_LINK_BYTES = 80
 """… that a link from a lamp takes, …"""
 
 FACE_BYTES = 1600
-"""… that a face takes with its element, the cluster above it and its part of the scene and of the rays' tree, …"""
+"""… that a face takes with its element, its cluster and its part of the scene and of the rays' tree, …"""
 
 ELEMENT_BYTES = 500
 """… that an element below a face takes while light is gathered, …"""
@@ -58,8 +58,8 @@ def refuse_too_large(scene: Scene, settings: SolverSettings) -> None:
     needed = (faces * FACE_BYTES + links * LINK_BYTES + working) / 2**30
     if needed > settings.memory_limit:
         raise UsageError(
-            f"the hierarchical method would need at least {needed:.2f} GiB for {faces:,} faces, more than the "
-            f"memory limit of {settings.memory_limit:g} GiB: raise the limit, or bake fewer objects"
+            f"the hierarchical method would need at least {needed:.2f} GiB for {faces:,} faces, more than "
+            f"the memory limit of {settings.memory_limit:g} GiB: raise the limit, or bake fewer objects"
         )
 
 

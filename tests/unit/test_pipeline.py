@@ -14,7 +14,7 @@ from radiosity_addon.bake_scene import BakeResult, BakeScene, Progress
 from radiosity_addon.errors import SceneError
 from radiosity_addon.methods import METHODS
 from radiosity_addon.pipeline import bake
-from radiosity_addon.quality import quality_of
+from radiosity_addon.quality import QUALITIES, quality_of
 from radiosity_addon.settings import BakeSettings
 from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, first_links, solve
 from tests.rooms import FLOOR, box_room, grey, rectangle, solid_box, sphere
@@ -343,5 +343,5 @@ def test_links_that_had_to_begin_coarse_are_told_of(monkeypatch: pytest.MonkeyPa
     assert told() == []
     (message,) = told(max_links=2_000)
     share = float(message.split("up to ")[1].split("%")[0])
-    assert 0.4 < share < 100
+    assert 100 * first_links.COARSEST_FAINT * QUALITIES["draft"].solver.error < share < 100
     assert "raise the most links and the memory limit" in message
