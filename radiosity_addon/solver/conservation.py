@@ -58,14 +58,16 @@ class Conservation:
     ) -> tuple[Array, Array]:
         """Return (e, 2) what leaves' radiosity, and (f,) what faces' gathered light is scaled with.
 
-        The first as from `factors`, given the second, which is 1 where anything may escape; and
+        The first as from `factors`, given the second, which is 1 where anything may escape, where faces are split, and
         everywhere without links to clusters: a few large faces are linked finely enough.
         """
         scale = self.factors(hierarchy, top, links, cluster_links)
         received = np.ones(len(hierarchy.faces))
         if len(cluster_links) == 0:
             return scale, received
-        closed = self.closed(hierarchy)
+        # Leaves of a split face share light unevenly, rightly: no one number mends them.
+        whole = hierarchy.first_child[: len(hierarchy.faces)] == LEAF
+        closed = self.closed(hierarchy) & whole
         for _ in range(ROUNDS):
             sums = received_by_faces(hierarchy, top, links, cluster_links, scale)
             wanted = np.clip(1.0 / np.maximum(sums, 1e-300), 1.0 / LIMIT_RECEIVED, LIMIT_RECEIVED)
