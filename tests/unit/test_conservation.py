@@ -135,7 +135,7 @@ def cluttered() -> HierarchicalState:
 
 
 def test_every_face_of_a_closed_scene_receives_from_all_around(cluttered: HierarchicalState) -> None:
-    """ΣFV of each that is not split within 0.2 % as balanced, power within 0.02 %; the links as measured are told unmended."""
+    """ΣFV of whole ones within 0.2 % as balanced, power kept; the links as measured are told unmended."""
     plain, balanced = cluttered.closure(), cluttered.balanced_closure()
     whole = cluttered.hierarchy.first_child[: len(plain)] == LEAF
     assert whole.mean() > 0.5
