@@ -79,7 +79,7 @@ class Conservation:
         """Return (f,) whether no ray of a face left the scene; after `factors`."""
         face = hierarchy.face[hierarchy.leaves]
         arrived = self._arriving[hierarchy.leaves] == 1.0
-        return np.bincount(face, ~arrived, len(hierarchy.faces)) == 0
+        return np.asarray(np.bincount(face, ~arrived, len(hierarchy.faces)) == 0)
 
     def factors(
         self,
@@ -103,9 +103,9 @@ class Conservation:
             at_links *= received[hierarchy.face[links.receiver]]
         sums = sent(hierarchy, links, at_links)
         own = sums[leaves].mean(axis=1)[:, 0]
-        arriving = Arriving(hierarchy, top, cluster_links, received)
-        sums = sums + sent_to_clusters(hierarchy, cluster_links, arriving)
-        from_clusters = _from_clusters(hierarchy, top, links, at_links, cluster_links, arriving)
+        at_clusters = Arriving(hierarchy, top, cluster_links, received)
+        sums = sums + sent_to_clusters(hierarchy, cluster_links, at_clusters)
+        from_clusters = _from_clusters(hierarchy, top, links, at_links, cluster_links, at_clusters)
         shared = push(hierarchy, sums + from_clusters)[leaves, 0] - own
         arriving = self._arriving[leaves]
         left = np.maximum(arriving - own, 0.0)
