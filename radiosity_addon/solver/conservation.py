@@ -59,7 +59,8 @@ class Conservation:
         """Return (e, 2) what leaves' radiosity, and (f,) what faces' gathered light is scaled with.
 
         The first as from `factors`, given the second, which is 1 where anything may escape,
-        where faces are split, and everywhere without links to clusters: a few large faces are linked finely enough.
+        where faces are split, and everywhere without links to clusters: a few large faces
+        are linked finely enough.
         """
         scale = self.factors(hierarchy, top, links, cluster_links)
         received = np.ones(len(hierarchy.faces))
