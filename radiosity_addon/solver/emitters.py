@@ -38,15 +38,15 @@ class EmitterGroup:
     @staticmethod
     def of_faces(faces: Faces, caster: RayCaster) -> list[EmitterGroup]:
         """Group the emissive faces by colour, which visibility then cannot mix up."""
+        # Their starts are lifted by one offset, which must not put their ends back on the face.
+        offset = 2.0 * caster.surface_offset
         rows = np.flatnonzero(faces.emission.max(axis=1, initial=0.0) > 0)
         if len(rows) == 0:
             return []
         colours, group = np.unique(faces.emission[rows], axis=0, return_inverse=True)
         group = group.reshape(-1)
         return [
-            EmitterGroup(
-                faces.corners[rows[group == g]], faces.normal[rows[group == g]], colour, caster.surface_offset
-            )
+            EmitterGroup(faces.corners[rows[group == g]], faces.normal[rows[group == g]], colour, offset)
             for g, colour in enumerate(colours)
         ]
 
