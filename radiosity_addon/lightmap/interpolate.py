@@ -47,10 +47,10 @@ class GatherPoints:
         Mean inverse distance seen from each point [1/m].
     """
 
-    def __init__(self, geometry: TexelGeometry, caster: RayCaster, crossed: Array, threads: int = 0) -> None:
+    def __init__(self, geometry: TexelGeometry, caster: RayCaster, alone: Array, threads: int = 0) -> None:
         self.threads = threads
         """0 means all cores."""
-        self._geometry, self._caster, self._crossed = geometry, caster, crossed
+        self._geometry, self._caster, self._alone = geometry, caster, alone
         self.texel = np.zeros(0, dtype=np.int32)
         self.closeness = np.zeros(0)
         self._grids: list[PointGrid] = []
@@ -93,8 +93,8 @@ class GatherPoints:
         along = geometry.position.take(of, axis=0) - geometry.position.take(texels, axis=0)
         distance = np.sqrt(np.einsum("pk,pk->p", along, along))
         change = distance * self.closeness.take(point)
-        # A texel that geometry cuts in two speaks for itself alone, and nobody for it.
-        apart = self._crossed.take(of) | self._crossed.take(texels)
+        # A texel that geometry cuts in two, or hoods, speaks for itself alone, and nobody for it.
+        apart = self._alone.take(of) | self._alone.take(texels)
         weight = np.where(of == texels, np.maximum(1.0 - change / REACH, 0.0) ** 2, 0.0)
         row = np.flatnonzero((of != texels) & (change < REACH) & ~apart)
         start, end = texels.take(row), of.take(row)

@@ -22,6 +22,10 @@ SAME_GAIN = 0.02
 """Where a lamp gives the centre of a footprint what it gives its farthest point, up to this
 part, the centre stands for all: what bends that little bends a mean by its square."""
 
+UNEVEN, MORE_GAINS = 0.02, 64
+"""Where the few points differ by more than this part, as beside a lamp and at the rim of a spot's cone,
+so many are asked."""
+
 DARKEST = 0.25
 """Noise is measured by the light expected, or by this part of the mean where that is darker."""
 
@@ -82,7 +86,7 @@ class SpreadPoints:
     """
 
     def __init__(self, at: Footprints, seed: int, threads: int = 0) -> None:
-        self.at, self._threads = at, threads
+        self.at, self._seed, self._threads = at, seed, threads
         self.points = np.empty((len(at), SPREAD if at.sampler else 1, 3), dtype=np.float32)
         self._farthest = np.zeros(len(at), dtype=np.int8)
 
@@ -116,10 +120,30 @@ class SpreadPoints:
                 far = spread[np.arange(len(own)), self._farthest[part]].astype(np.float64)
                 other = light.unit_irradiance(far, normals)
                 rows = np.flatnonzero(np.abs(other - own) > SAME_GAIN * np.maximum(own, other))
-                some = spread[rows].astype(np.float64).reshape(-1, 3)
-                each = light.unit_irradiance(some, np.repeat(normals[rows], SPREAD, axis=0))
-                own[rows] = each.reshape(-1, SPREAD).mean(axis=1)
+                own[rows] = self._varying(light, rows, part.start)
             gain[part] = own
 
         yield from chunk_steps(ask, len(at), CHUNK_POINTS, self._threads)
         return gain
+
+    def _varying(self, light: Lamp, rows: Array, first: int) -> Array:
+        """Return (r,) the mean gain at some rows, counted from `first`, over which it varies."""
+        rows = rows + first
+        each = self._gains(light, rows, self.points[rows])
+        mean = each.mean(axis=1)
+        uneven = np.flatnonzero(each.std(axis=1) > UNEVEN * mean)
+        step = CHUNK_POINTS // MORE_GAINS * SPREAD
+        for start in range(0, len(uneven), step):
+            some = uneven[start : start + step]
+            more = rows[some]
+            unit = stratified_square(self.at.keys[more], MORE_GAINS, self._seed)
+            assert self.at.sampler is not None
+            mean[some] = self._gains(light, more, self.at.sampler(more, unit)).mean(axis=1)
+        return np.asarray(mean)
+
+    def _gains(self, light: Lamp, rows: Array, points: Array) -> Array:
+        """Return (r, k) the gain at (r, k, 3) points of some rows' footprints."""
+        count = points.shape[1]
+        flat = points.reshape(-1, 3).astype(np.float64)
+        gain = light.unit_irradiance(flat, np.repeat(self.at.normals[rows], count, axis=0))
+        return np.asarray(gain.reshape(-1, count))
