@@ -8,10 +8,10 @@ import pytest
 from radiosity_addon.solver import Scene, emitters
 from radiosity_addon.solver.embree import EmbreeCaster
 from radiosity_addon.solver.emitters import EmitterGroup
+from radiosity_addon.solver.footprints import Footprints, SpreadPoints
 from radiosity_addon.solver.form_factor import point_to_polygon
 from radiosity_addon.solver.hierarchy import Faces
 from radiosity_addon.solver.sampling import stratified_square
-from radiosity_addon.solver.footprints import Footprints, SpreadPoints
 from radiosity_addon.solver.shadow_share import ShadowShare
 from radiosity_addon.solver.steps import drain
 from tests.rooms import grey, rectangle
