@@ -84,12 +84,12 @@ class SolverState:
     @property
     def reflectance(self) -> Array:
         """(e, 3) float64: of every element."""
-        return np.asarray(self.hierarchy.faces.reflectance[self.hierarchy.face])
+        return self.hierarchy.reflectance
 
     @property
     def emission(self) -> Array:
         """(e, 3) float64: own emission of every element [W/m²]."""
-        return np.asarray(self.hierarchy.faces.emission[self.hierarchy.face])
+        return self.hierarchy.emission
 
     def link_lights_to_leaves(self) -> None:
         """Link the lamps and the sky to the leaves as they are, splitting none."""
