@@ -23,6 +23,7 @@ from .radiometry import radiosity_of_radiance
 from .sampling import points_on_triangles
 from .shadow_share import Footprints, Sampler, ShadowShare
 from .steps import drain, scaled
+from .textured_emitters import emitter_groups
 from .visibility import Hits
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ class LocalPass:
         self._seed = state.settings.seed
         self.threads = state.settings.threads
         """0 means all cores."""
-        self.emitters = EmitterGroup.of_faces(state.hierarchy.faces, state.caster)
+        self.emitters = emitter_groups(state.scene, state.hierarchy.faces, state.caster)
 
     def direct(
         self,
