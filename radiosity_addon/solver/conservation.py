@@ -89,7 +89,7 @@ class Conservation:
             normals = normals.reshape(-1, 3)
             directions = to_world(cosine_hemisphere(unit).reshape(-1, 1, 3), normals)[:, 0]
             start = points.reshape(-1, 3) + self._caster.surface_offset * normals
-            escapes = self._caster.visible(start, directions, np.full(len(start), np.inf))
+            escapes = self._caster.passing(start, directions, np.full(len(start), np.inf))
             share[rows] = 1.0 - escapes.reshape(-1, RAYS).mean(axis=1)
 
         for_chunks(measure, len(nodes), CHUNK, self._threads)
