@@ -9,9 +9,7 @@ import numpy as np
 from radiosity_addon.solver import Scene
 from radiosity_addon.solver.surface_images import SurfaceImages
 from tests.rooms import box_room, grey, rectangle
-
-QUAD_UV = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], dtype=np.float32)
-"""The whole image on the two triangles of a `rectangle`."""
+from tests.unit.texel_scenes import QUAD_UV
 
 
 def image(

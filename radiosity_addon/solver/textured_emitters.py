@@ -16,7 +16,7 @@ from .scene import WHOLE_TRIANGLE, Scene
 from .surface_images import SurfaceImages
 from .visibility import RayCaster
 
-MOST_PIECES = 128
+MOST_PIECES = 256
 """Of all textured faces together, if no more faces shine: every lit point asks every piece."""
 
 SMOOTH = 0.002
