@@ -93,7 +93,7 @@ def gather_texels(
     resolve: Resolver,
 ) -> Generator[float, None, StoredLinks]:
     """Gather at few texels, densely where others do not reach; yields the fraction done."""
-    points = GatherPoints(geometry, local.caster, crossings.crossed, local.threads)
+    points = GatherPoints(geometry, local.caster, crossings.alone, local.threads)
     found: list[Gathered] = []
     first: list[int] = []
     width = (1.0 - FIT) / len(settings.strides)
