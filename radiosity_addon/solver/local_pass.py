@@ -25,6 +25,7 @@ from .lights import EnvironmentLight, Lamp
 from .radiometry import radiosity_of_radiance
 from .shadow_share import ShadowShare
 from .steps import drain, scaled
+from .textured_emitters import emitter_groups
 from .visibility import Hits
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ class LocalPass:
         self._seed = state.settings.seed
         self.threads = state.settings.threads
         """0 means all cores."""
-        self.emitters = EmitterGroup.of_faces(state.hierarchy.faces, state.caster)
+        self.emitters = emitter_groups(state.scene, state.hierarchy.faces, state.caster)
 
     def direct(
         self,
@@ -166,9 +167,12 @@ class LocalPass:
         return leaf
 
     def reflected(self) -> Array:
-        """Return (e, 3): the part of every element's radiosity it does not emit itself [W/m²]."""
-        hierarchy = self._state.hierarchy
-        return np.asarray(hierarchy.faces.reflectance[hierarchy.face] * self._state.irradiance)
+        """Return (e, 3): the part of every element's radiosity it does not emit itself [W/m²].
+
+        Where its surface is there, as it is for rays that hit it.
+        """
+        every = np.arange(self._state.hierarchy.n_elements)
+        return np.asarray(self._reflectance_where_hit(every) * self._state.irradiance)
 
     def reflected_at(self, triangle: Array, barycentric: Array) -> Array:
         """Return (n, 3): the same at points of triangles' fronts, (n, 2) weights of corners 2 and 3."""
@@ -200,9 +204,12 @@ class LocalPass:
         return gathered.sources
 
     def part_reflectance(self, parts: Array) -> Array:
-        """Return (p, 3) the reflectance of parts of leaf elements."""
+        """Return (p, 3) the reflectance of parts of leaf elements where their surface is there."""
+        return self._reflectance_where_hit(self.parts.leaf_of(parts))
+
+    def _reflectance_where_hit(self, elements: Array) -> Array:
         hierarchy = self._state.hierarchy
-        return np.asarray(hierarchy.faces.reflectance[hierarchy.face[self.parts.leaf_of(parts)]])
+        return np.asarray(hierarchy.reflectance[elements] / hierarchy.opacity_where_hit[elements, None])
 
     def part_direct(self, parts: Array) -> Generator[float, None, Array]:
         """Compute (p, 3) the irradiance of parts straight from lamps and emissive faces."""
