@@ -198,7 +198,7 @@ def _look_up(images: SurfaceImages, scene: Scene) -> tuple[np.ndarray, np.ndarra
     values, points = [], []
     for triangle in np.flatnonzero(images.textured):
         first, second, third = images.image_uv[triangle] * (width, height) - 0.5
-        leg = int(round(np.abs(second - first).max())) + 1
+        leg = round(np.abs(second - first).max()) + 1
         i, j = np.meshgrid(np.arange(leg), np.arange(leg))
         i, j = i[i + j < leg], j[i + j < leg]
         along, across = np.sign(second - first), np.sign(third - first)
@@ -297,7 +297,7 @@ _PROCEDURAL = {
     "noise of its object": ("ShaderNodeTexNoise", "Color", ("ShaderNodeTexCoord", "Object")),
     "noise in the world": ("ShaderNodeTexNoise", "Color", ("ShaderNodeNewGeometry", "Position")),
     "checker": ("ShaderNodeTexChecker", "Color", None),
-    "bricks": ("ShaderNodeTexBrick", "Color", ("ShaderNodeTexCoord", "Generated")),
+    "bricks": ("ShaderNodeTexBrick", "Color", ("ShaderNodeTexCoord", "Object")),
     "waves": ("ShaderNodeTexWave", "Color", ("ShaderNodeTexCoord", "UV")),
     "voronoi": ("ShaderNodeTexVoronoi", "Color", None),
     "magic": ("ShaderNodeTexMagic", "Color", ("ShaderNodeTexCoord", "Normal")),
