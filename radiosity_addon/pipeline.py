@@ -34,6 +34,7 @@ from .lightmap.reconstruct import GatherSettings, reconstruct
 from .lightmap.seams import Seams, find_seams
 from .lightmap.stitch import stitch_pages
 from .lightmap.texel_geometry import TexelGeometry
+from .lightmap.texel_materials import FOOTPRINT, texel_materials
 from .quality import for_error, quality_of, used_settings
 from .report import solver_part
 from .settings import BakeSettings
@@ -205,11 +206,10 @@ def _texel_values(
         "direct": light.direct,
         "indirect": light.indirect,
     }[settings.light]
-    scene = bake_scene.scene
-    emission = scene.emission[geometry.triangle]
+    reflectance, emission = texel_materials(bake_scene.scene, geometry, FOOTPRINT)
     if settings.light == "indirect":
         emission = np.zeros_like(emission)
-    values = to_quantity(irradiance, scene.reflectance[geometry.triangle], emission, settings.quantity)
+    values = to_quantity(irradiance, reflectance, emission, settings.quantity)
     return values, light.error
 
 

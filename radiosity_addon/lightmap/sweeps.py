@@ -20,6 +20,7 @@ from ..solver.scene import Scene
 from ..solver.steps import drain, scaled
 from .interpolate import Interpolation
 from .texel_geometry import TexelGeometry
+from .texel_materials import texel_materials
 
 CHUNK_HITS = 1 << 18
 """Hits averaged at once: their values stay in the processor's cache."""
@@ -114,7 +115,7 @@ def sweep_steps(
         Of an unknown number of sweeps: each takes its part of what is left.
     """
     texel_count = len(geometry)
-    reflectance = scene.reflectance[geometry.triangle]
+    reflectance, _ = texel_materials(scene, geometry)
     # Rows: texels, leaves, then NOTHING (−2) and SKY (−1). Columns lie one after the other in memory.
     table = np.zeros((texel_count + len(local.reflected()) + 2, 3), dtype=np.float32, order="F")
     sky = local.sky()

@@ -20,7 +20,7 @@ import numpy as np
 
 from .arrays import Array
 from .cluster_links import ClusterLinks
-from .hierarchy import LEAF, Hierarchy
+from .hierarchy import LEAF, Hierarchy, node_opacity
 from .links import Links
 from .node_samples import node_samples
 from .parallel import for_chunks
@@ -89,7 +89,7 @@ class Conservation:
             normals = normals.reshape(-1, 3)
             directions = to_world(cosine_hemisphere(unit).reshape(-1, 1, 3), normals)[:, 0]
             start = points.reshape(-1, 3) + self._caster.surface_offset * normals
-            escapes = self._caster.visible(start, directions, np.full(len(start), np.inf))
+            escapes = self._caster.passing(start, directions, np.full(len(start), np.inf))
             share[rows] = 1.0 - escapes.reshape(-1, RAYS).mean(axis=1)
 
         for_chunks(measure, len(nodes), CHUNK, self._threads)
@@ -104,7 +104,12 @@ def _from_clusters(hierarchy: Hierarchy, top: TreeTop, links: Links, cluster_lin
         return total
     # Linear in the face's place: (1, y) times four numbers a cluster, as `gather_at_clusters` sends.
     share = np.zeros((top.n_rows, 4))
-    for some, area in ((links, hierarchy.area), (cluster_links, clusters.area)):
+    # A receiver takes light where it is there.
+    there = node_opacity(hierarchy)
+    for some, area in (
+        (links, hierarchy.area * there[count:]),
+        (cluster_links, clusters.area * there[:count]),
+    ):
         grouped = np.flatnonzero(some.source < count)
         source = some.source[grouped]
         size = area[some.receiver[grouped]] / clusters.area[source]
@@ -125,18 +130,21 @@ def sent_to_clusters(hierarchy: Hierarchy, links: ClusterLinks) -> Array:
     """Return (e, 1, 1): the share of the light of each element that its own links to clusters carry."""
     single = links.source >= hierarchy.n_clusters
     element = links.source[single] - hierarchy.n_clusters
-    power = (hierarchy.clusters.area[links.receiver] * links.factor * links.visibility)[single]
+    there = hierarchy.clusters.area * node_opacity(hierarchy)[: hierarchy.n_clusters]
+    power = (there[links.receiver] * links.factor * links.visibility)[single]
     return np.bincount(element, power / hierarchy.area[element], hierarchy.n_elements)[:, None, None]
 
 
 def sent(hierarchy: Hierarchy, links: Links) -> Array:
     """Return (e, 4, 1): the share of the light of each element's quarters that its own links carry.
 
-    The transpose of `gather`, with reciprocity (handout (3.30)): Σ_r A_r F_rs V_rs / A_s.
+    The transpose of `gather`, with reciprocity (handout (3.30)): Σ_r A_r F_rs V_rs / A_s, of each
+    receiver's area A_r what is there.
     """
     single = links.source >= hierarchy.n_clusters
     element = links.source[single] - hierarchy.n_clusters
-    power = (hierarchy.area[links.receiver] * links.factor * links.visibility)[single]
+    there = hierarchy.area * hierarchy.opacity
+    power = (there[links.receiver] * links.factor * links.visibility)[single]
     per_element = power / hierarchy.area[element]
     inner = hierarchy.first_child[element] != LEAF
     total = np.zeros((hierarchy.n_elements, 4, 1))

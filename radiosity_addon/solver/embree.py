@@ -72,6 +72,10 @@ class EmbreeCaster:
         for_chunks(trace, count, CHUNK, self._threads)
         return free
 
+    def passing(self, origins: Array, directions: Array, distances: Array, least: float = 0.0) -> Array:  # noqa: ARG002
+        """Return the same: all surfaces are whole."""
+        return self.visible(origins, directions, distances)
+
     def first_hits(self, origins: Array, directions: Array) -> Hits:
         """Return what each ray meets first."""
         count = len(origins)

@@ -261,7 +261,7 @@ def lamp_light(
     rows = np.flatnonzero(gain > 0)
     directions, distances, above = light.shadow_rays(flat[rows], facing[rows], unit.reshape(-1, 1, 2)[rows])
     start = flat[rows] + caster.surface_offset * facing[rows]
-    free = caster.visible(start, directions[:, 0], distances[:, 0])
+    free = caster.passing(start, directions[:, 0], distances[:, 0])
     # A lamp point below the horizon says nothing: the closed form has cut it off already.
     weights[rows] = np.where(above[:, 0] > 0, gain[rows], 0.0)
     passed[rows] = weights[rows] * free
@@ -286,6 +286,6 @@ def sky_visibility(
         start = points[rows] if points.ndim == 3 else points[rows, None]
         start = np.broadcast_to(start + caster.surface_offset * normals[rows, None], directions.shape)
         endless = np.full(directions.shape[0] * rays, np.inf)
-        free = caster.visible(start.reshape(-1, 3), directions.reshape(-1, 3), endless)
+        free = caster.passing(start.reshape(-1, 3), directions.reshape(-1, 3), endless)
         share[rows] = free.reshape(-1, rays).mean(axis=1)
     return share

@@ -23,6 +23,7 @@ from .radiometry import radiosity_of_radiance
 from .sampling import points_on_triangles
 from .shadow_share import Footprints, Sampler, ShadowShare
 from .steps import drain, scaled
+from .textured_emitters import emitter_groups
 from .visibility import Hits
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ class LocalPass:
         self._seed = state.settings.seed
         self.threads = state.settings.threads
         """0 means all cores."""
-        self.emitters = EmitterGroup.of_faces(state.hierarchy.faces, state.caster)
+        self.emitters = emitter_groups(state.scene, state.hierarchy.faces, state.caster)
 
     def direct(
         self,
@@ -155,9 +156,12 @@ class LocalPass:
         return leaf
 
     def reflected(self) -> Array:
-        """Return (e, 3): the part of every element's radiosity it does not emit itself [W/m²]."""
-        hierarchy = self._state.hierarchy
-        return np.asarray(hierarchy.faces.reflectance[hierarchy.face] * self._state.irradiance)
+        """Return (e, 3): the part of every element's radiosity it does not emit itself [W/m²].
+
+        Where its surface is there, as it is for rays that hit it.
+        """
+        every = np.arange(self._state.hierarchy.n_elements)
+        return np.asarray(self.leaf_reflectance(every) * self._state.irradiance)
 
     def reflected_at(self, triangle: Array, barycentric: Array) -> Array:
         """Return (n, 3): the same at points of triangles' fronts, (n, 2) weights of corners 2 and 3."""
@@ -188,9 +192,9 @@ class LocalPass:
         )
 
     def leaf_reflectance(self, leaves: Array) -> Array:
-        """Return (l, 3) the reflectance of leaf elements."""
+        """Return (l, 3) the reflectance of leaf elements where their surface is there."""
         hierarchy = self._state.hierarchy
-        return np.asarray(hierarchy.faces.reflectance[hierarchy.face[leaves]])
+        return np.asarray(hierarchy.reflectance[leaves] / hierarchy.opacity_where_hit[leaves, None])
 
     def leaf_direct(self, leaves: Array) -> Generator[float, None, Array]:
         """Compute (l, 3) the irradiance of leaf elements straight from lamps and emissive faces."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from .arrays import Array
 from .cluster_links import ClusterLinks, gather_at_clusters
-from .hierarchy import Faces, Hierarchy
+from .hierarchy import Faces, Hierarchy, node_opacity
 from .light_base import Emitter
 from .lights import EnvironmentLight, SunLight
 from .links import Links
@@ -56,10 +56,10 @@ def power_balance(state: SolverState) -> dict[str, float]:
     Lamps and emission count over all their sides, sun and sky what arrives at the faces.
     """
     hierarchy, scene = state.hierarchy, state.scene
-    faces = hierarchy.faces
     leaves = hierarchy.leaves
-    emitted = float((faces.area @ faces.emission).mean()) if len(faces) else 0.0
-    gain = hierarchy.area[state.light_links.receiver] * state.light_links.gain.mean(axis=1)
+    emitted = float((hierarchy.area[leaves] @ hierarchy.emission[leaves]).mean()) if len(leaves) else 0.0
+    receiver = state.light_links.receiver
+    gain = hierarchy.area[receiver] * hierarchy.opacity[receiver] * state.light_links.gain.mean(axis=1)
     for number, light in enumerate(scene.lights):
         if isinstance(light, SunLight | EnvironmentLight):
             arriving = float(gain[state.light_links.light == number].sum())
@@ -67,7 +67,7 @@ def power_balance(state: SolverState) -> dict[str, float]:
         elif isinstance(light, Emitter):
             emitted += float(light.flux.mean())
 
-    kept = (1.0 - faces.reflectance[hierarchy.face[leaves]]) * state.irradiance[leaves]
+    kept = (hierarchy.opacity[leaves, None] - hierarchy.reflectance[leaves]) * state.irradiance[leaves]
     absorbed = float((hierarchy.area[leaves] @ kept).mean()) if len(leaves) else 0.0
     from_surfaces = _follow_surfaces(state)
     from_lamps = _follow_lamps(state)
@@ -128,14 +128,17 @@ def _fate(state: SolverState, origins: Array, directions: Array) -> tuple[Array,
 def link_closure(hierarchy: Hierarchy, links: Links, cluster_links: ClusterLinks | None = None) -> Array:
     """Return (f,) the area mean over each face's leaves of ΣFV over own and inherited links.
 
-    1 in a closed scene: all that leaves a face arrives somewhere.
+    1 in a closed scene: all that leaves a face arrives somewhere. A factor counts with its source's
+    opacity, as light that finds no surface there goes on to the next.
     """
-    own = np.bincount(links.receiver, links.factor * links.visibility, minlength=hierarchy.n_elements)
+    opacity = node_opacity(hierarchy)
+    factor = links.factor * links.visibility * opacity[links.source]
+    own = np.bincount(links.receiver, factor, minlength=hierarchy.n_elements)
     # An element's own links count for its whole area: exactly the mean over its leaves.
     held = np.bincount(hierarchy.face, own * hierarchy.area, minlength=len(hierarchy.faces))
     per_face = np.asarray(held / hierarchy.faces.area)
     if cluster_links is not None:
         top = TreeTop(hierarchy, cluster_links.receiver, cluster_links.source)
-        everywhere = np.ones((hierarchy.n_clusters + hierarchy.n_elements, 1))
-        per_face += np.maximum(gather_at_clusters(hierarchy, top, cluster_links, everywhere)[:, 0], 0.0)
+        there = gather_at_clusters(hierarchy, top, cluster_links, opacity[:, None])[:, 0]
+        per_face += np.maximum(there, 0.0)
     return per_face

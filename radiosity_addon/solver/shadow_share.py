@@ -140,7 +140,7 @@ class ShadowShare:
             start = start + caster.surface_offset * normal[:, None]
             point, sample = np.nonzero(weights > 0)
             ray = (point, sample)
-            free = caster.visible(start[ray], directions[ray], distances[ray])
+            free = caster.passing(start[ray], directions[ray], distances[ray])
             self._lit[chunk] += np.bincount(point, free * weights[ray], minlength=len(chunk))
             self._total[chunk] += weights.sum(axis=1)
 

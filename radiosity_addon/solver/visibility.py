@@ -58,6 +58,14 @@ class RayCaster(Protocol):
         """Return (n,) bool: nothing lies within `distances` along the unit `directions`."""
         ...
 
+    def passing(self, origins: Array, directions: Array, distances: Array, least: float = 0.0) -> Array:
+        """Return (n,) what share of light passes: `visible`, but between 0 and 1 through cut-outs.
+
+        Their opacity counts as at least `least` and as at most 1 − `least`, for callers that judge
+        by few rays: where some met a cut-out, more are needed.
+        """
+        ...
+
     def first_hits(self, origins: Array, directions: Array) -> Hits:
         """Return what each ray meets first."""
         ...
@@ -86,6 +94,10 @@ class BruteForceCaster:
     def visible(self, origins: Array, directions: Array, distances: Array) -> Array:
         """See `RayCaster.visible`."""
         return np.asarray(self.first_hits(origins, directions).distance >= distances)
+
+    def passing(self, origins: Array, directions: Array, distances: Array, least: float = 0.0) -> Array:  # noqa: ARG002
+        """Return the same: all surfaces are whole."""
+        return self.visible(origins, directions, distances)
 
     def first_hits(self, origins: Array, directions: Array) -> Hits:
         """See `RayCaster.first_hits`."""
