@@ -87,11 +87,15 @@ class SurfaceBake:
         )
         self._made.append(self._image)
 
+    def may_be_cut_out(self, surface: int) -> bool:
+        """Tell whether a surface's opacity varies."""
+        return surface in self._rewired and not self._rewired[surface].is_constant("passed")
+
     def is_constant(self, channel: str) -> bool:
         """Tell whether no material varies in a channel: what was read of them then holds."""
         return all(rewired.is_constant(channel) for rewired in self._rewired.values())
 
-    def bake(self, channel: str) -> np.ndarray:
+    def channel(self, channel: str) -> np.ndarray:
         """Return one channel, (h, w, 3) float32; what is not drawn is 0."""
         width, height = self._image.size
         for rewired in self._rewired.values():

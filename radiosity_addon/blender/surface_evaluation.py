@@ -63,26 +63,23 @@ def evaluate_surfaces(
     if not len(rows):
         return None
     corners, inputs = _gather(pieces, rows)
-    surface_of_row = surface[rows]
-    varies = np.array([one.varies for one in surfaces])[surface_of_row]
-    tiles = lay_out_surfaces(
-        np.where(varies, _areas(corners), 0.0),
-        np.array([one.opacity < 1.0 or one.varies for one in surfaces])[surface_of_row].astype(int),
-        _side(settings),
-    )
-    terms = _terms_of_constants(tiles, surfaces, surface_of_row)
-    if varies.any():
-        evaluation = SurfaceBake(context, settings, materials, set(surface_of_row[varies].tolist()), inputs)
-        try:
-            evaluation.draw(tiles, corners, inputs, surface_of_row, varies)
+    own = surface[rows]
+    varies = np.array([one.varies for one in surfaces])[own]
+    bake = SurfaceBake(context, settings, materials, set(own[varies].tolist()), inputs)
+    try:
+        cut_out = [one.opacity < 1.0 or bake.may_be_cut_out(row) for row, one in enumerate(surfaces)]
+        area = np.where(varies, _areas(corners), 0.0)
+        tiles = lay_out_surfaces(area, np.array(cut_out)[own].astype(int), _side(settings))
+        terms = _terms_of_constants(tiles, surfaces, own)
+        if varies.any():
+            bake.draw(tiles, corners, inputs, own, varies)
             triangle, row, column, *_ = tiles.texels()
-            own = varies[triangle]
+            row, column = row[varies[triangle]], column[varies[triangle]]
             for channel in CHANNELS:
-                if not evaluation.is_constant(channel):
-                    baked = evaluation.bake(channel)
-                    terms[channel][row[own], column[own]] = baked[row[own], column[own]]
-        finally:
-            evaluation.remove()
+                if not bake.is_constant(channel):
+                    terms[channel][row, column] = bake.channel(channel)[row, column]
+    finally:
+        bake.remove()
     return _images(tiles, terms, rows, len(surface))
 
 
