@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any
 
 import bpy
 import numpy as np
@@ -17,10 +15,8 @@ from radiosity_addon.settings import BakeSettings
 from radiosity_addon.solver.scene import Scene
 from radiosity_addon.solver.surface_images import SurfaceImages
 from tests.blender.exporting import CUBE, CUBE_FACES, add_cube, add_instance
-from tests.blender.scenes import add_mesh, add_node, shader_material, with_nodes
-
-_RED = (0.6, 0.2, 0.1, 1.0)
-_BLUE = (0.1, 0.2, 0.8, 1.0)
+from tests.blender.material_zoo import BLUE, RED, ZOO, cut_out, diffuse_of, feed, make_all_vary
+from tests.blender.scenes import add_mesh, add_node, shader_material
 
 
 def _scene(resolution: int = 128) -> Scene:
@@ -33,133 +29,12 @@ def _images(resolution: int = 128) -> SurfaceImages:
     return images
 
 
-def _feed(material: bpy.types.Material, source: bpy.types.NodeSocket, socket: str = "Color") -> None:
-    """Link a socket to that input of the material's shader."""
-    tree = material.node_tree
-    output = next(node for node in tree.nodes if node.type == "OUTPUT_MATERIAL")
-    tree.links.new(source, output.inputs["Surface"].links[0].from_node.inputs[socket])
-
-
-def _diffuse_of(kind: str, output: str = "Color", **inputs: Any) -> tuple[bpy.types.Material, bpy.types.Node]:
-    """Make a diffuse material whose color comes from a node."""
-    material = shader_material(kind, "ShaderNodeBsdfDiffuse")
-    node = add_node(material.node_tree, kind, **inputs)
-    _feed(material, node.outputs[output])
-    return material, node
-
-
-def _varying(tree: bpy.types.NodeTree, value: Any) -> bpy.types.NodeSocket:
-    """Return a socket that is constant, but which only Cycles knows to be: a color ramp."""
-    ramp = tree.nodes.new("ShaderNodeValToRGB")
-    for element in ramp.color_ramp.elements:
-        element.color = value
-    return ramp.outputs["Color"]
-
-
-def _principled(**inputs: Any) -> Callable[[], bpy.types.Material]:
-    return lambda: shader_material("M", "ShaderNodeBsdfPrincipled", **inputs)
-
-
-def _mixed(kind: str) -> bpy.types.Material:
-    material = shader_material("M", kind)
-    tree = material.node_tree
-    node = next(node for node in tree.nodes if node.bl_idname == kind)
-    if kind == "ShaderNodeMixShader":
-        node.inputs[0].default_value = 0.3
-    sockets = [socket for socket in node.inputs if socket.type == "SHADER"]
-    tree.links.new(add_node(tree, "ShaderNodeBsdfDiffuse", Color=_RED).outputs[0], sockets[0])
-    glow = add_node(tree, "ShaderNodeEmission", Color=_BLUE, Strength=2.0)
-    tree.links.new(glow.outputs[0], sockets[1])
-    return material
-
-
-def _cut_out() -> bpy.types.Material:
-    material = shader_material("M", "ShaderNodeMixShader", Fac=0.3)
-    tree = material.node_tree
-    mix = next(node for node in tree.nodes if node.type == "MIX_SHADER")
-    tree.links.new(add_node(tree, "ShaderNodeBsdfTransparent").outputs[0], mix.inputs[1])
-    tree.links.new(add_node(tree, "ShaderNodeBsdfDiffuse", Color=_RED).outputs[0], mix.inputs[2])
-    return material
-
-
-def _grouped() -> bpy.types.Material:
-    """A group in a group: the inner takes a color, and mixes a shader it is given with its own."""
-    inner = bpy.data.node_groups.new("Inner", "ShaderNodeTree")
-    inner.interface.new_socket("Tint", in_out="INPUT", socket_type="NodeSocketColor")
-    inner.interface.new_socket("Other", in_out="INPUT", socket_type="NodeSocketShader")
-    inner.interface.new_socket("Result", in_out="OUTPUT", socket_type="NodeSocketShader")
-    entry, leave = inner.nodes.new("NodeGroupInput"), inner.nodes.new("NodeGroupOutput")
-    own = inner.nodes.new("ShaderNodeBsdfDiffuse")
-    mix = add_node(inner, "ShaderNodeMixShader", Fac=0.25)
-    inner.links.new(entry.outputs["Tint"], own.inputs["Color"])
-    inner.links.new(own.outputs[0], mix.inputs[1])
-    inner.links.new(entry.outputs["Other"], mix.inputs[2])
-    inner.links.new(mix.outputs[0], leave.inputs["Result"])
-
-    outer = bpy.data.node_groups.new("Outer", "ShaderNodeTree")
-    outer.interface.new_socket("Color", in_out="INPUT", socket_type="NodeSocketColor")
-    outer.interface.new_socket("Shader", in_out="OUTPUT", socket_type="NodeSocketShader")
-    entry, leave = outer.nodes.new("NodeGroupInput"), outer.nodes.new("NodeGroupOutput")
-    use = outer.nodes.new("ShaderNodeGroup")
-    use.node_tree = inner
-    glow = add_node(outer, "ShaderNodeEmission", Strength=2.0)
-    outer.links.new(entry.outputs["Color"], use.inputs["Tint"])
-    outer.links.new(entry.outputs["Color"], glow.inputs["Color"])
-    outer.links.new(glow.outputs[0], use.inputs["Other"])
-    outer.links.new(use.outputs[0], leave.inputs["Shader"])
-
-    material = bpy.data.materials.new("M")
-    tree = with_nodes(material)
-    group = tree.nodes.new("ShaderNodeGroup")
-    group.node_tree = outer
-    group.inputs["Color"].default_value = _RED
-    tree.links.new(group.outputs[0], tree.nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
-    return material
-
-
-_ZOO: dict[str, Callable[[], bpy.types.Material]] = {
-    "diffuse": lambda: shader_material("M", "ShaderNodeBsdfDiffuse", Color=_RED),
-    "emission": lambda: shader_material("M", "ShaderNodeEmission", Color=_BLUE, Strength=3.0),
-    "principled": _principled(Base_Color=_RED),
-    "tinted": _principled(Base_Color=_RED, Specular_Tint=_BLUE, Specular_IOR_Level=0.9, Roughness=0.1),
-    "metal": _principled(Base_Color=_RED, Metallic=1.0, Roughness=0.7),
-    "half a metal": _principled(Base_Color=_RED, Metallic=0.4, Roughness=0.3),
-    "glowing": _principled(Base_Color=_RED, Emission_Color=_BLUE, Emission_Strength=2.0),
-    "thin": _principled(Base_Color=_RED, Alpha=0.3, Emission_Color=_BLUE, Emission_Strength=2.0),
-    "glass": _principled(Base_Color=_RED, Transmission_Weight=0.6),
-    "mixed": lambda: _mixed("ShaderNodeMixShader"),
-    "added": lambda: _mixed("ShaderNodeAddShader"),
-    "cut out": _cut_out,
-    "grouped": _grouped,
-    "glossy": lambda: shader_material("M", "ShaderNodeBsdfAnisotropic", Color=_RED),
-}
-
-
-def _make_all_vary(tree: bpy.types.NodeTree) -> None:
-    """Feed every unlinked color and share of the shaders with the same value from a node."""
-    for node in list(tree.nodes):
-        if node.type == "GROUP":
-            _make_all_vary(node.node_tree)
-        if node.type != "GROUP" and not any(out.type == "SHADER" for out in node.outputs):
-            continue
-        for socket in node.inputs:
-            if socket.is_linked or not socket.enabled:
-                continue
-            if socket.type == "RGBA":
-                tree.links.new(_varying(tree, socket.default_value), socket)
-            elif socket.type == "VALUE" and socket.name in (
-                "Fac", "Factor", "Alpha", "Metallic", "Roughness", "Transmission Weight",
-                "Specular IOR Level",
-            ):  # fmt: skip
-                tree.links.new(_varying(tree, [socket.default_value] * 3 + [1.0]), socket)
-
-
-@pytest.mark.parametrize("kind", _ZOO)
+@pytest.mark.parametrize("kind", ZOO)
 def test_evaluated_values_are_those_read_as_constants(kind: str) -> None:
-    material = _ZOO[kind]()
+    material = ZOO[kind]()
     read = read_material(material)
     assert not read.varies
-    _make_all_vary(material.node_tree)
+    make_all_vary(material.node_tree)
     assert read_material(material).varies
     add_mesh("Quad", material=material)
     images = _images()
@@ -215,7 +90,7 @@ def test_an_image_texture_gives_its_own_texels(colorspace: str) -> None:
     from radiosity_addon.blender.image_values import linear_from_srgb
 
     image, pixels = _picture(8, colorspace)
-    material, node = _diffuse_of("ShaderNodeTexImage")
+    material, node = diffuse_of("ShaderNodeTexImage")
     node.image, node.interpolation = image, "Closest"
     _square_uvs(add_mesh("Quad", material=material))
     scene = _scene()
@@ -236,9 +111,9 @@ def test_an_image_texture_gives_its_own_texels(colorspace: str) -> None:
 
 def test_uv_maps_are_taken_by_name_and_the_rendered_one_by_default() -> None:
     image, pixels = _picture()
-    material, node = _diffuse_of("ShaderNodeTexImage")
+    material, node = diffuse_of("ShaderNodeTexImage")
     node.image, node.interpolation = image, "Closest"
-    named, other = _diffuse_of("ShaderNodeTexImage")
+    named, other = diffuse_of("ShaderNodeTexImage")
     other.image, other.interpolation = image, "Closest"
     uv_map = named.node_tree.nodes.new("ShaderNodeUVMap")
     uv_map.uv_map = "Second"
@@ -260,7 +135,7 @@ def test_uv_maps_are_taken_by_name_and_the_rendered_one_by_default() -> None:
 @pytest.mark.parametrize("node", ["ShaderNodeVertexColor", "ShaderNodeAttribute"])
 @pytest.mark.parametrize(("domain", "kind"), [("CORNER", "FLOAT_COLOR"), ("POINT", "BYTE_COLOR")])
 def test_vertex_colors(node: str, domain: str, kind: str) -> None:
-    material, source = _diffuse_of(node)
+    material, source = diffuse_of(node)
     if node == "ShaderNodeVertexColor":
         source.layer_name = "Paint"
     else:
@@ -319,7 +194,7 @@ def test_procedural_nodes_as_cycles_bakes_them_on_the_object_itself(kind: str) -
         tree.links.new(source.outputs[coordinates[1]], node.inputs["Vector"])
     if "Scale" in node.inputs:
         node.inputs["Scale"].default_value = 0.4 if kind == "bricks" else 1.3
-    _feed(material, node.outputs[output])
+    feed(material, node.outputs[output])
     obj = add_mesh("Lump", CUBE, CUBE_FACES, material=material, location=(0.4, 0.2, 0.3))
     obj.rotation_euler, obj.scale, obj.color = (0.3, 0.4, 0.5), (1, -2, 0.5), (0.3, 0.5, 0.7, 1)
     for vertex in obj.data.vertices:
@@ -366,7 +241,7 @@ def _bake_itself(obj: bpy.types.Object, width: int, height: int) -> np.ndarray:
 
 
 def test_instances_have_their_own_numbers() -> None:
-    material, _ = _diffuse_of("ShaderNodeObjectInfo", "Random")
+    material, _ = diffuse_of("ShaderNodeObjectInfo", "Random")
     collection = bpy.data.collections.new("Many")
     add_mesh("Quad", material=material, collection=collection)
     for number in range(3):
@@ -379,7 +254,7 @@ def test_hundreds_of_objects_take_one_bake(monkeypatch: pytest.MonkeyPatch) -> N
     bake = surface_bake.bake_emission
     monkeypatch.setattr(surface_bake, "bake_emission", lambda: calls.append(1) or bake())
     for kind in ("ShaderNodeTexNoise", "ShaderNodeTexChecker", "ShaderNodeTexVoronoi"):
-        material, _ = _diffuse_of(kind)
+        material, _ = diffuse_of(kind)
         for number in range(100):
             add_mesh(f"{kind} {number}", material=material, location=(3 * number, 0, 0))
     images = _images()
@@ -390,9 +265,9 @@ def test_hundreds_of_objects_take_one_bake(monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_constant_materials_are_not_evaluated(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(surface_bake, "bake_emission", lambda: pytest.fail("nothing varies"))
-    add_cube(material=shader_material("M", "ShaderNodeBsdfPrincipled", Base_Color=_RED))
+    add_cube(material=shader_material("M", "ShaderNodeBsdfPrincipled", Base_Color=RED))
     assert _scene().images is None
-    add_mesh("Pane", material=_cut_out())
+    add_mesh("Pane", material=cut_out())
     scene = _scene()
     assert scene.images.textured.sum() == 2
     np.testing.assert_allclose(scene.opacity, np.where(scene.images.textured, 0.3, 1.0), rtol=1e-6)
@@ -403,17 +278,17 @@ def test_opacity_of_an_image_s_alpha() -> None:
     pixels[..., 3] = np.random.default_rng(4).integers(0, 2, (8, 8))
     image.alpha_mode = "CHANNEL_PACKED"
     image.pixels.foreach_set(pixels.ravel())
-    material = shader_material("Leaf", "ShaderNodeBsdfPrincipled", Specular_IOR_Level=0.0, Base_Color=_RED)
+    material = shader_material("Leaf", "ShaderNodeBsdfPrincipled", Specular_IOR_Level=0.0, Base_Color=RED)
     node = material.node_tree.nodes.new("ShaderNodeTexImage")
     node.image, node.interpolation = image, "Closest"
-    _feed(material, node.outputs["Alpha"], "Alpha")
+    feed(material, node.outputs["Alpha"], "Alpha")
     _square_uvs(add_mesh("Leaf", material=material))
     scene = _scene()
     values, points = _look_up(scene.images, scene)
     place = np.floor((points[:, :2] + 1) / 2 * 8).astype(int)
     alpha = pixels[place[:, 1], place[:, 0], 3]
     np.testing.assert_array_equal(values[:, 6], alpha)
-    np.testing.assert_allclose(values[:, :3], alpha[:, None] * _RED[:3], atol=1e-6)
+    np.testing.assert_allclose(values[:, :3], alpha[:, None] * RED[:3], atol=1e-6)
 
 
 def test_a_shadow_ray_switch_lets_light_pass_and_reflects_all_the_same() -> None:
@@ -421,14 +296,14 @@ def test_a_shadow_ray_switch_lets_light_pass_and_reflects_all_the_same() -> None
     tree = material.node_tree
     mix = next(node for node in tree.nodes if node.type == "MIX_SHADER")
     tree.links.new(tree.nodes.new("ShaderNodeLightPath").outputs["Is Shadow Ray"], mix.inputs[0])
-    tree.links.new(add_node(tree, "ShaderNodeEmission", Color=_BLUE).outputs[0], mix.inputs[1])
+    tree.links.new(add_node(tree, "ShaderNodeEmission", Color=BLUE).outputs[0], mix.inputs[1])
     tree.links.new(
         add_node(tree, "ShaderNodeBsdfTransparent", Color=(0.75,) * 3 + (1,)).outputs[0], mix.inputs[2]
     )
     add_mesh("Pane", material=material)
     scene = _scene()
     np.testing.assert_allclose(scene.opacity, 0.25, atol=1e-6)
-    np.testing.assert_allclose(scene.emission, np.tile(np.array(_BLUE[:3]) * math.pi, (2, 1)), rtol=1e-5)
+    np.testing.assert_allclose(scene.emission, np.tile(np.array(BLUE[:3]) * math.pi, (2, 1)), rtol=1e-5)
 
 
 def test_the_file_is_the_same_afterwards() -> None:
@@ -436,9 +311,9 @@ def test_the_file_is_the_same_afterwards() -> None:
     from tests.blender.zoo import build_zoo
 
     build_zoo(bpy.context)
-    for number, make in enumerate(_ZOO.values()):
+    for number, make in enumerate(ZOO.values()):
         material = make()
-        _make_all_vary(material.node_tree)
+        make_all_vary(material.node_tree)
         add_mesh(f"Evaluated {number}", material=material, location=(0, 0, 5 + number))
     before = _tidy_dump()
     assert _scene().images is not None

@@ -11,8 +11,8 @@ from .stage import add_lamp, add_node, add_quad, diffuse, emptied_nodes, shader_
 SIDE = ((2, -2, 0), (2, 2, 0), (2, 2, 2.2), (2, -2, 2.2))
 """The corners of a wall that closes the stage on the right."""
 
-NOWHERE = (82, 82, 82, 82)
-"""No texel of the lightmap: what has this for its place is not compared, but bounces or blocks."""
+NOWHERE = (127.55, 127.55, 127.95, 127.95)
+"""A place in the lightmap without the center of a texel: what has it is not compared, but bounces or blocks."""
 
 
 @row("image-texture")
