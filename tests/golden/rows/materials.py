@@ -12,7 +12,7 @@ SIDE = ((2, -2, 0), (2, 2, 0), (2, 2, 2.2), (2, -2, 2.2))
 """The corners of a wall that closes the stage on the right."""
 
 NOWHERE = (127.55, 127.55, 127.95, 127.95)
-"""A place in the lightmap without the center of a texel: what has it is not compared, but bounces or blocks."""
+"""A place in the lightmap without a texel's center: what has it is not compared, but bounces or blocks."""
 
 
 @row("image-texture")
