@@ -18,9 +18,9 @@ from .aiming import BrightElements
 from .arrays import Array
 from .emitters import EmitterGroup
 from .gathering import NOTHING, SKY, Gathered, Gathering, Resolver
+from .leaf_parts import LeafParts
 from .lights import EnvironmentLight, Lamp
 from .radiometry import radiosity_of_radiance
-from .sampling import points_on_triangles
 from .shadow_share import Footprints, Sampler, ShadowShare
 from .steps import drain, scaled
 from .textured_emitters import emitter_groups
@@ -144,7 +144,15 @@ class LocalPass:
 
     @cached_property
     def _bright(self) -> BrightElements:
-        return BrightElements(self._state.hierarchy, self.reflected())
+        return BrightElements(self._state.hierarchy, self.reflected(), self._unshadowed)
+
+    def _unshadowed(self, points: Array, normals: Array) -> Array:
+        """Return (n,) the irradiance straight from lamps were nothing in the way, a mean of the channels."""
+        total = np.zeros(len(points))
+        for light in self._state.scene.lights:
+            if isinstance(light, Lamp):
+                total += light.unit_irradiance(points, normals) * light.strength.mean()
+        return total
 
     def leaves_of(self, hits: Hits) -> Array:
         """Return (n,) int32: the leaf element under each hit; SKY for none or a black back."""
@@ -161,7 +169,7 @@ class LocalPass:
         Where its surface is there, as it is for rays that hit it.
         """
         every = np.arange(self._state.hierarchy.n_elements)
-        return np.asarray(self.leaf_reflectance(every) * self._state.irradiance)
+        return np.asarray(self._reflectance_where_hit(every) * self._state.irradiance)
 
     def reflected_at(self, triangle: Array, barycentric: Array) -> Array:
         """Return (n, 3): the same at points of triangles' fronts, (n, 2) weights of corners 2 and 3."""
@@ -177,28 +185,32 @@ class LocalPass:
         leaf = hierarchy.leaf_at(np.maximum(face, 0), barycentric)
         return np.asarray(np.where(face >= 0, self._state.irradiance.mean(axis=1)[leaf], 0.0))
 
-    def gather_at_leaves(self, leaves: Array, rays: int, resolve: Resolver) -> Generator[float, None, Array]:
-        """Gather over whole leaf elements instead of points, (l, rays) sources; yields the fraction done."""
-        at = self._whole_leaves(leaves)
+    @cached_property
+    def parts(self) -> LeafParts:
+        """The parts of leaf elements that rays may hit."""
+        return LeafParts(self._state.hierarchy, self.caster)
+
+    def parts_of(self, hits: Hits) -> Array:
+        """Return (n,) int32: the part of a leaf element under each hit; NOTHING for none or a black back."""
+        return self.parts.at(self.leaves_of(hits), hits)
+
+    def gather_at_parts(self, parts: Array, rays: int, resolve: Resolver) -> Generator[float, None, Array]:
+        """Gather over whole parts instead of points, (p, rays) sources; yields the fraction done."""
+        at = self.parts.footprints(parts)
         gathered = yield from self.gather_steps(at, at.normals, rays, resolve)
         return gathered.sources
 
-    def _whole_leaves(self, leaves: Array) -> Footprints:
-        """Return leaf elements as footprints."""
-        corners = self._state.hierarchy.corners[leaves]
-        normals = self._state.hierarchy.normal[leaves]
-        return Footprints(
-            corners.mean(axis=1), normals, leaves, lambda rows, u: points_on_triangles(corners[rows], u)
-        )
+    def part_reflectance(self, parts: Array) -> Array:
+        """Return (p, 3) the reflectance of parts of leaf elements where their surface is there."""
+        return self._reflectance_where_hit(self.parts.leaf_of(parts))
 
-    def leaf_reflectance(self, leaves: Array) -> Array:
-        """Return (l, 3) the reflectance of leaf elements where their surface is there."""
+    def _reflectance_where_hit(self, elements: Array) -> Array:
         hierarchy = self._state.hierarchy
-        return np.asarray(hierarchy.reflectance[leaves] / hierarchy.opacity_where_hit[leaves, None])
+        return np.asarray(hierarchy.reflectance[elements] / hierarchy.opacity_where_hit[elements, None])
 
-    def leaf_direct(self, leaves: Array) -> Generator[float, None, Array]:
-        """Compute (l, 3) the irradiance of leaf elements straight from lamps and emissive faces."""
-        return self.direct_steps(self._whole_leaves(leaves), rays=16)
+    def part_direct(self, parts: Array) -> Generator[float, None, Array]:
+        """Compute (p, 3) the irradiance of parts straight from lamps and emissive faces."""
+        return self.direct_steps(self.parts.footprints(parts), rays=16)
 
     def sky(self) -> Array:
         """Return (3,) the radiosity equivalent πL of the sky [W/m²]."""

@@ -22,7 +22,16 @@ CHANNELS = 7
 """Reflectance RGB, emission RGB, opacity."""
 
 MAX_DEPTH = 8
-"""An area's mean is taken over 4^8 parts at most, each of about a texel or less up to there."""
+"""An area's mean is taken over 4^8 parts at most."""
+
+LEAST_DEPTH = 2
+"""And over 4^2 at least."""
+
+SMALL = 8.0
+"""Areas so many texels wide, at whose rims many of their samples lie, take four times as many."""
+
+THIN = 4.0
+"""Parts are at most so many texels long, however thin."""
 
 CHUNK_SAMPLES = 1 << 18
 """Look-ups done at once; their temporaries take about 60 MB."""
@@ -72,6 +81,7 @@ class SurfaceImages:
         self.values[..., 6] = np.minimum(self.values[..., 6], 1.0)
         self._weighed = self.values.copy()
         self._weighed[..., :6] *= self.values[..., 6:]
+        self._opacity = np.ascontiguousarray(self.values[..., 6:])
 
     def __len__(self) -> int:
         return len(self.textured)
@@ -95,17 +105,18 @@ class SurfaceImages:
         weighed : (n, 7) float32
             Reflectance and emission, each multiplied by opacity, and opacity.
         """
-        return self._bilinear(self._weighed, triangle, barycentric)
+        return _bilinear(self._weighed, self._place(triangle, barycentric))
 
     def opacity_at(self, triangle: Array, barycentric: Array) -> Array:
         """Return (n,) float32 the opacity at the same points."""
-        return self._bilinear(self.values[..., 6:], triangle, barycentric)[:, 0]
+        return _bilinear(self._opacity, self._place(triangle, barycentric))[:, 0]
 
     def area_means(self, triangle: Array, corners: Array) -> Array:
         """Average over parts of textured triangles.
 
-        The mean over the centroids of so many equal parts that each is at most about a texel long,
-        or over 4^`MAX_DEPTH`. A part's parts use the same points.
+        The mean over the centroids of so many equal parts that a texel holds two at least,
+        or of 4^`MAX_DEPTH`, each of the texel it lies in. Nothing is interpolated: of a bright texel's
+        light none then lies on a dark part next to it, which nobody would think to divide.
 
         Parameters
         ----------
@@ -119,43 +130,26 @@ class SurfaceImages:
             As from `at`.
         """
         means = np.empty((len(triangle), CHANNELS))
-        height, width = self.values.shape[:2]
-        uv = self._uv(np.repeat(triangle, 3), corners.reshape(-1, 2)).reshape(-1, 3, 2) * (width, height)
-        longest = np.linalg.norm(uv - np.roll(uv, 1, axis=1), axis=2).max(axis=1, initial=0.0)
-        depth = np.ceil(np.log2(np.maximum(longest, 1.0))).astype(int)
-        depth = np.clip(depth, 1, MAX_DEPTH)
+        place = self._place(np.repeat(triangle, 3), corners.reshape(-1, 2)).reshape(-1, 3, 2)
+        depth = _depth(place)
         for levels in np.unique(depth):
             inside = _centroids(int(levels))
             rows = np.flatnonzero(depth == levels)
             step = max(CHUNK_SAMPLES // len(inside), 1)
             for first in range(0, len(rows), step):
                 some = rows[first : first + step]
-                points = np.einsum("sc,nck->nsk", inside, corners[some]).reshape(-1, 2)
-                found = self.at(np.repeat(triangle[some], len(inside)), points)
-                found = found.reshape(len(some), len(inside), CHANNELS)
+                points = np.einsum("sc,nck->nsk", inside, place[some]).reshape(-1, 2)
+                found = _nearest(self._weighed, points).reshape(len(some), len(inside), CHANNELS)
                 means[some] = found.mean(axis=1, dtype=np.float64)
         return means
 
-    def _uv(self, triangle: Array, barycentric: Array) -> Array:
-        """Return (n, 2) where points of triangles are in the image."""
+    def _place(self, triangle: Array, barycentric: Array) -> Array:
+        """Return (n, 2) where points of triangles are in the image [texels]."""
+        height, width = self.values.shape[:2]
         corners = self.image_uv[triangle].astype(np.float64)
         weights = np.asarray(barycentric, dtype=np.float64)
-        return np.asarray(corners[:, 0] + np.einsum("nc,nck->nk", weights, corners[:, 1:] - corners[:, :1]))
-
-    def _bilinear(self, image: Array, triangle: Array, barycentric: Array) -> Array:
-        """Look (h, w, k) up at points of triangles, (n, k)."""
-        height, width = image.shape[:2]
-        texels = image.reshape(height * width, -1)
-        place = self._uv(triangle, barycentric) * (width, height) - 0.5
-        place = np.clip(place, 0.0, (width - 1.0, height - 1.0))
-        low = np.minimum(place.astype(np.int64), (max(width - 2, 0), max(height - 2, 0)))
-        part = (place - low).astype(np.float32)
-        right, up = int(width > 1), width * int(height > 1)
-        first = low[:, 1] * width + low[:, 0]
-        along, across = part[:, :1], part[:, 1:]
-        lower = texels[first] * (1 - along) + texels[first + right] * along
-        upper = texels[first + up] * (1 - along) + texels[first + up + right] * along
-        return np.asarray(lower * (1 - across) + upper * across)
+        uv = corners[:, 0] + np.einsum("nc,nck->nk", weights, corners[:, 1:] - corners[:, :1])
+        return np.asarray(uv * (width, height))
 
     def _check(self) -> None:
         """Refuse coordinates and texels that say nothing, naming the first triangle that has some."""
@@ -199,6 +193,39 @@ def _refuse(bad: Array, complaint: str) -> None:
     """Raise a SceneError for the first triangle of a (t,) mask."""
     if bad.any():
         raise SceneError(f"triangle {int(np.flatnonzero(bad)[0])} {complaint}")
+
+
+def _bilinear(image: Array, place: Array) -> Array:
+    """Look (h, w, k) up at (n, 2) places in texels, (n, k); beyond the middles of the rim its own values."""
+    height, width = image.shape[:2]
+    texels = image.reshape(height * width, -1)
+    place = np.clip(place - 0.5, 0.0, (width - 1.0, height - 1.0))
+    low = np.minimum(place.astype(np.int64), (max(width - 2, 0), max(height - 2, 0)))
+    part = (place - low).astype(np.float32)
+    right, up = int(width > 1), width * int(height > 1)
+    first = low[:, 1] * width + low[:, 0]
+    along, across = part[:, :1], part[:, 1:]
+    lower = texels[first] * (1 - along) + texels[first + right] * along
+    upper = texels[first + up] * (1 - along) + texels[first + up + right] * along
+    return np.asarray(lower * (1 - across) + upper * across)
+
+
+def _nearest(image: Array, place: Array) -> Array:
+    """Return (n, k) the texels of (h, w, k) that (n, 2) places lie in."""
+    height, width = image.shape[:2]
+    column, row = np.clip(place.astype(np.int64), 0, (width - 1, height - 1)).T
+    return np.asarray(image.reshape(height * width, -1).take(row * width + column, axis=0))
+
+
+def _depth(place: Array) -> Array:
+    """Return (n,) how often to halve the sides of (n, 3, 2) triangles in texels until they are small."""
+    edges = place - np.roll(place, 1, axis=1)
+    area = np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
+    longest = np.linalg.norm(edges, axis=2).max(axis=1, initial=0.0)
+    size = np.maximum(np.sqrt(area), longest / THIN)
+    finer = np.where(size < SMALL, 2.0 * size, size)
+    depth = np.ceil(np.log2(np.maximum(finer, 1.0))).astype(int)
+    return np.asarray(np.clip(depth, LEAST_DEPTH, MAX_DEPTH))
 
 
 def _centroids(depth: int) -> Array:

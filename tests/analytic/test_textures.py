@@ -172,6 +172,7 @@ def test_a_bright_spot_in_an_image_of_emission_converges() -> None:
         local = solve(scene, SolverSettings(error=error)).local_pass
         found = local.irradiance_at(np.where(lower, 0, 1), barycentric)
         errors.append(float(np.sqrt(((found - exact) ** 2).mean() / (exact**2).mean())))
+    assert errors == sorted(errors, reverse=True)
     assert errors[0] > 2 * errors[2]
     assert errors[2] < 0.05
     direct = solve(scene).local_pass.direct(points, up, np.arange(len(points)))[:, 0]

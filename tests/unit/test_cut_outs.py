@@ -26,7 +26,7 @@ def stack(opacities: np.ndarray) -> tuple[np.ndarray, SurfaceImages]:
     inset = 0.5 / size
     # Half a texel inside, so that look-ups keep to the layer's own part.
     inner = inset + QUAD_UV * (1 - 2 * inset)
-    uv = [np.zeros_like(QUAD_UV), *((inner + (layer, 0)) / (count, 1) for layer in range(count))]
+    uv = [np.zeros_like(QUAD_UV), *((inner + np.array((layer, 0))) / (count, 1) for layer in range(count))]
     images = SurfaceImages(values, np.concatenate(uv), np.arange(len(triangles)) > 1)
     return triangles, images
 
