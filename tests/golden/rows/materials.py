@@ -60,7 +60,7 @@ def procedural() -> None:
     _lit_stage()
     material = diffuse("Procedural", 0.8)
     tree = material.node_tree
-    coordinates = tree.nodes.new("ShaderNodeTexCoord").outputs["Object"]
+    coordinates = _object_coordinates(tree)
     checker = add_node(tree, "ShaderNodeTexChecker", Scale=1.5)
     checker.inputs["Color1"].default_value = (0.9, 0.6, 0.1, 1)
     checker.inputs["Color2"].default_value = (0.05, 0.1, 0.3, 1)
@@ -105,7 +105,7 @@ def mix_and_add() -> None:
     material = bpy.data.materials.new("Mixed")
     tree = emptied_nodes(material)
     checker = add_node(tree, "ShaderNodeTexChecker", Scale=1.5)
-    tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Object"], checker.inputs["Vector"])
+    tree.links.new(_object_coordinates(tree), checker.inputs["Vector"])
     mix, add = (tree.nodes.new(f"ShaderNode{kind}Shader") for kind in ("Mix", "Add"))
     red = add_node(tree, "ShaderNodeBsdfDiffuse", Color=(0.8, 0.1, 0.1, 1))
     blue = add_node(tree, "ShaderNodeBsdfDiffuse", Color=(0.1, 0.3, 0.8, 1))
@@ -157,6 +157,13 @@ def _lit_stage() -> None:
     """The stage under a lamp that makes the floor and the left wall bright."""
     stage()
     add_lamp("AREA", energy=60, size=0.6)
+
+
+def _object_coordinates(tree: bpy.types.NodeTree) -> bpy.types.NodeSocket:
+    """Add object coordinates, moved a little: no surface may lie where the squares of a checker end."""
+    mapping = add_node(tree, "ShaderNodeMapping", Location=(0.1, 0.2, 0.3))
+    tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Object"], mapping.inputs["Vector"])
+    return mapping.outputs["Vector"]
 
 
 def _image(material: bpy.types.Material) -> bpy.types.Node:
