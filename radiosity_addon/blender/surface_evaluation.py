@@ -23,7 +23,7 @@ from .surface_bake import SurfaceBake
 from .surface_rewiring import CHANNELS
 from .surface_terms import surface_of_terms
 
-MIN_SIDE, MAX_SIDE = 256, 2048
+MIN_SIDE, MIN_CUT_OUT_SIDE, MAX_SIDE = 256, 1024, 2048
 """Texels along the image's side."""
 
 
@@ -69,7 +69,7 @@ def evaluate_surfaces(
     try:
         cut_out = [one.opacity < 1.0 or bake.may_be_cut_out(row) for row, one in enumerate(surfaces)]
         area = np.where(varies, _areas(corners), 0.0)
-        tiles = lay_out_surfaces(area, np.array(cut_out)[own].astype(int), _side(settings))
+        tiles = lay_out_surfaces(area, np.array(cut_out)[own].astype(int), _side(settings, any(cut_out)))
         terms = _terms_of_constants(tiles, surfaces, own)
         if varies.any():
             bake.draw(tiles, corners, inputs, own, varies)
@@ -83,11 +83,15 @@ def evaluate_surfaces(
     return _images(tiles, terms, rows, len(surface))
 
 
-def _side(settings: BakeSettings) -> int:
-    """Return twice the lightmap's own texels, where those are known, within bounds."""
+def _side(settings: BakeSettings, cut_out: bool) -> int:
+    """Return twice the lightmap's own texels, where those are known, within bounds.
+
+    Four times where light falls through holes: their shadows are as sharp as their edges.
+    """
     if settings.texel_density is not None or settings.atlas != "shared":
         return MAX_SIDE
-    return min(max(2 * settings.resolution, MIN_SIDE), MAX_SIDE)
+    wanted = (4 if cut_out else 2) * settings.resolution
+    return min(max(wanted, MIN_CUT_OUT_SIDE if cut_out else MIN_SIDE), MAX_SIDE)
 
 
 def _areas(corners: np.ndarray) -> np.ndarray:
