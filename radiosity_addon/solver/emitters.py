@@ -49,10 +49,9 @@ class EmitterGroup:
             return []
         colours, group = np.unique(faces.emission[rows], axis=0, return_inverse=True)
         group = group.reshape(-1)
+        offset = end_offset(caster)
         return [
-            EmitterGroup(
-                faces.corners[rows[group == g]], faces.normal[rows[group == g]], colour, caster.surface_offset
-            )
+            EmitterGroup(faces.corners[rows[group == g]], faces.normal[rows[group == g]], colour, offset)
             for g, colour in enumerate(colours)
         ]
 
@@ -66,7 +65,11 @@ class EmitterGroup:
         return gain
 
     def shadow_rays(self, points: Array, normals: Array, u: Array) -> tuple[Array, Array, Array]:
-        """Aim (n, k) rays at the faces in proportion to their factors; equal weights.
+        """Aim (n, k) rays at the faces in proportion to their factors.
+
+        The weights tell apart the rays to one face only; every face weighs as much as it has rays.
+        Else, so near a large face that no ray finds the spot most light comes from, the few rays to a
+        far and perhaps hidden face would decide.
 
         Returns
         -------
@@ -94,7 +97,7 @@ class EmitterGroup:
         sent = self._level[face] * self._areas[face]
         thrown = throughput(ray_geometry_term(cos_r, cos_s, distances), 1.0, sent)
         weights = np.where(total > 0, radiance_of_radiosity(thrown) / width, 0.0)
-        return directions, distances, weights
+        return directions, distances, _balanced(weights, face, len(self._corners))
 
     def _factors(self, points: Array, normals: Array) -> Array:
         """Return (n, m) form factors from points to faces, times the faces' levels."""
@@ -106,3 +109,20 @@ class EmitterGroup:
             np.broadcast_to(self._corners[None], (count, faces, 3, 3)).reshape(-1, 3, 3),
         )
         return np.asarray(factors.reshape(count, faces) * self._level)
+
+
+def end_offset(caster: RayCaster) -> float:
+    """Return how far off an emissive face shadow rays end [m].
+
+    Their starts are lifted by one offset, which must not put their ends back on the face.
+    """
+    return 2.0 * caster.surface_offset
+
+
+def _balanced(weights: Array, face: Array, faces: int) -> Array:
+    """Scale (n, k) weights so that in every row the rays to one face have 1 on average."""
+    keys = (np.arange(len(face))[:, None] * faces + face).ravel()
+    _, number = np.unique(keys, return_inverse=True)
+    number = number.reshape(-1)
+    mean = np.bincount(number, weights.ravel()) / np.bincount(number)
+    return np.asarray(weights / np.maximum(mean[number].reshape(weights.shape), 1e-300))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from .arrays import Array
-from .emitters import EmitterGroup
+from .emitters import EmitterGroup, end_offset
 from .hierarchy import Faces, split_in_four
 from .scene import WHOLE_TRIANGLE, Scene
 from .surface_images import SurfaceImages
@@ -102,7 +102,7 @@ def _of_pieces(
             corners[level > 0],
             faces.normal[face[level > 0]],
             strength,
-            caster.surface_offset,
+            end_offset(caster),
             level[level > 0],
         )
         for level, strength in lamps

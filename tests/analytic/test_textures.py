@@ -73,6 +73,31 @@ def test_a_screen_does_not_disturb_the_furnace(opacity) -> None:
     )
 
 
+def test_a_screen_of_many_faces_does_not_disturb_the_furnace() -> None:
+    """The same through links to and from clusters."""
+    room, _ = box_room((2, 1, 1), 8)
+    triangles = np.concatenate([room, rectangle((1, 0, 0), (0, 1, 0), (0, 0, 1), 8)])
+    count, screen = len(triangles), np.arange(len(triangles)) >= len(room)
+    chance = np.random.default_rng(6)
+    reflectance, opacity = patterned(32), chance.random((32, 32))
+    values = np.concatenate(
+        [image(32, reflectance, 3 - 3 * reflectance), image(32, reflectance, 3 - 3 * reflectance, opacity)]
+    )
+    # Each triangle shows a patch of its own, the screen's in the upper half of the image.
+    corner = np.stack(
+        [chance.uniform(0.05, 0.85, count), chance.uniform(0.05, 0.38, count) + 0.5 * screen], 1
+    )
+    uv = corner[:, None] + QUAD_UV[0] * (0.1, 0.05)
+    images = SurfaceImages(values, uv, np.ones(count, bool))
+    scene = Scene(triangles, grey(count, 0), grey(count, 0), two_sided=screen, images=images)
+    solution = solve(scene)
+    assert solution.report["closure_area_mean"] == pytest.approx(1.0, abs=0.01)
+    power = solution.report["power_W"]
+    assert power["absorbed"] == pytest.approx(power["emitted"], rel=0.01)
+    np.testing.assert_allclose(solution.triangle_irradiance, 3.0, rtol=0.08)
+    np.testing.assert_allclose(scene.areas @ solution.triangle_irradiance / scene.areas.sum(), 3.0, rtol=0.01)
+
+
 @pytest.mark.parametrize("method", ["conjugate-gradient", "shooting", "two-level"])
 def test_a_screen_does_not_disturb_the_furnace_by_any_method(method: str) -> None:
     scene = furnace(3.0, 0.5)
