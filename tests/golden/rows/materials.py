@@ -117,7 +117,6 @@ def mix_and_add() -> None:
     tree.links.new(add.outputs[0], mix.inputs[2])
     tree.links.new(mix.outputs[0], tree.nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
     _paint("Left", material)
-    _paint("Floor", material)
 
 
 @row("textured-emission")
@@ -135,7 +134,7 @@ def textured_emission() -> None:
     _tile(panel)
 
 
-@row("cut-out")
+@row("cut-out", limit=0.04)
 def cut_out() -> None:
     """Fence cut out of a plane by an image's alpha."""
     stage(blockers=False)
