@@ -24,6 +24,8 @@ from .scene_objects import (
     unknown_objects,
     visible_objects,
 )
+from .shading_inputs import MeshValues, asked_by_material, doubts, read_mesh_inputs, read_object_inputs
+from .surface_bake import can_evaluate
 from .world import read_world
 
 
@@ -38,6 +40,10 @@ class Piece:
     matrix : (4, 4) float64
     surface : (t,) int32
         Rows of `Collected.surfaces`.
+    asked : frozenset of str
+        What its materials' nodes ask for, of those that vary; see `shading_inputs`.
+    inputs : dict of str to (t, 3, 4) or (4,) float32
+        What was found of it: not what follows from `mesh` and `matrix`, nor what is missing.
     bakeable : bool
         A lightmap can be assigned to it: it is a mesh and can be edited.
     linked : bool
@@ -51,6 +57,8 @@ class Piece:
     mesh: MeshArrays
     matrix: np.ndarray
     surface: np.ndarray
+    asked: frozenset[str]
+    inputs: dict[str, np.ndarray]
     bakeable: bool
     linked: bool
     uv_layers: int
@@ -64,10 +72,11 @@ class Piece:
 
 @dataclass(frozen=True)
 class Collected:
-    """All that was found. `surfaces` is indexed by `Piece.surface`."""
+    """All that was found. `surfaces` and `materials` are indexed by `Piece.surface`."""
 
     pieces: list[Piece]
     surfaces: list[Surface]
+    materials: list[bpy.types.Material | None]
     lights: list[Light]
     warnings: list[BakeWarning]
 
@@ -95,9 +104,10 @@ def collect(depsgraph: bpy.types.Depsgraph) -> Collected:
 
 class _Collector:
     def __init__(self, depsgraph: bpy.types.Depsgraph) -> None:
-        self.collected = Collected([], [], [], [])
+        self.collected = Collected([], [], [], [], [])
         self._override = depsgraph.view_layer_eval.material_override
-        self._meshes: dict[int, MeshArrays | None] = {}
+        self._meshes: dict[tuple[int, frozenset[str]], tuple[MeshArrays | None, MeshValues]] = {}
+        self._asked: list[frozenset[str]] = []
         self._surface_of: dict[str | None, int] = {}
         self._taken = {obj.name for obj in bpy.data.objects if obj.library is None}
         self._instancers = {
@@ -121,7 +131,9 @@ class _Collector:
     def mesh(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
         shown = original_object(instance)
         matrix = matrix_of(instance)
-        mesh = self._read(instance)
+        used, has_empty_slot = self._used_surfaces(instance)
+        asked = frozenset().union(*(self._asked[row] for row in used))
+        mesh, mesh_inputs = self._read(instance, asked)
         if mesh is None or not all_finite(matrix):
             raise SceneError(not_finite_message(shown.name))
         if len(mesh) == 0:
@@ -134,12 +146,18 @@ class _Collector:
             {layer.name for layer in shown.data.uv_layers} if is_mesh and not instance.is_instance else set()
         )
         self._warn_about(shown, owner, is_mesh)
+        if has_empty_slot:
+            message = f"object '{name}' has an empty material slot; grey {DEFAULT_GREY} is used"
+            self._warn([BakeWarning(name, message)])
         self.collected.pieces.append(
             Piece(
                 source=source,
                 mesh=mesh,
                 matrix=matrix,
-                surface=self._surfaces(instance, name, mesh),
+                # A face whose slot does not exist shows the last one, as in Blender.
+                surface=used[np.clip(mesh.material, 0, len(used) - 1)],
+                asked=asked,
+                inputs={**mesh_inputs, **read_object_inputs(instance, asked)},
                 bakeable=is_mesh and owner.library is None,
                 linked=is_mesh and owner.library is not None,
                 uv_layers=max(mesh.uv_layers, len(layers)),
@@ -147,15 +165,18 @@ class _Collector:
             )
         )
 
-    def _read(self, instance: bpy.types.DepsgraphObjectInstance) -> MeshArrays | None:
+    def _read(
+        self, instance: bpy.types.DepsgraphObjectInstance, asked: frozenset[str]
+    ) -> tuple[MeshArrays | None, MeshValues]:
+        """Return a mesh's triangles, and what is asked of it at their corners."""
         obj = instance.object
-        key = obj.data.as_pointer()
+        key = (obj.data.as_pointer(), asked)
         if key not in self._meshes:
             if is_generated(instance):
-                self._meshes[key] = read_mesh(obj.data)
+                self._meshes[key] = _read_evaluated(obj.data, asked)
             else:
                 # Not `obj.data`: a window's subdivision may still be pending on the GPU.
-                self._meshes[key] = read_mesh(obj.to_mesh())
+                self._meshes[key] = _read_evaluated(obj.to_mesh(), asked)
                 obj.to_mesh_clear()
         return self._meshes[key]
 
@@ -171,27 +192,31 @@ class _Collector:
         self._taken.add(name)
         return name
 
-    def _surfaces(
-        self, instance: bpy.types.DepsgraphObjectInstance, name: str, mesh: MeshArrays
-    ) -> np.ndarray:
-        """Return the row of `collected.surfaces` for each triangle, (t,) int32."""
+    def _used_surfaces(self, instance: bpy.types.DepsgraphObjectInstance) -> tuple[np.ndarray, bool]:
+        """Return the row of `collected.surfaces` for each slot, and whether a slot is empty."""
         if self._override is not None:
-            return np.full(len(mesh), self._surface(self._override), dtype=np.int32)
+            return np.array([self._surface(self._override)], dtype=np.int32), False
         materials = materials_of(instance)
-        if any(material is None for material in materials):
-            message = f"object '{name}' has an empty material slot; grey {DEFAULT_GREY} is used"
-            self._warn([BakeWarning(name, message)])
-        rows = np.array([self._surface(material) for material in materials or [None]], dtype=np.int32)
-        # A face whose slot does not exist shows the last one, as in Blender.
-        return rows[np.clip(mesh.material, 0, len(rows) - 1)]
+        rows = [self._surface(material) for material in materials or [None]]
+        return np.array(rows, dtype=np.int32), any(material is None for material in materials)
 
     def _surface(self, material: bpy.types.Material | None) -> int:
         key = None if material is None else material.original.name_full
         if key not in self._surface_of:
             surface = read_material(material)
-            self._warn(surface.warnings)
             self._surface_of[key] = len(self.collected.surfaces)
             self.collected.surfaces.append(surface)
+            self.collected.materials.append(material and material.original)
+            self._asked.append(
+                asked_by_material(material.node_tree) if material and surface.varies else frozenset()
+            )
+            self._warn(surface.warnings)
+            if material is not None and surface.varies:
+                said = [
+                    BakeWarning(material.name, f"material '{material.name}': {doubt}")
+                    for doubt in doubts(material.node_tree)
+                ]
+                self._warn(said if can_evaluate() else surface.fallbacks)
         return self._surface_of[key]
 
     def _warn_about(self, shown: bpy.types.Object, owner: bpy.types.Object, is_mesh: bool) -> None:
@@ -208,6 +233,11 @@ class _Collector:
 
     def _warn(self, warnings: Sequence[BakeWarning]) -> None:
         self.collected.warnings.extend(warnings)
+
+
+def _read_evaluated(mesh: bpy.types.Mesh, asked: frozenset[str]) -> tuple[MeshArrays | None, MeshValues]:
+    arrays = read_mesh(mesh)
+    return arrays, {} if arrays is None else read_mesh_inputs(mesh, arrays.loops, asked)
 
 
 def _unlit(name: str, why: str, mend: str) -> BakeWarning:

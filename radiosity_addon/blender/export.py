@@ -16,6 +16,7 @@ from .collect import Collected, Piece, collect
 from .export_sources import Export
 from .mesh_arrays import all_finite, degenerate, not_finite_message, world_from_object
 from .render_state import leave_edit_mode, render_depsgraph
+from .surface_evaluation import evaluate_surfaces
 
 MAX_UV_LAYERS = 8
 
@@ -90,20 +91,27 @@ def _assemble(
         raise SceneError(_nothing_to_bake(context))
 
     surface = np.concatenate(surfaces)
-    lights = list(collected.lights)
-    if not lights and not emission[surface].any():
-        if settings.sky:
-            lights.append(EnvironmentLight(1.0))
-        else:
-            warnings.append(_no_light(context))
+    images = evaluate_surfaces(
+        context,
+        collected.pieces,
+        collected.surfaces,
+        collected.materials,
+        settings,
+    )
     scene = Scene(
         triangles=np.concatenate(corners),
         reflectance=reflectance[surface],
         emission=emission[surface],
         two_sided=True,  # Blender's surfaces reflect and emit on both sides
-        lights=lights,
+        lights=collected.lights,
         normals=np.concatenate(normals),
+        images=images,
     )
+    if not scene.lights and not scene.emission.any():
+        if settings.sky:
+            scene.lights = (EnvironmentLight(1.0),)
+        else:
+            warnings.append(_no_light(context))
     return Export(
         BakeScene(scene, tuple(objects), tuple(dict.fromkeys(warnings))),
         tuple(piece.source for piece in collected.pieces),
