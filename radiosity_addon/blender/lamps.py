@@ -40,7 +40,7 @@ def read_lamp(
     """
     data = lamp.data
     name = lamp.name
-    if _is_portal(data):
+    if _is_portal(data) or not lamp.visible_diffuse:
         return None, ()
     warnings = _not_understood(lamp)
     strength, notes = _strength(name, data)
@@ -80,6 +80,7 @@ def _point(
         strength * _sphere_area(data),
         radius=radius,
         soft_falloff=data.use_soft_falloff,
+        casts_shadow=_casts_shadow(data),
         name=name,
     ), []
 
@@ -106,6 +107,7 @@ def _spot(
         blend=data.spot_blend,
         radius=data.shadow_soft_size,
         soft_falloff=data.use_soft_falloff,
+        casts_shadow=_casts_shadow(data),
         name=name,
     ), warnings
 
@@ -115,7 +117,9 @@ def _sun(
 ) -> tuple[Light, list[BakeWarning]]:
     if not getattr(data, "normalize", True):
         strength = strength * cone_projected_solid_angle(data.angle / 2.0)  # it was a radiance
-    return SunLight(_backward(matrix), strength, angle=data.angle, name=name), []
+    return SunLight(
+        _backward(matrix), strength, angle=data.angle, casts_shadow=_casts_shadow(data), name=name
+    ), []
 
 
 def _area(
@@ -133,7 +137,16 @@ def _area(
         raise SceneError(f"lamp '{name}' has no area; give it a size and a scale above 0")
     if not getattr(data, "normalize", True):
         strength = strength * area
-    return AreaLight(matrix[:3, 3], edge_u, edge_v, strength, shape=shape, name=name), []
+    return AreaLight(
+        matrix[:3, 3],
+        edge_u,
+        edge_v,
+        strength,
+        shape=shape,
+        spread=data.spread,
+        casts_shadow=_casts_shadow(data),
+        name=name,
+    ), []
 
 
 def _backward(matrix: np.ndarray) -> np.ndarray:
@@ -150,6 +163,11 @@ def _sphere_area(data: bpy.types.Light) -> float:
     return sphere_area(data.shadow_soft_size)
 
 
+def _casts_shadow(data: bpy.types.Light) -> bool:
+    """Tell what Cycles asks: its own switch, or where it has none (later on) that of all engines."""
+    return bool(getattr(data.cycles, "cast_shadow", data.use_shadow))
+
+
 def _is_portal(data: bpy.types.Light) -> bool:
     return data.type == "AREA" and bool(getattr(getattr(data, "cycles", None), "is_portal", False))
 
@@ -157,17 +175,11 @@ def _is_portal(data: bpy.types.Light) -> bool:
 def _not_understood(lamp: bpy.types.Object) -> list[BakeWarning]:
     data = lamp.data
     messages = []
-    if not data.use_shadow:
-        messages.append("'Cast Shadow' off is ignored: it casts shadows")
-    if data.type == "AREA" and data.spread < math.pi - 1e-4:
-        messages.append(f"a spread of {math.degrees(data.spread):.3g}° is ignored; 180° is used")
     if data.type == "SPOT" and data.use_square:
         messages.append("the square cone is ignored; a round one is used")
     linking = getattr(lamp, "light_linking", None)
     if linking and (linking.receiver_collection or linking.blocker_collection):
         messages.append("light linking is ignored: it lights everything")
-    if not lamp.visible_diffuse:
-        messages.append("'Ray Visibility: Diffuse' off is ignored: it lights everything")
     return [BakeWarning(lamp.name, f"lamp '{lamp.name}': {message}") for message in messages]
 
 

@@ -94,6 +94,8 @@ class ShadowShare:
 
     def steps(self, facing: Array, rays: int) -> Generator[float, None, Array]:
         """Ask where `facing` (n,) bool; yields the fraction done, returns the (n,) share."""
+        if isinstance(self._light, Lamp) and not self._light.casts_shadow:
+            return np.ones(len(facing))
         for fraction in self._shadow(np.flatnonzero(facing), rays):
             yield 0.5 * fraction
         # Few rays miss the faint ends of a penumbra: where many rays found one, ask around it.
