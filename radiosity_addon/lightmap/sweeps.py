@@ -66,7 +66,7 @@ class StoredLinks:
     Attributes
     ----------
     sources : (g, rays) int32
-        Texels by number, leaf elements after them, NOTHING and SKY negative.
+        Texels by number, leaf elements after them, NOTHING and the sky negative.
     spread : Interpolation
     aimed : AimedRays
         What some of the points ask apart.
@@ -115,10 +115,11 @@ def sweep_steps(
     """
     texel_count = len(geometry)
     reflectance = scene.reflectance[geometry.triangle]
-    # Rows: texels, leaves, then NOTHING (−2) and SKY (−1). Columns lie one after the other in memory.
-    table = np.zeros((texel_count + len(local.reflected()) + 2, 3), dtype=np.float32, order="F")
-    sky = local.sky()
-    table[-1] = sky
+    sky = local.beyond()
+    # Rows: texels, leaves, then the sky and nothing. Columns lie one after the other in memory.
+    surfaces = texel_count + len(local.reflected())
+    table = np.zeros((surfaces + len(sky), 3), dtype=np.float32, order="F")
+    table[surfaces:] = sky
     direct = lamps
     if sky.any():
         # The sky's light is direct: its share of the same rays.
@@ -126,19 +127,19 @@ def sweep_steps(
         direct = lamps + np.maximum(from_sky, 0.0)
 
     table[:texel_count] = local.reflected_at(geometry.triangle, geometry.barycentric)
-    table[texel_count:-2] = local.reflected()
+    table[texel_count:surfaces] = local.reflected()
     leaves = _Leaves(local, texel_count)
     yield from scaled(leaves.gather_steps(links, resolve, len(table)), 0.1, 0.2)
-    table[: len(table) - 2][~_reached(links, leaves, direct)] = 0.0
+    table[:surfaces][~_reached(links, leaves, direct, len(sky))] = 0.0
     indirect, left = np.zeros_like(direct), 0.8
     for _ in range(sweeps):
         leaves.sweep(table)
-        table[-1] = 0.0
+        table[surfaces:] = 0.0
         irradiance = links.irradiance_steps(table, local.threads)
         arriving = yield from scaled(irradiance, 1.0 - left, 1.0 - SWEPT * left)
         left *= SWEPT
         indirect = np.maximum(arriving, 0.0)
-        table[-1] = sky
+        table[surfaces:] = sky
         radiosity = (reflectance * (direct + indirect)).astype(np.float32)
         change = np.abs(radiosity - table[:texel_count]).max(initial=0.0)
         table[:texel_count] = radiosity
@@ -172,14 +173,14 @@ def estimated_error(links: StoredLinks, table: Array, irradiance: Array, threads
     return float(np.sqrt((noise**2).mean())) / mean
 
 
-def _reached(links: StoredLinks, leaves: _Leaves, direct: Array) -> Array:
-    """Return (table rows − 2,) bool: what light can get to along the links, after any number of bounces.
+def _reached(links: StoredLinks, leaves: _Leaves, direct: Array, beyond: int) -> Array:
+    """Return (table rows − beyond,) bool: what light can get to along the links, after any number of bounces.
 
     The sweeps' fixed point is 0 elsewhere. Found outright, because from what the hierarchy leaked into
     a sealed box they would only fade, by the reflectance a sweep.
     """
     reached = leaves.lit_or_unknown(direct)
-    padded = np.append(reached, [False, False])  # NOTHING and SKY, whose light is direct
+    padded = np.append(reached, np.zeros(beyond, dtype=bool))  # nothing, and the sky, whose light is direct
     aims = np.zeros(len(links.sources), dtype=bool)
     while True:
         dark, step = np.flatnonzero(~aims), max(CHUNK_HITS // links.sources.shape[1], 1)
@@ -190,7 +191,7 @@ def _reached(links: StoredLinks, leaves: _Leaves, direct: Array) -> Array:
         more = ~padded[: len(direct)] & links.spread.any_of(aims)
         padded[: len(direct)] |= more
         if not (leaves.reach(padded) or more.any()):
-            return padded[:-2]
+            return padded[: len(reached)]
 
 
 class _Leaves:
@@ -210,9 +211,10 @@ class _Leaves:
         known = np.zeros(table_rows, dtype=bool)
         met[links.sources.ravel()] = True
         met[links.aimed.sources.ravel()] = True
+        surfaces = texel_count + self._elements
         seen, rows, parts = [], [], LEAF_ROUNDS + 1
         for turn in range(LEAF_ROUNDS):
-            row = np.flatnonzero(met[:-2] & ~known[:-2])
+            row = np.flatnonzero(met[:surfaces] & ~known[:surfaces])
             row = row[row >= texel_count]
             if len(row) == 0:
                 break

@@ -105,3 +105,7 @@ class EnvironmentLight(Light):
     def strength(self) -> Float64Array:
         """(3,) RGB radiance [W/m²/sr]."""
         return np.asarray(self.radiance, dtype=np.float64)
+
+    def relative(self, directions: Float64Array) -> Float64Array:
+        """Return (...) radiance by directions (..., 3), relative to `radiance`: 1 here."""
+        return np.ones(directions.shape[:-1])

@@ -17,9 +17,9 @@ import numpy as np
 from .aiming import BrightElements
 from .arrays import Array
 from .emitters import EmitterGroup
+from .environment import SkyTable
 from .gathering import NOTHING, SKY, Gathered, Gathering, Resolver
-from .lights import EnvironmentLight, Lamp
-from .radiometry import radiosity_of_radiance
+from .lights import Lamp
 from .sampling import points_on_triangles
 from .shadow_share import Footprints, Sampler, ShadowShare
 from .steps import drain, scaled
@@ -135,7 +135,15 @@ class LocalPass:
             What is about expected. None aims at nothing.
         """
         gathering = Gathering(
-            self.caster, at, surface_normals, rays, resolve, self.leaves_of, self._seed, self.threads
+            self.caster,
+            at,
+            surface_normals,
+            rays,
+            resolve,
+            self.leaves_of,
+            self._seed,
+            self.threads,
+            self._sky,
         )
         if irradiance is None:
             return (yield from gathering.steps(None, np.zeros(len(at))))
@@ -146,7 +154,7 @@ class LocalPass:
         return BrightElements(self._state.hierarchy, self.reflected())
 
     def leaves_of(self, hits: Hits) -> Array:
-        """Return (n,) int32: the leaf element under each hit; SKY for none or a black back."""
+        """Return (n,) int32: the leaf element under each hit; NOTHING for none or a black back."""
         hierarchy = self._state.hierarchy
         face = hierarchy.faces.of_triangle[(~hits.front).astype(np.int8), hits.triangle]
         on_face = (hits.triangle >= 0) & (face >= 0)
@@ -196,8 +204,14 @@ class LocalPass:
         """Compute (l, 3) the irradiance of leaf elements straight from lamps and emissive faces."""
         return self.direct_steps(self._whole_leaves(leaves), rays=16)
 
-    def sky(self) -> Array:
-        """Return (3,) the radiosity equivalent πL of the sky [W/m²]."""
-        lights = self._state.scene.lights
-        skies = [light.strength for light in lights if isinstance(light, EnvironmentLight)]
-        return radiosity_of_radiance(np.sum(skies, axis=0)) if skies else np.zeros(3)
+    def beyond(self) -> Array:
+        """Return (cells + 1, 3) the last rows of a table of radiosity [W/m²]: the sky's cells, and NOTHING.
+
+        So the negative numbers of what rays found index them.
+        """
+        assert (NOTHING, SKY) == (-1, -2)
+        return np.concatenate([self._sky.radiosity[::-1], np.zeros((1, 3))])
+
+    @cached_property
+    def _sky(self) -> SkyTable:
+        return SkyTable(self._state.scene.lights)
