@@ -24,7 +24,6 @@ from .scene_objects import (
     unknown_objects,
     visible_objects,
 )
-from .world import read_world
 
 
 @dataclass(frozen=True)
@@ -73,7 +72,7 @@ class Collected:
 
 
 def collect(depsgraph: bpy.types.Depsgraph) -> Collected:
-    """Read meshes, materials, lamps and world of an evaluated scene.
+    """Read meshes, materials and lamps of an evaluated scene.
 
     Raises
     ------
@@ -86,7 +85,6 @@ def collect(depsgraph: bpy.types.Depsgraph) -> Collected:
             collector.lamp(instance)
         else:
             collector.mesh(instance)
-    collector.world(depsgraph.scene_eval.world)
     for name, kind in unknown_objects(depsgraph).items():
         message = f"object '{name}' is {kind}; that is left out: it neither lights nor blocks"
         collector.collected.warnings.append(BakeWarning(name, message))
@@ -108,12 +106,6 @@ class _Collector:
 
     def lamp(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
         light, warnings = read_lamp(instance.object, matrix_of(instance))
-        self._warn(warnings)
-        if light is not None:
-            self.collected.lights.append(light)
-
-    def world(self, world: bpy.types.World | None) -> None:
-        light, warnings = read_world(world)
         self._warn(warnings)
         if light is not None:
             self.collected.lights.append(light)

@@ -16,6 +16,7 @@ from .collect import Collected, Piece, collect
 from .export_sources import Export
 from .mesh_arrays import all_finite, degenerate, not_finite_message, world_from_object
 from .render_state import leave_edit_mode, render_depsgraph
+from .world import read_world
 
 MAX_UV_LAYERS = 8
 
@@ -45,6 +46,10 @@ def export_scene(context: bpy.types.Context, settings: BakeSettings) -> Export:
     leave_edit_mode(context)
     with render_depsgraph(context) as depsgraph:
         collected = collect(depsgraph)
+    # After that: Cycles may have to render it, which no evaluated object would survive.
+    world, warnings = read_world(context.scene.world)
+    collected.lights.extend(world)
+    collected.warnings.extend(warnings)
     chosen = _chosen(context, collected.pieces, settings.objects)
     for piece in chosen:
         _check_uv_layers(piece)

@@ -28,10 +28,10 @@ AIMED_PART = 4
 Resolver = Callable[[Hits], Array]
 """Hits → (n,) int32: the number under which a hit's radiosity will be looked up."""
 
-NOTHING = -1
+NOTHING = -2
 """A gather ray that left through the surface it started on: it carries no light."""
-SKY = -2
-"""The sky's first cell; the others count down from it (see `SkyTable`)."""
+SKY = -3
+"""The sky's first cell; the others count down from it (see `SkyTable`). −1 is left to resolvers."""
 
 
 @dataclass(frozen=True)

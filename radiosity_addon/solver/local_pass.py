@@ -205,12 +205,12 @@ class LocalPass:
         return self.direct_steps(self._whole_leaves(leaves), rays=16)
 
     def beyond(self) -> Array:
-        """Return (cells + 1, 3) the last rows of a table of radiosity [W/m²]: the sky's cells, and NOTHING.
+        """Return (cells + 2, 3) the last rows of a table of radiosity [W/m²]: the sky's cells, and two dark.
 
         So the negative numbers of what rays found index them.
         """
-        assert (NOTHING, SKY) == (-1, -2)
-        return np.concatenate([self._sky.radiosity[::-1], np.zeros((1, 3))])
+        assert (NOTHING, SKY) == (-2, -3)
+        return np.concatenate([self._sky.radiosity[::-1], np.zeros((2, 3))])
 
     @cached_property
     def _sky(self) -> SkyTable:

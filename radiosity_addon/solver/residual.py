@@ -110,7 +110,7 @@ class Residual:
         return self.given(face, self.radiosity(face, barycentric), direct + indirect)
 
     def gathered(self, local: LocalPass) -> Array:
-        """Return (e + cells + 1, 3): what a gather ray finds [W/m²], elements first, then `LocalPass.beyond`.
+        """Return (e + cells + 2, 3): what a gather ray finds [W/m²], elements first, then `LocalPass.beyond`.
 
         Elements without their own emission, which is direct light.
         """
