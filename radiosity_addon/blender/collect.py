@@ -12,7 +12,7 @@ from ..bake_scene import LIGHTMAP_UV_LAYER, BakeWarning
 from ..errors import SceneError
 from ..solver.lights import Light
 from .export_sources import ExportSource
-from .lamps import read_lamp
+from .lamps import LampFactors, read_lamp
 from .materials import DEFAULT_GREY, Surface, read_material
 from .mesh_arrays import MeshArrays, all_finite, not_finite_message, read_mesh
 from .scene_objects import (
@@ -71,15 +71,15 @@ class Collected:
     warnings: list[BakeWarning]
 
 
-def collect(depsgraph: bpy.types.Depsgraph) -> Collected:
-    """Read meshes, materials and lamps of an evaluated scene.
+def collect(depsgraph: bpy.types.Depsgraph, factors: LampFactors) -> Collected:
+    """Read meshes, materials and lamps of an evaluated scene; `factors` are those of `lamp_factors`.
 
     Raises
     ------
     SceneError
         If a coordinate is NaN or infinite.
     """
-    collector = _Collector(depsgraph)
+    collector = _Collector(depsgraph, factors)
     for instance in visible_objects(depsgraph):
         if instance.object.type == "LIGHT":
             collector.lamp(instance)
@@ -92,7 +92,8 @@ def collect(depsgraph: bpy.types.Depsgraph) -> Collected:
 
 
 class _Collector:
-    def __init__(self, depsgraph: bpy.types.Depsgraph) -> None:
+    def __init__(self, depsgraph: bpy.types.Depsgraph, factors: LampFactors) -> None:
+        self._factors = factors
         self.collected = Collected([], [], [], [])
         self._override = depsgraph.view_layer_eval.material_override
         self._meshes: dict[int, MeshArrays | None] = {}
@@ -105,7 +106,7 @@ class _Collector:
         }
 
     def lamp(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
-        light, warnings = read_lamp(instance.object, matrix_of(instance))
+        light, warnings = read_lamp(instance.object, matrix_of(instance), self._factors)
         self._warn(warnings)
         if light is not None:
             self.collected.lights.append(light)

@@ -46,28 +46,16 @@ def world_pixels(
     BakeError
         If Cycles could not render it.
     """
-    with tempfile.TemporaryDirectory(prefix="radiosity-") as folder, _only_for_now():
-        path = Path(folder) / "world.exr"
-        scene = _scene(world, window, size, path)
-        try:
-            bpy.ops.render.render(write_still=True, scene=scene.name)
-            image = bpy.data.images.load(str(path))
-        except RuntimeError as error:
-            raise BakeError(
-                f"world '{world.name}' cannot be rendered: {' '.join(str(error).split())}"
-            ) from error
-        image.colorspace_settings.name = "Non-Color"
-        pixels = np.empty(size[0] * size[1] * image.channels, dtype=np.float32)
-        image.pixels.foreach_get(pixels)
-    radiance = pixels.reshape(*size, -1)[..., :3].astype(np.float64)
-    return np.maximum(np.nan_to_num(radiance, posinf=0.0), 0.0)
+    with only_for_now():
+        copy = world.copy()
+        _answer_light_paths(copy.node_tree, {})
+        return look_around(panorama_scene(copy, window), size, f"world '{world.name}'")
 
 
-def _scene(world: bpy.types.World, window: Bounds, size: tuple[int, int], path: Path) -> bpy.types.Scene:
-    """Make a scene that holds nothing but the world and a camera that looks around."""
+def panorama_scene(world: bpy.types.World | None, window: Bounds = WHOLE) -> bpy.types.Scene:
+    """Make a scene that holds nothing but a world, and a camera that looks around."""
     scene = bpy.data.scenes.new("Radiosity World")
-    scene.world = world.copy()
-    _answer_light_paths(scene.world.node_tree, {})
+    scene.world = world
     data = bpy.data.cameras.new("Radiosity World")
     camera = bpy.data.objects.new("Radiosity World", data)
     low, high, left, right = window
@@ -85,8 +73,30 @@ def _scene(world: bpy.types.World, window: Bounds, size: tuple[int, int], path: 
         "longitude_max": half,
     }.items():
         setattr(data if hasattr(data, name) else data.cycles, name, value)
-    _set_up(scene, size, path)
     return scene
+
+
+def look_around(scene: bpy.types.Scene, size: tuple[int, int], what: str) -> np.ndarray:
+    """Render a `panorama_scene`: (h, w, 3) float64 radiance, as `world_pixels` returns it.
+
+    Raises
+    ------
+    BakeError
+        If Cycles could not render `what`.
+    """
+    with tempfile.TemporaryDirectory(prefix="radiosity-") as folder:
+        path = Path(folder) / "seen.exr"
+        _set_up(scene, size, path)
+        try:
+            bpy.ops.render.render(write_still=True, scene=scene.name)
+            image = bpy.data.images.load(str(path))
+        except RuntimeError as error:
+            raise BakeError(f"{what} cannot be rendered: {' '.join(str(error).split())}") from error
+        image.colorspace_settings.name = "Non-Color"
+        pixels = np.empty(size[0] * size[1] * image.channels, dtype=np.float32)
+        image.pixels.foreach_get(pixels)
+    radiance = pixels.reshape(*size, -1)[..., :3].astype(np.float64)
+    return np.maximum(np.nan_to_num(radiance, posinf=0.0), 0.0)
 
 
 def _set_up(scene: bpy.types.Scene, size: tuple[int, int], path: Path) -> None:
@@ -135,9 +145,12 @@ def _replace(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, answer: flo
 
 
 @contextmanager
-def _only_for_now() -> Iterator[None]:
+def only_for_now() -> Iterator[None]:
     """Remove whatever datablock the block makes, the render result included."""
-    kinds = ("scenes", "objects", "cameras", "worlds", "node_groups", "images", "actions")
+    kinds = (
+        "scenes", "objects", "meshes", "materials", "lights", "cameras", "worlds", "node_groups",
+        "images", "actions",
+    )  # fmt: skip
     before: dict[str, set[Any]] = {kind: set(getattr(bpy.data, kind)) for kind in kinds}
     try:
         yield

@@ -129,6 +129,8 @@ class ShadowShare:
             centre, normal = at.points[chunk], at.normals[chunk]
             unit = stratified_square(at.keys[chunk], count, self._seed + 1)
             directions, distances, weights = self._light.shadow_rays(centre, normal, unit)
+            # The edge of a spot's cone may cross a footprint and leave its centre dark: then all count alike.
+            weights = np.where(weights.any(axis=1, keepdims=True), weights, 1.0)
             start = np.repeat(centre[:, None], count, axis=1)
             if at.sampler is not None:
                 # The same lamp points, seen from points spread over the footprint.

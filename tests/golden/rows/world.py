@@ -11,32 +11,32 @@ from . import row
 from .stage import add_node, emptied_nodes, stage
 
 
-@row("world-colour")
+@row("world-colour", samples=48)
 def world_colour() -> None:
     """World of one colour."""
-    stage()
+    _open_stage()
     _, background = _world()
     background.inputs["Color"].default_value = (0.3, 0.5, 1.0, 1.0)
 
 
-@row("world-hdri")
+@row("world-hdri", samples=48)
 def world_hdri() -> None:
     """Image with a small sun and a window, strength 0.7."""
-    stage()
+    _open_stage()
     _hdri(0.0, 0.7)
 
 
-@row("world-hdri-turned")
+@row("world-hdri-turned", samples=48)
 def world_hdri_turned() -> None:
     """The same image, turned by 70° through a Mapping."""
-    stage()
+    _open_stage()
     _hdri(math.radians(70), 0.7)
 
 
-@row("world-gradient")
+@row("world-gradient", samples=48)
 def world_gradient() -> None:
     """Procedural sky of a Gradient Texture and a Color Ramp, plain white to the camera."""
-    stage()
+    _open_stage()
     tree, background = _world()
     place = tree.nodes.new("ShaderNodeTexCoord")
     turn = add_node(tree, "ShaderNodeMapping", Rotation=(0.0, math.pi / 2, 0.3))
@@ -57,38 +57,38 @@ def world_gradient() -> None:
     tree.links.new(mix.outputs[0], output.inputs["Surface"])
 
 
-@row("sky-preetham")
+@row("sky-preetham", samples=48)
 def sky_preetham() -> None:
     """Sky Texture, Preetham."""
-    stage()
+    _open_stage()
     _sky("PREETHAM", sun_direction=(0.5, -0.6, 0.6), turbidity=3.0)
 
 
-@row("sky-hosek-wilkie")
+@row("sky-hosek-wilkie", samples=48)
 def sky_hosek_wilkie() -> None:
     """Sky Texture, Hosek and Wilkie."""
-    stage()
+    _open_stage()
     _sky("HOSEK_WILKIE", sun_direction=(0.5, -0.6, 0.6), turbidity=3.0, ground_albedo=0.4)
 
 
-@row("sky-scattering")
+@row("sky-scattering", samples=48)
 def sky_scattering() -> None:
     """Sky Texture, single scattering (Nishita before 5.0), without a sun disc."""
-    stage()
+    _open_stage()
     _sky(_single(), sun_disc=False, sun_elevation=0.5, sun_rotation=2.4)
 
 
-@row("sky-sun")
+@row("sky-sun", samples=48)
 def sky_sun() -> None:
     """Sky Texture, single scattering, with its sun disc."""
-    stage()
+    _open_stage()
     _sky(_single(), sun_disc=True, sun_elevation=0.6, sun_rotation=2.4, strength=0.03)
 
 
-@row("sky-multiple", needs=(5, 0))
+@row("sky-multiple", samples=48, needs=(5, 0))
 def sky_multiple() -> None:
     """Sky Texture, multiple scattering, with a sun disc of 4°."""
-    stage()
+    _open_stage()
     _sky(
         "MULTIPLE_SCATTERING",
         sun_disc=True,
@@ -97,6 +97,12 @@ def sky_multiple() -> None:
         sun_rotation=2.4,
         strength=0.03,
     )
+
+
+def _open_stage() -> None:
+    """Build the stage; its box stands a little below the floor, lest rays from its bottom start in it."""
+    stage()
+    bpy.data.objects["Box"].location.z -= 0.01
 
 
 def _single() -> str:
