@@ -23,6 +23,10 @@ CHUNK_RAYS = 1 << 17
 MORE_RAYS = 16
 """Times as many shadow rays where the first disagree."""
 
+GAIN_SAMPLES = ((4, 0.03), (16, 0.2), (64, 1.0))
+"""Samples of a footprint that tell a lamp's mean gain; more of them where these vary by more than this
+part: near a lamp, and where the edge of its beam crosses."""
+
 PENUMBRA_STEPS = 32
 """How far, in neighbours, a penumbra is followed from where few rays found it."""
 
@@ -64,9 +68,19 @@ class Footprints:
         """Return (n,) the unoccluded irradiance per unit of strength, a mean over the footprint."""
         if self.sampler is None:
             return light.unit_irradiance(self.points, self.normals)
-        spread = self.sampler(np.arange(len(self)), stratified_square(self.keys, 4, seed)).reshape(-1, 3)
-        gain = light.unit_irradiance(spread, np.repeat(self.normals, 4, axis=0))
-        return np.asarray(gain.reshape(-1, 4).mean(axis=1))
+        mean = np.empty(len(self))
+        rows = np.arange(len(self))
+        for samples, uneven in GAIN_SAMPLES:
+            unit = stratified_square(self.keys[rows], samples, seed)
+            spread = self.sampler(rows, unit).reshape(-1, 3)
+            gain = light.unit_irradiance(spread, np.repeat(self.normals[rows], samples, axis=0))
+            gain = gain.reshape(-1, samples)
+            mean[rows] = gain.mean(axis=1)
+            varied = np.zeros(len(self), dtype=bool)
+            varied[rows] = np.ptp(gain, axis=1) > uneven * gain.max(axis=1)
+            # An edge that only cuts a footprint's corner is found at its neighbours.
+            rows = np.flatnonzero(self.near(varied) if self.near is not None and varied.any() else varied)
+        return mean
 
 
 class ShadowShare:
