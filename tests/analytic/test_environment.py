@@ -31,7 +31,7 @@ def a_sky() -> np.ndarray:
     pixels[64:] += (0.2, 0.4, 0.8)
     pixels[100:102, 30:33] = (900.0, 700.0, 500.0)
     pixels[80:92, 180:195] = (9.0, 4.0, 2.0)
-    return pixels
+    return pixels * (1.0 + 0.1 * rng.random((*SHAPE, 1)))  # no two pixels are equally bright
 
 
 def lights_of(pixels: np.ndarray) -> list[Light]:

@@ -120,9 +120,9 @@ def area_spread() -> None:
 
 @row("area-spread-narrow")
 def area_spread_narrow() -> None:
-    """Round area lamp with a spread of 15°."""
+    """Round area lamp with a spread of 30°."""
     stage()
-    narrow = {"shape": "DISK", "size": 0.8, "spread": math.radians(15)}
+    narrow = {"shape": "DISK", "size": 0.8, "spread": math.radians(30)}
     add_lamp("AREA", (1.2, -1.0, 2.0), (0.9, -0.4, 0.0), energy=20, **narrow)
 
 
