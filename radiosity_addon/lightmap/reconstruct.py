@@ -49,39 +49,43 @@ class GatherSettings:
     rays : int
         A gather point.
     sweeps : int
-        Jacobi sweeps over the texels, at most.
+        Jacobi sweeps over the texels, at most, …
+    tolerance : float
+        … or until no texel changes by more than this part of the mean.
     """
 
     strides: tuple[int, ...] = (4, 2, 1)
     support: float = 1.0
     rays: int = 256
     sweeps: int = 64
+    tolerance: float = 2e-4
 
 
 def reconstruct(
     scene: Scene, local: LocalPass, geometry: TexelGeometry, settings: GatherSettings
 ) -> Generator[float, None, TexelLight]:
     """Compute direct and indirect irradiance of all texels; yields the fraction done."""
-    lamps = yield from scaled(local.direct_steps(footprints(geometry)), 0.0, DIRECT)
+    lamps = yield from scaled(local.direct_steps(footprints(geometry, local)), 0.0, DIRECT)
     found = crossing_steps(geometry, local.caster, local.threads)
     crossings = Crossings(geometry, local.caster, (yield from scaled(found, DIRECT, CROSSED)))
     resolve = _resolver(local, geometry, crossings)
     stored = gather_texels(local, geometry, settings, crossings, resolve)
     links = yield from scaled(stored, CROSSED, GATHERED)
-    swept = sweep_steps(scene, local, geometry, links, lamps, resolve, settings.sweeps)
+    swept = sweep_steps(scene, local, geometry, links, lamps, resolve, settings.sweeps, settings.tolerance)
     light = yield from scaled(swept, GATHERED, 1.0)
     yield 1.0
     return light
 
 
-def footprints(geometry: TexelGeometry) -> Footprints:
-    """Return where all texels ask for light."""
+def footprints(geometry: TexelGeometry, local: LocalPass) -> Footprints:
+    """Return where all texels ask for light, and how much the elements lead them to expect."""
     return Footprints(
         geometry.position,
         geometry.normal,
         np.arange(len(geometry)),
         geometry.sample,
         geometry.neighbourhood,
+        expected=local.irradiance_at(geometry.triangle, geometry.barycentric),
     )
 
 
@@ -93,7 +97,7 @@ def gather_texels(
     resolve: Resolver,
 ) -> Generator[float, None, StoredLinks]:
     """Gather at few texels, densely where others do not reach; yields the fraction done."""
-    points = GatherPoints(geometry, local.caster, crossings.crossed, local.threads)
+    points = GatherPoints(geometry, local.caster, crossings.alone, local.threads)
     found: list[Gathered] = []
     first: list[int] = []
     width = (1.0 - FIT) / len(settings.strides)
@@ -138,13 +142,13 @@ def _choose(
 
 
 def _resolver(local: LocalPass, geometry: TexelGeometry, crossings: Crossings) -> Resolver:
-    """Number hits: texels by their own number, leaf elements after the texels."""
+    """Number hits: texels by their own number, parts of leaf elements after the texels."""
 
     def resolve(hits: Hits) -> Array:
         texel = crossings.look_up(geometry.texel_at(hits), hits)
         elsewhere = texel == NO_TEXEL
-        leaf = local.leaves_of(hits.take(elsewhere))
-        texel[elsewhere] = np.where(leaf == NOTHING, NOTHING, leaf + len(geometry))
+        part = local.parts_of(hits.take(elsewhere))
+        texel[elsewhere] = np.where(part == NOTHING, NOTHING, part + len(geometry))
         return texel
 
     return resolve

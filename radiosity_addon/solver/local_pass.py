@@ -9,6 +9,7 @@ whose hits are looked up in the solution.
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -18,10 +19,11 @@ from .aiming import BrightElements
 from .arrays import Array
 from .emitters import EmitterGroup
 from .environment import SkyTable
+from .footprints import Footprints, Sampler, SpreadPoints
 from .gathering import NOTHING, SKY, Gathered, Gathering, Resolver
+from .leaf_parts import LeafParts
 from .lights import Lamp
-from .sampling import points_on_triangles
-from .shadow_share import Footprints, Sampler, ShadowShare
+from .shadow_share import ShadowShare
 from .steps import drain, scaled
 from .visibility import Hits
 
@@ -79,14 +81,15 @@ class LocalPass:
         seeds += [self._seed + 17 + 7 * number for number in range(len(self.emitters))]
         count = len(seeds)
         lights: list[Lamp | EmitterGroup] = [*lamps, *self.emitters]
+        spread = SpreadPoints(at, self._seed + 2, self.threads)
         for done, (light, seed) in enumerate(zip(lights, seeds, strict=True)):
+            begin, end = done / count, (done + 1) / count
             if isinstance(light, EmitterGroup):
                 gain = light.unit_irradiance(at.points, at.normals)
             else:
-                gain = at.mean_gain(light, seed)
-            yield (done + 0.1) / count
-            share = ShadowShare(self.caster, light, at, seed, self.threads).steps(gain > 0, shadow_rays)
-            unblocked = yield from scaled(share, (done + 0.1) / count, (done + 1) / count)
+                gain = yield from scaled(spread.gain_steps(light), begin, begin + 0.1 / count)
+            share = ShadowShare(self.caster, light, spread, seed, self.threads).steps(gain, shadow_rays)
+            unblocked = yield from scaled(share, begin + 0.1 / count, end)
             total += (gain * unblocked)[:, None] * light.strength
         return total
 
@@ -151,7 +154,15 @@ class LocalPass:
 
     @cached_property
     def _bright(self) -> BrightElements:
-        return BrightElements(self._state.hierarchy, self.reflected())
+        return BrightElements(self._state.hierarchy, self.reflected(), self._unshadowed)
+
+    def _unshadowed(self, points: Array, normals: Array) -> Array:
+        """Return (n,) the irradiance straight from lamps were nothing in the way, a mean of the channels."""
+        total = np.zeros(len(points))
+        for light in self._state.scene.lights:
+            if isinstance(light, Lamp):
+                total += light.unit_irradiance(points, normals) * light.strength.mean()
+        return total
 
     def leaves_of(self, hits: Hits) -> Array:
         """Return (n,) int32: the leaf element under each hit; NOTHING for none or a black back."""
@@ -181,28 +192,30 @@ class LocalPass:
         leaf = hierarchy.leaf_at(np.maximum(face, 0), barycentric)
         return np.asarray(np.where(face >= 0, self._state.irradiance.mean(axis=1)[leaf], 0.0))
 
-    def gather_at_leaves(self, leaves: Array, rays: int, resolve: Resolver) -> Generator[float, None, Array]:
-        """Gather over whole leaf elements instead of points, (l, rays) sources; yields the fraction done."""
-        at = self._whole_leaves(leaves)
+    @cached_property
+    def parts(self) -> LeafParts:
+        """The parts of leaf elements that rays may hit."""
+        return LeafParts(self._state.hierarchy, self.caster)
+
+    def parts_of(self, hits: Hits) -> Array:
+        """Return (n,) int32: the part of a leaf element under each hit; NOTHING for none or a black back."""
+        return self.parts.at(self.leaves_of(hits), hits)
+
+    def gather_at_parts(self, parts: Array, rays: int, resolve: Resolver) -> Generator[float, None, Array]:
+        """Gather over whole parts instead of points, (p, rays) sources; yields the fraction done."""
+        at = self.parts.footprints(parts)
         gathered = yield from self.gather_steps(at, at.normals, rays, resolve)
         return gathered.sources
 
-    def _whole_leaves(self, leaves: Array) -> Footprints:
-        """Return leaf elements as footprints."""
-        corners = self._state.hierarchy.corners[leaves]
-        normals = self._state.hierarchy.normal[leaves]
-        return Footprints(
-            corners.mean(axis=1), normals, leaves, lambda rows, u: points_on_triangles(corners[rows], u)
-        )
-
-    def leaf_reflectance(self, leaves: Array) -> Array:
-        """Return (l, 3) the reflectance of leaf elements."""
+    def part_reflectance(self, parts: Array) -> Array:
+        """Return (p, 3) the reflectance of parts of leaf elements."""
         hierarchy = self._state.hierarchy
-        return np.asarray(hierarchy.faces.reflectance[hierarchy.face[leaves]])
+        return np.asarray(hierarchy.faces.reflectance[hierarchy.face[self.parts.leaf_of(parts)]])
 
-    def leaf_direct(self, leaves: Array) -> Generator[float, None, Array]:
-        """Compute (l, 3) the irradiance of leaf elements straight from lamps and emissive faces."""
-        return self.direct_steps(self._whole_leaves(leaves), rays=16)
+    def part_direct(self, parts: Array) -> Generator[float, None, Array]:
+        """Compute (p, 3) the irradiance of parts straight from lamps and emissive faces."""
+        expected = self._state.irradiance[self.parts.leaf_of(parts)].mean(axis=1)
+        return self.direct_steps(replace(self.parts.footprints(parts), expected=expected), rays=16)
 
     def beyond(self) -> Array:
         """Return (cells + 2, 3) the last rows of a table of radiosity [W/m²]: the sky's cells, and two dark.
