@@ -12,7 +12,7 @@ from ..bake_scene import LIGHTMAP_UV_LAYER, BakeWarning
 from ..errors import SceneError
 from ..solver.lights import Light
 from .export_sources import ExportSource
-from .lamps import read_lamp
+from .lamps import LampFactors, read_lamp
 from .materials import DEFAULT_GREY, Surface, read_material
 from .mesh_arrays import MeshArrays, all_finite, not_finite_message, read_mesh
 from .scene_objects import (
@@ -26,7 +26,6 @@ from .scene_objects import (
 )
 from .shading_inputs import MeshValues, asked_by_material, doubts, read_mesh_inputs, read_object_inputs
 from .surface_bake import can_evaluate
-from .world import read_world
 
 
 @dataclass(frozen=True)
@@ -81,21 +80,20 @@ class Collected:
     warnings: list[BakeWarning]
 
 
-def collect(depsgraph: bpy.types.Depsgraph) -> Collected:
-    """Read meshes, materials, lamps and world of an evaluated scene.
+def collect(depsgraph: bpy.types.Depsgraph, factors: LampFactors) -> Collected:
+    """Read meshes, materials and lamps of an evaluated scene; `factors` are those of `lamp_factors`.
 
     Raises
     ------
     SceneError
         If a coordinate is NaN or infinite.
     """
-    collector = _Collector(depsgraph)
+    collector = _Collector(depsgraph, factors)
     for instance in visible_objects(depsgraph):
         if instance.object.type == "LIGHT":
             collector.lamp(instance)
         else:
             collector.mesh(instance)
-    collector.world(depsgraph.scene_eval.world)
     for name, kind in unknown_objects(depsgraph).items():
         message = f"object '{name}' is {kind}; that is left out: it neither lights nor blocks"
         collector.collected.warnings.append(BakeWarning(name, message))
@@ -103,7 +101,8 @@ def collect(depsgraph: bpy.types.Depsgraph) -> Collected:
 
 
 class _Collector:
-    def __init__(self, depsgraph: bpy.types.Depsgraph) -> None:
+    def __init__(self, depsgraph: bpy.types.Depsgraph, factors: LampFactors) -> None:
+        self._factors = factors
         self.collected = Collected([], [], [], [], [])
         self._override = depsgraph.view_layer_eval.material_override
         self._meshes: dict[tuple[int, frozenset[str]], tuple[MeshArrays | None, MeshValues]] = {}
@@ -117,13 +116,7 @@ class _Collector:
         }
 
     def lamp(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
-        light, warnings = read_lamp(instance.object, matrix_of(instance))
-        self._warn(warnings)
-        if light is not None:
-            self.collected.lights.append(light)
-
-    def world(self, world: bpy.types.World | None) -> None:
-        light, warnings = read_world(world)
+        light, warnings = read_lamp(instance.object, matrix_of(instance), self._factors)
         self._warn(warnings)
         if light is not None:
             self.collected.lights.append(light)

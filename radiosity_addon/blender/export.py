@@ -14,9 +14,11 @@ from ..solver.lights import EnvironmentLight
 from ..solver.scene import Scene
 from .collect import Collected, Piece, collect
 from .export_sources import Export
+from .lamps import lamp_factors
 from .mesh_arrays import all_finite, degenerate, not_finite_message, world_from_object
 from .render_state import leave_edit_mode, render_depsgraph
 from .surface_evaluation import evaluate_surfaces
+from .world import read_world
 
 MAX_UV_LAYERS = 8
 
@@ -44,8 +46,13 @@ def export_scene(context: bpy.types.Context, settings: BakeSettings) -> Export:
         baked has no room for another UV layer.
     """
     leave_edit_mode(context)
+    factors = lamp_factors()
     with render_depsgraph(context) as depsgraph:
-        collected = collect(depsgraph)
+        collected = collect(depsgraph, factors)
+    # After that: Cycles may have to render it, which no evaluated object would survive.
+    world, warnings = read_world(context.scene.world)
+    collected.lights.extend(world)
+    collected.warnings.extend(warnings)
     chosen = _chosen(context, collected.pieces, settings.objects)
     for piece in chosen:
         _check_uv_layers(piece)

@@ -18,11 +18,11 @@ import numpy as np
 from .aiming import BrightElements
 from .arrays import Array
 from .emitters import EmitterGroup
+from .environment import SkyTable
 from .footprints import Footprints, Sampler, SpreadPoints
 from .gathering import NOTHING, SKY, Gathered, Gathering, Resolver
 from .leaf_parts import LeafParts
-from .lights import EnvironmentLight, Lamp
-from .radiometry import radiosity_of_radiance
+from .lights import Lamp
 from .shadow_share import ShadowShare
 from .steps import drain, scaled
 from .textured_emitters import emitter_groups
@@ -139,7 +139,15 @@ class LocalPass:
             What is about expected. None aims at nothing.
         """
         gathering = Gathering(
-            self.caster, at, surface_normals, rays, resolve, self.leaves_of, self._seed, self.threads
+            self.caster,
+            at,
+            surface_normals,
+            rays,
+            resolve,
+            self.leaves_of,
+            self._seed,
+            self.threads,
+            self._sky,
         )
         if irradiance is None:
             return (yield from gathering.steps(None, np.zeros(len(at))))
@@ -158,7 +166,7 @@ class LocalPass:
         return total
 
     def leaves_of(self, hits: Hits) -> Array:
-        """Return (n,) int32: the leaf element under each hit; SKY for none or a black back."""
+        """Return (n,) int32: the leaf element under each hit; NOTHING for none or a black back."""
         hierarchy = self._state.hierarchy
         face = hierarchy.faces.of_triangle[(~hits.front).astype(np.int8), hits.triangle]
         on_face = (hits.triangle >= 0) & (face >= 0)
@@ -216,8 +224,14 @@ class LocalPass:
         expected = self._state.irradiance[self.parts.leaf_of(parts)].mean(axis=1)
         return self.direct_steps(replace(self.parts.footprints(parts), expected=expected), rays=16)
 
-    def sky(self) -> Array:
-        """Return (3,) the radiosity equivalent πL of the sky [W/m²]."""
-        lights = self._state.scene.lights
-        skies = [light.strength for light in lights if isinstance(light, EnvironmentLight)]
-        return radiosity_of_radiance(np.sum(skies, axis=0)) if skies else np.zeros(3)
+    def beyond(self) -> Array:
+        """Return (cells + 2, 3) the last rows of a table of radiosity [W/m²]: the sky's cells, and two dark.
+
+        So the negative numbers of what rays found index them.
+        """
+        assert (NOTHING, SKY) == (-2, -3)
+        return np.concatenate([self._sky.radiosity[::-1], np.zeros((2, 3))])
+
+    @cached_property
+    def _sky(self) -> SkyTable:
+        return SkyTable(self._state.scene.lights)

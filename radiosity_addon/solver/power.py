@@ -13,6 +13,7 @@ import numpy as np
 
 from .arrays import Array
 from .cluster_links import ClusterLinks, gather_at_clusters
+from .environment import SkyPatch
 from .hierarchy import Faces, Hierarchy, node_opacity
 from .light_base import Emitter
 from .lights import EnvironmentLight, SunLight
@@ -41,7 +42,7 @@ def light_power(scene: Scene, faces: Faces) -> float:
     width = corners.max(axis=0) - corners.min(axis=0)
     sides = np.array([width[1] * width[2], width[2] * width[0], width[0] * width[1]])
     for light in scene.lights:
-        if isinstance(light, SunLight):
+        if isinstance(light, SunLight | SkyPatch):
             total = total + light.strength * float(np.abs(np.asarray(light.direction)) @ sides)
         elif isinstance(light, EnvironmentLight):
             total = total + irradiance_under_sky(light.strength) * float(sides.sum())
@@ -61,7 +62,7 @@ def power_balance(state: SolverState) -> dict[str, float]:
     receiver = state.light_links.receiver
     gain = hierarchy.area[receiver] * hierarchy.opacity[receiver] * state.light_links.gain.mean(axis=1)
     for number, light in enumerate(scene.lights):
-        if isinstance(light, SunLight | EnvironmentLight):
+        if isinstance(light, SunLight | SkyPatch | EnvironmentLight):
             arriving = float(gain[state.light_links.light == number].sum())
             emitted += arriving * float(light.strength.mean())
         elif isinstance(light, Emitter):

@@ -20,7 +20,7 @@ import numpy as np
 from .arrays import Array
 from .form_factor import point_to_polygon
 from .hierarchy import split_in_four
-from .local_pass import NOTHING, SKY, LocalPass
+from .local_pass import LocalPass
 from .parallel import for_chunks
 from .point_exchange import corner_factors, visible_share
 from .point_light import lamp_irradiance
@@ -113,16 +113,16 @@ class Residual:
         return self.given(face, barycentric, direct + indirect)
 
     def gathered(self, local: LocalPass) -> Array:
-        """Return (e + 2, 3): what a gather ray finds [W/m²], elements first, then NOTHING and SKY.
+        """Return (e + cells + 2, 3): what a gather ray finds [W/m²], elements first, then `LocalPass.beyond`.
 
         Elements without their own emission, which is direct light.
         """
-        assert (NOTHING, SKY) == (-2, -1)
-        table = np.zeros((self._hierarchy.n_elements + 2, 3))
+        beyond = local.beyond()
+        table = np.zeros((self._hierarchy.n_elements + len(beyond), 3))
         leaf = self._basis.leaf
         table[leaf] = self._basis.leaf_means(self._values) - self._hierarchy.emission[leaf]
         table[leaf] /= self._hierarchy.opacity_where_hit[leaf, None]
-        table[SKY] = local.sky()
+        table[self._hierarchy.n_elements :] = beyond
         return table
 
     def given(self, face: Array, barycentric: Array, irradiance: Array) -> Array:

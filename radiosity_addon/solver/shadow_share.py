@@ -82,6 +82,8 @@ class ShadowShare:
         -------
         share : (n,) float64
         """
+        if isinstance(self._light, Lamp) and not self._light.casts_shadow:
+            return np.ones(len(gain))
         facing, near = gain > 0, self._at.near
         part = self._at.weight_of(gain * self._light.strength.mean())
         few = _power_of_two(rays * np.sqrt(part / MAIN_PART), rays)
@@ -133,6 +135,8 @@ class ShadowShare:
             centre, normal = at.points[chunk], at.normals[chunk]
             unit = stratified_square(at.keys[chunk], count, self._seed + 1)
             directions, distances, weights = self._light.shadow_rays(centre, normal, unit)
+            # The edge of a spot's cone may cross a footprint and leave its centre dark: then all count alike.
+            weights = np.where(weights.any(axis=1, keepdims=True), weights, 1.0)
             start = centre[:, None]
             if at.sampler is not None:
                 # The same lamp points, seen from points spread over the footprint.
