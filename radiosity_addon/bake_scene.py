@@ -41,6 +41,8 @@ class BakeObject:
         The mesh corner (loop) of each triangle corner: UVs go back through it.
     uv : (count, 3, 2) float32 or None
         The existing `Lightmap` UVs to keep; None to unwrap anew.
+    texel_scale : float
+        Its texels per metre, relative to the other objects.
     """
 
     name: str
@@ -50,6 +52,7 @@ class BakeObject:
     polygon: Array
     loops: Array
     uv: Array | None = None
+    texel_scale: float = 1.0
 
     @property
     def rows(self) -> slice:

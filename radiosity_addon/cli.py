@@ -83,8 +83,9 @@ def settings_of(request: argparse.Namespace) -> BakeSettings:
     given: dict[str, Any] = {name: getattr(request, name) for name in SHARED_FIELDS}
     if request.resolution is not None:
         given["resolution"] = request.resolution
-    if request.objects is not None:
-        given["objects"] = tuple(request.objects)
+    for name in ("objects", "light_only", "ignore"):
+        if getattr(request, name) is not None:
+            given[name] = tuple(getattr(request, name))
     return BakeSettings(**given)
 
 
@@ -168,6 +169,8 @@ def _add_bake(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="what gets a lightmap; the rest still lights and blocks (default: every rendered mesh)",
     )
+    add("--light-only", nargs="+", metavar="NAME", help="what lights and blocks but gets no lightmap")
+    add("--ignore", nargs="+", metavar="NAME", help="what is left out as if it were not there")
     add(
         "--sky", action="store_true", help="add a white sky of strength 1 where the scene has no light at all"
     )

@@ -42,6 +42,9 @@ class BakeSettings:
     format : "exr" or "png16"
     objects : names of what gets a lightmap, or None for every render-visible mesh
         Everything else still lights and blocks.
+    light_only, ignore : tuple of str
+        Names of objects that get no lightmap, and of objects left out as if they were not
+        there; they win over the objects' own modes.
     sky : bool
         Add a white sky of strength 1 where the scene has no light at all.
     keep_uvs : bool
@@ -70,6 +73,8 @@ class BakeSettings:
     light: str = "all"
     format: str = "exr"
     objects: tuple[str, ...] | None = None
+    light_only: tuple[str, ...] = ()
+    ignore: tuple[str, ...] = ()
     sky: bool = False
     keep_uvs: bool = False
     seed: int = 0
@@ -99,6 +104,9 @@ class BakeSettings:
             raise UsageError("a residual is an error picture: leave --error out, or bake another quantity")
         if self.threads < 0:
             raise UsageError(f"threads {self.threads} is negative; 0 means all cores")
+        for name in (*self.light_only, *self.ignore):
+            if name in (self.objects or ()):
+                raise UsageError(f"object '{name}' cannot both get a lightmap and be light only or ignored")
         if self.seed < 0:
             raise UsageError(f"seed {self.seed} is negative")
         for name, value, allowed in (

@@ -10,11 +10,13 @@ import numpy as np
 
 from ..bake_scene import LIGHTMAP_UV_LAYER, BakeWarning
 from ..errors import SceneError
+from ..settings import BakeSettings
 from ..solver.lights import Light
 from .export_sources import ExportSource
 from .lamps import read_lamp
 from .materials import DEFAULT_GREY, Surface, read_material
-from .mesh_arrays import MeshArrays, all_finite, not_finite_message, read_mesh
+from .mesh_arrays import MeshArrays, all_finite, no_triangles, not_finite_message, read_mesh
+from .object_roles import BAKE, BAKEABLE_TYPES, IGNORE, Role, role_of
 from .scene_objects import (
     is_generated,
     materials_of,
@@ -38,8 +40,10 @@ class Piece:
     matrix : (4, 4) float64
     surface : (t,) int32
         Rows of `Collected.surfaces`.
+    role : Role
+        Of what is ignored, `mesh` is empty.
     bakeable : bool
-        A lightmap can be assigned to it: it is a mesh and can be edited.
+        It is to have a lightmap, if it is asked for, and can: it may be edited.
     linked : bool
         It would be bakeable, were it not linked from a library.
     uv_layers : int
@@ -51,6 +55,7 @@ class Piece:
     mesh: MeshArrays
     matrix: np.ndarray
     surface: np.ndarray
+    role: Role
     bakeable: bool
     linked: bool
     uv_layers: int
@@ -59,7 +64,7 @@ class Piece:
     @property
     def names(self) -> tuple[str, ...]:
         """The names by which a user may ask for it."""
-        return tuple(filter(None, (self.source.name, self.source.object_name, self.source.instancer)))
+        return _names(self.source)
 
 
 @dataclass(frozen=True)
@@ -72,15 +77,17 @@ class Collected:
     warnings: list[BakeWarning]
 
 
-def collect(depsgraph: bpy.types.Depsgraph) -> Collected:
+def collect(depsgraph: bpy.types.Depsgraph, settings: BakeSettings | None = None) -> Collected:
     """Read meshes, materials, lamps and world of an evaluated scene.
+
+    `settings.ignore` and `settings.light_only` name objects to leave out, or without lightmaps.
 
     Raises
     ------
     SceneError
         If a coordinate is NaN or infinite.
     """
-    collector = _Collector(depsgraph)
+    collector = _Collector(depsgraph, settings or BakeSettings())
     for instance in visible_objects(depsgraph):
         if instance.object.type == "LIGHT":
             collector.lamp(instance)
@@ -94,12 +101,14 @@ def collect(depsgraph: bpy.types.Depsgraph) -> Collected:
 
 
 class _Collector:
-    def __init__(self, depsgraph: bpy.types.Depsgraph) -> None:
+    def __init__(self, depsgraph: bpy.types.Depsgraph, settings: BakeSettings) -> None:
+        self._settings = settings
         self.collected = Collected([], [], [], [])
         self._override = depsgraph.view_layer_eval.material_override
         self._meshes: dict[int, MeshArrays | None] = {}
         self._surface_of: dict[str | None, int] = {}
-        self._taken = {obj.name for obj in bpy.data.objects if obj.library is None}
+        # A curve's mesh comes as an instance, and may have the curve's own name.
+        self._taken = {obj.name for obj in bpy.data.objects if obj.library is None and obj.type == "MESH"}
         self._instancers = {
             instance.parent.original.name
             for instance in visible_objects(depsgraph)
@@ -121,27 +130,33 @@ class _Collector:
     def mesh(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
         shown = original_object(instance)
         matrix = matrix_of(instance)
-        mesh = self._read(instance)
-        if mesh is None or not all_finite(matrix):
-            raise SceneError(not_finite_message(shown.name))
-        if len(mesh) == 0:
-            return
+        owner = instance.parent.original if instance.is_instance else shown
         name = self._unique_name(instance)
         source = source_of(instance, name, not instance.is_instance and shown.name in self._instancers)
-        owner = instance.parent.original if instance.is_instance else shown
+        role = role_of(shown, owner, _names(source), self._settings)
+        # What is ignored stays known: it must still be shown where its instancer will be hidden.
+        mesh = no_triangles() if role.mode == IGNORE else self._read(instance)
+        if mesh is None or not all_finite(matrix):
+            raise SceneError(not_finite_message(shown.name))
+        if len(mesh) == 0 and role.mode != IGNORE:
+            return
+        can_bake = role.mode == BAKE and shown.type in BAKEABLE_TYPES
         is_mesh = shown.type == "MESH"
         layers = (
             {layer.name for layer in shown.data.uv_layers} if is_mesh and not instance.is_instance else set()
         )
-        self._warn_about(shown, owner, is_mesh)
+        if can_bake and owner.library is not None:
+            self._warn([_linked(owner.name)])
+        self._warn(role.warnings)
         self.collected.pieces.append(
             Piece(
                 source=source,
                 mesh=mesh,
                 matrix=matrix,
                 surface=self._surfaces(instance, name, mesh),
-                bakeable=is_mesh and owner.library is None,
-                linked=is_mesh and owner.library is not None,
+                role=role,
+                bakeable=can_bake and owner.library is None,
+                linked=can_bake and owner.library is not None,
                 uv_layers=max(mesh.uv_layers, len(layers)),
                 has_lightmap_layer=mesh.lightmap_uv is not None or LIGHTMAP_UV_LAYER in layers,
             )
@@ -163,7 +178,8 @@ class _Collector:
         shown = original_object(instance)
         if not instance.is_instance and shown.library is None:
             return shown.name
-        base = f"{instance.parent.original.name}/{shown.name}" if instance.is_instance else shown.name
+        own = not instance.is_instance or (shown.type != "MESH" and instance.parent.original == shown)
+        base = shown.name if own else f"{instance.parent.original.name}/{shown.name}"
         name, count = base, 0
         while name in self._taken:
             count += 1
@@ -175,6 +191,8 @@ class _Collector:
         self, instance: bpy.types.DepsgraphObjectInstance, name: str, mesh: MeshArrays
     ) -> np.ndarray:
         """Return the row of `collected.surfaces` for each triangle, (t,) int32."""
+        if len(mesh) == 0:
+            return np.zeros(0, dtype=np.int32)
         if self._override is not None:
             return np.full(len(mesh), self._surface(self._override), dtype=np.int32)
         materials = materials_of(instance)
@@ -194,22 +212,15 @@ class _Collector:
             self.collected.surfaces.append(surface)
         return self._surface_of[key]
 
-    def _warn_about(self, shown: bpy.types.Object, owner: bpy.types.Object, is_mesh: bool) -> None:
-        if not is_mesh:
-            self._warn([_unlit(shown.name, "is not a mesh", "convert it to one")])
-        elif owner.library is not None:
-            self._warn(
-                [_unlit(owner.name, "is linked from a library", "make it local or a library override")]
-            )
-        for kind in ("shadow", "diffuse"):
-            if not getattr(shown, f"visible_{kind}"):
-                message = f"'Ray Visibility: {kind.title()}' off is ignored: it lights and blocks"
-                self._warn([BakeWarning(shown.name, f"object '{shown.name}': {message}")])
-
     def _warn(self, warnings: Sequence[BakeWarning]) -> None:
         self.collected.warnings.extend(warnings)
 
 
-def _unlit(name: str, why: str, mend: str) -> BakeWarning:
-    what = f"object '{name}' {why}: it lights and blocks but gets no lightmap"
-    return BakeWarning(name, f"{what}; {mend} to bake it")
+def _names(source: ExportSource) -> tuple[str, ...]:
+    """Return the names by which a user may ask for what a source shows."""
+    return tuple(filter(None, (source.name, source.object_name, source.instancer)))
+
+
+def _linked(name: str) -> BakeWarning:
+    what = f"object '{name}' is linked from a library: it lights and blocks but gets no lightmap"
+    return BakeWarning(name, f"{what}; make it local or a library override to bake it")

@@ -17,6 +17,7 @@ from ..settings import (
     BakeSettings,
 )
 from .method_properties import MethodProperties, given_settings
+from .object_roles import BAKE, BAKEABLE_TYPES
 
 DEFAULTS = BakeSettings()
 
@@ -229,12 +230,11 @@ def settings_of(context: bpy.types.Context) -> BakeSettings:
 
 
 def selected_meshes(context: bpy.types.Context) -> tuple[str, ...]:
-    """Return the names of the selected objects that show a surface when rendered."""
-    surfaces = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
+    """Return the names of the selected objects that show a surface when rendered and are to be baked."""
     return tuple(
         obj.name
         for obj in context.view_layer.objects.selected
-        if obj.type in surfaces and not obj.hide_render
+        if obj.type in BAKEABLE_TYPES and not obj.hide_render and obj.radiosity_mode == BAKE
     )
 
 

@@ -261,7 +261,7 @@ def lamp_light(
     rows = np.flatnonzero(gain > 0)
     directions, distances, above = light.shadow_rays(flat[rows], facing[rows], unit.reshape(-1, 1, 2)[rows])
     start = flat[rows] + caster.surface_offset * facing[rows]
-    free = caster.visible(start, directions[:, 0], distances[:, 0])
+    free = caster.for_lamps.visible(start, directions[:, 0], distances[:, 0])
     # A lamp point below the horizon says nothing: the closed form has cut it off already.
     weights[rows] = np.where(above[:, 0] > 0, gain[rows], 0.0)
     passed[rows] = weights[rows] * free

@@ -81,11 +81,11 @@ class LocalPass:
         lights: list[Lamp | EmitterGroup] = [*lamps, *self.emitters]
         for done, (light, seed) in enumerate(zip(lights, seeds, strict=True)):
             if isinstance(light, EmitterGroup):
-                gain = light.unit_irradiance(at.points, at.normals)
+                gain, caster = light.unit_irradiance(at.points, at.normals), self.caster
             else:
-                gain = at.mean_gain(light, seed)
+                gain, caster = at.mean_gain(light, seed), self.caster.for_lamps
             yield (done + 0.1) / count
-            share = ShadowShare(self.caster, light, at, seed, self.threads).steps(gain > 0, shadow_rays)
+            share = ShadowShare(caster, light, at, seed, self.threads).steps(gain > 0, shadow_rays)
             unblocked = yield from scaled(share, (done + 0.1) / count, (done + 1) / count)
             total += (gain * unblocked)[:, None] * light.strength
         return total

@@ -153,7 +153,7 @@ StateType = TypeVar("StateType", bound=SolverState)
 def begin(scene: Scene, settings: SolverSettings, kind: type[StateType]) -> StateType:
     """Prepare a scene for a method: its faces, its ray caster, and the power of its light."""
     started = time.perf_counter()
-    caster = EmbreeCaster(scene.triangles, settings.threads)
+    caster = EmbreeCaster.of_scene(scene, settings.threads)
     hierarchy = Hierarchy(scene)
     power = light_power(scene, hierarchy.faces)
     state = kind(scene, settings, hierarchy, caster, power, started=started)
