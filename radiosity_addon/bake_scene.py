@@ -171,6 +171,9 @@ class BakeResult:
         The scene's and the bake's own.
     seconds : dict of str to float
         Wall-clock time of each stage.
+    atlas : tuple of dict
+        Parallel to `pages`: "resolution", "texels_per_metre" of objects at texel scale 1,
+        "utilisation" (the share of texels that show a surface) and the number of "objects".
     """
 
     pages: tuple[LightmapPage, ...]
@@ -178,3 +181,4 @@ class BakeResult:
     solver: dict[str, Any]
     warnings: tuple[BakeWarning, ...]
     seconds: dict[str, float] = field(default_factory=dict)
+    atlas: tuple[dict[str, float], ...] = ()

@@ -52,6 +52,8 @@ class RADIOSITY_PT_main(_Panel, bpy.types.Panel):
         if settings.quality == BY_ERROR[0]:
             column.prop(settings, "relative_error")
         column.prop(settings, "atlas")
+        if settings.atlas == "shared" and settings.size_mode == "resolution":
+            column.prop(settings, "pages")
         column = layout.column()
         column.prop(settings, "output_folder")
         if output_folder(context) is None:
@@ -80,6 +82,10 @@ class RADIOSITY_PT_advanced(_Panel, bpy.types.Panel):
         column = layout.column()
         for name in ("quantity", "light", "format"):
             column.prop(settings, name)
+        column = layout.column()
+        if settings.size_mode == "density":
+            column.prop(settings, "max_resolution")
+        column.prop(settings, "mip_levels")
         column = layout.column(heading="Scene")
         column.prop(settings, "sky")
         column.prop(settings, "keep_uvs")
