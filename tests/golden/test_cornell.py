@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,12 +11,14 @@ import pytest
 
 from bench.error_measure import relative_rmse
 from bench.layout import write_layout
-from radiosity_addon.bake_scene import BakeResult, Progress
+from radiosity_addon.bake_scene import BakeResult
 from radiosity_addon.blender.cornell import build_cornell_box
 from radiosity_addon.blender.export import export_scene
 from radiosity_addon.lightmap.rasterise import rasterise
 from radiosity_addon.pipeline import bake
 from radiosity_addon.settings import BakeSettings
+from radiosity_addon.solver.steps import drain
+from tests.golden.comparison import write_png
 from tests.golden.cornell_reference import FILE, Reference, load
 
 RELATIVE_RMSE = 0.011
@@ -44,22 +45,13 @@ class Comparison:
         return self.result.pages[0].pixels
 
 
-def exhaust(steps: Generator[Progress, None, BakeResult]) -> BakeResult:
-    while True:
-        try:
-            next(steps)
-        except StopIteration as done:
-            result: BakeResult = done.value
-            return result
-
-
 @pytest.fixture(scope="module")
 def comparison(empty_blender: None) -> Comparison:
     reference = load()
     build_cornell_box()
     write_layout(reference.uv)
     settings = BakeSettings(resolution=reference.resolution, keep_uvs=True)
-    result = exhaust(bake(export_scene(bpy.context, settings).bake_scene, settings))
+    result = drain(bake(export_scene(bpy.context, settings).bake_scene, settings))
     size = reference.resolution
     owner, compared = np.full((size, size), -1), np.zeros((size, size), dtype=bool)
     for number, item in enumerate(result.objects):
@@ -118,15 +110,6 @@ def test_picture_for_the_eye(comparison: Comparison) -> None:
     strip = np.concatenate([pages[0], gap, pages[1], gap, pages[2]], axis=1) * exposure
     write_png(PICTURE, np.clip(strip, 0, 1) ** (1 / 2.2))
     assert PICTURE.stat().st_size > 10_000
-
-
-def write_png(path: Path, pixels: np.ndarray) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    height, width, _ = pixels.shape
-    image = bpy.data.images.new("Picture", width, height)
-    image.pixels.foreach_set(np.dstack([pixels, np.ones((height, width))]).astype(np.float32).ravel())
-    image.filepath_raw, image.file_format = str(path), "PNG"
-    image.save()
 
 
 def test_the_reference_is_small() -> None:

@@ -1,6 +1,7 @@
 """Bake by shooting in a window and watch the viewport brighten; then Esc, another file, switched off.
 
-Every shot gives a picture, and slowly, so that there is time to photograph a few.
+Every shot gives a picture. The solver waits before some of them until those so far were photographed:
+what is on the photographs does not depend on how fast the machine is.
 
 Usage: blender cornell.blend --enable-event-simulate --python drive_live_view.py -- ANSWER.json
 """
@@ -8,6 +9,7 @@ Usage: blender cornell.blend --enable-event-simulate --python drive_live_view.py
 import importlib
 import json
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -31,6 +33,35 @@ seen = {"pictures": [], "shots": []}
 
 SHOTS = 30
 SECONDS_A_PICTURE = 0.2
+PHOTOGRAPHED = (2, 5, 12, 20, 28)
+"""How many pictures there are when a photograph is taken: the first is dark."""
+
+
+class Turns:
+    """Lets the solver, in its thread, and the photographer, in the window's, take turns."""
+
+    def __init__(self):
+        self.made = 0
+        self.go_on = threading.Event()
+        self.watched = True
+
+    def next_picture(self):
+        """Wait, in the solver's thread, until the next picture may be made."""
+        if self.watched and self.made in PHOTOGRAPHED:
+            self.go_on.wait(60)
+        self.go_on.clear()
+        self.made += 1
+
+    def ready(self):
+        """The solver waits, and its pictures have all come to the window."""
+        return self.made in PHOTOGRAPHED and len(seen["pictures"]) >= self.made
+
+    def taken(self):
+        """The solver goes on."""
+        return not self.ready()
+
+
+turns = Turns()
 
 
 def slow_down():
@@ -38,6 +69,7 @@ def slow_down():
     picture = pipeline._picture
 
     def slowly(state):
+        turns.next_picture()
         time.sleep(SECONDS_A_PICTURE)
         return picture(state)
 
@@ -105,13 +137,15 @@ def script():
     before = dump_file()
 
     bake()
-    while not settled():
-        yield 0.5
-        if pictured() and not settled():
-            name = f"live-{len(seen['shots']):02d}.png"
-            yield from photograph(name)
-            if not settled():
-                seen["shots"].append(name)
+    for number in range(len(PHOTOGRAPHED)):
+        yield from events.until(turns.ready, 60)
+        name = f"live-{number:02d}.png"
+        yield from photograph(name)
+        seen["shots"].append(name)
+        turns.go_on.set()
+        yield from events.until(turns.taken, 60)
+    turns.watched = False
+    yield from events.until(settled, 120)
     seen["brightening"] = list(seen["pictures"])
     seen["active_after_finish"] = live_view.is_active()
     yield from events.key("Z", *view, ctrl=True)

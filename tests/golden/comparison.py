@@ -1,0 +1,89 @@
+"""One row baked with ours, beside its references."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from bench.error_measure import relative_rmse
+from radiosity_addon.bake_scene import BakeResult, BakeWarning
+from radiosity_addon.blender.export import export_scene
+from radiosity_addon.lightmap.rasterise import rasterise
+from radiosity_addon.pipeline import bake
+from radiosity_addon.settings import BakeSettings
+from radiosity_addon.solver.steps import drain
+from tests.golden import references
+from tests.golden.rows import Row
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A bake, its references, and which texels are compared.
+
+    Parameters
+    ----------
+    ours : (n, n, 3) float32
+        H/π [W/m²/sr]; row 0 is v = 0.
+    theirs : References
+    compared : (n, n) bool
+        The centre is inside a triangle, and Cycles wrote the texel.
+    warnings : tuple of BakeWarning
+    """
+
+    ours: np.ndarray
+    theirs: references.References
+    compared: np.ndarray
+    warnings: tuple[BakeWarning, ...]
+
+    @property
+    def relative_rmse(self) -> float:
+        at = self.compared
+        return relative_rmse(self.ours[at], self.theirs.first[at], self.theirs.second[at])
+
+    @property
+    def mean_ratio(self) -> float:
+        """Our mean by theirs."""
+        at = self.compared
+        return float(self.ours[at].mean(dtype=float) / self.theirs.mean[at].mean(dtype=float))
+
+    def strip(self) -> np.ndarray:
+        """Return (n, 3 n, 3) display values in [0, 1]: ours, Cycles, and ten times the difference."""
+        theirs = self.theirs.mean
+        error = 10 * np.abs(self.ours - theirs) * self.compared[..., None]
+        bright = theirs[self.compared].max(axis=1)
+        exposure = 0.8 / max(float(np.quantile(bright, 0.98)), 1e-9) if len(bright) else 1.0
+        pages = [self.ours * (self.compared | self.theirs.coverage)[..., None], theirs, error]
+        return np.clip(np.concatenate(pages, axis=1) * exposure, 0, 1) ** (1 / 2.2)
+
+
+def bake_row(row: Row, quality: str = "medium") -> BakeResult:
+    """Build a row into an empty file and bake it on the layout it brings."""
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    row.build()
+    settings = BakeSettings(resolution=row.resolution, keep_uvs=True, quality=quality)
+    return drain(bake(export_scene(bpy.context, settings).bake_scene, settings))
+
+
+def compare(row: Row, quality: str = "medium") -> Comparison:
+    """Bake a row and put it beside its references."""
+    theirs = references.load(row)
+    result = bake_row(row, quality)
+    inside = np.zeros((row.resolution, row.resolution), dtype=bool)
+    for item in result.objects:
+        texels = rasterise(item.uv, row.resolution)
+        inside[texels.row[texels.centre_inside], texels.column[texels.centre_inside]] = True
+    return Comparison(result.pages[0].pixels, theirs, inside & theirs.coverage, result.warnings)
+
+
+def write_png(path: Path, pixels: np.ndarray) -> None:
+    """Write (h, w, 3) display values, row 0 at the bottom."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    height, width, _ = pixels.shape
+    image = bpy.data.images.new("Picture", width, height)
+    image.pixels.foreach_set(np.dstack([pixels, np.ones((height, width))]).astype(np.float32).ravel())
+    image.filepath_raw, image.file_format = str(path), "PNG"
+    image.save()
+    bpy.data.images.remove(image)

@@ -1,0 +1,1 @@
+"""Geometry: whatever becomes a mesh when it is rendered."""

@@ -1,0 +1,1 @@
+"""Materials: what reflects, lets through and glows, and how much of it."""

@@ -1,0 +1,1 @@
+"""Skies: plain ones, images, and the Sky Texture."""

@@ -1,0 +1,41 @@
+"""Every row of the gallery against Cycles, texel by texel on the same layout, shadows' borders included."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import pytest
+
+from tests.golden import references
+from tests.golden.comparison import compare, write_png
+from tests.golden.rows import FAMILIES, ROWS
+
+PICTURES = Path(__file__).resolve().parents[2] / "out" / "golden"
+
+MEAN = 0.015
+"""Each bake's mean is this near to Cycles', whatever its RMSE may be."""
+
+
+@pytest.mark.parametrize("name", ROWS)
+def test_row(name: str) -> None:
+    row = ROWS[name]
+    if bpy.app.version < row.needs:
+        pytest.skip(f"Blender {bpy.app.version_string} does not have it")
+    known = references.read_index(row.family).get(name, {}).get("signature")
+    assert known == row.signature, f"make its references: python -m tests.golden.make_references {name}"
+    comparison = compare(row)
+    # The picture for the eye: ours, Cycles, and ten times the difference.
+    write_png(PICTURES / f"{name}.png", comparison.strip())
+    assert comparison.compared.sum() > 0.9 * comparison.theirs.coverage.sum()
+    assert comparison.relative_rmse < row.limit
+    assert comparison.mean_ratio == pytest.approx(1.0, abs=MEAN)
+
+
+def test_references_have_rows() -> None:
+    """No file is left behind when a row goes."""
+    wanted = {path.name for row in ROWS.values() for path in references.files(row)}
+    assert {path.name for path in references.FOLDER.glob("*.exr")} == wanted
+    assert [name for family in FAMILIES for name in references.read_index(family)] == sorted(
+        ROWS, key=lambda name: (FAMILIES.index(ROWS[name].family), name)
+    )
