@@ -30,6 +30,10 @@ Sampler = Callable[[Array, Array], Array]
 """(rows, u (r, k, 2)) → (r, k, 3): points of the rows' footprints."""
 
 
+Lift = Callable[[Array, Array, Array], Array]
+"""(rows, starts (r, k, 3), directions (r, k, 3)) → (r, k, 3): where shadow rays start instead."""
+
+
 @dataclass(frozen=True)
 class Footprints:
     """Where light is asked for.
@@ -48,6 +52,8 @@ class Footprints:
     starts : int or None
         From how many samples a point's gather rays start, each of them a run that is stratified by
         itself; None gives every ray its own.
+    lift : callable or None
+        Moves the starts of shadow rays off a smooth surface's flat triangles.
     """
 
     points: Array
@@ -56,6 +62,7 @@ class Footprints:
     sampler: Sampler | None = None
     near: Callable[[Array], Array] | None = None
     starts: int | None = None
+    lift: Lift | None = None
 
     def __len__(self) -> int:
         return len(self.points)
@@ -137,6 +144,8 @@ class ShadowShare:
                 length = np.linalg.norm(along, axis=2)
                 directions = along / np.maximum(length, 1e-300)[..., None]
                 distances = np.where(finite[..., 0], length, np.inf)
+            if at.lift is not None:
+                start = at.lift(chunk, start, directions)
             start = start + caster.surface_offset * normal[:, None]
             point, sample = np.nonzero(weights > 0)
             ray = (point, sample)

@@ -12,7 +12,7 @@ import traceback
 import radiosity_addon
 
 from .checks import check
-from .test_fuzz import SCENES
+from .scenes import SCENES
 
 
 def main() -> int:
