@@ -196,7 +196,8 @@ class _Collector:
         if self._override is not None:
             return np.full(len(mesh), self._surface(self._override), dtype=np.int32)
         materials = materials_of(instance)
-        if any(material is None for material in materials):
+        used = np.unique(np.clip(mesh.material, 0, max(len(materials) - 1, 0)))
+        if any(materials[slot] is None for slot in used if slot < len(materials)):
             message = f"object '{name}' has an empty material slot; grey {DEFAULT_GREY} is used"
             self._warn([BakeWarning(name, message)])
         rows = np.array([self._surface(material) for material in materials or [None]], dtype=np.int32)
