@@ -10,11 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import bpy
 
-from ..bake_scene import BakeWarning
-from ..settings import BakeSettings
+if TYPE_CHECKING:
+    from ..bake_scene import BakeWarning
+    from ..settings import BakeSettings
 
 BAKE, LIGHT_ONLY, IGNORE = "BAKE", "LIGHT_ONLY", "IGNORE"
 
@@ -86,6 +88,8 @@ def role_of(
     settings : BakeSettings
         `ignore` and `light_only` win over the objects' own modes.
     """
+    from ..bake_scene import BakeWarning  # with the solver, which registering is not to load
+
     both = (shown,) if shown == owner else (shown, owner)
     modes = {getattr(obj, "radiosity_mode", BAKE) for obj in both}
     mode = IGNORE if IGNORE in modes else LIGHT_ONLY if LIGHT_ONLY in modes else BAKE
@@ -114,6 +118,8 @@ def role_of(
 
 def half_visible(name: str) -> BakeWarning:
     """Say what is not as in Cycles for an object that only one kind of rays meets."""
+    from ..bake_scene import BakeWarning
+
     return BakeWarning(
         name,
         f"object '{name}': Ray Visibility has only one of Diffuse and Shadow on; lamps go by Shadow, "

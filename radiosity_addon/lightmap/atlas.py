@@ -1,7 +1,5 @@
 """Lightmap UVs for all objects of a bake: charts, pages, and what becomes of UVs to keep.
 
-The only module that imports xatlas, which grows the charts; everything else is ours.
-
 Kept UVs (an existing layer) stay as they are, bit for bit, wherever that is possible: on an
 object's own page always, on a shared page when all objects bring UVs and none lies over another's.
 Otherwise each object's kept layout is packed, as one chart of unchanged shape, beside the others.
@@ -9,7 +7,6 @@ Otherwise each object's kept layout is packed, as one chart of unchanged shape, 
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -19,13 +16,12 @@ from numpy.typing import NDArray
 
 from ..bake_scene import BakeWarning
 from ..errors import BakeError
-from .box_charts import box_charts
 from .charts import Charts, unwrap
 from .flatten import rescale_to_area, signed_double_area
+from .growers import PatientGrower
 from .packing import Limits, Packing, pack
 from .pages import least_pages, shared_out
 from .rasterise import coverage_sum
-from .resting import Resting
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -36,9 +32,6 @@ _PROBE = 1024
 
 _OVERLAP = 1.01
 """A texel filled to more than this holds triangles that lie over each other."""
-
-_resting = Resting()
-"""The latest of xatlas' atlases: destroyed right after their work they may hang."""
 
 
 @dataclass(frozen=True)
@@ -196,40 +189,6 @@ def run_atlas(
     return result
 
 
-def grow_charts(vertices: Float, faces: Int) -> tuple[Float, Int]:
-    """Cut a mesh into charts with xatlas.
-
-    Parameters
-    ----------
-    vertices : (v, 3) float64
-        At a scale where triangles are about 1 in area, welded.
-    faces : (n, 3) int64
-
-    Returns
-    -------
-    uv : (n, 3, 2) float64
-        Stretched along u and v, each chart otherwise; charts may lie over each other.
-    chart : (n,) int64
-        −1 for faces that xatlas left out.
-    """
-    import xatlas
-
-    atlas = xatlas.Atlas()
-    atlas.add_mesh(vertices.astype(np.float32), faces.astype(np.uint32))
-    # Its packing is not used: make it quick, and do not let it turn charts twice.
-    packing = xatlas.PackOptions()
-    packing.rotate_charts = False
-    packing.bilinear = False
-    atlas.generate(xatlas.ChartOptions(), packing)
-    _, indices, uv = atlas[0]
-    _, chart_of_vertex = atlas.get_mesh_vertex_assignment(0)
-    chart = chart_of_vertex[indices[:, 0]].astype(np.int64)
-    chart[chart == np.iinfo(np.uint32).max] = -1
-    scale = np.array((max(atlas.width, 1), max(atlas.height, 1)), dtype=np.float64)
-    _resting.keep(atlas)
-    return uv[indices].astype(np.float64) * scale, chart
-
-
 _Laid = list[tuple[list[int], Packing]]
 """Per page the numbers of its objects, and how they lie there."""
 
@@ -273,23 +232,6 @@ def _pack_group(group: list[_Layout], options: AtlasOptions) -> Iterator[Packing
     yield from _pack_page(group, options.resolution, options.texel_density, options.limits)
 
 
-class _PatientGrower:
-    """Grows charts with xatlas until an object has taken too long, and then by directions."""
-
-    def __init__(self, seconds: float) -> None:
-        self._seconds, self._spent = seconds, 0.0
-        self.gave_up = False
-
-    def __call__(self, vertices: Float, faces: Int) -> tuple[Float, Int]:
-        if self._spent >= self._seconds:
-            self.gave_up = True
-            return box_charts(vertices, faces)
-        started = time.perf_counter()
-        grown = grow_charts(vertices, faces)
-        self._spent += time.perf_counter() - started
-        return grown
-
-
 def _lay_flat(
     source: AtlasInput, probe: int, warnings: list[BakeWarning], seconds: float
 ) -> Iterator[_Layout]:
@@ -303,7 +245,7 @@ def _lay_flat(
     if not len(triangles):
         yield _Layout(source, Charts(np.zeros((0, 3, 2)), np.zeros(0, dtype=np.int64), 0), kept=False)
         return
-    grower = _PatientGrower(seconds)
+    grower = PatientGrower(seconds)
     for charts in unwrap(triangles, np.asarray(source.polygon, dtype=np.int64), grower):
         yield _Layout(source, _scaled(charts, source.scale), kept=False)
     if grower.gave_up:

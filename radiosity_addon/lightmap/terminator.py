@@ -79,4 +79,4 @@ def _weights(corners: Array, points: Array) -> Array:
     # Each weight is an area; the cross products with the normal turn edges inwards.
     second = np.einsum("rkd,rd->rk", from_first, np.cross(other, normal)) / scale[:, None]
     third = np.einsum("rkd,rd->rk", from_first, np.cross(normal, one)) / scale[:, None]
-    return np.clip(np.stack([1.0 - second - third, second, third], axis=-1), 0.0, 1.0)
+    return np.asarray(np.clip(np.stack([1.0 - second - third, second, third], axis=-1), 0.0, 1.0))
