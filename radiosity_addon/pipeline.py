@@ -153,6 +153,8 @@ def _texels(bake_scene: BakeScene, baked: list[BakeObject], atlas: Atlas) -> Tex
     for item, placed in zip(baked, atlas.objects, strict=True):
         uv[item.rows] = placed.uv
         page_of_triangle[item.rows] = placed.page
+    # What has no area has no side to be lit from, whatever its UVs say.
+    page_of_triangle[bake_scene.scene.areas == 0] = -1
     rows = [np.flatnonzero(page_of_triangle == page) for page in range(len(atlas.pages))]
     texels = [rasterise(uv[of], page.resolution) for of, page in zip(rows, atlas.pages, strict=True)]
     return TexelGeometry(bake_scene.scene, uv, page_of_triangle, texels, rows)
