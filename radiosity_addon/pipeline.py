@@ -40,6 +40,7 @@ from .report import solver_part
 from .settings import BakeSettings
 from .solver import Solution, SolverSettings, SolverState, solve_progress
 from .solver.arrays import Array
+from .solver.first_links import COARSEST_FAINT
 
 T = TypeVar("T")
 
@@ -319,7 +320,7 @@ def _of_solution(solution: Solution, settings: SolverSettings) -> tuple[BakeWarn
                 f"{solution.over_budget:.2%} of the light: bake at a lower quality, or fewer objects",
             )
         )
-    if solution.first_faint > settings.error:
+    if solution.first_faint > COARSEST_FAINT * settings.error:
         warnings.append(
             BakeWarning(
                 "scene",

@@ -3,11 +3,17 @@
 Such a texel shows the mean of both sides, as it should. Light that comes back from it must
 not be the mean: a ray from inside a closed box would then see the lit floor outside. A hit
 on a crossed texel is looked up in a whole neighbour that the hit point can see.
+
+What hovers closely over a surface (a window's frame a millimetre off the wall, a door in its
+frame) parts light from dark likewise, though nothing stands on the texel, and the gap lets lines
+of sight along the surface through. Short probes along the normal tell which texels are *hooded*,
+which only partly, and on which side of the hood's rim a hit lies.
 """
 
 from __future__ import annotations
 
 from collections.abc import Generator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -30,10 +36,33 @@ INSET = 0.96
 OUTSET = 1.01
 """… but touched, if the wall crosses corners drawn out so far."""
 
+HOOD = 0.25
+"""What is nearer above a surface than this part of a texel's width hoods it. Light reaches about as far
+into a gap as the gap is high: into a high one it fades over texels, without a hood's sharp rim."""
+
 _CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]], dtype=np.float32)
 _EDGES = np.array([[0, 1], [1, 2], [2, 3], [3, 0]])
 _DIAGONALS = np.array([[0, 2], [1, 3]])
+_SPOTS = np.array([[u, v] for u in (0.02, 0.5, 0.98) for v in (0.02, 0.5, 0.98)], dtype=np.float32)
 _AROUND = np.array([[r, c] for r in (-1, 0, 1) for c in (-1, 0, 1) if r or c])
+
+
+@dataclass(frozen=True)
+class CrossedTexels:
+    """What `crossing_steps` found of n texels, (n,) bool each.
+
+    Attributes
+    ----------
+    cut : geometry stands on them
+    touched : they end at geometry; not cut
+    rim : a hood's rim is above them
+    hooded : all of them is below a hood; neither cut nor at a rim
+    """
+
+    cut: Array
+    touched: Array
+    rim: Array
+    hooded: Array
 
 
 class Crossings:
@@ -43,16 +72,25 @@ class Crossings:
     ----------
     geometry : TexelGeometry
     caster : RayCaster
-    found : pair of (n,) bool, or None
+    found : CrossedTexels or None
         What `crossing_steps` found; None finds it.
+
+    Attributes
+    ----------
+    crossed, touched : (n,) bool
+        Crossed are texels that geometry cuts and those at the rim of a hood; none is both.
+    alone : (n,) bool
+        Texels whose light is like no neighbour's, though a line of sight may join them: crossed or hooded.
     """
 
     def __init__(
-        self, geometry: TexelGeometry, caster: RayCaster, found: tuple[Array, Array] | None = None
+        self, geometry: TexelGeometry, caster: RayCaster, found: CrossedTexels | None = None
     ) -> None:
         self._geometry, self._caster = geometry, caster
-        self.crossed, self.touched = drain(crossing_steps(geometry, caster)) if found is None else found
-        """(n,) bool each; none is both"""
+        found = drain(crossing_steps(geometry, caster)) if found is None else found
+        self._cut, self._hooded = found.cut, found.hooded
+        self.crossed, self.touched = found.cut | found.rim, found.touched & ~found.rim
+        self.alone = self.crossed | found.hooded
 
     def look_up(self, texel: Array, hits: Hits) -> Array:
         """Replace crossed texels, and touched ones from beyond, by whole neighbours on the hit's side.
@@ -67,7 +105,7 @@ class Crossings:
         Returns
         -------
         texel : (h,) int32
-            NOTHING where no whole neighbour can be seen.
+            NOTHING where no whole neighbour can be seen, and the texel is cut or the hit below a hood.
         """
         result = texel.copy()
         rows = np.flatnonzero((texel != NO_TEXEL) & (self.crossed[texel] | self.touched[texel]))
@@ -75,8 +113,16 @@ class Crossings:
             chunk = rows[first : first + CHUNK]
             position = self._geometry.positions_of(hits.take(chunk))
             apart = self.crossed[texel[chunk]] | ~self._sees_centre(texel[chunk], position)
-            result[chunk[apart]] = self._neighbour(texel[chunk[apart]], position[apart])
+            result[chunk[apart]] = self._elsewhere(texel[chunk[apart]], position[apart])
         return result
+
+    def _elsewhere(self, texel: Array, position: Array) -> Array:
+        """Return (h,) the texels that hits on texels not theirs are looked up in, or NOTHING."""
+        below = _hooded(self._geometry, self._caster, texel, position[:, None])[:, 0]
+        found = self._neighbour(texel, position, below)
+        # In the open the mean over a hood's rim is rather too dark than a leak.
+        own = (found == NOTHING) & self.crossed[texel] & ~self._cut[texel] & ~below
+        return np.where(own, texel, found)
 
     def _sees_centre(self, texel: Array, position: Array) -> Array:
         """Return (h,) whether nothing is between points and the centres of their texels."""
@@ -84,8 +130,11 @@ class Crossings:
         start, end = position + lift, self._geometry.position[texel] + lift
         return _free(self._caster, start[:, None], end[:, None])[:, 0]
 
-    def _neighbour(self, texel: Array, position: Array) -> Array:
-        """Return (h,) the nearest whole neighbour visible from each hit, or NOTHING."""
+    def _neighbour(self, texel: Array, position: Array, below: Array) -> Array:
+        """Return (h,) the nearest whole neighbour visible from each hit, or NOTHING.
+
+        Where a hit is `below` a hood, (h,) bool, the neighbour must be as well, and else must not.
+        """
         geometry = self._geometry
         around = np.full((len(texel), len(_AROUND)), NO_TEXEL, dtype=np.int32)
         for page, numbers in enumerate(geometry.index):
@@ -97,6 +146,7 @@ class Crossings:
             near = numbers[np.clip(row, 0, last), np.clip(column, 0, last)]
             around[mine] = np.where(inside, near, NO_TEXEL)
         whole = (around != NO_TEXEL) & ~self.crossed[around]
+        whole &= self._hooded[around] == below[:, None]
         normal = geometry.surface_normal[texel]
         # The same surface only: a chart's neighbour on the page may lie anywhere.
         along = geometry.position[around] - position[:, None]
@@ -117,14 +167,9 @@ class Crossings:
 
 def crossing_steps(
     geometry: TexelGeometry, caster: RayCaster, threads: int = 0
-) -> Generator[float, None, tuple[Array, Array]]:
-    """Find the texels that geometry cuts, and those that end at it; yields the fraction done.
-
-    Returns
-    -------
-    crossed, touched : (n,) bool
-    """
-    crossed, touched = np.zeros(len(geometry), dtype=bool), np.zeros(len(geometry), dtype=bool)
+) -> Generator[float, None, CrossedTexels]:
+    """Find the texels that geometry cuts, touches or hoods; yields the fraction done."""
+    result = CrossedTexels(*np.zeros((4, len(geometry)), dtype=bool))
 
     def find(part: slice) -> None:
         rows = np.arange(part.start, part.stop)
@@ -140,10 +185,26 @@ def crossing_steps(
         doubtful = ~_segments_free(caster, middle + OUTSET * (square - middle), _DIAGONALS) & ~cut
         some = np.flatnonzero(doubtful)
         cut[some] = ~_segments_free(caster, centre[some] + INSET * from_centre[some], _DIAGONALS)
-        crossed[rows], touched[rows] = cut, doubtful & ~cut
+        result.cut[rows], result.touched[rows] = cut, doubtful & ~cut
+        spots = geometry.sample(rows, np.broadcast_to(_SPOTS, (len(rows), *_SPOTS.shape)), 1.0)
+        below = _hooded(geometry, caster, rows, spots)
+        result.rim[rows] = below.any(axis=1) & ~below.all(axis=1)
+        result.hooded[rows] = below.all(axis=1) & ~cut
 
     yield from chunk_steps(find, len(geometry), CHUNK // 4, threads)
-    return crossed, touched
+    return result
+
+
+def _hooded(geometry: TexelGeometry, caster: RayCaster, texel: Array, spots: Array) -> Array:
+    """Return (n, k) whether something is close above (n, k, 3) spots on texels."""
+    lift, normal = LIFT * caster.surface_offset, geometry.surface_normal[texel]
+    square = geometry.squares(texel)
+    width = np.linalg.norm(square[:, 2] - square[:, 0], axis=1) / np.sqrt(2.0)
+    height = np.maximum(HOOD * width, 2.0 * lift)
+    probes = np.broadcast_to(normal[:, None], spots.shape).reshape(-1, 3)
+    start = (spots + lift * normal[:, None]).reshape(-1, 3)
+    free = caster.visible(start, probes, np.repeat(height - lift, spots.shape[1]))
+    return np.asarray(~free.reshape(spots.shape[:2]))
 
 
 def _segments_free(caster: RayCaster, corners: Array, segments: Array) -> Array:

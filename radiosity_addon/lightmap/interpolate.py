@@ -50,10 +50,10 @@ class GatherPoints:
         Mean inverse distance seen from each point [1/m].
     """
 
-    def __init__(self, geometry: TexelGeometry, caster: RayCaster, crossed: Array, threads: int = 0) -> None:
+    def __init__(self, geometry: TexelGeometry, caster: RayCaster, alone: Array, threads: int = 0) -> None:
         self.threads = threads
         """0 means all cores."""
-        self._geometry, self._caster, self._crossed = geometry, caster, crossed
+        self._geometry, self._caster, self._alone = geometry, caster, alone
         self.texel = np.zeros(0, dtype=np.int32)
         self.closeness = np.zeros(0)
         self._grids: list[PointGrid] = []
@@ -95,9 +95,9 @@ class GatherPoints:
         distance = np.sqrt(np.einsum("pk,pk->p", along, along))
         bend = np.sqrt(np.maximum(1.0 - turn, 0.0))
         weight = np.maximum(1.0 - (distance * self.closeness[point] + bend) / REACH, 0.0) ** 2
-        # A texel that geometry cuts in two speaks for itself alone, and nobody for it.
+        # A texel that geometry cuts in two, or hoods, speaks for itself alone, and nobody for it.
         other = of != texels
-        weight[other & (self._crossed[of] | self._crossed[texels])] = 0.0
+        weight[other & (self._alone[of] | self._alone[texels])] = 0.0
         row = np.flatnonzero((weight > 0) & other)
         # Over a bulge the straight line dips below the surface, by an eighth of the distance
         # times the turn of the normal: start and end that much higher.

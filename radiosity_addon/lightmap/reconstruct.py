@@ -95,7 +95,7 @@ def gather_texels(
     resolve: Resolver,
 ) -> Generator[float, None, StoredLinks]:
     """Gather at few texels, densely where others do not reach; yields the fraction done."""
-    points = GatherPoints(geometry, local.caster, crossings.crossed, local.threads)
+    points = GatherPoints(geometry, local.caster, crossings.alone, local.threads)
     found: list[Gathered] = []
     first: list[int] = []
     width = (1.0 - FIT) / len(settings.strides)
@@ -140,13 +140,13 @@ def _choose(
 
 
 def _resolver(local: LocalPass, geometry: TexelGeometry, crossings: Crossings) -> Resolver:
-    """Number hits: texels by their own number, leaf elements after the texels."""
+    """Number hits: texels by their own number, parts of leaf elements after the texels."""
 
     def resolve(hits: Hits) -> Array:
         texel = crossings.look_up(geometry.texel_at(hits), hits)
         elsewhere = texel == NO_TEXEL
-        leaf = local.leaves_of(hits.take(elsewhere))
-        texel[elsewhere] = np.where(leaf == NOTHING, NOTHING, leaf + len(geometry))
+        part = local.parts_of(hits.take(elsewhere))
+        texel[elsewhere] = np.where(part == NOTHING, NOTHING, part + len(geometry))
         return texel
 
     return resolve

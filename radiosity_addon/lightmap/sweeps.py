@@ -1,14 +1,14 @@
 """Jacobi sweeps over the texels along stored gather hits: no ray is traced.
 
-The unknowns are the texels and those leaf elements that gather rays met where no texel is:
-backs, and surfaces without a lightmap. Those elements gather too, so that what the coarse
-hierarchy smeared across a wall's foot or into a closed box does not come back.
+The unknowns are the texels and those parts of leaf elements that gather rays met where no texel is:
+backs, and surfaces without a lightmap. Those parts gather too, so that what the coarse hierarchy
+smeared across a wall's foot or into a closed box does not come back.
 """
 
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -30,7 +30,7 @@ at once; a dark closet next to a bright room, into which the hierarchy's element
 wall's foot, takes as many sweeps as light would bounce in it."""
 
 LEAF_RAYS = 64
-"""Gather rays of a leaf element."""
+"""Gather rays of a part of a leaf element."""
 
 LEAF_ROUNDS = 3
 """Rounds of asking the leaves that leaves met; beyond, the hierarchy's values stand."""
@@ -66,7 +66,7 @@ class StoredLinks:
     Attributes
     ----------
     sources : (g, rays) int32
-        Texels by number, leaf elements after them, NOTHING and SKY negative.
+        Texels by number, parts of leaf elements after them, NOTHING and SKY negative.
     spread : Interpolation
     aimed : AimedRays
         What some of the points ask apart.
@@ -115,20 +115,21 @@ def sweep_steps(
     """
     texel_count = len(geometry)
     reflectance = scene.reflectance[geometry.triangle]
-    # Rows: texels, leaves, then NOTHING (−2) and SKY (−1). Columns lie one after the other in memory.
-    table = np.zeros((texel_count + len(local.reflected()) + 2, 3), dtype=np.float32, order="F")
+    leaves = _Leaves(local, texel_count)
+    links = yield from scaled(leaves.gather_steps(links, resolve), 0.0, 0.1)
+    # Rows: texels, elements, their cells that were met, then NOTHING (−2) and SKY (−1). Columns lie
+    # one after the other in memory.
+    table = np.zeros((texel_count + len(leaves.element) + 2, 3), dtype=np.float32, order="F")
     sky = local.sky()
     table[-1] = sky
     direct = lamps
     if sky.any():
         # The sky's light is direct: its share of the same rays.
-        from_sky = yield from scaled(links.irradiance_steps(table, local.threads), 0.0, 0.1)
+        from_sky = yield from scaled(links.irradiance_steps(table, local.threads), 0.1, 0.2)
         direct = lamps + np.maximum(from_sky, 0.0)
 
     table[:texel_count] = local.reflected_at(geometry.triangle, geometry.barycentric)
-    table[texel_count:-2] = local.reflected()
-    leaves = _Leaves(local, texel_count)
-    yield from scaled(leaves.gather_steps(links, resolve, len(table)), 0.1, 0.2)
+    table[texel_count:-2] = local.reflected()[leaves.element]
     table[: len(table) - 2][~_reached(links, leaves, direct)] = 0.0
     indirect, left = np.zeros_like(direct), 0.8
     for _ in range(sweeps):
@@ -194,44 +195,71 @@ def _reached(links: StoredLinks, leaves: _Leaves, direct: Array) -> Array:
 
 
 class _Leaves:
-    """The leaf elements that gather rays met, and what they see in turn."""
+    """The parts of leaf elements that gather rays met, and what they see in turn.
+
+    Attributes
+    ----------
+    element : (k,) int
+        The elements that the table's rows after the texels are of: all of them, then one more row for
+        each cell met.
+    """
 
     def __init__(self, local: LocalPass, texel_count: int) -> None:
         self._local, self._texel_count = local, texel_count
         self._rows = np.zeros(0, dtype=np.int64)
-        self._elements = len(local.reflected())
+        self._cells = np.zeros(0, dtype=np.int64)
+        self.element = np.arange(len(local.reflected()))
 
-    def gather_steps(
-        self, links: StoredLinks, resolve: Resolver, table_rows: int
-    ) -> Generator[float, None, None]:
-        """Look from the leaves the links met, and from those that these met; yields the fraction done."""
+    def gather_steps(self, links: StoredLinks, resolve: Resolver) -> Generator[float, None, StoredLinks]:
+        """Look from the parts the links met, and from those that these met; yields the fraction done.
+
+        Returns
+        -------
+        links : StoredLinks
+            Their sources are rows of the table.
+        """
         local, texel_count = self._local, self._texel_count
-        met = np.zeros(table_rows, dtype=bool)
-        known = np.zeros(table_rows, dtype=bool)
+        met = np.zeros(texel_count + len(local.parts) + 2, dtype=bool)
+        known = np.zeros_like(met)
         met[links.sources.ravel()] = True
         met[links.aimed.sources.ravel()] = True
-        seen, rows, parts = [], [], LEAF_ROUNDS + 1
+        seen, parts, stages = [], [np.zeros(0, dtype=np.int64)], LEAF_ROUNDS + 1
         for turn in range(LEAF_ROUNDS):
-            row = np.flatnonzero(met[:-2] & ~known[:-2])
-            row = row[row >= texel_count]
-            if len(row) == 0:
+            part = np.flatnonzero(met[texel_count:-2] & ~known[texel_count:-2])
+            if len(part) == 0:
                 break
-            known[row] = True
-            rays = local.gather_at_leaves(row - texel_count, LEAF_RAYS, resolve)
-            found = yield from scaled(rays, turn / parts, (turn + 1) / parts)
+            known[texel_count + part] = True
+            rays = local.gather_at_parts(part, LEAF_RAYS, resolve)
+            found = yield from scaled(rays, turn / stages, (turn + 1) / stages)
             met[found.ravel()] = True
-            rows.append(row)
+            parts.append(part)
             seen.append(found)
-        if rows:
-            self._rows = np.concatenate(rows)
-            self._sources = np.concatenate(seen)
-            self._reflectance = local.leaf_reflectance(self._rows - texel_count)
-            lamps = local.leaf_direct(self._rows - texel_count)
-            self._lamps = yield from scaled(lamps, LEAF_ROUNDS / parts, 1.0)
+        if not seen:
+            return links
+        elements = len(self.element)
+        self._cells = elements + np.flatnonzero(met[texel_count + elements : -2])
+        self.element = np.append(self.element, local.parts.leaf_of(self._cells))
+        gathered = np.concatenate(parts)
+        self._rows = self._renumbered(texel_count + gathered)
+        self._sources = self._renumbered(np.concatenate(seen))
+        self._reflectance = local.part_reflectance(gathered)
+        self._lamps = yield from scaled(local.part_direct(gathered), LEAF_ROUNDS / stages, 1.0)
+        aimed = replace(links.aimed, sources=self._renumbered(links.aimed.sources))
+        return replace(links, sources=self._renumbered(links.sources), aimed=aimed)
+
+    def _renumbered(self, sources: Array) -> Array:
+        """Give the cells the rows that follow the elements'."""
+        first = len(self.element) - len(self._cells) + self._texel_count
+        cells = sources >= first
+        if not cells.any():
+            return sources
+        result = sources.copy()
+        result[cells] = first + np.searchsorted(self._cells, sources[cells] - self._texel_count)
+        return result
 
     def lit_or_unknown(self, direct: Array) -> Array:
-        """Return (texels + elements,) bool: what direct light (n, 3) meets, and elements that gather none."""
-        lit = np.ones(self._texel_count + self._elements, dtype=bool)
+        """Return (table rows − 2,) bool: what direct light (n, 3) meets, and parts that gather none."""
+        lit = np.ones(self._texel_count + len(self.element), dtype=bool)
         lit[: self._texel_count] = direct.any(axis=1)
         if len(self._rows):
             lit[self._rows] = self._lamps.any(axis=1)

@@ -15,10 +15,14 @@ import numpy as np
 
 from .arrays import Array
 from .geometry_term import ray_geometry_term, throughput
-from .hierarchy import Hierarchy
+from .hierarchy import Hierarchy, split_in_four, split_in_sixteen
 from .radiometry import radiance_of_radiosity
 from .sampling import points_on_triangles
 from .visibility import Hits
+
+EVEN = 0.2
+"""This part of the rays at an element spreads over it evenly: lamps do not tell what other light there
+is, nor shadows."""
 
 CONTRAST = 6.0
 """Elements are bright from this many times the mean reflected radiosity …"""
@@ -96,9 +100,14 @@ class BrightElements:
     hierarchy : Hierarchy
     reflected : (e, 3) float64
         Every element's reflected radiosity [W/m²].
+    lit : callable or None
+        Points and normals (p, 3) → (p,): how strongly lamps light them, about. An element may be
+        larger than the bright spot on it; rays then aim at the spot. None aims evenly.
     """
 
-    def __init__(self, hierarchy: Hierarchy, reflected: Array) -> None:
+    def __init__(
+        self, hierarchy: Hierarchy, reflected: Array, lit: Callable[[Array, Array], Array] | None = None
+    ) -> None:
         leaves = hierarchy.leaves
         level, area = reflected[leaves].mean(axis=1), hierarchy.area[leaves]
         mean = float(level @ area) / max(float(area.sum()), 1e-300)
@@ -113,9 +122,22 @@ class BrightElements:
         self._hosts[hierarchy.faces.triangle[hierarchy.face[self.element]]] = True
         self._number = np.full(hierarchy.n_elements, -1, dtype=np.int32)
         self._number[self.element] = np.arange(len(bright))
+        self._cells = split_in_sixteen(self._corners)
+        self._chance = self._chances(lit)
 
     def __len__(self) -> int:
         return len(self.element)
+
+    def _chances(self, lit: Callable[[Array, Array], Array] | None) -> Array:
+        """Return (m, 16) how likely a ray at an element aims at each of its sixteenths."""
+        chance = np.full((len(self), 16), 1.0 / 16.0)
+        if lit is None or len(self) == 0:
+            return chance
+        places = split_in_four(self._cells.reshape(-1, 3, 3)).mean(axis=2).reshape(-1, 3)
+        level = lit(places, np.repeat(self._normals, 64, axis=0)).reshape(-1, 16, 4).mean(axis=2)
+        total = level.sum(axis=1, keepdims=True)
+        uneven = np.where(total > 0, level / np.where(total > 0, total, 1.0), chance)
+        return np.asarray(EVEN * chance + (1.0 - EVEN) * uneven)
 
     def shares(self, points: Array, normals: Array, rays: int, irradiance: Array) -> Array:
         """Return (n, m) what each element would send to points [W/m²], roughly; 0 is left to chance.
@@ -187,14 +209,23 @@ class BrightElements:
         share = np.take_along_axis(shares, pick, axis=1)
         below = (np.take_along_axis(running, pick, axis=1) - share) / total
         part = np.maximum(share / total, 1e-300)
-        inside = np.stack([np.clip((wanted - below) / part, 0.0, 1.0), u[row, :, 1]], axis=-1)
-        corners = self._corners[pick].reshape(-1, 3, 3)
+        within = np.clip((wanted - below) / part, 0.0, 1.0)
+        # The same once more, for the sixteenths of the element.
+        running = np.cumsum(self._chance, axis=1)
+        flat = (running / running[:, -1:] + np.arange(len(self))[:, None]).ravel()
+        found = np.searchsorted(flat, np.minimum(within, 1.0 - 1e-12) + pick, side="right")
+        cell = np.clip(found - 16 * pick, 0, 15)
+        chance = self._chance[pick, cell]
+        along_cell = np.clip((within - (running[pick, cell] - chance)) / chance, 0.0, 1.0)
+        inside = np.stack([along_cell, u[row, :, 1]], axis=-1)
+        corners = self._cells[pick, cell].reshape(-1, 3, 3)
         targets = points_on_triangles(corners, inside.reshape(-1, 1, 2)).reshape(*pick.shape, 3)
         along = targets - points[row]
         distance = np.linalg.norm(along, axis=2)
         directions = along / np.maximum(distance, 1e-300)[..., None]
         cos_r = np.einsum("nkc,nc->nk", directions, normals[row])
         cos_s = -np.einsum("nkc,nkc->nk", directions, self._normals[pick])
-        thrown = throughput(ray_geometry_term(cos_r, cos_s, distance), 1.0, self._area[pick])
+        area = self._area[pick] / (16.0 * chance)
+        thrown = throughput(ray_geometry_term(cos_r, cos_s, distance), 1.0, area)
         weights = radiance_of_radiosity(thrown) / (part * u.shape[1])
         return Aim(row, directions, self.element[pick], np.where(share > 0, weights, 0.0))

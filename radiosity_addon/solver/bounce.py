@@ -19,6 +19,7 @@ def reflect(
     scale: Array | None = None,
     cluster_links: ClusterLinks | None = None,
     top: TreeTop | None = None,
+    received: Array | None = None,
 ) -> tuple[Array, Array]:
     """Gather over all links from the state's radiosity, then push and pull; the state stays.
 
@@ -34,6 +35,8 @@ def reflect(
         What the faces of clusters receive together.
     top : TreeTop or None
         With all clusters of both sets of links; needed for the second.
+    received : (f,) float64 or None
+        What the light that faces gather is scaled with (`conservation`).
 
     Returns
     -------
@@ -47,6 +50,8 @@ def reflect(
         # A face that looks past the horizon of what its neighbours see gets nothing, not less.
         shared = np.maximum(gather_at_clusters(hierarchy, top, cluster_links, sent), 0.0)
         own[: len(hierarchy.faces)] += shared[:, None]
+    if received is not None:
+        own *= received[hierarchy.face][:, None, None]
     gathered = push(hierarchy, own)
     return push_pull(hierarchy, lights, gathered, state.emission, state.reflectance)
 
@@ -65,12 +70,13 @@ def bounce(
     scale: Array | None = None,
     cluster_links: ClusterLinks | None = None,
     top: TreeTop | None = None,
+    received: Array | None = None,
 ) -> None:
     """Move the state's irradiance and radiosity on by one step (see `reflect`), and count it.
 
     The step's change at the leaves is taken as the residual, that of the radiosity before.
     """
-    irradiance, radiosity = reflect(state, links, lights, scale, cluster_links, top)
+    irradiance, radiosity = reflect(state, links, lights, scale, cluster_links, top, received)
     state.residual = relative_residual(state, radiosity)
     state.irradiance, state.radiosity = irradiance, radiosity
     state.iterations += 1

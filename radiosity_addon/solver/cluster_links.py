@@ -36,9 +36,12 @@ class ClusterLinks:
     visibility, doubt : (l,) float32
         As for `Links`.
     vector : (l, 3) float32
-        v, visibility included: the cluster's mean normal times v is factor · visibility.
+        v, visibility included: h and the cluster's mean normal times v make factor · visibility.
     gradient : (l, 3) float32
         g [1/m], visibility included.
+    even : (l,) float32
+        h, visibility included: what a face receives whichever way it looks; 0 unless the
+        receiver's faces look many ways.
     """
 
     receiver: Array
@@ -48,6 +51,7 @@ class ClusterLinks:
     doubt: Array
     vector: Array
     gradient: Array
+    even: Array
 
     def __len__(self) -> int:
         return len(self.receiver)
@@ -60,7 +64,7 @@ class ClusterLinks:
 def no_cluster_links() -> ClusterLinks:
     """Return an empty set of links."""
     index, number, vector = np.zeros(0, np.int32), np.zeros(0, np.float32), np.zeros((0, 3), np.float32)
-    return ClusterLinks(index, index, number, number, number, vector, vector)
+    return ClusterLinks(index, index, number, number, number, vector, vector, number)
 
 
 def join_cluster_links(parts: list[ClusterLinks]) -> ClusterLinks:
@@ -90,8 +94,8 @@ def gather_at_clusters(hierarchy: Hierarchy, top: TreeTop, links: ClusterLinks, 
     if len(links) == 0:
         return irradiance
     clusters, faces = hierarchy.clusters, hierarchy.faces
-    # n·v + g·x − g·c: linear in (n, x, 1), so seven numbers a cluster and channel.
-    constant = -np.einsum("lk,lk->l", links.gradient, clusters.centre[links.receiver])
+    # n·v + g·x + h − g·c: linear in (n, x, 1), so seven numbers a cluster and channel.
+    constant = links.even - np.einsum("lk,lk->l", links.gradient, clusters.centre[links.receiver])
     weights = [*links.vector.T, *links.gradient.T, constant]
     basis = [*faces.normal.T, *faces.centre.T, np.ones(1)]
     of_cluster = np.flatnonzero(links.source < len(clusters))

@@ -4,6 +4,11 @@ Far pairs are sampled: stratified point pairs give the mean of the kernel withou
 receiver's cosine, as a vector, and of the kernel's derivative. Where the two sides nearly
 touch samples would scatter wildly; there Lambert's formula, summed over the source's faces,
 is asked at points of the receiver, and a plane is fitted to the answers.
+
+Receivers that look many ways are linked only where they exchange hardly anything. What such
+faces receive is no plane of their normal n: over all directions max(n·d, 0) is nearest to
+1/4 + n·d/2 (its first two spherical harmonics: Ramamoorthi and Hanrahan 2001), so half the
+vector is kept, and the rest of the mean goes to all faces evenly.
 """
 
 from __future__ import annotations
@@ -57,12 +62,19 @@ def measure_cluster_links(
         At most n.
     """
     near = shapes.looks_large(receiver, source, NEAR)
-    many = near & (_held(hierarchy, source) > MOST_FACES)
+    wide = shapes.cone[receiver] > WIDE
+    many = near & ((_held(hierarchy, source) > MOST_FACES) | wide)
     result: list[ClusterLinks] = []
-    for kind, chosen in (("far", ~near), ("near", near & ~many), ("many", many)):
+    for kind, chosen in (
+        ("far", ~near & ~wide),
+        ("wide", ~near & wide),
+        ("near", near & ~many),
+        ("many", many & ~wide),
+        ("wide and many", many & wide),
+    ):
         rows = np.flatnonzero(chosen)
         parts: dict[int, ClusterLinks] = {}
-        samples = FAR_SAMPLES if kind == "far" else NEAR_SAMPLES
+        samples = FAR_SAMPLES if kind in ("far", "wide") else NEAR_SAMPLES
 
         def measure(
             piece: slice,
@@ -80,8 +92,12 @@ def measure_cluster_links(
     return join_cluster_links(result)
 
 
+WIDE = 1.0
+"""Faces of which some are turned further than this from their mean [rad] look many ways: on the far side
+of such a cluster n·v is below 0, and would eat up what arrives there from elsewhere."""
+
 LEAST_SQUARE = 0.01
-"""Of a mean normal: faces that look all ways, together only in clutter, have none to go by."""
+"""Of a mean normal: faces that look different ways may have next to none to go by."""
 
 
 class _Pairs:
@@ -109,24 +125,36 @@ class _Pairs:
         self.area = node_area(hierarchy, self.source)[:, None]
 
     def links(self, caster: RayCaster, kind: str) -> ClusterLinks:
-        """Return the links of the pairs that exchange anything; all are "far", "near", or near of "many"."""
+        """Return the links of the pairs that exchange anything.
+
+        All are "far" or "near", or "wide" of a receiver that looks many ways; "many" are near ones
+        whose sources have too many faces to be asked one by one.
+        """
         # A sample stands for its share of the source as a disk: bounded however near (Wallace et al. 1989).
-        own_disk = 0.0 if kind == "far" else self.area / self.faces.shape[1]
-        scale = np.where(self.faces, self.area / (self.square * (np.pi * self.square + own_disk)), 0.0)
+        own_disk = 0.0 if kind in ("far", "wide") else self.area / self.faces.shape[1]
+        bounded = self.area / (self.square * (np.pi * self.square + own_disk))
+        scale = np.where(self.faces, bounded, 0.0)
         transfer = scale * self.rise_x * self.rise_y
+        mean = transfer.mean(axis=1)
         mean_normal = self.hierarchy.clusters.normal[self.receiver]
+        even = np.zeros(len(mean))
         if kind == "near":
             vector, gradient = self._exact()
+        elif "wide" in kind:
+            toward = bounded * np.maximum(self.rise_y, 0.0)
+            vector = 0.5 * np.einsum("ns,nsk->nk", toward, self.along) / toward.shape[1]
+            gradient = np.zeros_like(vector)
+            even = mean - np.einsum("nk,nk->n", mean_normal, vector)
         else:
             vector, gradient = self._sampled(scale, transfer)
             if kind == "many":
                 # Samples that nearly touch have no derivative to speak of.
                 gradient = np.zeros_like(gradient)
             # Where place and normal go together, n·v at their means is not the mean of the transfer.
-            lacking = transfer.mean(axis=1) - np.einsum("nk,nk->n", mean_normal, vector)
+            lacking = mean - np.einsum("nk,nk->n", mean_normal, vector)
             squared = np.maximum(np.einsum("nk,nk->n", mean_normal, mean_normal), LEAST_SQUARE)
             vector += mean_normal * (lacking / squared)[:, None]
-        factor = np.maximum(np.einsum("nk,nk->n", mean_normal, vector), 0.0)
+        factor = np.maximum(even + np.einsum("nk,nk->n", mean_normal, vector), 0.0)
         traced, free = self._trace(caster, transfer)
         weight = np.where(traced, transfer, 0.0)
         total = weight.sum(axis=1)
@@ -139,6 +167,7 @@ class _Pairs:
             _doubt(transfer, traced, free, factor).astype(np.float32),
             (vector * visibility[:, None]).astype(np.float32),
             (gradient * visibility[:, None]).astype(np.float32),
+            (even * visibility).astype(np.float32),
         )
         return links.take(factor > 0)
 

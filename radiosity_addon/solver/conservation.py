@@ -19,24 +19,31 @@ from __future__ import annotations
 import numpy as np
 
 from .arrays import Array
-from .cluster_links import ClusterLinks
+from .cluster_links import ClusterLinks, gather_at_clusters
 from .hierarchy import LEAF, Hierarchy
 from .links import Links
 from .node_samples import node_samples
 from .parallel import for_chunks
 from .sampling import cosine_hemisphere, stratified_square, to_world
-from .transport import push
+from .transport import gather, node_radiosity, pull, push
 from .tree_top import TreeTop
 from .visibility import RayCaster
 
 RAYS = 32
 """Hemisphere rays of a leaf; in a closed scene they all agree, and there is no noise at all."""
 
+ROUNDS = 2
+"""How often both balances are struck in turn."""
+
 CHUNK = 1 << 13
 """Leaves measured at once: their rays take about 30 MB a thread."""
 
 LIMIT = 2.0
 """Largest factor: a leaf with hardly any links is not blown up."""
+
+LIMIT_RECEIVED = 1.5
+"""Largest factor on what a face receives, and the inverse of the least: more is no error of a curve, and
+must not be hidden."""
 
 
 class Conservation:
@@ -46,14 +53,61 @@ class Conservation:
         self._caster, self._min_area, self._seed, self._threads = caster, min_area, seed, threads
         self._arriving = np.zeros(0)
 
-    def factors(self, hierarchy: Hierarchy, top: TreeTop, links: Links, cluster_links: ClusterLinks) -> Array:
-        """Return (e, 2): what to scale leaves' radiosity with, over own links and over shared ones."""
+    def balance(
+        self, hierarchy: Hierarchy, top: TreeTop, links: Links, cluster_links: ClusterLinks
+    ) -> tuple[Array, Array]:
+        """Return (e, 2) what leaves' radiosity, and (f,) what faces' gathered light is scaled with.
+
+        The first as from `factors`, given the second, which is 1 where anything may escape,
+        where faces are split, and everywhere without links to clusters: a few large faces
+        are linked finely enough.
+        """
+        scale = self.factors(hierarchy, top, links, cluster_links)
+        received = np.ones(len(hierarchy.faces))
+        if len(cluster_links) == 0:
+            return scale, received
+        # Leaves of a split face share light unevenly, rightly: no one number mends them.
+        whole = hierarchy.first_child[: len(hierarchy.faces)] == LEAF
+        closed = self.closed(hierarchy) & whole
+        for _ in range(ROUNDS):
+            sums = received_by_faces(hierarchy, top, links, cluster_links, scale)
+            wanted = np.clip(1.0 / np.maximum(sums, 1e-300), 1.0 / LIMIT_RECEIVED, LIMIT_RECEIVED)
+            received = np.where(closed & (sums > 0), wanted, 1.0)
+            scale = self.factors(hierarchy, top, links, cluster_links, received)
+        return scale, received
+
+    def closed(self, hierarchy: Hierarchy) -> Array:
+        """Return (f,) whether no ray of a face left the scene; after `factors`."""
+        face = hierarchy.face[hierarchy.leaves]
+        arrived = self._arriving[hierarchy.leaves] == 1.0
+        return np.asarray(np.bincount(face, ~arrived, len(hierarchy.faces)) == 0)
+
+    def factors(
+        self,
+        hierarchy: Hierarchy,
+        top: TreeTop,
+        links: Links,
+        cluster_links: ClusterLinks,
+        received: Array | None = None,
+    ) -> Array:
+        """Return (e, 2): what to scale leaves' radiosity with, over own links and over shared ones.
+
+        Parameters
+        ----------
+        received : (f,) float64 or None
+            What the faces' gathered light is scaled with.
+        """
         self._measure(hierarchy)
         leaves = hierarchy.leaves
-        sums = sent(hierarchy, links)
+        at_links = hierarchy.area[links.receiver] * links.factor * links.visibility
+        if received is not None:
+            at_links *= received[hierarchy.face[links.receiver]]
+        sums = sent(hierarchy, links, at_links)
         own = sums[leaves].mean(axis=1)[:, 0]
-        sums = sums + sent_to_clusters(hierarchy, cluster_links)
-        shared = push(hierarchy, sums + _from_clusters(hierarchy, top, links, cluster_links))[leaves, 0] - own
+        at_clusters = Arriving(hierarchy, top, cluster_links, received)
+        sums = sums + sent_to_clusters(hierarchy, cluster_links, at_clusters)
+        from_clusters = _from_clusters(hierarchy, top, links, at_links, cluster_links, at_clusters)
+        shared = push(hierarchy, sums + from_clusters)[leaves, 0] - own
         arriving = self._arriving[leaves]
         left = np.maximum(arriving - own, 0.0)
         result = np.ones((hierarchy.n_elements, 2))
@@ -96,7 +150,58 @@ class Conservation:
         return share
 
 
-def _from_clusters(hierarchy: Hierarchy, top: TreeTop, links: Links, cluster_links: ClusterLinks) -> Array:
+class Arriving:
+    """What the receivers of links to clusters take, per unit of the source's radiosity.
+
+    Parameters
+    ----------
+    received : (f,) float64 or None
+        What their faces' light is scaled with.
+
+    Attributes
+    ----------
+    power : (l,) float64
+        Σ A_f a_f (n_f·v + g·(x_f − c) + h) over the receiver's faces [m²].
+    area : (l,) float64
+        Σ A_f a_f [m²]
+    """
+
+    def __init__(
+        self, hierarchy: Hierarchy, top: TreeTop, links: ClusterLinks, received: Array | None
+    ) -> None:
+        clusters, faces = hierarchy.clusters, hierarchy.faces
+        if received is None:
+            self.area = clusters.area[links.receiver]
+            self.power = self.area * links.factor * links.visibility
+            return
+        weight = (received * faces.area)[:, None]
+        sums = top.sums(np.concatenate([weight, weight * faces.normal, weight * faces.centre], axis=1))
+        at = sums[top.row[links.receiver]]
+        self.area = at[:, 0]
+        offset = at[:, 4:] - at[:, :1] * clusters.centre[links.receiver]
+        self.power = at[:, 0] * links.even + np.einsum("lk,lk->l", at[:, 1:4], links.vector)
+        self.power += np.einsum("lk,lk->l", offset, links.gradient)
+
+
+def received_by_faces(
+    hierarchy: Hierarchy, top: TreeTop, links: Links, cluster_links: ClusterLinks, scale: Array
+) -> Array:
+    """Return (f,) ΣFV over each face's, its elements' and its clusters' links, sources scaled by `scale`."""
+    ones = np.ones((hierarchy.n_elements, 1))
+    own = pull(hierarchy, push(hierarchy, gather(hierarchy, links, ones, scale, top)))
+    means = node_radiosity(hierarchy, pull(hierarchy, scale[:, 1:] * ones), top)
+    shared = np.maximum(gather_at_clusters(hierarchy, top, cluster_links, means)[:, 0], 0.0)
+    return np.asarray(own[: len(hierarchy.faces), 0] + shared)
+
+
+def _from_clusters(
+    hierarchy: Hierarchy,
+    top: TreeTop,
+    links: Links,
+    at_links: Array,
+    cluster_links: ClusterLinks,
+    arriving: Arriving,
+) -> Array:
     """Return (e, 4, 1) the share that the links of the clusters above each face carry."""
     clusters, faces, count = hierarchy.clusters, hierarchy.faces, hierarchy.n_clusters
     total = np.zeros((hierarchy.n_elements, 4, 1))
@@ -104,16 +209,16 @@ def _from_clusters(hierarchy: Hierarchy, top: TreeTop, links: Links, cluster_lin
         return total
     # Linear in the face's place: (1, y) times four numbers a cluster, as `gather_at_clusters` sends.
     share = np.zeros((top.n_rows, 4))
-    for some, area in ((links, hierarchy.area), (cluster_links, clusters.area)):
-        grouped = np.flatnonzero(some.source < count)
-        source = some.source[grouped]
-        size = area[some.receiver[grouped]] / clusters.area[source]
-        share[:, 0] += top.spread(source, size * (some.factor * some.visibility)[grouped])
-        if isinstance(some, ClusterLinks):
-            slope = size[:, None] * some.gradient[grouped]
-            share[:, 0] += top.spread(source, np.einsum("lk,lk->l", slope, clusters.centre[source]))
-            for axis in range(3):
-                share[:, 1 + axis] -= top.spread(source, slope[:, axis])
+    grouped = np.flatnonzero(links.source < count)
+    source = links.source[grouped]
+    share[:, 0] += top.spread(source, at_links[grouped] / clusters.area[source])
+    grouped = np.flatnonzero(cluster_links.source < count)
+    source = cluster_links.source[grouped]
+    slope = (arriving.area[grouped] / clusters.area[source])[:, None] * cluster_links.gradient[grouped]
+    evenly = arriving.power[grouped] / clusters.area[source]
+    share[:, 0] += top.spread(source, evenly + np.einsum("lk,lk->l", slope, clusters.centre[source]))
+    for axis in range(3):
+        share[:, 1 + axis] -= top.spread(source, slope[:, axis])
     carried = np.zeros(len(faces))
     for term, pushed in zip((np.ones(1), *faces.centre.T), top.push(share).T, strict=True):
         carried += term * pushed[top.tip]
@@ -121,23 +226,25 @@ def _from_clusters(hierarchy: Hierarchy, top: TreeTop, links: Links, cluster_lin
     return total
 
 
-def sent_to_clusters(hierarchy: Hierarchy, links: ClusterLinks) -> Array:
+def sent_to_clusters(hierarchy: Hierarchy, links: ClusterLinks, arriving: Arriving) -> Array:
     """Return (e, 1, 1): the share of the light of each element that its own links to clusters carry."""
     single = links.source >= hierarchy.n_clusters
     element = links.source[single] - hierarchy.n_clusters
-    power = (hierarchy.clusters.area[links.receiver] * links.factor * links.visibility)[single]
+    power = arriving.power[single]
     return np.bincount(element, power / hierarchy.area[element], hierarchy.n_elements)[:, None, None]
 
 
-def sent(hierarchy: Hierarchy, links: Links) -> Array:
+def sent(hierarchy: Hierarchy, links: Links, at_links: Array | None = None) -> Array:
     """Return (e, 4, 1): the share of the light of each element's quarters that its own links carry.
 
-    The transpose of `gather`, with reciprocity (handout (3.30)): Σ_r A_r F_rs V_rs / A_s.
+    The transpose of `gather`, with reciprocity (handout (3.30)): Σ_r A_r F_rs V_rs / A_s;
+    `at_links` (l,) are other A_r F_rs V_rs [m²], scaled.
     """
+    if at_links is None:
+        at_links = hierarchy.area[links.receiver] * links.factor * links.visibility
     single = links.source >= hierarchy.n_clusters
     element = links.source[single] - hierarchy.n_clusters
-    power = (hierarchy.area[links.receiver] * links.factor * links.visibility)[single]
-    per_element = power / hierarchy.area[element]
+    per_element = at_links[single] / hierarchy.area[element]
     inner = hierarchy.first_child[element] != LEAF
     total = np.zeros((hierarchy.n_elements, 4, 1))
     for quarter in range(4):

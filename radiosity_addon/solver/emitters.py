@@ -38,15 +38,15 @@ class EmitterGroup:
     @staticmethod
     def of_faces(faces: Faces, caster: RayCaster) -> list[EmitterGroup]:
         """Group the emissive faces by colour, which visibility then cannot mix up."""
+        # Their starts are lifted by one offset, which must not put their ends back on the face.
+        offset = 2.0 * caster.surface_offset
         rows = np.flatnonzero(faces.emission.max(axis=1, initial=0.0) > 0)
         if len(rows) == 0:
             return []
         colours, group = np.unique(faces.emission[rows], axis=0, return_inverse=True)
         group = group.reshape(-1)
         return [
-            EmitterGroup(
-                faces.corners[rows[group == g]], faces.normal[rows[group == g]], colour, caster.surface_offset
-            )
+            EmitterGroup(faces.corners[rows[group == g]], faces.normal[rows[group == g]], colour, offset)
             for g, colour in enumerate(colours)
         ]
 
@@ -60,7 +60,11 @@ class EmitterGroup:
         return gain
 
     def shadow_rays(self, points: Array, normals: Array, u: Array) -> tuple[Array, Array, Array]:
-        """Aim (n, k) rays at the faces in proportion to their factors; equal weights.
+        """Aim (n, k) rays at the faces in proportion to their factors.
+
+        The weights tell apart the rays to one face only; every face weighs as much as it has rays.
+        Else, so near a large face that no ray finds the spot most light comes from, the few rays to a
+        far and perhaps hidden face would decide.
 
         Returns
         -------
@@ -87,7 +91,7 @@ class EmitterGroup:
         cos_s = -np.einsum("nkc,nkc->nk", directions, self._normals[face])
         thrown = throughput(ray_geometry_term(cos_r, cos_s, distances), 1.0, self._areas[face])
         weights = np.where(total > 0, radiance_of_radiosity(thrown) / width, 0.0)
-        return directions, distances, weights
+        return directions, distances, _balanced(weights, face, len(self._corners))
 
     def _factors(self, points: Array, normals: Array) -> Array:
         """Return (n, m) form factors from points to faces."""
@@ -98,3 +102,12 @@ class EmitterGroup:
             np.broadcast_to(normals[:, None], shape).reshape(-1, 3),
             np.broadcast_to(self._corners[None], (count, faces, 3, 3)).reshape(-1, 3, 3),
         ).reshape(count, faces)
+
+
+def _balanced(weights: Array, face: Array, faces: int) -> Array:
+    """Scale (n, k) weights so that in every row the rays to one face have 1 on average."""
+    keys = (np.arange(len(face))[:, None] * faces + face).ravel()
+    _, number = np.unique(keys, return_inverse=True)
+    number = number.reshape(-1)
+    mean = np.bincount(number, weights.ravel()) / np.bincount(number)
+    return np.asarray(weights / np.maximum(mean[number].reshape(weights.shape), 1e-300))

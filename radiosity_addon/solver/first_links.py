@@ -31,7 +31,7 @@ FACE_SIZE = 0.4
 """… or this part where a single face receives: its links do not know where in the source the light is."""
 
 CONE = 0.35
-"""Faces receive together while none is turned further than this from their mean [rad]."""
+"""Faces receive together while none is turned further than this from their mean [rad], or faintly."""
 
 BUDGET = 0.4
 """First links may take this part of `SolverSettings.max_links`; refinement needs the rest …"""
@@ -39,15 +39,20 @@ BUDGET = 0.4
 FEWEST = 200_000
 """… but so many in any case: loosened further they would mean nothing."""
 
+WANTED = 6000.0
+"""Over the square root of BF_ε: more first links than that are not wanted, as refinement adds those that
+carry light, …"""
+
+COARSEST_FAINT = 8.0
+"""… unless pairs that exchange more than this times BF_ε, as a share of all area, went into one link: then
+only the budget has it. A link's doubt is about an eighth of its factor, and more where it is refined."""
+
 FAINT = 1e-7
 """Where there are more, pairs that exchange less than this share of all area are linked however large
-they look; where that does not do, …"""
+they look and whichever way their faces do; where that does not do, …"""
 
-FAINTER, WIDER = 2.0, 1.25
-"""… than so many times more, again and again; and from `LEAST_FAINT` on the cone widens as well."""
-
-LEAST_FAINT = 1e-4
-"""As in a clutter of more small curved things than there may be links."""
+FAINTER = 2.0
+"""… than so many times more, again and again."""
 
 THINNED = 1 << 14
 """How many first links there will be is estimated by following so many pairs at a time."""
@@ -80,9 +85,14 @@ def first_links(
         look, to keep within the budget; 0 if none.
     """
     most = max(int(BUDGET * max_links), FEWEST)
+    wanted = WANTED / max(settings.error, 1e-9) ** 0.5
     limits, pairs = _Limits(float(hierarchy.faces.area.sum()), settings.min_area), None
     while True:
-        while _estimate(hierarchy, shapes, limits) > most:
+        while True:
+            count = _estimate(hierarchy, shapes, limits)
+            may_be_coarser = FAINTER * limits.faint <= COARSEST_FAINT * settings.error
+            if count <= min(wanted, most) or (count <= most and not may_be_coarser):
+                break
             limits = limits.looser()
         pairs = _first_pairs(hierarchy, shapes, limits, int(SLACK * most))
         if pairs is not None:
@@ -106,13 +116,9 @@ class _Limits:
     area: float
     tiny: float
     faint: float = 0.0
-    cone: float = CONE
 
     def looser(self) -> _Limits:
-        if self.faint == 0.0:
-            return replace(self, faint=FAINT)
-        wider = WIDER if self.faint >= LEAST_FAINT else 1.0
-        return replace(self, faint=FAINTER * self.faint, cone=wider * self.cone)
+        return replace(self, faint=FAINTER * self.faint if self.faint > 0.0 else FAINT)
 
 
 def _first_pairs(
@@ -169,12 +175,12 @@ def _judge(
     may = shapes.may_see(receiver, source)
     receiver, source = receiver[may], source[may]
     coarse = _looks_small(shapes, receiver, source, limits)
-    wide = shapes.cone[receiver] > limits.cone
+    wide = shapes.cone[receiver] > CONE
     ready = coarse & ~wide
+    if limits.faint > 0.0:
+        ready |= shapes.exchange_bound(receiver, source) <= limits.faint * limits.area
     # Where only its many directions keep the receiver from being linked, opening the source is no use.
-    opened = _open_larger(
-        hierarchy, shapes, receiver[~ready], source[~ready], limits.cone, (coarse & wide)[~ready]
-    )
+    opened = _open_larger(hierarchy, shapes, receiver[~ready], source[~ready], (coarse & wide)[~ready])
     return (receiver[ready], source[ready]), opened
 
 
@@ -188,8 +194,6 @@ def _looks_small(shapes: NodeShapes, receiver: Array, source: Array, limits: _Li
     # A face beside a cluster is told apart from it: samples would scatter there.
     tiny = limits.tiny * limits.area
     small = (shapes.area[receiver] <= tiny) & (shapes.area[source] <= tiny) & ~to_face & ~of_mixed
-    if limits.faint > 0.0:
-        far |= shapes.exchange_bound(receiver, source) <= limits.faint * limits.area
     return np.asarray(far | small | (to_face & of_face))
 
 
@@ -198,13 +202,12 @@ def _open_larger(
     shapes: NodeShapes,
     receiver: Array,
     source: Array,
-    cone: float,
     only_receiver: Array,
 ) -> tuple[Array, Array]:
     """Replace pairs by pairs with the two children of their larger cluster."""
     count, children = hierarchy.n_clusters, hierarchy.clusters.children
     # What looks many ways is opened rather: it may not receive.
-    weight = np.where(shapes.cone[receiver] > cone, 2.0, 1.0)
+    weight = np.where(shapes.cone[receiver] > CONE, 2.0, 1.0)
     larger = weight * shapes.radius[receiver] >= shapes.radius[source]
     opened = (receiver < count) & ((source >= count) | larger | only_receiver)
     return (

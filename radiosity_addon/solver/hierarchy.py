@@ -114,6 +114,10 @@ class Hierarchy:
         """(e, 3) float64: the unit normal of every element."""
         return np.asarray(self.faces.normal[self.face])
 
+    def normal_of(self, elements: Array) -> Array:
+        """Return (n, 3) float64: the unit normals of some elements."""
+        return np.asarray(self.faces.normal[self.face[elements]])
+
     def subdivide(self, elements: Array) -> None:
         """Give four children to each of the distinct leaf `elements` (handout §4.2, Subdiv)."""
         if len(elements) == 0:
@@ -169,3 +173,8 @@ def split_in_four(corners: Array) -> Array:
     ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
     children = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (bc, ca, ab)]
     return np.stack([np.stack(child, axis=1) for child in children], axis=1)
+
+
+def split_in_sixteen(corners: Array) -> Array:
+    """Return (n, 16, 3, 3) the grandchildren of (n, 3, 3) triangles."""
+    return split_in_four(split_in_four(corners).reshape(-1, 3, 3)).reshape(-1, 16, 3, 3)

@@ -85,6 +85,7 @@ def link_lights(
     min_area: float,
     seed: int,
     threads: int = 0,
+    most_elements: int = 1 << 30,
 ) -> LightLinks:
     """Link every light to the elements it reaches, splitting where its light varies.
 
@@ -94,6 +95,8 @@ def link_lights(
         BF_ε [W]: an element is split while (spread of irradiance) × area exceeds it.
     min_area : float
         A_ε [m²]: no element becomes smaller.
+    most_elements : int
+        How many the hierarchy may grow to; the largest and most doubtful are split first.
     """
     receivers, numbers, gains = [], [], []
     coarse_area = float(hierarchy.faces.area.sum()) / COARSEST
@@ -107,12 +110,15 @@ def link_lights(
             may_split = (hierarchy.first_child[waiting] != LEAF) | (area >= 4 * min_area)
             # Where few samples may miss the light altogether, they are not asked.
             blind = may_split & ((area > coarse_area) | too_near(light, hierarchy, waiting))
+            blind = _affordable(hierarchy, waiting, blind, area, most_elements)
             gain, doubt = np.zeros((len(waiting), 4)), np.zeros(len(waiting))
             seeing = np.flatnonzero(~blind)
             gain[seeing], doubt[seeing] = measure_light(
                 hierarchy, light, caster, waiting[seeing], seed + 101 * number, threads
             )
-            split = blind | (may_split & (doubt * area * strength > misplaced_power))
+            misplaced = np.where(blind, np.inf, doubt * area * strength)
+            split = may_split & (misplaced > misplaced_power)
+            split = _affordable(hierarchy, waiting, split, misplaced, most_elements)
             kept = ~split & (gain.max(axis=1) > 0)
             receivers.append(waiting[kept])
             gains.append(gain[kept])
@@ -126,6 +132,17 @@ def link_lights(
         np.concatenate(numbers or empty).astype(np.int32),
         np.concatenate(gains or [np.zeros((0, 4))]).astype(np.float32),
     )
+
+
+def _affordable(hierarchy: Hierarchy, elements: Array, wanted: Array, weight: Array, most: int) -> Array:
+    """Return which of the elements `wanted` may be split with no more than `most` in all: the weightiest."""
+    new = np.flatnonzero(wanted & (hierarchy.first_child[elements] == LEAF))
+    room = max((most - hierarchy.n_elements) // 4, 0)
+    if len(new) <= room:
+        return wanted
+    kept = wanted.copy()
+    kept[new[np.argsort(-weight[new], kind="stable")[room:]]] = False
+    return kept
 
 
 def too_near(light: Light, hierarchy: Hierarchy, elements: Array) -> Array:

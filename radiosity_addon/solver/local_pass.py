@@ -18,9 +18,9 @@ from .aiming import BrightElements
 from .arrays import Array
 from .emitters import EmitterGroup
 from .gathering import NOTHING, SKY, Gathered, Gathering, Resolver
+from .leaf_parts import LeafParts
 from .lights import EnvironmentLight, Lamp
 from .radiometry import radiosity_of_radiance
-from .sampling import points_on_triangles
 from .shadow_share import Footprints, Sampler, ShadowShare
 from .steps import drain, scaled
 from .visibility import Hits
@@ -143,7 +143,15 @@ class LocalPass:
 
     @cached_property
     def _bright(self) -> BrightElements:
-        return BrightElements(self._state.hierarchy, self.reflected())
+        return BrightElements(self._state.hierarchy, self.reflected(), self._unshadowed)
+
+    def _unshadowed(self, points: Array, normals: Array) -> Array:
+        """Return (n,) the irradiance straight from lamps were nothing in the way, a mean of the channels."""
+        total = np.zeros(len(points))
+        for light in self._state.scene.lights:
+            if isinstance(light, Lamp):
+                total += light.unit_irradiance(points, normals) * light.strength.mean()
+        return total
 
     def leaves_of(self, hits: Hits) -> Array:
         """Return (n,) int32: the leaf element under each hit; SKY for none or a black back."""
@@ -176,28 +184,29 @@ class LocalPass:
         found[on_face] = values[hierarchy.leaf_at(face[on_face], barycentric[on_face])]
         return found
 
-    def gather_at_leaves(self, leaves: Array, rays: int, resolve: Resolver) -> Generator[float, None, Array]:
-        """Gather over whole leaf elements instead of points, (l, rays) sources; yields the fraction done."""
-        at = self._whole_leaves(leaves)
+    @cached_property
+    def parts(self) -> LeafParts:
+        """The parts of leaf elements that rays may hit."""
+        return LeafParts(self._state.hierarchy, self.caster)
+
+    def parts_of(self, hits: Hits) -> Array:
+        """Return (n,) int32: the part of a leaf element under each hit; NOTHING for none or a black back."""
+        return self.parts.at(self.leaves_of(hits), hits)
+
+    def gather_at_parts(self, parts: Array, rays: int, resolve: Resolver) -> Generator[float, None, Array]:
+        """Gather over whole parts instead of points, (p, rays) sources; yields the fraction done."""
+        at = self.parts.footprints(parts)
         gathered = yield from self.gather_steps(at, at.normals, rays, resolve)
         return gathered.sources
 
-    def _whole_leaves(self, leaves: Array) -> Footprints:
-        """Return leaf elements as footprints."""
-        corners = self._state.hierarchy.corners[leaves]
-        normals = self._state.hierarchy.normal[leaves]
-        return Footprints(
-            corners.mean(axis=1), normals, leaves, lambda rows, u: points_on_triangles(corners[rows], u)
-        )
-
-    def leaf_reflectance(self, leaves: Array) -> Array:
-        """Return (l, 3) the reflectance of leaf elements."""
+    def part_reflectance(self, parts: Array) -> Array:
+        """Return (p, 3) the reflectance of parts of leaf elements."""
         hierarchy = self._state.hierarchy
-        return np.asarray(hierarchy.faces.reflectance[hierarchy.face[leaves]])
+        return np.asarray(hierarchy.faces.reflectance[hierarchy.face[self.parts.leaf_of(parts)]])
 
-    def leaf_direct(self, leaves: Array) -> Generator[float, None, Array]:
-        """Compute (l, 3) the irradiance of leaf elements straight from lamps and emissive faces."""
-        return self.direct_steps(self._whole_leaves(leaves), rays=16)
+    def part_direct(self, parts: Array) -> Generator[float, None, Array]:
+        """Compute (p, 3) the irradiance of parts straight from lamps and emissive faces."""
+        return self.direct_steps(self.parts.footprints(parts), rays=16)
 
     def sky(self) -> Array:
         """Return (3,) the radiosity equivalent πL of the sky [W/m²]."""

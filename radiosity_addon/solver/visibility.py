@@ -80,6 +80,13 @@ def surface_offset(triangles: Array) -> float:
     return max(OFFSET_STEPS * float(np.finfo(np.float32).eps) * extent, 1e-12)
 
 
+def sees(caster: RayCaster, start: Array, end: Array) -> Array:
+    """Return (n,) whether nothing lies between (n, 3) points."""
+    along = end - start
+    length = np.linalg.norm(along, axis=1)
+    return caster.visible(start, along / np.maximum(length, 1e-300)[:, None], length)
+
+
 class BruteForceCaster:
     """Tests every ray against every triangle (Möller and Trumbore 1997): slow, obvious, the reference."""
 

@@ -7,6 +7,7 @@ a wall, and where no chain of rays leads to a lamp the hierarchy's solution is n
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from radiosity_addon.bake_scene import BakedObject, BakeResult, BakeScene, Light
 from radiosity_addon.pipeline import bake
 from radiosity_addon.settings import BakeSettings
 from radiosity_addon.solver import EnvironmentLight, PointLight, Scene
-from tests.rooms import CEILING, box_room, grey, solid_box
+from tests.rooms import CEILING, box_room, grey, rectangle, solid_box
 from tests.unit.texel_scenes import bake_scene
 
 ON_FLOOR = (1.03, 0.97, 0.0), (1.97, 2.11, 1.0)
@@ -126,3 +127,50 @@ def test_no_texel_in_a_sealed_box_is_lit(
 @pytest.mark.parametrize(("thickness", "light"), [(0.0, "sky"), (0.01, "lamp")])
 def test_nor_at_medium_quality(thickness: float, light: str) -> None:
     assert_sealed(sealed_box(*ON_FLOOR, thickness, light), "medium")
+
+
+@pytest.mark.parametrize(("thickness", "light"), [(0.0, "lamp"), (0.01, "emissive"), (0.01, "sky")])
+def test_nor_on_a_floor_without_a_lightmap(thickness: float, light: str) -> None:
+    """Elements of the floor run on under the walls, and rays that hit it find no texels."""
+    assert_sealed(sealed_box(*ON_FLOOR, thickness, light, floor_baked=False), "draft")
+
+
+def test_a_wall_across_surfaces_without_lightmaps_makes_two_rooms() -> None:
+    """The lit one is like a room that ends at the wall, the other black; only ceilings are baked."""
+    split = 0.83
+    rooms, surface = box_room((2, 1, 1))
+    wall = rectangle((split, 0, 0), (0, 1, 0), (0, 0, 1))
+    around = np.concatenate([rooms[surface != CEILING], wall])
+    alone, surface = box_room((split, 1, 1))
+    divided = _ceilings((0.0, split, 2.0), around)
+    single = _ceilings((0.0, split), alone[surface != CEILING])
+    assert not divided[1].pixels.any()
+    lit, expected = (page.pixels[page.coverage].mean(axis=0) for page in (divided[0], single[0]))
+    np.testing.assert_allclose(lit, expected, rtol=0.01)
+
+
+def test_a_box_that_reaches_through_the_floor_is_dark_above_it() -> None:
+    """It is open below, where the sky shines in: the backs of its walls run on from there into the dark."""
+    room, surface = box_room((3, 3, 3))
+    room = room[surface != CEILING]
+    (left, front, _), (right, back, _) = ON_FLOOR
+    box = solid_box((left, front, -0.4), (right, back, 0.6))[2:]
+    triangles = np.concatenate([room, box])
+    count = len(triangles)
+    sky = [EnvironmentLight(1.0)]
+    scene = Scene(triangles, grey(count, 0.8), grey(count, 0.0), two_sided=True, lights=sky)
+    whole = bake_scene(scene, ("Room", len(room)), ("Box", len(box)))
+    result = run(whole, "draft")
+    assert result.pages[0].pixels.max() > 0.5
+    assert_dark_floor(whole, result, 0)
+
+
+def _ceilings(ends: Sequence[float], around: np.ndarray) -> tuple[LightmapPage, ...]:
+    """Bake ceilings 1 m wide and high, from each x to the next; a lamp hangs at x = 0.3."""
+    above = [rectangle((x, 0, 1), (0, 1, 0), (end - x, 0, 0)) for x, end in pairwise(ends)]
+    triangles = np.concatenate([around, *above])
+    lamp = PointLight((0.3, 0.6, 0.4), 10.0, radius=0.05)
+    count = len(triangles)
+    scene = Scene(triangles, grey(count, 0.7), grey(count, 0.0), lights=[lamp], two_sided=True)
+    parts = [("Around", len(around), None, False), *((f"Ceiling {x}", 2) for x in ends[:-1])]
+    return run(bake_scene(scene, *parts), "draft").pages

@@ -59,3 +59,17 @@ def test_nothing_comes_back_to_a_lone_floor() -> None:
     np.testing.assert_array_equal(
         baked("irradiance", "all", position), baked("irradiance", "direct", position)
     )
+
+
+def test_close_to_a_lamp_a_texel_is_still_the_mean_over_its_footprint() -> None:
+    """The lamp is nearer than a texel is wide: from point to point of a texel its light varies manifold."""
+    position = (0.304, -0.203, 0.01)
+    within = ((np.arange(32) + 0.5) / 32 - 0.5) / 2  # of the middle half of a texel (decision 0010)
+    points = ((np.arange(RESOLUTION)[:, None] + 0.5 + within) / RESOLUTION * 2 - 1) * HALF
+    y, x = points[:, None, :, None], points[None, :, None, :]
+    square = (x - position[0]) ** 2 + (y - position[1]) ** 2 + position[2] ** 2
+    expected = POWER[0] / (4 * np.pi) * (position[2] / square**1.5).mean(axis=(2, 3))
+    found = baked("irradiance", "direct", position)[..., 0]
+    near = expected > 0.002 * expected.max()
+    assert 50 < near.sum() < 1000
+    np.testing.assert_allclose(found[near], expected[near], rtol=0.02)

@@ -51,7 +51,7 @@ def test_the_mean_of_what_faces_receive_is_the_factor(made) -> None:
     hierarchy, _, _, links = made
     assert len(links) > 1000
     mean_normal = hierarchy.clusters.normal[links.receiver]
-    carried = np.einsum("lk,lk->l", mean_normal, links.vector)
+    carried = np.einsum("lk,lk->l", mean_normal, links.vector) + links.even
     np.testing.assert_allclose(carried, links.factor * links.visibility, rtol=2e-5, atol=1e-8)
     some = links.take(np.array([5]))
     top = TreeTop(hierarchy, links.receiver, links.source)
@@ -208,3 +208,36 @@ def test_threads_do_not_change_a_bit() -> None:
         assert [array.tobytes() for array in vars(mine).values()] == [
             array.tobytes() for array in vars(theirs).values()
         ]
+
+
+def test_what_looks_all_ways_is_lit_all_around() -> None:
+    """A ball linked as a whole to a closed room of B = 1: H is 1 on every side, and turned to a lamp more.
+
+    Half the vector and a quarter of its length are the first two harmonics of max(n·d, 0): all around
+    they add up to the true irradiance, where whole vectors would cancel to 0.
+    """
+    room, _ = box_room((2, 2, 2), n=4)
+    ball = 0.1 * sphere(2)[:, ::-1] + 1.0
+    triangles = np.concatenate([room, ball])
+    emission = grey(len(triangles), 0.0)
+    emission[len(room) :] = 1.0  # what shines has a tree of its own
+    hierarchy = Hierarchy(Scene(triangles, grey(len(triangles), 0.5), emission))
+    shapes, caster = NodeShapes(hierarchy), EmbreeCaster(triangles, 1)
+    faces = len(room) + np.arange(len(ball))
+    of_ball = hierarchy.roots[-1]
+    assert set(faces_of(hierarchy, of_ball)) == set(faces)
+    walls = hierarchy.n_clusters + np.arange(len(room))
+    to = np.full(len(walls), of_ball)
+    links = measure_cluster_links(hierarchy, shapes, caster, to, walls, 0, 1)
+    assert len(links) == len(walls)
+    assert (links.even > 0).all()
+    top = TreeTop(hierarchy, links.receiver)
+    bright = np.ones((hierarchy.n_elements, 2))
+    bright[: len(room), 1] = hierarchy.faces.centre[: len(room), 2] > 1.99
+    got = gather_at_clusters(hierarchy, top, links, node_radiosity(hierarchy, bright))[faces]
+    np.testing.assert_allclose(got[:, 0], 1.0, atol=0.12)
+    wanted = exact(hierarchy, faces, np.arange(len(room)), bright[: len(room), 1])
+    area = hierarchy.faces.area[faces]
+    assert area @ got[:, 1] == pytest.approx(area @ wanted, rel=0.05)
+    assert np.sqrt(np.mean((got[:, 1] - wanted) ** 2)) < 0.12 * wanted.max()
+    assert np.corrcoef(got[:, 1], wanted)[0, 1] > 0.9

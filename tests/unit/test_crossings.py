@@ -148,3 +148,51 @@ def test_a_wall_beyond_the_triangle_that_owns_a_texel_touches_it() -> None:
         position = np.stack([middle - shift / SIZE, middle + shift / SIZE], axis=1)
         found = crossings.look_up(texel, on_floor(position))
         np.testing.assert_array_equal(found == texel, own)
+
+
+def slab(low: float, high: float, height: float) -> np.ndarray:
+    """What hovers over the columns from `low` to `high`, and beyond the floor in the other direction."""
+    return rectangle((low / SIZE, -1, height / SIZE), (0, 3, 0), ((high - low) / SIZE, 0, 0))
+
+
+def test_what_hovers_closely_hoods_what_lies_below_and_cuts_nothing() -> None:
+    crossings = crossings_of(slab(6.5, 11.5, 0.05))
+    columns = np.broadcast_to(np.arange(SIZE), (SIZE, SIZE))
+    np.testing.assert_array_equal(image(crossings), (columns == 6) | (columns == 11))
+    alone = crossings.alone[crossings._geometry.index[0]]
+    np.testing.assert_array_equal(alone, (columns >= 6) & (columns <= 11))
+    assert not crossings.touched.any()
+
+
+@pytest.mark.parametrize("height", [0.3, -0.05])
+def test_a_high_gap_and_what_lies_below_the_surface_hood_nothing(height: float) -> None:
+    assert not crossings_of(slab(6.5, 11.5, height)).alone.any()
+
+
+def test_hits_below_a_hood_stay_below_and_those_in_the_open_outside() -> None:
+    """Through the gap each sees the other side's texels: the line of sight is free."""
+    crossings = crossings_of(slab(6.5, 11.5, 0.05))
+    numbers = crossings._geometry.index[0]
+    row = np.arange(SIZE)
+    for x, column in ((6.1, 5), (6.45, 5), (6.55, 7), (6.9, 7)):
+        hits = on_floor(np.stack([np.full(SIZE, x), row + 0.5], axis=1) / SIZE)
+        found = crossings.look_up(numbers[row, 6], hits)
+        np.testing.assert_array_equal(found, numbers[row, column])
+
+
+def test_below_a_hood_narrower_than_a_texel_there_is_nothing() -> None:
+    """Its neighbours are whole and in sight, but lie in the open."""
+    crossings = crossings_of(slab(6.3, 6.7, 0.05))
+    numbers = crossings._geometry.index[0]
+    texel = np.repeat(numbers[8, 6], 2)
+    hits = on_floor(np.array([[6.5, 8.5], [6.1, 8.5]]) / SIZE)
+    np.testing.assert_array_equal(crossings.look_up(texel, hits), [NOTHING, numbers[8, 5]])
+
+
+def test_in_the_open_between_hoods_a_texel_answers_for_itself() -> None:
+    """Slats over every texel: no neighbour is whole, and no light is lost."""
+    crossings = crossings_of(*(slab(column + 0.3, column + 0.8, 0.05) for column in range(SIZE)))
+    assert crossings.crossed.all()
+    texel = np.repeat(crossings._geometry.index[0][8, 6], 2)
+    hits = on_floor(np.array([[6.1, 8.5], [6.5, 8.5]]) / SIZE)
+    np.testing.assert_array_equal(crossings.look_up(texel, hits), [texel[0], NOTHING])

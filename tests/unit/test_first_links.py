@@ -69,6 +69,7 @@ def made(scene: Scene, max_links: int) -> tuple[Links, ClusterLinks, float]:
 def test_a_small_budget_makes_links_coarse_and_says_so(
     clutter: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(first_links, "WANTED", np.inf)
     *_, faint = made(clutter, 10**9)
     assert faint == 0.0
     monkeypatch.setattr(first_links, "FEWEST", 1)
@@ -80,14 +81,37 @@ def test_a_small_budget_makes_links_coarse_and_says_so(
     assert 0 < told[0] < told[1] < 0.1
 
 
+def test_links_are_few_while_the_error_asks_for_no_finer(
+    clutter: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`WANTED` is kept to while `faint` may rise with BF_ε; then there are more, and `faint` says why."""
+    hierarchy = Hierarchy(clutter)
+    shapes = NodeShapes(hierarchy)
+    caster = EmbreeCaster(clutter.triangles, 1)
+    monkeypatch.setattr(first_links, "WANTED", 600.0)
+    links, together, faint = first_links.first_links(
+        hierarchy, shapes, caster, SolverSettings(error=1e-3), 10**6
+    )
+    assert len(links) + len(together) <= first_links.SLACK * 600 / 1e-3**0.5
+    assert 0.0 < faint <= first_links.COARSEST_FAINT * 1e-3
+    monkeypatch.setattr(first_links, "WANTED", 1.0)
+    links, together, faint = first_links.first_links(
+        hierarchy, shapes, caster, SolverSettings(error=1e-3), 10**6
+    )
+    assert len(links) + len(together) > 1 / 1e-3**0.5
+    assert 0.5 < faint / (first_links.COARSEST_FAINT * 1e-3) <= 1.0
+
+
 def test_coarse_first_links_still_send_what_there_is(clutter: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every leaf sends no more than it has, and the mean light is that of the fine links."""
     *_, (_, fine) = hierarchical.solve_steps(clutter, SolverSettings(error=1e-3))
     monkeypatch.setattr(first_links, "FEWEST", 1)
-    settings = SolverSettings(error=1e-3, max_links=150_000)
+    settings = SolverSettings(error=1e-3, max_links=50_000)
     *_, (_, coarse) = hierarchical.solve_steps(clutter, settings)
-    assert fine.details["hierarchical"]["first_faint"] == 0.0 < coarse.details["hierarchical"]["first_faint"]
-    assert coarse.n_links <= 150_000
+    # Finer than BF_ε asks for none need be; a short budget alone makes them coarser.
+    assert fine.details["hierarchical"]["first_faint"] <= first_links.COARSEST_FAINT * 1e-3
+    assert coarse.details["hierarchical"]["first_faint"] > fine.details["hierarchical"]["first_faint"]
+    assert coarse.n_links <= 50_000
     assert coarse.residual < settings.tolerance
     means = [
         state.hierarchy.faces.area @ state.irradiance[: len(state.hierarchy.faces), 0]

@@ -14,10 +14,10 @@ from radiosity_addon.bake_scene import BakeResult, BakeScene, Progress
 from radiosity_addon.errors import SceneError
 from radiosity_addon.methods import METHODS
 from radiosity_addon.pipeline import bake
-from radiosity_addon.quality import quality_of
+from radiosity_addon.quality import QUALITIES, quality_of
 from radiosity_addon.settings import BakeSettings
-from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, solve
-from tests.rooms import FLOOR, box_room, grey, rectangle, solid_box
+from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, first_links, solve
+from tests.rooms import FLOOR, box_room, grey, rectangle, solid_box, sphere
 from tests.unit.texel_scenes import QUAD_UV, bake_object, bake_scene, in_cell
 
 
@@ -324,3 +324,24 @@ def test_triangles_without_area_do_no_harm() -> None:
     result = run(bake_scene(scene, ("Room", 15)))
     assert np.isfinite(result.pages[0].pixels).all()
     assert texels(result).mean() == pytest.approx(texels(run(lit_room(lights=[LAMP]))).mean(), rel=0.02)
+
+
+def test_links_that_had_to_begin_coarse_are_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Many small curved things, and a budget that does not do for the links they ask for."""
+    chance = np.random.default_rng(5)
+    balls = [0.06 * sphere(1)[:, ::-1] + chance.uniform(0.1, 0.9, 3) for _ in range(10)]
+    triangles = np.concatenate([box_room()[0], *balls])
+    count = len(triangles)
+    scene = Scene(triangles, grey(count, 0.5), grey(count, 0.0), lights=[LAMP])
+    clutter = bake_scene(scene, ("Room", 12), ("Balls", count - 12))
+    monkeypatch.setattr(first_links, "FEWEST", 1)
+
+    def told(**settings: Any) -> list[str]:
+        warnings = run(clutter, resolution=16, **settings).warnings
+        return [warning.message for warning in warnings if "links begin coarse" in warning.message]
+
+    assert told() == []
+    (message,) = told(max_links=2_000)
+    share = float(message.split("up to ")[1].split("%")[0])
+    assert 100 * first_links.COARSEST_FAINT * QUALITIES["draft"].solver.error < share < 100
+    assert "raise the most links and the memory limit" in message

@@ -17,11 +17,12 @@ from ..arrays import Array
 from ..bounce import bounce, reflect, relative_residual
 from ..cluster_links import ClusterLinks, join_cluster_links, no_cluster_links
 from ..cluster_pairs import measure_cluster_links
-from ..conservation import Conservation
+from ..conservation import Conservation, received_by_faces
 from ..first_links import first_links
 from ..light_links import link_lights
 from ..link_census import elements_by_level, leaves_by_level, linked_leaves, links_by_level
 from ..links import Links, join, measure_links, no_links
+from ..memory_budget import link_budget, most_light_elements, refinable, refuse_too_large
 from ..node_shapes import NodeShapes
 from ..oracle import (
     children_of_cluster_links,
@@ -48,15 +49,6 @@ what else it would show is left to the next round, if there is one."""
 LIGHT_SHARE = 0.25
 """BF_ε of light links, in units of the links': they are few, and every bounce starts with them."""
 
-LINK_BYTES = 200
-"""Memory a link takes while links are sorted and gathered over (52 bytes at rest, 44 to a cluster), …"""
-
-FACE_BYTES = 1500
-"""… that a face takes with its element and the cluster above it, …"""
-
-ELEMENT_BYTES = 500
-"""… and an element below a face, while light is gathered (see docs/solver.md)."""
-
 
 @dataclass
 class HierarchicalState(SolverState):
@@ -70,6 +62,8 @@ class HierarchicalState(SolverState):
     top: TreeTop | None = None
     """The clusters that the links use."""
     conservation: Conservation | None = None
+    balance: tuple[Array, Array] | None = None
+    """What was scaled at the end (see `Conservation.balance`)."""
 
     @property
     def n_links(self) -> int:
@@ -80,12 +74,26 @@ class HierarchicalState(SolverState):
         """Return (f,) the area mean over each face's leaves of ΣFV over own and inherited links."""
         return link_closure(self.hierarchy, self.links, self.cluster_links)
 
+    def balanced_closure(self) -> Array:
+        """Return (f,) ΣFV as light was sent and received in the end, scaled (see `conservation`)."""
+        if self.balance is None or self.top is None:
+            return self.closure()
+        scale, received = self.balance
+        sums = received_by_faces(self.hierarchy, self.top, self.links, self.cluster_links, scale)
+        return np.asarray(received * sums)
+
 
 def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float, HierarchicalState]]:
     """Solve step by step: yields (fraction done, state) so that a caller may show or cancel.
 
     The last state yielded is the solution.
+
+    Raises
+    ------
+    UsageError
+        If the scene does not fit into the memory limit; nothing is allocated then.
     """
+    refuse_too_large(scene, settings)
     state = begin(scene, settings, HierarchicalState)
     hierarchy, caster = state.hierarchy, state.caster
     min_area = settings.min_area * float(hierarchy.faces.area.sum())
@@ -96,12 +104,19 @@ def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float,
         return
     light_threshold = LIGHT_SHARE * settings.error * state.power
     state.light_links = link_lights(
-        hierarchy, scene.lights, caster, light_threshold, min_area, settings.seed, settings.threads
+        hierarchy,
+        scene.lights,
+        caster,
+        light_threshold,
+        min_area,
+        settings.seed,
+        settings.threads,
+        most_light_elements(hierarchy, settings),
     )
     yield 0.1, state
     shapes = NodeShapes(hierarchy)
     state.links, state.cluster_links, state.faint = first_links(
-        hierarchy, shapes, caster, settings, link_budget(state)
+        hierarchy, shapes, caster, settings, link_budget(hierarchy, settings, len(state.light_links))
     )
     state.reset()
     yield 0.3, state
@@ -184,21 +199,14 @@ def refine(state: HierarchicalState, shapes: NodeShapes, threshold: float, min_a
 def _over(state: HierarchicalState, errors: Array, threshold: float) -> Array:
     """Return the rows of the links above the threshold, the worst of them if the budget is short."""
     chosen = np.flatnonzero(errors > threshold)
-    room = max((link_budget(state) - state.n_links) // 3, 0)
+    light_links = len(state.light_links)
+    room = refinable(state.hierarchy, state.settings, state.n_links - light_links, light_links)
     if len(chosen) > room:
         order = np.argsort(errors[chosen], kind="stable")[::-1]
         left = float(errors[chosen[order[room:]]].max(initial=0.0)) / state.power
         state.over_budget = max(state.over_budget, left)
         chosen = np.sort(chosen[order[:room]])
     return chosen
-
-
-def link_budget(state: HierarchicalState) -> int:
-    """Return how many links there may be: `max_links`, or what faces and elements leave of the memory."""
-    hierarchy, settings = state.hierarchy, state.settings
-    faces = len(hierarchy.faces)
-    taken = FACE_BYTES * faces + ELEMENT_BYTES * (hierarchy.n_elements - faces)
-    return min(settings.max_links, max(int((settings.memory_limit * 2**30 - taken) / LINK_BYTES), 0))
 
 
 def iterate(state: HierarchicalState, tolerance: float, last: bool = False) -> None:
@@ -211,20 +219,20 @@ def iterate(state: HierarchicalState, tolerance: float, last: bool = False) -> N
     assert state.conservation is not None  # set when the state was made
     lights = state.direct()
     state.top = top = _top(state)
-    scale = state.conservation.factors(hierarchy, top, links, cluster_links)
+    state.balance = scale, received = state.conservation.balance(hierarchy, top, links, cluster_links)
     leaves = hierarchy.leaves
     least = state.emission[leaves]
     mixer = Anderson(hierarchy.area[leaves])
     while not exhausted(state):
         before = state.radiosity[leaves]
-        bounce(state, links, lights, scale, cluster_links, top)
+        bounce(state, links, lights, scale, cluster_links, top, received)
         state.note()
         if state.residual < tolerance or exhausted(state):
             break
         # What a mixture guesses below the emission is no radiosity.
         state.radiosity[leaves] = np.maximum(mixer.next(before, state.radiosity[leaves]), least)
     if last:
-        _, after = reflect(state, links, lights, scale, cluster_links, top)
+        _, after = reflect(state, links, lights, scale, cluster_links, top, received)
         state.residual = relative_residual(state, after)
         state.history[-1:] = [replace(entry, residual=state.residual) for entry in state.history[-1:]]
 
@@ -248,8 +256,32 @@ def tell(state: HierarchicalState, rounds: list[dict[str, float]]) -> None:
     state.details["hierarchical"] = {
         "rounds": rounds,
         "first_faint": state.faint,
+        "closure": closure_figures(state),
         "links_per_leaf": n_links / max(linked_leaves(hierarchy, links, state.cluster_links), 1),
         "elements_by_level": elements_by_level(hierarchy),
         "leaves_by_level": leaves_by_level(hierarchy),
         "links_by_level": links_by_level(hierarchy, links.receiver, links.source),
+    }
+
+
+def closure_figures(state: HierarchicalState) -> dict[str, dict[str, float]]:
+    """Return how far ΣFV is from 1 on faces that light reaches and nothing escapes from.
+
+    Of the "links" as they were measured, and "balanced", as their light was scaled: the area
+    "mean", the root of the mean "square" of what is missing, and the share of the area that is
+    more than a percent "off".
+    """
+    hierarchy = state.hierarchy
+    faces = len(hierarchy.faces)
+    assert state.conservation is not None  # set when the state was made
+    held = state.conservation.closed(hierarchy) & (state.irradiance[:faces].max(axis=1) > 0)
+    weight = hierarchy.faces.area * held
+    weight /= max(float(weight.sum()), 1e-300)
+    return {
+        name: {
+            "mean": float(weight @ sums),
+            "rms": float(np.sqrt(weight @ (sums - 1.0) ** 2)),
+            "off": float(weight @ (np.abs(sums - 1.0) > 0.01)),
+        }
+        for name, sums in (("links", state.closure()), ("balanced", state.balanced_closure()))
     }

@@ -1,0 +1,74 @@
+"""Sheets that lie in one another, linked as clusters, against a single sheet."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from radiosity_addon.solver import Scene
+from radiosity_addon.solver.methods.hierarchical import HierarchicalState
+from tests.rooms import CEILING, box_room, grey, rectangle
+from tests.unit.solved_rooms import solved
+
+REFLECTANCE = 0.6
+ROOM = 6 * 2 * 4**2
+
+
+def with_sheets(kind: str) -> HierarchicalState:
+    """A closed room under a shining ceiling with a sheet of 128 triangles in the air, once or twice."""
+    room, surface = box_room((2, 2, 2), n=4)
+    sheet = rectangle((0.4, 0.4, 0.8), (1.2, 0, 0), (0, 1.2, 0), 8)
+    sheets = {"single": [sheet], "twice": [sheet, sheet], "back to back": [sheet, sheet[:, ::-1]]}[kind]
+    triangles = np.concatenate([room, *sheets])
+    emission = grey(len(triangles), 0.0)
+    emission[:ROOM][surface == CEILING] = 1.0
+    two_sided = np.arange(len(triangles)) >= ROOM if kind != "back to back" else None
+    scene = Scene(triangles, grey(len(triangles), REFLECTANCE), emission, two_sided=two_sided)
+    state = solved(scene, error=1e-3)
+    assert len(state.cluster_links) > 1000
+    return state
+
+
+@pytest.fixture(scope="module")
+def single() -> HierarchicalState:
+    return with_sheets("single")
+
+
+def light(state: HierarchicalState) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the irradiance of the room's faces, and of the sheets' that look up and down."""
+    faces = state.hierarchy.faces
+    irradiance = state.irradiance[: len(faces), 0]
+    on_sheet = np.abs(faces.centre[:, 2] - 0.8) < 1e-6
+    up = faces.normal[:, 2] > 0.5
+    return irradiance[:ROOM], irradiance[on_sheet & up], irradiance[on_sheet & ~up]
+
+
+def power_ratio(state: HierarchicalState) -> float:
+    faces = state.hierarchy.faces
+    absorbed = (1 - REFLECTANCE) * float(faces.area @ state.irradiance[: len(faces), 0])
+    return absorbed / float(faces.area @ faces.emission[:, 0])
+
+
+def test_sheets_back_to_back_are_one_two_sided_sheet(single: HierarchicalState) -> None:
+    state = with_sheets("back to back")
+    assert power_ratio(state) == pytest.approx(1.0, abs=1e-4)
+    (walls, up, down), (walls_alone, up_alone, down_alone) = light(state), light(single)
+    assert len(up) == len(up_alone) == len(down) == len(down_alone) == 128
+    assert walls.mean() == pytest.approx(walls_alone.mean(), rel=0.002)
+    assert up.mean() == pytest.approx(up_alone.mean(), rel=0.02)
+    # No light passes: what is below has a fifth of what is above.
+    assert down.mean() == pytest.approx(down_alone.mean(), rel=0.05)
+    assert down.mean() < 0.25 * up.mean()
+
+
+def test_sheets_that_face_the_same_way_make_no_light(single: HierarchicalState) -> None:
+    """Both are seen, and share what there is: the power is kept, and the room is no brighter for it."""
+    state = with_sheets("twice")
+    assert state.residual < state.settings.tolerance
+    assert power_ratio(state) == pytest.approx(1.0, abs=1e-4)
+    (walls, up, down), (walls_alone, up_alone, down_alone) = light(state), light(single)
+    assert len(up) == len(down) == 256
+    # Twice the surface absorbs: darker, by no more than the second sheet's share.
+    assert 0.85 < walls.mean() / walls_alone.mean() < 1.0
+    assert 0.85 < up.mean() / up_alone.mean() < 1.0
+    assert 0.6 < down.mean() / down_alone.mean() < 1.0
