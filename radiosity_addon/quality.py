@@ -31,7 +31,7 @@ QUALITIES = {
             patches=100,
             contrast=0.2,
         ),
-        GatherSettings(strides=(4, 2, 1), support=0.5, rays=96),
+        GatherSettings(strides=(4, 2, 1), support=0.5, rays=96, tolerance=8e-4),
     ),
     "medium": Quality(
         SolverSettings(
@@ -43,7 +43,7 @@ QUALITIES = {
             patches=200,
             contrast=0.1,
         ),
-        GatherSettings(strides=(4, 2, 1), support=1.5, rays=192),
+        GatherSettings(strides=(4, 2, 1), support=1.5, rays=192, tolerance=4e-4),
     ),
     "high": Quality(
         SolverSettings(
@@ -55,15 +55,27 @@ QUALITIES = {
             patches=400,
             contrast=0.05,
         ),
-        GatherSettings(strides=(4, 2, 1), support=6.0, rays=384, sweeps=128),
+        GatherSettings(strides=(4, 2, 1), support=6.0, rays=384, sweeps=128, tolerance=2e-4),
     ),
 }
 
 
-ERRORS = {"draft": 0.012, "medium": 0.0077, "high": 0.0057}
-"""Relative RMS errors of the qualities in the Cornell box at 256², against Cycles (docs/decisions/0017)."""
+COARSEST = Quality(
+    SolverSettings(shadow_rays=2, error=3e-3, min_area=3e-4),
+    GatherSettings(strides=(4, 2, 1), support=0.2, rays=32, tolerance=2e-3),
+)
+"""What is bought for the largest errors that are asked for."""
 
-FEWEST_RAYS, MOST_RAYS = 32, 2048
+LADDER = (
+    (0.029, COARSEST),
+    (0.0125, QUALITIES["draft"]),
+    (0.0077, QUALITIES["medium"]),
+    (0.0057, QUALITIES["high"]),
+)
+"""Relative RMS errors in the Cornell box at 256², the larger of estimated and measured against Cycles
+(docs/decisions/0020)."""
+
+FEWEST_RAYS, MOST_RAYS = COARSEST.gather.rays, 2048
 """A gather point's rays, whatever error is asked for."""
 
 
@@ -73,9 +85,9 @@ def for_error(error: float) -> Quality:
     Every number follows a power of the error, from one quality to the next; other scenes take
     more or less, which the estimate of the error then tells.
     """
-    names = ("draft", "medium") if error > ERRORS["medium"] else ("medium", "high")
-    low, high = (QUALITIES[name] for name in names)
-    part = math.log(error / ERRORS[names[0]]) / math.log(ERRORS[names[1]] / ERRORS[names[0]])
+    rung = sum(error <= step for step, _ in LADDER[1:-1])
+    (low_error, low), (high_error, high) = LADDER[rung : rung + 2]
+    part = math.log(error / low_error) / math.log(high_error / low_error)
 
     def between(one: float, other: float) -> float:
         return float(one * (other / one) ** part)
@@ -83,14 +95,16 @@ def for_error(error: float) -> Quality:
     rays = min(max(between(low.gather.rays, high.gather.rays), FEWEST_RAYS), MOST_RAYS)
     solver = replace(
         low.solver,
-        error=min(max(between(low.solver.error, high.solver.error), 1e-5), 3e-3),
-        min_area=min(max(between(low.solver.min_area, high.solver.min_area), 5e-6), 3e-4),
+        error=min(max(between(low.solver.error, high.solver.error), 1e-5), COARSEST.solver.error),
+        min_area=min(max(between(low.solver.min_area, high.solver.min_area), 5e-6), COARSEST.solver.min_area),
         shadow_rays=round(min(max(between(low.solver.shadow_rays, high.solver.shadow_rays), 2), 64)),
     )
+    coarse = COARSEST.gather
     gather = replace(
         high.gather,
-        support=min(max(between(low.gather.support, high.gather.support), 0.2), 16.0),
-        rays=16 * round(rays / 16),
+        support=min(max(between(low.gather.support, high.gather.support), coarse.support), 16.0),
+        rays=8 * math.ceil(rays / 8 - 1e-6),
+        tolerance=min(max(between(low.gather.tolerance, high.gather.tolerance), 1e-4), coarse.tolerance),
     )
     return Quality(solver, gather)
 

@@ -173,15 +173,18 @@ def crossing_steps(
 
     def find(part: slice) -> None:
         rows = np.arange(part.start, part.stop)
-        # The whole texel: hits land all over it, though its light comes from the middle.
-        corners = geometry.sample(rows, np.broadcast_to(_CORNERS, (len(rows), 4, 2)), 1.0)
         lift = LIFT * caster.surface_offset * geometry.surface_normal[rows][:, None]
-        centre = geometry.position[rows][:, None] + lift
-        from_centre = corners + lift - centre
-        cut = ~_segments_free(caster, centre + INSET * from_centre, _EDGES)
         # Of the texel on the page: hits land on the part outside its triangle as well.
         square = geometry.squares(rows) + lift
         middle = square.mean(axis=1, keepdims=True)
+        # All of the texel that is on its triangle: hits land all over it, though its light comes
+        # from the middle.
+        corners, ends = square.copy(), np.flatnonzero(~geometry.whole[rows])
+        spots = np.broadcast_to(_CORNERS, (len(ends), 4, 2))
+        corners[ends] = geometry.sample(rows[ends], spots, 1.0) + lift[ends]
+        centre = geometry.position[rows][:, None] + lift
+        from_centre = corners - centre
+        cut = ~_segments_free(caster, centre + INSET * from_centre, _EDGES)
         doubtful = ~_segments_free(caster, middle + OUTSET * (square - middle), _DIAGONALS) & ~cut
         some = np.flatnonzero(doubtful)
         cut[some] = ~_segments_free(caster, centre[some] + INSET * from_centre[some], _DIAGONALS)

@@ -36,7 +36,7 @@ def texel_residual(
         Positive where the elements are brighter than the light they send there makes the surface.
     """
     local, residual = solution.local_pass, solution.element_residual
-    direct = yield from scaled(local.direct_steps(footprints(geometry)), 0.0, DIRECT)
+    direct = yield from scaled(local.direct_steps(footprints(geometry, local)), 0.0, DIRECT)
     found = crossing_steps(geometry, local.caster, local.threads)
     crossings = Crossings(geometry, local.caster, (yield from scaled(found, DIRECT, CROSSED)))
     stored = gather_texels(local, geometry, settings, crossings, local.leaves_of)

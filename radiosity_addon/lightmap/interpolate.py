@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..solver.arrays import Array
-from ..solver.parallel import chunk_steps
+from ..solver.parallel import chunk_steps, for_chunks
 from ..solver.steps import drain
 from ..solver.visibility import RayCaster
-from .point_grid import PointGrid
+from .point_grid import NONE, PointGrid
 from .texel_geometry import TexelGeometry
 
 REACH = 0.35
@@ -57,6 +57,7 @@ class GatherPoints:
         self.texel = np.zeros(0, dtype=np.int32)
         self.closeness = np.zeros(0)
         self._grids: list[PointGrid] = []
+        self._weighed = _Weighed.nothing()
         self._number = np.full(len(geometry), -1, dtype=np.int32)
 
     def __len__(self) -> int:
@@ -72,41 +73,48 @@ class GatherPoints:
         self.texel = np.concatenate([self.texel, texel])
         self.closeness = np.concatenate([self.closeness, closeness])
 
-    def pairs(self, texels: Array) -> tuple[Array, Array]:
-        """Return rows of `texels` and gather points of all levels around them, sorted by row, then point.
+    def pairs(self, texels: Array, level: int = 0) -> tuple[Array, Array]:
+        """Return rows of `texels` and gather points around them of all levels from `level`, sorted by row.
 
         In the world, not on the page: the next chart or object goes on where one ends.
         """
         position, normal = self._geometry.position[texels], self._geometry.normal[texels]
+        grids = self._grids[level:]
+        near = [np.full((len(texels), 0), NONE, np.int32)] + [grid.near(position, normal) for grid in grids]
+        found = np.concatenate(near, axis=1)
+        # Its own point each texel has, should others crowd it out of its cell.
         own = self._number[texels]
-        keys = [np.flatnonzero(own >= 0) * len(self) + own[own >= 0]]
-        for grid in self._grids:
-            found = grid.near(position, normal)
-            row, column = np.nonzero(found >= 0)
-            keys.append(row * len(self) + found[row, column])
-        return np.divmod(np.unique(np.concatenate(keys)), max(len(self), 1))
+        own[(found == own[:, None]).any(axis=1)] = NONE
+        found = np.concatenate([own[:, None], found], axis=1)
+        row, column = np.nonzero(found != NONE)
+        return row, found[row, column]
 
     def kernel(self, texels: Array, point: Array) -> Array:
         """Return (p,) weights in [0, 1] of gather points for texels (p,), pair by pair; 0 out of reach."""
         geometry = self._geometry
-        of = self.texel[point]
-        along = geometry.position[of] - geometry.position[texels]
-        turn = np.einsum("pk,pk->p", geometry.normal[of], geometry.normal[texels])
+        of = self.texel.take(point)
+        along = geometry.position.take(of, axis=0) - geometry.position.take(texels, axis=0)
         distance = np.sqrt(np.einsum("pk,pk->p", along, along))
-        bend = np.sqrt(np.maximum(1.0 - turn, 0.0))
-        weight = np.maximum(1.0 - (distance * self.closeness[point] + bend) / REACH, 0.0) ** 2
+        change = distance * self.closeness.take(point)
         # A texel that geometry cuts in two, or hoods, speaks for itself alone, and nobody for it.
-        other = of != texels
-        weight[other & (self._alone[of] | self._alone[texels])] = 0.0
-        row = np.flatnonzero((weight > 0) & other)
+        apart = self._alone.take(of) | self._alone.take(texels)
+        weight = np.where(of == texels, np.maximum(1.0 - change / REACH, 0.0) ** 2, 0.0)
+        row = np.flatnonzero((of != texels) & (change < REACH) & ~apart)
+        start, end = texels.take(row), of.take(row)
+        normal, other = geometry.normal.take(start, axis=0), geometry.normal.take(end, axis=0)
+        bend = np.sqrt(np.maximum(1.0 - np.einsum("pk,pk->p", normal, other), 0.0))
+        spoken = np.maximum(1.0 - (change[row] + bend) / REACH, 0.0) ** 2
         # Over a bulge the straight line dips below the surface, by an eighth of the distance
         # times the turn of the normal: start and end that much higher.
-        lift = LIFT * self._caster.surface_offset + SAGITTA * (distance * bend)[row]
-        start = geometry.position[texels[row]] + lift[:, None] * geometry.normal[texels[row]]
-        end = geometry.position[of[row]] + lift[:, None] * geometry.normal[of[row]]
-        length = np.linalg.norm(end - start, axis=1)
-        directions = (end - start) / np.maximum(length, 1e-300)[:, None]
-        weight[row] *= self._caster.visible(start, directions, length)
+        lift = LIFT * self._caster.surface_offset + SAGITTA * distance[row] * bend
+        begin = geometry.position.take(start, axis=0) + lift[:, None] * normal
+        directions = along.take(row, axis=0) + lift[:, None] * (other - normal)
+        length = np.sqrt(np.einsum("pk,pk->p", directions, directions))
+        directions /= np.maximum(length, 1e-300)[:, None]
+        heard = spoken > 0
+        weight[row[heard]] = spoken[heard] * self._caster.visible(
+            begin[heard], directions[heard], length[heard]
+        )
         return np.asarray(weight)
 
     def support(self, texels: Array) -> Array:
@@ -116,14 +124,79 @@ class GatherPoints:
     def support_steps(self, texels: Array) -> Generator[float, None, Array]:
         """Compute the same; yields the fraction done."""
         total = np.empty(len(texels))
+        parts: dict[int, tuple[Array, Array, Array]] = {}
 
         def weigh(rows: slice) -> None:
             row, point = self.pairs(texels[rows])
             weight = self.kernel(texels[rows][row], point)
             total[rows] = np.bincount(row, weight, minlength=len(texels[rows]))
+            reached = np.flatnonzero(weight)
+            parts[rows.start] = texels[rows][row[reached]], point[reached], weight[reached]
 
         yield from chunk_steps(weigh, len(texels), CHUNK, self.threads)
+        self._weighed = _Weighed.joined(len(self._grids), texels, [parts[start] for start in sorted(parts)])
         return total
+
+    def weights_of(self, texels: slice) -> tuple[Array, Array, Array]:
+        """Return rows, points and weights above 0 for a run of all texels, sorted by row.
+
+        What `support_steps` weighed last is not weighed again.
+        """
+        known = self._weighed
+        run = np.arange(texels.start, texels.stop)
+        mine = slice(*np.searchsorted(known.texels, [texels.start, texels.stop]))
+        old = np.zeros(len(run), dtype=bool)
+        old[known.texels[mine] - texels.start] = True
+        found = [self._fresh(run[~old], 0), self._fresh(run[old], known.levels), known.pairs_of(texels)]
+        texel, point, weight = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        row = texel - texels.start
+        order = np.argsort(row.astype(np.int16 if len(run) < 1 << 15 else np.int64), kind="stable")
+        return row[order], point[order], weight[order]
+
+    def _fresh(self, texels: Array, level: int) -> tuple[Array, Array, Array]:
+        """Weigh the points of all levels from `level` for texels: (p,) texels, points, weights above 0."""
+        row, point = self.pairs(texels, level)
+        weight = self.kernel(texels[row], point)
+        reached = np.flatnonzero(weight)
+        return texels[row[reached]], point[reached], weight[reached].astype(np.float32)
+
+
+@dataclass(frozen=True)
+class _Weighed:
+    """What was weighed when the first `levels` levels of points were there.
+
+    Attributes
+    ----------
+    levels : int
+    texels : (n,) int
+        Ascending; they were no points themselves.
+    texel, point, weight : (p,) int, int32, float32
+        Pairs with a weight above 0, sorted by texel.
+    """
+
+    levels: int
+    texels: Array
+    texel: Array
+    point: Array
+    weight: Array
+
+    @staticmethod
+    def nothing() -> _Weighed:
+        none = np.zeros(0, dtype=np.int32)
+        return _Weighed(0, none, none, none, np.zeros(0, dtype=np.float32))
+
+    @staticmethod
+    def joined(levels: int, texels: Array, parts: list[tuple[Array, Array, Array]]) -> _Weighed:
+        """Put the chunks' pairs together; nothing if `texels` are not in order."""
+        if not parts or (np.diff(texels) <= 0).any():
+            return _Weighed.nothing()
+        texel, point, weight = (np.concatenate(chunks) for chunks in zip(*parts, strict=True))
+        return _Weighed(levels, texels, texel, point, weight.astype(np.float32))
+
+    def pairs_of(self, texels: slice) -> tuple[Array, Array, Array]:
+        """Return texels, points and weights of a run of texels."""
+        part = slice(*np.searchsorted(self.texel, [texels.start, texels.stop]))
+        return self.texel[part], self.point[part], self.weight[part]
 
 
 @dataclass(frozen=True)
@@ -143,11 +216,20 @@ class Interpolation:
     point: Array
     weight: Array
 
-    def __call__(self, values: Array) -> Array:
+    def __call__(self, values: Array, threads: int = 1) -> Array:
         """Carry (g, k) values of the gather points to (n, k) of the texels."""
         result = np.empty((len(self.first), values.shape[1]))
-        for channel in range(values.shape[1]):
-            result[:, channel] = np.add.reduceat(values[self.point, channel] * self.weight, self.first)
+        ends = np.append(self.first, len(self.point))
+        columns = [np.ascontiguousarray(values[:, channel]) for channel in range(values.shape[1])]
+
+        def spread(rows: slice) -> None:
+            entries = slice(ends[rows.start], ends[rows.stop])
+            point, weight = self.point[entries].astype(np.intp), self.weight[entries]
+            first = self.first[rows] - entries.start
+            for channel, column in enumerate(columns):
+                result[rows, channel] = np.add.reduceat(column.take(point) * weight, first)
+
+        for_chunks(spread, len(self.first), CHUNK, threads)
         return result
 
     def any_of(self, chosen: Array) -> Array:
@@ -175,10 +257,7 @@ def fit_steps(points: GatherPoints, geometry: TexelGeometry) -> Generator[float,
     parts: dict[int, tuple[Array, Array, Array]] = {}
 
     def weigh(rows: slice) -> None:
-        row, point = points.pairs(np.arange(rows.start, rows.stop, dtype=np.int64))
-        kernel = points.kernel(row + rows.start, point)
-        reached = kernel > 0
-        row, point, kernel = row[reached], point[reached], kernel[reached]
+        row, point, kernel = points.weights_of(rows)
         count = np.bincount(row, minlength=rows.stop - rows.start)
         if not count.all():
             raise ValueError(

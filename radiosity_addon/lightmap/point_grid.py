@@ -10,7 +10,11 @@ from ..solver.sampling import orthonormal_basis
 PER_CELL = 2
 """Points taken from a cell: on a lattice as wide as the cells there are hardly more."""
 
-_SPOTS = np.array([[i, j] for i in (-1, 0, 1) for j in (-1, 0, 1)], dtype=np.float64)
+NONE = -1
+"""Stands where a cell has no more points."""
+
+_SPOTS = [(i, j) for i in (-1.0, 0.0, 1.0) for j in (-1.0, 0.0, 1.0)]
+_PRIMES = tuple(np.int64(8 * prime) for prime in (73856093, 19349663, 83492791))
 
 
 class PointGrid:
@@ -27,34 +31,50 @@ class PointGrid:
 
     def __init__(self, position: Array, normal: Array, numbers: Array, size: float) -> None:
         self._size = size
-        keys = self._keys(position, normal)
+        keys = _hash((position / size).T) + _facing(normal)
         order = np.argsort(keys, kind="stable")
-        self._sorted, self._numbers = keys[order], numbers[order]
+        # Looked up past its end, the last cell answers that it has no more.
+        self._sorted = np.append(keys[order], np.repeat(keys[order][-1:], PER_CELL))
+        self._numbers = np.append(numbers[order], np.full(len(self._sorted) - len(order), NONE, np.int32))
 
     def near(self, position: Array, normal: Array) -> Array:
-        """Return (n, 18) int32: points that face alike in the nine cells around, −1 for none.
+        """Return (n, 18) int32: points that face alike in the nine cells around, each once; NONE for none.
 
-        The cells are those under a 3 × 3 grid in the tangent plane; a point may come twice.
+        The cells are those under a 3 × 3 grid in the tangent plane.
         """
-        tangent, bitangent = orthonormal_basis(normal)
-        steps = self._size * (
-            _SPOTS[:, :1] * tangent[:, None].astype(np.float64) + _SPOTS[:, 1:] * bitangent[:, None]
-        )
-        spots = position[:, None] + steps
-        facing = np.broadcast_to(normal[:, None], spots.shape)
-        keys = self._keys(spots.reshape(-1, 3), facing.reshape(-1, 3))
-        start = np.searchsorted(self._sorted, keys)
-        found = np.full((len(keys), PER_CELL), -1, dtype=np.int32)
-        for which in range(PER_CELL if len(self._sorted) else 0):
-            slot = np.minimum(start + which, len(self._sorted) - 1)
-            same = (self._sorted[slot] == keys) & (start + which < len(self._sorted))
-            found[same, which] = self._numbers[slot[same]]
-        return found.reshape(len(position), -1)
+        found = np.full((len(position), len(_SPOTS) * PER_CELL), NONE, dtype=np.int32)
+        if not len(self._sorted):
+            return found
+        tangent, bitangent = (np.ascontiguousarray(axis.T) for axis in orthonormal_basis(normal))
+        middle = np.ascontiguousarray((position / self._size).T)
+        facing = _facing(normal)
+        keys: list[Array] = []
+        for spot, (i, j) in enumerate(_SPOTS):
+            key = _hash(middle + i * tangent + j * bitangent) + facing
+            # In a tilted plane two of the nine may lie in one cell.
+            again = np.logical_or.reduce([key == other for other in keys]) if keys else None
+            keys.append(key)
+            start = np.searchsorted(self._sorted, key)
+            for which in range(PER_CELL):
+                slot = np.minimum(start + which, len(self._sorted) - 1)
+                same = self._sorted.take(slot) == key
+                if again is not None:
+                    same &= ~again
+                found[:, spot * PER_CELL + which] = np.where(same, self._numbers.take(slot), NONE)
+        return found
 
-    def _keys(self, position: Array, normal: Array) -> Array:
-        """Hash cells and the axis the normal is nearest to; a rare clash only offers a far point."""
-        cell = np.floor(position / self._size).astype(np.int64)
-        axis = np.abs(normal).argmax(axis=1)
-        facing = 2 * axis + (normal[np.arange(len(normal)), axis] < 0)
-        primes = np.array([73856093, 19349663, 83492791], dtype=np.int64)
-        return np.asarray((cell * primes).sum(axis=1) * 8 + facing)
+
+def _hash(place: Array) -> Array:
+    """Return (n,) int64 a number for the cells of places (3, n); a rare clash only offers a far point."""
+    key = np.zeros(place.shape[1], dtype=np.int64)
+    for coordinate, prime in zip(place, _PRIMES, strict=True):
+        key += np.floor(coordinate).astype(np.int64) * prime
+    return key
+
+
+def _facing(normal: Array) -> Array:
+    """Return (n,) int64 0 … 5: the half axis each normal is nearest to."""
+    x, y, z = np.abs(normal).T
+    axis = np.where((x >= y) & (x >= z), 0, np.where(y >= z, 1, 2))
+    along = np.take_along_axis(normal, axis[:, None], axis=1)[:, 0]
+    return np.asarray(2 * axis + (along < 0), dtype=np.int64)

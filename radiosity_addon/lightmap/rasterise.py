@@ -145,14 +145,24 @@ def rasterise(uv: Float32, resolution: int) -> Texels:
     covered = np.flatnonzero(owner != _NOBODY)
     row, column = (part.astype(np.int32) for part in np.divmod(covered, resolution))
     triangle = owner[covered]
-    area = np.empty(len(covered), dtype=np.float32)
+    area = np.ones(len(covered), dtype=np.float32)
     centroid = np.empty((len(covered), 3), dtype=np.float32)
-    for start in range(0, len(covered), CHUNK):
-        part = slice(start, start + CHUNK)
-        polygon, origin, _ = _clip(uv, resolution, triangle[part], row[part], column[part])
-        area[part], middle = polygon_area_centroid(polygon)
-        centroid[part] = _barycentric(middle[:, None], origin)[:, 0]
+    whole = best[covered] >= _CENTRE + 1
+    for some in _runs(np.flatnonzero(whole)):
+        origin = uv[triangle[some]].astype(np.float64) * resolution
+        origin -= np.stack((column[some], row[some]), axis=-1)[:, None, :]
+        centroid[some] = _barycentric(np.full((len(some), 1, 2), 0.5), origin)[:, 0]
+    for some in _runs(np.flatnonzero(~whole)):
+        polygon, origin, _ = _clip(uv, resolution, triangle[some], row[some], column[some])
+        area[some], middle = polygon_area_centroid(polygon)
+        centroid[some] = _barycentric(middle[:, None], origin)[:, 0]
     return Texels(resolution, uv, row, column, triangle, area, centroid, best[covered] >= _CENTRE)
+
+
+def _runs(rows: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
+    """Cut row numbers into runs of at most `CHUNK`."""
+    for start in range(0, len(rows), CHUNK):
+        yield rows[start : start + CHUNK]
 
 
 def coverage_sum(uv: Float32, resolution: int) -> Float:

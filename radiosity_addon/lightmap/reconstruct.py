@@ -50,39 +50,43 @@ class GatherSettings:
     rays : int
         A gather point.
     sweeps : int
-        Jacobi sweeps over the texels, at most.
+        Jacobi sweeps over the texels, at most, …
+    tolerance : float
+        … or until no texel changes by more than this part of the mean.
     """
 
     strides: tuple[int, ...] = (4, 2, 1)
     support: float = 1.0
     rays: int = 256
     sweeps: int = 64
+    tolerance: float = 2e-4
 
 
 def reconstruct(
     scene: Scene, local: LocalPass, geometry: TexelGeometry, settings: GatherSettings
 ) -> Generator[float, None, TexelLight]:
     """Compute direct and indirect irradiance of all texels; yields the fraction done."""
-    lamps = yield from scaled(local.direct_steps(footprints(geometry)), 0.0, DIRECT)
+    lamps = yield from scaled(local.direct_steps(footprints(geometry, local)), 0.0, DIRECT)
     found = crossing_steps(geometry, local.caster, local.threads)
     crossings = Crossings(geometry, local.caster, (yield from scaled(found, DIRECT, CROSSED)))
     resolve = _resolver(local, geometry, crossings)
     stored = gather_texels(local, geometry, settings, crossings, resolve)
     links = yield from scaled(stored, CROSSED, GATHERED)
-    swept = sweep_steps(scene, local, geometry, links, lamps, resolve, settings.sweeps)
+    swept = sweep_steps(scene, local, geometry, links, lamps, resolve, settings.sweeps, settings.tolerance)
     light = yield from scaled(swept, GATHERED, 1.0)
     yield 1.0
     return light
 
 
-def footprints(geometry: TexelGeometry) -> Footprints:
-    """Return where all texels ask for light."""
+def footprints(geometry: TexelGeometry, local: LocalPass) -> Footprints:
+    """Return where all texels ask for light, and how much the elements lead them to expect."""
     return Footprints(
         geometry.position,
         geometry.normal,
         np.arange(len(geometry)),
         geometry.sample,
         geometry.neighbourhood,
+        expected=local.irradiance_at(geometry.triangle, geometry.barycentric),
         lift=SmoothLift(geometry),
     )
 

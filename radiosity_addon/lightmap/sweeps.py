@@ -25,8 +25,8 @@ CHUNK_HITS = 1 << 18
 """Hits averaged at once: their values stay in the processor's cache."""
 
 TOLERANCE = 2e-4
-"""Largest change of any texel, relative to the mean, at which the sweeps end. Most texels are there
-at once; a dark closet next to a bright room, into which the hierarchy's elements leak across the
+"""Largest change of any texel, relative to the mean, at which the sweeps end by default. Most texels are
+there at once; a dark closet next to a bright room, into which the hierarchy's elements leak across the
 wall's foot, takes as many sweeps as light would bounce in it."""
 
 LEAF_RAYS = 64
@@ -35,11 +35,15 @@ LEAF_RAYS = 64
 LEAF_ROUNDS = 3
 """Rounds of asking the leaves that leaves met; beyond, the hierarchy's values stand."""
 
+STILL = 0.1
+"""A row of the table moves once it is off by this part of the tolerance: what sees only rows that rest
+need not be asked again, and most rest after a few sweeps."""
+
 SWEPT = 0.7
 """A sweep takes the other part of the progress left: how many there will be is not known."""
 
 LEAF_SWEEPS = 24
-"""Sweeps among the leaves for each over the texels: they are few."""
+"""Sweeps among the leaves for each over the texels, at most: they are few."""
 
 
 @dataclass(frozen=True)
@@ -79,12 +83,16 @@ class StoredLinks:
     def irradiance_steps(self, table: Array, threads: int = 0) -> Generator[float, None, Array]:
         """Compute (n, 3) what a table of radiosity sends to the texels; yields the fraction done."""
         mean = yield from mean_steps(table, self.sources, threads)
+        return self.spread_out(table, mean, threads)
+
+    def spread_out(self, table: Array, mean: Array, threads: int = 0) -> Array:
+        """Add what aimed rays brought to (g, 3) `mean`, and carry it from the gather points to the texels."""
         aimed = self.aimed
         for channel in range(table.shape[1] if len(aimed.row) else 0):
             values = table[:, channel][aimed.sources]
             values[aimed.sources < 0] = 0.0
             mean[aimed.row, channel] += np.einsum("ak,ak->a", values, aimed.weights)
-        return self.spread(mean)
+        return self.spread(mean, threads)
 
 
 def sweep_steps(
@@ -132,18 +140,23 @@ def sweep_steps(
     table[texel_count:-2] = local.reflected()[leaves.element]
     table[: len(table) - 2][~_reached(links, leaves, direct)] = 0.0
     indirect, left = np.zeros_like(direct), 0.8
+    changed = np.ones(len(table), dtype=bool)
+    means = _Means(links.sources, table.shape[1], local.threads)
+    still = STILL * tolerance * float(table[:texel_count].mean()) if texel_count else 0.0
     for _ in range(sweeps):
-        leaves.sweep(table)
+        leaves.sweep(table, changed, still)
         table[-1] = 0.0
-        irradiance = links.irradiance_steps(table, local.threads)
-        arriving = yield from scaled(irradiance, 1.0 - left, 1.0 - SWEPT * left)
+        steps = means.steps(table, changed)
+        mean = yield from scaled(steps, 1.0 - left, 1.0 - SWEPT * left)
         left *= SWEPT
-        indirect = np.maximum(arriving, 0.0)
+        indirect = np.maximum(links.spread_out(table, mean.copy(), local.threads), 0.0)
         table[-1] = sky
         radiosity = (reflectance * (direct + indirect)).astype(np.float32)
-        change = np.abs(radiosity - table[:texel_count]).max(initial=0.0)
-        table[:texel_count] = radiosity
-        if change <= tolerance * radiosity.mean():
+        change = np.abs(radiosity - table[:texel_count]).max(axis=1)
+        changed[:] = False
+        changed[:texel_count] = change > still
+        table[:texel_count][changed[:texel_count]] = radiosity[changed[:texel_count]]
+        if change.max(initial=0.0) <= tolerance * radiosity.mean():
             break
     return TexelLight(direct, indirect, estimated_error(links, table, direct + indirect, local.threads))
 
@@ -207,6 +220,7 @@ class _Leaves:
     def __init__(self, local: LocalPass, texel_count: int) -> None:
         self._local, self._texel_count = local, texel_count
         self._rows = np.zeros(0, dtype=np.int64)
+        self._means: _Means | None = None
         self._cells = np.zeros(0, dtype=np.int64)
         self.element = np.arange(len(local.reflected()))
 
@@ -274,11 +288,71 @@ class _Leaves:
         reached[self._rows[dark[seen]]] = True
         return bool(seen.any())
 
-    def sweep(self, table: Array) -> None:
-        """Update the leaves' rows of the table of reflected radiosity, among themselves to convergence."""
-        for _ in range(LEAF_SWEEPS if len(self._rows) else 0):
-            irradiance = self._lamps + mean_of_sources(table, self._sources)
-            table[self._rows] = self._reflectance * irradiance
+    def sweep(self, table: Array, changed: Array, still: float) -> None:
+        """Update the leaves' rows of the table of reflected radiosity, among themselves to convergence.
+
+        Parameters
+        ----------
+        changed : (table rows,) bool
+            What changed since the last call; rows that change now are added.
+        still : float
+            Rows that would change by less stay as they are.
+        """
+        if not len(self._rows):
+            return
+        if self._means is None:
+            self._means = _Means(self._sources, table.shape[1], self._local.threads)
+        fresh = changed.copy()
+        for _ in range(LEAF_SWEEPS):
+            irradiance = self._lamps + drain(self._means.steps(table, fresh))
+            reflected = (self._reflectance * irradiance).astype(np.float32)
+            moved = np.abs(reflected - table[self._rows]).max(axis=1) > still
+            if not moved.any():
+                break
+            rows = self._rows[moved]
+            table[rows] = reflected[moved]
+            fresh[:] = False
+            fresh[rows] = changed[rows] = True
+
+
+class _Means:
+    """Means over rows of sources, of which only those are made anew that see something changed.
+
+    Parameters
+    ----------
+    sources : (g, rays) int32
+    channels, threads : int
+    """
+
+    def __init__(self, sources: Array, channels: int, threads: int) -> None:
+        self._sources, self._threads = sources, threads
+        self._mean = np.zeros((len(sources), channels))
+        self._known = False
+
+    def steps(self, table: Array, changed: Array) -> Generator[float, None, Array]:
+        """Compute (g, channels) the means of the table's rows; yields the fraction done.
+
+        Parameters
+        ----------
+        changed : (table rows,) bool
+            Which rows changed since the last call; the first call asks all.
+        """
+        columns = _columns(table)
+
+        def average(rows: slice) -> None:
+            seen = self._sources[rows]
+            if not self._known:
+                self._mean[rows] = _mean_of(columns, seen)
+                return
+            again = np.flatnonzero(changed.take(seen, mode="wrap").any(axis=1))
+            if len(again):
+                self._mean[rows.start + again] = _mean_of(columns, seen[again])
+
+        if not self._known or changed.any():
+            chunk = max(CHUNK_HITS // max(self._sources.shape[1], 1), 1)
+            yield from chunk_steps(average, len(self._sources), chunk, self._threads)
+        self._known = True
+        return self._mean
 
 
 def mean_of_sources(table: Array, sources: Array) -> Array:
@@ -289,14 +363,22 @@ def mean_of_sources(table: Array, sources: Array) -> Array:
 def mean_steps(table: Array, sources: Array, threads: int) -> Generator[float, None, Array]:
     """Compute the same; yields the fraction done."""
     result = np.empty((len(sources), table.shape[1]))
-    columns = [np.ascontiguousarray(table[:, channel]) for channel in range(table.shape[1])]
+    columns = _columns(table)
 
     def average(rows: slice) -> None:
-        # Negative numbers count from the end, which `take` does not know.
-        seen = sources[rows].astype(np.intp)
-        seen[seen < 0] += len(table)
-        for channel, column in enumerate(columns):
-            result[rows, channel] = column.take(seen).mean(axis=1)
+        result[rows] = _mean_of(columns, sources[rows])
 
     yield from chunk_steps(average, len(sources), max(CHUNK_HITS // max(sources.shape[1], 1), 1), threads)
     return result
+
+
+def _columns(table: Array) -> list[Array]:
+    """Return the table's channels, each in one piece of memory."""
+    return [np.ascontiguousarray(table[:, channel]) for channel in range(table.shape[1])]
+
+
+def _mean_of(columns: list[Array], sources: Array) -> Array:
+    """Return (r, channels) means over the columns' values at (r, rays) sources."""
+    # "wrap" lets negative numbers count from the end.
+    seen = sources.astype(np.intp)
+    return np.stack([column.take(seen, mode="wrap").mean(axis=1) for column in columns], axis=1)

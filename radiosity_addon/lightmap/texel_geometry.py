@@ -40,8 +40,8 @@ class TexelGeometry:
     uv, page_of_triangle, triangles, face_normals, normals
         Of every scene triangle, as given.
     page, row, column, triangle : (n,) int32
-    centre_inside : (n,) bool
-        Whether the texel's centre is on its triangle.
+    centre_inside, whole : (n,) bool
+        Whether the texel's centre, and all of the texel, is on its triangle.
     barycentric : (n, 2) float32
         Weights of the triangle's second and third corner at the centre of the footprint.
     position, normal, surface_normal : (n, 3) float64
@@ -65,6 +65,7 @@ class TexelGeometry:
         self.row = np.concatenate([page.row for page in texels])
         self.column = np.concatenate([page.column for page in texels])
         self.centre_inside = np.concatenate([page.centre_inside for page in texels])
+        self.whole = np.concatenate([page.area for page in texels]) >= 1.0
         triangles = [of[page.triangle] for of, page in zip(rows, texels, strict=True)]
         self.triangle = np.concatenate(triangles).astype(np.int32)
         self._inset = _edge_inset(scene)
@@ -105,19 +106,41 @@ class TexelGeometry:
 
     def sample(self, rows: Array, u: Array, width: float = FOOTPRINT) -> Array:
         """Return (r, k, 3) points spread over the middle `width` of r texels by u (r, k, 2)."""
-        return _at(self._scene.triangles[self.triangle[rows]], self.sample_weights(rows, u, width))
+        points = np.empty((len(rows), u.shape[1], 3))
+        # The middle of a texel that is whole on its triangle needs no clipping.
+        inner = self.whole[rows] & (width < 1.0)
+        plain, cut = np.flatnonzero(inner), np.flatnonzero(~inner)
+        points[plain] = self._in_plane(rows[plain], 0.5 + (u[plain].astype(np.float64) - 0.5) * width)
+        corners = self._scene.triangles[self.triangle[rows[cut]]]
+        points[cut] = _at(corners, self.sample_weights(rows[cut], u[cut], width))
+        return points
 
     def squares(self, rows: Array) -> Array:
         """Return (r, 4, 3) the corners of whole texels, in their triangles' planes but not cut by them."""
-        place = self._places[self.triangle[rows]].astype(np.float64)
-        first, second = place[:, None, 2:4], place[:, None, 4:6]
-        origin = np.stack([self.column[rows], self.row[rows]], axis=1)[:, None]
-        at = origin + _SQUARE - place[:, None, :2]
-        whole = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
-        along = (at[..., 0] * second[..., 1] - at[..., 1] * second[..., 0]) / whole
-        across = (first[..., 0] * at[..., 1] - first[..., 1] * at[..., 0]) / whole
-        weights = np.stack([1.0 - along - across, along, across], axis=-1)
-        return _at(self._scene.triangles[self.triangle[rows]], weights)
+        return self._in_plane(rows, np.broadcast_to(_SQUARE, (len(rows), 4, 2)))
+
+    def _in_plane(self, rows: Array, spots: Array) -> Array:
+        """Return (r, k, 3) points in the triangles' planes at places (r, k, 2) of texels as unit squares."""
+        triangle = self.triangle[rows]
+        start = np.stack([self.column[rows], self.row[rows]], axis=1) - self._places[triangle, :2]
+        across, up = self._texel_edges
+        points = spots[..., :1] * across[triangle, None]
+        points += spots[..., 1:] * up[triangle, None]
+        first = self._scene.triangles[triangle, 0]
+        points += (first + start[:, :1] * across[triangle] + start[:, 1:] * up[triangle])[:, None]
+        return np.asarray(points)
+
+    @cached_property
+    def _texel_edges(self) -> tuple[Array, Array]:
+        """(t, 3) float64 twice: the way to the next texel of the row, and of the column; 0 without area."""
+        edges = self._scene.triangles[:, 1:] - self._scene.triangles[:, :1]
+        place = self._places.astype(np.float64)
+        first, second = place[:, 2:4], place[:, 4:6]
+        whole = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+        part = np.where(whole == 0.0, 0.0, 1.0 / np.where(whole == 0.0, 1.0, whole))[:, None]
+        across = (second[:, 1:] * edges[:, 0] - first[:, 1:] * edges[:, 1]) * part
+        up = (first[:, :1] * edges[:, 1] - second[:, :1] * edges[:, 0]) * part
+        return across, up
 
     def sample_weights(self, rows: Array, u: Array, width: float = FOOTPRINT) -> Array:
         """Return (r, k, 3) the barycentric weights of the same points in the texels' triangles."""
@@ -139,15 +162,22 @@ class TexelGeometry:
 
     def neighbourhood(self, chosen: Array) -> Array:
         """Grow a (n,) mask of texels by one texel in all eight directions of their page."""
-        grown = np.zeros(len(self), dtype=bool)
-        for numbers in self.index:
-            inside = numbers != NO_TEXEL
-            image = np.zeros(np.array(numbers.shape) + 2, dtype=bool)
-            image[1:-1, 1:-1][inside] = chosen[numbers[inside]]
+        grown = np.empty(len(self), dtype=bool)
+        for page, (numbers, inside) in enumerate(zip(self.index, self._framed, strict=True)):
+            mine = slice(self._first[page], self._first[page + 1])
+            image = np.zeros((len(numbers) + 2, numbers.shape[1] + 2), dtype=bool)
+            image.ravel()[inside] = chosen[mine]
             image[1:-1] = image[1:-1] | image[:-2] | image[2:]
             image[:, 1:-1] = image[:, 1:-1] | image[:, :-2] | image[:, 2:]
-            grown[numbers[inside]] = image[1:-1, 1:-1][inside]
+            grown[mine] = image.ravel().take(inside)
         return grown
+
+    @cached_property
+    def _framed(self) -> list[Array]:
+        """Per page, where its texels lie in a page that is one texel larger all around, row by row."""
+        return [
+            (page.row.astype(np.int64) + 1) * (page.resolution + 2) + page.column + 1 for page in self._texels
+        ]
 
     def positions_of(self, hits: Hits) -> Array:
         """Return (h, 3) where rays hit; meaningless without a hit."""

@@ -13,13 +13,13 @@ import numpy as np
 
 from .aiming import AimedRays, BrightElements
 from .arrays import Array
+from .footprints import Footprints
 from .parallel import chunk_steps
 from .sampling import cosine_hemisphere, orthonormal_basis, stratified_square
-from .shadow_share import Footprints
 from .visibility import Hits, RayCaster
 
-CHUNK_RAYS = 1 << 17
-"""Rays a thread prepares at once; bounds its temporaries to about 20 MB."""
+CHUNK_RAYS = 1 << 16
+"""Rays a thread prepares at once; bounds its temporaries to about 10 MB."""
 
 AIMED_PART = 4
 """One ray is aimed for so many cosine-distributed ones, where any are aimed."""

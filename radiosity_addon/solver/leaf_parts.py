@@ -11,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 
 from .arrays import Array
+from .footprints import Footprints
 from .gathering import NOTHING
 from .hierarchy import Hierarchy, split_in_sixteen
 from .sampling import points_on_triangles
-from .shadow_share import Footprints
 from .visibility import Hits, RayCaster, sees
 
 CELLS = 16

@@ -9,6 +9,7 @@ whose hits are looked up in the solution.
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -17,11 +18,12 @@ import numpy as np
 from .aiming import BrightElements
 from .arrays import Array
 from .emitters import EmitterGroup
+from .footprints import Footprints, Sampler, SpreadPoints
 from .gathering import NOTHING, SKY, Gathered, Gathering, Resolver
 from .leaf_parts import LeafParts
 from .lights import EnvironmentLight, Lamp
 from .radiometry import radiosity_of_radiance
-from .shadow_share import Footprints, Sampler, ShadowShare
+from .shadow_share import ShadowShare
 from .steps import drain, scaled
 from .visibility import Hits
 
@@ -79,14 +81,16 @@ class LocalPass:
         seeds += [self._seed + 17 + 7 * number for number in range(len(self.emitters))]
         count = len(seeds)
         lights: list[Lamp | EmitterGroup] = [*lamps, *self.emitters]
+        spread = SpreadPoints(at, self._seed + 2, self.threads)
         for done, (light, seed) in enumerate(zip(lights, seeds, strict=True)):
+            begin, end = done / count, (done + 1) / count
             if isinstance(light, EmitterGroup):
                 gain, caster = light.unit_irradiance(at.points, at.normals), self.caster
             else:
-                gain, caster = at.mean_gain(light, seed), self.caster.for_lamps
-            yield (done + 0.1) / count
-            share = ShadowShare(caster, light, at, seed, self.threads).steps(gain > 0, shadow_rays)
-            unblocked = yield from scaled(share, (done + 0.1) / count, (done + 1) / count)
+                caster = self.caster.for_lamps
+                gain = yield from scaled(spread.gain_steps(light), begin, begin + 0.1 / count)
+            share = ShadowShare(caster, light, spread, seed, self.threads).steps(gain, shadow_rays)
+            unblocked = yield from scaled(share, begin + 0.1 / count, end)
             total += (gain * unblocked)[:, None] * light.strength
         return total
 
@@ -206,7 +210,8 @@ class LocalPass:
 
     def part_direct(self, parts: Array) -> Generator[float, None, Array]:
         """Compute (p, 3) the irradiance of parts straight from lamps and emissive faces."""
-        return self.direct_steps(self.parts.footprints(parts), rays=16)
+        expected = self._state.irradiance[self.parts.leaf_of(parts)].mean(axis=1)
+        return self.direct_steps(replace(self.parts.footprints(parts), expected=expected), rays=16)
 
     def sky(self) -> Array:
         """Return (3,) the radiosity equivalent πL of the sky [W/m²]."""

@@ -10,7 +10,7 @@ from radiosity_addon.lightmap import accuracy
 from radiosity_addon.lightmap.interpolate import Interpolation
 from radiosity_addon.lightmap.reconstruct import GatherSettings
 from radiosity_addon.lightmap.sweeps import StoredLinks, TexelLight, estimated_error
-from radiosity_addon.quality import ERRORS, QUALITIES, for_error
+from radiosity_addon.quality import LADDER, for_error
 from radiosity_addon.settings import BakeSettings
 
 
@@ -43,13 +43,15 @@ def test_darkness_has_no_error() -> None:
     assert estimated_error(links_of(np.zeros((3, 4))), np.zeros((1, 3), np.float32), np.zeros((3, 3))) == 0.0
 
 
-@pytest.mark.parametrize("name", sorted(ERRORS))
-def test_a_quality_is_what_reaches_its_error(name: str) -> None:
-    found = for_error(ERRORS[name])
-    assert found.gather.rays == QUALITIES[name].gather.rays
-    assert found.gather.support == pytest.approx(QUALITIES[name].gather.support)
-    assert found.solver.error == pytest.approx(QUALITIES[name].solver.error)
-    assert found.solver.shadow_rays == QUALITIES[name].solver.shadow_rays
+@pytest.mark.parametrize("rung", range(len(LADDER)))
+def test_a_rung_of_the_ladder_is_what_reaches_its_error(rung: int) -> None:
+    error, quality = LADDER[rung]
+    found = for_error(error)
+    assert found.gather.rays == quality.gather.rays
+    assert found.gather.support == pytest.approx(quality.gather.support)
+    assert found.gather.tolerance == pytest.approx(quality.gather.tolerance)
+    assert found.solver.error == pytest.approx(quality.solver.error)
+    assert found.solver.shadow_rays == quality.solver.shadow_rays
 
 
 def test_smaller_errors_take_no_fewer_rays() -> None:

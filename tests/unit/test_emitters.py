@@ -8,10 +8,11 @@ import pytest
 from radiosity_addon.solver import Scene, emitters
 from radiosity_addon.solver.embree import EmbreeCaster
 from radiosity_addon.solver.emitters import EmitterGroup
+from radiosity_addon.solver.footprints import Footprints, SpreadPoints
 from radiosity_addon.solver.form_factor import point_to_polygon
 from radiosity_addon.solver.hierarchy import Faces
 from radiosity_addon.solver.sampling import stratified_square
-from radiosity_addon.solver.shadow_share import Footprints, ShadowShare
+from radiosity_addon.solver.shadow_share import ShadowShare
 from radiosity_addon.solver.steps import drain
 from tests.rooms import grey, rectangle
 
@@ -105,7 +106,7 @@ def test_a_hidden_face_far_off_does_not_darken_what_lies_close_before_a_large_on
     flat = np.random.default_rng(5).uniform(-0.5, 0.5, (count, 2))
     points = np.concatenate([flat, np.zeros((count, 1))], axis=1)
     at = Footprints(points, np.tile([0, 0, 1.0], (count, 1)), np.arange(count))
-    share = drain(ShadowShare(caster, group, at, 0).steps(np.ones(count, dtype=bool), 64))
+    share = drain(ShadowShare(caster, group, SpreadPoints(at, 0), 0).steps(np.ones(count, dtype=bool), 64))
     factor = factors(triangles, points, at.normals)
     truth = factor[:, :2].sum(axis=1) / factor.sum(axis=1)
     assert (truth < 0.999).mean() > 0.5
@@ -165,5 +166,5 @@ def test_lifted_rays_do_not_end_on_a_face_that_lies_parallel() -> None:
     (group,) = EmitterGroup.of_faces(Faces(scene), caster)
     points = np.concatenate([np.random.default_rng(5).uniform(-0.5, 0.5, (50, 2)), np.zeros((50, 1))], axis=1)
     at = Footprints(points, np.tile([0, 0, 1.0], (50, 1)), np.arange(50))
-    share = drain(ShadowShare(caster, group, at, 0).steps(np.ones(50, dtype=bool), 16))
+    share = drain(ShadowShare(caster, group, SpreadPoints(at, 0), 0).steps(np.ones(50, dtype=bool), 16))
     np.testing.assert_allclose(share, 1.0, rtol=1e-12)

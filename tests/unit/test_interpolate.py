@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from radiosity_addon.lightmap.interpolate import GatherPoints, Interpolation, _linear_weights, fit
+from radiosity_addon.lightmap.point_grid import PER_CELL
 from radiosity_addon.lightmap.texel_geometry import TexelGeometry
 from radiosity_addon.solver import Scene
 from radiosity_addon.solver.embree import EmbreeCaster
@@ -197,3 +198,26 @@ def test_a_tight_bunch_of_points_far_away_cannot_make_light():
     weights = _linear_weights(along, np.array([0.2, 0.5, 0.3]), np.array([3]))
     assert weights.sum() == pytest.approx(1.0, rel=1e-5)
     assert np.abs(weights).sum() <= 3.0 + 1e-5
+
+
+def test_what_was_weighed_before_is_not_weighed_anew_but_kept() -> None:
+    """The weights of a bake that asked for support are those of one that never did."""
+    geometry = geometry_of(rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0.5)))
+    asked = points_of(geometry, 4, 2, 1, closeness=4.0)
+    fresh = GatherPoints(geometry, caster_of(geometry), np.zeros(len(geometry), dtype=bool))
+    ends = np.cumsum([0, *(len(grid._numbers) - PER_CELL for grid in asked._grids)])
+    for stride, first, end in zip((4, 2, 1), ends, ends[1:], strict=False):
+        fresh.add(stride, asked.texel[first:end], asked.closeness[first:end])
+    assert len(asked._weighed.texels) > 0
+    assert len(fresh._weighed.texels) == 0
+    count = len(geometry)
+    again = weights_of(fit(fresh, geometry), fresh, count)
+    np.testing.assert_allclose(weights_of(fit(asked, geometry), asked, count), again, atol=2e-6)
+
+
+def test_the_threads_change_no_texel() -> None:
+    geometry = geometry_of(rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0.5)))
+    spread = fit(points_of(geometry, 4, 1), geometry)
+    values = np.random.default_rng(3).random((int(spread.point.max()) + 1, 3))
+    for threads in (2, 3):
+        np.testing.assert_array_equal(spread(values, threads), spread(values, 1))

@@ -7,7 +7,7 @@ import pytest
 
 from radiosity_addon.lightmap.interpolate import Interpolation
 from radiosity_addon.lightmap.reconstruct import GatherSettings, reconstruct
-from radiosity_addon.lightmap.sweeps import StoredLinks, TexelLight, sweep_steps
+from radiosity_addon.lightmap.sweeps import StoredLinks, TexelLight, _Means, mean_of_sources, sweep_steps
 from radiosity_addon.lightmap.texel_geometry import TexelGeometry
 from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, SolverSettings, solve
 from radiosity_addon.solver.local_pass import NOTHING, SKY
@@ -130,3 +130,20 @@ def test_direct_and_indirect_are_apart() -> None:
     assert (light.indirect[on_wall].max(axis=1) > 0).all()
     # The floor gets its second bounce from the wall, which is dark but for the first.
     assert light.direct[~on_wall].mean() > 5 * light.indirect[~on_wall].mean()
+
+
+def test_only_what_sees_a_change_is_asked_again() -> None:
+    random = np.random.default_rng(2)
+    sources = random.integers(-2, 40, (300, 8)).astype(np.int32)
+    table = random.random((42, 3)).astype(np.float32)
+    means = _Means(sources, 3, 2)
+    drain(means.steps(table, np.zeros(42, dtype=bool)))
+    changed = np.zeros(42, dtype=bool)
+    changed[[7, 41]] = True
+    stale = table.copy()
+    table[[7, 20, 41]] += 1.0
+    found = drain(means.steps(table, changed))
+    sees = changed[sources].any(axis=1)
+    assert 0 < sees.sum() < len(sees)
+    np.testing.assert_array_equal(found[sees], mean_of_sources(table, sources[sees]))
+    np.testing.assert_array_equal(found[~sees], mean_of_sources(stale, sources[~sees]))

@@ -129,3 +129,20 @@ def test_neighbourhood_grows_by_one_texel_and_stays_on_its_page() -> None:
     corner[geometry.index[1][0, 0]] = True
     assert geometry.neighbourhood(corner).sum() == 4
     assert not geometry.neighbourhood(np.zeros(len(geometry), dtype=bool)).any()
+
+
+def test_whole_texels_are_sampled_over_the_middle_half_of_their_squares() -> None:
+    geometry = two_pages()
+    rows = np.flatnonzero(geometry.whole)
+    assert 0 < len(rows) < len(geometry)
+    u = np.random.default_rng(4).random((len(rows), 5, 2))
+    triangle = geometry.triangle[rows]
+    edges = geometry.triangles[triangle, 1:] - geometry.triangles[triangle, :1]
+    offset = geometry.sample(rows, u) - geometry.triangles[triangle, :1]
+    weights = offset @ np.linalg.pinv(edges)
+    np.testing.assert_allclose(weights @ edges, offset, atol=1e-6 * np.abs(edges).max())
+    size = np.array([len(numbers) for numbers in geometry.index])[geometry.page[rows]]
+    corners = geometry.uv[triangle].astype(np.float64) * size[:, None, None]
+    spots = corners[:, :1] + weights @ (corners[:, 1:] - corners[:, :1])
+    lower_left = np.stack([geometry.column[rows], geometry.row[rows]], axis=1)[:, None]
+    np.testing.assert_allclose(spots, lower_left + 0.5 + 0.5 * (u - 0.5), atol=1e-4)

@@ -1,0 +1,156 @@
+"""Where light is asked for: points, and the footprints that samples are spread over."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+
+import numpy as np
+
+from .arrays import Array
+from .light_base import Lamp
+from .parallel import chunk_steps
+from .sampling import stratified_square
+
+SPREAD = 4
+"""Points of each footprint that all lamps share."""
+
+CHUNK_POINTS = 1 << 14
+"""Footprints worked on at once; bounds the temporaries to about 20 MB a thread."""
+
+SAME_GAIN = 0.02
+"""Where a lamp gives the centre of a footprint what it gives its farthest point, up to this
+part, the centre stands for all: what bends that little bends a mean by its square."""
+
+UNEVEN, MORE_GAINS = 0.02, 64
+"""Where the few points differ by more than this part, as beside a lamp and at the rim of a spot's cone,
+so many are asked."""
+
+DARKEST = 0.25
+"""Noise is measured by the light expected, or by this part of the mean where that is darker."""
+
+Sampler = Callable[[Array, Array], Array]
+"""(rows, u (r, k, 2)) → (r, k, 3): points of the rows' footprints."""
+
+
+Lift = Callable[[Array, Array, Array], Array]
+"""(rows, starts (r, k, 3), directions (r, k, 3)) → (r, k, 3): where shadow rays start instead."""
+
+
+@dataclass(frozen=True)
+class Footprints:
+    """Where light is asked for.
+
+    Attributes
+    ----------
+    points, normals : (n, 3) float64
+        Centres of the footprints, unit normals.
+    keys : (n,) int
+        With the seed, what places each point's samples.
+    sampler : callable or None
+        Spreads the samples over each point's footprint; None keeps them at the point.
+    near : callable or None
+        Grows a (n,) mask of doubtful points to their neighbours, which then also get the
+        larger number of rays.
+    starts : int or None
+        From how many samples a point's gather rays start, each of them a run that is stratified by
+        itself; None gives every ray its own.
+    expected : (n,) float64 or None [W/m²]
+        About how much light there is, a mean of the channels: a lamp that can add little to it is
+        asked with few shadow rays. None asks all lamps alike.
+    lift : callable or None
+        Moves the starts of shadow rays off a smooth surface's flat triangles.
+    """
+
+    points: Array
+    normals: Array
+    keys: Array
+    sampler: Sampler | None = None
+    near: Callable[[Array], Array] | None = None
+    starts: int | None = None
+    expected: Array | None = None
+    lift: Lift | None = None
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def weight_of(self, irradiance: Array) -> Array:
+        """Return (n,) in [0, 1]: how much an irradiance (n,) [W/m²] counts beside what is expected."""
+        if self.expected is None:
+            return np.ones(len(self))
+        scale = np.maximum(self.expected, DARKEST * self.expected.mean()) if len(self) else self.expected
+        return np.asarray(np.minimum(irradiance / np.maximum(scale, 1e-300), 1.0))
+
+
+class SpreadPoints:
+    """The centres of footprints and a few points spread over each, which all lamps share.
+
+    Attributes
+    ----------
+    at : Footprints
+    points : (n, SPREAD, 3) float32
+        Equal to the centre without a sampler.
+    """
+
+    def __init__(self, at: Footprints, seed: int, threads: int = 0) -> None:
+        self.at, self._seed, self._threads = at, seed, threads
+        self.points = np.empty((len(at), SPREAD if at.sampler else 1, 3), dtype=np.float32)
+        self._farthest = np.zeros(len(at), dtype=np.int8)
+
+        def spread(part: slice) -> None:
+            if at.sampler is None:
+                self.points[part] = at.points[part, None]
+                return
+            rows = np.arange(part.start, part.stop)
+            points = at.sampler(rows, stratified_square(at.keys[part], SPREAD, seed))
+            self.points[part] = points
+            self._farthest[part] = ((points - at.points[part, None]) ** 2).sum(axis=2).argmax(axis=1)
+
+        for _ in chunk_steps(spread, len(at), CHUNK_POINTS, threads):
+            pass
+
+    def gain_steps(self, light: Lamp) -> Generator[float, None, Array]:
+        """Compute (n,) the unoccluded irradiance per unit of strength, a mean over the footprint.
+
+        Yields
+        ------
+        fraction : float
+        """
+        at = self.at
+        gain = np.empty(len(at))
+
+        def ask(part: slice) -> None:
+            normals = at.normals[part]
+            own = light.unit_irradiance(at.points[part], normals)
+            if at.sampler is not None:
+                spread = self.points[part]
+                far = spread[np.arange(len(own)), self._farthest[part]].astype(np.float64)
+                other = light.unit_irradiance(far, normals)
+                rows = np.flatnonzero(np.abs(other - own) > SAME_GAIN * np.maximum(own, other))
+                own[rows] = self._varying(light, rows, part.start)
+            gain[part] = own
+
+        yield from chunk_steps(ask, len(at), CHUNK_POINTS, self._threads)
+        return gain
+
+    def _varying(self, light: Lamp, rows: Array, first: int) -> Array:
+        """Return (r,) the mean gain at some rows, counted from `first`, over which it varies."""
+        rows = rows + first
+        each = self._gains(light, rows, self.points[rows])
+        mean = each.mean(axis=1)
+        uneven = np.flatnonzero(each.std(axis=1) > UNEVEN * mean)
+        step = CHUNK_POINTS // MORE_GAINS * SPREAD
+        for start in range(0, len(uneven), step):
+            some = uneven[start : start + step]
+            more = rows[some]
+            unit = stratified_square(self.at.keys[more], MORE_GAINS, self._seed)
+            assert self.at.sampler is not None
+            mean[some] = self._gains(light, more, self.at.sampler(more, unit)).mean(axis=1)
+        return np.asarray(mean)
+
+    def _gains(self, light: Lamp, rows: Array, points: Array) -> Array:
+        """Return (r, k) the gain at (r, k, 3) points of some rows' footprints."""
+        count = points.shape[1]
+        flat = points.reshape(-1, 3).astype(np.float64)
+        gain = light.unit_irradiance(flat, np.repeat(self.at.normals[rows], count, axis=0))
+        return np.asarray(gain.reshape(-1, count))

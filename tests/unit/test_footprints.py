@@ -1,0 +1,81 @@
+"""What lamps are asked for over footprints: gains, and shadow rays by what a lamp adds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from radiosity_addon.solver.embree import EmbreeCaster
+from radiosity_addon.solver.footprints import Footprints, SpreadPoints
+from radiosity_addon.solver.lights import AreaLight, PointLight
+from radiosity_addon.solver.sampling import points_on_triangles, stratified_square
+from radiosity_addon.solver.shadow_share import MAIN_PART, ShadowShare
+from radiosity_addon.solver.steps import drain
+from tests.rooms import rectangle
+
+COUNT = 400
+LAMP = AreaLight((0.5, 0.5, 1.0), (0.4, 0, 0), (0, -0.4, 0), 5.0)
+"""Shines down on the floor z = 0."""
+
+
+def floor(expected: float | None = None, width: float = 0.02) -> Footprints:
+    """Squares in rows over the unit square."""
+    side = int(np.sqrt(COUNT))
+    steps = (np.arange(side) + 0.5) / side
+    points = np.stack([*np.meshgrid(steps, steps), np.zeros((side, side))], axis=-1).reshape(-1, 3)
+    flat = np.zeros((COUNT, 3, 3))
+    flat[:, 1, 0] = flat[:, 2, 1] = width
+    corners = points[:, None] - width / 3 * np.array([1.0, 1.0, 0.0]) + flat
+    return Footprints(
+        points,
+        np.tile([0.0, 0.0, 1.0], (COUNT, 1)),
+        np.arange(COUNT),
+        lambda rows, u: points_on_triangles(corners[rows], u),
+        expected=None if expected is None else np.full(COUNT, expected),
+    )
+
+
+def share_of(
+    at: Footprints, caster: EmbreeCaster, rays: int = 4, threads: int = 1, seed: int = 0
+) -> np.ndarray:
+    spread = SpreadPoints(at, seed + 2, threads)
+    gain = drain(spread.gain_steps(LAMP))
+    return drain(ShadowShare(caster, LAMP, spread, seed + 5, threads).steps(gain, rays))
+
+
+def blocker() -> EmbreeCaster:
+    return EmbreeCaster(rectangle((0.3, 0.3, 0.5), (0.4, 0, 0), (0, 0.4, 0)))
+
+
+def test_a_gain_is_the_mean_over_the_footprint() -> None:
+    """Where it bends most: the centre alone would be far off right under a lamp."""
+    near = PointLight((0.52, 0.48, 0.03), 1.0, radius=0.0)
+    at = floor(width=0.05)
+    assert at.sampler is not None
+    each = at.sampler(np.arange(COUNT), stratified_square(np.arange(COUNT), 4096, 9)).reshape(-1, 3)
+    mean = near.unit_irradiance(each, np.repeat(at.normals, 4096, axis=0)).reshape(COUNT, -1).mean(axis=1)
+    own = near.unit_irradiance(at.points, at.normals)
+    assert np.abs(own / mean - 1).max() > 0.2
+    gain = drain(SpreadPoints(at, 1).gain_steps(near))
+    np.testing.assert_allclose(gain, mean, rtol=0.05)
+    assert np.abs(gain - mean).mean() < 0.01 * mean.mean()
+
+
+@pytest.mark.parametrize("part", [1.0, 0.1, 0.02])
+def test_a_lamp_that_adds_little_gets_few_rays_and_the_same_mean(part: float) -> None:
+    at = floor()
+    power = float((LAMP.unit_irradiance(at.points, at.normals) * LAMP.strength.mean()).mean())
+    caster, seeds = blocker(), range(0, 80, 10)
+    shares = np.array([share_of(floor(power / (part * MAIN_PART)), caster, seed=seed) for seed in seeds])
+    truth = share_of(at, blocker(), rays=64)
+    # Of all light, the lamp's part of it: what it is wrong by, and its noise.
+    assert abs(shares.mean() - truth.mean()) * part < 0.008
+    assert np.sqrt(((shares - truth) ** 2).mean()) * part < 0.08
+    rays = caster.rays / shares.size
+    assert rays < {1.0: 64.0, 0.1: 16.0, 0.02: 4.0}[part]
+
+
+def test_the_threads_change_no_share() -> None:
+    one = share_of(floor(1.0), blocker())
+    for threads in (2, 3):
+        np.testing.assert_array_equal(share_of(floor(1.0), blocker(), threads=threads), one)
