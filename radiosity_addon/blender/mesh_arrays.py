@@ -77,6 +77,12 @@ def read_mesh(mesh: bpy.types.Mesh) -> MeshArrays | None:
     )
 
 
+def no_triangles() -> MeshArrays:
+    """Return a mesh without triangles."""
+    vectors, numbers = np.zeros((0, 3, 3)), np.zeros(0, dtype=np.int32)
+    return MeshArrays(vectors, vectors, np.zeros((0, 3), dtype=np.int32), numbers, numbers, None, 0)
+
+
 def all_finite(values: np.ndarray) -> bool:
     """Tell whether positions of any shape are neither NaN nor infinite."""
     return bool((np.abs(values) < _INFINITE).all())

@@ -23,6 +23,7 @@ from ..solver.visibility import Hits
 from .crossings import Crossings, crossing_steps
 from .interpolate import GatherPoints, fit_steps
 from .sweeps import StoredLinks, TexelLight, sweep_steps
+from .terminator import SmoothLift
 from .texel_geometry import NO_TEXEL, TexelGeometry
 
 DIRECT, CROSSED, GATHERED = 0.25, 0.3, 0.85
@@ -86,6 +87,7 @@ def footprints(geometry: TexelGeometry, local: LocalPass) -> Footprints:
         geometry.sample,
         geometry.neighbourhood,
         expected=local.irradiance_at(geometry.triangle, geometry.barycentric),
+        lift=SmoothLift(geometry),
     )
 
 

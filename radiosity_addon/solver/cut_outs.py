@@ -26,10 +26,17 @@ MOST_LAYERS = 1000
 
 
 def ray_caster(scene: Scene, threads: int = 0) -> RayCaster:
-    """Return what answers visibility queries about a scene."""
+    """Return what answers for the light of a scene's surfaces; it knows what answers for that of lamps."""
+    lamps = None
+    if (scene.in_shadows != scene.in_bounces).any():
+        lamps = _caster(scene, threads, scene.in_shadows, None)
+    return _caster(scene, threads, scene.in_bounces, lamps)
+
+
+def _caster(scene: Scene, threads: int, only: Array, for_lamps: RayCaster | None) -> RayCaster:
     if scene.images is None or not scene.images.cut_out.any():
-        return EmbreeCaster(scene.triangles, threads)
-    return CutOutCaster(scene.triangles, scene.images, threads)
+        return EmbreeCaster(scene.triangles, threads, only, for_lamps)
+    return CutOutCaster(scene.triangles, scene.images, threads, only, for_lamps)
 
 
 class CutOutCaster:
@@ -43,17 +50,41 @@ class CutOutCaster:
         Of the same triangles.
     threads : int
         0 means all cores. Results do not depend on it.
+    only : (t,) bool or None
+        The triangles that rays meet, where it is not all of them.
+    for_lamps : RayCaster or None
+        What stops the light of lamps, where that is something else.
     """
 
-    def __init__(self, triangles: Array, images: SurfaceImages, threads: int = 0) -> None:
-        self.rays = 0
+    def __init__(
+        self,
+        triangles: Array,
+        images: SurfaceImages,
+        threads: int = 0,
+        only: Array | None = None,
+        for_lamps: RayCaster | None = None,
+    ) -> None:
+        self._own_rays = 0
+        self._for_lamps = for_lamps
         self._counting = Lock()
         self.surface_offset = surface_offset(triangles)
         self._images = images
-        self._whole_rows = np.append(np.flatnonzero(~images.cut_out), NO_HIT).astype(np.int32)
-        self._cut_rows = np.append(np.flatnonzero(images.cut_out), NO_HIT).astype(np.int32)
-        self._whole = EmbreeCaster(triangles[~images.cut_out], threads)
-        self._cut = EmbreeCaster(triangles[images.cut_out], threads)
+        met = np.ones(len(triangles), dtype=bool) if only is None else only
+        whole, cut = met & ~images.cut_out, met & images.cut_out
+        self._whole_rows = np.append(np.flatnonzero(whole), NO_HIT).astype(np.int32)
+        self._cut_rows = np.append(np.flatnonzero(cut), NO_HIT).astype(np.int32)
+        self._whole = EmbreeCaster(triangles[whole], threads)
+        self._cut = EmbreeCaster(triangles[cut], threads)
+
+    @property
+    def for_lamps(self) -> RayCaster:
+        """The caster that knows what stops the light of lamps; most often this one."""
+        return self if self._for_lamps is None else self._for_lamps
+
+    @property
+    def rays(self) -> int:
+        """Rays asked for so far, those to lamps among them; what they meet on their way does not count."""
+        return self._own_rays + (0 if self._for_lamps is None else self._for_lamps.rays)
 
     def visible(self, origins: Array, directions: Array, distances: Array) -> Array:
         """Return (n,) bool: nothing that is there lies within `distances` along the unit `directions`."""
@@ -114,7 +145,7 @@ class CutOutCaster:
 
     def _count(self, rays: int) -> None:
         with self._counting:
-            self.rays += rays
+            self._own_rays += rays
 
 
 class _Ways:

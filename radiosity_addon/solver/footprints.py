@@ -36,6 +36,10 @@ Sampler = Callable[[Array, Array], Array]
 """(rows, u (r, k, 2)) → (r, k, 3): points of the rows' footprints."""
 
 
+Lift = Callable[[Array, Array, Array], Array]
+"""(rows, starts (r, k, 3), directions (r, k, 3)) → (r, k, 3): where shadow rays start instead."""
+
+
 @dataclass(frozen=True)
 class Footprints:
     """Where light is asked for.
@@ -57,6 +61,8 @@ class Footprints:
     expected : (n,) float64 or None [W/m²]
         About how much light there is, a mean of the channels: a lamp that can add little to it is
         asked with few shadow rays. None asks all lamps alike.
+    lift : callable or None
+        Moves the starts of shadow rays off a smooth surface's flat triangles.
     """
 
     points: Array
@@ -66,6 +72,7 @@ class Footprints:
     near: Callable[[Array], Array] | None = None
     starts: int | None = None
     expected: Array | None = None
+    lift: Lift | None = None
 
     def __len__(self) -> int:
         return len(self.points)

@@ -27,11 +27,11 @@ LEAF = -1
 class Faces:
     """The f sides of the scene's triangles that take part: fronts first, then backs.
 
-    Triangles without area have no faces. Backs exist where `two_sided`.
+    Triangles without area, or out of the bounces, have no faces. Backs exist where `two_sided`.
     """
 
     def __init__(self, scene: Scene) -> None:
-        solid = np.flatnonzero(scene.areas > 0)
+        solid = np.flatnonzero((scene.areas > 0) & scene.in_bounces)
         backs = solid[scene.two_sided[solid]]
         self.triangle = np.concatenate([solid, backs]).astype(np.int32)
         """(f,) int32"""

@@ -279,7 +279,8 @@ def lamp_light(
     rows = np.flatnonzero(gain > 0)
     directions, distances, above = light.shadow_rays(flat[rows], facing[rows], unit.reshape(-1, 1, 2)[rows])
     start = flat[rows] + caster.surface_offset * facing[rows]
-    free = caster.passing(start, directions[:, 0], distances[:, 0]) if light.casts_shadow else True
+    lamps = caster.for_lamps
+    free = lamps.passing(start, directions[:, 0], distances[:, 0]) if light.casts_shadow else True
     # A lamp point below the horizon says nothing: the closed form has cut it off already.
     weights[rows] = np.where(above[:, 0] > 0, gain[rows], 0.0)
     passed[rows] = weights[rows] * free

@@ -86,10 +86,11 @@ class LocalPass:
         for done, (light, seed) in enumerate(zip(lights, seeds, strict=True)):
             begin, end = done / count, (done + 1) / count
             if isinstance(light, EmitterGroup):
-                gain = light.unit_irradiance(at.points, at.normals)
+                gain, caster = light.unit_irradiance(at.points, at.normals), self.caster
             else:
+                caster = self.caster.for_lamps
                 gain = yield from scaled(spread.gain_steps(light), begin, begin + 0.1 / count)
-            share = ShadowShare(self.caster, light, spread, seed, self.threads).steps(gain, shadow_rays)
+            share = ShadowShare(caster, light, spread, seed, self.threads).steps(gain, shadow_rays)
             unblocked = yield from scaled(share, begin + 0.1 / count, end)
             total += (gain * unblocked)[:, None] * light.strength
         return total
@@ -184,17 +185,20 @@ class LocalPass:
 
     def reflected_at(self, triangle: Array, barycentric: Array) -> Array:
         """Return (n, 3): the same at points of triangles' fronts, (n, 2) weights of corners 2 and 3."""
-        hierarchy = self._state.hierarchy
-        face = hierarchy.faces.of_triangle[0, triangle]
-        leaf = hierarchy.leaf_at(np.maximum(face, 0), barycentric)
-        return np.where((face >= 0)[:, None], self.reflected()[leaf], 0.0)
+        return self._at_fronts(triangle, barycentric, self.reflected())
 
     def irradiance_at(self, triangle: Array, barycentric: Array) -> Array:
         """Return (n,) the elements' irradiance there, a mean of the channels [W/m²]."""
+        return self._at_fronts(triangle, barycentric, self._state.irradiance.mean(axis=1))
+
+    def _at_fronts(self, triangle: Array, barycentric: Array, values: Array) -> Array:
+        """Return the (e, …) values of the leaves at points of triangles' fronts; 0 where there is none."""
         hierarchy = self._state.hierarchy
         face = hierarchy.faces.of_triangle[0, triangle]
-        leaf = hierarchy.leaf_at(np.maximum(face, 0), barycentric)
-        return np.asarray(np.where(face >= 0, self._state.irradiance.mean(axis=1)[leaf], 0.0))
+        on_face = face >= 0
+        found = np.zeros((len(face), *values.shape[1:]))
+        found[on_face] = values[hierarchy.leaf_at(face[on_face], barycentric[on_face])]
+        return found
 
     @cached_property
     def parts(self) -> LeafParts:

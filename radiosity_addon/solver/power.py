@@ -22,6 +22,7 @@ from .radiometry import irradiance_under_sky
 from .sampling import cosine_hemisphere, points_on_triangles, stratified_square, to_world
 from .scene import Scene
 from .tree_top import TreeTop
+from .visibility import RayCaster
 
 if TYPE_CHECKING:
     from .state import SolverState
@@ -96,7 +97,7 @@ def _follow_surfaces(state: SolverState) -> tuple[float, float]:
     normals = hierarchy.normal[leaf]
     unit = stratified_square(number, 1, seed + 12)
     directions = to_world(cosine_hemisphere(unit), normals)[:, 0]
-    black, escaped = _fate(state, points + state.caster.surface_offset * normals, directions)
+    black, escaped = _fate(state, state.caster, points + state.caster.surface_offset * normals, directions)
     return total * float(black.mean()), total * float(escaped.mean())
 
 
@@ -111,16 +112,16 @@ def _follow_lamps(state: SolverState) -> tuple[float, float]:
         place = stratified_square(np.zeros(1, np.int64), count, seed)[0]
         way = stratified_square(np.zeros(1, np.int64), count, seed + 1)[0]
         origins, directions, share = light.emit(place, way)
-        black, escaped = _fate(state, origins, directions)
+        black, escaped = _fate(state, state.caster.for_lamps, origins, directions)
         flux = float(light.flux.mean())
         black_total += flux * float((black * share).sum() / share.sum())
         escaped_total += flux * float((escaped * share).sum() / share.sum())
     return black_total, escaped_total
 
 
-def _fate(state: SolverState, origins: Array, directions: Array) -> tuple[Array, Array]:
+def _fate(state: SolverState, caster: RayCaster, origins: Array, directions: Array) -> tuple[Array, Array]:
     """Return (n,) whether rays end on a black back, and whether they leave the scene."""
-    hits = state.caster.first_hits(origins, directions)
+    hits = caster.first_hits(origins, directions)
     escaped = hits.triangle < 0
     face = state.hierarchy.faces.of_triangle[(~hits.front).astype(int), hits.triangle]
     return ~escaped & (face < 0), escaped

@@ -41,6 +41,9 @@ class Scene:
     images : SurfaceImages or None
         Reflectance, emission and opacity of textured triangles in detail; their rows of
         `reflectance` and `emission` become the area means, opacity multiplied in.
+    in_bounces, in_shadows : bool or (t,) bool
+        Whether triangles meet the light that surfaces and sky send, and whether they stop that
+        of lamps. Out of bounces a triangle is lit but neither reflects nor emits.
 
     Raises
     ------
@@ -57,6 +60,8 @@ class Scene:
         lights: Sequence[Light] = (),
         normals: Array | None = None,
         images: SurfaceImages | None = None,
+        in_bounces: bool | Array = True,
+        in_shadows: bool | Array = True,
     ) -> None:
         self.triangles = np.ascontiguousarray(triangles, dtype=np.float64)
         if self.triangles.ndim != 3 or self.triangles.shape[1:] != (3, 3):
@@ -64,10 +69,9 @@ class Scene:
         count = len(self.triangles)
         self.reflectance = np.minimum(_rgb_rows("reflectance", reflectance, count), MAX_REFLECTANCE)
         self.emission = _rgb_rows("emission", emission, count)
-        sides = np.asarray(two_sided, dtype=bool)
-        if sides.shape not in ((), (count,)):
-            raise SceneError(f"two_sided has shape {sides.shape}; a bool or ({count},) is needed")
-        self.two_sided = np.broadcast_to(sides, (count,)).copy()
+        self.two_sided = _flags("two_sided", two_sided, count)
+        self.in_bounces = _flags("in_bounces", in_bounces, count)
+        self.in_shadows = _flags("in_shadows", in_shadows, count)
         self.lights = tuple(lights)
         if not np.isfinite(self.triangles).all():
             row = int(np.flatnonzero(~np.isfinite(self.triangles).all(axis=(1, 2)))[0])
@@ -107,6 +111,14 @@ class Scene:
 
     def __len__(self) -> int:
         return len(self.triangles)
+
+
+def _flags(name: str, values: bool | Array, count: int) -> Array:
+    """Return `values` as (count,) bool."""
+    flags = np.asarray(values, dtype=bool)
+    if flags.shape not in ((), (count,)):
+        raise SceneError(f"{name} has shape {flags.shape}; a bool or ({count},) is needed")
+    return np.broadcast_to(flags, (count,)).copy()
 
 
 def _rgb_rows(name: str, values: Array, count: int) -> Array:

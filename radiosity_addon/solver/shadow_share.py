@@ -149,6 +149,8 @@ class ShadowShare:
                 length = np.sqrt(np.einsum("rkc,rkc->rk", along, along))
                 directions = along / np.maximum(length, 1e-300)[..., None]
                 distances = np.where(finite, length, np.inf)
+            if at.lift is not None:
+                start = at.lift(chunk, np.broadcast_to(start, directions.shape), directions)
             start = np.broadcast_to(start + caster.surface_offset * normal[:, None], directions.shape)
             point, sample = np.nonzero(weights > 0)
             ray = (point, sample)

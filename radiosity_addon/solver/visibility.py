@@ -51,8 +51,16 @@ class RayCaster(Protocol):
 
     surface_offset: float
     """How far ray origins leave their surface [m]."""
-    rays: int
-    """Rays traced so far."""
+
+    @property
+    def rays(self) -> int:
+        """Rays traced so far."""
+        ...
+
+    @property
+    def for_lamps(self) -> RayCaster:
+        """The caster that knows what stops the light of lamps; most often this one."""
+        ...
 
     def visible(self, origins: Array, directions: Array, distances: Array) -> Array:
         """Return (n,) bool: nothing lies within `distances` along the unit `directions`."""
@@ -97,6 +105,11 @@ class BruteForceCaster:
         self._normal = np.cross(self._edge_1, self._edge_2)
         self.surface_offset = surface_offset(triangles)
         self.rays = 0
+
+    @property
+    def for_lamps(self) -> RayCaster:
+        """All triangles stop the light of lamps here."""
+        return self
 
     def visible(self, origins: Array, directions: Array, distances: Array) -> Array:
         """See `RayCaster.visible`."""
