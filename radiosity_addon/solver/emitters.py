@@ -107,6 +107,8 @@ class EmitterGroup:
             np.broadcast_to(points[:, None], shape).reshape(-1, 3),
             np.broadcast_to(normals[:, None], shape).reshape(-1, 3),
             np.broadcast_to(self._corners[None], (count, faces, 3, 3)).reshape(-1, 3, 3),
+            # Among the faces may be the back of the one the point is on.
+            contact=False,
         )
         return np.asarray(factors.reshape(count, faces) * self._level)
 
