@@ -171,7 +171,7 @@ def test_lifted_rays_do_not_end_on_a_face_that_lies_parallel() -> None:
 
 
 def test_a_face_does_not_light_itself_from_behind() -> None:
-    """Both sides of a floor glow, as a wall does: the floor gets the wall's light, and none from its own back."""
+    """Both sides of a floor glow, as a wall does: it gets the wall's light, none from its own back."""
     floor, wall = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0)), rectangle((0, 0, 0), (0, 1, 0), (0, 0, 1))
     points = np.array([[0.5, 0.5, 0.0], [0.1, 0.5, 0.0], [0.9, 0.2, 0.0]])
     scene = Scene(np.concatenate([floor, wall]), grey(4, 0.4), grey(4, 0.3), two_sided=True)
