@@ -1,4 +1,4 @@
-"""Five hundred random scenes: no crash, no NaN, no light from nothing, and restored exactly."""
+"""Hundreds of random scenes: no crash, no NaN, no light from nothing, and restored exactly."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+import bpy
 import numpy as np
 import pytest
-
-pytest.importorskip("bpy")
 
 import radiosity_addon
 from radiosity_addon import pipeline
@@ -21,6 +20,9 @@ from .checks import check
 from .scenes import SCENES
 
 ROOT = Path(__file__).resolve().parents[2]
+
+TRIED = SCENES if bpy.app.version[:2] == (5, 0) else SCENES // 5
+"""The Blender that tests are written with gets all, the others enough to meet what differs in them."""
 
 BAKED_SEED = 17
 """Its scene can be baked."""
@@ -32,7 +34,7 @@ TIMEOUT = 1500
 def test_random_scenes() -> None:
     """Processes share the seeds; one that Blender takes down with it is told by its exit code."""
     workers = max(os.cpu_count() or 1, 1)
-    limits = [SCENES * number // workers for number in range(workers + 1)]
+    limits = [TRIED * number // workers for number in range(workers + 1)]
     command = [sys.executable, "-m", "tests.fuzz", "--seeds"]
     running = [
         subprocess.Popen(
@@ -53,7 +55,7 @@ def test_random_scenes() -> None:
         assert process.returncode == 0, words[-3000:]
     baked = sum(int(re.findall(r"(\d+) baked", words)[-1]) for words in told)
     # The generator is of no use if many of its scenes are refused.
-    assert baked > 0.7 * SCENES
+    assert baked > 0.7 * TRIED
 
 
 def test_a_wrong_bake_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
