@@ -91,26 +91,32 @@ class SpreadPoints:
     Attributes
     ----------
     at : Footprints
-    points : (n, SPREAD, 3) float32
-        Equal to the centre without a sampler.
+    count : int
+        Points of each; 1, the centre, without a sampler.
     """
 
     def __init__(self, at: Footprints, seed: int, threads: int = 0) -> None:
         self.at, self._seed, self._threads = at, seed, threads
-        self.points = np.empty((len(at), SPREAD if at.sampler else 1, 3), dtype=np.float32)
+        self.count = SPREAD if at.sampler else 1
+        # From the centre: single precision is too coarse for the place of small things far from the origin.
+        self._apart = np.zeros((len(at), self.count, 3), dtype=np.float32)
         self._farthest = np.zeros(len(at), dtype=np.int8)
 
         def spread(part: slice) -> None:
             if at.sampler is None:
-                self.points[part] = at.points[part, None]
                 return
             rows = np.arange(part.start, part.stop)
             points = at.sampler(rows, stratified_square(at.keys[part], SPREAD, seed))
-            self.points[part] = points
-            self._farthest[part] = ((points - at.points[part, None]) ** 2).sum(axis=2).argmax(axis=1)
+            apart = points - at.points[part, None]
+            self._apart[part] = apart
+            self._farthest[part] = (apart**2).sum(axis=2).argmax(axis=1)
 
         for _ in chunk_steps(spread, len(at), CHUNK_POINTS, threads):
             pass
+
+    def points(self, rows: Array | slice) -> Array:
+        """Return (r, count, 3) float64: the points of some footprints."""
+        return np.asarray(self.at.points[rows, None] + self._apart[rows])
 
     def gain_steps(self, light: Lamp) -> Generator[float, None, Array]:
         """Compute (n,) the unoccluded irradiance per unit of strength, a mean over the footprint.
@@ -126,8 +132,8 @@ class SpreadPoints:
             normals = at.normals[part]
             own = light.unit_irradiance(at.points[part], normals)
             if at.sampler is not None:
-                spread = self.points[part]
-                far = spread[np.arange(len(own)), self._farthest[part]].astype(np.float64)
+                spread = self.points(part)
+                far = spread[np.arange(len(own)), self._farthest[part]]
                 other = light.unit_irradiance(far, normals)
                 rows = np.flatnonzero(np.abs(other - own) > SAME_GAIN * np.maximum(own, other))
                 jump[part] = np.abs(other - own) > EDGE * np.maximum(own, other)
@@ -144,7 +150,7 @@ class SpreadPoints:
     def _varying(self, light: Lamp, rows: Array, first: int) -> Array:
         """Return (r,) the mean gain at some rows, counted from `first`, over which it varies."""
         rows = rows + first
-        each = self._gains(light, rows, self.points[rows])
+        each = self._gains(light, rows, self.points(rows))
         mean = each.mean(axis=1)
         uneven = np.flatnonzero(each.std(axis=1) > UNEVEN * mean)
         mean[uneven] = self._many(light, rows[uneven])
@@ -164,6 +170,5 @@ class SpreadPoints:
     def _gains(self, light: Lamp, rows: Array, points: Array) -> Array:
         """Return (r, k) the gain at (r, k, 3) points of some rows' footprints."""
         count = points.shape[1]
-        flat = points.reshape(-1, 3).astype(np.float64)
-        gain = light.unit_irradiance(flat, np.repeat(self.at.normals[rows], count, axis=0))
+        gain = light.unit_irradiance(points.reshape(-1, 3), np.repeat(self.at.normals[rows], count, axis=0))
         return np.asarray(gain.reshape(-1, count))

@@ -162,9 +162,9 @@ class ShadowShare:
 
     def _starts(self, rows: Array, count: int) -> Array:
         """Return (r, count, 3) float64 points of the footprints of some rows."""
-        at, shared = self._at, self._spread.points
-        if count <= shared.shape[1]:
-            return np.asarray(shared[rows, :count], dtype=np.float64)
+        at = self._at
+        if count <= self._spread.count:
+            return self._spread.points(rows)[:, :count]
         assert at.sampler is not None
         some = min(count, STARTS)
         starts = at.sampler(rows, stratified_square(at.keys[rows], some, self._seed + 2))
