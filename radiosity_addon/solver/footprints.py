@@ -11,6 +11,7 @@ from .arrays import Array
 from .light_base import Lamp
 from .parallel import chunk_steps
 from .sampling import stratified_square
+from .steps import scaled
 
 SPREAD = 4
 """Points of each footprint that all lamps share."""
@@ -22,7 +23,7 @@ SAME_GAIN = 0.02
 """Where a lamp gives the centre of a footprint what it gives its farthest point, up to this
 part, the centre stands for all: what bends that little bends a mean by its square."""
 
-UNEVEN, MORE_GAINS = 0.02, 64
+UNEVEN, MORE_GAINS = 0.02, 256
 """Where the few points differ by more than this part, as beside a lamp and at the rim of a spot's cone,
 so many are asked."""
 
@@ -126,7 +127,8 @@ class SpreadPoints:
         fraction : float
         """
         at = self.at
-        gain, jump = np.empty(len(at)), np.zeros(len(at), dtype=bool)
+        gain = np.empty(len(at))
+        varies, jump = np.zeros((2, len(at)), dtype=bool)
 
         def ask(part: slice) -> None:
             normals = at.normals[part]
@@ -135,21 +137,26 @@ class SpreadPoints:
                 spread = self.points(part)
                 far = spread[np.arange(len(own)), self._farthest[part]]
                 other = light.unit_irradiance(far, normals)
-                rows = np.flatnonzero(np.abs(other - own) > SAME_GAIN * np.maximum(own, other))
+                varies[part] = np.abs(other - own) > SAME_GAIN * np.maximum(own, other)
                 jump[part] = np.abs(other - own) > EDGE * np.maximum(own, other)
-                own[rows] = self._varying(light, rows, part.start)
             gain[part] = own
 
-        yield from chunk_steps(ask, len(at), CHUNK_POINTS, self._threads)
+        yield from scaled(chunk_steps(ask, len(at), CHUNK_POINTS, self._threads), 0.0, 0.5)
+        # Right under a lamp two points may happen to see it alike: their neighbours do not.
+        bent = np.flatnonzero(varies if at.near is None else at.near(varies))
+
+        def average(part: slice) -> None:
+            gain[bent[part]] = self._varying(light, bent[part])
+
+        yield from scaled(chunk_steps(average, len(bent), CHUNK_POINTS, self._threads), 0.5, 1.0)
         if at.near is not None and jump.any():
             # An edge that only cuts a footprint's corner is found from its neighbours.
             rows = np.flatnonzero(at.near(jump) | (at.near(gain > 0) & at.near(gain <= 0)))
             gain[rows] = self._many(light, rows)
         return gain
 
-    def _varying(self, light: Lamp, rows: Array, first: int) -> Array:
-        """Return (r,) the mean gain at some rows, counted from `first`, over which it varies."""
-        rows = rows + first
+    def _varying(self, light: Lamp, rows: Array) -> Array:
+        """Return (r,) the mean gain at some rows, over which it varies."""
         each = self._gains(light, rows, self.points(rows))
         mean = each.mean(axis=1)
         uneven = np.flatnonzero(each.std(axis=1) > UNEVEN * mean)

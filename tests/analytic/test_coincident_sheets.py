@@ -36,7 +36,7 @@ def pages(twin: np.ndarray | None = None, baked: bool = True) -> dict[str, Light
     scene = Scene(triangles, grey(count, 0.7), grey(count, 0.0), lights=[lamp], two_sided=True)
     parts = [("Floor", 2), ("Ceiling", 2), ("Walls", 8)]
     twins = [] if twin is None else [("Twin", len(twin), None, baked)]
-    settings = BakeSettings(quality="draft", resolution=32, atlas="per-object")
+    settings = BakeSettings(quality="medium", resolution=32, atlas="per-object")
     result = drain(bake(bake_scene(scene, *parts, *twins), settings))
     named = zip(result.objects, result.pages, strict=True)
     return {item.object.name: page for item, page in named}
@@ -52,7 +52,7 @@ def values(page: LightmapPage) -> np.ndarray:
 
 
 def assert_alike(found: LightmapPage, expected: LightmapPage) -> None:
-    """The same in the mean, and texel by texel within the noise of draft quality."""
+    """The same in the mean, and texel by texel within the noise of medium quality."""
     mean = values(expected).mean()
     assert values(found).mean() == pytest.approx(mean, rel=2e-3)
     difference = values(found) - values(expected)

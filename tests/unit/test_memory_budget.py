@@ -46,6 +46,12 @@ def solve(triangles, **more):
     return state
 
 def peak():
+    # Where there is one: a child's ru_maxrss begins at what its parent had.
+    try:
+        status = open("/proc/self/status").read()
+        return int(status.split("VmHWM:")[1].split()[0]) / 2**20
+    except OSError:
+        pass
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**30 if sys.platform == "darwin" else 2**20)
 
 solve(box_room()[0], error=0.01)

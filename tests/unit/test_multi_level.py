@@ -10,7 +10,7 @@ import pytest
 from radiosity_addon.errors import UsageError
 from radiosity_addon.quality import quality_of
 from radiosity_addon.settings import BakeSettings
-from radiosity_addon.solver import PointLight, Scene, SolverSettings, solve
+from radiosity_addon.solver import PointLight, Scene, SolverSettings, memory_budget, solve
 from radiosity_addon.solver.exchange import exchange_areas
 from radiosity_addon.solver.hierarchy import LEAF, Hierarchy
 from radiosity_addon.solver.link_census import elements_by_level, leaves_by_level, links_by_level
@@ -275,10 +275,11 @@ def test_a_bake_limits_the_area_by_the_form_factor_error(given: dict[str, float]
 def test_memory_bounds_the_links_of_the_refined_hierarchy() -> None:
     """A limit too small for what the error asks stops refinement like a budget of links, and says so."""
     *_, (_, free) = hierarchical.solve_steps(furnished(), SolverSettings(error=1e-3))
-    faces = len(free.hierarchy.faces)
-    others = hierarchical.FACE_BYTES * faces
-    limit = (others + (len(free.links) // 2) * hierarchical.LINK_BYTES) / 2**30
-    *_, (_, bound) = hierarchical.solve_steps(furnished(), SolverSettings(error=1e-3, memory_limit=limit))
+    settings = SolverSettings(error=1e-3, memory_limit=1.0)
+    others = 2**30 - memory_budget.free_bytes(free.hierarchy, settings)
+    limit = (others + (len(free.links) // 2) * memory_budget.LINK_BYTES) / 2**30
+    tight = SolverSettings(error=1e-3, memory_limit=limit)
+    *_, (_, bound) = hierarchical.solve_steps(furnished(), tight)
     assert free.over_budget == 0.0
     assert bound.over_budget > 1e-3
-    assert len(bound.links) <= len(free.links) // 2
+    assert len(bound.links) <= memory_budget.link_budget(bound.hierarchy, tight, 0) < len(free.links)
