@@ -104,6 +104,7 @@ def sweep_steps(
     resolve: Resolver,
     sweeps: int,
     tolerance: float = TOLERANCE,
+    gain: Array | None = None,
 ) -> Generator[float, None, TexelLight]:
     """Iterate H = direct + Σ ρ H over the stored hits, started from the hierarchy's solution.
 
@@ -115,6 +116,8 @@ def sweep_steps(
         At most so many, …
     tolerance : float
         … or until no texel changes by more than this part of the mean.
+    gain : (n,) float64 or None
+        How much brighter than their mean the texels are where hits ask them; None is 1.
 
     Yields
     ------
@@ -123,6 +126,8 @@ def sweep_steps(
     """
     texel_count = len(geometry)
     reflectance = scene.reflectance[geometry.triangle]
+    if gain is not None:
+        reflectance = reflectance * gain[:, None]
     leaves = _Leaves(local, texel_count)
     links = yield from scaled(leaves.gather_steps(links, resolve), 0.0, 0.1)
     # Rows: texels, elements, their cells that were met, then NOTHING (−2) and SKY (−1). Columns lie

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .arrays import Array
+from .emitters import EmitterGroup
 from .light_base import Lamp
 from .parallel import chunk_steps
 from .sampling import stratified_square
@@ -102,8 +103,11 @@ class SpreadPoints:
         for _ in chunk_steps(spread, len(at), CHUNK_POINTS, threads):
             pass
 
-    def gain_steps(self, light: Lamp) -> Generator[float, None, Array]:
+    def gain_steps(self, light: Lamp | EmitterGroup, least: float = 0.0) -> Generator[float, None, Array]:
         """Compute (n,) the unoccluded irradiance per unit of strength, a mean over the footprint.
+
+        Where it is no more than `least` in the centre, that stands for all; without one, where the
+        farthest point gets the same.
 
         Yields
         ------
@@ -117,16 +121,18 @@ class SpreadPoints:
             own = light.unit_irradiance(at.points[part], normals)
             if at.sampler is not None:
                 spread = self.points[part]
-                far = spread[np.arange(len(own)), self._farthest[part]].astype(np.float64)
-                other = light.unit_irradiance(far, normals)
-                rows = np.flatnonzero(np.abs(other - own) > SAME_GAIN * np.maximum(own, other))
+                rows = np.flatnonzero(own > least)
+                if not least:
+                    far = spread[np.arange(len(own)), self._farthest[part]].astype(np.float64)
+                    other = light.unit_irradiance(far, normals)
+                    rows = np.flatnonzero(np.abs(other - own) > SAME_GAIN * np.maximum(own, other))
                 own[rows] = self._varying(light, rows, part.start)
             gain[part] = own
 
         yield from chunk_steps(ask, len(at), CHUNK_POINTS, self._threads)
         return gain
 
-    def _varying(self, light: Lamp, rows: Array, first: int) -> Array:
+    def _varying(self, light: Lamp | EmitterGroup, rows: Array, first: int) -> Array:
         """Return (r,) the mean gain at some rows, counted from `first`, over which it varies."""
         rows = rows + first
         each = self._gains(light, rows, self.points[rows])
@@ -141,7 +147,7 @@ class SpreadPoints:
             mean[some] = self._gains(light, more, self.at.sampler(more, unit)).mean(axis=1)
         return np.asarray(mean)
 
-    def _gains(self, light: Lamp, rows: Array, points: Array) -> Array:
+    def _gains(self, light: Lamp | EmitterGroup, rows: Array, points: Array) -> Array:
         """Return (r, k) the gain at (r, k, 3) points of some rows' footprints."""
         count = points.shape[1]
         flat = points.reshape(-1, 3).astype(np.float64)

@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 
 __all__ = ["NOTHING", "SKY", "Footprints", "Gathered", "LocalPass", "Resolver", "Sampler"]
 
+NEAR = 0.05
+"""Form factor beyond which emissive faces are so near that it may change over a texel."""
+
 
 class LocalPass:
     """Asks for the light at points of a solved scene."""
@@ -84,10 +87,8 @@ class LocalPass:
         spread = SpreadPoints(at, self._seed + 2, self.threads)
         for done, (light, seed) in enumerate(zip(lights, seeds, strict=True)):
             begin, end = done / count, (done + 1) / count
-            if isinstance(light, EmitterGroup):
-                gain = light.unit_irradiance(at.points, at.normals)
-            else:
-                gain = yield from scaled(spread.gain_steps(light), begin, begin + 0.1 / count)
+            gains = spread.gain_steps(light, NEAR if isinstance(light, EmitterGroup) else 0.0)
+            gain = yield from scaled(gains, begin, begin + 0.1 / count)
             share = ShadowShare(self.caster, light, spread, seed, self.threads).steps(gain, shadow_rays)
             unblocked = yield from scaled(share, begin + 0.1 / count, end)
             total += (gain * unblocked)[:, None] * light.strength
