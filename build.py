@@ -33,6 +33,7 @@ usage: python3 build.py VERB [arguments]
   restore SCENE [options]    take a bake out of a .blend again
   test [--bpy VERSION] ...   run the tests; what follows goes to pytest
                              --bpy 4.2 or 5.2: with that bpy, in an environment of its own
+  fuzz [--seeds A:B]         bake random scenes and check what must hold of each (default 0:500)
   bench [--case NAME] ...    measure against Cycles into bench/results and the README; --small tries
                              all of it out in a minute
   check                      lint, layer rule and types
@@ -53,6 +54,7 @@ def main(arguments: list[str]) -> int:
         "bake": bake,
         "restore": restore,
         "test": test,
+        "fuzz": fuzz,
         "bench": bench,
         "check": check,
         "figures": figures,
@@ -95,6 +97,12 @@ def test(arguments: list[str]) -> int:
         return 2
     os.chdir(ROOT)
     return environment.hand_over("-m", "pytest", *arguments)
+
+
+def fuzz(arguments: list[str]) -> int:
+    """Bake random scenes; more of them than the tests do, if so asked."""
+    os.chdir(ROOT)
+    return environments.main_environment(ROOT).hand_over("-m", "tests.fuzz", *arguments)
 
 
 def bench(arguments: list[str]) -> int:

@@ -41,6 +41,8 @@ class BakeObject:
         The mesh corner (loop) of each triangle corner: UVs go back through it.
     uv : (count, 3, 2) float32 or None
         The existing `Lightmap` UVs to keep; None to unwrap anew.
+    texel_scale : float
+        Its texels per metre, relative to the other objects.
     """
 
     name: str
@@ -50,6 +52,7 @@ class BakeObject:
     polygon: Array
     loops: Array
     uv: Array | None = None
+    texel_scale: float = 1.0
 
     @property
     def rows(self) -> slice:
@@ -168,6 +171,9 @@ class BakeResult:
         The scene's and the bake's own.
     seconds : dict of str to float
         Wall-clock time of each stage.
+    atlas : tuple of dict
+        Parallel to `pages`: "resolution", "texels_per_metre" of objects at texel scale 1,
+        "utilisation" (the share of texels that show a surface) and the number of "objects".
     """
 
     pages: tuple[LightmapPage, ...]
@@ -175,3 +181,4 @@ class BakeResult:
     solver: dict[str, Any]
     warnings: tuple[BakeWarning, ...]
     seconds: dict[str, float] = field(default_factory=dict)
+    atlas: tuple[dict[str, float], ...] = ()

@@ -24,7 +24,8 @@ EXIT_USAGE = 2
 EXIT_INTERRUPTED = 130
 
 SHARED_FIELDS = (
-    *("texel_density", "atlas", "quality", "relative_error", "quantity", "light", "format"),
+    *("texel_density", "pages", "max_resolution", "mip_levels", "padding", "unwrap_seconds"),
+    *("atlas", "quality", "relative_error", "quantity", "light", "format"),
     *("sky", "keep_uvs", "seed", "threads", "method", *SETTINGS),
 )
 """Settings whose option says exactly what the field says."""
@@ -83,8 +84,9 @@ def settings_of(request: argparse.Namespace) -> BakeSettings:
     given: dict[str, Any] = {name: getattr(request, name) for name in SHARED_FIELDS}
     if request.resolution is not None:
         given["resolution"] = request.resolution
-    if request.objects is not None:
-        given["objects"] = tuple(request.objects)
+    for name in ("objects", "light_only", "ignore"):
+        if getattr(request, name) is not None:
+            given[name] = tuple(getattr(request, name))
     return BakeSettings(**given)
 
 
@@ -140,6 +142,30 @@ def _add_bake(parser: argparse.ArgumentParser) -> None:
         metavar="PX_PER_M",
         help="pixels per metre; the page size follows from the surface",
     )
+    add("--pages", type=int, default=default.pages, metavar="N", help="shared images (default 1)")
+    add(
+        "--max-resolution",
+        type=int,
+        default=default.max_resolution,
+        metavar="N",
+        help=f"largest page that a density makes; more need more pages (default {default.max_resolution})",
+    )
+    between = parser.add_mutually_exclusive_group()
+    between.add_argument(
+        "--mip-levels",
+        type=int,
+        default=default.mip_levels,
+        metavar="N",
+        help="down to which mip level charts stay apart (default 0)",
+    )
+    between.add_argument("--padding", type=int, metavar="N", help="free texels between charts instead")
+    add(
+        "--unwrap-seconds",
+        type=float,
+        default=default.unwrap_seconds,
+        metavar="S",
+        help=f"longest time to unwrap one object well (default {default.unwrap_seconds:g})",
+    )
     accuracy = parser.add_mutually_exclusive_group()
     accuracy.add_argument(
         "--quality",
@@ -168,6 +194,8 @@ def _add_bake(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="what gets a lightmap; the rest still lights and blocks (default: every rendered mesh)",
     )
+    add("--light-only", nargs="+", metavar="NAME", help="what lights and blocks but gets no lightmap")
+    add("--ignore", nargs="+", metavar="NAME", help="what is left out as if it were not there")
     add(
         "--sky", action="store_true", help="add a white sky of strength 1 where the scene has no light at all"
     )

@@ -25,15 +25,17 @@ from .bake_scene import (
 )
 from .errors import BakeError, SceneError
 from .lightmap.accuracy import light_within
-from .lightmap.atlas import Atlas, AtlasInput, build_atlas
+from .lightmap.atlas import Atlas, AtlasInput, AtlasOptions, build_atlas
 from .lightmap.dilate import dilate
 from .lightmap.encode import to_quantity
 from .lightmap.error_picture import summary, texel_residual
+from .lightmap.packing import Limits, padding_for
 from .lightmap.rasterise import rasterise
 from .lightmap.reconstruct import GatherSettings, reconstruct
 from .lightmap.seams import Seams, find_seams
 from .lightmap.stitch import stitch_pages
 from .lightmap.texel_geometry import TexelGeometry
+from .lightmap.texel_materials import FOOTPRINT, texel_materials
 from .quality import for_error, quality_of, used_settings
 from .report import solver_part
 from .settings import BakeSettings
@@ -45,6 +47,12 @@ T = TypeVar("T")
 
 UNWRAP, RASTERISE, SOLVE, LIGHT, ENCODE = 0.0, 0.15, 0.2, 0.5, 0.97
 """How far the whole is when each stage begins; rough, from bakes at medium quality."""
+
+DILATED = 8
+"""Texels past the charts that are filled ring by ring, if not more are free."""
+
+FEW_TEXELS = 8
+"""An object with fewer than the square of so many texels is warned of."""
 
 PICTURE_SECONDS = 0.25
 """Time between two pictures of the solution: often enough to watch, too rarely to cost much."""
@@ -94,7 +102,8 @@ def bake(bake_scene: BakeScene, settings: BakeSettings) -> Generator[Progress, N
         values, error = yield from _staged(steps, "light", LIGHT, ENCODE)
     yield Progress("encode", ENCODE)
     with _timed(seconds, "encode"):
-        pages = _pages(geometry, values, _seams(bake_scene, solution, geometry, settings))
+        seams = _seams(bake_scene, solution, geometry, settings)
+        pages = _pages(geometry, values, seams, max(DILATED, _padding(settings)))
         _check(solution, pages)
 
     report = solver_part(solution.final_report(), used_settings(quality.solver), bake_scene.objects)
@@ -102,11 +111,12 @@ def bake(bake_scene: BakeScene, settings: BakeSettings) -> Generator[Progress, N
         report["estimated_error"] = error
     if settings.quantity == "residual":
         report["error_picture"] = summary(values)
-    warnings = (*bake_scene.warnings, *atlas.warnings, *_of_solution(solution, quality.solver))
+    of_texels = _of_texels(bake_scene, baked, geometry)
+    warnings = (*bake_scene.warnings, *atlas.warnings, *of_texels, *_of_solution(solution, quality.solver))
     objects = tuple(
         BakedObject(item, placed.uv, placed.page) for item, placed in zip(baked, atlas.objects, strict=True)
     )
-    return BakeResult(pages, objects, report, warnings, seconds)
+    return BakeResult(pages, objects, report, warnings, seconds, _told(atlas, pages))
 
 
 def _unwrap(
@@ -114,14 +124,27 @@ def _unwrap(
 ) -> Generator[Progress, None, Atlas]:
     """Lay the objects' charts out on pages."""
     inputs = [
-        AtlasInput(item.name, bake_scene.scene.triangles[item.rows], item.polygon, item.uv) for item in baked
+        AtlasInput(item.name, bake_scene.scene.triangles[item.rows], item.polygon, item.uv, item.texel_scale)
+        for item in baked
     ]
-    steps = build_atlas(inputs, settings.resolution, settings.texel_density, settings.atlas == "shared")
-    for step in steps:
+    options = AtlasOptions(
+        settings.resolution,
+        settings.texel_density,
+        settings.atlas == "shared",
+        settings.pages,
+        Limits(settings.max_resolution, _padding(settings)),
+        settings.unwrap_seconds,
+    )
+    for step in build_atlas(inputs, options):
         if isinstance(step, Atlas):
             return step
         yield Progress("unwrap", UNWRAP + (RASTERISE - UNWRAP) * step)
     raise AssertionError("the atlas ended without a result")
+
+
+def _padding(settings: BakeSettings) -> int:
+    """Return the free texels between charts."""
+    return padding_for(settings.mip_levels) if settings.padding is None else settings.padding
 
 
 def _texels(bake_scene: BakeScene, baked: list[BakeObject], atlas: Atlas) -> TexelGeometry:
@@ -132,6 +155,8 @@ def _texels(bake_scene: BakeScene, baked: list[BakeObject], atlas: Atlas) -> Tex
     for item, placed in zip(baked, atlas.objects, strict=True):
         uv[item.rows] = placed.uv
         page_of_triangle[item.rows] = placed.page
+    # What has no area has no side to be lit from, whatever its UVs say.
+    page_of_triangle[bake_scene.scene.areas == 0] = -1
     rows = [np.flatnonzero(page_of_triangle == page) for page in range(len(atlas.pages))]
     texels = [rasterise(uv[of], page.resolution) for of, page in zip(rows, atlas.pages, strict=True)]
     return TexelGeometry(bake_scene.scene, uv, page_of_triangle, texels, rows)
@@ -206,11 +231,10 @@ def _texel_values(
         "direct": light.direct,
         "indirect": light.indirect,
     }[settings.light]
-    scene = bake_scene.scene
-    emission = scene.emission[geometry.triangle]
+    reflectance, emission = texel_materials(bake_scene.scene, geometry, FOOTPRINT)
     if settings.light == "indirect":
         emission = np.zeros_like(emission)
-    values = to_quantity(irradiance, scene.reflectance[geometry.triangle], emission, settings.quantity)
+    values = to_quantity(irradiance, reflectance, emission, settings.quantity)
     return values, light.error
 
 
@@ -224,14 +248,16 @@ def _seams(
     return seams if settings.quantity != "radiosity" else seams.of_one_material(bake_scene.scene)
 
 
-def _pages(geometry: TexelGeometry, values: Array, seams: Seams | None) -> tuple[LightmapPage, ...]:
-    """Put texels' values on their pages, filled past the charts' borders, and stitch the seams."""
+def _pages(
+    geometry: TexelGeometry, values: Array, seams: Seams | None, rings: int
+) -> tuple[LightmapPage, ...]:
+    """Put texels' values on their pages, filled `rings` past the charts' borders, and stitch the seams."""
     pages = []
     for number, index in enumerate(geometry.index):
         pixels = np.zeros((*index.shape, 3), dtype=np.float32)
         coverage = index >= 0
         pixels[coverage] = values[geometry.page == number][index[coverage] - geometry.first(number)]
-        pages.append(LightmapPage(dilate(pixels, coverage), coverage))
+        pages.append(LightmapPage(dilate(pixels, coverage, rings), coverage))
     if seams is None or not len(seams):
         return tuple(pages)
     stitched = stitch_pages([page.pixels for page in pages], geometry, seams)
@@ -245,6 +271,34 @@ def _check(solution: Solution, pages: tuple[LightmapPage, ...]) -> None:
             "the solution is not finite: this is a defect of the solver; please report the scene, "
             "and try another quality meanwhile"
         )
+
+
+def _told(atlas: Atlas, pages: tuple[LightmapPage, ...]) -> tuple[dict[str, float], ...]:
+    """Return what the report says of each page."""
+    return tuple(
+        {
+            "resolution": laid.resolution,
+            "texels_per_metre": laid.density,
+            "utilisation": float(page.coverage.mean()),
+            "objects": sum(item.page == number for item in atlas.objects),
+        }
+        for number, (laid, page) in enumerate(zip(atlas.pages, pages, strict=True))
+    )
+
+
+def _of_texels(
+    bake_scene: BakeScene, baked: list[BakeObject], geometry: TexelGeometry
+) -> Iterator[BakeWarning]:
+    """Warn of objects that get hardly any texels."""
+    counts = np.bincount(geometry.triangle, minlength=len(bake_scene.scene))
+    for item in baked:
+        texels, surface = int(counts[item.rows].sum()), bake_scene.scene.areas[item.rows].sum()
+        if surface > 0 and texels < FEW_TEXELS**2:
+            yield BakeWarning(
+                item.name,
+                f"object '{item.name}' gets only {texels} texels, fewer than {FEW_TEXELS} × {FEW_TEXELS}: "
+                "raise the resolution or its texel scale",
+            )
 
 
 def _of_solution(solution: Solution, settings: SolverSettings) -> tuple[BakeWarning, ...]:

@@ -58,6 +58,8 @@ class BakeReport:
         seconds : dict of str to float
             Wall-clock time of every stage, those outside the pipeline included.
         """
+        told = result.atlas or ({},) * len(files)
+        pages = [{"image": file.path, **_plain(page)} for file, page in zip(files, told, strict=True)]
         objects = []
         for baked in result.objects:
             height, width = result.pages[baked.page].pixels.shape[:2]
@@ -78,6 +80,7 @@ class BakeReport:
             {
                 "version": VERSION,
                 "objects": objects,
+                "pages": pages,
                 "solver": _plain(solver),
                 "warnings": [{"name": w.name, "message": w.message} for w in result.warnings],
                 "seconds": {stage: round(float(taken), 4) for stage, taken in seconds.items()},

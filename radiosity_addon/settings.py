@@ -15,6 +15,9 @@ ATLASES = ("shared", "per-object")
 FORMATS = ("exr", "png16")
 
 MAX_RESOLUTION = 16384
+MAX_PAGES = 64
+MAX_MIP_LEVELS = 8
+MAX_PADDING = 512
 MIN_ERROR, MAX_ERROR = 0.002, 0.2
 
 
@@ -30,6 +33,17 @@ class BakeSettings:
         Texels per metre; the page size then follows from the surface area.
         Exclusive with an explicit resolution (the front doors see to that).
     atlas : "shared" or "per-object"
+    pages : int
+        How many pages of that resolution the objects of a shared atlas are shared out over;
+        with a density there are as many as it takes.
+    max_resolution : int
+        Width and height that a page may have at most where a density sets its size.
+    mip_levels : int
+        Down to which mip level charts stay apart, 0 to 8.
+    padding : int or None
+        Free texels between charts; None takes what the mip levels ask for.
+    unwrap_seconds : float
+        How long one object may be unwrapped before the rest of it is cut more simply.
     quality : "draft", "medium" or "high"
     relative_error : float or None
         The RMS error to reach, relative to the mean of the light, 0.002 to 0.2; replaces the
@@ -42,6 +56,9 @@ class BakeSettings:
     format : "exr" or "png16"
     objects : names of what gets a lightmap, or None for every render-visible mesh
         Everything else still lights and blocks.
+    light_only, ignore : tuple of str
+        Names of objects that get no lightmap, and of objects left out as if they were not
+        there; they win over the objects' own modes.
     sky : bool
         Add a white sky of strength 1 where the scene has no light at all.
     keep_uvs : bool
@@ -64,12 +81,19 @@ class BakeSettings:
     resolution: int = 512
     texel_density: float | None = None
     atlas: str = "shared"
+    pages: int = 1
+    max_resolution: int = MAX_RESOLUTION
+    mip_levels: int = 0
+    padding: int | None = None
+    unwrap_seconds: float = 60.0
     quality: str = "medium"
     relative_error: float | None = None
     quantity: str = "irradiance_over_pi"
     light: str = "all"
     format: str = "exr"
     objects: tuple[str, ...] | None = None
+    light_only: tuple[str, ...] = ()
+    ignore: tuple[str, ...] = ()
     sky: bool = False
     keep_uvs: bool = False
     seed: int = 0
@@ -93,12 +117,16 @@ class BakeSettings:
             raise UsageError(f"resolution {self.resolution} is not between 1 and {MAX_RESOLUTION} pixels")
         if self.texel_density is not None and not 0 < self.texel_density < float("inf"):
             raise UsageError(f"texel density {self.texel_density} is not a positive number of pixels a metre")
+        self._check_atlas()
         if self.relative_error is not None and not MIN_ERROR <= self.relative_error <= MAX_ERROR:
             raise UsageError(f"error {self.relative_error} is not between {MIN_ERROR} and {MAX_ERROR}")
         if self.relative_error is not None and self.quantity == "residual":
             raise UsageError("a residual is an error picture: leave --error out, or bake another quantity")
         if self.threads < 0:
             raise UsageError(f"threads {self.threads} is negative; 0 means all cores")
+        for name in (*self.light_only, *self.ignore):
+            if name in (self.objects or ()):
+                raise UsageError(f"object '{name}' cannot both get a lightmap and be light only or ignored")
         if self.seed < 0:
             raise UsageError(f"seed {self.seed} is negative")
         for name, value, allowed in (
@@ -113,6 +141,23 @@ class BakeSettings:
         if self.quantity == "residual":
             self._check_residual()
         check_method(self.method, self.method_settings())
+
+    def _check_atlas(self) -> None:
+        """Refuse what pages cannot be."""
+        if not 1 <= self.pages <= MAX_PAGES:
+            raise UsageError(f"{self.pages} pages are not between 1 and {MAX_PAGES}")
+        if self.pages > 1 and (self.atlas != "shared" or self.texel_density is not None):
+            raise UsageError("pages are for a shared atlas of a given resolution; else they are counted")
+        if not 4 <= self.max_resolution <= MAX_RESOLUTION:
+            raise UsageError(
+                f"largest page {self.max_resolution} is not between 4 and {MAX_RESOLUTION} pixels"
+            )
+        if not 0 <= self.mip_levels <= MAX_MIP_LEVELS:
+            raise UsageError(f"mip level {self.mip_levels} is not between 0 and {MAX_MIP_LEVELS}")
+        if self.padding is not None and not 1 <= self.padding <= MAX_PADDING:
+            raise UsageError(f"padding {self.padding} is not between 1 and {MAX_PADDING} pixels")
+        if not self.unwrap_seconds >= 0:
+            raise UsageError(f"unwrapping for {self.unwrap_seconds} seconds is not possible")
 
     def _check_residual(self) -> None:
         """Refuse what an error picture cannot be."""

@@ -129,7 +129,7 @@ def round_table(around: int) -> Shape:
 
 def sofa(around: int) -> Shape:
     """Return a sofa for two that faces +y."""
-    parts = [box("Green", (1.7, 0.85, 0.3), bottom=False)]
+    parts = [box("Green", (1.6, 0.83, 0.3), bottom=False)]
     parts += [cushion("Green", (0.7, 0.72, 0.2), around).at(x, 0.06, 0.39) for x in (-0.36, 0.36)]
     parts += [
         cushion("Green", (0.7, 0.22, 0.5), around).turned(-12, 0).at(x, -0.3, 0.66) for x in (-0.36, 0.36)

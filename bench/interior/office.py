@@ -23,6 +23,9 @@ SKY = (2.6, 3.4, 4.6)
 """Radiance [W/m²/sr]."""
 PANEL_POWER, DESK_LAMP_POWER, BULB_RADIANCE, SCREEN_RADIANCE = 55.0, 4.0, 90.0, 1.5
 
+LAMP_TURN = -40
+"""Of the desk lamps [°]: their heads hang over the desk, away from the monitors' edges."""
+
 COLOURS = {
     "Wall": (0.76, 0.74, 0.70),
     "Accent": (0.30, 0.42, 0.50),
@@ -82,7 +85,8 @@ def _pieces(detail: float) -> Iterator[tuple[str, Shape]]:
         things.append(papers.turned(random.uniform(-20, 20)).at(x - 0.58, y - 0.1, top))
         yield f"On Desk {number}", join(things)
         if number % 2 == 0:
-            yield f"Desk Lamp {number}", furniture.desk_lamp(around).at(x - 0.7, y + 0.25, top)
+            lamp = furniture.desk_lamp(around).turned(LAMP_TURN)
+            yield f"Desk Lamp {number}", lamp.at(x - 0.7, y + 0.25, top)
     for number in range(3 if detail >= 0.5 else 1):
         case = (
             furniture.bookcase(random, max(1, round(5 * detail)))
@@ -178,7 +182,9 @@ def _add_lamps(scene: bpy.types.Scene, detail: float) -> None:
         if number % 2 == 0:
             lamp = bpy.data.lights.new("Desk Lamp", "POINT")
             lamp.energy, lamp.shadow_soft_size, lamp.color = DESK_LAMP_POWER, 0.03, (1.0, 0.8, 0.55)
-            _add(scene, f"Bulb {number}", lamp, (x - 0.4, y + 0.25, 0.74 + 0.45))
+            turn = np.radians(LAMP_TURN)
+            head = (x - 0.7 + 0.3 * np.cos(turn), y + 0.25 + 0.3 * np.sin(turn), 0.74 + 0.45)
+            _add(scene, f"Bulb {number}", lamp, head)
 
 
 def _add(

@@ -177,12 +177,21 @@ def _show(context: bpy.types.Context, replacements: Sequence[_Replacement]) -> N
             mark_made(collection)
             context.scene.collection.children.link(collection)
         collection.objects.link(_new_stand_in(replacement))
-        hidden.add(_shown_by(replacement.source))
+        hidden |= _family(_shown_by(replacement.source))
     for name in sorted(hidden):
         obj = bpy.data.objects[name, None]
         record_hiding(obj)
         obj.hide_viewport = obj.hide_render = True
     context.view_layer.update()
+
+
+def _family(name: str) -> set[str]:
+    """Return an object's name, and those of the metaballs that melt into one surface with it."""
+    if bpy.data.objects[name, None].type != "META":
+        return {name}
+    base = name.split(".")[0]
+    balls = (obj for obj in bpy.data.objects if obj.type == "META" and obj.library is None)
+    return {obj.name for obj in balls if obj.name.split(".")[0] == base}
 
 
 def _swap_mesh(replacement: _Replacement) -> None:

@@ -10,11 +10,13 @@ import numpy as np
 
 from ..bake_scene import LIGHTMAP_UV_LAYER, BakeWarning
 from ..errors import SceneError
+from ..settings import BakeSettings
 from ..solver.lights import Light
 from .export_sources import ExportSource
-from .lamps import read_lamp
+from .lamps import LampFactors, read_lamp
 from .materials import DEFAULT_GREY, Surface, read_material
-from .mesh_arrays import MeshArrays, all_finite, not_finite_message, read_mesh
+from .mesh_arrays import MeshArrays, all_finite, no_triangles, not_finite_message, read_mesh
+from .object_roles import BAKE, BAKEABLE_TYPES, IGNORE, Role, role_of
 from .scene_objects import (
     is_generated,
     materials_of,
@@ -24,7 +26,8 @@ from .scene_objects import (
     unknown_objects,
     visible_objects,
 )
-from .world import read_world
+from .shading_inputs import MeshValues, asked_by_material, doubts, read_mesh_inputs, read_object_inputs
+from .surface_bake import can_evaluate
 
 
 @dataclass(frozen=True)
@@ -38,8 +41,14 @@ class Piece:
     matrix : (4, 4) float64
     surface : (t,) int32
         Rows of `Collected.surfaces`.
+    role : Role
+        Of what is ignored, `mesh` is empty.
+    asked : frozenset of str
+        What its materials' nodes ask for, of those that vary; see `shading_inputs`.
+    inputs : dict of str to (t, 3, 4) or (4,) float32
+        What was found of it: not what follows from `mesh` and `matrix`, nor what is missing.
     bakeable : bool
-        A lightmap can be assigned to it: it is a mesh and can be edited.
+        It is to have a lightmap, if it is asked for, and can: it may be edited.
     linked : bool
         It would be bakeable, were it not linked from a library.
     uv_layers : int
@@ -51,6 +60,9 @@ class Piece:
     mesh: MeshArrays
     matrix: np.ndarray
     surface: np.ndarray
+    role: Role
+    asked: frozenset[str]
+    inputs: dict[str, np.ndarray]
     bakeable: bool
     linked: bool
     uv_layers: int
@@ -59,34 +71,51 @@ class Piece:
     @property
     def names(self) -> tuple[str, ...]:
         """The names by which a user may ask for it."""
-        return tuple(filter(None, (self.source.name, self.source.object_name, self.source.instancer)))
+        return _names(self.source)
+
+
+@dataclass(frozen=True)
+class _Contents:
+    """What a piece holds; see there."""
+
+    mesh: MeshArrays
+    surface: np.ndarray
+    asked: frozenset[str]
+    inputs: dict[str, np.ndarray]
+
+
+_NOTHING = _Contents(no_triangles(), np.zeros(0, dtype=np.int32), frozenset(), {})
 
 
 @dataclass(frozen=True)
 class Collected:
-    """All that was found. `surfaces` is indexed by `Piece.surface`."""
+    """All that was found. `surfaces` and `materials` are indexed by `Piece.surface`."""
 
     pieces: list[Piece]
     surfaces: list[Surface]
+    materials: list[bpy.types.Material | None]
     lights: list[Light]
     warnings: list[BakeWarning]
 
 
-def collect(depsgraph: bpy.types.Depsgraph) -> Collected:
-    """Read meshes, materials, lamps and world of an evaluated scene.
+def collect(
+    depsgraph: bpy.types.Depsgraph, factors: LampFactors, settings: BakeSettings | None = None
+) -> Collected:
+    """Read meshes, materials and lamps of an evaluated scene; `factors` are those of `lamp_factors`.
+
+    `settings.ignore` and `settings.light_only` name objects to leave out, or without lightmaps.
 
     Raises
     ------
     SceneError
         If a coordinate is NaN or infinite.
     """
-    collector = _Collector(depsgraph)
+    collector = _Collector(depsgraph, factors, settings or BakeSettings())
     for instance in visible_objects(depsgraph):
         if instance.object.type == "LIGHT":
             collector.lamp(instance)
         else:
             collector.mesh(instance)
-    collector.world(depsgraph.scene_eval.world)
     for name, kind in unknown_objects(depsgraph).items():
         message = f"object '{name}' is {kind}; that is left out: it neither lights nor blocks"
         collector.collected.warnings.append(BakeWarning(name, message))
@@ -94,12 +123,16 @@ def collect(depsgraph: bpy.types.Depsgraph) -> Collected:
 
 
 class _Collector:
-    def __init__(self, depsgraph: bpy.types.Depsgraph) -> None:
-        self.collected = Collected([], [], [], [])
+    def __init__(self, depsgraph: bpy.types.Depsgraph, factors: LampFactors, settings: BakeSettings) -> None:
+        self._factors = factors
+        self._settings = settings
+        self.collected = Collected([], [], [], [], [])
         self._override = depsgraph.view_layer_eval.material_override
-        self._meshes: dict[int, MeshArrays | None] = {}
+        self._meshes: dict[tuple[int, frozenset[str]], tuple[MeshArrays | None, MeshValues]] = {}
+        self._asked: list[frozenset[str]] = []
         self._surface_of: dict[str | None, int] = {}
-        self._taken = {obj.name for obj in bpy.data.objects if obj.library is None}
+        # A curve's mesh comes as an instance, and may have the curve's own name.
+        self._taken = {obj.name for obj in bpy.data.objects if obj.library is None and obj.type == "MESH"}
         self._instancers = {
             instance.parent.original.name
             for instance in visible_objects(depsgraph)
@@ -107,13 +140,7 @@ class _Collector:
         }
 
     def lamp(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
-        light, warnings = read_lamp(instance.object, matrix_of(instance))
-        self._warn(warnings)
-        if light is not None:
-            self.collected.lights.append(light)
-
-    def world(self, world: bpy.types.World | None) -> None:
-        light, warnings = read_world(world)
+        light, warnings = read_lamp(instance.object, matrix_of(instance), self._factors)
         self._warn(warnings)
         if light is not None:
             self.collected.lights.append(light)
@@ -121,41 +148,65 @@ class _Collector:
     def mesh(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
         shown = original_object(instance)
         matrix = matrix_of(instance)
-        mesh = self._read(instance)
-        if mesh is None or not all_finite(matrix):
-            raise SceneError(not_finite_message(shown.name))
-        if len(mesh) == 0:
-            return
+        owner = instance.parent.original if instance.is_instance else shown
         name = self._unique_name(instance)
         source = source_of(instance, name, not instance.is_instance and shown.name in self._instancers)
-        owner = instance.parent.original if instance.is_instance else shown
+        role = role_of(shown, owner, _names(source), self._settings)
+        # What is ignored stays known: it must still be shown where its instancer will be hidden.
+        contents = _NOTHING if role.mode == IGNORE else self._contents(instance)
+        if contents is None or not all_finite(matrix):
+            raise SceneError(not_finite_message(shown.name))
+        mesh = contents.mesh
+        if len(mesh) == 0 and role.mode != IGNORE:
+            return
+        self._warn_of_empty_slots(instance, name, mesh)
+        can_bake = role.mode == BAKE and shown.type in BAKEABLE_TYPES
         is_mesh = shown.type == "MESH"
         layers = (
             {layer.name for layer in shown.data.uv_layers} if is_mesh and not instance.is_instance else set()
         )
-        self._warn_about(shown, owner, is_mesh)
+        if can_bake and owner.library is not None:
+            self._warn([_linked(owner.name)])
+        self._warn(role.warnings)
         self.collected.pieces.append(
             Piece(
                 source=source,
                 mesh=mesh,
                 matrix=matrix,
-                surface=self._surfaces(instance, name, mesh),
-                bakeable=is_mesh and owner.library is None,
-                linked=is_mesh and owner.library is not None,
+                surface=contents.surface,
+                asked=contents.asked,
+                inputs=contents.inputs,
+                role=role,
+                bakeable=can_bake and owner.library is None,
+                linked=can_bake and owner.library is not None,
                 uv_layers=max(mesh.uv_layers, len(layers)),
                 has_lightmap_layer=mesh.lightmap_uv is not None or LIGHTMAP_UV_LAYER in layers,
             )
         )
 
-    def _read(self, instance: bpy.types.DepsgraphObjectInstance) -> MeshArrays | None:
+    def _contents(self, instance: bpy.types.DepsgraphObjectInstance) -> _Contents | None:
+        """Read the mesh and what it shows; None if a coordinate is NaN or infinite."""
+        slots = self._slots(instance)
+        asked = frozenset().union(*(self._asked[row] for row in slots))
+        mesh, inputs = self._read(instance, asked)
+        if mesh is None:
+            return None
+        # A face whose slot does not exist shows the last one, as in Blender.
+        surface = slots[np.clip(mesh.material, 0, len(slots) - 1)]
+        return _Contents(mesh, surface, asked, {**inputs, **read_object_inputs(instance, asked)})
+
+    def _read(
+        self, instance: bpy.types.DepsgraphObjectInstance, asked: frozenset[str]
+    ) -> tuple[MeshArrays | None, MeshValues]:
+        """Return a mesh's triangles, and what is asked of it at their corners."""
         obj = instance.object
-        key = obj.data.as_pointer()
+        key = (obj.data.as_pointer(), asked)
         if key not in self._meshes:
             if is_generated(instance):
-                self._meshes[key] = read_mesh(obj.data)
+                self._meshes[key] = _read_evaluated(obj.data, asked)
             else:
                 # Not `obj.data`: a window's subdivision may still be pending on the GPU.
-                self._meshes[key] = read_mesh(obj.to_mesh())
+                self._meshes[key] = _read_evaluated(obj.to_mesh(), asked)
                 obj.to_mesh_clear()
         return self._meshes[key]
 
@@ -163,7 +214,8 @@ class _Collector:
         shown = original_object(instance)
         if not instance.is_instance and shown.library is None:
             return shown.name
-        base = f"{instance.parent.original.name}/{shown.name}" if instance.is_instance else shown.name
+        own = not instance.is_instance or (shown.type != "MESH" and instance.parent.original == shown)
+        base = shown.name if own else f"{instance.parent.original.name}/{shown.name}"
         name, count = base, 0
         while name in self._taken:
             count += 1
@@ -171,45 +223,56 @@ class _Collector:
         self._taken.add(name)
         return name
 
-    def _surfaces(
-        self, instance: bpy.types.DepsgraphObjectInstance, name: str, mesh: MeshArrays
-    ) -> np.ndarray:
-        """Return the row of `collected.surfaces` for each triangle, (t,) int32."""
+    def _slots(self, instance: bpy.types.DepsgraphObjectInstance) -> np.ndarray:
+        """Return the row of `collected.surfaces` for each material slot, (s,) int32."""
         if self._override is not None:
-            return np.full(len(mesh), self._surface(self._override), dtype=np.int32)
+            return np.array([self._surface(self._override)], dtype=np.int32)
         materials = materials_of(instance)
-        if any(material is None for material in materials):
+        rows = [self._surface(material) for material in materials or [None]]
+        return np.array(rows, dtype=np.int32)
+
+    def _warn_of_empty_slots(
+        self, instance: bpy.types.DepsgraphObjectInstance, name: str, mesh: MeshArrays
+    ) -> None:
+        materials = [] if self._override is not None else materials_of(instance)
+        used = np.unique(np.clip(mesh.material, 0, max(len(materials) - 1, 0)))
+        if any(materials[slot] is None for slot in used if slot < len(materials)):
             message = f"object '{name}' has an empty material slot; grey {DEFAULT_GREY} is used"
             self._warn([BakeWarning(name, message)])
-        rows = np.array([self._surface(material) for material in materials or [None]], dtype=np.int32)
-        # A face whose slot does not exist shows the last one, as in Blender.
-        return rows[np.clip(mesh.material, 0, len(rows) - 1)]
 
     def _surface(self, material: bpy.types.Material | None) -> int:
         key = None if material is None else material.original.name_full
         if key not in self._surface_of:
             surface = read_material(material)
-            self._warn(surface.warnings)
             self._surface_of[key] = len(self.collected.surfaces)
             self.collected.surfaces.append(surface)
-        return self._surface_of[key]
-
-    def _warn_about(self, shown: bpy.types.Object, owner: bpy.types.Object, is_mesh: bool) -> None:
-        if not is_mesh:
-            self._warn([_unlit(shown.name, "is not a mesh", "convert it to one")])
-        elif owner.library is not None:
-            self._warn(
-                [_unlit(owner.name, "is linked from a library", "make it local or a library override")]
+            self.collected.materials.append(material and material.original)
+            self._asked.append(
+                asked_by_material(material.node_tree) if material and surface.varies else frozenset()
             )
-        for kind in ("shadow", "diffuse"):
-            if not getattr(shown, f"visible_{kind}"):
-                message = f"'Ray Visibility: {kind.title()}' off is ignored: it lights and blocks"
-                self._warn([BakeWarning(shown.name, f"object '{shown.name}': {message}")])
+            self._warn(surface.warnings)
+            if material is not None and surface.varies:
+                said = [
+                    BakeWarning(material.name, f"material '{material.name}': {doubt}")
+                    for doubt in doubts(material.node_tree)
+                ]
+                self._warn(said if can_evaluate() else surface.fallbacks)
+        return self._surface_of[key]
 
     def _warn(self, warnings: Sequence[BakeWarning]) -> None:
         self.collected.warnings.extend(warnings)
 
 
-def _unlit(name: str, why: str, mend: str) -> BakeWarning:
-    what = f"object '{name}' {why}: it lights and blocks but gets no lightmap"
-    return BakeWarning(name, f"{what}; {mend} to bake it")
+def _read_evaluated(mesh: bpy.types.Mesh, asked: frozenset[str]) -> tuple[MeshArrays | None, MeshValues]:
+    arrays = read_mesh(mesh)
+    return arrays, {} if arrays is None else read_mesh_inputs(mesh, arrays.loops, asked)
+
+
+def _names(source: ExportSource) -> tuple[str, ...]:
+    """Return the names by which a user may ask for what a source shows."""
+    return tuple(filter(None, (source.name, source.object_name, source.instancer)))
+
+
+def _linked(name: str) -> BakeWarning:
+    what = f"object '{name}' is linked from a library: it lights and blocks but gets no lightmap"
+    return BakeWarning(name, f"{what}; make it local or a library override to bake it")

@@ -14,8 +14,12 @@ from ..solver.lights import EnvironmentLight
 from ..solver.scene import Scene
 from .collect import Collected, Piece, collect
 from .export_sources import Export
+from .lamps import lamp_factors
 from .mesh_arrays import all_finite, degenerate, not_finite_message, world_from_object
+from .object_roles import BAKE, BAKEABLE_TYPES, half_visible
 from .render_state import leave_edit_mode, render_depsgraph
+from .surface_evaluation import evaluate_surfaces
+from .world import read_world
 
 MAX_UV_LAYERS = 8
 
@@ -28,7 +32,7 @@ def export_scene(context: bpy.types.Context, settings: BakeSettings) -> Export:
     context : bpy.types.Context
         Of a scene without lightmaps: restore an earlier bake first.
     settings : BakeSettings
-        `objects`, `sky` and `keep_uvs` matter here.
+        `objects`, `light_only`, `ignore`, `sky` and `keep_uvs` matter here.
 
     Returns
     -------
@@ -37,14 +41,20 @@ def export_scene(context: bpy.types.Context, settings: BakeSettings) -> Export:
     Raises
     ------
     UsageError
-        If `settings.objects` names what is not there or cannot have a lightmap.
+        If settings name objects that are not there, or that cannot have a lightmap and should.
     SceneError
         If there is nothing to bake, a coordinate is NaN or infinite, or an object to be
         baked has no room for another UV layer.
     """
     leave_edit_mode(context)
+    factors = lamp_factors()
     with render_depsgraph(context) as depsgraph:
-        collected = collect(depsgraph)
+        collected = collect(depsgraph, factors, settings)
+    # After that: Cycles may have to render it, which no evaluated object would survive.
+    world, warnings = read_world(context.scene.world)
+    collected.lights.extend(world)
+    collected.warnings.extend(warnings)
+    _check_names(context, collected.pieces, settings)
     chosen = _chosen(context, collected.pieces, settings.objects)
     for piece in chosen:
         _check_uv_layers(piece)
@@ -58,6 +68,7 @@ def _assemble(
     reflectance = np.array([surface.reflectance for surface in collected.surfaces]).reshape(-1, 3)
     emission = np.array([surface.emission for surface in collected.surfaces]).reshape(-1, 3)
     objects, corners, normals, surfaces = [], [], [], []
+    in_bounces, in_shadows = [], []
     first, area_to_bake = 0, False
     for piece in collected.pieces:
         mesh = piece.mesh
@@ -80,8 +91,11 @@ def _assemble(
                 polygon=mesh.polygon,
                 loops=np.ascontiguousarray(mesh.loops[:, order]),
                 uv=None if uv is None else np.ascontiguousarray(uv[:, order]),
+                texel_scale=piece.role.texel_scale,
             )
         )
+        in_bounces.append(np.full(len(mesh), piece.role.in_bounces))
+        in_shadows.append(np.full(len(mesh), piece.role.in_shadows))
         corners.append(world)
         normals.append(world_normals)
         surfaces.append(piece.surface)
@@ -90,20 +104,35 @@ def _assemble(
         raise SceneError(_nothing_to_bake(context))
 
     surface = np.concatenate(surfaces)
-    lights = list(collected.lights)
-    if not lights and not emission[surface].any():
-        if settings.sky:
-            lights.append(EnvironmentLight(1.0))
-        else:
-            warnings.append(_no_light(context))
+    images = evaluate_surfaces(
+        context,
+        collected.pieces,
+        collected.surfaces,
+        collected.materials,
+        settings,
+    )
     scene = Scene(
         triangles=np.concatenate(corners),
         reflectance=reflectance[surface],
         emission=emission[surface],
         two_sided=True,  # Blender's surfaces reflect and emit on both sides
-        lights=lights,
+        lights=collected.lights,
         normals=np.concatenate(normals),
+        images=images,
+        in_bounces=np.concatenate(in_bounces),
+        in_shadows=np.concatenate(in_shadows),
     )
+    if not scene.lights and not scene.emission.any():
+        if settings.sky:
+            scene.lights = (EnvironmentLight(1.0),)
+        else:
+            warnings.append(_no_light(context))
+    if scene.emission.any() or any(isinstance(light, EnvironmentLight) for light in scene.lights):
+        warnings += [
+            half_visible(piece.source.object_name)
+            for piece in collected.pieces
+            if piece.role.in_bounces != piece.role.in_shadows and len(piece.mesh)
+        ]
     return Export(
         BakeScene(scene, tuple(objects), tuple(dict.fromkeys(warnings))),
         tuple(piece.source for piece in collected.pieces),
@@ -131,17 +160,34 @@ def _chosen(context: bpy.types.Context, pieces: list[Piece], names: tuple[str, .
     return chosen
 
 
+def _check_names(context: bpy.types.Context, pieces: list[Piece], settings: BakeSettings) -> None:
+    """Refuse names of objects to leave out, or without lightmaps, that fit nothing."""
+    known = {name for piece in pieces for name in piece.names}
+    for option, names in (("--ignore", settings.ignore), ("--light-only", settings.light_only)):
+        for name in names:
+            # What has no faces, or does not show, is left out anyway.
+            if name not in known and name not in context.scene.objects:
+                raise UsageError(f"{option}: no object '{name}'" + _did_you_mean(name, known))
+
+
+def _did_you_mean(name: str, known: set[str]) -> str:
+    close = difflib.get_close_matches(name, sorted(known), n=3, cutoff=0.5)
+    hint = " or ".join(f"'{match}'" for match in close)
+    return f"; did you mean {hint}?" if close else " in this scene"
+
+
 def _unknown(context: bpy.types.Context, pieces: list[Piece], name: str) -> str:
     """Say why `name` cannot be baked."""
     obj = context.scene.objects.get(name)
     if obj is None:
-        known = sorted({known for piece in pieces if piece.bakeable for known in piece.names})
-        close = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
-        hint = " or ".join(f"'{match}'" for match in close)
-        return f"no object '{name}' to bake" + (f"; did you mean {hint}?" if close else " in this scene")
-    if obj.type != "MESH":
-        return f"object '{name}' is not a mesh but {obj.type.lower()}; only meshes get lightmaps"
-    if not any(name in piece.names for piece in pieces) and len(obj.data.polygons) > 0:
+        known = {known for piece in pieces if piece.bakeable for known in piece.names}
+        return f"no object '{name}' to bake" + _did_you_mean(name, known)
+    if obj.type not in BAKEABLE_TYPES:
+        return f"object '{name}' is not a surface but {obj.type.lower()}; only surfaces get lightmaps"
+    roles = [piece.role for piece in pieces if name in piece.names]
+    if any(role.mode != BAKE for role in roles):
+        return f"object '{name}' is light only or ignored: set it to Bake to give it a lightmap"
+    if not roles and (obj.type != "MESH" or len(obj.data.polygons) > 0):
         return f"object '{name}' is hidden from render; show it there to bake it"
     return f"object '{name}' has no faces to bake"
 

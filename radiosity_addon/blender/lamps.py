@@ -11,14 +11,31 @@ from ..bake_scene import BakeWarning
 from ..errors import SceneError
 from ..solver.lights import AreaLight, Light, PointLight, SpotLight, SunLight
 from ..solver.radiometry import cone_projected_solid_angle, sphere_area
+from .lamp_pixels import lamp_factor
 from .materials import read_radiance, uses_nodes
 from .mesh_arrays import all_finite
 
 _SAME_SCALE = 1e-4  # relative difference of axes below which a scale counts as uniform
+_EVEN = 0.02  # relative variation with direction below which a lamp's nodes count as constant
+
+LampFactors = dict[str, tuple[np.ndarray, float]]
+"""By a lamp's full name, what its nodes make of its light (see `lamp_factor`)."""
+
+
+def lamp_factors() -> LampFactors:
+    """Have Cycles evaluate the nodes of all lamps whose light is not a plain constant.
+
+    Before the scene is evaluated: rendering would not leave its objects alive.
+    """
+    factors = {}
+    for lamp in bpy.data.lights:
+        if lamp.users and uses_nodes(lamp) and read_radiance(lamp, "lamp")[1]:
+            factors[lamp.name_full] = lamp_factor(lamp)
+    return factors
 
 
 def read_lamp(
-    lamp: bpy.types.Object, matrix_world: np.ndarray
+    lamp: bpy.types.Object, matrix_world: np.ndarray, factors: LampFactors
 ) -> tuple[Light | None, tuple[BakeWarning, ...]]:
     """Return the light that a lamp object, or an instance of one, is.
 
@@ -26,6 +43,8 @@ def read_lamp(
     ----------
     lamp : bpy.types.Object of type LIGHT, evaluated
     matrix_world : (4, 4) float64
+    factors : dict
+        Of `lamp_factors`.
 
     Returns
     -------
@@ -40,10 +59,10 @@ def read_lamp(
     """
     data = lamp.data
     name = lamp.name
-    if _is_portal(data):
+    if _is_portal(data) or not lamp.visible_diffuse:
         return None, ()
     warnings = _not_understood(lamp)
-    strength, notes = _strength(name, data)
+    strength, notes = _strength(name, data, factors)
     warnings += notes
     if not (all_finite(matrix_world) and np.isfinite(strength).all()):
         raise SceneError(
@@ -58,7 +77,7 @@ def read_lamp(
     return light, tuple(warnings + notes)
 
 
-def _strength(name: str, data: bpy.types.Light) -> tuple[np.ndarray, list[BakeWarning]]:
+def _strength(name: str, data: bpy.types.Light, factors: LampFactors) -> tuple[np.ndarray, list[BakeWarning]]:
     """Return energy × colour of all that scales it, (3,) RGB [W, or W/m² of a sun]."""
     strength = data.energy * np.array(data.color[:3], dtype=np.float64)
     if getattr(data, "use_temperature", False):
@@ -67,7 +86,15 @@ def _strength(name: str, data: bpy.types.Light) -> tuple[np.ndarray, list[BakeWa
     if not uses_nodes(data):
         return strength, []
     factor, warnings = read_radiance(data, "lamp")
-    return strength * factor, [BakeWarning(name, warning.message) for warning in warnings]
+    measured = factors.get(data.original.name_full)
+    if not warnings or measured is None:
+        return strength * factor, [BakeWarning(name, warning.message) for warning in warnings]
+    mean, variation = measured
+    notes = []
+    if variation > _EVEN:
+        message = "its nodes shine unevenly; their mean over all directions is used"
+        notes.append(BakeWarning(name, f"lamp '{name}': {message}"))
+    return strength * mean, notes
 
 
 def _point(
@@ -80,6 +107,7 @@ def _point(
         strength * _sphere_area(data),
         radius=radius,
         soft_falloff=data.use_soft_falloff,
+        casts_shadow=_casts_shadow(data),
         name=name,
     ), []
 
@@ -106,6 +134,7 @@ def _spot(
         blend=data.spot_blend,
         radius=data.shadow_soft_size,
         soft_falloff=data.use_soft_falloff,
+        casts_shadow=_casts_shadow(data),
         name=name,
     ), warnings
 
@@ -115,7 +144,9 @@ def _sun(
 ) -> tuple[Light, list[BakeWarning]]:
     if not getattr(data, "normalize", True):
         strength = strength * cone_projected_solid_angle(data.angle / 2.0)  # it was a radiance
-    return SunLight(_backward(matrix), strength, angle=data.angle, name=name), []
+    return SunLight(
+        _backward(matrix), strength, angle=data.angle, casts_shadow=_casts_shadow(data), name=name
+    ), []
 
 
 def _area(
@@ -133,7 +164,16 @@ def _area(
         raise SceneError(f"lamp '{name}' has no area; give it a size and a scale above 0")
     if not getattr(data, "normalize", True):
         strength = strength * area
-    return AreaLight(matrix[:3, 3], edge_u, edge_v, strength, shape=shape, name=name), []
+    return AreaLight(
+        matrix[:3, 3],
+        edge_u,
+        edge_v,
+        strength,
+        shape=shape,
+        spread=data.spread,
+        casts_shadow=_casts_shadow(data),
+        name=name,
+    ), []
 
 
 def _backward(matrix: np.ndarray) -> np.ndarray:
@@ -150,6 +190,11 @@ def _sphere_area(data: bpy.types.Light) -> float:
     return sphere_area(data.shadow_soft_size)
 
 
+def _casts_shadow(data: bpy.types.Light) -> bool:
+    """Tell what Cycles asks: its own switch, or where it has none (later on) that of all engines."""
+    return bool(getattr(data.cycles, "cast_shadow", data.use_shadow))
+
+
 def _is_portal(data: bpy.types.Light) -> bool:
     return data.type == "AREA" and bool(getattr(getattr(data, "cycles", None), "is_portal", False))
 
@@ -157,17 +202,11 @@ def _is_portal(data: bpy.types.Light) -> bool:
 def _not_understood(lamp: bpy.types.Object) -> list[BakeWarning]:
     data = lamp.data
     messages = []
-    if not data.use_shadow:
-        messages.append("'Cast Shadow' off is ignored: it casts shadows")
-    if data.type == "AREA" and data.spread < math.pi - 1e-4:
-        messages.append(f"a spread of {math.degrees(data.spread):.3g}° is ignored; 180° is used")
     if data.type == "SPOT" and data.use_square:
         messages.append("the square cone is ignored; a round one is used")
     linking = getattr(lamp, "light_linking", None)
     if linking and (linking.receiver_collection or linking.blocker_collection):
         messages.append("light linking is ignored: it lights everything")
-    if not lamp.visible_diffuse:
-        messages.append("'Ray Visibility: Diffuse' off is ignored: it lights everything")
     return [BakeWarning(lamp.name, f"lamp '{lamp.name}': {message}") for message in messages]
 
 

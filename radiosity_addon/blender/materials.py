@@ -1,7 +1,7 @@
-"""Materials as radiosity sees them: one diffuse reflectance and one emission each.
+"""Materials as radiosity sees them: reflectance, emission and opacity, read as constants.
 
-Principled, Diffuse and Emission shaders, and mixes of them by constant factors, are
-understood. Everything else gives a warning that names the material and the value used.
+Where something varies over the surface the material says so (`Surface.varies`), and
+`surface_evaluation.py` has Cycles evaluate it; what is read here is then the fallback.
 """
 
 from __future__ import annotations
@@ -15,32 +15,22 @@ import numpy as np
 from ..bake_scene import BakeWarning
 from ..solver.radiometry import radiosity_of_radiance
 from ..solver.scene import MAX_REFLECTANCE
-from .shader_nodes import NotConstantError, Stack, Value, default_rgb, evaluate, feed_of, output_node
+from .node_algebra import NodeAlgebra
+from .shader_nodes import (
+    MissingImageError,
+    NotConstantError,
+    Stack,
+    Value,
+    default_rgb,
+    evaluate,
+    feed_of,
+    output_node,
+)
+from .shader_terms import ShaderTerms, Terms, nothing
+from .surface_terms import surface_of_terms
 
 DEFAULT_GREY = 0.8
 """Reflectance of a face without material, as in Cycles."""
-
-_IGNORED_WEIGHTS = (  # Principled sockets that should be 0, and what we do instead
-    ("Transmission Weight", "transmission is ignored: the surface is baked opaque"),
-    ("Subsurface Weight", "subsurface scattering is ignored: the base colour is used"),
-    ("Coat Weight", "the coat is ignored"),
-    ("Sheen Weight", "the sheen is ignored"),
-)
-_TRANSPARENT = ("BSDF_TRANSPARENT", "HOLDOUT")
-_COLOURED = (
-    "BSDF_GLOSSY",
-    "BSDF_METALLIC",
-    "BSDF_ANISOTROPIC",
-    "BSDF_TOON",
-    "BSDF_SHEEN",
-    "BSDF_VELVET",
-    "BSDF_TRANSLUCENT",
-    "SUBSURFACE_SCATTERING",
-    "BSDF_HAIR",
-    "BSDF_HAIR_PRINCIPLED",
-    "BSDF_RAY_PORTAL",
-    "EEVEE_SPECULAR",
-)
 
 
 @dataclass(frozen=True)
@@ -50,41 +40,50 @@ class Surface:
     Parameters
     ----------
     reflectance : (3,) float64 in [0, 0.99]
+        Where the surface is there.
     emission : (3,) float64
-        Exitance of each side [W/m²].
+        Exitance of each side [W/m²], where the surface is there.
+    opacity : float in [0, 1]
+        The share of light that does not go straight through.
     warnings : tuple of BakeWarning
+    varies : bool
+        Something it is made of varies over the surface, and means or defaults stand for it.
+    fallbacks : tuple of BakeWarning
+        Which; to be told of unless the material is evaluated.
     """
 
     reflectance: np.ndarray
     emission: np.ndarray
+    opacity: float = 1.0
     warnings: tuple[BakeWarning, ...] = ()
+    varies: bool = False
+    fallbacks: tuple[BakeWarning, ...] = ()
 
-
-@dataclass(frozen=True)
-class _Shader:
-    """What a shader socket comes to; `radiance` is emitted [W/m²/sr]."""
-
-    reflectance: np.ndarray
-    radiance: np.ndarray
-    transparent: bool = False
-
-
-_NOTHING = _Shader(np.zeros(3), np.zeros(3))
+    @property
+    def is_plain(self) -> bool:
+        """Whether its reflectance and emission say it all."""
+        return not self.varies and self.opacity == 1.0
 
 
 def read_material(material: bpy.types.Material | None) -> Surface:
-    """Return what a material reflects and emits; None is Cycles' default grey."""
+    """Return what a material reflects, emits and covers; None is Cycles' default grey."""
     if material is None:
         return Surface(np.full(3, DEFAULT_GREY), np.zeros(3))
     reader = _Reader(material.name, "material")
     if not uses_nodes(material):
-        shader = _Shader(np.array(material.diffuse_color[:3], dtype=np.float64), np.zeros(3))
+        terms = Terms(np.array(material.diffuse_color[:3], dtype=np.float64), np.zeros(3), np.zeros(3))
     else:
-        shader = reader.material(material.node_tree)
+        terms = reader.material(material.node_tree)
+    reflectance, radiance, opacity = surface_of_terms(
+        terms.reflected[None], terms.radiance[None], terms.passed[None]
+    )
     return Surface(
-        reader.clamped_reflectance(shader.reflectance),
-        radiosity_of_radiance(reader.not_negative("emission", shader.radiance)),
+        reader.clamped_reflectance(reflectance[0]),
+        radiosity_of_radiance(reader.not_negative("emission", radiance[0])),
+        float(opacity[0]),
         tuple(reader.warnings),
+        reader.varies,
+        tuple(reader.fallbacks),
     )
 
 
@@ -108,10 +107,11 @@ def read_radiance(
     output = output_node(owner.node_tree)
     if output is None:
         return np.zeros(3), ()
-    shader = reader.shader(output.inputs["Surface"], ())
+    terms = reader.shader(output.inputs["Surface"], ())
     if "Volume" in output.inputs and output.inputs["Volume"].is_linked:
         reader.warn("its volume is ignored")
-    return reader.not_negative("strength", shader.radiance), tuple(reader.warnings)
+    radiance = reader.not_negative("strength", terms.radiance)
+    return radiance, (*reader.fallbacks, *reader.warnings)
 
 
 def uses_nodes(owner: bpy.types.ID) -> bool:
@@ -125,67 +125,62 @@ def uses_nodes(owner: bpy.types.ID) -> bool:
         return bool(getattr(owner, "use_nodes", True))
 
 
-class _Reader:
-    """Reads one node tree and collects its warnings."""
+class _Reader(ShaderTerms[Stack]):
+    """Reads one node tree as constants and collects its warnings."""
 
     def __init__(self, name: str, kind: str) -> None:
         self.name = name
         self.kind = kind
         self.warnings: list[BakeWarning] = []
+        self.fallbacks: list[BakeWarning] = []
+        self.varies = False
 
     def warn(self, message: str) -> None:
-        warning = BakeWarning(self.name, f"{self.kind} '{self.name}': {message}")
-        if warning not in self.warnings:
-            self.warnings.append(warning)
+        self._add(self.warnings, message)
 
-    def material(self, tree: bpy.types.NodeTree) -> _Shader:
+    def algebra(self, _: Stack) -> NodeAlgebra:
+        return NodeAlgebra(None)
+
+    def material(self, tree: bpy.types.NodeTree) -> Terms:
         output = output_node(tree)
         if output is None or feed_of(output.inputs["Surface"]).node is None:
             self.warn(f"it has no surface shader; reflectance {_text(np.zeros(3))} is used")
-            return _NOTHING
+            return nothing()
         for socket in ("Volume", "Displacement"):
             if output.inputs[socket].is_linked:
                 self.warn(f"its {socket.lower()} is ignored")
         return self.shader(output.inputs["Surface"], ())
 
-    def shader(self, socket: bpy.types.NodeSocket, stack: Stack) -> _Shader:
-        """Return what a shader socket comes to."""
-        feed = feed_of(socket, stack)
-        node = feed.node
-        if node is None:
-            return _NOTHING
-        if node.type == "BSDF_PRINCIPLED":
-            return self._principled(node, feed.stack)
-        if node.type == "BSDF_DIFFUSE":
-            self._normal_map(node)
-            return _Shader(self.value(node.inputs["Color"], feed.stack), np.zeros(3))
-        if node.type in ("EMISSION", "BACKGROUND"):
-            strength = self.scalar(node.inputs["Strength"], feed.stack)
-            return _Shader(np.zeros(3), strength * self.value(node.inputs["Color"], feed.stack))
-        if node.type == "MIX_SHADER":
-            return self._mix(node, feed.stack)
-        if node.type == "ADD_SHADER":
-            first, second = (self.shader(socket, feed.stack) for socket in node.inputs[:2])
-            return _Shader(first.reflectance + second.reflectance, first.radiance + second.radiance)
-        return self._not_understood(node, feed.stack)
+    def shader(self, socket: bpy.types.NodeSocket, place: Stack) -> Terms:
+        feed = feed_of(socket, place)
+        return nothing() if feed.node is None else self.terms(feed.node, feed.stack)
 
-    def value(self, socket: bpy.types.NodeSocket, stack: Stack) -> np.ndarray:
-        """Return a socket's constant (3,), with a warning where it stands for something else."""
+    def color(self, socket: bpy.types.NodeSocket, place: Stack) -> np.ndarray:
+        """Return a socket's constant (3,), with a note where it stands for something else."""
         try:
-            value = evaluate(socket, stack)
-        except NotConstantError as reason:
+            value = evaluate(socket, place)
+        except MissingImageError as reason:
             default = default_rgb(socket)
             self.warn(f"{socket.name} comes from {reason}; {_text(default)} is used")
             return default
+        except NotConstantError as reason:
+            default = default_rgb(socket)
+            self._varying(f"{socket.name} comes from {reason}; {_text(default)} is used")
+            return default
         if value.notes:
-            self.warn(
+            self._varying(
                 f"{socket.name} comes from {', '.join(value.notes)}; the mean {_text(value.rgb)} is used"
             )
         return value.rgb
 
-    def scalar(self, socket: bpy.types.NodeSocket, stack: Stack) -> float:
-        """Return a number socket's constant, warning as `value` does."""
-        return Value(self.value(socket, stack)).scalar
+    def scalar(self, socket: bpy.types.NodeSocket, place: Stack) -> float:
+        """Return a number socket's constant, noting as `color` does."""
+        return Value(self.color(socket, place)).scalar
+
+    def not_understood(self, node: bpy.types.Node) -> Terms:
+        what = "reflectance" if self.kind == "material" else "radiance"
+        self.warn(f"{node.bl_label} is not understood; {what} {_text(np.zeros(3))} is used")
+        return nothing()
 
     def clamped_reflectance(self, reflectance: np.ndarray) -> np.ndarray:
         """Keep a reflectance where the light in a closed room still dies away."""
@@ -202,58 +197,14 @@ class _Reader:
             self.warn(f"{what} {_text(values)} is not possible; {_text(mended)} is used")
         return mended
 
-    def _principled(self, node: bpy.types.Node, stack: Stack) -> _Shader:
-        self._normal_map(node)
-        for name, message in _IGNORED_WEIGHTS:
-            socket = node.inputs.get(name)
-            if socket is not None and (socket.is_linked or socket.default_value > 0):
-                self.warn(message)
-        alpha = node.inputs["Alpha"]
-        if alpha.is_linked or alpha.default_value < 1:
-            self.warn("alpha is ignored: the surface is baked opaque")
-        radiance = np.zeros(3)
-        strength = node.inputs["Emission Strength"]
-        if strength.is_linked or strength.default_value != 0:
-            colour = node.inputs["Emission Color"]
-            if colour.is_linked or default_rgb(colour).any():
-                radiance = self.scalar(strength, stack) * self.value(colour, stack)
-        return _Shader(self.value(node.inputs["Base Color"], stack), radiance)
+    def _varying(self, message: str) -> None:
+        self.varies = True
+        self._add(self.fallbacks, message)
 
-    def _mix(self, node: bpy.types.Node, stack: Stack) -> _Shader:
-        first, second = (self.shader(socket, stack) for socket in node.inputs[1:3])
-        if first.transparent != second.transparent:
-            self.warn("transparency is ignored: the surface is baked opaque with its other shader")
-            return second if first.transparent else first
-        share = min(max(self.scalar(node.inputs[0], stack), 0.0), 1.0)
-        return _Shader(
-            (1 - share) * first.reflectance + share * second.reflectance,
-            (1 - share) * first.radiance + share * second.radiance,
-            first.transparent,
-        )
-
-    def _not_understood(self, node: bpy.types.Node, stack: Stack) -> _Shader:
-        label = node.bl_label
-        if node.type in _TRANSPARENT:
-            if not stack and self.kind == "material" and _feeds_output(node):
-                self.warn(f"{label} is baked opaque; reflectance {_text(np.zeros(3))} is used")
-            return _Shader(np.zeros(3), np.zeros(3), transparent=True)
-        colour = node.inputs.get("Color") or node.inputs.get("Base Color")
-        if node.type in _COLOURED and colour is not None:
-            reflectance = self.value(colour, stack)
-            self.warn(f"{label} is baked as diffuse; reflectance {_text(reflectance)} is used")
-            return _Shader(reflectance, np.zeros(3))
-        what = "reflectance" if self.kind == "material" else "radiance"
-        self.warn(f"{label} is not understood; {what} {_text(np.zeros(3))} is used")
-        return _NOTHING
-
-    def _normal_map(self, node: bpy.types.Node) -> None:
-        if node.inputs["Normal"].is_linked:
-            self.warn("its normal map is ignored: the mesh's own normals are used")
-
-
-def _feeds_output(node: bpy.types.Node) -> bool:
-    """Tell whether a shader goes straight to a material output."""
-    return any(link.to_node.type == "OUTPUT_MATERIAL" for socket in node.outputs for link in socket.links)
+    def _add(self, to: list[BakeWarning], message: str) -> None:
+        warning = BakeWarning(self.name, f"{self.kind} '{self.name}': {message}")
+        if warning not in to:
+            to.append(warning)
 
 
 def _text(rgb: np.ndarray) -> str:

@@ -77,6 +77,12 @@ def read_mesh(mesh: bpy.types.Mesh) -> MeshArrays | None:
     )
 
 
+def no_triangles() -> MeshArrays:
+    """Return a mesh without triangles."""
+    vectors, numbers = np.zeros((0, 3, 3)), np.zeros(0, dtype=np.int32)
+    return MeshArrays(vectors, vectors, np.zeros((0, 3), dtype=np.int32), numbers, numbers, None, 0)
+
+
 def all_finite(values: np.ndarray) -> bool:
     """Tell whether positions of any shape are neither NaN nor infinite."""
     return bool((np.abs(values) < _INFINITE).all())
@@ -123,12 +129,19 @@ def world_from_object(mesh: MeshArrays, matrix: np.ndarray) -> tuple[np.ndarray,
     linear = matrix[:3, :3]
     corners = mesh.corners @ linear.T + matrix[:3, 3]
     mirrored = bool(np.linalg.det(linear) < 0)
-    # The cofactor matrix is det · inverse-transpose, and exists for flattening ones too.
-    cofactors = np.cross(np.roll(linear, -1, axis=0), np.roll(linear, -2, axis=0))
-    normals = mesh.normals @ (-cofactors if mirrored else cofactors).T
+    normals = mesh.normals @ normal_matrix(linear).T
     if mirrored:
         corners, normals = corners[:, ::-1], normals[:, ::-1]
     return corners, _unit_normals(normals, corners), mirrored
+
+
+def normal_matrix(linear: np.ndarray) -> np.ndarray:
+    """Return the matrix that turns normals, but for their length, as `linear` (3, 3) turns positions.
+
+    The cofactor matrix is det · inverse-transpose, and exists for flattening ones too.
+    """
+    cofactors = np.cross(np.roll(linear, -1, axis=0), np.roll(linear, -2, axis=0))
+    return np.asarray(-cofactors if np.linalg.det(linear) < 0 else cofactors)
 
 
 def degenerate(corners: np.ndarray) -> np.ndarray:

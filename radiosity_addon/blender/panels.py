@@ -8,6 +8,7 @@ import bpy
 
 from . import runtime
 from .method_properties import AUTOMATIC, shown_settings
+from .object_roles import BAKE, BAKEABLE_TYPES
 from .operators import output_folder
 from .properties import BY_ERROR
 
@@ -51,6 +52,8 @@ class RADIOSITY_PT_main(_Panel, bpy.types.Panel):
         if settings.quality == BY_ERROR[0]:
             column.prop(settings, "relative_error")
         column.prop(settings, "atlas")
+        if settings.atlas == "shared" and settings.size_mode == "resolution":
+            column.prop(settings, "pages")
         column = layout.column()
         column.prop(settings, "output_folder")
         if output_folder(context) is None:
@@ -79,6 +82,10 @@ class RADIOSITY_PT_advanced(_Panel, bpy.types.Panel):
         column = layout.column()
         for name in ("quantity", "light", "format"):
             column.prop(settings, name)
+        column = layout.column()
+        if settings.size_mode == "density":
+            column.prop(settings, "max_resolution")
+        column.prop(settings, "mip_levels")
         column = layout.column(heading="Scene")
         column.prop(settings, "sky")
         column.prop(settings, "keep_uvs")
@@ -88,6 +95,33 @@ class RADIOSITY_PT_advanced(_Panel, bpy.types.Panel):
         column = layout.column(heading="Viewport")
         column.prop(settings, "show_while_solving")
         column.prop(settings, "show_result")
+
+
+class RADIOSITY_PT_object(_Panel, bpy.types.Panel):
+    """What the active object is there for."""
+
+    bl_idname = "RADIOSITY_PT_object"
+    bl_label = "Active Object"
+    bl_parent_id = "RADIOSITY_PT_main"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Show it for what can light, block or be baked."""
+        obj = context.object
+        surface = obj is not None and (obj.type in BAKEABLE_TYPES or obj.instance_type == "COLLECTION")
+        return surface and not runtime.running.active
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw its settings."""
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.label(text=context.object.name, icon="OBJECT_DATA")
+        layout.prop(context.object, "radiosity_mode", expand=True)
+        column = layout.column()
+        column.enabled = context.object.radiosity_mode == BAKE
+        column.prop(context.object, "radiosity_texel_scale")
 
 
 class RADIOSITY_PT_solver(_Panel, bpy.types.Panel):
@@ -191,6 +225,7 @@ def _wrapped(text: str, width: int) -> list[str]:
 
 CLASSES = (
     RADIOSITY_PT_main,
+    RADIOSITY_PT_object,
     RADIOSITY_PT_solver,
     RADIOSITY_PT_advanced,
     RADIOSITY_PT_last_bake,

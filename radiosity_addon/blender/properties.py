@@ -10,6 +10,8 @@ from ..settings import (
     FORMATS,
     LIGHTS,
     MAX_ERROR,
+    MAX_MIP_LEVELS,
+    MAX_PAGES,
     MAX_RESOLUTION,
     MIN_ERROR,
     QUALITIES,
@@ -17,12 +19,13 @@ from ..settings import (
     BakeSettings,
 )
 from .method_properties import MethodProperties, given_settings
+from .object_roles import BAKE, BAKEABLE_TYPES
 
 DEFAULTS = BakeSettings()
 
 SHARED_FIELDS = (
     *("atlas", "quantity", "light", "format"),
-    *("sky", "keep_uvs", "seed", "threads"),
+    *("max_resolution", "mip_levels", "sky", "keep_uvs", "seed", "threads"),
 )
 """Settings of the panel that a bake takes as they are."""
 
@@ -108,6 +111,29 @@ class RadiositySettings(MethodProperties, bpy.types.PropertyGroup):
         min=0.01,
         soft_min=1.0,
         soft_max=1024.0,
+    )
+    pages: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Pages",
+        description="How many images the objects are shared out over",
+        default=DEFAULTS.pages,
+        min=1,
+        max=MAX_PAGES,
+        soft_max=16,
+    )
+    max_resolution: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Largest Page",
+        description="Largest image that a density makes; what does not fit goes to more images",
+        default=DEFAULTS.max_resolution,
+        min=4,
+        max=MAX_RESOLUTION,
+        subtype="PIXEL",
+    )
+    mip_levels: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Mip Levels",
+        description="Down to which mip level the lightmap's charts stay apart: each doubles the padding",
+        default=DEFAULTS.mip_levels,
+        min=0,
+        max=MAX_MIP_LEVELS,
     )
     atlas: bpy.props.EnumProperty(  # type: ignore[valid-type]
         name="Atlas",
@@ -222,6 +248,7 @@ def settings_of(context: bpy.types.Context) -> BakeSettings:
         texel_density=group.texel_density if by_density else None,
         quality=DEFAULTS.quality if by_error else group.quality,
         relative_error=group.relative_error if by_error else None,
+        pages=group.pages if group.atlas == "shared" and not by_density else 1,
         objects=chosen,
         **{name: getattr(group, name) for name in SHARED_FIELDS},
         **given_settings(group),
@@ -229,12 +256,11 @@ def settings_of(context: bpy.types.Context) -> BakeSettings:
 
 
 def selected_meshes(context: bpy.types.Context) -> tuple[str, ...]:
-    """Return the names of the selected objects that show a surface when rendered."""
-    surfaces = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
+    """Return the names of the selected objects that show a surface when rendered and are to be baked."""
     return tuple(
         obj.name
         for obj in context.view_layer.objects.selected
-        if obj.type in surfaces and not obj.hide_render
+        if obj.type in BAKEABLE_TYPES and not obj.hide_render and obj.radiosity_mode == BAKE
     )
 
 

@@ -8,7 +8,7 @@ from functools import partial
 
 import bpy
 
-from . import bake_record, cli_host, operators, panels, properties, runtime
+from . import bake_record, cli_host, object_roles, operators, panels, properties, runtime
 
 CLASSES = (*operators.CLASSES, *panels.CLASSES)
 
@@ -20,7 +20,7 @@ def register() -> None:
     if _undo:
         return
     try:
-        for module in (bake_record, properties):
+        for module in (bake_record, object_roles, properties):
             module.register()
             _undo.append(module.unregister)
         for cls in CLASSES:

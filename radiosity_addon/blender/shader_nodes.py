@@ -25,6 +25,10 @@ class NotConstantError(Exception):
     """What feeds a socket varies over the surface; the message names it."""
 
 
+class MissingImageError(NotConstantError):
+    """An image that feeds a socket has no pixels."""
+
+
 @dataclass(frozen=True)
 class Feed:
     """What feeds a socket: a node's output, or (node None) the default of `socket`."""
@@ -54,8 +58,11 @@ class Value:
         return float(self.rgb @ _LUMINANCE)
 
 
-def feed_of(socket: bpy.types.NodeSocket, stack: Stack = ()) -> Feed:
-    """Follow an input socket to the node that computes it, or to the constant it ends at."""
+def feed_of(socket: bpy.types.NodeSocket, stack: Stack = (), enter_groups: bool = True) -> Feed:
+    """Follow an input socket to the node that computes it, or to the constant it ends at.
+
+    Without `enter_groups` a group node, or the node of a group's inputs, is where it ends.
+    """
     for _ in range(_MAX_STEPS):
         links = [link for link in socket.links if link.is_valid and not link.is_muted]
         if not links:
@@ -68,13 +75,13 @@ def feed_of(socket: bpy.types.NodeSocket, stack: Stack = ()) -> Feed:
             socket = inner[0]
         elif node.type == "REROUTE":
             socket = node.inputs[0]
-        elif node.type == "GROUP" and node.node_tree is not None:
-            inside = _group_output(node.node_tree, output.identifier)
+        elif enter_groups and node.type == "GROUP" and node.node_tree is not None:
+            inside = group_output(node.node_tree, output.identifier)
             if inside is None:
                 return Feed(None, socket, stack)
             socket, stack = inside, (*stack, node)
-        elif node.type == "GROUP_INPUT" and stack:
-            outside = _by_identifier(stack[-1].inputs, output.identifier)
+        elif enter_groups and node.type == "GROUP_INPUT" and stack:
+            outside = by_identifier(stack[-1].inputs, output.identifier)
             if outside is None:
                 return Feed(None, socket, stack)
             socket, stack = outside, stack[:-1]
@@ -113,13 +120,15 @@ def output_node(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
     return tree.get_output_node("CYCLES") or tree.get_output_node("ALL")
 
 
-def _group_output(tree: bpy.types.NodeTree, identifier: str) -> bpy.types.NodeSocket | None:
+def group_output(tree: bpy.types.NodeTree, identifier: str) -> bpy.types.NodeSocket | None:
+    """Return the socket inside a group that feeds its output of that identifier."""
     outputs = [node for node in tree.nodes if node.type == "GROUP_OUTPUT"]
     active = [node for node in outputs if node.is_active_output] or outputs
-    return _by_identifier(active[0].inputs, identifier) if active else None
+    return by_identifier(active[0].inputs, identifier) if active else None
 
 
-def _by_identifier(sockets: bpy.types.bpy_prop_collection, identifier: str) -> bpy.types.NodeSocket | None:
+def by_identifier(sockets: bpy.types.bpy_prop_collection, identifier: str) -> bpy.types.NodeSocket | None:
+    """Find a socket where several share a name; None where there is none."""
     return next((socket for socket in sockets if socket.identifier == identifier), None)
 
 
@@ -130,10 +139,10 @@ def _constant(_: bpy.types.Node, output: bpy.types.NodeSocket, _stack: Stack) ->
 def _image(node: bpy.types.Node, output: bpy.types.NodeSocket, _stack: Stack) -> Value:
     image = node.image
     if image is None:
-        raise NotConstantError("an image texture without an image")
+        raise MissingImageError("an image texture without an image")
     mean = image_mean(image, equirectangular=node.type == "TEX_ENVIRONMENT")
     if mean is None:
-        raise NotConstantError(f"image '{image.name}', which has no pixels (is its file missing?)")
+        raise MissingImageError(f"image '{image.name}', which has no pixels (is its file missing?)")
     rgb = np.full(3, mean[3]) if output.name == "Alpha" else mean[:3]
     return Value(rgb, (f"image '{image.name}'",))
 
@@ -161,7 +170,7 @@ def _mix(node: bpy.types.Node, _: bpy.types.NodeSocket, stack: Stack) -> Value:
         if kind is None or (kind == "Vector" and node.factor_mode != "UNIFORM"):
             raise NotConstantError(f"node '{node.bl_label}'")
         names = ("Factor_Float", f"A_{kind}", f"B_{kind}")
-        sockets = [_by_identifier(node.inputs, name) for name in names]
+        sockets = [by_identifier(node.inputs, name) for name in names]
         blend = node.blend_type if kind == "Color" else "MIX"
         clamp = kind == "Color" and node.clamp_result
     else:

@@ -1,7 +1,5 @@
 """Lightmap UVs for all objects of a bake: charts, pages, and what becomes of UVs to keep.
 
-The only module that imports xatlas, which grows the charts; everything else is ours.
-
 Kept UVs (an existing layer) stay as they are, bit for bit, wherever that is possible: on an
 object's own page always, on a shared page when all objects bring UVs and none lies over another's.
 Otherwise each object's kept layout is packed, as one chart of unchanged shape, beside the others.
@@ -10,19 +8,20 @@ Otherwise each object's kept layout is packed, as one chart of unchanged shape, 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..bake_scene import BakeWarning
 from ..errors import BakeError
-from ..settings import MAX_RESOLUTION
 from .charts import Charts, unwrap
 from .flatten import rescale_to_area, signed_double_area
-from .packing import Packing, pack
+from .growers import PatientGrower
+from .packing import Limits, Packing, pack
+from .pages import least_pages, shared_out
 from .rasterise import coverage_sum
-from .resting import Resting
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -33,9 +32,6 @@ _PROBE = 1024
 
 _OVERLAP = 1.01
 """A texel filled to more than this holds triangles that lie over each other."""
-
-_resting = Resting()
-"""The latest of xatlas' atlases: destroyed right after their work they may hang."""
 
 
 @dataclass(frozen=True)
@@ -51,12 +47,43 @@ class AtlasInput:
         The polygon of each triangle: it stays in one chart.
     uv : (n, 3, 2) float32 or None
         UVs to keep; None to unwrap.
+    scale : float
+        Its texels per metre, relative to the other objects.
     """
 
     name: str
     triangles: Float
     polygon: NDArray[np.int32]
     uv: Float32 | None = None
+    scale: float = 1.0
+
+
+@dataclass(frozen=True)
+class AtlasOptions:
+    """How objects are laid out.
+
+    Parameters
+    ----------
+    resolution : int
+        Width and height of a page, if no density is given.
+    texel_density : float or None
+        Texels per metre; pages become as large as that needs, multiples of 4.
+    shared : bool
+        All objects on common pages, or each on its own.
+    pages : int
+        How many pages the objects share, if no density is given; with one, as many as it takes.
+    limits : Limits
+        Of every page.
+    unwrap_seconds : float
+        After so long an object's rest is cut into charts by the directions its faces look.
+    """
+
+    resolution: int = 512
+    texel_density: float | None = None
+    shared: bool = True
+    pages: int = 1
+    limits: Limits = field(default_factory=Limits)
+    unwrap_seconds: float = 60.0
 
 
 @dataclass(frozen=True)
@@ -76,7 +103,7 @@ class AtlasPage:
     resolution : int
         Width and height in texels.
     density : float
-        Texels per metre, the mean over all its surface; 0 if there is none.
+        Texels per metre of objects at scale 1, the mean over all their surface; 0 if there is none.
     utilisation : float
         The share of the page that charts cover, 0 to 1.
     """
@@ -104,23 +131,13 @@ class _Layout:
     kept: bool
 
 
-def build_atlas(
-    objects: Sequence[AtlasInput],
-    resolution: int = 512,
-    texel_density: float | None = None,
-    shared: bool = True,
-) -> Iterator[float | Atlas]:
+def build_atlas(objects: Sequence[AtlasInput], options: AtlasOptions) -> Iterator[float | Atlas]:
     """Lay out all objects; yields the fraction done now and then, and at the end the `Atlas`.
 
     Parameters
     ----------
     objects : sequence of AtlasInput
-    resolution : int
-        Width and height of a page, if no density is given.
-    texel_density : float or None
-        Texels per metre; pages become as large as that needs, multiples of 4.
-    shared : bool
-        All objects on one page, or each on its own.
+    options : AtlasOptions
 
     Raises
     ------
@@ -134,31 +151,29 @@ def build_atlas(
     total = sum(len(source.triangles) for source in objects)
     done = 0
     # A density's page is not known yet, and may be as large as any.
-    probe = _PROBE if texel_density is not None else min(resolution, _PROBE)
+    probe = _PROBE if options.texel_density is not None else min(options.resolution, _PROBE)
     for source in objects:
         layout = None
-        for layout in _lay_flat(source, probe, warnings):
+        for layout in _lay_flat(source, probe, warnings, options.unwrap_seconds):
             share = float((layout.charts.chart >= 0).mean()) if len(source.triangles) else 0.0
             yield 0.7 * (done + share * len(source.triangles)) / max(total, 1)
         assert layout is not None
         layouts.append(layout)
         done += len(source.triangles)
 
-    pages: list[AtlasPage] = []
-    placed: list[AtlasObject] = []
-    for group in [layouts] if shared else [[layout] for layout in layouts]:
-        packing = _kept_as_they_are(group, resolution, texel_density)
-        if packing is None:
-            for trial in _pack_page(group, resolution, texel_density):
-                packing = trial or packing
-                yield 0.7 + 0.3 * len(placed) / len(layouts)
-        assert packing is not None
+    for laid in _lay_on_pages(layouts, options):
+        if laid is None:
+            yield 0.7
+    assert laid is not None
+    placed: list[AtlasObject | None] = [None] * len(layouts)
+    for number, (group, packing) in enumerate(laid):
         if packing.crowded:
-            warnings.append(_crowded(group, packing.resolution))
-        ends = np.cumsum([len(layout.source.triangles) for layout in group])
-        placed += [AtlasObject(uv, len(pages)) for uv in np.split(packing.uv, ends[:-1])]
-        pages.append(_page(packing))
-    yield Atlas(tuple(placed), tuple(pages), tuple(warnings))
+            warnings.append(_crowded([layouts[each] for each in group], packing.resolution))
+        ends = np.cumsum([len(layouts[each].source.triangles) for each in group])
+        for each, uv in zip(group, np.split(packing.uv, ends[:-1]), strict=True):
+            placed[each] = AtlasObject(uv, number)
+    pages = tuple(_page(packing) for _, packing in laid)
+    yield Atlas(tuple(each for each in placed if each is not None), pages, tuple(warnings))
 
 
 def run_atlas(
@@ -166,60 +181,87 @@ def run_atlas(
     resolution: int = 512,
     texel_density: float | None = None,
     shared: bool = True,
+    **options: Any,
 ) -> Atlas:
     """Run `build_atlas` through and return the `Atlas`."""
-    *_, result = build_atlas(objects, resolution, texel_density, shared)
+    *_, result = build_atlas(objects, AtlasOptions(resolution, texel_density, shared, **options))
     assert isinstance(result, Atlas)
     return result
 
 
-def grow_charts(vertices: Float, faces: Int) -> tuple[Float, Int]:
-    """Cut a mesh into charts with xatlas.
-
-    Parameters
-    ----------
-    vertices : (v, 3) float64
-        At a scale where triangles are about 1 in area, welded.
-    faces : (n, 3) int64
-
-    Returns
-    -------
-    uv : (n, 3, 2) float64
-        Stretched along u and v, each chart otherwise; charts may lie over each other.
-    chart : (n,) int64
-        −1 for faces that xatlas left out.
-    """
-    import xatlas
-
-    atlas = xatlas.Atlas()
-    atlas.add_mesh(vertices.astype(np.float32), faces.astype(np.uint32))
-    # Its packing is not used: make it quick, and do not let it turn charts twice.
-    packing = xatlas.PackOptions()
-    packing.rotate_charts = False
-    packing.bilinear = False
-    atlas.generate(xatlas.ChartOptions(), packing)
-    _, indices, uv = atlas[0]
-    _, chart_of_vertex = atlas.get_mesh_vertex_assignment(0)
-    chart = chart_of_vertex[indices[:, 0]].astype(np.int64)
-    chart[chart == np.iinfo(np.uint32).max] = -1
-    scale = np.array((max(atlas.width, 1), max(atlas.height, 1)), dtype=np.float64)
-    _resting.keep(atlas)
-    return uv[indices].astype(np.float64) * scale, chart
+_Laid = list[tuple[list[int], Packing]]
+"""Per page the numbers of its objects, and how they lie there."""
 
 
-def _lay_flat(source: AtlasInput, probe: int, warnings: list[BakeWarning]) -> Iterator[_Layout]:
+def _lay_on_pages(layouts: list[_Layout], options: AtlasOptions) -> Iterator[_Laid | None]:
+    """Pack objects on as many pages as are asked for or needed; None now and then, at last the pages."""
+    density = options.texel_density
+    surfaces = [_surface([layout]) * layout.source.scale**2 for layout in layouts]
+    count = len(layouts)
+    if options.shared:
+        count = options.pages
+        if density is not None:
+            count = least_pages(sum(surfaces), density, options.limits.largest)
+    while True:
+        groups = shared_out(surfaces, count) if options.shared else [[each] for each in range(count)]
+        laid: _Laid = []
+        try:
+            for group in groups:
+                packing = None
+                for trial in _pack_group([layouts[each] for each in group], options):
+                    packing = trial or packing
+                    yield None
+                assert packing is not None
+                laid.append((group, packing))
+        except BakeError:
+            # What does not fit at the density asked for may fit on more pages.
+            if density is None or len(groups) == len(layouts):
+                raise
+            count = max(count, len(groups)) + 1
+            continue
+        yield laid
+        return
+
+
+def _pack_group(group: list[_Layout], options: AtlasOptions) -> Iterator[Packing | None]:
+    """Lay out one page, its kept UVs as they are where that is possible."""
+    kept = _kept_as_they_are(group, options.resolution, options.texel_density, options.limits.largest)
+    if kept is not None:
+        yield kept
+        return
+    yield from _pack_page(group, options.resolution, options.texel_density, options.limits)
+
+
+def _lay_flat(
+    source: AtlasInput, probe: int, warnings: list[BakeWarning], seconds: float
+) -> Iterator[_Layout]:
     """Cut one object into charts, or take the UVs it has."""
     triangles = np.asarray(source.triangles, dtype=np.float64).reshape(-1, 3, 3)
     if source.uv is not None:
         kept = _kept_charts(source, triangles, probe, warnings)
         if kept is not None:
-            yield _Layout(source, kept, kept=True)
+            yield _Layout(source, _scaled(kept, source.scale), kept=True)
             return
     if not len(triangles):
         yield _Layout(source, Charts(np.zeros((0, 3, 2)), np.zeros(0, dtype=np.int64), 0), kept=False)
         return
-    for charts in unwrap(triangles, np.asarray(source.polygon, dtype=np.int64), grow_charts):
-        yield _Layout(source, charts, kept=False)
+    grower = PatientGrower(seconds)
+    for charts in unwrap(triangles, np.asarray(source.polygon, dtype=np.int64), grower):
+        yield _Layout(source, _scaled(charts, source.scale), kept=False)
+    if grower.gave_up:
+        warnings.append(
+            BakeWarning(
+                source.name,
+                f"object '{source.name}' took more than {seconds:g} s to unwrap; the rest of it was cut by "
+                "the directions its faces look, which makes more seams: give it a UV layer Lightmap and "
+                "keep UVs, or simplify it",
+            )
+        )
+
+
+def _scaled(charts: Charts, scale: float) -> Charts:
+    """Return an object's charts at its own scale; one that is 1 changes no bit."""
+    return charts if scale == 1.0 else replace(charts, uv=charts.uv * scale)
 
 
 def _kept_charts(
@@ -248,7 +290,9 @@ def _kept_charts(
     return Charts(rescale_to_area(uv, triangles, chart, 1), chart, 1)
 
 
-def _kept_as_they_are(group: list[_Layout], resolution: int, density: float | None) -> Packing | None:
+def _kept_as_they_are(
+    group: list[_Layout], resolution: int, density: float | None, largest: int
+) -> Packing | None:
     """Return the page of kept UVs left bit for bit, None if they must be packed."""
     if not all(layout.kept for layout in group):
         return None
@@ -260,9 +304,9 @@ def _kept_as_they_are(group: list[_Layout], resolution: int, density: float | No
     flat = float(0.5 * np.abs(signed_double_area(uv.astype(np.float64))).sum())
     if density is not None:
         size = density * np.sqrt(surface / flat)
-        if not size <= MAX_RESOLUTION:
+        if not size <= largest:
             raise BakeError(
-                f"a texel density of {density:g} px/m needs a page above {MAX_RESOLUTION} px for the kept "
+                f"a texel density of {density:g} px/m needs a page above {largest} px for the kept "
                 f"UVs of {group[0].source.name}: lower the density"
             )
         resolution = max(4, 4 * int(np.ceil(size / 4)))
@@ -280,7 +324,9 @@ def _apart(layouts: list[Float32], resolution: int) -> bool:
     return not (taken > _OVERLAP).any()
 
 
-def _pack_page(group: list[_Layout], resolution: int, density: float | None) -> Iterator[Packing | None]:
+def _pack_page(
+    group: list[_Layout], resolution: int, density: float | None, limits: Limits
+) -> Iterator[Packing | None]:
     """Pack the charts of several objects together; triangles without area get a harmless place."""
     uv = np.concatenate([layout.charts.uv for layout in group])
     first = np.cumsum([0] + [layout.charts.count for layout in group])
@@ -294,7 +340,7 @@ def _pack_page(group: list[_Layout], resolution: int, density: float | None) -> 
     if not len(used):
         yield Packing(np.full(uv.shape, 0.5, dtype=np.float32), resolution if density is None else 4, 0.0)
         return
-    for packing in pack(uv[used], chart[used], resolution, density):
+    for packing in pack(uv[used], chart[used], resolution, density, limits):
         if packing is None:
             yield None
             continue
@@ -332,5 +378,5 @@ def _crowded(group: list[_Layout], resolution: int) -> BakeWarning:
     return BakeWarning(
         group[0].source.name if len(group) == 1 else "atlas",
         f"{resolution} px is too small to keep {count} charts apart, so light bleeds between them; "
-        "raise the resolution",
+        "raise the resolution or the number of pages",
     )

@@ -43,9 +43,6 @@ into a gap as the gap is high: into a high one it fades over texels, without a h
 OPEN_ENOUGH = 0.25
 """A texel answers hits beside the hood over its other part if so much of its footprint lies in the open."""
 
-UNANSWERED = -3
-"""No texel speaks for a hit, but it lies in the open: a part of the leaf element under it does."""
-
 _CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]], dtype=np.float32)
 _EDGES = np.array([[0, 1], [1, 2], [2, 3], [3, 0]])
 _DIAGONALS = np.array([[0, 2], [1, 3]])
@@ -122,7 +119,7 @@ class Crossings:
         Returns
         -------
         texel : (h,) int32
-            Where no whole neighbour can be seen: NOTHING if the hit is below a hood, and UNANSWERED
+            Where no whole neighbour can be seen: NOTHING if the hit is below a hood, and NO_TEXEL
             if the texel is cut, or next to nothing of it in the open.
         """
         result = texel.copy()
@@ -135,11 +132,11 @@ class Crossings:
         return result
 
     def _elsewhere(self, texel: Array, position: Array) -> Array:
-        """Return (h,) the texels that hits on texels not theirs are looked up in, UNANSWERED or NOTHING."""
+        """Return (h,) the texels that hits on texels not theirs are looked up in, NO_TEXEL or NOTHING."""
         below = _hooded(self._geometry, self._caster, texel, position[:, None])[:, 0]
         found = self._neighbour(texel, position, below)
         own = (found == NOTHING) & self._answers[texel] & ~below
-        found = np.where((found == NOTHING) & ~below, UNANSWERED, found)
+        found = np.where((found == NOTHING) & ~below, NO_TEXEL, found)
         return np.where(own, texel, found)
 
     def _sees_centre(self, texel: Array, position: Array) -> Array:

@@ -43,8 +43,7 @@ def texel_residual(
     links = yield from scaled(stored, CROSSED, GATHERED)
     arriving = links.irradiance_steps(residual.gathered(local), local.threads)
     irradiance = direct + (yield from scaled(arriving, GATHERED, 1.0))
-    face = residual.front_of(geometry.triangle)
-    values = residual.given(face, _elements_at(residual, geometry, face), irradiance)
+    values = _residual_at(residual, geometry, irradiance)
     yield 1.0
     return values
 
@@ -60,10 +59,10 @@ def summary(residual: Array) -> dict[str, list[float]]:
     }
 
 
-def _elements_at(residual: Residual, geometry: TexelGeometry, face: Array) -> Array:
-    """Return (n, 3) the mean of B̂ over every texel."""
+def _residual_at(residual: Residual, geometry: TexelGeometry, irradiance: Array) -> Array:
+    """Return (n, 3) the mean of r over every texel, for (n, 3) what arrives there."""
+    face = residual.front_of(geometry.triangle)
     rows = np.arange(len(geometry))
     weights = geometry.sample_weights(rows, stratified_square(rows, SAMPLES, 0))
-    return np.asarray(
-        sum(residual.radiosity(face, weights[:, sample, 1:]) for sample in range(SAMPLES)) / SAMPLES
-    )
+    values = (residual.given(face, weights[:, sample, 1:], irradiance) for sample in range(SAMPLES))
+    return np.asarray(sum(values) / SAMPLES)

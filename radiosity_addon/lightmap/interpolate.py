@@ -27,6 +27,9 @@ REACH = 0.35
 SLOPE_DAMPING = 0.05
 """Pull of the fitted slopes towards zero, relative to the spread of the points."""
 
+STEEPEST = 2.0
+"""How far a slope may lower a point's weight, as a multiple of it."""
+
 LIFT = 2.0
 """Lines of sight run this many surface offsets above the surface, …"""
 
@@ -305,6 +308,10 @@ def _linear_weights(along: Array, kernel: Array, count: Array) -> Array:
     damping = SLOPE_DAMPING * np.trace(moment, axis1=1, axis2=2) + 1e-18
     moment += damping[:, None, None] * np.eye(3)
     slope = np.linalg.solve(moment, -mean[:, :, None])[:, :, 0]
-    weights = share * (1.0 + np.einsum("pk,pk->p", offset, np.repeat(slope, count, axis=0)))
+    tilt = np.einsum("pk,pk->p", offset, np.repeat(slope, count, axis=0))
+    # A tight bunch of points far away knows nothing of a slope: no point counts against itself by
+    # more than it counts, which bounds the sum of all weights' sizes by 3.
+    steepest = STEEPEST / np.maximum(-np.minimum.reduceat(tilt, first), STEEPEST)
+    weights = share * (1.0 + np.repeat(steepest, count) * tilt)
     weights /= np.repeat(np.add.reduceat(weights, first), count)
     return np.asarray(weights, dtype=np.float32)

@@ -1,8 +1,8 @@
 """Packing charts into one square page, as large as they fit or at a given density.
 
 Charts keep their shape and their common scale; each box starts on a texel's border. Between
-the texels that any two charts cover at least `GAP` texels stay free, and one at the page's
-border, so neither bilinear filtering nor dilation mixes charts. The packer of xatlas was
+the texels that any two charts cover at least `Limits.padding` texels stay free, and half as many
+at the page's border, so neither bilinear filtering nor dilation mixes charts. The packer of xatlas was
 measured and left aside: it stretches every chart to whole texels, spills into more pages without
 a limit on time, and cannot be run twice on one atlas (docs/decisions/0005).
 """
@@ -26,10 +26,7 @@ Float32 = NDArray[np.float32]
 Int = NDArray[np.int64]
 
 GAP = 2
-"""Free texels between charts."""
-
-BORDER = 1
-"""Free texels along the page's border."""
+"""Free texels between charts that bilinear filtering asks for, without mip levels."""
 
 SMALLEST = 0.25
 """Texels; a chart that would be narrower is widened to this, so that nothing gets lost."""
@@ -70,6 +67,38 @@ class Packing:
 
 
 @dataclass(frozen=True)
+class Limits:
+    """What pages must keep to.
+
+    Parameters
+    ----------
+    largest : int
+        Width and height of a page at most.
+    padding : int
+        Free texels between charts.
+    """
+
+    largest: int = MAX_RESOLUTION
+    padding: int = GAP
+
+    def gap(self, cell: int) -> int:
+        """Free cells of `cell` texels between charts."""
+        return -(-self.padding // cell)
+
+    def border(self, cell: int) -> int:
+        """Free cells along the page's border: pages are repeated in the mind of a sampler."""
+        return -(-self.gap(cell) // 2)
+
+
+def padding_for(mip_levels: int) -> int:
+    """Return the free texels between charts that keep them apart down to a mip level.
+
+    At level L a texel is 2^L wide, and bilinear filtering reaches 1.5 of them beyond a chart.
+    """
+    return (3 * (1 << mip_levels) + 1) // 2
+
+
+@dataclass(frozen=True)
 class _Job:
     """Aligned charts, their outlines, and the orders worth trying."""
 
@@ -80,9 +109,12 @@ class _Job:
     extent: Float
     orders: tuple[Int, ...]
     area: float
+    limits: Limits
 
 
-def pack(uv: Float, chart: Int, resolution: int, density: float | None) -> Iterator[Packing | None]:
+def pack(
+    uv: Float, chart: Int, resolution: int, density: float | None, limits: Limits | None = None
+) -> Iterator[Packing | None]:
     """Pack charts into a square page.
 
     Parameters
@@ -95,6 +127,7 @@ def pack(uv: Float, chart: Int, resolution: int, density: float | None) -> Itera
         The page's size, if no density is given.
     density : float or None
         Texels per metre; the page becomes the smallest square multiple of 4 that holds it.
+    limits : Limits or None
 
     Yields
     ------
@@ -105,9 +138,9 @@ def pack(uv: Float, chart: Int, resolution: int, density: float | None) -> Itera
     Raises
     ------
     BakeError
-        If the density asks for more than `MAX_RESOLUTION` texels.
+        If the density asks for more than the largest page.
     """
-    job = _job(uv, chart)
+    job = _job(uv, chart, limits or Limits())
     if density is not None:
         yield _pack_at(job, density)
         return
@@ -119,7 +152,7 @@ def pack(uv: Float, chart: Int, resolution: int, density: float | None) -> Itera
         finer *= 2
 
 
-def _job(uv: Float, chart: Int) -> _Job:
+def _job(uv: Float, chart: Int, limits: Limits) -> _Job:
     count = int(chart.max()) + 1
     aligned = align(uv, chart, count)
     extent = np.zeros((count, 2))
@@ -130,7 +163,7 @@ def _job(uv: Float, chart: Int) -> _Job:
         orders.append(np.lexsort((np.arange(count), -long, -extent.prod(axis=1))))
         orders.append(np.lexsort((np.arange(count), -long, -short)))
     area = float(0.5 * np.abs(signed_double_area(aligned)).sum())
-    return _Job(aligned, chart, *outline(aligned, chart), extent, tuple(orders), area)
+    return _Job(aligned, chart, *outline(aligned, chart), extent, tuple(orders), area, limits)
 
 
 @dataclass(frozen=True)
@@ -165,7 +198,7 @@ def _pack_into(job: _Job, resolution: int, page: int) -> Iterator[Packing | None
     `page` is the page's real size when `resolution` is a finer stand-in for it.
     """
     cell = -(-resolution // FINEST)
-    side = resolution // cell - 2 * BORDER
+    side = resolution // cell - 2 * job.limits.border(cell)
     count = len(job.extent)
     if side < 1:
         return
@@ -179,7 +212,7 @@ def _pack_into(job: _Job, resolution: int, page: int) -> Iterator[Packing | None
             placement, height = _place(job, scaled.shapes, side, cell)
             if placement is not None:
                 low = scale
-                best = _packing(_moved(job, scaled, placement) * cell, resolution, page, scale)
+                best = _packing(_moved(job, scaled, placement, cell) * cell, resolution, page, scale)
             else:
                 high = scale
             yield best
@@ -200,21 +233,22 @@ def _pack_into(job: _Job, resolution: int, page: int) -> Iterator[Packing | None
 
 def _pack_at(job: _Job, density: float) -> Packing:
     """Find the smallest page that holds the charts at `density` texels per metre."""
-    reach = float(job.extent.max()) * density + 2 * BORDER
+    largest = job.limits.largest
+    reach = float(job.extent.max()) * density + 2 * job.limits.border(1)
     guess = max(float(np.sqrt(job.area)) * density, reach if len(job.extent) == 1 else 0.7 * reach)
-    if not guess <= MAX_RESOLUTION:
-        raise _too_dense(density)
+    if not guess <= largest:
+        raise _too_dense(density, largest)
     step = 1.0
     resolution, too_small, best = _multiple(guess), 0, None
     while best is None or best.resolution - too_small > max(4, best.resolution // 256):
-        if resolution > MAX_RESOLUTION:
-            raise _too_dense(density)
+        if resolution > largest:
+            raise _too_dense(density, largest)
         cell = -(-resolution // FINEST)
-        side = resolution // cell - 2 * BORDER
+        side = resolution // cell - 2 * job.limits.border(cell)
         scaled = _scaled(job, density, cell)
         placement, _ = _place(job, scaled.shapes, side, cell) if side > 0 else (None, 0)
         if placement is not None:
-            moved = _moved(job, scaled, placement)
+            moved = _moved(job, scaled, placement, cell)
             best = _packing(moved * cell, resolution, resolution, density)
             resolution = _multiple((too_small + best.resolution) / 2)
         else:
@@ -222,7 +256,7 @@ def _pack_at(job: _Job, density: float) -> Packing:
             step *= 1.5
             grown = resolution * (1 + 0.02 * step) if best is None else (resolution + best.resolution) / 2
             # The largest page is tried before giving up.
-            ceiling = MAX_RESOLUTION if too_small < MAX_RESOLUTION else 2 * MAX_RESOLUTION
+            ceiling = largest if too_small < largest else 2 * largest
             resolution = min(_multiple(max(grown, resolution + 1)), ceiling)
         if best is not None and resolution >= best.resolution:
             return best
@@ -234,16 +268,16 @@ def _multiple(size: float) -> int:
     return max(4, 4 * int(np.ceil(size / 4)))
 
 
-def _too_dense(density: float) -> BakeError:
+def _too_dense(density: float, largest: int) -> BakeError:
     return BakeError(
-        f"a texel density of {density:g} px/m needs an atlas page above {MAX_RESOLUTION} px: "
+        f"a texel density of {density:g} px/m needs an atlas page above {largest} px: "
         "lower the density, bake fewer objects, or give each object its own page"
     )
 
 
 def _place(job: _Job, shapes: tuple[Shapes, Shapes], side: int, cell: int) -> tuple[Placement | None, int]:
     """Return the first placement within a square of `side` cells, else None and the height reached."""
-    gap = -(-GAP // cell)
+    gap = job.limits.gap(cell)
     even = shapes[0]
     if min(max(shape.width.max(), shape.height.max()) for shape in shapes) > side:
         return None, 0
@@ -258,7 +292,7 @@ def _place(job: _Job, shapes: tuple[Shapes, Shapes], side: int, cell: int) -> tu
     return None, placement.height if placement is not None else 0
 
 
-def _moved(job: _Job, scaled: _Scaled, placement: Placement) -> Float:
+def _moved(job: _Job, scaled: _Scaled, placement: Placement, cell: int) -> Float:
     """Return (n, 3, 2) chart corners turned and moved to their place [cells]."""
     chart = job.chart
     quarter = placement.quarter[chart]
@@ -269,7 +303,7 @@ def _moved(job: _Job, scaled: _Scaled, placement: Placement) -> Float:
     width, height = (np.where(odd, odd_box, even_box)[:, k : k + 1] for k in (0, 1))
     u = np.choose(quarter[:, None], (x, height - y, width - x, y))
     v = np.choose(quarter[:, None], (y, x, height - y, width - x))
-    corner = np.stack((placement.x, placement.y), axis=-1)[chart][:, None] + BORDER
+    corner = np.stack((placement.x, placement.y), axis=-1)[chart][:, None] + job.limits.border(cell)
     return np.asarray(np.stack((u, v), axis=-1) + corner)
 
 

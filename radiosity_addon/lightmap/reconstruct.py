@@ -20,9 +20,10 @@ from ..solver.local_pass import NOTHING, Footprints, Gathered, LocalPass, Resolv
 from ..solver.scene import Scene
 from ..solver.steps import scaled
 from ..solver.visibility import Hits
-from .crossings import UNANSWERED, Crossings, crossing_steps
+from .crossings import Crossings, crossing_steps
 from .interpolate import GatherPoints, fit_steps
 from .sweeps import StoredLinks, TexelLight, sweep_steps
+from .terminator import SmoothLift
 from .texel_geometry import NO_TEXEL, TexelGeometry
 
 DIRECT, CROSSED, GATHERED = 0.25, 0.3, 0.85
@@ -87,6 +88,7 @@ def footprints(geometry: TexelGeometry, local: LocalPass) -> Footprints:
         geometry.sample,
         geometry.neighbourhood,
         expected=local.irradiance_at(geometry.triangle, geometry.barycentric),
+        lift=SmoothLift(geometry),
     )
 
 
@@ -165,7 +167,7 @@ def _resolver(local: LocalPass, geometry: TexelGeometry, crossings: Crossings) -
 
     def resolve(hits: Hits) -> Array:
         texel = crossings.look_up(geometry.texel_at(hits), hits)
-        elsewhere = (texel == NO_TEXEL) | (texel == UNANSWERED)
+        elsewhere = texel == NO_TEXEL
         part = local.parts_of(hits.take(elsewhere))
         texel[elsewhere] = np.where(part == NOTHING, NOTHING, part + len(geometry))
         return texel

@@ -69,10 +69,12 @@ class Seams:
         return Seams(self.texel[rows], self.weight[rows], self.length[rows], self.triangle[rows])
 
     def of_one_material(self, scene: Scene) -> Seams:
-        """Return the places whose two sides reflect and emit alike."""
+        """Return the places whose two sides reflect and emit alike, which images do not tell."""
         alike = np.ones(len(self), dtype=bool)
         for values in (scene.reflectance, scene.emission):
             alike &= (values[self.triangle[:, 0]] == values[self.triangle[:, 1]]).all(axis=1)
+        if scene.images is not None:
+            alike &= ~scene.images.textured[self.triangle].any(axis=1)
         return self.take(alike)
 
     def sides(self, values: Array) -> Array:

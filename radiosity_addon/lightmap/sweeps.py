@@ -20,6 +20,7 @@ from ..solver.scene import Scene
 from ..solver.steps import drain, scaled
 from .interpolate import Interpolation
 from .texel_geometry import TexelGeometry
+from .texel_materials import texel_materials
 
 CHUNK_HITS = 1 << 18
 """Hits averaged at once: their values stay in the processor's cache."""
@@ -70,7 +71,7 @@ class StoredLinks:
     Attributes
     ----------
     sources : (g, rays) int32
-        Texels by number, parts of leaf elements after them, NOTHING and SKY negative.
+        Texels by number, parts of leaf elements after them, NOTHING and the sky negative.
     spread : Interpolation
     aimed : AimedRays
         What some of the points ask apart.
@@ -125,16 +126,17 @@ def sweep_steps(
         Of an unknown number of sweeps: each takes its part of what is left.
     """
     texel_count = len(geometry)
-    reflectance = scene.reflectance[geometry.triangle]
+    reflectance, _ = texel_materials(scene, geometry)
     if gain is not None:
         reflectance = reflectance * gain[:, None]
     leaves = _Leaves(local, texel_count)
     links = yield from scaled(leaves.gather_steps(links, resolve), 0.0, 0.1)
-    # Rows: texels, elements, their cells that were met, then NOTHING (−2) and SKY (−1). Columns lie
-    # one after the other in memory.
-    table = np.zeros((texel_count + len(leaves.element) + 2, 3), dtype=np.float32, order="F")
-    sky = local.sky()
-    table[-1] = sky
+    # Rows: texels, elements, their cells that were met, then the sky and nothing. Columns lie one
+    # after the other in memory.
+    sky = local.beyond()
+    surfaces = texel_count + len(leaves.element)
+    table = np.zeros((surfaces + len(sky), 3), dtype=np.float32, order="F")
+    table[surfaces:] = sky
     direct = lamps
     if sky.any():
         # The sky's light is direct: its share of the same rays.
@@ -142,20 +144,20 @@ def sweep_steps(
         direct = lamps + np.maximum(from_sky, 0.0)
 
     table[:texel_count] = local.reflected_at(geometry.triangle, geometry.barycentric)
-    table[texel_count:-2] = local.reflected()[leaves.element]
-    table[: len(table) - 2][~_reached(links, leaves, direct)] = 0.0
+    table[texel_count:surfaces] = local.reflected()[leaves.element]
+    table[:surfaces][~_reached(links, leaves, direct, len(sky))] = 0.0
     indirect, left = np.zeros_like(direct), 0.8
     changed = np.ones(len(table), dtype=bool)
     means = _Means(links.sources, table.shape[1], local.threads)
     still = STILL * tolerance * float(table[:texel_count].mean()) if texel_count else 0.0
     for _ in range(sweeps):
         leaves.sweep(table, changed, still)
-        table[-1] = 0.0
+        table[surfaces:] = 0.0
         steps = means.steps(table, changed)
         mean = yield from scaled(steps, 1.0 - left, 1.0 - SWEPT * left)
         left *= SWEPT
         indirect = np.maximum(links.spread_out(table, mean.copy(), local.threads), 0.0)
-        table[-1] = sky
+        table[surfaces:] = sky
         radiosity = (reflectance * (direct + indirect)).astype(np.float32)
         change = np.abs(radiosity - table[:texel_count]).max(axis=1)
         changed[:] = False
@@ -191,14 +193,14 @@ def estimated_error(links: StoredLinks, table: Array, irradiance: Array, threads
     return float(np.sqrt((noise**2).mean())) / mean
 
 
-def _reached(links: StoredLinks, leaves: _Leaves, direct: Array) -> Array:
-    """Return (table rows − 2,) bool: what light can get to along the links, after any number of bounces.
+def _reached(links: StoredLinks, leaves: _Leaves, direct: Array, beyond: int) -> Array:
+    """Return (table rows − beyond,) bool: what light can get to along the links, after any number of bounces.
 
     The sweeps' fixed point is 0 elsewhere. Found outright, because from what the hierarchy leaked into
     a sealed box they would only fade, by the reflectance a sweep.
     """
     reached = leaves.lit_or_unknown(direct)
-    padded = np.append(reached, [False, False])  # NOTHING and SKY, whose light is direct
+    padded = np.append(reached, np.zeros(beyond, dtype=bool))  # nothing, and the sky, whose light is direct
     aims = np.zeros(len(links.sources), dtype=bool)
     while True:
         dark, step = np.flatnonzero(~aims), max(CHUNK_HITS // links.sources.shape[1], 1)
@@ -209,7 +211,7 @@ def _reached(links: StoredLinks, leaves: _Leaves, direct: Array) -> Array:
         more = ~padded[: len(direct)] & links.spread.any_of(aims)
         padded[: len(direct)] |= more
         if not (leaves.reach(padded) or more.any()):
-            return padded[:-2]
+            return padded[: len(reached)]
 
 
 class _Leaves:
@@ -238,13 +240,14 @@ class _Leaves:
             Their sources are rows of the table.
         """
         local, texel_count = self._local, self._texel_count
-        met = np.zeros(texel_count + len(local.parts) + 2, dtype=bool)
+        surfaces = texel_count + len(local.parts)
+        met = np.zeros(surfaces + len(local.beyond()), dtype=bool)
         known = np.zeros_like(met)
         met[links.sources.ravel()] = True
         met[links.aimed.sources.ravel()] = True
         seen, parts, stages = [], [np.zeros(0, dtype=np.int64)], LEAF_ROUNDS + 1
         for turn in range(LEAF_ROUNDS):
-            part = np.flatnonzero(met[texel_count:-2] & ~known[texel_count:-2])
+            part = np.flatnonzero(met[texel_count:surfaces] & ~known[texel_count:surfaces])
             if len(part) == 0:
                 break
             known[texel_count + part] = True
@@ -256,7 +259,7 @@ class _Leaves:
         if not seen:
             return links
         elements = len(self.element)
-        self._cells = elements + np.flatnonzero(met[texel_count + elements : -2])
+        self._cells = elements + np.flatnonzero(met[texel_count + elements : surfaces])
         self.element = np.append(self.element, local.parts.leaf_of(self._cells))
         gathered = np.concatenate(parts)
         self._rows = self._renumbered(texel_count + gathered)

@@ -37,7 +37,7 @@ class TexelGeometry:
 
     Attributes
     ----------
-    uv, page_of_triangle, triangles, face_normals
+    uv, page_of_triangle, triangles, face_normals, normals
         Of every scene triangle, as given.
     page, row, column, triangle : (n,) int32
     centre_inside, whole : (n,) bool
@@ -58,7 +58,7 @@ class TexelGeometry:
     ) -> None:
         self._scene = scene
         self.uv, self.page_of_triangle = uv, page_of_triangle
-        self.triangles, self.face_normals = scene.triangles, scene.face_normals
+        self.triangles, self.face_normals, self.normals = scene.triangles, scene.face_normals, scene.normals
         self._texels = list(texels)
         self._first = np.cumsum([0] + [len(page) for page in texels])
         self.page = np.repeat(np.arange(len(texels), dtype=np.int32), np.diff(self._first))

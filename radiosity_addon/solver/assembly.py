@@ -23,7 +23,7 @@ from .exchange import exchange_areas
 from .form_factor import point_to_polygon
 from .hierarchy import Faces, Hierarchy
 from .linear_system import LinearSystem
-from .overlaps import shares
+from .overlaps import arriving, shares
 from .parallel import for_chunks
 from .point_exchange import corner_factors, visible_share
 from .vertex_basis import vertex_basis
@@ -73,12 +73,17 @@ def with_lamps(system: LinearSystem, direct: Array) -> LinearSystem:
     return replace(system, emission=system.emission + system.reflectance * direct)
 
 
-def share_overlaps(system: LinearSystem) -> tuple[LinearSystem, Array]:
+def share_overlaps(system: LinearSystem, opacity: Array) -> tuple[LinearSystem, Array]:
     """Keep elements from exchanging more than there is (see `overlaps`).
 
     Of a reciprocal system every element *sends* only its share s, as in shooting: in C = s B
     that is the same system with s ρ for ρ and s E for E, so T stays as it is, and symmetric.
     Of others every row, what an element *receives*, is scaled in place.
+
+    Parameters
+    ----------
+    opacity : (n,) float64
+        Of each unknown's surface: what is not there takes no light.
 
     Returns
     -------
@@ -87,7 +92,7 @@ def share_overlaps(system: LinearSystem) -> tuple[LinearSystem, Array]:
     sends : (n,) float64
         s: B = C / s. 1 throughout where the rows were scaled, and where nothing overlaps.
     """
-    share = shares(np.asarray(system.exchange.sum(axis=1) / system.area))
+    share = shares(arriving(system.exchange, opacity) / system.area)
     if system.reciprocal:
         scale = share[:, None]
         return replace(
@@ -185,11 +190,11 @@ def _shifted(work: Callable[[slice], None], start: int) -> Callable[[slice], Non
 
 
 def _system(hierarchy: Hierarchy, basis: Basis, exchange: Array, reciprocal: bool = False) -> LinearSystem:
-    face = basis.faces(hierarchy)
+    element = basis.elements()
     return LinearSystem(
         exchange=exchange,
-        reflectance=hierarchy.faces.reflectance[face],
-        emission=hierarchy.faces.emission[face],
+        reflectance=hierarchy.reflectance[element],
+        emission=hierarchy.emission[element],
         area=basis.area,
         mass=basis.mass(),
         reciprocal=reciprocal,

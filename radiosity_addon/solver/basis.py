@@ -30,7 +30,7 @@ class Basis:
     corner : (l, 3) int32
         The unknown at each corner of each leaf.
     home : (n,) int
-        The row of a leaf that holds node x_i; its face gives the unknown's normal, ρ and E.
+        The row of a leaf that holds node x_i; it gives the unknown's normal, ρ and E.
     place : (n, 3) float64
         Barycentric weights of x_i in that leaf.
     area : (n,) float64
@@ -56,9 +56,13 @@ class Basis:
         corners = hierarchy.corners[self.leaf[self.home]]
         return np.asarray(np.einsum("nc,nck->nk", self.place, corners))
 
+    def elements(self) -> Array:
+        """Return (n,) the leaf element of each node, whose ρ and E the unknown has."""
+        return np.asarray(self.leaf[self.home])
+
     def faces(self, hierarchy: Hierarchy) -> Array:
         """Return (n,) the face of each node."""
-        return np.asarray(hierarchy.face[self.leaf[self.home]])
+        return np.asarray(hierarchy.face[self.elements()])
 
     def mass(self) -> Array | None:
         """Return M_ij = N_j(x_i), (n, n) float64, or None where it is the identity (3.9)."""

@@ -220,8 +220,8 @@ class _Pairs:
         return values
 
     def _trace(self, caster: RayCaster, transfer: Array) -> tuple[Array, Array]:
-        """Trace the first samples of every pair, and all where those disagree: two (n, s) bool."""
-        traced, free = np.zeros(transfer.shape, dtype=bool), np.zeros(transfer.shape, dtype=bool)
+        """Trace the first samples of every pair, and all where those disagree: (n, s) bool and float."""
+        traced, free = np.zeros(transfer.shape, dtype=bool), np.zeros(transfer.shape)
         rows = np.arange(len(transfer))
         for columns in (slice(0, FIRST_RAYS), slice(FIRST_RAYS, transfer.shape[1])):
             chosen = np.zeros(transfer.shape, dtype=bool)

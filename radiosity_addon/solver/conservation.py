@@ -20,7 +20,7 @@ import numpy as np
 
 from .arrays import Array
 from .cluster_links import ClusterLinks, gather_at_clusters
-from .hierarchy import LEAF, Hierarchy
+from .hierarchy import LEAF, Hierarchy, node_opacity
 from .links import Links
 from .node_samples import node_samples
 from .parallel import for_chunks
@@ -99,7 +99,7 @@ class Conservation:
         """
         self._measure(hierarchy)
         leaves = hierarchy.leaves
-        at_links = hierarchy.area[links.receiver] * links.factor * links.visibility
+        at_links = taken_at_links(hierarchy, links)
         if received is not None:
             at_links *= received[hierarchy.face[links.receiver]]
         sums = sent(hierarchy, links, at_links)
@@ -143,7 +143,7 @@ class Conservation:
             normals = normals.reshape(-1, 3)
             directions = to_world(cosine_hemisphere(unit).reshape(-1, 1, 3), normals)[:, 0]
             start = points.reshape(-1, 3) + self._caster.surface_offset * normals
-            escapes = self._caster.visible(start, directions, np.full(len(start), np.inf))
+            escapes = self._caster.passing(start, directions, np.full(len(start), np.inf))
             share[rows] = 1.0 - escapes.reshape(-1, RAYS).mean(axis=1)
 
         for_chunks(measure, len(nodes), CHUNK, self._threads)
@@ -151,7 +151,7 @@ class Conservation:
 
 
 class Arriving:
-    """What the receivers of links to clusters take, per unit of the source's radiosity.
+    """What the receivers of links to clusters take where they are there, per unit of the source's radiosity.
 
     Parameters
     ----------
@@ -171,10 +171,10 @@ class Arriving:
     ) -> None:
         clusters, faces = hierarchy.clusters, hierarchy.faces
         if received is None:
-            self.area = clusters.area[links.receiver]
+            self.area = (clusters.area * node_opacity(hierarchy)[: len(clusters)])[links.receiver]
             self.power = self.area * links.factor * links.visibility
             return
-        weight = (received * faces.area)[:, None]
+        weight = (received * faces.area * faces.opacity)[:, None]
         sums = top.sums(np.concatenate([weight, weight * faces.normal, weight * faces.centre], axis=1))
         at = sums[top.row[links.receiver]]
         self.area = at[:, 0]
@@ -187,9 +187,9 @@ def received_by_faces(
     hierarchy: Hierarchy, top: TreeTop, links: Links, cluster_links: ClusterLinks, scale: Array
 ) -> Array:
     """Return (f,) ΣFV over each face's, its elements' and its clusters' links, sources scaled by `scale`."""
-    ones = np.ones((hierarchy.n_elements, 1))
-    own = pull(hierarchy, push(hierarchy, gather(hierarchy, links, ones, scale, top)))
-    means = node_radiosity(hierarchy, pull(hierarchy, scale[:, 1:] * ones), top)
+    there = hierarchy.opacity[:, None]
+    own = pull(hierarchy, push(hierarchy, gather(hierarchy, links, there, scale, top)))
+    means = node_radiosity(hierarchy, pull(hierarchy, scale[:, 1:] * there), top)
     shared = np.maximum(gather_at_clusters(hierarchy, top, cluster_links, means)[:, 0], 0.0)
     return np.asarray(own[: len(hierarchy.faces), 0] + shared)
 
@@ -234,14 +234,20 @@ def sent_to_clusters(hierarchy: Hierarchy, links: ClusterLinks, arriving: Arrivi
     return np.bincount(element, power / hierarchy.area[element], hierarchy.n_elements)[:, None, None]
 
 
+def taken_at_links(hierarchy: Hierarchy, links: Links) -> Array:
+    """Return (l,) A_r F_rs V_rs [m²] of links to elements, of each receiver's area A_r what is there."""
+    there = hierarchy.area * hierarchy.opacity
+    return np.asarray(there[links.receiver] * links.factor * links.visibility)
+
+
 def sent(hierarchy: Hierarchy, links: Links, at_links: Array | None = None) -> Array:
     """Return (e, 4, 1): the share of the light of each element's quarters that its own links carry.
 
-    The transpose of `gather`, with reciprocity (handout (3.30)): Σ_r A_r F_rs V_rs / A_s;
-    `at_links` (l,) are other A_r F_rs V_rs [m²], scaled.
+    The transpose of `gather`, with reciprocity (handout (3.30)): Σ_r A_r F_rs V_rs / A_s, of each
+    receiver's area what is there; `at_links` (l,) are other A_r F_rs V_rs [m²], scaled.
     """
     if at_links is None:
-        at_links = hierarchy.area[links.receiver] * links.factor * links.visibility
+        at_links = taken_at_links(hierarchy, links)
     single = links.source >= hierarchy.n_clusters
     element = links.source[single] - hierarchy.n_clusters
     per_element = at_links[single] / hierarchy.area[element]

@@ -12,7 +12,7 @@ import numpy as np
 
 from .arrays import Array
 from .parallel import for_chunks
-from .visibility import NO_HIT, Hits, surface_offset
+from .visibility import NO_HIT, Hits, RayCaster, surface_offset
 
 CHUNK = 1 << 16
 """Rays a call: large enough to hide the call's 2 µs, small enough for cache and threads."""
@@ -30,16 +30,30 @@ class EmbreeCaster:
         World-space corners [m].
     threads : int
         0 means all cores. Results do not depend on it.
+    only : (t,) bool or None
+        The triangles that rays meet, where it is not all of them.
+    for_lamps : RayCaster or None
+        What stops the light of lamps, where that is something else.
     """
 
-    def __init__(self, triangles: Array, threads: int = 0) -> None:
+    def __init__(
+        self,
+        triangles: Array,
+        threads: int = 0,
+        only: Array | None = None,
+        for_lamps: RayCaster | None = None,
+    ) -> None:
         from embreex.mesh_construction import TriangleMesh
         from embreex.rtcore_scene import EmbreeScene
 
-        self.rays = 0
+        self._own_rays = 0
+        self._for_lamps = for_lamps
         self._counting = Lock()
         self.surface_offset = surface_offset(triangles)
         self._threads = threads
+        self._rows = None if only is None or only.all() else np.flatnonzero(only)
+        if self._rows is not None:
+            triangles = triangles[self._rows]
         self._empty = len(triangles) == 0
         if self._empty:
             return
@@ -53,6 +67,16 @@ class EmbreeCaster:
         # The first query builds the hierarchy; it must not race with another thread's.
         self._scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32), query="OCCLUDED")
 
+    @property
+    def for_lamps(self) -> RayCaster:
+        """The caster that knows what stops the light of lamps; most often this one."""
+        return self if self._for_lamps is None else self._for_lamps
+
+    @property
+    def rays(self) -> int:
+        """Rays traced so far, those to lamps among them."""
+        return self._own_rays + (0 if self._for_lamps is None else self._for_lamps.rays)
+
     def visible(self, origins: Array, directions: Array, distances: Array) -> Array:
         """Return (n,) bool: nothing lies within `distances` along the unit `directions`."""
         count = len(origins)
@@ -60,7 +84,7 @@ class EmbreeCaster:
         if self._empty or count == 0:
             return free
         with self._counting:
-            self.rays += count
+            self._own_rays += count
 
         def trace(rows: slice) -> None:
             start = (origins[rows] - self._centre).astype(np.float32)
@@ -72,6 +96,10 @@ class EmbreeCaster:
         for_chunks(trace, count, CHUNK, self._threads)
         return free
 
+    def passing(self, origins: Array, directions: Array, distances: Array, least: float = 0.0) -> Array:  # noqa: ARG002
+        """Return the same: all surfaces are whole."""
+        return self.visible(origins, directions, distances)
+
     def first_hits(self, origins: Array, directions: Array) -> Hits:
         """Return what each ray meets first."""
         count = len(origins)
@@ -82,7 +110,7 @@ class EmbreeCaster:
         if self._empty or count == 0:
             return Hits(triangle, barycentric, front, distance)
         with self._counting:
-            self.rays += count
+            self._own_rays += count
 
         def trace(rows: slice) -> None:
             start = (origins[rows] - self._centre).astype(np.float32)
@@ -90,7 +118,7 @@ class EmbreeCaster:
             found = self._scene.run(start, along, output=True)
             row = found["primID"]
             hit = row >= 0
-            triangle[rows] = row
+            triangle[rows] = row if self._rows is None else np.where(hit, self._rows[row], NO_HIT)
             barycentric[rows, 0] = np.where(hit, found["u"], 0)
             barycentric[rows, 1] = np.where(hit, found["v"], 0)
             distance[rows] = np.where(hit, found["tfar"], np.inf)

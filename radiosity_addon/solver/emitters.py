@@ -27,31 +27,36 @@ class EmitterGroup:
         Exitance [W/m²].
     offset : float
         Shadow rays end this far off the surface, so that they do not meet it.
+    level : (m,) float64 or None
+        What part of `strength` each face emits; None for all of it.
     """
 
-    def __init__(self, corners: Array, normals: Array, strength: Array, offset: float) -> None:
+    def __init__(
+        self, corners: Array, normals: Array, strength: Array, offset: float, level: Array | None = None
+    ) -> None:
         self._corners, self._normals, self._offset = corners, normals, offset
         edges = corners[:, 1:] - corners[:, :1]
         self._areas = 0.5 * np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
         self.strength = strength
+        self._level = np.ones(len(corners)) if level is None else level
 
     @staticmethod
-    def of_faces(faces: Faces, caster: RayCaster) -> list[EmitterGroup]:
-        """Group the emissive faces by colour, which visibility then cannot mix up."""
-        # Their starts are lifted by one offset, which must not put their ends back on the face.
-        offset = 2.0 * caster.surface_offset
-        rows = np.flatnonzero(faces.emission.max(axis=1, initial=0.0) > 0)
+    def of_faces(faces: Faces, caster: RayCaster, among: Array | None = None) -> list[EmitterGroup]:
+        """Group the emissive faces, if given those of a (f,) mask, by colour: visibility cannot mix it up."""
+        shines = faces.emission.max(axis=1, initial=0.0) > 0
+        rows = np.flatnonzero(shines if among is None else shines & among)
         if len(rows) == 0:
             return []
         colours, group = np.unique(faces.emission[rows], axis=0, return_inverse=True)
         group = group.reshape(-1)
+        offset = end_offset(caster)
         return [
             EmitterGroup(faces.corners[rows[group == g]], faces.normal[rows[group == g]], colour, offset)
             for g, colour in enumerate(colours)
         ]
 
     def unit_irradiance(self, points: Array, normals: Array) -> Array:
-        """Return (n,) the unoccluded irradiance per unit of exitance: Σ_m F(point → face m)."""
+        """Return (n,) the unoccluded irradiance per unit of exitance: Σ_m F(point → face m) · level."""
         gain = np.empty(len(points))
         step = max(CHUNK_PAIRS // len(self._corners), 1)
         for first in range(0, len(points), step):
@@ -89,19 +94,31 @@ class EmitterGroup:
         # A uniform point of a face stands for what the whole face would send, were it all there.
         cos_r = np.einsum("nkc,nc->nk", directions, normals)
         cos_s = -np.einsum("nkc,nkc->nk", directions, self._normals[face])
-        thrown = throughput(ray_geometry_term(cos_r, cos_s, distances), 1.0, self._areas[face])
+        sent = self._level[face] * self._areas[face]
+        thrown = throughput(ray_geometry_term(cos_r, cos_s, distances), 1.0, sent)
         weights = np.where(total > 0, radiance_of_radiosity(thrown) / width, 0.0)
         return directions, distances, _balanced(weights, face, len(self._corners))
 
     def _factors(self, points: Array, normals: Array) -> Array:
-        """Return (n, m) form factors from points to faces."""
+        """Return (n, m) form factors from points to faces, times the faces' levels."""
         count, faces = len(points), len(self._corners)
         shape = (count, faces, 3)
-        return point_to_polygon(
+        factors = point_to_polygon(
             np.broadcast_to(points[:, None], shape).reshape(-1, 3),
             np.broadcast_to(normals[:, None], shape).reshape(-1, 3),
             np.broadcast_to(self._corners[None], (count, faces, 3, 3)).reshape(-1, 3, 3),
-        ).reshape(count, faces)
+            # Among the faces may be the back of the one the point is on.
+            contact=False,
+        )
+        return np.asarray(factors.reshape(count, faces) * self._level)
+
+
+def end_offset(caster: RayCaster) -> float:
+    """Return how far off an emissive face shadow rays end [m].
+
+    Their starts are lifted by one offset, which must not put their ends back on the face.
+    """
+    return 2.0 * caster.surface_offset
 
 
 def _balanced(weights: Array, face: Array, faces: int) -> Array:

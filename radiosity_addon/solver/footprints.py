@@ -27,11 +27,18 @@ UNEVEN, MORE_GAINS = 0.02, 64
 """Where the few points differ by more than this part, as beside a lamp and at the rim of a spot's cone,
 so many are asked."""
 
+EDGE = 0.5
+"""Where centre and farthest point differ by more than this part, an edge of the lamp's beam crosses."""
+
 DARKEST = 0.25
 """Noise is measured by the light expected, or by this part of the mean where that is darker."""
 
 Sampler = Callable[[Array, Array], Array]
 """(rows, u (r, k, 2)) → (r, k, 3): points of the rows' footprints."""
+
+
+Lift = Callable[[Array, Array, Array], Array]
+"""(rows, starts (r, k, 3), directions (r, k, 3)) → (r, k, 3): where shadow rays start instead."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +62,8 @@ class Footprints:
     expected : (n,) float64 or None [W/m²]
         About how much light there is, a mean of the channels: a lamp that can add little to it is
         asked with few shadow rays. None asks all lamps alike.
+    lift : callable or None
+        Moves the starts of shadow rays off a smooth surface's flat triangles.
     """
 
     points: Array
@@ -64,6 +73,7 @@ class Footprints:
     near: Callable[[Array], Array] | None = None
     starts: int | None = None
     expected: Array | None = None
+    lift: Lift | None = None
 
     def __len__(self) -> int:
         return len(self.points)
@@ -114,7 +124,7 @@ class SpreadPoints:
         fraction : float
         """
         at = self.at
-        gain = np.empty(len(at))
+        gain, jump = np.empty(len(at)), np.zeros(len(at), dtype=bool)
 
         def ask(part: slice) -> None:
             normals = at.normals[part]
@@ -126,10 +136,15 @@ class SpreadPoints:
                     far = spread[np.arange(len(own)), self._farthest[part]].astype(np.float64)
                     other = light.unit_irradiance(far, normals)
                     rows = np.flatnonzero(np.abs(other - own) > SAME_GAIN * np.maximum(own, other))
+                    jump[part] = np.abs(other - own) > EDGE * np.maximum(own, other)
                 own[rows] = self._varying(light, rows, part.start)
             gain[part] = own
 
         yield from chunk_steps(ask, len(at), CHUNK_POINTS, self._threads)
+        if at.near is not None and jump.any():
+            # An edge that only cuts a footprint's corner is found from its neighbours.
+            rows = np.flatnonzero(at.near(jump) | (at.near(gain > 0) & at.near(gain <= 0)))
+            gain[rows] = self._many(light, rows)
         return gain
 
     def _varying(self, light: Lamp | EmitterGroup, rows: Array, first: int) -> Array:
@@ -138,14 +153,19 @@ class SpreadPoints:
         each = self._gains(light, rows, self.points[rows])
         mean = each.mean(axis=1)
         uneven = np.flatnonzero(each.std(axis=1) > UNEVEN * mean)
-        step = CHUNK_POINTS // MORE_GAINS * SPREAD
-        for start in range(0, len(uneven), step):
-            some = uneven[start : start + step]
-            more = rows[some]
-            unit = stratified_square(self.at.keys[more], MORE_GAINS, self._seed)
-            assert self.at.sampler is not None
-            mean[some] = self._gains(light, more, self.at.sampler(more, unit)).mean(axis=1)
+        mean[uneven] = self._many(light, rows[uneven])
         return np.asarray(mean)
+
+    def _many(self, light: Lamp | EmitterGroup, rows: Array) -> Array:
+        """Return (r,) the mean gain at some rows, by many points of each."""
+        mean = np.empty(len(rows))
+        step = CHUNK_POINTS // MORE_GAINS * SPREAD
+        for start in range(0, len(rows), step):
+            some = rows[start : start + step]
+            unit = stratified_square(self.at.keys[some], MORE_GAINS, self._seed)
+            assert self.at.sampler is not None
+            mean[start : start + step] = self._gains(light, some, self.at.sampler(some, unit)).mean(axis=1)
+        return mean
 
     def _gains(self, light: Lamp | EmitterGroup, rows: Array, points: Array) -> Array:
         """Return (r, k) the gain at (r, k, 3) points of some rows' footprints."""

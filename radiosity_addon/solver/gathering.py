@@ -13,6 +13,7 @@ import numpy as np
 
 from .aiming import AimedRays, BrightElements
 from .arrays import Array
+from .environment import SkyTable
 from .footprints import Footprints
 from .parallel import chunk_steps
 from .sampling import cosine_hemisphere, orthonormal_basis, stratified_square
@@ -25,11 +26,12 @@ AIMED_PART = 4
 """One ray is aimed for so many cosine-distributed ones, where any are aimed."""
 
 Resolver = Callable[[Hits], Array]
-"""Hits → (n,) int32: the number under which a hit's radiosity will be looked up; SKY for none."""
+"""Hits → (n,) int32: the number under which a hit's radiosity will be looked up."""
 
-SKY = -1
 NOTHING = -2
 """A gather ray that left through the surface it started on: it carries no light."""
+SKY = -3
+"""The sky's first cell; the others count down from it (see `SkyTable`). −1 is left to resolvers."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,7 @@ class Gathered:
     Attributes
     ----------
     sources : (n, rays) int32
-        What the resolver said; SKY where nothing was hit, NOTHING below the surface and where
+        What the resolver said; a cell of the sky where nothing was hit, NOTHING below the surface and where
         aimed rays ask instead.
     closeness : (n,) float64
         Mean of 1/distance over the rays [1/m]: how quickly irradiance may change.
@@ -66,6 +68,7 @@ class Gathering:
     resolve, leaves_of : callable
         Number the hits, and tell the leaf elements hit.
     seed, threads : int
+    sky : SkyTable
     """
 
     def __init__(
@@ -78,10 +81,11 @@ class Gathering:
         leaves_of: Resolver,
         seed: int,
         threads: int,
+        sky: SkyTable,
     ) -> None:
         self._caster, self._at, self._surface_normals, self._rays = caster, at, surface_normals, rays
         self._resolve, self._leaves_of = resolve, leaves_of
-        self._seed, self._threads = seed, threads
+        self._seed, self._threads, self._sky = seed, threads, sky
         self._sources = np.empty((len(at), rays), dtype=np.int32)
         self._closeness = np.empty(len(at))
         self._aimed: dict[int, AimedRays] = {}
@@ -123,7 +127,10 @@ class Gathering:
         directions = local @ frame
         start = self._starts(rows, rays, self._seed + 4)
         hits = self._caster.first_hits(start.reshape(-1, 3), directions.reshape(-1, 3))
-        found = np.where(hits.triangle < 0, SKY, self._resolve(hits)).reshape(len(rows), rays)
+        found = self._resolve(hits)
+        missed = np.flatnonzero(hits.triangle < 0)
+        found[missed] = SKY - self._sky.cells(directions.reshape(-1, 3)[missed])
+        found = found.reshape(len(rows), rays)
         surface = self._surface_normals[rows].astype(np.float32)
         found[(directions @ surface[:, :, None])[:, :, 0] <= 0] = NOTHING
         if bright is not None and shares is not None:

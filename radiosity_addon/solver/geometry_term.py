@@ -18,6 +18,9 @@ import numpy as np
 from .arrays import Array
 from .visibility import RayCaster
 
+LEAST = 1e-6
+"""Of what a cut-out lets pass, and of what it stops, as far as `sees` tells."""
+
 _TINY = 1e-150
 """Least square of a distance: keeps a point and itself from 0/0, and its own square above 0."""
 
@@ -87,7 +90,7 @@ def throughput(geometry: Array, area: Array | float, other_area: Array | float) 
 def sees(
     caster: RayCaster, points: Array, normals: Array, other_points: Array, other_normals: Array
 ) -> Array:
-    """Return V of pairs of points on surfaces: whether nothing lies between them.
+    """Return V of pairs of points on surfaces: whether nothing lies between them, or how much passes.
 
     Both ends leave their surfaces by the caster's offset, so that no surface hides itself.
     Facing away is the geometry term's affair and is not asked here.
@@ -99,9 +102,10 @@ def sees(
 
     Returns
     -------
-    visible : (n,) bool
+    visible : (n,) bool or float
+        Never 0 or 1 where a cut-out was met: others may find what few rays between do not.
     """
     start = points + caster.surface_offset * normals
     along = other_points + caster.surface_offset * other_normals - start
     distance = np.linalg.norm(along, axis=1)
-    return caster.visible(start, along / np.maximum(distance, _TINY)[:, None], distance)
+    return caster.passing(start, along / np.maximum(distance, _TINY)[:, None], distance, LEAST)

@@ -10,11 +10,16 @@ element n − n_clusters. So a link's source may be either and its receiver is a
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .arrays import Array
 from .clusters import Clusters, build_clusters
-from .scene import Scene
+from .scene import WHOLE_TRIANGLE, Scene
+
+if TYPE_CHECKING:
+    from .surface_images import SurfaceImages
 
 LEAF = -1
 
@@ -22,11 +27,11 @@ LEAF = -1
 class Faces:
     """The f sides of the scene's triangles that take part: fronts first, then backs.
 
-    Triangles without area have no faces. Backs exist where `two_sided`.
+    Triangles without area, or out of the bounces, have no faces. Backs exist where `two_sided`.
     """
 
     def __init__(self, scene: Scene) -> None:
-        solid = np.flatnonzero(scene.areas > 0)
+        solid = np.flatnonzero((scene.areas > 0) & scene.in_bounces)
         backs = solid[scene.two_sided[solid]]
         self.triangle = np.concatenate([solid, backs]).astype(np.int32)
         """(f,) int32"""
@@ -47,6 +52,8 @@ class Faces:
         """(f, 3) float64"""
         self.emission = scene.emission[self.triangle]
         """(f, 3) float64 [W/m²]"""
+        self.opacity = scene.opacity[self.triangle]
+        """(f,) float64: reflectance and emission are already multiplied by it"""
         self.of_triangle = np.full((2, len(scene)), LEAF, dtype=np.int32)
         """(2, t) int32: the face of each triangle's front (row 0) and back (row 1), or −1"""
         self.of_triangle[0, solid] = np.arange(len(solid))
@@ -67,6 +74,10 @@ class Hierarchy:
         −1 for none. Four children are contiguous: three at the corners, one in the middle.
     level : (e,) int32
     area : (e,) float64 [m²]
+    reflectance, emission : (e, 3) float64
+        Area means over each element, multiplied by opacity; emission in W/m².
+    opacity : (e,) float64
+        Area means.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -78,6 +89,14 @@ class Hierarchy:
         self.first_child = np.full(count, LEAF, dtype=np.int32)
         self.level = np.zeros(count, dtype=np.int32)
         self.area = self.faces.area.copy()
+        self.reflectance: Array = self.faces.reflectance.copy()
+        self.emission: Array = self.faces.emission.copy()
+        self.opacity: Array = self.faces.opacity.copy()
+        self._images = scene.images
+        if self._images is not None:
+            self._weights = np.where(
+                self.faces.front[:, None, None], WHOLE_TRIANGLE, WHOLE_TRIANGLE[[0, 2, 1]]
+            )
         emits = self.faces.emission.max(axis=1, initial=0.0) > 0
         # Emitters are grouped apart: averaged into a cluster of dark faces a small lamp is
         # missed by a few samples. So are backs: each lies where its front lies, unseen from
@@ -114,6 +133,11 @@ class Hierarchy:
         """(e, 3) float64: the unit normal of every element."""
         return np.asarray(self.faces.normal[self.face])
 
+    @property
+    def opacity_where_hit(self) -> Array:
+        """(e,) float64: what to divide by for radiosity where a ray found a surface; never 0."""
+        return np.where(self.opacity > 0, self.opacity, 1.0)
+
     def normal_of(self, elements: Array) -> Array:
         """Return (n, 3) float64: the unit normals of some elements."""
         return np.asarray(self.faces.normal[self.face[elements]])
@@ -130,6 +154,29 @@ class Hierarchy:
         self.first_child = np.concatenate([self.first_child, np.full(4 * len(elements), LEAF, np.int32)])
         self.level = np.concatenate([self.level, np.repeat(self.level[elements] + 1, 4).astype(np.int32)])
         self.area = np.concatenate([self.area, np.repeat(self.area[elements] / 4, 4)])
+        for name in ("reflectance", "emission", "opacity"):
+            values = getattr(self, name)
+            setattr(self, name, np.concatenate([values, np.repeat(values[elements], 4, axis=0)]))
+        if self._images is not None:
+            self._look_up(self._images, elements)
+
+    def _look_up(self, images: SurfaceImages, elements: Array) -> None:
+        """Take the means over the new children of `elements` from images, and average them upwards."""
+        weights = split_in_four(self._weights[elements]).reshape(-1, 3, 2)
+        self._weights = np.concatenate([self._weights, weights])
+        triangle = self.faces.triangle[self.face[elements]]
+        above = elements[images.textured[triangle]]
+        rows = (self.first_child[above][:, None] + np.arange(4)).ravel()
+        means = images.area_means(self.faces.triangle[self.face[rows]], self._weights[rows])
+        self.reflectance[rows], self.emission[rows] = means[:, :3], means[:, 3:6]
+        self.opacity[rows] = means[:, 6]
+        # Samples of large elements are coarser than those of their parts.
+        while len(above):
+            children = self.first_child[above][:, None] + np.arange(4)
+            for values in (self.reflectance, self.emission, self.opacity):
+                values[above] = values[children].mean(axis=1)
+            above = np.unique(self.parent[above])
+            above = above[above != LEAF]
 
     def leaf_at(self, face: Array, barycentric: Array) -> Array:
         """Find the leaf element under points of faces.
@@ -161,12 +208,21 @@ class Hierarchy:
         return element
 
 
+def node_opacity(hierarchy: Hierarchy) -> Array:
+    """Return (n_nodes,) float64: the area mean of the opacity of every cluster and element."""
+    clusters, faces = hierarchy.clusters, hierarchy.faces
+    if (faces.opacity == 1.0).all():
+        return np.ones(hierarchy.n_clusters + hierarchy.n_elements)
+    of_clusters = clusters.average(faces.opacity[:, None], faces.area)[:, 0]
+    return np.concatenate([of_clusters, hierarchy.opacity])
+
+
 def split_in_four(corners: Array) -> Array:
-    """Join the midpoints of the edges of (n, 3, 3) triangles.
+    """Join the midpoints of the edges of (n, 3, d) triangles.
 
     Returns
     -------
-    children : (n, 4, 3, 3)
+    children : (n, 4, 3, d)
         At corner 0, 1, 2, and the middle one; all oriented like their parent, of equal area.
     """
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]

@@ -68,8 +68,17 @@ class Light:
         object.__setattr__(self, field, value)
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Lamp(Light, ABC):
-    """A light with a place or direction of its own: all but the environment."""
+    """A light with a place or direction of its own: all but the environment.
+
+    Parameters
+    ----------
+    casts_shadow : bool
+        Whether what stands between it and a surface takes its light away.
+    """
+
+    casts_shadow: bool = True
 
     @abstractmethod
     def unit_irradiance(self, points: Float64Array, normals: Float64Array) -> Float64Array:

@@ -200,7 +200,7 @@ def measure_light(
             rows = rows_of[piece]
             asked = _pieces(hierarchy, elements[rows], pieces)
             if isinstance(light, EnvironmentLight):
-                gain[rows], doubt[rows] = _measure_sky(asked, caster, seed, divisor)
+                gain[rows], doubt[rows] = _measure_sky(asked, light, caster, seed, divisor)
             else:
                 gain[rows], doubt[rows] = _measure_lamp(asked, light, caster, seed, divisor)
 
@@ -227,15 +227,16 @@ def _pieces(hierarchy: Hierarchy, elements: Array, count: int) -> _Pieces:
     return _Pieces(count, keys, corners, np.repeat(normals, count, axis=0))
 
 
-def _measure_sky(asked: _Pieces, caster: RayCaster, seed: int, divisor: int) -> tuple[Array, Array]:
+def _measure_sky(
+    asked: _Pieces, light: EnvironmentLight, caster: RayCaster, seed: int, divisor: int
+) -> tuple[Array, Array]:
     """Measure the sky on pieces of elements (see `measure_light`); whole ones have a column only."""
     rays = SKY_RAYS // divisor
     points = points_on_triangles(asked.corners, stratified_square(asked.keys, rays, seed + 1))
-    open_share = sky_visibility(points, asked.normals, rays, caster, asked.keys, seed)
-    values = irradiance_under_sky(open_share.reshape(-1, asked.count))
+    share, error = sky_share(light, points, asked.normals, rays, caster, asked.keys, seed)
+    values = irradiance_under_sky(share.reshape(-1, asked.count))
     # Expected noise of a quarter's mean is not a difference between quarters.
-    spread = np.sqrt(open_share * (1 - open_share) / rays).reshape(-1, asked.count)
-    noise = irradiance_under_sky(spread.mean(axis=1))
+    noise = irradiance_under_sky(error.reshape(-1, asked.count).mean(axis=1))
     return values, np.maximum(values.std(axis=1) - noise, 0.0)
 
 
@@ -278,7 +279,8 @@ def lamp_light(
     rows = np.flatnonzero(gain > 0)
     directions, distances, above = light.shadow_rays(flat[rows], facing[rows], unit.reshape(-1, 1, 2)[rows])
     start = flat[rows] + caster.surface_offset * facing[rows]
-    free = caster.visible(start, directions[:, 0], distances[:, 0])
+    lamps = caster.for_lamps
+    free = lamps.passing(start, directions[:, 0], distances[:, 0]) if light.casts_shadow else True
     # A lamp point below the horizon says nothing: the closed form has cut it off already.
     weights[rows] = np.where(above[:, 0] > 0, gain[rows], 0.0)
     passed[rows] = weights[rows] * free
@@ -288,14 +290,28 @@ def lamp_light(
     return gain.reshape(shape), share
 
 
-def sky_visibility(
-    points: Array, normals: Array, rays: int, caster: RayCaster, keys: Array, seed: int
-) -> Array:
-    """Return (n,) the cosine-weighted share of each hemisphere that meets no surface.
+def sky_share(
+    light: EnvironmentLight,
+    points: Array,
+    normals: Array,
+    rays: int,
+    caster: RayCaster,
+    keys: Array,
+    seed: int,
+) -> tuple[Array, Array]:
+    """Ask for a sky's light at points, relative to an open sky of its radiance.
 
     `points` are (n, 3), or (n, rays, 3) to start every ray elsewhere.
+
+    Returns
+    -------
+    share : (n,) float64
+        The cosine-weighted share of each hemisphere that meets no surface, weighted by the
+        relative radiance there.
+    error : (n,) float64
+        Its standard error, were the rays independent.
     """
-    share = np.empty(len(points))
+    share, error = np.empty(len(points)), np.empty(len(points))
     for first in range(0, len(points), CHUNK):
         rows = slice(first, first + CHUNK)
         unit = stratified_square(keys[rows], rays, seed)
@@ -303,6 +319,8 @@ def sky_visibility(
         start = points[rows] if points.ndim == 3 else points[rows, None]
         start = np.broadcast_to(start + caster.surface_offset * normals[rows, None], directions.shape)
         endless = np.full(directions.shape[0] * rays, np.inf)
-        free = caster.visible(start.reshape(-1, 3), directions.reshape(-1, 3), endless)
-        share[rows] = free.reshape(-1, rays).mean(axis=1)
-    return share
+        free = caster.passing(start.reshape(-1, 3), directions.reshape(-1, 3), endless)
+        found = free.reshape(-1, rays) * light.relative(directions)
+        share[rows] = found.mean(axis=1)
+        error[rows] = found.std(axis=1) / np.sqrt(rays)
+    return share, error

@@ -12,13 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from .area_light import AREA_SHAPES, AreaLight
 from .bulb_lights import PointLight, SpotLight
-from .curved_factor import cap_cosine, point_to_ellipse
-from .geometry_term import ray_geometry_term, throughput
-from .light_base import Emitter, Float64Array, Lamp, Light, Rays, Samples, directions_to, row_cosines
-from .point_factor import point_to_polygon
-from .radiometry import radiance_of_flux
-from .sampling import concentric_disk, cosine_hemisphere, to_world, uniform_cone
+from .curved_factor import cap_cosine
+from .light_base import Float64Array, Lamp, Light, Rays, Samples, row_cosines
+from .sampling import to_world, uniform_cone
 
 __all__ = [
     "AREA_SHAPES",
@@ -30,8 +28,6 @@ __all__ = [
     "SpotLight",
     "SunLight",
 ]
-
-AREA_SHAPES = ("rectangle", "ellipse")
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,98 +83,6 @@ class SunLight(Lamp):
 
 
 @dataclass(frozen=True, eq=False)
-class AreaLight(Emitter):
-    """A flat lamp of uniform radiance power/(π area) on one side.
-
-    Parameters
-    ----------
-    position : (3,) float [m]
-        Its centre.
-    edge_u, edge_v : (3,) float [m]
-        Full edge vectors, or full conjugate axes of an ellipse; it shines to the side that
-        edge_u × edge_v points to.
-    power : float or (3,) float [W]
-    shape : "rectangle" or "ellipse"
-
-    Raises
-    ------
-    SceneError
-        If a value is out of range or the lamp has no area.
-    """
-
-    position: npt.ArrayLike
-    edge_u: npt.ArrayLike
-    edge_v: npt.ArrayLike
-    power: npt.ArrayLike
-    shape: str = "rectangle"
-
-    def __post_init__(self) -> None:
-        for field in ("position", "edge_u", "edge_v"):
-            self._set_vector(field)
-        self._set_rgb("power")
-        if self.shape not in AREA_SHAPES:
-            raise self._fail(f"shape {self.shape!r} is unknown", f"choose one of {', '.join(AREA_SHAPES)}")
-        if not self.area > 0.0:
-            raise self._fail("it has no area", "give it a size above 0 both ways")
-
-    @property
-    def strength(self) -> Float64Array:
-        """(3,) RGB power [W]."""
-        return np.asarray(self.power, dtype=np.float64)
-
-    @property
-    def area(self) -> float:
-        """The area that shines [m²]."""
-        parallelogram = float(np.linalg.norm(self._facing))
-        return parallelogram if self.shape == "rectangle" else 0.25 * np.pi * parallelogram
-
-    @property
-    def _facing(self) -> Float64Array:
-        """A vector along the side it shines to."""
-        facing: Float64Array = np.cross(np.asarray(self.edge_u), np.asarray(self.edge_v))
-        return facing
-
-    @property
-    def flux(self) -> Float64Array:
-        """(3,) RGB power it sends out [W]."""
-        return self.strength.copy()
-
-    def emit(self, place: Samples, way: Samples) -> Rays:
-        """Return rays uniform over the lamp, cosine-distributed (see `Emitter.emit`)."""
-        normal = self._facing / np.linalg.norm(self._facing)
-        directions = to_world(cosine_hemisphere(np.asarray(way, dtype=np.float64))[None], normal[None])[0]
-        return self._points(np.asarray(place, dtype=np.float64)), directions, np.ones(len(directions))
-
-    def unit_irradiance(self, points: Float64Array, normals: Float64Array) -> Float64Array:
-        """Return the irradiance per power, F / area (see `Lamp.unit_irradiance`)."""
-        centre, half_u, half_v = self._half_axes()
-        if self.shape == "ellipse":
-            return point_to_ellipse(points, normals, centre, half_u, half_v) / self.area
-        corners = centre + np.stack([-half_u - half_v, half_u - half_v, half_u + half_v, half_v - half_u])
-        return point_to_polygon(points, normals, np.broadcast_to(corners, (len(points), 4, 3))) / self.area
-
-    def shadow_rays(self, points: Float64Array, normals: Float64Array, u: Samples) -> Rays:
-        """Return rays to samples uniform over the lamp (see `Lamp.shadow_rays`)."""
-        samples = self._points(np.asarray(u, dtype=np.float64))
-        directions, distances = directions_to(samples - points[:, None])
-        facing = -(directions @ (self._facing / np.linalg.norm(self._facing)))
-        geometry = ray_geometry_term(row_cosines(directions, normals), facing, distances)
-        # Each ray stands for a k-th of the lamp: radiance times what it throws on a square metre.
-        thrown = throughput(geometry, 1.0, self.area / directions.shape[1])
-        return directions, distances, radiance_of_flux(1.0, self.area) * thrown
-
-    def _points(self, square: Float64Array) -> Float64Array:
-        """Map (…, 2) points of the unit square to uniform points of the lamp, (…, 3)."""
-        centre, half_u, half_v = self._half_axes()
-        across = concentric_disk(square) if self.shape == "ellipse" else 2.0 * square - 1.0
-        points: Float64Array = centre + across @ np.stack([half_u, half_v])
-        return points
-
-    def _half_axes(self) -> tuple[Float64Array, Float64Array, Float64Array]:
-        return np.asarray(self.position), 0.5 * np.asarray(self.edge_u), 0.5 * np.asarray(self.edge_v)
-
-
-@dataclass(frozen=True, eq=False)
 class EnvironmentLight(Light):
     """A sky of constant radiance around the scene, as seen by whatever is not covered.
 
@@ -201,3 +105,7 @@ class EnvironmentLight(Light):
     def strength(self) -> Float64Array:
         """(3,) RGB radiance [W/m²/sr]."""
         return np.asarray(self.radiance, dtype=np.float64)
+
+    def relative(self, directions: Float64Array) -> Float64Array:
+        """Return (...) radiance by directions (..., 3), relative to `radiance`: 1 here."""
+        return np.ones(directions.shape[:-1])

@@ -164,7 +164,7 @@ def _measure_chunk(
         factor.astype(np.float32),
         visibility.astype(np.float32),
         doubt.astype(np.float32),
-        *_quarter_shares(hierarchy, receiver, source, samples, transfer * (free | ~traced)),
+        *_quarter_shares(hierarchy, receiver, source, samples, transfer * np.where(traced, free, 1.0)),
     )
     return links.take(factor > 0)
 

@@ -18,13 +18,14 @@ import numpy as np
 from .aiming import BrightElements
 from .arrays import Array
 from .emitters import EmitterGroup
+from .environment import SkyTable
 from .footprints import Footprints, Sampler, SpreadPoints
 from .gathering import NOTHING, SKY, Gathered, Gathering, Resolver
 from .leaf_parts import LeafParts
-from .lights import EnvironmentLight, Lamp
-from .radiometry import radiosity_of_radiance
+from .lights import Lamp
 from .shadow_share import ShadowShare
 from .steps import drain, scaled
+from .textured_emitters import emitter_groups
 from .visibility import Hits
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ class LocalPass:
         self._seed = state.settings.seed
         self.threads = state.settings.threads
         """0 means all cores."""
-        self.emitters = EmitterGroup.of_faces(state.hierarchy.faces, state.caster)
+        self.emitters = emitter_groups(state.scene, state.hierarchy.faces, state.caster)
 
     def direct(
         self,
@@ -87,9 +88,11 @@ class LocalPass:
         spread = SpreadPoints(at, self._seed + 2, self.threads)
         for done, (light, seed) in enumerate(zip(lights, seeds, strict=True)):
             begin, end = done / count, (done + 1) / count
-            gains = spread.gain_steps(light, NEAR if isinstance(light, EmitterGroup) else 0.0)
+            glows = isinstance(light, EmitterGroup)
+            caster = self.caster if glows else self.caster.for_lamps
+            gains = spread.gain_steps(light, NEAR if glows else 0.0)
             gain = yield from scaled(gains, begin, begin + 0.1 / count)
-            share = ShadowShare(self.caster, light, spread, seed, self.threads).steps(gain, shadow_rays)
+            share = ShadowShare(caster, light, spread, seed, self.threads).steps(gain, shadow_rays)
             unblocked = yield from scaled(share, begin + 0.1 / count, end)
             total += (gain * unblocked)[:, None] * light.strength
         return total
@@ -139,7 +142,15 @@ class LocalPass:
             What is about expected. None aims at nothing.
         """
         gathering = Gathering(
-            self.caster, at, surface_normals, rays, resolve, self.leaves_of, self._seed, self.threads
+            self.caster,
+            at,
+            surface_normals,
+            rays,
+            resolve,
+            self.leaves_of,
+            self._seed,
+            self.threads,
+            self._sky,
         )
         if irradiance is None:
             return (yield from gathering.steps(None, np.zeros(len(at))))
@@ -158,7 +169,7 @@ class LocalPass:
         return total
 
     def leaves_of(self, hits: Hits) -> Array:
-        """Return (n,) int32: the leaf element under each hit; SKY for none or a black back."""
+        """Return (n,) int32: the leaf element under each hit; NOTHING for none or a black back."""
         hierarchy = self._state.hierarchy
         face = hierarchy.faces.of_triangle[(~hits.front).astype(np.int8), hits.triangle]
         on_face = (hits.triangle >= 0) & (face >= 0)
@@ -167,23 +178,29 @@ class LocalPass:
         return leaf
 
     def reflected(self) -> Array:
-        """Return (e, 3): the part of every element's radiosity it does not emit itself [W/m²]."""
-        hierarchy = self._state.hierarchy
-        return np.asarray(hierarchy.faces.reflectance[hierarchy.face] * self._state.irradiance)
+        """Return (e, 3): the part of every element's radiosity it does not emit itself [W/m²].
+
+        Where its surface is there, as it is for rays that hit it.
+        """
+        every = np.arange(self._state.hierarchy.n_elements)
+        return np.asarray(self._reflectance_where_hit(every) * self._state.irradiance)
 
     def reflected_at(self, triangle: Array, barycentric: Array) -> Array:
         """Return (n, 3): the same at points of triangles' fronts, (n, 2) weights of corners 2 and 3."""
-        hierarchy = self._state.hierarchy
-        face = hierarchy.faces.of_triangle[0, triangle]
-        leaf = hierarchy.leaf_at(np.maximum(face, 0), barycentric)
-        return np.where((face >= 0)[:, None], self.reflected()[leaf], 0.0)
+        return self._at_fronts(triangle, barycentric, self.reflected())
 
     def irradiance_at(self, triangle: Array, barycentric: Array) -> Array:
         """Return (n,) the elements' irradiance there, a mean of the channels [W/m²]."""
+        return self._at_fronts(triangle, barycentric, self._state.irradiance.mean(axis=1))
+
+    def _at_fronts(self, triangle: Array, barycentric: Array, values: Array) -> Array:
+        """Return the (e, …) values of the leaves at points of triangles' fronts; 0 where there is none."""
         hierarchy = self._state.hierarchy
         face = hierarchy.faces.of_triangle[0, triangle]
-        leaf = hierarchy.leaf_at(np.maximum(face, 0), barycentric)
-        return np.asarray(np.where(face >= 0, self._state.irradiance.mean(axis=1)[leaf], 0.0))
+        on_face = face >= 0
+        found = np.zeros((len(face), *values.shape[1:]))
+        found[on_face] = values[hierarchy.leaf_at(face[on_face], barycentric[on_face])]
+        return found
 
     @cached_property
     def parts(self) -> LeafParts:
@@ -201,17 +218,26 @@ class LocalPass:
         return gathered.sources
 
     def part_reflectance(self, parts: Array) -> Array:
-        """Return (p, 3) the reflectance of parts of leaf elements."""
+        """Return (p, 3) the reflectance of parts of leaf elements where their surface is there."""
+        return self._reflectance_where_hit(self.parts.leaf_of(parts))
+
+    def _reflectance_where_hit(self, elements: Array) -> Array:
         hierarchy = self._state.hierarchy
-        return np.asarray(hierarchy.faces.reflectance[hierarchy.face[self.parts.leaf_of(parts)]])
+        return np.asarray(hierarchy.reflectance[elements] / hierarchy.opacity_where_hit[elements, None])
 
     def part_direct(self, parts: Array) -> Generator[float, None, Array]:
         """Compute (p, 3) the irradiance of parts straight from lamps and emissive faces."""
         expected = self._state.irradiance[self.parts.leaf_of(parts)].mean(axis=1)
         return self.direct_steps(replace(self.parts.footprints(parts), expected=expected), rays=16)
 
-    def sky(self) -> Array:
-        """Return (3,) the radiosity equivalent πL of the sky [W/m²]."""
-        lights = self._state.scene.lights
-        skies = [light.strength for light in lights if isinstance(light, EnvironmentLight)]
-        return radiosity_of_radiance(np.sum(skies, axis=0)) if skies else np.zeros(3)
+    def beyond(self) -> Array:
+        """Return (cells + 2, 3) the last rows of a table of radiosity [W/m²]: the sky's cells, and two dark.
+
+        So the negative numbers of what rays found index them.
+        """
+        assert (NOTHING, SKY) == (-2, -3)
+        return np.concatenate([self._sky.radiosity[::-1], np.zeros((2, 3))])
+
+    @cached_property
+    def _sky(self) -> SkyTable:
+        return SkyTable(self._state.scene.lights)

@@ -26,3 +26,18 @@ def shares(sums: Array, limit: float = OVERLAP) -> Array:
     """
     over = sums > limit
     return np.where(over, 1.0 / np.where(over, sums, 1.0), 1.0)
+
+
+def arriving(exchange: Array, opacity: Array) -> Array:
+    """Return (n,) Σ_j T_ij α_j [m²]: how much of what rows exchange finds a surface there.
+
+    Parameters
+    ----------
+    exchange : (n, m) float64
+        Exchange areas T.
+    opacity : (m,) float64
+        α of each column's surface: a link sees all of a surface's area, holes included.
+    """
+    if (opacity == 1.0).all():
+        return np.asarray(exchange.sum(axis=1))
+    return np.asarray(exchange @ opacity)

@@ -73,14 +73,16 @@ def trace_pairs(caster: RayCaster, samples: PairSamples, empty_too: bool = False
 
     Returns
     -------
-    traced, free : (n, 16) bool
-        Which samples were asked, and which of these nothing blocks.
+    traced : (n, 16) bool
+        Which samples were asked.
+    free : (n, 16) float64
+        What share of these passes: 0 or 1 where there are no cut-outs.
     """
     traced = np.zeros(samples.transfer.shape, dtype=bool)
-    free = np.zeros(samples.transfer.shape, dtype=bool)
+    free = np.zeros(samples.transfer.shape)
     every = np.arange(len(traced))
     _trace(caster, samples, every, slice(0, FIRST_SAMPLES), traced, free)
-    seen = (free[:, :4] & traced[:, :4]).sum(axis=1)
+    seen = free[:, :4].sum(axis=1)
     tried = traced[:, :4].sum(axis=1)
     unsettled = np.flatnonzero(((seen > 0) & (seen < tried)) | (empty_too & (tried == 0)))
     _trace(caster, samples, unsettled, slice(FIRST_SAMPLES, ALL_SAMPLES), traced, free)

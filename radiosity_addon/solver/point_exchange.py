@@ -10,7 +10,7 @@ import numpy as np
 
 from .arrays import Array
 from .form_factor import point_to_polygon
-from .geometry_term import kernel
+from .geometry_term import LEAST, kernel
 from .hierarchy import split_in_four
 from .sampling import points_on_triangles, stratified_square
 from .visibility import RayCaster
@@ -61,7 +61,7 @@ def visible_share(
         start = (points[rows] + caster.surface_offset * normals[rows])[pair]
         along = ends[pair, sample] + caster.surface_offset * source_normals[rows[pair]] - start
         distance = np.linalg.norm(along, axis=1)
-        free = caster.visible(start, along / np.maximum(distance, 1e-300)[:, None], distance)
+        free = caster.passing(start, along / np.maximum(distance, 1e-300)[:, None], distance, LEAST)
         lit[rows] += np.bincount(pair, weight[pair, sample] * free, minlength=len(rows))
         total[rows] += weight.sum(axis=1)
         rows, first = np.flatnonzero((lit > 0) & (lit < total)), count

@@ -24,7 +24,11 @@ CONTACT = 1e-6
 
 
 def point_to_polygon(
-    points: npt.ArrayLike, normals: npt.ArrayLike, polygons: npt.ArrayLike, both_sides: bool = False
+    points: npt.ArrayLike,
+    normals: npt.ArrayLike,
+    polygons: npt.ArrayLike,
+    both_sides: bool = False,
+    contact: bool = True,
 ) -> Float64Array:
     """Return the form factor from oriented points to planar polygons, row by row.
 
@@ -43,6 +47,9 @@ def point_to_polygon(
         May be a broadcast view: rows are copied by chunks of `CHUNK_CORNERS` corners.
     both_sides : bool
         Count the polygon's back as well.
+    contact : bool
+        Whether faces in contact see each other. A surface's own back lies in its plane and faces the
+        other way just like one in contact, so callers that cannot tell them apart say no.
 
     Returns
     -------
@@ -66,11 +73,13 @@ def point_to_polygon(
         rows = slice(start, start + step)
         # One array a coordinate: (k, 3, rows) corners as seen from the point.
         corners = np.subtract(polygons[rows].transpose(1, 2, 0), points[rows].T, order="C")
-        factors[rows] = _chunk_factors(corners, np.ascontiguousarray(normals[rows].T), both_sides)
+        factors[rows] = _chunk_factors(corners, np.ascontiguousarray(normals[rows].T), both_sides, contact)
     return factors
 
 
-def _chunk_factors(corners: Float64Array, normal: Float64Array, both_sides: bool) -> Float64Array:
+def _chunk_factors(
+    corners: Float64Array, normal: Float64Array, both_sides: bool, contact: bool
+) -> Float64Array:
     """Return (m,) factors of (k, 3, m) corners relative to points with (3, m) normals."""
     area_vector = _area_vector(corners)
     area = np.sqrt(_dot(area_vector, area_vector))
@@ -97,7 +106,7 @@ def _chunk_factors(corners: Float64Array, normal: Float64Array, both_sides: bool
     if len(rows):
         picked = (array.take(rows, axis=-1) for array in (corners, heights, normal, area_vector))
         turn[rows] = _cut_turn(*picked)
-    rows = np.flatnonzero(~off_plane & (area > 0.0))
+    rows = np.flatnonzero(~off_plane & (area > 0.0) & contact)
     if len(rows):
         facing = area_vector[:, rows] / area[rows]
         turn[rows] = _contact_turn(corners[:, :, rows], normal[:, rows], facing, both_sides)

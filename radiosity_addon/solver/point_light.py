@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .arrays import Array
-from .light_links import lamp_light, sky_visibility
+from .light_links import lamp_light, sky_share
 from .lights import EnvironmentLight, Lamp, Light
 from .parallel import for_chunks
 from .radiometry import irradiance_under_sky
@@ -43,7 +43,7 @@ def lamp_irradiance(
         for number, light in enumerate(lights):
             own_seed = seed + 101 * number
             if isinstance(light, EnvironmentLight):
-                share = sky_visibility(points[rows], facing, SKY_RAYS, caster, keys, own_seed)
+                share, _ = sky_share(light, points[rows], facing, SKY_RAYS, caster, keys, own_seed)
                 gain = irradiance_under_sky(1.0) * share
             elif isinstance(light, Lamp):
                 repeated = np.repeat(points[rows, None], SHADOW_RAYS, axis=1)

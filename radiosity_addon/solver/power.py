@@ -13,7 +13,8 @@ import numpy as np
 
 from .arrays import Array
 from .cluster_links import ClusterLinks, gather_at_clusters
-from .hierarchy import Faces, Hierarchy
+from .environment import SkyPatch
+from .hierarchy import Faces, Hierarchy, node_opacity
 from .light_base import Emitter
 from .lights import EnvironmentLight, SunLight
 from .links import Links
@@ -21,6 +22,7 @@ from .radiometry import irradiance_under_sky
 from .sampling import cosine_hemisphere, points_on_triangles, stratified_square, to_world
 from .scene import Scene
 from .tree_top import TreeTop
+from .visibility import RayCaster
 
 if TYPE_CHECKING:
     from .state import SolverState
@@ -41,7 +43,7 @@ def light_power(scene: Scene, faces: Faces) -> float:
     width = corners.max(axis=0) - corners.min(axis=0)
     sides = np.array([width[1] * width[2], width[2] * width[0], width[0] * width[1]])
     for light in scene.lights:
-        if isinstance(light, SunLight):
+        if isinstance(light, SunLight | SkyPatch):
             total = total + light.strength * float(np.abs(np.asarray(light.direction)) @ sides)
         elif isinstance(light, EnvironmentLight):
             total = total + irradiance_under_sky(light.strength) * float(sides.sum())
@@ -56,18 +58,18 @@ def power_balance(state: SolverState) -> dict[str, float]:
     Lamps and emission count over all their sides, sun and sky what arrives at the faces.
     """
     hierarchy, scene = state.hierarchy, state.scene
-    faces = hierarchy.faces
     leaves = hierarchy.leaves
-    emitted = float((faces.area @ faces.emission).mean()) if len(faces) else 0.0
-    gain = hierarchy.area[state.light_links.receiver] * state.light_links.gain.mean(axis=1)
+    emitted = float((hierarchy.area[leaves] @ hierarchy.emission[leaves]).mean()) if len(leaves) else 0.0
+    receiver = state.light_links.receiver
+    gain = hierarchy.area[receiver] * hierarchy.opacity[receiver] * state.light_links.gain.mean(axis=1)
     for number, light in enumerate(scene.lights):
-        if isinstance(light, SunLight | EnvironmentLight):
+        if isinstance(light, SunLight | SkyPatch | EnvironmentLight):
             arriving = float(gain[state.light_links.light == number].sum())
             emitted += arriving * float(light.strength.mean())
         elif isinstance(light, Emitter):
             emitted += float(light.flux.mean())
 
-    kept = (1.0 - faces.reflectance[hierarchy.face[leaves]]) * state.irradiance[leaves]
+    kept = (hierarchy.opacity[leaves, None] - hierarchy.reflectance[leaves]) * state.irradiance[leaves]
     absorbed = float((hierarchy.area[leaves] @ kept).mean()) if len(leaves) else 0.0
     from_surfaces = _follow_surfaces(state)
     from_lamps = _follow_lamps(state)
@@ -95,7 +97,7 @@ def _follow_surfaces(state: SolverState) -> tuple[float, float]:
     normals = hierarchy.normal[leaf]
     unit = stratified_square(number, 1, seed + 12)
     directions = to_world(cosine_hemisphere(unit), normals)[:, 0]
-    black, escaped = _fate(state, points + state.caster.surface_offset * normals, directions)
+    black, escaped = _fate(state, state.caster, points + state.caster.surface_offset * normals, directions)
     return total * float(black.mean()), total * float(escaped.mean())
 
 
@@ -110,16 +112,16 @@ def _follow_lamps(state: SolverState) -> tuple[float, float]:
         place = stratified_square(np.zeros(1, np.int64), count, seed)[0]
         way = stratified_square(np.zeros(1, np.int64), count, seed + 1)[0]
         origins, directions, share = light.emit(place, way)
-        black, escaped = _fate(state, origins, directions)
+        black, escaped = _fate(state, state.caster.for_lamps, origins, directions)
         flux = float(light.flux.mean())
         black_total += flux * float((black * share).sum() / share.sum())
         escaped_total += flux * float((escaped * share).sum() / share.sum())
     return black_total, escaped_total
 
 
-def _fate(state: SolverState, origins: Array, directions: Array) -> tuple[Array, Array]:
+def _fate(state: SolverState, caster: RayCaster, origins: Array, directions: Array) -> tuple[Array, Array]:
     """Return (n,) whether rays end on a black back, and whether they leave the scene."""
-    hits = state.caster.first_hits(origins, directions)
+    hits = caster.first_hits(origins, directions)
     escaped = hits.triangle < 0
     face = state.hierarchy.faces.of_triangle[(~hits.front).astype(int), hits.triangle]
     return ~escaped & (face < 0), escaped
@@ -128,14 +130,17 @@ def _fate(state: SolverState, origins: Array, directions: Array) -> tuple[Array,
 def link_closure(hierarchy: Hierarchy, links: Links, cluster_links: ClusterLinks | None = None) -> Array:
     """Return (f,) the area mean over each face's leaves of ΣFV over own and inherited links.
 
-    1 in a closed scene: all that leaves a face arrives somewhere.
+    1 in a closed scene: all that leaves a face arrives somewhere. A factor counts with its source's
+    opacity, as light that finds no surface there goes on to the next.
     """
-    own = np.bincount(links.receiver, links.factor * links.visibility, minlength=hierarchy.n_elements)
+    opacity = node_opacity(hierarchy)
+    factor = links.factor * links.visibility * opacity[links.source]
+    own = np.bincount(links.receiver, factor, minlength=hierarchy.n_elements)
     # An element's own links count for its whole area: exactly the mean over its leaves.
     held = np.bincount(hierarchy.face, own * hierarchy.area, minlength=len(hierarchy.faces))
     per_face = np.asarray(held / hierarchy.faces.area)
     if cluster_links is not None:
         top = TreeTop(hierarchy, cluster_links.receiver, cluster_links.source)
-        everywhere = np.ones((hierarchy.n_clusters + hierarchy.n_elements, 1))
-        per_face += np.maximum(gather_at_clusters(hierarchy, top, cluster_links, everywhere)[:, 0], 0.0)
+        there = gather_at_clusters(hierarchy, top, cluster_links, opacity[:, None])[:, 0]
+        per_face += np.maximum(there, 0.0)
     return per_face

@@ -20,7 +20,7 @@ import numpy as np
 from .arrays import Array
 from .form_factor import point_to_polygon
 from .hierarchy import split_in_four
-from .local_pass import NOTHING, SKY, LocalPass
+from .local_pass import LocalPass
 from .parallel import for_chunks
 from .point_exchange import corner_factors, visible_share
 from .point_light import lamp_irradiance
@@ -55,7 +55,10 @@ class Residual:
 
     def radiosity(self, face: Array, barycentric: Array) -> Array:
         """Return B̂ (n, 3) at points of faces [W/m²]; parameters as for `at`."""
-        leaf = self._hierarchy.leaf_at(face, barycentric)
+        return self._at_leaves(self._hierarchy.leaf_at(face, barycentric), face, barycentric)
+
+    def _at_leaves(self, leaf: Array, face: Array, barycentric: Array) -> Array:
+        """Return the same, for known leaves."""
         corners = self._hierarchy.corners[leaf]
         weights = _weights(corners, self.position(face, barycentric))
         return self._basis.evaluate(self._values, self._row[leaf], weights)
@@ -93,7 +96,7 @@ class Residual:
             self._state.scene.lights, points, normals, self._state.caster, settings.seed, settings.threads
         )
         irradiance += self._from_surfaces(points, normals)
-        return self.given(face, self.radiosity(face, barycentric), irradiance)
+        return self.given(face, barycentric, irradiance)
 
     def by_rays(self, face: Array, barycentric: Array, rays: int, local: LocalPass | None = None) -> Array:
         """Return r at points of faces, the integral by `rays` cosine-distributed rays a point.
@@ -107,25 +110,29 @@ class Residual:
         direct = local.direct(points, normals, keys, rays=SHADOW_RAYS)
         sources, _ = local.gather(points, normals, normals, keys, rays, local.leaves_of)
         indirect = self.gathered(local)[sources].mean(axis=1)
-        return self.given(face, self.radiosity(face, barycentric), direct + indirect)
+        return self.given(face, barycentric, direct + indirect)
 
     def gathered(self, local: LocalPass) -> Array:
-        """Return (e + 2, 3): what a gather ray finds [W/m²], elements first, then NOTHING and SKY.
+        """Return (e + cells + 2, 3): what a gather ray finds [W/m²], elements first, then `LocalPass.beyond`.
 
         Elements without their own emission, which is direct light.
         """
-        assert (NOTHING, SKY) == (-2, -1)
-        table = np.zeros((self._hierarchy.n_elements + 2, 3))
+        beyond = local.beyond()
+        table = np.zeros((self._hierarchy.n_elements + len(beyond), 3))
         leaf = self._basis.leaf
-        emission = self._hierarchy.faces.emission[self._hierarchy.face[leaf]]
-        table[leaf] = self._basis.leaf_means(self._values) - emission
-        table[SKY] = local.sky()
+        table[leaf] = self._basis.leaf_means(self._values) - self._hierarchy.emission[leaf]
+        table[leaf] /= self._hierarchy.opacity_where_hit[leaf, None]
+        table[self._hierarchy.n_elements :] = beyond
         return table
 
-    def given(self, face: Array, radiosity: Array, irradiance: Array) -> Array:
-        """Return B̂ − E − ρH (n, 3) on faces (n,), where B̂ and all that arrives are known."""
-        faces = self._hierarchy.faces
-        return np.asarray(radiosity - faces.emission[face] - faces.reflectance[face] * irradiance)
+    def given(self, face: Array, barycentric: Array, irradiance: Array) -> Array:
+        """Return B̂ − E − ρH (n, 3) at points of faces, for (n, 3) all that arrives; see `at`.
+
+        ρ and E are those the solution was made with: means over the leaf elements.
+        """
+        leaf = self._hierarchy.leaf_at(face, barycentric)
+        emission, reflectance = self._hierarchy.emission[leaf], self._hierarchy.reflectance[leaf]
+        return np.asarray(self._at_leaves(leaf, face, barycentric) - emission - reflectance * irradiance)
 
     def norm(self, weights: str = CONSTANT, splits: int = 0, points: int = 2) -> Array:
         """Return |r| = Σ_i |⟨r, W_i⟩| of each channel, (3,) (handout (3.7)).

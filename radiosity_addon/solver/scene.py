@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,8 +11,14 @@ from ..errors import SceneError
 from .arrays import Array
 from .lights import Light
 
+if TYPE_CHECKING:
+    from .surface_images import SurfaceImages
+
 MAX_REFLECTANCE = 0.99
 """Reflectances are clamped here: at 1 a closed room has no solution."""
+
+WHOLE_TRIANGLE = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+"""A triangle's corners as weights of its second and third."""
 
 
 class Scene:
@@ -31,6 +38,12 @@ class Scene:
     lights : sequence of Light
     normals : (t, 3, 3) float or None
         Unit shading normals at the corners; None for flat shading.
+    images : SurfaceImages or None
+        Reflectance, emission and opacity of textured triangles in detail; their rows of
+        `reflectance` and `emission` become the area means, opacity multiplied in.
+    in_bounces, in_shadows : bool or (t,) bool
+        Whether triangles meet the light that surfaces and sky send, and whether they stop that
+        of lamps. Out of bounces a triangle is lit but neither reflects nor emits.
 
     Raises
     ------
@@ -46,6 +59,9 @@ class Scene:
         two_sided: bool | Array = False,
         lights: Sequence[Light] = (),
         normals: Array | None = None,
+        images: SurfaceImages | None = None,
+        in_bounces: bool | Array = True,
+        in_shadows: bool | Array = True,
     ) -> None:
         self.triangles = np.ascontiguousarray(triangles, dtype=np.float64)
         if self.triangles.ndim != 3 or self.triangles.shape[1:] != (3, 3):
@@ -53,10 +69,9 @@ class Scene:
         count = len(self.triangles)
         self.reflectance = np.minimum(_rgb_rows("reflectance", reflectance, count), MAX_REFLECTANCE)
         self.emission = _rgb_rows("emission", emission, count)
-        sides = np.asarray(two_sided, dtype=bool)
-        if sides.shape not in ((), (count,)):
-            raise SceneError(f"two_sided has shape {sides.shape}; a bool or ({count},) is needed")
-        self.two_sided = np.broadcast_to(sides, (count,)).copy()
+        self.two_sided = _flags("two_sided", two_sided, count)
+        self.in_bounces = _flags("in_bounces", in_bounces, count)
+        self.in_shadows = _flags("in_shadows", in_shadows, count)
         self.lights = tuple(lights)
         if not np.isfinite(self.triangles).all():
             row = int(np.flatnonzero(~np.isfinite(self.triangles).all(axis=(1, 2)))[0])
@@ -79,9 +94,31 @@ class Scene:
             if not np.isfinite(self.normals).all():
                 raise SceneError("normals hold a value that is NaN or infinite")
         """(t, 3, 3) float64: shading normals at the corners"""
+        self.images = images
+        self.opacity = np.ones(count)
+        """(t,) float64: area means"""
+        if images is not None:
+            self._average(images)
+
+    def _average(self, images: SurfaceImages) -> None:
+        """Take the images' area means for the textured triangles' constants."""
+        if len(images) != len(self):
+            raise SceneError(f"the surface images are of {len(images)} triangles; there are {len(self)}")
+        rows = np.flatnonzero(images.textured)
+        means = images.area_means(rows, np.broadcast_to(WHOLE_TRIANGLE, (len(rows), 3, 2)))
+        self.reflectance[rows], self.emission[rows] = means[:, :3], means[:, 3:6]
+        self.opacity[rows] = means[:, 6]
 
     def __len__(self) -> int:
         return len(self.triangles)
+
+
+def _flags(name: str, values: bool | Array, count: int) -> Array:
+    """Return `values` as (count,) bool."""
+    flags = np.asarray(values, dtype=bool)
+    if flags.shape not in ((), (count,)):
+        raise SceneError(f"{name} has shape {flags.shape}; a bool or ({count},) is needed")
+    return np.broadcast_to(flags, (count,)).copy()
 
 
 def _rgb_rows(name: str, values: Array, count: int) -> Array:

@@ -82,6 +82,8 @@ class ShadowShare:
         -------
         share : (n,) float64
         """
+        if isinstance(self._light, Lamp) and not self._light.casts_shadow:
+            return np.ones(len(gain))
         facing, near = gain > 0, self._at.near
         part = self._at.weight_of(gain * self._light.strength.mean())
         few = _power_of_two(rays * np.sqrt(part / MAIN_PART), rays)
@@ -133,6 +135,8 @@ class ShadowShare:
             centre, normal = at.points[chunk], at.normals[chunk]
             unit = stratified_square(at.keys[chunk], count, self._seed + 1)
             directions, distances, weights = self._light.shadow_rays(centre, normal, unit)
+            # The edge of a spot's cone may cross a footprint and leave its centre dark: then all count alike.
+            weights = np.where(weights.any(axis=1, keepdims=True), weights, 1.0)
             start = centre[:, None]
             if at.sampler is not None:
                 # The same lamp points, seen from points spread over the footprint.
@@ -145,10 +149,12 @@ class ShadowShare:
                 length = np.sqrt(np.einsum("rkc,rkc->rk", along, along))
                 directions = along / np.maximum(length, 1e-300)[..., None]
                 distances = np.where(finite, length, np.inf)
+            if at.lift is not None:
+                start = at.lift(chunk, np.broadcast_to(start, directions.shape), directions)
             start = np.broadcast_to(start + caster.surface_offset * normal[:, None], directions.shape)
             point, sample = np.nonzero(weights > 0)
             ray = (point, sample)
-            free = caster.visible(start[ray], directions[ray], distances[ray])
+            free = caster.passing(start[ray], directions[ray], distances[ray])
             self._lit[chunk] += np.bincount(point, free * weights[ray], minlength=len(chunk))
             self._total[chunk] += weights.sum(axis=1)
 

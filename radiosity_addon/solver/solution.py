@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .arrays import Array
-from .local_pass import NOTHING, SKY, LocalPass
+from .local_pass import LocalPass
 from .power import power_balance
 from .residual import Residual
 from .state import SolverState
@@ -105,8 +105,7 @@ class Solution:
         keys = np.arange(len(points))
         direct = local.direct(points, normals, keys, rays=64)
         sources, _ = local.gather(points, normals, normals, keys, POINT_RAYS, local.leaves_of)
-        radiosity = np.concatenate([local.reflected(), np.zeros((1, 3)), local.sky()[None]])
-        assert (NOTHING, SKY) == (-2, -1)  # they index the two rows appended
+        radiosity = np.concatenate([local.reflected(), local.beyond()])
         return np.asarray(direct + radiosity[sources].mean(axis=1))
 
     def residual(

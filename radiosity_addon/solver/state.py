@@ -10,7 +10,7 @@ import numpy as np
 
 from .arrays import Array
 from .basis import Basis, constant_basis
-from .embree import EmbreeCaster
+from .cut_outs import ray_caster
 from .hierarchy import Hierarchy
 from .light_links import LightLinks, light_strengths, link_lights, no_light_links
 from .power import light_power
@@ -84,12 +84,12 @@ class SolverState:
     @property
     def reflectance(self) -> Array:
         """(e, 3) float64: of every element."""
-        return np.asarray(self.hierarchy.faces.reflectance[self.hierarchy.face])
+        return self.hierarchy.reflectance
 
     @property
     def emission(self) -> Array:
         """(e, 3) float64: own emission of every element [W/m²]."""
-        return np.asarray(self.hierarchy.faces.emission[self.hierarchy.face])
+        return self.hierarchy.emission
 
     def link_lights_to_leaves(self) -> None:
         """Link the lamps and the sky to the leaves as they are, splitting none."""
@@ -153,7 +153,7 @@ StateType = TypeVar("StateType", bound=SolverState)
 def begin(scene: Scene, settings: SolverSettings, kind: type[StateType]) -> StateType:
     """Prepare a scene for a method: its faces, its ray caster, and the power of its light."""
     started = time.perf_counter()
-    caster = EmbreeCaster(scene.triangles, settings.threads)
+    caster = ray_caster(scene, settings.threads)
     hierarchy = Hierarchy(scene)
     power = light_power(scene, hierarchy.faces)
     state = kind(scene, settings, hierarchy, caster, power, started=started)

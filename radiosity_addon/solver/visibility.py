@@ -51,11 +51,27 @@ class RayCaster(Protocol):
 
     surface_offset: float
     """How far ray origins leave their surface [m]."""
-    rays: int
-    """Rays traced so far."""
+
+    @property
+    def rays(self) -> int:
+        """Rays traced so far."""
+        ...
+
+    @property
+    def for_lamps(self) -> RayCaster:
+        """The caster that knows what stops the light of lamps; most often this one."""
+        ...
 
     def visible(self, origins: Array, directions: Array, distances: Array) -> Array:
         """Return (n,) bool: nothing lies within `distances` along the unit `directions`."""
+        ...
+
+    def passing(self, origins: Array, directions: Array, distances: Array, least: float = 0.0) -> Array:
+        """Return (n,) what share of light passes: `visible`, but between 0 and 1 through cut-outs.
+
+        Their opacity counts as at least `least` and as at most 1 − `least`, for callers that judge
+        by few rays: where some met a cut-out, more are needed.
+        """
         ...
 
     def first_hits(self, origins: Array, directions: Array) -> Hits:
@@ -90,9 +106,18 @@ class BruteForceCaster:
         self.surface_offset = surface_offset(triangles)
         self.rays = 0
 
+    @property
+    def for_lamps(self) -> RayCaster:
+        """All triangles stop the light of lamps here."""
+        return self
+
     def visible(self, origins: Array, directions: Array, distances: Array) -> Array:
         """See `RayCaster.visible`."""
         return np.asarray(self.first_hits(origins, directions).distance >= distances)
+
+    def passing(self, origins: Array, directions: Array, distances: Array, least: float = 0.0) -> Array:  # noqa: ARG002
+        """Return the same: all surfaces are whole."""
+        return self.visible(origins, directions, distances)
 
     def first_hits(self, origins: Array, directions: Array) -> Hits:
         """See `RayCaster.first_hits`."""

@@ -37,6 +37,10 @@ LAMPS: dict[str, Lamp] = {
     "wide sun": SunLight((0.3, -0.5, -0.4), 3.0, angle=2.0),
     "rectangle": AreaLight((0.3, 0.2, 0.8), (1.0, 0.1, 0.2), (0.0, -0.6, 0.1), 10.0),
     "ellipse": AreaLight((0.3, 0.2, 0.8), (1.0, 0.1, 0.2), (0.0, -0.6, 0.1), 10.0, shape="ellipse"),
+    "narrow rectangle": AreaLight((0.3, 0.2, 0.8), (1.0, 0.1, 0.2), (0.0, -0.6, 0.1), 10.0, spread=1.2),
+    "narrow ellipse": AreaLight(
+        (0.3, 0.2, 0.8), (1.0, 0.1, 0.2), (0.0, -0.6, 0.1), 10.0, shape="ellipse", spread=1.2
+    ),
 }
 
 

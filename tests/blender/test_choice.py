@@ -56,7 +56,7 @@ def test_names_that_cannot_be_baked_say_why() -> None:
         ("Xyz", "no object 'Xyz' to bake"),
         ("Secret", "'Secret' is hidden from render"),
         ("Hollow", "'Hollow' has no faces"),
-        ("Bulb", "'Bulb' is not a mesh but light"),
+        ("Bulb", "'Bulb' is not a surface but light"),
     ):
         with pytest.raises(UsageError, match=words):
             export_with(objects=("Table", name))

@@ -50,6 +50,7 @@ _CASES: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
     "rectangle, stretched": ("AREA", _STRETCHED, {"shape": "RECTANGLE", "size": 0.8, "size_y": 0.3}),
     "disk, stretched": ("AREA", _STRETCHED, {"shape": "DISK", "size": 0.8}),
     "ellipse, mirrored": ("AREA", _MIRRORED, {"shape": "ELLIPSE", "size": 0.8, "size_y": 0.3}),
+    "rectangle, narrow": ("AREA", _AIMED, {"shape": "RECTANGLE", "size": 0.8, "size_y": 0.3, "spread": 1.0}),
     "square, facing away": ("AREA", _TURNED_OVER, {"shape": "SQUARE", "size": 0.8}),
 }
 _LATER_CASES: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
@@ -142,6 +143,26 @@ def test_a_lamp_hidden_in_the_viewport_only_lights(meter: bpy.types.Object) -> N
     assert len(_exported()[0]) == 1
 
 
+def test_a_lamp_hidden_from_diffuse_rays_does_not_light(meter: bpy.types.Object) -> None:
+    add_lamp("POINT", energy=7.0, transform=_ASIDE).visible_diffuse = False
+    assert _exported()[0] == []
+    assert not measure_irradiance(meter).any()
+
+
+def test_nodes_that_shine_unevenly_warn(meter: bpy.types.Object) -> None:
+    lamp = add_lamp("POINT", "Gobo", transform=_ASIDE, energy=7.0, shadow_soft_size=0.0)
+    if bpy.app.version < (5, 1):
+        lamp.data.use_nodes = True
+    tree = with_nodes(lamp.data)
+    emission, place = add_node(tree, "ShaderNodeEmission"), tree.nodes.new("ShaderNodeTexCoord")
+    tree.links.new(place.outputs["Normal"], emission.inputs["Color"])
+    tree.links.new(emission.outputs[0], tree.nodes.new("ShaderNodeOutputLight").inputs["Surface"])
+    (warning,) = _exported()[1]
+    assert warning.name == "Gobo"
+    assert "shine unevenly" in warning.message
+    assert len(bpy.data.scenes) == 1
+
+
 def test_negative_power_counts_as_none(meter: bpy.types.Object) -> None:
     add_lamp("POINT", "Thief", energy=-7.0)
     lamps, warnings = _exported()
@@ -170,8 +191,6 @@ def test_a_portal_is_no_lamp(meter: bpy.types.Object) -> None:
 @pytest.mark.parametrize(
     ("kind", "attribute", "value", "words"),
     [
-        ("POINT", "use_shadow", False, "casts shadows"),
-        ("AREA", "spread", 1.0, "a spread of 57.3°"),
         ("SPOT", "use_square", True, "square cone"),
     ],
 )

@@ -1,4 +1,4 @@
-"""Materials come to one reflectance and one emission; what is not understood is told."""
+"""Materials come to reflectance, emission and opacity; what is not understood is told."""
 
 from __future__ import annotations
 
@@ -27,6 +27,10 @@ def _output(tree: bpy.types.NodeTree) -> bpy.types.Node:
     return tree.nodes.new("ShaderNodeOutputMaterial")
 
 
+def _fallbacks(surface: Surface) -> str:
+    return "\n".join(warning.message for warning in surface.fallbacks)
+
+
 def _check(surface: Surface, reflectance: Any, emission: Any = (0, 0, 0)) -> None:
     np.testing.assert_allclose(surface.reflectance, reflectance, rtol=1e-6)
     np.testing.assert_allclose(surface.emission, emission, rtol=1e-6)
@@ -42,24 +46,6 @@ def test_diffuse() -> None:
     surface = read_material(shader_material("M", "ShaderNodeBsdfDiffuse", Color=_RED))
     _check(surface, _RED[:3])
     assert surface.warnings == ()
-
-
-def test_principled_reflects_its_base_colour_metal_or_not() -> None:
-    for metallic in (0.0, 1.0):
-        surface = read_material(
-            shader_material("M", "ShaderNodeBsdfPrincipled", Base_Color=_RED, Metallic=metallic)
-        )
-        _check(surface, _RED[:3])
-        assert surface.warnings == ()
-
-
-def test_principled_emits_strength_times_colour() -> None:
-    surface = read_material(
-        shader_material(
-            "M", "ShaderNodeBsdfPrincipled", Base_Color=_RED, Emission_Color=_BLUE, Emission_Strength=2.0
-        )
-    )
-    _check(surface, _RED[:3], 2 * math.pi * np.array(_BLUE[:3]))
 
 
 def test_emission_is_radiance_times_pi_and_black() -> None:
@@ -192,23 +178,27 @@ def _image(name: str, colour_space: str, *, is_float: bool) -> tuple[bpy.types.I
 @pytest.mark.parametrize(
     ("colour_space", "is_float"), [("sRGB", False), ("Non-Color", False), ("Linear Rec.709", True)]
 )
-def test_an_image_counts_with_its_linear_mean(colour_space: str, is_float: bool) -> None:
+def test_an_image_that_cannot_be_evaluated_counts_with_its_linear_mean(
+    colour_space: str, is_float: bool
+) -> None:
     image, pixels = _image("Bricks", colour_space, is_float=is_float)
     mean = (linear_from_srgb(pixels) if colour_space == "sRGB" else pixels).mean(axis=0)
     np.testing.assert_allclose(image_mean(image)[:3], mean, rtol=1e-5)
-    material = shader_material("Wall", "ShaderNodeBsdfPrincipled")
+    material = shader_material("Wall", "ShaderNodeBsdfPrincipled", Specular_IOR_Level=0)
     tree = material.node_tree
     texture = tree.nodes.new("ShaderNodeTexImage")
     texture.image = image
     tree.links.new(texture.outputs["Color"], tree.nodes["Principled BSDF"].inputs["Base Color"])
     surface = read_material(material)
     _check(surface, mean)
-    (warning,) = surface.warnings
+    assert surface.varies
+    assert surface.warnings == ()
+    (warning,) = surface.fallbacks
     assert warning.name == "Wall"
     assert warning.message.startswith("material 'Wall': Base Color comes from image 'Bricks'; the mean (")
 
 
-def test_a_checker_is_half_and_half() -> None:
+def test_a_checker_that_cannot_be_evaluated_is_half_and_half() -> None:
     material = shader_material("Floor", "ShaderNodeBsdfDiffuse", Color=(1, 1, 1, 1))
     tree = material.node_tree
     checker = tree.nodes.new("ShaderNodeTexChecker")
@@ -216,7 +206,8 @@ def test_a_checker_is_half_and_half() -> None:
     tree.links.new(checker.outputs["Color"], tree.nodes["Diffuse BSDF"].inputs["Color"])
     surface = read_material(material)
     _check(surface, (0.35, 0.2, 0.45))
-    assert "Color comes from node 'Checker Texture'; the mean (" in _messages(surface)
+    assert surface.varies
+    assert "Color comes from node 'Checker Texture'; the mean (" in _fallbacks(surface)
 
 
 def test_srgb_decodes_as_the_standard_says() -> None:
@@ -227,34 +218,18 @@ def test_srgb_decodes_as_the_standard_says() -> None:
 
 @pytest.mark.parametrize("kind", ["ShaderNodeTexNoise", "ShaderNodeVertexColor", "ShaderNodeTexImage"])
 def test_what_varies_in_unknown_ways_falls_back_on_the_sockets_value(kind: str) -> None:
-    """Procedural textures, vertex colours and images that are missing."""
+    """Procedural textures and vertex colours, if not evaluated; images that are missing, always."""
     material = shader_material("Odd", "ShaderNodeBsdfDiffuse", Color=_RED)
     tree = material.node_tree
     node = tree.nodes.new(kind)
     tree.links.new(node.outputs["Color"], tree.nodes["Diffuse BSDF"].inputs["Color"])
     surface = read_material(material)
     _check(surface, _RED[:3])
-    (warning,) = surface.warnings
+    missing = kind == "ShaderNodeTexImage"
+    (warning,) = surface.warnings if missing else surface.fallbacks
+    assert surface.varies == (not missing)
     assert warning.name == "Odd"
     assert "(0.6, 0.2, 0.1) is used" in warning.message
-
-
-@pytest.mark.parametrize(
-    ("socket", "value", "words"),
-    [
-        ("Alpha", 0.5, "alpha is ignored"),
-        ("Transmission_Weight", 1.0, "transmission is ignored"),
-        ("Subsurface_Weight", 0.3, "subsurface scattering is ignored"),
-        ("Coat_Weight", 0.3, "the coat is ignored"),
-        ("Sheen_Weight", 0.3, "the sheen is ignored"),
-    ],
-)
-def test_what_principled_does_beyond_diffuse_warns(socket: str, value: float, words: str) -> None:
-    surface = read_material(
-        shader_material("Odd", "ShaderNodeBsdfPrincipled", Base_Color=_RED, **{socket: value})
-    )
-    _check(surface, _RED[:3])
-    assert f"material 'Odd': {words}" in _messages(surface)
 
 
 def test_reflectance_of_one_is_clamped_and_named() -> None:
@@ -269,7 +244,7 @@ def test_negative_emission_is_none() -> None:
     assert "material 'Thief': emission (-1, -1, -1) is not possible" in _messages(surface)
 
 
-def test_a_cut_out_is_baked_with_its_solid_shader() -> None:
+def test_a_mix_with_transparent_is_its_solid_shader_where_it_is_there() -> None:
     material = shader_material("Leaf", "ShaderNodeMixShader", Fac=0.3)
     tree = material.node_tree
     mix = next(node for node in tree.nodes if node.type == "MIX_SHADER")
@@ -277,7 +252,28 @@ def test_a_cut_out_is_baked_with_its_solid_shader() -> None:
     tree.links.new(add_node(tree, "ShaderNodeBsdfDiffuse", Color=_RED).outputs[0], mix.inputs[2])
     surface = read_material(material)
     _check(surface, _RED[:3])
-    assert "transparency is ignored" in _messages(surface)
+    assert surface.opacity == pytest.approx(0.3)
+    assert surface.warnings == ()
+
+
+def test_transparent_passes_its_colour_and_reflects_nothing() -> None:
+    surface = read_material(shader_material("Gone", "ShaderNodeBsdfTransparent", Color=(0.9, 0.6, 0.3, 1)))
+    _check(surface, (0, 0, 0))
+    assert surface.opacity == pytest.approx(0.4)
+    assert surface.warnings == ()
+
+
+def test_what_glows_but_hides_nothing_keeps_its_light() -> None:
+    """Emission added to Transparent: only what is there emits, so a little of it is."""
+    material = shader_material("Flame", "ShaderNodeAddShader")
+    tree = material.node_tree
+    add = next(node for node in tree.nodes if node.type == "ADD_SHADER")
+    clear = add_node(tree, "ShaderNodeBsdfTransparent", Color=(1, 1, 1, 1))
+    tree.links.new(clear.outputs[0], add.inputs[0])
+    tree.links.new(add_node(tree, "ShaderNodeEmission", Color=_BLUE).outputs[0], add.inputs[1])
+    surface = read_material(material)
+    assert 0 < surface.opacity < 0.02
+    np.testing.assert_allclose(surface.emission * surface.opacity, math.pi * np.array(_BLUE[:3]), rtol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -286,7 +282,6 @@ def test_a_cut_out_is_baked_with_its_solid_shader() -> None:
         ("ShaderNodeBsdfAnisotropic", _RED[:3]),
         ("ShaderNodeBsdfTranslucent", _RED[:3]),
         ("ShaderNodeBsdfGlass", (0, 0, 0)),
-        ("ShaderNodeBsdfTransparent", (0, 0, 0)),
     ],
 )
 def test_other_shaders_warn_with_the_value_used(shader: str, reflectance: Any) -> None:

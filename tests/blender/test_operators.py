@@ -144,15 +144,19 @@ def test_baking_twice_gives_the_same_pixels(box: bpy.types.Scene) -> None:
 
 
 def test_editing_a_baked_copy_is_warned_of_when_it_is_dropped(box: bpy.types.Scene) -> None:
+    def warned() -> list[str]:
+        # At this resolution the blocks get few texels, which is told each time.
+        return [name for name, message in runtime.last_bake(box).warnings if "texels" not in message]
+
     bake()
     bake()
-    assert runtime.last_bake(box).warnings == ()
+    assert warned() == []
     bpy.context.view_layer.objects.active = bpy.data.objects["Tall Block"]
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.mesh.select_all(action="SELECT")
     bpy.ops.transform.translate(value=(0, 0, 1))
     bake()
-    assert [name for name, _ in runtime.last_bake(box).warnings] == ["Tall Block"]
+    assert warned() == ["Tall Block"]
 
 
 def test_lightmap_only_is_kept_when_baking_again(box: bpy.types.Scene) -> None:

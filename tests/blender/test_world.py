@@ -11,6 +11,7 @@ import pytest
 from radiosity_addon.bake_scene import BakeScene
 from radiosity_addon.blender.export import export_scene
 from radiosity_addon.settings import BakeSettings
+from radiosity_addon.solver.environment import CELLS, cell_directions, pixel_bounds, solid_angles
 from radiosity_addon.solver.form_factor import point_to_polygon
 from radiosity_addon.solver.lights import EnvironmentLight
 from tests.blender.scenes import QUAD, add_mesh, add_node, measure_irradiance, set_world, shader_material
@@ -49,38 +50,51 @@ def test_a_world_without_nodes_has_its_colour() -> None:
     np.testing.assert_allclose(math.pi * np.asarray(light.radiance), measure_irradiance(meter), rtol=1e-4)
 
 
-def test_a_world_texture_counts_with_its_mean_over_the_sphere() -> None:
-    meter = add_mesh("Meter", _METER)
-    image = bpy.data.images.new("Sky", 8, 4, float_buffer=True, is_data=True)
-    rows = np.array([0.0, 1.0, 2.0, 6.0], dtype=np.float32)  # from below upwards
-    pixels = np.ones((4, 8, 4), dtype=np.float32)
-    pixels[..., :3] = rows[:, None, None]
+@pytest.mark.parametrize("turn", [0.0, 1.0])
+def test_a_world_image_lights_as_in_cycles(turn: float) -> None:
+    meter = add_mesh("Meter", _METER, rotation_euler=(0.7, 0.2, 0))
+    image = bpy.data.images.new("Sky", 16, 8, float_buffer=True, is_data=True)
+    pixels = np.random.default_rng(1).random((8, 16, 4), dtype=np.float32)
+    pixels[6, 5] = 60.0  # a sun
     image.pixels.foreach_set(pixels.ravel())
-    world = set_world(0, 0, 0)
-    tree = world.node_tree
-    texture = add_node(tree, "ShaderNodeTexEnvironment")
-    texture.image = image
+    tree = set_world(0, 0, 0, strength=0.5).node_tree
+    texture, place = add_node(tree, "ShaderNodeTexEnvironment"), tree.nodes.new("ShaderNodeTexCoord")
+    texture.image, texture.interpolation = image, "Closest"
+    mapping = add_node(tree, "ShaderNodeMapping", Rotation=(0, 0, turn))
+    tree.links.new(place.outputs["Generated"], mapping.inputs["Vector"])
+    tree.links.new(mapping.outputs[0], texture.inputs["Vector"])
     tree.links.new(texture.outputs[0], next(n for n in tree.nodes if n.type == "BACKGROUND").inputs["Color"])
     scene = _exported()
-    weights = np.sin((np.arange(4) + 0.5) / 4 * math.pi)
-    (light,) = scene.scene.lights
-    np.testing.assert_allclose(light.radiance, np.full(3, rows @ weights / weights.sum()), rtol=1e-6)
-    (warning,) = scene.warnings
-    assert warning.name == "World"
-    assert "image 'Sky'; the mean" in warning.message
-    assert meter.name == "Meter"
+    assert scene.warnings == ()
+    assert len(bpy.data.scenes) == len(bpy.data.worlds) == 1
+    normal = np.array(meter.matrix_world.to_3x3().col[2])
+    np.testing.assert_allclose(_irradiance(scene, normal), measure_irradiance(meter, samples=256), rtol=5e-3)
 
 
-def test_a_sky_texture_warns_with_the_value_used() -> None:
+def test_what_only_the_camera_sees_does_not_light() -> None:
     add_mesh("Floor")
     tree = set_world(0.2, 0.3, 0.4).node_tree
-    sky = tree.nodes.new("ShaderNodeTexSky")
-    tree.links.new(sky.outputs[0], next(n for n in tree.nodes if n.type == "BACKGROUND").inputs["Color"])
-    scene = _exported()
-    (light,) = scene.scene.lights
-    np.testing.assert_allclose(light.radiance, (0.2, 0.3, 0.4), rtol=1e-6)
-    assert "Sky Texture" in scene.warnings[0].message
-    assert "(0.2, 0.3, 0.4) is used" in scene.warnings[0].message
+    plain = add_node(tree, "ShaderNodeBackground", Strength=9.0)
+    mix, path = tree.nodes.new("ShaderNodeMixShader"), tree.nodes.new("ShaderNodeLightPath")
+    tree.links.new(path.outputs["Is Camera Ray"], mix.inputs[0])
+    tree.links.new(next(n for n in tree.nodes if n.type == "BACKGROUND").outputs[0], mix.inputs[1])
+    tree.links.new(plain.outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], next(n for n in tree.nodes if n.type == "OUTPUT_WORLD").inputs["Surface"])
+    (light,) = _exported().scene.lights
+    np.testing.assert_allclose(light.radiance, (0.2, 0.3, 0.4), rtol=1e-5)
+
+
+def _irradiance(scene: BakeScene, normal: np.ndarray) -> np.ndarray:
+    """What an open plane receives of the exported sky, (3,) [W/m²]."""
+    total = np.zeros(3)
+    toward, angle = cell_directions(CELLS), solid_angles(pixel_bounds(CELLS))
+    for light in scene.scene.lights:
+        if isinstance(light, EnvironmentLight):
+            share = light.relative(toward) * np.maximum(toward @ normal, 0.0)
+            total += light.strength * float(share @ angle)
+        else:
+            total += light.unit_irradiance(np.zeros((1, 3)), normal[None])[0] * light.strength
+    return total
 
 
 def test_the_plain_sky_comes_only_where_there_is_no_light() -> None:

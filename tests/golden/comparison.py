@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from bench.error_measure import relative_rmse
+from bench.layout import objects_with_layout
 from radiosity_addon.bake_scene import BakeResult, BakeWarning
 from radiosity_addon.blender.export import export_scene
 from radiosity_addon.lightmap.rasterise import rasterise
@@ -63,7 +64,8 @@ def bake_row(row: Row, quality: str = "medium") -> BakeResult:
     """Build a row into an empty file and bake it on the layout it brings."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     row.build()
-    settings = BakeSettings(resolution=row.resolution, keep_uvs=True, quality=quality)
+    names = tuple(obj.name for obj in objects_with_layout(bpy.context.scene))
+    settings = BakeSettings(resolution=row.resolution, keep_uvs=True, quality=quality, objects=names)
     return drain(bake(export_scene(bpy.context, settings).bake_scene, settings))
 
 

@@ -14,6 +14,7 @@ import sys
 import time
 
 import bpy
+import numpy as np
 
 from bench import cycles
 from tests.golden import references
@@ -54,7 +55,9 @@ def make(row: Row, threads: int) -> tuple[float, int]:
     started = time.perf_counter()
     bakes = [cycles.bake_light(scene, row.resolution, row.samples, seed) for seed in SEEDS]
     seconds = time.perf_counter() - started
-    return seconds, references.save(row, (bakes[0], bakes[1]), cycles.covered(scene, row.resolution))
+    # Cycles has a NaN now and then (a point lamp on a spot's edge): such a texel is not compared.
+    coverage = cycles.covered(scene, row.resolution) & np.isfinite(bakes).all(axis=(0, 3))
+    return seconds, references.save(row, (bakes[0], bakes[1]), coverage)
 
 
 def entry_of(row: Row, seconds: float) -> dict[str, object]:

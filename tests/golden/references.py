@@ -65,7 +65,7 @@ def save(row: Row, bakes: tuple[np.ndarray, np.ndarray], coverage: np.ndarray) -
     """Write two (n, n, 3) bakes; returns their bytes together. Equal channels are kept once."""
     size = 0
     for path, bake in zip(files(row), bakes, strict=True):
-        kept = np.where(coverage[..., None], _rounded(bake), np.float16(0.0))
+        kept = _rounded(np.where(coverage[..., None], bake, 0.0))
         grey = (kept[..., :1] == kept).all()
         channels = {"Y": kept[..., 0]} if grey else {"RGB"[i]: kept[..., i] for i in range(3)}
         write_exr(path, {**channels, "A": coverage.astype(np.float16)})

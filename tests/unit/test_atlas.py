@@ -5,10 +5,17 @@ import pytest
 
 from radiosity_addon.errors import BakeError
 from radiosity_addon.lightmap import charts as charts_module
-from radiosity_addon.lightmap.atlas import Atlas, AtlasInput, build_atlas, grow_charts, run_atlas
+from radiosity_addon.lightmap.atlas import (
+    Atlas,
+    AtlasInput,
+    AtlasOptions,
+    build_atlas,
+    run_atlas,
+)
 from radiosity_addon.lightmap.charts import unwrap
 from radiosity_addon.lightmap.dilate import dilate
 from radiosity_addon.lightmap.flatten import project_polygons
+from radiosity_addon.lightmap.growers import grow_charts
 from radiosity_addon.lightmap.overlap import overlapping_triangles
 from radiosity_addon.lightmap.rasterise import coverage_sum, rasterise
 
@@ -274,7 +281,7 @@ def test_a_polygon_that_the_grower_cuts_gets_its_own_chart():
 def test_large_objects_go_through_in_pieces(monkeypatch):
     triangles, polygon = lumpy_ngons(7)
     monkeypatch.setattr(charts_module, "PIECE", 100)
-    *steps, atlas = build_atlas(inputs((triangles, polygon)), 256)
+    *steps, atlas = build_atlas(inputs((triangles, polygon)), AtlasOptions(256))
     assert len(steps) > len(triangles) / 100
     assert steps == sorted(steps)
     assert steps[0] >= 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap.crossings import UNANSWERED, Crossings
+from radiosity_addon.lightmap.crossings import Crossings
 from radiosity_addon.lightmap.texel_geometry import NO_TEXEL
 from radiosity_addon.solver import Scene
 from radiosity_addon.solver.embree import EmbreeCaster
@@ -114,7 +114,7 @@ def test_without_a_whole_neighbour_no_texel_answers() -> None:
     assert crossings.crossed[texel]
     inside, outside = np.array([[6.5 / SIZE, 6.5 / SIZE, 0], [6.1 / SIZE, 6.5 / SIZE, 0]])
     found = crossings.look_up(np.array([texel, texel], dtype=np.int32), on_floor(np.stack([inside, outside])))
-    assert found[0] == UNANSWERED
+    assert found[0] == NO_TEXEL
     assert found[1] == crossings._geometry.index[0][6, 5]
 
 
@@ -197,7 +197,7 @@ def test_between_hoods_a_texel_answers_if_its_footprint_is_in_the_open_as_well(l
     texel = np.repeat(crossings._geometry.index[0][8, 6], 2)
     hits = on_floor(np.array([[6.1, 8.5], [6.7, 8.5]]) / SIZE)
     answers = low == 0.5
-    expected = [texel[0] if answers else UNANSWERED, NOTHING]
+    expected = [texel[0] if answers else NO_TEXEL, NOTHING]
     np.testing.assert_array_equal(crossings.look_up(texel, hits), expected)
     # Half of the footprint is dark: where it is not, it is twice as bright as in the mean.
     lower = crossings._geometry.triangle[texel[0]] == crossings._geometry.triangle

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.solver import Scene, emitters
+from radiosity_addon.solver import Scene, SolverSettings, emitters, solve
 from radiosity_addon.solver.embree import EmbreeCaster
 from radiosity_addon.solver.emitters import EmitterGroup
 from radiosity_addon.solver.footprints import Footprints, SpreadPoints
@@ -168,3 +168,15 @@ def test_lifted_rays_do_not_end_on_a_face_that_lies_parallel() -> None:
     at = Footprints(points, np.tile([0, 0, 1.0], (50, 1)), np.arange(50))
     share = drain(ShadowShare(caster, group, SpreadPoints(at, 0), 0).steps(np.ones(50, dtype=bool), 16))
     np.testing.assert_allclose(share, 1.0, rtol=1e-12)
+
+
+def test_a_face_does_not_light_itself_from_behind() -> None:
+    """Both sides of a floor glow, as a wall does: it gets the wall's light, none from its own back."""
+    floor, wall = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0)), rectangle((0, 0, 0), (0, 1, 0), (0, 0, 1))
+    points = np.array([[0.5, 0.5, 0.0], [0.1, 0.5, 0.0], [0.9, 0.2, 0.0]])
+    scene = Scene(np.concatenate([floor, wall]), grey(4, 0.4), grey(4, 0.3), two_sided=True)
+    light = solve(scene, SolverSettings(error=1e-2)).local_pass.direct(
+        points, np.tile([0, 0, 1.0], (3, 1)), np.arange(3)
+    )
+    alone = factors(wall, points, np.tile([0, 0, 1.0], (3, 1))).sum(axis=1)
+    np.testing.assert_allclose(light, 0.3 * np.repeat(alone[:, None], 3, axis=1), rtol=1e-9)

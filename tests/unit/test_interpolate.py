@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap.interpolate import GatherPoints, Interpolation, fit
+from radiosity_addon.lightmap.interpolate import GatherPoints, Interpolation, _linear_weights, fit
 from radiosity_addon.lightmap.point_grid import PER_CELL
 from radiosity_addon.lightmap.texel_geometry import TexelGeometry
 from radiosity_addon.solver import Scene
@@ -206,6 +206,14 @@ def test_coplanar_surfaces_on_different_pages_share_their_points() -> None:
     assert ((share > 0.1) & (share < 0.9))[at_seam].all()
     far = np.abs(geometry.position[:, 0] - 1.0) > 0.5
     np.testing.assert_allclose(share[far], geometry.page[far] == 0, atol=1e-5)
+
+
+def test_a_tight_bunch_of_points_far_away_cannot_make_light():
+    """Points within 1 mm of each other, 1 m off: their slope is not followed for a metre."""
+    along = np.array([[1.0, 0, 0], [1.001, 0, 0], [1.0, 0.001, 0]])
+    weights = _linear_weights(along, np.array([0.2, 0.5, 0.3]), np.array([3]))
+    assert weights.sum() == pytest.approx(1.0, rel=1e-5)
+    assert np.abs(weights).sum() <= 3.0 + 1e-5
 
 
 def test_what_was_weighed_before_is_not_weighed_anew_but_kept() -> None:

@@ -25,7 +25,7 @@ HOMES = {
     "mathutils": "blender",
     "bpy_extras": "blender",
     "gpu": "blender",
-    "xatlas": "lightmap.atlas",
+    "xatlas": "lightmap.growers",
     "embreex": "solver.embree",
 }
 
@@ -142,7 +142,10 @@ def test_the_rule_sees_a_wrong_import(module: str, source: str) -> None:
     ("module", "source"),
     [
         ("blender.export", "import bpy\nfrom ..solver import scene\nfrom ..pipeline import bake"),
-        ("lightmap.atlas", "import xatlas\nfrom ..solver.scene import Scene\nfrom ..errors import BakeError"),
+        (
+            "lightmap.growers",
+            "import xatlas\nfrom ..solver.scene import Scene\nfrom ..errors import BakeError",
+        ),
         ("solver.embree", "from embreex import rtcore_scene\nimport numpy as np"),
     ],
 )

@@ -24,7 +24,7 @@ from radiosity_addon.solver.light_links import (
     link_lights,
     measure_light,
     no_light_links,
-    sky_visibility,
+    sky_share,
 )
 from radiosity_addon.solver.transport import push
 from tests.rooms import box_room, grey, rectangle, solid_box
@@ -102,17 +102,20 @@ def test_sky_on_a_plane_and_under_a_roof() -> None:
     assert mean == pytest.approx(np.pi * (1 - 0.19982), rel=0.005)
 
 
-def test_sky_visibility_of_points() -> None:
+def test_the_skys_share_at_points() -> None:
     room = box_room()[0]
     caster = EmbreeCaster(room[1:])  # half the floor is missing
     points = np.array([[0.5, 0.5, 0.5]] * 2)
     normals = np.array([[0, 0, 1.0], [0, 0, -1]])
-    share = sky_visibility(points, normals, 4096, caster, np.arange(2), seed=0)
+    sky = EnvironmentLight(1.0)
+    share, error = sky_share(sky, points, normals, 4096, caster, np.arange(2), seed=0)
     assert share[0] == 0
     # The missing half seen from the middle: half the factor of the whole square below.
     assert share[1] == pytest.approx(0.5 * 4 * 0.1385316, abs=0.01)
     spread = np.repeat(points[:, None], 4096, axis=1)
-    np.testing.assert_array_equal(sky_visibility(spread, normals, 4096, caster, np.arange(2), seed=0), share)
+    np.testing.assert_allclose(error, np.sqrt(share * (1 - share) / 4096), rtol=1e-6)
+    again, _ = sky_share(sky, spread, normals, 4096, caster, np.arange(2), seed=0)
+    np.testing.assert_array_equal(again, share)
 
 
 @pytest.mark.parametrize("name", ["point", "area", "sun"])

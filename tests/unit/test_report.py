@@ -52,6 +52,7 @@ def test_the_file_holds_what_the_format_promises(tmp_path: Path) -> None:
             {"object": "Wände", "uv_layer": "Lightmap", "image": "a.exr", "resolution": [8, 4], "atlas": 0},
             {"object": "B", "uv_layer": "Lightmap", "image": "b.exr", "resolution": [2, 2], "atlas": 1},
         ],
+        "pages": [{"image": "a.exr"}, {"image": "b.exr"}],
         "solver": {
             "elements": 8,
             "links": 12,

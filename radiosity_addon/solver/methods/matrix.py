@@ -15,7 +15,7 @@ from ..elements import subdivide_evenly
 from ..independent_sets import describe_sets, independent_sets
 from ..linear_system import LinearSystem
 from ..matrix_properties import matrix_properties
-from ..overlaps import OVERLAP
+from ..overlaps import OVERLAP, arriving
 from ..point_light import lamp_irradiance
 from ..scene import Scene
 from ..settings import SolverSettings
@@ -105,8 +105,9 @@ def solve_matrix(
     yield 0.02, state
 
     system, direct = yield from _assemble(state, basis)
-    overlapping = np.count_nonzero(system.exchange.sum(axis=1) > OVERLAP * system.area)
-    system, sends = share_overlaps(system)
+    opacity = state.hierarchy.opacity[basis.elements()]
+    overlapping = np.count_nonzero(arriving(system.exchange, opacity) > OVERLAP * system.area)
+    system, sends = share_overlaps(system, opacity)
     sets, alone = independent_sets(system)
     _describe(state, basis, system, sends, sets, alone, needed)
     state.details["matrix"]["overlapping"] = int(overlapping)
@@ -182,7 +183,8 @@ def _describe(
     """Put the matrix's properties and its independent sets into the report."""
     hierarchy = state.hierarchy
     state.entries = int(np.count_nonzero(system.exchange))
-    from_node = np.asarray(sends * system.exchange.sum(axis=1) / system.area)
+    opacity = hierarchy.opacity[basis.elements()]
+    from_node = np.asarray(sends * arriving(system.exchange, opacity) / system.area)
     on_leaf = basis.leaf_means(from_node[:, None])[:, 0]
     face = hierarchy.face[basis.leaf]
     power = np.bincount(face, on_leaf * hierarchy.area[basis.leaf], minlength=len(hierarchy.faces))

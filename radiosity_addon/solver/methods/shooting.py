@@ -26,7 +26,7 @@ from ...errors import UsageError
 from ..arrays import Array
 from ..elements import subdivide_evenly
 from ..exchange import exchange_areas
-from ..overlaps import shares
+from ..overlaps import arriving, shares
 from ..scene import Scene
 from ..settings import SolverSettings
 from ..state import SolverState, begin
@@ -198,7 +198,8 @@ def _make_columns(state: ShootingState, source: int) -> None:
     exchange = exchange_areas(state.hierarchy, state.caster, one, other, settings.seed, settings.threads)
     exchange = exchange.reshape(len(chosen), -1)
     # What lies in one plane is hit twice: a shot still sends no more than it has (see `overlaps`).
-    exchange *= shares(exchange.sum(axis=1) / state.hierarchy.area[leaves[chosen]])[:, None]
+    taken = arriving(exchange, state.hierarchy.opacity[leaves])
+    exchange *= shares(taken / state.hierarchy.area[leaves[chosen]])[:, None]
     factors = exchange / state.hierarchy.area[leaves]
     state.columns |= {int(place): row.copy() for place, row in zip(chosen, factors, strict=True)}
     state.pairs += len(chosen) * (len(leaves) - 1)

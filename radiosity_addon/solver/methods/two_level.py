@@ -26,7 +26,7 @@ from ..elements import subdivide_evenly
 from ..exchange import exchange_areas
 from ..hierarchy import LEAF
 from ..neighbours import neighbours
-from ..overlaps import shares
+from ..overlaps import arriving, shares
 from ..scene import Scene
 from ..settings import SolverSettings
 from ..state import SolverState, begin
@@ -69,7 +69,7 @@ class TwoLevelState(SolverState):
         faces = self.hierarchy.faces
         if not len(self.leaves):
             return np.zeros(len(faces))
-        sums = self.factors.sum(axis=1)
+        sums = arriving(self.factors, self.hierarchy.opacity[self.patches])
         weight = self.hierarchy.area[self.leaves] * sums * shares(sums)
         per_face = np.bincount(self.hierarchy.face[self.leaves], weight, minlength=len(faces))
         return np.asarray(per_face / faces.area)
@@ -154,7 +154,7 @@ def add_rows(state: TwoLevelState, new: Array) -> Iterator[float]:
 def solve_patches(state: TwoLevelState) -> None:
     """Average the factors over patches (4.1) and solve (4.2), a channel at a time (steps 3, 4)."""
     factors = patch_factors(state)
-    state.sends = shares(factors.sum(axis=1))[:, None]
+    state.sends = shares(arriving(factors, state.hierarchy.opacity[state.patches]))[:, None]
     factors *= state.sends.T
     emission = _emission(state)
     reflectance = state.reflectance[state.patches]

@@ -69,7 +69,7 @@ def row(
     *,
     limit: float = 0.03,
     resolution: int = 128,
-    samples: int = 256,
+    samples: int = 128,
     needs: tuple[int, int] = (4, 2),
 ) -> Callable[[Callable[[], None]], Callable[[], None]]:
     """Register a scene's builder as a row (see `Row`)."""

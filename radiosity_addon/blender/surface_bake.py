@@ -1,0 +1,159 @@
+"""A scene for the time of a few bakes, in which Cycles evaluates materials.
+
+One mesh in it holds triangles of many objects, and copies of their materials glow with what is
+asked for: a bake of emission at one sample is exact. Nothing that was in the file is touched,
+and all that is added to it is removed again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import bpy
+import numpy as np
+
+from ..errors import BakeError
+from ..lightmap.surface_tiles import SurfaceTiles
+from ..settings import BakeSettings
+from .bake_record import remove_datablocks
+from .surface_rewiring import RewiredMaterial
+
+_PIXEL_OFFSET = np.array([0.001, 0.002])
+"""Blender samples this much beside the centers of texels."""
+
+_UV_LAYER = "Tiles"
+
+
+def can_evaluate() -> bool:
+    """Tell whether this Blender has Cycles."""
+    return hasattr(bpy.types.Scene, "cycles")
+
+
+class SurfaceBake:
+    """A scene of one mesh and copies of materials, for the time of a few bakes."""
+
+    def __init__(
+        self,
+        context: bpy.types.Context,
+        settings: BakeSettings,
+        materials: Sequence[bpy.types.Material | None],
+        needed: set[int],
+        inputs: Mapping[str, np.ndarray],
+    ) -> None:
+        self._context = context
+        self._made: list[bpy.types.ID] = []
+        self._attributes = {name: f"radiosity_{number}" for number, name in enumerate(inputs)}
+        self._rewired: dict[int, RewiredMaterial] = {}
+        try:
+            for row in sorted(needed):
+                self._rewired[row] = RewiredMaterial(materials[row], self._attributes)
+                self._made += self._rewired[row].made
+            self._scene = _new_scene(context.scene, settings)
+            self._made.append(self._scene)
+        except BaseException:
+            self.remove()
+            raise
+
+    def draw(
+        self,
+        tiles: SurfaceTiles,
+        corners: np.ndarray,
+        inputs: Mapping[str, np.ndarray],
+        surface: np.ndarray,
+        varies: np.ndarray,
+    ) -> None:
+        """Make the mesh of those triangles that vary; its image coordinates are their tiles."""
+        coordinates, weights = (values[varies] for values in tiles.drawn_triangles())
+        size = np.array([tiles.width, tiles.height])
+        mesh = bpy.data.meshes.new("Radiosity Surfaces")
+        self._made.append(mesh)
+        _fill_mesh(mesh, _at_weights(corners[varies], weights))
+        layer = mesh.uv_layers.new(name=_UV_LAYER)
+        layer.uv.foreach_set("vector", (coordinates + _PIXEL_OFFSET / size).astype(np.float32).ravel())
+        for name, values in inputs.items():
+            attribute = mesh.attributes.new(self._attributes[name], "FLOAT_COLOR", "CORNER")
+            attribute.data.foreach_set("color", _at_weights(values[varies], weights).ravel())
+        slots = {row: slot for slot, row in enumerate(self._rewired)}
+        for rewired in self._rewired.values():
+            mesh.materials.append(rewired.material)
+        slot = np.array([slots[row] for row in surface[varies].tolist()], dtype=np.int32)
+        mesh.polygons.foreach_set("material_index", slot)
+        mesh.update()
+        self._object = bpy.data.objects.new("Radiosity Surfaces", mesh)
+        self._made.append(self._object)
+        self._scene.collection.objects.link(self._object)
+        self._image = bpy.data.images.new(
+            "Radiosity Surfaces", tiles.width, tiles.height, float_buffer=True, is_data=True
+        )
+        self._made.append(self._image)
+
+    def may_be_cut_out(self, surface: int) -> bool:
+        """Tell whether a surface's opacity varies."""
+        return surface in self._rewired and not self._rewired[surface].is_constant("passed")
+
+    def is_constant(self, channel: str) -> bool:
+        """Tell whether no material varies in a channel: what was read of them then holds."""
+        return all(rewired.is_constant(channel) for rewired in self._rewired.values())
+
+    def channel(self, channel: str) -> np.ndarray:
+        """Return one channel, (h, w, 3) float32; what is not drawn is 0."""
+        width, height = self._image.size
+        for rewired in self._rewired.values():
+            rewired.show(channel, self._image)
+        layer, obj = self._scene.view_layers[0], self._object
+        with self._context.temp_override(
+            scene=self._scene, view_layer=layer, object=obj, active_object=obj, selected_objects=[obj]
+        ):
+            done = bake_emission()
+        if done != {"FINISHED"}:
+            raise BakeError("Cycles could not evaluate the materials")
+        pixels = np.empty(width * height * 4, dtype=np.float32)
+        self._image.pixels.foreach_get(pixels)
+        return pixels.reshape(height, width, 4)[..., :3]
+
+    def remove(self) -> None:
+        """Leave the file as it was."""
+        remove_datablocks(self._made)
+        self._made.clear()
+
+
+def bake_emission() -> set[str]:
+    """Have Cycles write what the active object emits into its materials' active images."""
+    return bpy.ops.object.bake(
+        type="EMIT",
+        margin=0,
+        use_clear=True,
+        target="IMAGE_TEXTURES",
+        save_mode="INTERNAL",
+        use_selected_to_active=False,
+        uv_layer=_UV_LAYER,
+    )
+
+
+def _new_scene(shown: bpy.types.Scene, settings: BakeSettings) -> bpy.types.Scene:
+    scene = bpy.data.scenes.new("Radiosity Surfaces")
+    scene.frame_current, scene.frame_subframe = shown.frame_current, shown.frame_subframe
+    scene.render.engine = "CYCLES"
+    scene.cycles.device = "CPU"
+    scene.cycles.samples = 1
+    scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
+    if settings.threads:
+        scene.render.threads_mode, scene.render.threads = "FIXED", settings.threads
+    return scene
+
+
+def _at_weights(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Carry values (n, 3, k) of triangles' corners to three points given by weights (n, 3, 2)."""
+    steps = values[:, 1:] - values[:, :1]
+    return (values[:, :1] + np.einsum("npc,nck->npk", weights, steps)).astype(np.float32)
+
+
+def _fill_mesh(mesh: bpy.types.Mesh, corners: np.ndarray) -> None:
+    """Give an empty mesh triangles (n, 3, 3) that share no vertex."""
+    count = len(corners)
+    mesh.vertices.add(3 * count)
+    mesh.loops.add(3 * count)
+    mesh.polygons.add(count)
+    mesh.vertices.foreach_set("co", corners.astype(np.float32).ravel())
+    mesh.loops.foreach_set("vertex_index", np.arange(3 * count, dtype=np.int32))
+    mesh.polygons.foreach_set("loop_start", np.arange(0, 3 * count, 3, dtype=np.int32))

@@ -1,0 +1,31 @@
+"""From the terms of shaders to a surface that is there or not: reflectance, emission, opacity."""
+
+from __future__ import annotations
+
+import numpy as np
+
+LEAST_EMITTING = 1 / 64
+"""Opacity of what glows but hides nothing: only what is there can emit."""
+
+
+def surface_of_terms(
+    reflected: np.ndarray, radiance: np.ndarray, passed: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Divide what a surface does to light by how much of it is there.
+
+    Parameters
+    ----------
+    reflected, radiance, passed : (..., 3) float
+        As in `Terms`.
+
+    Returns
+    -------
+    reflectance, radiance : (..., 3) float
+        Of the surface where it is there; 0 where nothing is.
+    opacity : (...,) float in [0, 1]
+    """
+    opacity = np.clip(1.0 - np.nan_to_num(passed.mean(axis=-1)), 0.0, 1.0)
+    glows = (opacity < LEAST_EMITTING) & (radiance > 0).any(axis=-1)
+    opacity = np.where(glows, LEAST_EMITTING, opacity)
+    there = np.where(opacity > 0, opacity, 1.0)[..., None]
+    return reflected / there, radiance / there, opacity

@@ -1,0 +1,56 @@
+"""The chart grower to fall back on: faces that look along the same axis, side by side, are a chart.
+
+Takes time in proportion to the mesh, whatever the mesh is like, where xatlas may take minutes.
+Charts are more and smaller than xatlas', and stretched up to √3 before they are set to scale.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+
+def box_charts(vertices: Float, faces: Int) -> tuple[Float, Int]:
+    """Cut a mesh into charts by the axis that each face looks along most.
+
+    Parameters
+    ----------
+    vertices : (v, 3) float64
+    faces : (n, 3) int64
+
+    Returns
+    -------
+    uv : (n, 3, 2) float64
+        The faces' shadows on the plane across their axis, counter-clockwise from the front.
+    chart : (n,) int64
+        Faces of one axis that share vertices share a chart.
+    """
+    corners = vertices[faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    axis = np.abs(normal).argmax(axis=1)
+    ahead = normal[np.arange(len(faces)), axis] > 0
+    # Two other axes, in the order that keeps fronts counter-clockwise.
+    first, second = (axis + 1) % 3, (axis + 2) % 3
+    u = np.take_along_axis(corners, np.where(ahead, first, second)[:, None, None], axis=2)[..., 0]
+    v = np.take_along_axis(corners, np.where(ahead, second, first)[:, None, None], axis=2)[..., 0]
+    return np.stack((u, v), axis=-1), _connected(2 * axis + ahead, faces)
+
+
+def _connected(kind: Int, faces: Int) -> Int:
+    """Number the sets of faces (n, 3) of one kind (n,) that hang together by vertices."""
+    keys = kind[:, None] * (int(faces.max(initial=0)) + 1) + faces
+    corner = np.unique(keys, return_inverse=True)[1].reshape(-1, 3)
+    label = np.arange(int(corner.max(initial=-1)) + 1)
+    while True:
+        lowest = label.copy()
+        np.minimum.at(lowest, corner.reshape(-1), np.repeat(label[corner].min(axis=1), 3))
+        # A set's label also pulls down the label that stands for it: few rounds for long sets.
+        np.minimum.at(lowest, label, lowest)
+        lowest = lowest[lowest]
+        if (lowest == label).all():
+            break
+        label = lowest
+    return np.asarray(np.unique(label[corner[:, 0]], return_inverse=True)[1].reshape(-1))

@@ -1,0 +1,45 @@
+"""What reflects and emits at lightmap texels: constants of their triangles, or means of images."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..solver.arrays import Array
+from ..solver.sampling import stratified_square
+from ..solver.scene import Scene
+from ..solver.surface_images import CHANNELS, where_there
+from .rasterise import FOOTPRINT
+from .texel_geometry import TexelGeometry
+
+SAMPLES = 16
+"""Points of a texel at which images are looked up."""
+
+CHUNK = 1 << 14
+"""Texels looked up at once; their temporaries take about 60 MB."""
+
+WHOLE = 1.0
+"""The width of whole texels: what their light reflects from when they are seen."""
+
+__all__ = ["FOOTPRINT", "WHOLE", "texel_materials"]
+
+
+def texel_materials(scene: Scene, geometry: TexelGeometry, width: float = WHOLE) -> tuple[Array, Array]:
+    """Average reflectance and emission over the middle `width` of every texel.
+
+    Returns
+    -------
+    reflectance, emission : (n, 3) float64
+        Of the surface where it is there; emission in W/m².
+    """
+    reflectance, emission = scene.reflectance[geometry.triangle], scene.emission[geometry.triangle]
+    if scene.images is None:
+        return reflectance, emission
+    textured = np.flatnonzero(scene.images.textured[geometry.triangle])
+    for first in range(0, len(textured), CHUNK):
+        rows = textured[first : first + CHUNK]
+        weights = geometry.sample_weights(rows, stratified_square(rows, SAMPLES, 0), width)
+        triangle = np.repeat(geometry.triangle[rows], SAMPLES)
+        found = scene.images.at(triangle, weights[:, :, 1:].reshape(-1, 2))
+        mean = found.reshape(len(rows), SAMPLES, CHANNELS).mean(axis=1, dtype=np.float64)
+        reflectance[rows], emission[rows] = where_there(mean)
+    return reflectance, emission

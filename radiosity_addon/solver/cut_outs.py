@@ -1,0 +1,217 @@
+"""Rays through surfaces that are only partly there: leaves, fences, veils.
+
+Triangles that anything may be seen through are kept in a second ray caster, so that the others
+are asked as ever, and a scene without any has no second one. A ray that meets such a triangle
+looks up the opacity there. Asked how much light passes, what it leaves is multiplied up. Asked what
+is hit first, the surface is hit if a number drawn for the ray and the triangle is below it: where
+opacity is 0 or 1 no chance is left. That number depends on nothing but the two, so results do not
+depend on how rays are divided among threads.
+"""
+
+from __future__ import annotations
+
+from threading import Lock
+
+import numpy as np
+
+from .arrays import Array
+from .embree import TARGET_SLACK, EmbreeCaster
+from .sampling import hash_keys
+from .scene import Scene
+from .surface_images import SurfaceImages
+from .visibility import NO_HIT, Hits, RayCaster, surface_offset
+
+MOST_LAYERS = 1000
+"""A ray that passed so many surfaces meets no other."""
+
+
+def ray_caster(scene: Scene, threads: int = 0) -> RayCaster:
+    """Return what answers for the light of a scene's surfaces; it knows what answers for that of lamps."""
+    lamps = None
+    if (scene.in_shadows != scene.in_bounces).any():
+        lamps = _caster(scene, threads, scene.in_shadows, None)
+    return _caster(scene, threads, scene.in_bounces, lamps)
+
+
+def _caster(scene: Scene, threads: int, only: Array, for_lamps: RayCaster | None) -> RayCaster:
+    if scene.images is None or not scene.images.cut_out.any():
+        return EmbreeCaster(scene.triangles, threads, only, for_lamps)
+    return CutOutCaster(scene.triangles, scene.images, threads, only, for_lamps)
+
+
+class CutOutCaster:
+    """Visibility among triangles of which some are partly there.
+
+    Parameters
+    ----------
+    triangles : (t, 3, 3) float64
+        World-space corners [m].
+    images : SurfaceImages
+        Of the same triangles.
+    threads : int
+        0 means all cores. Results do not depend on it.
+    only : (t,) bool or None
+        The triangles that rays meet, where it is not all of them.
+    for_lamps : RayCaster or None
+        What stops the light of lamps, where that is something else.
+    """
+
+    def __init__(
+        self,
+        triangles: Array,
+        images: SurfaceImages,
+        threads: int = 0,
+        only: Array | None = None,
+        for_lamps: RayCaster | None = None,
+    ) -> None:
+        self._own_rays = 0
+        self._for_lamps = for_lamps
+        self._counting = Lock()
+        self.surface_offset = surface_offset(triangles)
+        self._images = images
+        met = np.ones(len(triangles), dtype=bool) if only is None else only
+        whole, cut = met & ~images.cut_out, met & images.cut_out
+        self._whole_rows = np.append(np.flatnonzero(whole), NO_HIT).astype(np.int32)
+        self._cut_rows = np.append(np.flatnonzero(cut), NO_HIT).astype(np.int32)
+        self._whole = EmbreeCaster(triangles[whole], threads)
+        self._cut = EmbreeCaster(triangles[cut], threads)
+
+    @property
+    def for_lamps(self) -> RayCaster:
+        """The caster that knows what stops the light of lamps; most often this one."""
+        return self if self._for_lamps is None else self._for_lamps
+
+    @property
+    def rays(self) -> int:
+        """Rays asked for so far, those to lamps among them; what they meet on their way does not count."""
+        return self._own_rays + (0 if self._for_lamps is None else self._for_lamps.rays)
+
+    def visible(self, origins: Array, directions: Array, distances: Array) -> Array:
+        """Return (n,) bool: nothing that is there lies within `distances` along the unit `directions`."""
+        self._count(len(origins))
+        free = self._whole.visible(origins, directions, distances)
+        rows = np.flatnonzero(free)
+        reach = distances[rows] * (1.0 - TARGET_SLACK)
+        free[rows] = self._first_there(origins[rows], directions[rows], reach).triangle == NO_HIT
+        return free
+
+    def passing(self, origins: Array, directions: Array, distances: Array, least: float = 0.0) -> Array:
+        """Return (n,) float64 what share of light passes: no chance here, but 1 − opacity of all it meets."""
+        self._count(len(origins))
+        share = self._whole.visible(origins, directions, distances).astype(np.float64)
+        free = np.flatnonzero(share)
+        ways = self._ways(free, origins, directions, distances * (1.0 - TARGET_SLACK))
+        while len(ways.ray):
+            hits = ways.meet()
+            opacity = np.clip(self._images.opacity_at(hits.triangle, hits.barycentric), least, 1.0 - least)
+            share[ways.ray] *= np.where(ways.again, 1.0, 1.0 - opacity)
+            ways.keep(share[ways.ray] > 0.0)
+        return share
+
+    def first_hits(self, origins: Array, directions: Array) -> Hits:
+        """Return what each ray meets first of what is there."""
+        self._count(len(origins))
+        hits = self._whole.first_hits(origins, directions)
+        nearer = self._first_there(origins, directions, hits.distance)
+        is_cut = nearer.triangle != NO_HIT
+        return Hits(
+            np.where(is_cut, nearer.triangle, self._whole_rows[hits.triangle]),
+            np.where(is_cut[:, None], nearer.barycentric, hits.barycentric),
+            np.where(is_cut, nearer.front, hits.front),
+            np.where(is_cut, nearer.distance, hits.distance),
+        )
+
+    def _first_there(self, origins: Array, directions: Array, reach: Array) -> Hits:
+        """Return the first cut-outs within `reach` that stop the rays."""
+        count = len(origins)
+        triangle = np.full(count, NO_HIT, dtype=np.int32)
+        barycentric = np.zeros((count, 2), dtype=np.float32)
+        front = np.zeros(count, dtype=bool)
+        distance = np.full(count, np.inf, dtype=np.float32)
+        ways = self._ways(np.arange(count), origins, directions, reach)
+        while len(ways.ray):
+            hits = ways.meet()
+            ray = ways.ray
+            opacity = self._images.opacity_at(hits.triangle, hits.barycentric)
+            stops = (opacity > _drawn(origins[ray], directions[ray], hits.triangle)) & ~ways.again
+            stopped = ray[stops]
+            triangle[stopped], distance[stopped] = hits.triangle[stops], hits.distance[stops]
+            barycentric[stopped], front[stopped] = hits.barycentric[stops], hits.front[stops]
+            ways.keep(~stops)
+        return Hits(triangle, barycentric, front, distance)
+
+    def _ways(self, ray: Array, origins: Array, directions: Array, reach: Array) -> _Ways:
+        return _Ways(self._cut, self._cut_rows, self.surface_offset, ray, origins, directions, reach)
+
+    def _count(self, rays: int) -> None:
+        with self._counting:
+            self._own_rays += rays
+
+
+class _Ways:
+    """Rays among cut-outs, from one to the next.
+
+    Parameters
+    ----------
+    cut : RayCaster
+        Of the cut-outs alone.
+    rows : (c + 1,) int32
+        The scene's triangle for each of its, and NO_HIT.
+    offset : float
+        How far beyond a cut-out rays go on [m].
+    ray : (w,) int
+        Which of the n rays are on their way.
+    origins, directions : (n, 3) float
+    reach : (n,) float
+
+    Attributes
+    ----------
+    ray : (w,) int
+        Those still on their way.
+    again : (w,) bool
+        Whether a ray met the triangle it has just passed: rounding, to be passed once more.
+    """
+
+    def __init__(
+        self,
+        cut: RayCaster,
+        rows: Array,
+        offset: float,
+        ray: Array,
+        origins: Array,
+        directions: Array,
+        reach: Array,
+    ) -> None:
+        self._cut, self._rows, self._offset = cut, rows, offset
+        self._origins, self._directions, self._reach = origins, directions, reach
+        self.ray, self.again = ray, np.zeros(len(ray), dtype=bool)
+        self._gone = np.zeros(len(ray))
+        self._last = np.full(len(ray), NO_HIT, dtype=np.int32)
+        self._layers = 0
+
+    def meet(self) -> Hits:
+        """Return the next cut-outs in the rays' way; rays that meet none within reach end here."""
+        start = self._origins[self.ray] + self._gone[:, None] * self._directions[self.ray]
+        hits = self._cut.first_hits(start, self._directions[self.ray])
+        distance, triangle = self._gone + hits.distance, self._rows[hits.triangle]
+        met = (triangle != NO_HIT) & (distance < self._reach[self.ray])
+        met &= self._layers < MOST_LAYERS
+        self._layers += 1
+        self._gone = distance + self._offset
+        self.again, self._last = triangle == self._last, triangle
+        self.keep(met)
+        return Hits(triangle[met], hits.barycentric[met], hits.front[met], distance[met])
+
+    def keep(self, going: Array) -> None:
+        """Go on with the rays of a mask."""
+        self.ray, self.again = self.ray[going], self.again[going]
+        self._gone, self._last = self._gone[going], self._last[going]
+
+
+def _drawn(origins: Array, directions: Array, triangle: Array) -> Array:
+    """Return (n,) numbers in [0, 1) that look random, each a function of its ray and triangle alone."""
+    ray = np.concatenate([origins, directions], axis=1).astype(np.float32).view(np.uint32)
+    bits = hash_keys(triangle, 61)
+    for column in range(6):
+        bits = hash_keys(ray[:, column].astype(np.uint64) << np.uint64(32) | bits, 62)
+    return np.asarray(bits * 2.0**-32)

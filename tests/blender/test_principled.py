@@ -1,0 +1,100 @@
+"""Principled comes to what Cycles bounces off it; what it does beyond is told."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from radiosity_addon.blender.materials import read_material
+from tests.blender.scenes import shader_material
+from tests.blender.test_materials import _BLUE, _RED, _check, _messages
+
+
+def test_principled_reflects_its_base_colour_where_nothing_shines() -> None:
+    surface = read_material(
+        shader_material("M", "ShaderNodeBsdfPrincipled", Base_Color=_RED, Specular_IOR_Level=0)
+    )
+    _check(surface, _RED[:3])
+    assert surface.warnings == ()
+
+
+@pytest.mark.parametrize("roughness", [0.0, 0.3, 1.0])
+def test_a_white_metal_loses_nothing_however_rough(roughness: float) -> None:
+    inputs = {"Base_Color": (0.99, 0.99, 0.99, 1), "Metallic": 1, "Roughness": roughness}
+    surface = read_material(shader_material("M", "ShaderNodeBsdfPrincipled", **inputs))
+    np.testing.assert_allclose(surface.reflectance, 0.99, atol=0.015)
+
+
+@pytest.mark.parametrize(
+    ("metallic", "roughness", "base", "measured"),
+    [
+        # 1 − 1/L of a small matte square's light L = H/π inside a closed cube of the material
+        # that emits 1 W/m²/sr: Cycles of Blender 5.0, 256 samples, 128 bounces.
+        (0, 0.1, 0.8, 0.8163),
+        (0, 0.1, 0.4, 0.4378),
+        (0, 0.5, 0.8, 0.8111),
+        (0, 0.5, 0.4, 0.4295),
+        (0, 1.0, 0.8, 0.8049),
+        (0, 1.0, 0.4, 0.4117),
+        (1, 0.1, 0.8, 0.8088),
+        (1, 0.1, 0.4, 0.4110),
+        (1, 0.5, 0.8, 0.7843),
+        (1, 0.5, 0.4, 0.3793),
+        (1, 1.0, 0.8, 0.6207),
+        (1, 1.0, 0.4, 0.2043),
+    ],
+)
+def test_principled_bounces_what_cycles_measures_in_a_closed_room(
+    metallic: float, roughness: float, base: float, measured: float
+) -> None:
+    """Diffuse and glossy together; what is left is documented in decision record 0022."""
+    values = {"Base_Color": (base, base, base, 1), "Metallic": metallic, "Roughness": roughness}
+    surface = read_material(shader_material("M", "ShaderNodeBsdfPrincipled", **values))
+    np.testing.assert_allclose(surface.reflectance, measured, atol=0.017)
+
+
+def test_principled_emits_strength_times_colour() -> None:
+    surface = read_material(
+        shader_material(
+            "M",
+            "ShaderNodeBsdfPrincipled",
+            Base_Color=_RED,
+            Specular_IOR_Level=0,
+            Emission_Color=_BLUE,
+            Emission_Strength=2.0,
+        )
+    )
+    _check(surface, _RED[:3], 2 * math.pi * np.array(_BLUE[:3]))
+
+
+@pytest.mark.parametrize(
+    ("socket", "value", "words"),
+    [
+        ("Subsurface_Weight", 0.3, "subsurface scattering is ignored"),
+        ("Coat_Weight", 0.3, "the coat is ignored"),
+        ("Sheen_Weight", 0.3, "the sheen is ignored"),
+    ],
+)
+def test_what_principled_does_beyond_diffuse_warns(socket: str, value: float, words: str) -> None:
+    inputs = {"Base_Color": _RED, "Specular_IOR_Level": 0, socket: value}
+    surface = read_material(shader_material("Odd", "ShaderNodeBsdfPrincipled", **inputs))
+    _check(surface, _RED[:3])
+    assert f"material 'Odd': {words}" in _messages(surface)
+
+
+def test_what_is_transmitted_is_not_reflected_and_warns() -> None:
+    inputs = {"Base_Color": _RED, "Specular_IOR_Level": 0, "Transmission_Weight": 0.75}
+    surface = read_material(shader_material("Glass", "ShaderNodeBsdfPrincipled", **inputs))
+    _check(surface, 0.25 * np.array(_RED[:3]))
+    assert surface.opacity == 1
+    assert "material 'Glass': transmission is ignored: the surface is baked opaque" in _messages(surface)
+
+
+def test_alpha_is_opacity_and_leaves_the_colour() -> None:
+    inputs = {"Base_Color": _RED, "Specular_IOR_Level": 0, "Alpha": 0.25, "Emission_Strength": 2.0}
+    surface = read_material(shader_material("Thin", "ShaderNodeBsdfPrincipled", **inputs))
+    _check(surface, _RED[:3], np.full(3, 2 * math.pi))
+    assert surface.opacity == pytest.approx(0.25)
+    assert surface.warnings == ()

@@ -1,0 +1,48 @@
+"""A scene is lit alike wherever it stands, and however large it is."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from radiosity_addon.blender.export import export_scene
+from radiosity_addon.pipeline import bake
+from radiosity_addon.settings import BakeSettings
+from radiosity_addon.solver.steps import drain
+from tests.golden.rows.geometry import lit, moved
+
+SETTINGS = BakeSettings(resolution=48, quality="draft", keep_uvs=True)
+
+
+@pytest.fixture(scope="module")
+def at_home() -> np.ndarray:
+    return baked((0.0, 0.0, 0.0), 1.0)
+
+
+def baked(place: tuple[float, float, float], scale: float) -> np.ndarray:
+    """Bake a corner of 4 m with blockers and a soft lamp, put elsewhere and scaled."""
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    lit(blockers=True)
+    moved(place, scale)
+    return drain(bake(export_scene(bpy.context, SETTINGS).bake_scene, SETTINGS)).pages[0].pixels
+
+
+@pytest.mark.parametrize(
+    ("place", "scale"),
+    [
+        ((7000.0, -7000.0, 1000.0), 1.0),
+        ((0.0, 0.0, 0.0), 2500.0),
+        ((0.0, 0.0, 0.0), 0.00025),
+        ((-0.7, 0.7, 0.1), 0.00025),
+    ],
+    ids=["10 km away", "10 km wide", "1 mm wide", "1 mm wide and 1 m away"],
+)
+def test_place_and_size_change_nothing(
+    at_home: np.ndarray, place: tuple[float, float, float], scale: float
+) -> None:
+    elsewhere = baked(place, scale)
+    # Where a ray grazes an edge, rounding decides: a shadow's border may differ by a ray.
+    error = np.sqrt(np.mean((elsewhere - at_home) ** 2)) / np.sqrt(np.mean(at_home**2))
+    assert error < 1e-3
+    assert elsewhere.mean() == pytest.approx(at_home.mean(), rel=1e-4)

@@ -1,0 +1,122 @@
+"""What must hold of every bake, whatever the scene."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from radiosity_addon.bake_scene import BakeResult, BakeScene
+from radiosity_addon.blender import job
+from radiosity_addon.blender.restore import restore
+from radiosity_addon.errors import SceneError, UsageError
+from radiosity_addon.settings import BakeSettings
+from radiosity_addon.solver.lights import EnvironmentLight
+from radiosity_addon.solver.steps import drain
+from radiosity_addon.solver.visibility import surface_offset
+from tests.blender.file_dump import differences, dump_file
+
+from .scenes import build
+
+BALANCE = 0.05
+"""Power that may be made: of what is emitted, by a draft of a few elements."""
+
+OVERSHOOT = 1.05
+"""A texel is interpolated between gather points, and a seam's are stitched."""
+
+
+def check(seed: int) -> bool:
+    """Build, bake, look at, and restore the scene of a seed; returns whether it could be baked.
+
+    Raises
+    ------
+    AssertionError
+        If what must hold does not.
+    """
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    settings = build(seed)
+    before = dump_file()
+    seen: list[tuple[BakeScene, BakeResult]] = []
+    try:
+        _bake(settings, seen)
+    except (SceneError, UsageError):
+        pass  # told in a line of its own
+    else:
+        for scene, result in seen:
+            _check_texels(scene, result, settings)
+            _check_power(scene, result)
+        restore(bpy.context)
+    bpy.context.scene.property_unset("radiosity")
+    left = differences(before, dump_file())
+    assert left == [], f"not restored: {left[:5]}"
+    return bool(seen)
+
+
+def _bake(settings: BakeSettings, seen: list[tuple[BakeScene, BakeResult]]) -> None:
+    """Bake the open scene, and keep what the pipeline was given and gave."""
+    pipeline_bake = job.pipeline.bake
+
+    def watched(scene: BakeScene, asked: BakeSettings):
+        result = yield from pipeline_bake(scene, asked)
+        seen.append((scene, result))
+        return result
+
+    job.pipeline.bake = watched
+    try:
+        drain(job.run_bake(bpy.context, settings, None))
+    finally:
+        job.pipeline.bake = pipeline_bake
+
+
+def _check_texels(scene: BakeScene, result: BakeResult, settings: BakeSettings) -> None:
+    """Texels are numbers, not negative, and no brighter than the light allows."""
+    brightest = 0.0
+    for number, page in enumerate(result.pages):
+        assert np.isfinite(page.pixels).all(), f"page {number} holds NaN or infinity"
+        assert page.pixels.min() >= 0, f"page {number} holds {page.pixels.min()}"
+        brightest = max(brightest, float(page.pixels.max()))
+    lights = scene.scene.lights
+    if any(not isinstance(light, EnvironmentLight) for light in lights):
+        return  # nothing bounds the light of a lamp but the distance to it
+    emission, reflectance = scene.scene.emission, scene.scene.reflectance
+    source = float(emission.max(initial=0.0))
+    source += float(np.pi * sum(np.max(light.strength) for light in lights))
+    # ‖H‖ ≤ ‖B‖ ≤ E + ρ ‖H‖ in the maximum's norm.
+    bound = source / (1 - float(reflectance.max(initial=0.0)))
+    if settings.quantity == "irradiance_over_pi":
+        bound /= np.pi
+    assert brightest <= OVERSHOOT * bound, f"a texel of {brightest:g} where {bound:g} is the most"
+
+
+def _layered(triangles: np.ndarray) -> bool:
+    """Tell whether a triangle lies on another one, as far as rays can tell."""
+    offset = surface_offset(triangles)
+    inner = np.einsum("pc,tck->tpk", _INNER, triangles)
+    for corners in triangles:
+        normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+        length = np.linalg.norm(normal)
+        if length == 0:
+            continue
+        normal /= length
+        beside = inner - corners[0]
+        edges = np.roll(corners, -1, axis=0) - corners
+        inwards = np.einsum("tpck,ck->tpc", inner[:, :, None] - corners, np.cross(normal, edges))
+        over = (inwards > 0).all(axis=2) & (np.abs(beside @ normal) < 4 * offset)
+        if over.any(axis=1).sum() > 1:  # it lies on itself
+            return True
+    return False
+
+
+_INNER = np.array([(1, 1, 1), (4, 1, 1), (1, 4, 1), (1, 1, 4)]) / np.array([[3], [6], [6], [6]])
+"""Barycentric weights of four points of a triangle."""
+
+
+def _check_power(scene: BakeScene, result: BakeResult) -> None:
+    """Light is not made: what is absorbed and escapes was emitted."""
+    if (scene.scene.in_bounces & ~scene.scene.in_shadows).any():
+        return  # lamps' light both goes through such surfaces and is reflected
+    if _layered(scene.scene.triangles):
+        return  # surfaces in one place are both lit, by the same light
+    power = result.solver["power_W"]
+    arrived = power["absorbed"] + power["escaped"]
+    assert np.isfinite(arrived)
+    assert arrived <= (1 + BALANCE) * power["emitted"] + 1e-12, f"{power} W"

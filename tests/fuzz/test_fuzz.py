@@ -1,0 +1,70 @@
+"""Hundreds of random scenes: no crash, no NaN, no light from nothing, and restored exactly."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+import radiosity_addon
+from radiosity_addon import pipeline
+
+from .checks import check
+from .scenes import SCENES
+
+ROOT = Path(__file__).resolve().parents[2]
+
+TRIED = SCENES if bpy.app.version[:2] == (5, 0) else SCENES // 5
+"""The Blender that tests are written with gets all, the others enough to meet what differs in them."""
+
+BAKED_SEED = 17
+"""Its scene can be baked."""
+
+TIMEOUT = 1500
+"""Seconds; on an idle machine a run takes a fifth of it."""
+
+
+def test_random_scenes() -> None:
+    """Processes share the seeds; one that Blender takes down with it is told by its exit code."""
+    workers = max(os.cpu_count() or 1, 1)
+    limits = [TRIED * number // workers for number in range(workers + 1)]
+    command = [sys.executable, "-m", "tests.fuzz", "--seeds"]
+    running = [
+        subprocess.Popen(
+            [*command, f"{first}:{last}"],
+            cwd=ROOT,
+            text=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+        )
+        for first, last in itertools.pairwise(limits)
+    ]
+    try:
+        told = [process.communicate(timeout=TIMEOUT)[0] for process in running]
+    finally:
+        for process in running:
+            process.kill()
+    for process, words in zip(running, told, strict=True):
+        assert process.returncode == 0, words[-3000:]
+    baked = sum(int(re.findall(r"(\d+) baked", words)[-1]) for words in told)
+    # The generator is of no use if many of its scenes are refused.
+    assert baked > 0.7 * TRIED
+
+
+def test_a_wrong_bake_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The checks can fail: handed darkness below zero they say so."""
+    real = pipeline.dilate
+    monkeypatch.setattr(pipeline, "dilate", lambda *given: real(*given) - np.float32(1e6))
+    radiosity_addon.register()
+    try:
+        with pytest.raises(AssertionError, match="page 0 holds -"):
+            check(BAKED_SEED)
+    finally:
+        radiosity_addon.unregister()

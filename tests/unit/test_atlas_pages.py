@@ -1,0 +1,109 @@
+"""Several pages, texel scales, padding for mip levels, and meshes that take too long to unwrap."""
+
+import numpy as np
+import pytest
+
+from radiosity_addon.errors import BakeError
+from radiosity_addon.lightmap.atlas import Atlas, AtlasInput, run_atlas
+from radiosity_addon.lightmap.box_charts import box_charts
+from radiosity_addon.lightmap.packing import Limits, padding_for
+from radiosity_addon.lightmap.rasterise import coverage_sum, rasterise
+
+from .lightmap_meshes import area_uv, box, uv_sphere
+
+pytest.importorskip("xatlas")
+
+
+def inputs(*meshes) -> list[AtlasInput]:
+    return [AtlasInput(f"object {k}", *mesh) for k, mesh in enumerate(meshes)]
+
+
+def densities(atlas: Atlas, objects: list[AtlasInput]) -> list[float]:
+    """Texels per metre of each object, by area."""
+    found = []
+    for laid, source in zip(atlas.objects, objects, strict=True):
+        edges = source.triangles[:, 1:] - source.triangles[:, :1]
+        surface = 0.5 * np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1).sum()
+        flat = area_uv(laid.uv).sum() * atlas.pages[laid.page].resolution ** 2
+        found.append(float(np.sqrt(flat / surface)))
+    return found
+
+
+@pytest.mark.parametrize("density", [None, 40.0])
+def test_an_objects_scale_is_its_share_of_texels_a_metre(density):
+    objects = [AtlasInput(f"box {scale}", *box((1, 1, 1)), scale=scale) for scale in (1.0, 0.5, 2.0)]
+    atlas = run_atlas(objects, 256, density)
+    found = densities(atlas, objects)
+    np.testing.assert_allclose(np.array(found) / found[0], (1.0, 0.5, 2.0), rtol=1e-3)
+    np.testing.assert_allclose(atlas.pages[0].density, found[0], rtol=1e-3)
+
+
+def test_a_density_that_needs_more_than_the_largest_page_makes_more_pages():
+    objects = inputs(*[box((1, 1, 1))] * 9)
+    atlas = run_atlas(objects, texel_density=50, limits=Limits(largest=256))
+    # Two boxes fit on a page, three do not.
+    assert run_atlas(objects[:3], texel_density=50).pages[0].resolution > 256
+    assert len(atlas.pages) == 5
+    assert all(page.resolution <= 256 for page in atlas.pages)
+    np.testing.assert_allclose(densities(atlas, objects), 50, rtol=1e-3)
+    per_page = np.bincount([laid.page for laid in atlas.objects])
+    assert per_page.max() - per_page.min() <= 1
+    with pytest.raises(BakeError, match="lower the density"):
+        run_atlas(objects, texel_density=50, limits=Limits(largest=64))
+
+
+def test_pages_asked_for_are_about_equally_full():
+    sizes = [(1, 1, 1), (2, 1, 1), (1, 1, 0.5), (3, 1, 1), (0.3, 0.3, 0.3), (1, 2, 2)]
+    atlas = run_atlas(inputs(*map(box, sizes)), 128, pages=3)
+    assert len(atlas.pages) == 3
+    assert {page.resolution for page in atlas.pages} == {128}
+    areas = [2 * (a * b + b * c + c * a) for a, b, c in sizes]
+    per_page = np.bincount([laid.page for laid in atlas.objects], areas)
+    assert per_page.max() < 1.5 * per_page.min()
+    assert len(run_atlas(inputs(box((1, 1, 1))), 64, pages=5).pages) == 1
+
+
+@pytest.mark.parametrize("mip_levels", [0, 1, 2, 3])
+def test_down_to_the_mip_level_asked_for_no_texel_shows_two_charts(mip_levels):
+    """Bilinear filtering at level L reads whole texels of that level; one may hold one chart only."""
+    triangles, polygon = box((1, 1, 1))
+    # Far apart in space, so that every polygon is a chart.
+    triangles = triangles + 10.0 * polygon[:, None, None]
+    atlas = run_atlas(inputs((triangles, polygon)), 256, limits=Limits(padding=padding_for(mip_levels)))
+    texels = rasterise(atlas.objects[0].uv, 256)
+    assert not atlas.warnings
+    owner = polygon[texels.triangle]
+    size = 2**mip_levels
+    reads = set()
+    for row, column, chart in zip(texels.row.tolist(), texels.column.tolist(), owner.tolist(), strict=True):
+        # A point of this texel reads its coarse texel and its neighbour on the nearer side.
+        for down in {int((row + at) / size + side) for at in (0.01, 0.99) for side in (-0.5, 0.5)}:
+            for right in {int((column + at) / size + side) for at in (0.01, 0.99) for side in (-0.5, 0.5)}:
+                reads.add((down, right, chart))
+    holds = {(r // size, c // size, o) for r, c, o in zip(texels.row, texels.column, owner, strict=True)}
+    foreign = {(r, c) for r, c, o in reads for other in range(6) if other != o and (r, c, other) in holds}
+    assert foreign == set()
+
+
+def test_box_charts_lie_front_side_up_and_hang_together():
+    triangles, _ = uv_sphere(24, 32)
+    vertices, index = np.unique(triangles.reshape(-1, 3).round(9), axis=0, return_inverse=True)
+    faces = index.reshape(-1, 3)
+    uv, chart = box_charts(vertices, faces)
+    assert chart.max() + 1 == 6
+    edges = np.cross(
+        vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]]
+    )
+    signed = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+    area = signed[0][:, 0] * signed[1][:, 1] - signed[0][:, 1] * signed[1][:, 0]
+    np.testing.assert_allclose(area, np.abs(edges).max(axis=1), atol=1e-12)
+
+
+def test_an_object_that_takes_too_long_is_cut_more_simply_and_named():
+    triangles, polygon = uv_sphere(24, 32)
+    atlas = run_atlas(inputs((triangles, polygon)), 256, unwrap_seconds=0.0)
+    assert [(w.name, "took more than 0 s" in w.message) for w in atlas.warnings] == [("object 0", True)]
+    uv = atlas.objects[0].uv
+    assert (area_uv(uv) > 0).all()
+    assert coverage_sum(uv, 256).max() < 1.01
+    assert atlas.pages[0].utilisation > 0.4

@@ -1,0 +1,130 @@
+"""Rays through triangles that are only partly there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from radiosity_addon.solver import Scene
+from radiosity_addon.solver.cut_outs import CutOutCaster, ray_caster
+from radiosity_addon.solver.embree import EmbreeCaster
+from radiosity_addon.solver.surface_images import SurfaceImages
+from radiosity_addon.solver.visibility import NO_HIT, BruteForceCaster
+from tests.rooms import grey, rectangle
+from tests.textured_rooms import image
+from tests.unit.texel_scenes import QUAD_UV
+
+LAYERS = 5
+
+
+def stack(opacities: np.ndarray) -> tuple[np.ndarray, SurfaceImages]:
+    """Unit squares at heights 1, 2, … of the opacities (k, h, w), over a whole one at 0."""
+    count = len(opacities)
+    triangles = np.concatenate([rectangle((0, 0, z), (1, 0, 0), (0, 1, 0)) for z in range(count + 1)])
+    size = opacities.shape[1]
+    values = image(size, 0.5, 0.0, np.concatenate(list(opacities), axis=1), wide=size * count)
+    inset = 0.5 / size
+    # Half a texel inside, so that look-ups keep to the layer's own part.
+    inner = inset + QUAD_UV * (1 - 2 * inset)
+    uv = [np.zeros_like(QUAD_UV), *((inner + np.array((layer, 0))) / (count, 1) for layer in range(count))]
+    images = SurfaceImages(values, np.concatenate(uv), np.arange(len(triangles)) > 1)
+    return triangles, images
+
+
+def downward(count: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Rays from above the stack, somewhat slanted."""
+    chance = np.random.default_rng(seed)
+    origins = np.concatenate(
+        [chance.uniform(0.3, 0.7, (count, 2)), np.full((count, 1), LAYERS + 0.9)], axis=1
+    )
+    directions = np.concatenate([chance.uniform(-0.04, 0.04, (count, 2)), np.full((count, 1), -1.0)], axis=1)
+    return origins, directions / np.linalg.norm(directions, axis=1, keepdims=True)
+
+
+def test_without_cut_outs_there_is_nothing_between_rays_and_embree() -> None:
+    triangles, images = stack(np.ones((2, 4, 4)))
+    plain = Scene(triangles, grey(6, 0.5), grey(6, 0))
+    assert isinstance(ray_caster(plain), EmbreeCaster)
+    assert isinstance(ray_caster(Scene(triangles, grey(6, 0.5), grey(6, 0), images=images)), EmbreeCaster)
+    _, partly = stack(np.full((2, 4, 4), 0.9))
+    cast = ray_caster(Scene(triangles, grey(6, 0.5), grey(6, 0), images=partly))
+    assert isinstance(cast, CutOutCaster)
+
+
+def test_holes_let_pass_and_the_rest_blocks() -> None:
+    """Opacities of 0 and 1 in large blocks, rays far from their borders: as the triangles cut out."""
+    blocks = np.random.default_rng(1).integers(0, 2, (LAYERS, 2, 2)).astype(float)
+    triangles, images = stack(blocks.repeat(64, 1).repeat(64, 2))
+    origins, directions = downward(4000)
+    crossing = [
+        (layer, *(origins + (origins[:, 2] - layer)[:, None] / -directions[:, 2:] * directions)[:, :2].T)
+        for layer in range(1, LAYERS + 1)
+    ]
+    clear = np.all([(np.abs(x - 0.5) > 0.02) & (np.abs(y - 0.5) > 0.02) for _, x, y in crossing], axis=0)
+    expected = np.zeros(len(origins), dtype=int)
+    for layer, x, y in crossing:
+        expected[blocks[layer - 1, (y > 0.5).astype(int), (x > 0.5).astype(int)] > 0] = layer
+    cast = CutOutCaster(triangles, images)
+    hits = cast.first_hits(origins, directions)
+    heights = origins[:, 2] + hits.distance * directions[:, 2]
+    np.testing.assert_allclose(heights[clear], expected[clear], atol=1e-4)
+    np.testing.assert_array_equal(hits.triangle[clear] // 2, expected[clear])
+    weights = np.concatenate([1 - hits.barycentric.sum(axis=1, keepdims=True), hits.barycentric], axis=1)
+    at = np.einsum("nc,nck->nk", weights, triangles[hits.triangle])
+    np.testing.assert_allclose(at, origins + hits.distance[:, None] * directions, atol=1e-5)
+    assert hits.front.all()
+
+    to_floor = (LAYERS + 0.9) / -directions[:, 2]
+    free = cast.visible(origins, directions, to_floor)
+    np.testing.assert_array_equal(free[clear], expected[clear] == 0)
+    np.testing.assert_array_equal(cast.passing(origins, directions, to_floor)[clear], expected[clear] == 0)
+    assert 0.02 < free.mean() < 0.98
+    # Only as far as asked.
+    above_all = np.full(len(origins), 0.8)
+    assert cast.visible(origins, directions, above_all).all()
+    assert cast.first_hits(origins[:1], -directions[:1]).triangle[0] == NO_HIT
+
+
+def test_veils_multiply() -> None:
+    """The share that passes is the product of 1 − α, exactly; rays pass as often, and independently."""
+    opacity = np.array([0.1, 0.5, 0.3, 0.0, 0.6])
+    triangles, images = stack(np.ones((LAYERS, 4, 4)) * opacity[:, None, None])
+    cast = CutOutCaster(triangles, images)
+    origins, directions = downward(40_000)
+    to_floor = (LAYERS + 0.9) / -directions[:, 2]
+    through = np.prod(1 - opacity)
+    np.testing.assert_allclose(cast.passing(origins, directions, to_floor), through, rtol=1e-5)
+    assert cast.visible(origins, directions, to_floor).mean() == pytest.approx(through, abs=0.005)
+    layer = cast.first_hits(origins, directions).triangle // 2
+    # From above: the fifth stops 0.6, the third 0.3 of the rest, …
+    left = 1.0
+    for number in range(LAYERS, 0, -1):
+        assert (layer == number).mean() == pytest.approx(left * opacity[number - 1], abs=0.01)
+        left *= 1 - opacity[number - 1]
+    assert (layer == 0).mean() == pytest.approx(left, abs=0.01)
+    hinted = cast.passing(origins, directions, to_floor, 1e-3)
+    np.testing.assert_allclose(hinted, through * (1 - 1e-3), rtol=1e-5)
+
+
+def test_rays_are_stopped_alike_however_they_are_divided() -> None:
+    triangles, images = stack(np.random.default_rng(2).random((LAYERS, 8, 8)))
+    origins, directions = downward(1000)
+    whole = CutOutCaster(triangles, images, threads=2).first_hits(origins, directions)
+    cast = CutOutCaster(triangles, images, threads=1)
+    for rows in (slice(0, 300), slice(300, 1000)):
+        part = cast.first_hits(origins[rows], directions[rows])
+        np.testing.assert_array_equal(part.triangle, whole.triangle[rows])
+        assert part.distance.tobytes() == whole.distance[rows].tobytes()
+
+
+def test_grazing_rays_meet_each_veil_once() -> None:
+    """Rays that leave a crossed triangle so flat that rounding meets it again are not weakened twice."""
+    triangles, images = stack(np.full((LAYERS, 4, 4), 0.5))
+    angle = np.random.default_rng(3).uniform(0, 2 * np.pi, 5000)
+    flat = np.stack([np.cos(angle), np.sin(angle), np.full(5000, -3e-3)], axis=1)
+    directions = flat / np.linalg.norm(flat, axis=1, keepdims=True)
+    origins = np.tile([0.51, 0.47, LAYERS + 3e-4], (5000, 1))
+    share = CutOutCaster(triangles, images).passing(origins, directions, np.full(5000, 0.4))
+    assert set(np.unique(share)) <= {0.5, 1.0}
+    met = BruteForceCaster(triangles).visible(origins, directions, np.full(5000, 0.4))
+    assert (share[~met] == 0.5).mean() > 0.95
