@@ -40,16 +40,20 @@ HOOD = 0.25
 """What is nearer above a surface than this part of a texel's width hoods it. Light reaches about as far
 into a gap as the gap is high: into a high one it fades over texels, without a hood's sharp rim."""
 
+OPEN_ENOUGH = 0.25
+"""A texel answers hits beside the hood over its other part if so much of its footprint lies in the open."""
+
 _CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]], dtype=np.float32)
 _EDGES = np.array([[0, 1], [1, 2], [2, 3], [3, 0]])
 _DIAGONALS = np.array([[0, 2], [1, 3]])
 _SPOTS = np.array([[u, v] for u in (0.02, 0.5, 0.98) for v in (0.02, 0.5, 0.98)], dtype=np.float32)
+_MIDDLES = np.array([[u, v] for u in (0.125, 0.375, 0.625, 0.875) for v in (0.125, 0.375, 0.625, 0.875)])
 _AROUND = np.array([[r, c] for r in (-1, 0, 1) for c in (-1, 0, 1) if r or c])
 
 
 @dataclass(frozen=True)
 class CrossedTexels:
-    """What `crossing_steps` found of n texels, (n,) bool each.
+    """What `crossing_steps` found of n texels, (n,) bool each but for the last.
 
     Attributes
     ----------
@@ -57,12 +61,14 @@ class CrossedTexels:
     touched : they end at geometry; not cut
     rim : a hood's rim is above them
     hooded : all of them is below a hood; neither cut nor at a rim
+    open_share : (n,) float64, the part of their footprint that is below no hood
     """
 
     cut: Array
     touched: Array
     rim: Array
     hooded: Array
+    open_share: Array
 
 
 class Crossings:
@@ -81,6 +87,11 @@ class Crossings:
         Crossed are texels that geometry cuts and those at the rim of a hood; none is both.
     alone : (n,) bool
         Texels whose light is like no neighbour's, though a line of sight may join them: crossed or hooded.
+    beside : (n,) bool
+        Texels next to a crossed one: what stands there takes half of what they see.
+    gain : (n,) float64
+        How much brighter a texel is where hits ask it than in the mean: below a hood it is dark, and
+        only hits in the open are answered by texels at a rim.
     """
 
     def __init__(
@@ -91,6 +102,9 @@ class Crossings:
         self._cut, self._hooded = found.cut, found.hooded
         self.crossed, self.touched = found.cut | found.rim, found.touched & ~found.rim
         self.alone = self.crossed | found.hooded
+        self._answers = found.rim & ~found.cut & (found.open_share >= OPEN_ENOUGH)
+        self.gain = np.where(self._answers, 1.0 / np.maximum(found.open_share, OPEN_ENOUGH), 1.0)
+        self.beside = geometry.neighbourhood(self.crossed) & ~self.alone
 
     def look_up(self, texel: Array, hits: Hits) -> Array:
         """Replace crossed texels, and touched ones from beyond, by whole neighbours on the hit's side.
@@ -105,7 +119,8 @@ class Crossings:
         Returns
         -------
         texel : (h,) int32
-            NOTHING where no whole neighbour can be seen, and the texel is cut or the hit below a hood.
+            Where no whole neighbour can be seen: NOTHING if the hit is below a hood, and NO_TEXEL
+            if the texel is cut, or next to nothing of it in the open.
         """
         result = texel.copy()
         rows = np.flatnonzero((texel != NO_TEXEL) & (self.crossed[texel] | self.touched[texel]))
@@ -117,11 +132,11 @@ class Crossings:
         return result
 
     def _elsewhere(self, texel: Array, position: Array) -> Array:
-        """Return (h,) the texels that hits on texels not theirs are looked up in, or NOTHING."""
+        """Return (h,) the texels that hits on texels not theirs are looked up in, NO_TEXEL or NOTHING."""
         below = _hooded(self._geometry, self._caster, texel, position[:, None])[:, 0]
         found = self._neighbour(texel, position, below)
-        # In the open the mean over a hood's rim is rather too dark than a leak.
-        own = (found == NOTHING) & self.crossed[texel] & ~self._cut[texel] & ~below
+        own = (found == NOTHING) & self._answers[texel] & ~below
+        found = np.where((found == NOTHING) & ~below, NO_TEXEL, found)
         return np.where(own, texel, found)
 
     def _sees_centre(self, texel: Array, position: Array) -> Array:
@@ -169,7 +184,8 @@ def crossing_steps(
     geometry: TexelGeometry, caster: RayCaster, threads: int = 0
 ) -> Generator[float, None, CrossedTexels]:
     """Find the texels that geometry cuts, touches or hoods; yields the fraction done."""
-    result = CrossedTexels(*np.zeros((4, len(geometry)), dtype=bool))
+    cut, touched, rim, hooded = np.zeros((4, len(geometry)), dtype=bool)
+    result = CrossedTexels(cut, touched, rim, hooded, open_share=np.ones(len(geometry)))
 
     def find(part: slice) -> None:
         rows = np.arange(part.start, part.stop)
@@ -193,6 +209,9 @@ def crossing_steps(
         below = _hooded(geometry, caster, rows, spots)
         result.rim[rows] = below.any(axis=1) & ~below.all(axis=1)
         result.hooded[rows] = below.all(axis=1) & ~cut
+        at_rim = rows[result.rim[rows]]
+        spots = geometry.sample(at_rim, np.broadcast_to(_MIDDLES, (len(at_rim), *_MIDDLES.shape)))
+        result.open_share[at_rim] = 1.0 - _hooded(geometry, caster, at_rim, spots).mean(axis=1)
 
     yield from chunk_steps(find, len(geometry), CHUNK // 4, threads)
     return result

@@ -95,7 +95,7 @@ class GatherPoints:
         of = self.texel.take(point)
         along = geometry.position.take(of, axis=0) - geometry.position.take(texels, axis=0)
         distance = np.sqrt(np.einsum("pk,pk->p", along, along))
-        change = distance * self.closeness.take(point)
+        change = distance * np.maximum(self.closeness.take(point), self._own_closeness(texels))
         # A texel that geometry cuts in two, or hoods, speaks for itself alone, and nobody for it.
         apart = self._alone.take(of) | self._alone.take(texels)
         weight = np.where(of == texels, np.maximum(1.0 - change / REACH, 0.0) ** 2, 0.0)
@@ -116,6 +116,13 @@ class GatherPoints:
             begin[heard], directions[heard], length[heard]
         )
         return np.asarray(weight)
+
+    def _own_closeness(self, texels: Array) -> Array:
+        """Return (p,) what texels that are points see themselves; 0 where they are none."""
+        number = self._number.take(texels)
+        if not len(self):
+            return np.zeros(len(texels))
+        return np.where(number >= 0, self.closeness.take(np.maximum(number, 0)), 0.0)
 
     def support(self, texels: Array) -> Array:
         """Return (n,) the summed weights around texels: below 1 they need a point of their own."""
@@ -147,7 +154,12 @@ class GatherPoints:
         mine = slice(*np.searchsorted(known.texels, [texels.start, texels.stop]))
         old = np.zeros(len(run), dtype=bool)
         old[known.texels[mine] - texels.start] = True
-        found = [self._fresh(run[~old], 0), self._fresh(run[old], known.levels), known.pairs_of(texels)]
+        # What has become a point since has learnt how close things are to it.
+        old &= self._number[run] < 0
+        kept = known.pairs_of(texels)
+        still = old[kept[0] - texels.start]
+        kept = (kept[0][still], kept[1][still], kept[2][still])
+        found = [self._fresh(run[~old], 0), self._fresh(run[old], known.levels), kept]
         texel, point, weight = (np.concatenate(parts) for parts in zip(*found, strict=True))
         row = texel - texels.start
         order = np.argsort(row.astype(np.int16 if len(run) < 1 << 15 else np.int64), kind="stable")

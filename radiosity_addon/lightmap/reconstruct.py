@@ -72,7 +72,8 @@ def reconstruct(
     resolve = _resolver(local, geometry, crossings)
     stored = gather_texels(local, geometry, settings, crossings, resolve)
     links = yield from scaled(stored, CROSSED, GATHERED)
-    swept = sweep_steps(scene, local, geometry, links, lamps, resolve, settings.sweeps, settings.tolerance)
+    limits = settings.sweeps, settings.tolerance
+    swept = sweep_steps(scene, local, geometry, links, lamps, resolve, *limits, crossings.gain)
     light = yield from scaled(swept, GATHERED, 1.0)
     yield 1.0
     return light
@@ -105,24 +106,38 @@ def gather_texels(
     width = (1.0 - FIT) / len(settings.strides)
     for number, stride in enumerate(settings.strides):
         begin = number * width
-        choice = _choose(points, geometry, stride, settings.support)
+        choice = _choose(points, geometry, stride, settings.support, crossings.beside)
         chosen = yield from scaled(choice, begin, begin + 0.2 * width)
-        at = Footprints(
-            geometry.position[chosen],
-            geometry.normal[chosen],
-            chosen,
-            partial(_sample_of, geometry, chosen),
-            starts=STARTS,
-        )
-        expected = local.irradiance_at(geometry.triangle[chosen], geometry.barycentric[chosen])
-        rays = local.gather_steps(at, geometry.surface_normal[chosen], settings.rays, resolve, expected)
-        gathered = yield from scaled(rays, begin + 0.2 * width, begin + width)
-        first.append(len(points))
-        points.add(stride, chosen, gathered.closeness)
-        found.append(gathered)
+        # Across a rim light changes by more than noise: there every ray starts from a point of its own.
+        edge = crossings.crossed[chosen]
+        at, closeness = begin + 0.2 * width, []
+        for some, starts in ((chosen[~edge], STARTS), (chosen[edge], None)):
+            end = at + 0.8 * width * len(some) / max(len(chosen), 1)
+            rays = _gather(local, geometry, some, starts, settings.rays, resolve)
+            gathered = yield from scaled(rays, at, end)
+            first.append(sum(len(before.sources) for before in found))
+            found.append(gathered)
+            closeness.append(gathered.closeness)
+            at = end
+        points.add(stride, np.concatenate([chosen[~edge], chosen[edge]]), np.concatenate(closeness))
     spread = yield from scaled(fit_steps(points, geometry), 1.0 - FIT, 1.0)
     sources = np.concatenate([gathered.sources for gathered in found])
     return StoredLinks(sources, spread, AimedRays.joined([gathered.aimed for gathered in found], first))
+
+
+def _gather(
+    local: LocalPass, geometry: TexelGeometry, chosen: Array, starts: int | None, rays: int, resolve: Resolver
+) -> Generator[float, None, Gathered]:
+    """Gather at some texels; yields the fraction done."""
+    at = Footprints(
+        geometry.position[chosen],
+        geometry.normal[chosen],
+        chosen,
+        partial(_sample_of, geometry, chosen),
+        starts=starts,
+    )
+    expected = local.irradiance_at(geometry.triangle[chosen], geometry.barycentric[chosen])
+    return (yield from local.gather_steps(at, geometry.surface_normal[chosen], rays, resolve, expected))
 
 
 def _sample_of(geometry: TexelGeometry, chosen: Array, rows: Array, u: Array) -> Array:
@@ -131,15 +146,19 @@ def _sample_of(geometry: TexelGeometry, chosen: Array, rows: Array, u: Array) ->
 
 
 def _choose(
-    points: GatherPoints, geometry: TexelGeometry, stride: int, support: float
+    points: GatherPoints, geometry: TexelGeometry, stride: int, support: float, beside: Array
 ) -> Generator[float, None, Array]:
-    """Find the texels on a lattice that no point so far reaches; yields the fraction done."""
+    """Find the texels on a lattice that no point so far reaches; yields the fraction done.
+
+    Those beside something, (n,) bool, are chosen as well: points in the open do not know how close
+    it is to them.
+    """
     on_lattice = (geometry.row % stride == 0) & (geometry.column % stride == 0)
     candidates = np.flatnonzero(on_lattice)
     if len(points):
         candidates = np.setdiff1d(candidates, points.texel, assume_unique=True)
         reached = yield from points.support_steps(candidates)
-        candidates = candidates[reached < support]
+        candidates = candidates[(reached < support) | beside[candidates]]
     return candidates.astype(np.int32)
 
 

@@ -105,6 +105,7 @@ def sweep_steps(
     resolve: Resolver,
     sweeps: int,
     tolerance: float = TOLERANCE,
+    gain: Array | None = None,
 ) -> Generator[float, None, TexelLight]:
     """Iterate H = direct + Σ ρ H over the stored hits, started from the hierarchy's solution.
 
@@ -116,6 +117,8 @@ def sweep_steps(
         At most so many, …
     tolerance : float
         … or until no texel changes by more than this part of the mean.
+    gain : (n,) float64 or None
+        How much brighter than their mean the texels are where hits ask them; None is 1.
 
     Yields
     ------
@@ -124,6 +127,8 @@ def sweep_steps(
     """
     texel_count = len(geometry)
     reflectance, _ = texel_materials(scene, geometry)
+    if gain is not None:
+        reflectance = reflectance * gain[:, None]
     leaves = _Leaves(local, texel_count)
     links = yield from scaled(leaves.gather_steps(links, resolve), 0.0, 0.1)
     # Rows: texels, elements, their cells that were met, then the sky and nothing. Columns lie one

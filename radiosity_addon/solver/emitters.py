@@ -12,8 +12,8 @@ from .radiometry import radiance_of_radiosity
 from .sampling import points_on_triangles
 from .visibility import RayCaster
 
-CHUNK_PAIRS = 1 << 20
-"""Point and face pairs evaluated at once; bounds the temporaries to about 200 MB."""
+CHUNK_PAIRS = 1 << 18
+"""Point and face pairs evaluated at once; bounds the temporaries to about 50 MB a thread."""
 
 
 class EmitterGroup:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .arrays import Array
+from .emitters import EmitterGroup
 from .light_base import Lamp
 from .parallel import chunk_steps
 from .sampling import stratified_square
@@ -23,7 +24,7 @@ SAME_GAIN = 0.02
 """Where a lamp gives the centre of a footprint what it gives its farthest point, up to this
 part, the centre stands for all: what bends that little bends a mean by its square."""
 
-UNEVEN, MORE_GAINS = 0.02, 256
+UNEVEN, MORE_GAINS = 0.02, 64
 """Where the few points differ by more than this part, as beside a lamp and at the rim of a spot's cone,
 so many are asked."""
 
@@ -119,8 +120,11 @@ class SpreadPoints:
         """Return (r, count, 3) float64: the points of some footprints."""
         return np.asarray(self.at.points[rows, None] + self._apart[rows])
 
-    def gain_steps(self, light: Lamp) -> Generator[float, None, Array]:
+    def gain_steps(self, light: Lamp | EmitterGroup, least: float = 0.0) -> Generator[float, None, Array]:
         """Compute (n,) the unoccluded irradiance per unit of strength, a mean over the footprint.
+
+        Where it is no more than `least` in the centre, that stands for all; without one, where the
+        farthest point gets the same.
 
         Yields
         ------
@@ -134,16 +138,19 @@ class SpreadPoints:
             normals = at.normals[part]
             own = light.unit_irradiance(at.points[part], normals)
             if at.sampler is not None:
-                spread = self.points(part)
-                far = spread[np.arange(len(own)), self._farthest[part]]
-                other = light.unit_irradiance(far, normals)
-                varies[part] = np.abs(other - own) > SAME_GAIN * np.maximum(own, other)
-                jump[part] = np.abs(other - own) > EDGE * np.maximum(own, other)
+                if least:
+                    varies[part] = own > least
+                else:
+                    spread = self.points(part)
+                    far = spread[np.arange(len(own)), self._farthest[part]]
+                    other = light.unit_irradiance(far, normals)
+                    varies[part] = np.abs(other - own) > SAME_GAIN * np.maximum(own, other)
+                    jump[part] = np.abs(other - own) > EDGE * np.maximum(own, other)
             gain[part] = own
 
         yield from scaled(chunk_steps(ask, len(at), CHUNK_POINTS, self._threads), 0.0, 0.5)
         # Right under a lamp two points may happen to see it alike: their neighbours do not.
-        bent = np.flatnonzero(varies if at.near is None else at.near(varies))
+        bent = np.flatnonzero(varies if at.near is None or least else at.near(varies))
 
         def average(part: slice) -> None:
             gain[bent[part]] = self._varying(light, bent[part])
@@ -155,7 +162,7 @@ class SpreadPoints:
             gain[rows] = self._many(light, rows)
         return gain
 
-    def _varying(self, light: Lamp, rows: Array) -> Array:
+    def _varying(self, light: Lamp | EmitterGroup, rows: Array) -> Array:
         """Return (r,) the mean gain at some rows, over which it varies."""
         each = self._gains(light, rows, self.points(rows))
         mean = each.mean(axis=1)
@@ -163,7 +170,7 @@ class SpreadPoints:
         mean[uneven] = self._many(light, rows[uneven])
         return np.asarray(mean)
 
-    def _many(self, light: Lamp, rows: Array) -> Array:
+    def _many(self, light: Lamp | EmitterGroup, rows: Array) -> Array:
         """Return (r,) the mean gain at some rows, by many points of each."""
         mean = np.empty(len(rows))
         step = CHUNK_POINTS // MORE_GAINS * SPREAD
@@ -174,7 +181,7 @@ class SpreadPoints:
             mean[start : start + step] = self._gains(light, some, self.at.sampler(some, unit)).mean(axis=1)
         return mean
 
-    def _gains(self, light: Lamp, rows: Array, points: Array) -> Array:
+    def _gains(self, light: Lamp | EmitterGroup, rows: Array, points: Array) -> Array:
         """Return (r, k) the gain at (r, k, 3) points of some rows' footprints."""
         count = points.shape[1]
         gain = light.unit_irradiance(points.reshape(-1, 3), np.repeat(self.at.normals[rows], count, axis=0))

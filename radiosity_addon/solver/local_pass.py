@@ -33,6 +33,9 @@ if TYPE_CHECKING:
 
 __all__ = ["NOTHING", "SKY", "Footprints", "Gathered", "LocalPass", "Resolver", "Sampler"]
 
+NEAR = 0.05
+"""Form factor beyond which emissive faces are so near that it may change over a texel."""
+
 
 class LocalPass:
     """Asks for the light at points of a solved scene."""
@@ -85,11 +88,10 @@ class LocalPass:
         spread = SpreadPoints(at, self._seed + 2, self.threads)
         for done, (light, seed) in enumerate(zip(lights, seeds, strict=True)):
             begin, end = done / count, (done + 1) / count
-            if isinstance(light, EmitterGroup):
-                gain, caster = light.unit_irradiance(at.points, at.normals), self.caster
-            else:
-                caster = self.caster.for_lamps
-                gain = yield from scaled(spread.gain_steps(light), begin, begin + 0.1 / count)
+            glows = isinstance(light, EmitterGroup)
+            caster = self.caster if glows else self.caster.for_lamps
+            gains = spread.gain_steps(light, NEAR if glows else 0.0)
+            gain = yield from scaled(gains, begin, begin + 0.1 / count)
             share = ShadowShare(caster, light, spread, seed, self.threads).steps(gain, shadow_rays)
             unblocked = yield from scaled(share, begin + 0.1 / count, end)
             total += (gain * unblocked)[:, None] * light.strength

@@ -106,15 +106,15 @@ def test_whole_texels_and_none_are_left_alone() -> None:
     np.testing.assert_array_equal(texel, given)
 
 
-def test_without_a_whole_neighbour_there_is_nothing() -> None:
-    """Inside a box narrower than a texel no whole texel can be seen."""
+def test_without_a_whole_neighbour_no_texel_answers() -> None:
+    """Inside a box narrower than a texel no whole texel can be seen: the leaf below is asked."""
     low, high = 6.3 / SIZE, 6.7 / SIZE
     crossings = crossings_of(solid_box((low, low, -0.1), (high, high, 0.5)))
     texel = crossings._geometry.index[0][6, 6]
     assert crossings.crossed[texel]
     inside, outside = np.array([[6.5 / SIZE, 6.5 / SIZE, 0], [6.1 / SIZE, 6.5 / SIZE, 0]])
     found = crossings.look_up(np.array([texel, texel], dtype=np.int32), on_floor(np.stack([inside, outside])))
-    assert found[0] == NOTHING
+    assert found[0] == NO_TEXEL
     assert found[1] == crossings._geometry.index[0][6, 5]
 
 
@@ -189,10 +189,26 @@ def test_below_a_hood_narrower_than_a_texel_there_is_nothing() -> None:
     np.testing.assert_array_equal(crossings.look_up(texel, hits), [NOTHING, numbers[8, 5]])
 
 
-def test_in_the_open_between_hoods_a_texel_answers_for_itself() -> None:
-    """Slats over every texel: no neighbour is whole, and no light is lost."""
-    crossings = crossings_of(*(slab(column + 0.3, column + 0.8, 0.05) for column in range(SIZE)))
+@pytest.mark.parametrize("low", [0.3, 0.5])
+def test_between_hoods_a_texel_answers_if_its_footprint_is_in_the_open_as_well(low: float) -> None:
+    """Slats over every texel: no neighbour is whole, and no light is lost. Footprints are middle halves."""
+    crossings = crossings_of(*(slab(column + low, column + low + 0.5, 0.05) for column in range(SIZE)))
     assert crossings.crossed.all()
     texel = np.repeat(crossings._geometry.index[0][8, 6], 2)
-    hits = on_floor(np.array([[6.1, 8.5], [6.5, 8.5]]) / SIZE)
-    np.testing.assert_array_equal(crossings.look_up(texel, hits), [texel[0], NOTHING])
+    hits = on_floor(np.array([[6.1, 8.5], [6.7, 8.5]]) / SIZE)
+    answers = low == 0.5
+    expected = [texel[0] if answers else NO_TEXEL, NOTHING]
+    np.testing.assert_array_equal(crossings.look_up(texel, hits), expected)
+    # Half of the footprint is dark: where it is not, it is twice as bright as in the mean.
+    lower = crossings._geometry.triangle[texel[0]] == crossings._geometry.triangle
+    inside = lower & (crossings._geometry.row + 1 < crossings._geometry.column)
+    np.testing.assert_allclose(crossings.gain[inside], 2.0 if answers else 1.0)
+
+
+def test_texels_beside_crossed_ones_are_told() -> None:
+    """A wall cuts column 6; a board hoods columns 11 to 13, with rims in 11 and 13."""
+    wall = rectangle((6.5 / SIZE, -1, -0.5), (0, 3, 0), (0, 0, 1))
+    crossings = crossings_of(wall, slab(11.5, 13.5, 0.05))
+    expected = np.broadcast_to(np.isin(np.arange(SIZE), [5, 7, 10, 14]), (SIZE, SIZE))
+    np.testing.assert_array_equal(crossings.beside[crossings._geometry.index[0]], expected)
+    assert (crossings.gain[crossings._geometry.index[0]][:, :11] == 1.0).all()

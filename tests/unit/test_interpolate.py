@@ -173,6 +173,22 @@ def test_support_falls_with_distance_and_closeness() -> None:
     assert supports[0][3] > supports[1][3] > supports[2][3]
 
 
+def test_a_point_near_something_listens_no_farther_than_it_speaks() -> None:
+    """What stands close to a point takes part of its view; points in the open do not know."""
+    geometry = geometry_of(PLANE)
+    points = points_of(geometry, 4, 1)
+    near = np.setdiff1d(geometry.index[0], points.texel)[:1].astype(np.int32)
+    assert points.support(near)[0] > 0.5
+    points.add(1, near, np.array([20.0]))
+    matrix = weights_of(fit(points, geometry), points, len(geometry))
+    np.testing.assert_allclose(matrix[near[0]], points.texel == near, atol=1e-6)
+    # So weighed whatever was known before it became a point.
+    fresh = GatherPoints(geometry, caster_of(geometry), np.zeros(len(geometry), dtype=bool))
+    fresh.add(4, points.texel, points.closeness)
+    again = weights_of(fit(fresh, geometry), fresh, len(geometry))
+    np.testing.assert_allclose(again[near[0]], matrix[near[0]], atol=1e-6)
+
+
 def test_a_texel_that_nothing_reaches_is_an_error() -> None:
     geometry = geometry_of(PLANE)
     with pytest.raises(ValueError, match="no gather point in reach"):
