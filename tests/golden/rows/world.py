@@ -71,18 +71,18 @@ def sky_hosek_wilkie() -> None:
     _sky("HOSEK_WILKIE", sun_direction=(0.5, -0.6, 0.6), turbidity=3.0, ground_albedo=0.4)
 
 
-@row("sky-scattering", samples=48)
+@row("sky-scattering", samples=48, needs=(5, 0))
 def sky_scattering() -> None:
-    """Sky Texture, single scattering (Nishita before 5.0), without a sun disc."""
+    """Sky Texture, single scattering, without a sun disc; Nishita before 5.0 is another sky, 2 % apart."""
     _open_stage()
-    _sky(_single(), sun_disc=False, sun_elevation=0.5, sun_rotation=2.4)
+    _sky("SINGLE_SCATTERING", sun_disc=False, sun_elevation=0.5, sun_rotation=2.4)
 
 
-@row("sky-sun", samples=48)
+@row("sky-sun", samples=48, needs=(5, 0))
 def sky_sun() -> None:
     """Sky Texture, single scattering, with its sun disc."""
     _open_stage()
-    _sky(_single(), sun_disc=True, sun_elevation=0.6, sun_rotation=2.4, strength=0.03)
+    _sky("SINGLE_SCATTERING", sun_disc=True, sun_elevation=0.6, sun_rotation=2.4, strength=0.03)
 
 
 @row("sky-multiple", samples=48, needs=(5, 0))
@@ -103,10 +103,6 @@ def _open_stage() -> None:
     """Build the stage; its box stands a little below the floor, lest rays from its bottom start in it."""
     stage()
     bpy.data.objects["Box"].location.z -= 0.01
-
-
-def _single() -> str:
-    return "NISHITA" if bpy.app.version < (5, 0) else "SINGLE_SCATTERING"
 
 
 def _sky(kind: str, strength: float = 0.3, **values: object) -> None:
