@@ -139,10 +139,10 @@ def solver_figures(report: dict[str, Any], leaves: int) -> dict[str, Any]:
              "estimated_error", "over_budget")  # fmt: skip
     kept = {name: report[name] for name in names if name in report}
     leaves = leaves or report.get("leaves", 0)
-    # Leaves are all elements that have no children; of small faces clusters are told apart no further.
-    per_leaf = report.get("hierarchical", {}).get("links_per_leaf", report["links"] / max(leaves, 1))
     closure = report.get("hierarchical", {}).get("closure")
-    return {**kept, "leaves": leaves, "links_per_leaf": per_leaf, **({"closure": closure} if closure else {})}
+    if closure:
+        kept["closure"] = closure
+    return {**kept, "leaves": leaves, "links_per_leaf": report["links"] / max(leaves, 1)}
 
 
 def save_whole(path: Path, pixels: np.ndarray) -> None:

@@ -40,7 +40,7 @@ HOOD = 0.25
 """What is nearer above a surface than this part of a texel's width hoods it. Light reaches about as far
 into a gap as the gap is high: into a high one it fades over texels, without a hood's sharp rim."""
 
-OPEN_ENOUGH = 0.25
+OPEN_ENOUGH = 0.5
 """A texel answers hits beside the hood over its other part if so much of its footprint lies in the open."""
 
 _CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]], dtype=np.float32)

@@ -13,7 +13,7 @@ from radiosity_addon.settings import BakeSettings
 from radiosity_addon.solver.lights import EnvironmentLight
 from radiosity_addon.solver.steps import drain
 from radiosity_addon.solver.visibility import surface_offset
-from tests.blender.file_dump import differences, dump_file
+from tests.blender.file_dump import differences_since, dump_file
 
 from .scenes import build
 
@@ -46,7 +46,7 @@ def check(seed: int) -> bool:
             _check_power(scene, result)
         restore(bpy.context)
     bpy.context.scene.property_unset("radiosity")
-    left = differences(before, dump_file())
+    left = differences_since(before)
     assert left == [], f"not restored: {left[:5]}"
     return bool(seen)
 
