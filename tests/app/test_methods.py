@@ -15,9 +15,10 @@ Run = Callable[..., object]
 
 TINY = ("--resolution", "32", "--quality", "draft")
 
-EXACT = ("--resolution", "32", "--quality", "high")
+EXACT = ("--resolution", "48", "--quality", "high")
 """Which elements are bright enough to be aimed at is the method's to say, so that rays differ, and their
-noise: it has to be below what is asserted."""
+noise: it has to be below what is asserted. Where an object's foot cuts texels, parts of elements answer the
+rays instead, as large as the method made them: texels have to be small beside the cube."""
 
 METHODS = {
     "dense": ("--elements 80", {"elements": 80}),
@@ -89,7 +90,7 @@ def test_each_method_bakes_the_same_light(
     # The elements rays meet are others, but their light is soon replaced by the texels' own.
     pixels = read_pixels(out / "lightmap.exr")
     np.testing.assert_allclose(pixels.mean(), reference.mean(), rtol=1e-3)
-    np.testing.assert_allclose(pixels, reference, rtol=0, atol=0.01 * reference.max())
+    np.testing.assert_allclose(pixels, reference, rtol=0, atol=0.005 * reference.max())
 
 
 def test_the_plot_is_drawn_where_asked_and_named(run: Run, small_room: Path, tmp_path: Path) -> None:
