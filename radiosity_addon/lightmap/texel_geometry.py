@@ -107,8 +107,8 @@ class TexelGeometry:
     def sample(self, rows: Array, u: Array, width: float = FOOTPRINT) -> Array:
         """Return (r, k, 3) points spread over the middle `width` of r texels by u (r, k, 2)."""
         points = np.empty((len(rows), u.shape[1], 3))
-        # The middle of a texel that is whole on its triangle needs no clipping.
-        inner = self.whole[rows] & (width < 1.0)
+        # What is inside a texel that is whole on its triangle needs no clipping.
+        inner = self.whole[rows] & ((width < 1.0) | ((u > 0.0) & (u < 1.0)).all(axis=(1, 2)))
         plain, cut = np.flatnonzero(inner), np.flatnonzero(~inner)
         points[plain] = self._in_plane(rows[plain], 0.5 + (u[plain].astype(np.float64) - 0.5) * width)
         corners = self._scene.triangles[self.triangle[rows[cut]]]
