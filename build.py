@@ -26,6 +26,9 @@ from build_tools.errors import BuildError  # noqa: E402
 
 ROOT = Path(__file__).resolve().parent
 
+SIDE_BY_SIDE = ("-n", "auto", "--maxprocesses", "8", "--dist", "loadfile")
+"""How pytest spreads tests over the cores: those of one file share what they prepare."""
+
 USAGE = """\
 usage: python3 build.py VERB [arguments]
 
@@ -87,7 +90,7 @@ def restore(arguments: list[str]) -> int:
 
 
 def test(arguments: list[str]) -> int:
-    """Run pytest, in the main environment or in one with another bpy."""
+    """Run pytest, in the main environment or in one with another bpy; all tests if nothing else is asked."""
     if arguments[:1] != ["--bpy"]:
         environment = environments.main_environment(ROOT)
     elif len(arguments) > 1:
@@ -96,7 +99,11 @@ def test(arguments: list[str]) -> int:
         print("build.py: error: --bpy needs a version, such as 4.2", file=sys.stderr)
         return 2
     os.chdir(ROOT)
-    return environment.hand_over("-m", "pytest", *arguments)
+    if arguments:
+        return environment.hand_over("-m", "pytest", *arguments)
+    # Side by side, but for the windows: they share one real Blender and are timed.
+    code = environment.run("-m", "pytest", *SIDE_BY_SIDE, "-m", "not real_blender")
+    return environment.run("-m", "pytest", "-m", "real_blender") or code
 
 
 def fuzz(arguments: list[str]) -> int:
