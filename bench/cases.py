@@ -123,7 +123,7 @@ def blender_version() -> str:
 
 
 def _file(name: str, title: str, path: str, **more: Any) -> Case:
-    settings: dict[str, Any] = {"samples": (16, 64, 256), "reference_samples": 512, "resolution": 512, **more}
+    settings: dict[str, Any] = {"samples": (8, 32, 128), "reference_samples": 128, "resolution": 512, **more}
     return Case(name=name, title=title, builder="file", path=path, **settings)
 
 
