@@ -78,8 +78,10 @@ def stratified_square(keys: npt.ArrayLike, k: int, seed: int = 0, first: int = 0
     index = np.arange(first, first + k, dtype=np.uint32)
     low = index & np.uint32((1 << _TABLE_BITS) - 1)
     high = index - low
-    order = _shuffle(_reversed_bits(low), hash_keys(rows, 3 * seed)[:, None])
-    bits = _reversed_table()[order] ^ _sobol_bits(high)
+    order = _shuffle(_reversals()[low], hash_keys(rows, 3 * seed)[:, None])
+    bits = _reversed_table()[order]
+    if high.any():
+        bits ^= _sobol_bits(high)
     bits ^= np.stack([hash_keys(rows, 3 * seed + 1), hash_keys(rows, 3 * seed + 2)], axis=-1)[:, None]
     # 24 bits are what a float32 below 1 holds exactly; rounding 32 could give 1.
     return (bits >> np.uint32(8)).astype(np.float32) * np.float32(2.0**-24)
@@ -106,9 +108,15 @@ def _reversed_bits(index: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:
 
 
 @cache
+def _reversals() -> npt.NDArray[np.uint32]:
+    """Return `_reversed_bits` of all (2^`_TABLE_BITS`,) indices."""
+    return _reversed_bits(np.arange(1 << _TABLE_BITS, dtype=np.uint32))
+
+
+@cache
 def _reversed_table() -> npt.NDArray[np.uint32]:
     """Return the Sobol' points by bit-reversed index, (2^`_TABLE_BITS`, 2)."""
-    return _sobol_bits(_reversed_bits(np.arange(1 << _TABLE_BITS, dtype=np.uint32)))
+    return _sobol_bits(_reversals())
 
 
 def _sobol_bits(index: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:
