@@ -59,6 +59,7 @@ class GatherPoints:
         self._grids: list[PointGrid] = []
         self._weighed = _Weighed.nothing()
         self._number = np.full(len(geometry), -1, dtype=np.int32)
+        self._farthest = np.full(len(geometry), np.inf)
 
     def __len__(self) -> int:
         return len(self.texel)
@@ -95,7 +96,9 @@ class GatherPoints:
         of = self.texel.take(point)
         along = geometry.position.take(of, axis=0) - geometry.position.take(texels, axis=0)
         distance = np.sqrt(np.einsum("pk,pk->p", along, along))
-        change = distance * np.maximum(self.closeness.take(point), self._own_closeness(texels))
+        self._bound_reach(texels, 1.0 / np.maximum(self.closeness.take(point), 1e-300) + distance)
+        closeness = np.maximum(self.closeness.take(point), self._own_closeness(texels))
+        change = distance * closeness
         # A texel that geometry cuts in two, or hoods, speaks for itself alone, and nobody for it.
         apart = self._alone.take(of) | self._alone.take(texels)
         weight = np.where(of == texels, np.maximum(1.0 - change / REACH, 0.0) ** 2, 0.0)
@@ -122,7 +125,15 @@ class GatherPoints:
         number = self._number.take(texels)
         if not len(self):
             return np.zeros(len(texels))
-        return np.where(number >= 0, self.closeness.take(np.maximum(number, 0)), 0.0)
+        around = 1.0 / self._farthest.take(texels)
+        return np.where(number >= 0, self.closeness.take(np.maximum(number, 0)), around)
+
+    def _bound_reach(self, texels: Array, distance: Array) -> None:
+        """Note for texels (p,), sorted, that what they see is no farther (p,) than neighbours lead to expect."""
+        first = np.flatnonzero(np.diff(texels, prepend=-1))
+        if len(first):
+            some = texels[first]
+            self._farthest[some] = np.minimum(self._farthest[some], np.minimum.reduceat(distance, first))
 
     def support(self, texels: Array) -> Array:
         """Return (n,) the summed weights around texels: below 1 they need a point of their own."""
