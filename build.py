@@ -41,6 +41,7 @@ usage: python3 build.py VERB [arguments]
                              all of it out in a minute
   check                      lint, layer rule and types
   figures [--check] [NAME…]  compute the figures of docs/theory, or only assert their numbers
+          [gallery [ROW…]]   and the pictures of docs/gallery.md, minutes of work; --check bakes none
   docs                       build docs/ to a static site in out/site
   package                    make the extension's zips in dist/, one a platform
   real-blender               install the Blender that the tests with a window use (root on Debian)
@@ -135,8 +136,15 @@ def check(arguments: list[str]) -> int:
 
 
 def figures(arguments: list[str]) -> int:
-    """Compute, check and draw the figures of the theory pages."""
-    return environments.docs_environment(ROOT).hand_over(str(ROOT / "docs" / "figures"), *arguments)
+    """Compute, check and draw the figures of the theory pages, then the gallery's, or one of the two."""
+    os.chdir(ROOT)
+    only_gallery, code = arguments[:1] == ["gallery"], 0
+    if not only_gallery:
+        code = environments.docs_environment(ROOT).run(str(ROOT / "docs" / "figures"), *arguments)
+    if only_gallery or not set(arguments) - {"--check"}:
+        rows = arguments[1:] if only_gallery else arguments
+        code = environments.main_environment(ROOT).run("-m", "tests.golden.gallery", *rows) or code
+    return code
 
 
 def docs(_: list[str]) -> int:

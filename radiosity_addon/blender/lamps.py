@@ -116,27 +116,20 @@ def _spot(
     name: str, data: bpy.types.Light, matrix: np.ndarray, strength: np.ndarray
 ) -> tuple[Light, list[BakeWarning]]:
     scale = np.linalg.norm(matrix[:3, :3], axis=0)
-    angle, warnings = data.spot_size, []
-    if scale.min() > 0 and np.ptp(scale) > _SAME_SCALE * scale.max() and angle < math.pi:
-        # Cycles tests the cone in the lamp's own space, so a scale across it widens it.
-        stretch = math.sqrt(scale[0] * scale[1]) / scale[2]
-        angle = 2.0 * math.atan(math.tan(angle / 2.0) * stretch)
-        warnings.append(
-            BakeWarning(
-                name, f"lamp '{name}': scaled unevenly; a round cone of {math.degrees(angle):.3g}° is used"
-            )
-        )
+    stretched = scale.min() > 0 and np.ptp(scale) > _SAME_SCALE * scale.max()
     return SpotLight(
         matrix[:3, 3],
         _backward(matrix),
         strength * _sphere_area(data),
-        angle,
+        data.spot_size,
         blend=data.spot_blend,
         radius=data.shadow_soft_size,
         soft_falloff=data.use_soft_falloff,
+        # Cycles tests the cone in the lamp's own space, so a scale across it widens it.
+        round_from_world=np.linalg.inv(matrix[:3, :3]) if stretched else None,
         casts_shadow=_casts_shadow(data),
         name=name,
-    ), warnings
+    ), []
 
 
 def _sun(

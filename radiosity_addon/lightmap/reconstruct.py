@@ -35,6 +35,9 @@ STARTS = 16
 FIT = 0.15
 """The part of gathering that weighs the points."""
 
+WIDE = 4.0
+"""Texels this many times wider than the median tell less of the light than leaf elements that are smaller."""
+
 
 @dataclass(frozen=True)
 class GatherSettings:
@@ -164,9 +167,13 @@ def _choose(
 
 def _resolver(local: LocalPass, geometry: TexelGeometry, crossings: Crossings) -> Resolver:
     """Number hits: texels by their own number, parts of leaf elements after the texels."""
+    wide = geometry.texel_area > (WIDE * geometry.texel_size) ** 2
 
     def resolve(hits: Hits) -> Array:
         texel = crossings.look_up(geometry.texel_at(hits), hits)
+        doubtful = np.flatnonzero((texel >= 0) & wide[hits.triangle])
+        finer = local.leaf_areas(hits.take(doubtful)) < geometry.texel_area[hits.triangle[doubtful]]
+        texel[doubtful[finer]] = NO_TEXEL
         elsewhere = texel == NO_TEXEL
         part = local.parts_of(hits.take(elsewhere))
         texel[elsewhere] = np.where(part == NOTHING, NOTHING, part + len(geometry))

@@ -92,13 +92,15 @@ class TexelGeometry:
     @cached_property
     def texel_size(self) -> float:
         """Width of a texel in the world [m], the median."""
-        if not len(self):
-            return 1.0
-        edges = self.uv[self.triangle, 1:].astype(np.float64) - self.uv[self.triangle, :1]
+        return float(np.sqrt(np.median(self.texel_area[self.triangle]))) if len(self) else 1.0
+
+    @cached_property
+    def texel_area(self) -> Array:
+        """(t,) float64: what a texel is of every triangle [m²]; endless where it has none of a page."""
+        edges = self.uv[:, 1:].astype(np.float64) - self.uv[:, :1]
         flat = 0.5 * np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
-        size = np.array([len(numbers) for numbers in self.index])[self.page]
-        area = self._scene.areas[self.triangle] / np.maximum(flat * size * size, 1e-300)
-        return float(np.sqrt(np.median(area)))
+        flat *= np.array([len(numbers) ** 2 for numbers in self.index])[np.maximum(self.page_of_triangle, 0)]
+        return np.asarray(self._scene.areas / np.maximum(flat, 1e-300))
 
     def first(self, page: int) -> int:
         """Return the number of a page's first texel."""

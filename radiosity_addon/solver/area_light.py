@@ -19,6 +19,9 @@ AREA_SHAPES = ("rectangle", "ellipse")
 _NODES = 10
 """Of Gauss and Legendre, each way over the part of a lamp that a point sees through the soft-box."""
 
+_NARROWEST = 1e-3
+"""Spreads [rad] below this shine as it does, all but in parallel: a millimetre of blur at a metre."""
+
 _NODES_CHUNK = 1 << 9
 """Points integrated at a time; temporaries stay in the processor's cache."""
 
@@ -37,7 +40,7 @@ class AreaLight(Emitter):
     power : float or (3,) float [W]
     shape : "rectangle" or "ellipse"
     spread : float [rad]
-        The full angle of the cone that each point of the lamp shines into, above 0 to π: as through
+        The full angle of the cone that each point of the lamp shines into, 0 to π: as through
         the slats of a soft-box, radiance falls as 1 − tan θ / tan(spread/2), and the power is kept.
 
     Raises
@@ -57,7 +60,8 @@ class AreaLight(Emitter):
         for field in ("position", "edge_u", "edge_v"):
             self._set_vector(field)
         self._set_rgb("power")
-        self._set_number("spread", 0.0, float(np.pi) + 1e-6, above=True)
+        self._set_number("spread", 0.0, float(np.pi) + 1e-6)
+        object.__setattr__(self, "spread", max(self.spread, _NARROWEST))
         if self.shape not in AREA_SHAPES:
             raise self._fail(f"shape {self.shape!r} is unknown", f"choose one of {', '.join(AREA_SHAPES)}")
         if not self.area > 0.0:

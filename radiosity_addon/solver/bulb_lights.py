@@ -25,6 +25,12 @@ _INTENSITY = intensity_of_flux(1.0)
 _EDGE_SAMPLES = 16
 """Samples across a spot's disk, each way, that average the cone's edge over it."""
 
+_RIM_SAMPLES = 256
+"""Directions around a stretched cone that tell how wide and how narrow it is."""
+
+_CONE_SAMPLES = 256
+"""Samples over a stretched cone, each way, that tell its power."""
+
 _EDGE_CHUNK = 1 << 10
 """Points whose edge samples are taken at a time; temporaries stay below 64 MB."""
 
@@ -167,6 +173,9 @@ class SpotLight(_Bulb):
     blend : float
         Share of 1 − cos(angle/2) over which the edge fades by a smoothstep in the cosine.
     radius, soft_falloff : as for a `PointLight`
+    round_from_world : (3, 3) float or None
+        Takes directions to where the cone is round, with that angle and blend; None: it is in the world.
+        So a lamp may be stretched: the intensity inside stays.
 
     Raises
     ------
@@ -181,17 +190,57 @@ class SpotLight(_Bulb):
     blend: float = 0.15
     radius: float = 0.0
     soft_falloff: bool = True
+    round_from_world: npt.ArrayLike | None = None
 
     def __post_init__(self) -> None:
         self._validate()
         self._set_vector("direction", unit=True)
         self._set_number("angle", 0.0, float(np.pi) + 1e-6, above=True)
         self._set_number("blend", 0.0, 1.0)
+        if self.round_from_world is not None:
+            turn = np.asarray(self.round_from_world, dtype=np.float64)
+            if turn.shape != (3, 3) or not np.isfinite(turn).all() or np.linalg.det(turn) == 0.0:
+                raise self._fail("its cone is flat or not finite", "set its scale to something other than 0")
+            self._store("round_from_world", turn)
 
     @property
     def flux(self) -> Float64Array:
         """(3,) RGB power inside the cone [W]: the smoothstep's mean is a half."""
-        return intensity_of_flux(self.strength) * cone_solid_angle(self._opening) * (1.0 - 0.5 * self.blend)
+        share = 1.0 - 0.5 * self.blend
+        if self.round_from_world is not None:
+            step = (np.arange(_CONE_SAMPLES) + 0.5) / _CONE_SAMPLES
+            square = np.stack(np.meshgrid(step, step), axis=-1).reshape(-1, 2)
+            share = float(self.emit(square, square)[2].mean())
+        return intensity_of_flux(self.strength) * cone_solid_angle(self._opening) * share
+
+    @property
+    def half_angles(self) -> tuple[float, float]:
+        """How narrow and how wide the cone is, from its axis to its edge [rad]."""
+        half = 0.5 * self.angle
+        if self.round_from_world is None:
+            return half, half
+        turn = 2.0 * np.pi * np.arange(_RIM_SAMPLES) / _RIM_SAMPLES
+        rim = np.stack([np.sin(half) * np.cos(turn), np.sin(half) * np.sin(turn)], axis=-1)
+        rim = np.insert(rim, 2, np.cos(half), axis=1)
+        seen, _ = self._in_world(to_world(rim[None], self._round_axis[None])[0])
+        away = np.arccos(np.clip(seen @ np.asarray(self.direction), -1.0, 1.0))
+        return float(away.min()), float(away.max())
+
+    @property
+    def _round_axis(self) -> Float64Array:
+        """The cone's axis where it is round."""
+        if self.round_from_world is None:
+            return np.asarray(self.direction)
+        axis: Float64Array = np.asarray(self.round_from_world) @ np.asarray(self.direction)
+        return np.asarray(axis / np.linalg.norm(axis))
+
+    def _in_world(self, directions: Float64Array) -> tuple[Float64Array, Float64Array]:
+        """Return unit directions (n, 3) of the round cone's space in the world, and how solid angles grow."""
+        if self.round_from_world is None:
+            return directions, np.ones(len(directions))
+        back = np.linalg.inv(np.asarray(self.round_from_world))
+        turned, length = directions_to(directions @ back.T)
+        return turned, np.abs(np.linalg.det(back)) / length**3
 
     @property
     def _opening(self) -> float:
@@ -199,15 +248,17 @@ class SpotLight(_Bulb):
         return float(2.0 * np.sin(0.25 * self.angle) ** 2)
 
     def emit(self, place: Samples, way: Samples) -> Rays:  # noqa: ARG002 - all start at one place
-        """Return rays from the lamp's centre, uniform over the cone (see `Emitter.emit`)."""
-        axis = np.asarray(self.direction)[None]
-        directions = to_world(uniform_cone(np.asarray(way, dtype=np.float64), self._opening)[None], axis)[0]
+        """Return rays from the lamp's centre, uniform over the round cone (see `Emitter.emit`)."""
+        cone = uniform_cone(np.asarray(way, dtype=np.float64), self._opening)
+        directions, growth = self._in_world(to_world(cone[None], self._round_axis[None])[0])
         origins = np.broadcast_to(np.asarray(self.position), directions.shape)
-        return origins, directions, self._attenuation(directions)
+        return origins, directions, self._attenuation(directions) * growth
 
     def _attenuation(self, directions: Float64Array) -> Float64Array:
         edge = np.cos(0.5 * self.angle)
-        above = directions @ np.asarray(self.direction) - edge
+        if self.round_from_world is not None:
+            directions = directions_to(directions @ np.asarray(self.round_from_world).T)[0]
+        above = directions @ self._round_axis - edge
         if self.blend == 0.0:
             return np.where(above > 0.0, 1.0, 0.0)
         step = np.clip(above / (self.blend * self._opening), 0.0, 1.0)
@@ -234,6 +285,10 @@ class SpotLight(_Bulb):
         """Return (n,) whether the attenuation differs over the lamp's disk or sphere as seen."""
         half = 0.5 * self.angle
         plateau = np.arccos(np.clip(np.cos(half) + self.blend * self._opening, -1.0, 1.0))
+        if self.round_from_world is not None:
+            # Anywhere between the narrowest plateau and the widest edge; asked in vain it is the same.
+            narrow, half = self.half_angles
+            plateau = 0.0 if self.blend > 0.0 else narrow
         off_axis = np.arccos(np.clip(-(toward @ np.asarray(self.direction)), -1.0, 1.0))
         spread = np.arctan2(self.radius, distance)
         if not self.soft_falloff:

@@ -162,8 +162,8 @@ def too_near(light: Light, hierarchy: Hierarchy, elements: Array) -> Array:
         seen = np.arcsin(np.clip(radius / np.maximum(distance, 1e-300), 0.0, 1.0))
         axis = np.asarray(light.direction)
         off = np.arccos(np.clip(along @ axis / np.maximum(distance, 1e-300), -1.0, 1.0))
-        half = 0.5 * light.angle
-        near |= (off - seen < half) & (seen > NEAR * half)
+        narrow, wide = light.half_angles
+        near |= (off - seen < wide) & (seen > NEAR * narrow)
     return np.asarray(before & near)
 
 

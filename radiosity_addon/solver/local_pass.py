@@ -177,6 +177,11 @@ class LocalPass:
         leaf[on_face] = hierarchy.leaf_at(face[on_face], hits.barycentric[on_face])
         return leaf
 
+    def leaf_areas(self, hits: Hits) -> Array:
+        """Return (n,) float64 the area of the leaf element under each hit [m²]; endless for none."""
+        leaf = self.leaves_of(hits)
+        return np.asarray(np.where(leaf == NOTHING, np.inf, self._state.hierarchy.area[leaf]))
+
     def reflected(self) -> Array:
         """Return (e, 3): the part of every element's radiosity it does not emit itself [W/m²].
 

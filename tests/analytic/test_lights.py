@@ -157,6 +157,14 @@ def test_spot_flux_is_what_arrives_around_it(angle: float, blend: float) -> None
     np.testing.assert_allclose(lamp.flux, arriving * lamp.strength, rtol=1e-6)
 
 
+def test_a_spread_of_nothing_is_a_parallel_beam() -> None:
+    """Below a lamp of a square metre and a watt lies a square metre with 1 W/m², and darkness around it."""
+    lamp = AreaLight((0, 0, 2.0), (1, 0, 0), (0, -1, 0), 1.0, spread=0.0)
+    points = np.array([[0.0, 0, 0], [0.49, 0.49, 0], [0.51, 0, 0], [0, -0.51, 0]])
+    light = lamp.unit_irradiance(points, np.tile([[0.0, 0, 1]], (4, 1)))
+    np.testing.assert_allclose(light, [1, 1, 0, 0], rtol=3e-3)
+
+
 def test_a_spot_with_a_radius_softens_its_edge_about_the_point_spot() -> None:
     """Across the cone's edge a hard spot's irradiance is the share of its disk that lights."""
     lamp = SpotLight((0, 0, 1), DOWN, 1.0, angle=np.pi / 2, blend=0.0, radius=0.1)

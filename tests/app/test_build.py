@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import subprocess
 import sys
 from pathlib import Path
@@ -174,6 +175,41 @@ def test_help_lists_every_verb() -> None:
     assert done.returncode == 0
     for verb in ("bake", "restore", "test", "bench", "check", "figures", "docs", "package", "real-blender"):
         assert f"\n  {verb} " in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "wanted"),
+    [
+        ((), {"docs": (), "main": ()}),
+        (("--check",), {"docs": ("--check",), "main": ("--check",)}),
+        (("quadtree", "--check"), {"docs": ("quadtree", "--check")}),
+        (("gallery",), {"main": ()}),
+        (("gallery", "metal", "--stale"), {"main": ("metal", "--stale")}),
+    ],
+)
+def test_figures_are_of_the_theory_and_of_the_gallery(
+    arguments: tuple[str, ...], wanted: dict[str, tuple[str, ...]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each in its own environment; either may fail the verb."""
+    ran: dict[str, tuple[str, ...]] = {}
+
+    class Pretended:
+        def __init__(self, name: str) -> None:
+            self.name = name
+
+        def run(self, *command: str) -> int:
+            ran[self.name] = command[2:] if command[0] == "-m" else command[1:]
+            return 1 if self.name == failing else 0
+
+    monkeypatch.syspath_prepend(str(ROOT))
+    monkeypatch.chdir(ROOT)
+    build = importlib.import_module("build")
+    monkeypatch.setattr(environments, "docs_environment", lambda _: Pretended("docs"))
+    monkeypatch.setattr(environments, "main_environment", lambda _: Pretended("main"))
+    for failing in ("nothing", "docs", "main"):
+        ran.clear()
+        assert build.figures(list(arguments)) == int(failing in wanted)
+        assert ran == wanted
 
 
 def _must_not_be_called(*arguments: object) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import bpy
 import numpy as np
@@ -50,14 +49,22 @@ class Comparison:
         at = self.compared
         return float(self.ours[at].mean(dtype=float) / self.theirs.mean[at].mean(dtype=float))
 
-    def strip(self) -> np.ndarray:
-        """Return (n, 3 n, 3) display values in [0, 1]: ours, Cycles, and ten times the difference."""
+    @property
+    def exposure(self) -> float:
+        """What brings the brightest of the compared texels just below white."""
+        bright = self.theirs.mean[self.compared].max(axis=1)
+        return 0.8 / max(float(np.quantile(bright, 0.98)), 1e-9) if len(bright) else 1.0
+
+    def panels(self) -> list[np.ndarray]:
+        """Return three (n, n, 3) pictures in [0, 1]: ours, Cycles', ten times the difference."""
         theirs = self.theirs.mean
         error = 10 * np.abs(self.ours - theirs) * self.compared[..., None]
-        bright = theirs[self.compared].max(axis=1)
-        exposure = 0.8 / max(float(np.quantile(bright, 0.98)), 1e-9) if len(bright) else 1.0
         pages = [self.ours * (self.compared | self.theirs.coverage)[..., None], theirs, error]
-        return np.clip(np.concatenate(pages, axis=1) * exposure, 0, 1) ** (1 / 2.2)
+        return [np.clip(page * self.exposure, 0, 1) ** (1 / 2.2) for page in pages]
+
+    def strip(self) -> np.ndarray:
+        """Return the three side by side, (n, 3 n, 3)."""
+        return np.concatenate(self.panels(), axis=1)
 
 
 def bake_row(row: Row, quality: str = "medium") -> BakeResult:
@@ -78,14 +85,3 @@ def compare(row: Row, quality: str = "medium") -> Comparison:
         texels = rasterise(item.uv, row.resolution)
         inside[texels.row[texels.centre_inside], texels.column[texels.centre_inside]] = True
     return Comparison(result.pages[0].pixels, theirs, inside & theirs.coverage, result.warnings)
-
-
-def write_png(path: Path, pixels: np.ndarray) -> None:
-    """Write (h, w, 3) display values, row 0 at the bottom."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    height, width, _ = pixels.shape
-    image = bpy.data.images.new("Picture", width, height)
-    image.pixels.foreach_set(np.dstack([pixels, np.ones((height, width))]).astype(np.float32).ravel())
-    image.filepath_raw, image.file_format = str(path), "PNG"
-    image.save()
-    bpy.data.images.remove(image)

@@ -18,8 +18,8 @@ from radiosity_addon.lightmap.rasterise import rasterise
 from radiosity_addon.pipeline import bake
 from radiosity_addon.settings import BakeSettings
 from radiosity_addon.solver.steps import drain
-from tests.golden.comparison import write_png
 from tests.golden.cornell_reference import FILE, Reference, load
+from tests.golden.png import write_png
 
 RELATIVE_RMSE = 0.011
 """Promised are 1.5 %; 0.76 % is measured."""

@@ -7,7 +7,7 @@ import math
 import bpy
 
 from . import row
-from .stage import add_lamp, add_mesh, add_object, diffuse, stage
+from .stage import add_box, add_lamp, add_mesh, add_object, diffuse, stage
 
 CUBE = tuple((x, y, z) for z in (-0.5, 0.5) for y in (-0.5, 0.5) for x in (-0.5, 0.5))
 CUBE_FACES = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))
@@ -95,6 +95,16 @@ def ball(rows: int, columns: int, radius: float) -> tuple[list, list, list]:
                 (left + (right - left) * u / columns, bottom + (top - bottom) * v / rows) for v, _, u in ring
             ]
     return vertices, faces, uv
+
+
+@row("resting-boxes")
+def resting_boxes() -> None:
+    """Boxes that stand on the floor and on each other: faces in one plane, back to back."""
+    lit()
+    paint = diffuse("Boxes", 0.6)
+    add_box("Lower", (0.8, 0.8, 0.6), (83, 105, 127, 127), paint, location=(-0.3, 0.5, 0.3), turn=0.4)
+    add_box("Upper", (0.5, 0.5, 0.5), (83, 83, 127, 105), paint, location=(-0.3, 0.5, 0.85), turn=-0.2)
+    bare("Bare", CUBE, CUBE_FACES, location=(0.9, 1.1, 0.4), scale=(0.5, 0.5, 0.8))
 
 
 @row("smooth-sphere")

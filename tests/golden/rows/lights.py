@@ -69,6 +69,14 @@ def spot_square() -> None:
     add_lamp("SPOT", energy=300, spot_size=math.radians(50), spot_blend=0.3, use_square=True)
 
 
+@row("spot-stretched")
+def spot_stretched() -> None:
+    """Spot whose object is scaled unevenly: the cone becomes an ellipse."""
+    stage()
+    wide = add_lamp("SPOT", energy=300, spot_size=math.radians(50), spot_blend=0.2, shadow_soft_size=0.02)
+    wide.scale = (1.6, 0.7, 1.0)
+
+
 @row("sun-hard")
 def sun_hard() -> None:
     """Sun of angle 0."""
@@ -124,6 +132,21 @@ def area_spread_narrow() -> None:
     stage()
     narrow = {"shape": "DISK", "size": 0.8, "spread": math.radians(30)}
     add_lamp("AREA", (1.2, -1.0, 2.0), (0.9, -0.4, 0.0), energy=20, **narrow)
+
+
+@row("area-spread-beam")
+def area_spread_beam() -> None:
+    """Square area lamp with a spread of 15°."""
+    stage()
+    narrow = {"shape": "SQUARE", "size": 0.8, "spread": math.radians(15)}
+    add_lamp("AREA", (1.2, -1.0, 2.0), (0.9, -0.4, 0.0), energy=20, **narrow)
+
+
+@row("area-spread-none")
+def area_spread_none() -> None:
+    """Square area lamp with a spread of 0: a beam whose rays are parallel."""
+    stage()
+    add_lamp("AREA", (1.2, -1.0, 3.0), (-0.2, 0.5, 0.3), energy=60, shape="SQUARE", size=2.2, spread=0.0)
 
 
 @row("area-near")

@@ -1,0 +1,95 @@
+"""The text of `docs/gallery.md`, from the rows and what was measured of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from tests.golden.rows import FAMILIES, ROWS, Row
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "docs" / "gallery.md"
+IMAGES = ROOT / "docs" / "images" / "gallery"
+RECORD = Path(__file__).parent / "gallery.json"
+
+INTRODUCTION = """\
+# Gallery
+
+What is followed of Blender, row by row: a small scene each, baked at medium quality and compared with
+Cycles, texel by texel on the same layout. From left to right:
+
+1. the scene, what has a lightmap showing the one made here (other objects stand in Cycles' own light);
+2. that lightmap (H/π);
+3. the one Cycles bakes, the mean of two with different seeds;
+4. ten times the difference, which includes the noise of Cycles.
+
+The stage of most rows is a floor with two walls, a box that stands on it and a slab that floats. In the
+lightmap the floor is at the lower left, the back wall above it, the left wall to its right; the six sides
+of box and slab are at the upper right.
+
+**relRMSE** is the root of the mean square error over all texels, shadows' borders included, relative to
+the mean light; two references that know nothing of each other take their own noise out of it. 3 % are
+allowed unless another limit is given. The **mean** is that of all texels, relative to Cycles'. The golden
+tests bake every row and fail if an error exceeds its limit or leaves this page's number.
+
+This page is written by `python3 build.py figures gallery`; the scenes are in `tests/golden/rows`, the
+references and the script that makes them in `tests/golden`.
+"""
+
+CHAPTERS = {
+    "lights": ("Lamps", "Their shapes, their softness, their colours, and whom they light."),
+    "world": ("Worlds", "Plain skies, images, and the Sky Texture."),
+    "materials": ("Materials", "What reflects, lets through and glows, and how much of it."),
+    "geometry": ("Geometry", "Whatever becomes a mesh when it is rendered, near and far, large and small."),
+}
+"""Title and first line of each family's chapter."""
+
+USUAL_LIMIT, USUAL_RESOLUTION = 0.03, 128
+
+
+def picture(name: str) -> Path:
+    """Return where a row's picture is."""
+    return IMAGES / f"{name}.png"
+
+
+def page(record: dict[str, dict[str, Any]]) -> str:
+    """Return the whole page; rows that were not measured yet are left out."""
+    parts = [INTRODUCTION]
+    for family in FAMILIES:
+        title, first = CHAPTERS[family]
+        rows = [row for row in ROWS.values() if row.family == family and row.name in record]
+        parts.append(f"\n## {title}\n\n{first} {_summary(rows, record)}\n")
+        parts += [_section(row, record[row.name]) for row in rows]
+    return "".join(parts)
+
+
+def _summary(rows: list[Row], record: dict[str, dict[str, Any]]) -> str:
+    if not rows:
+        return ""
+    errors = sorted(record[row.name]["error"] for row in rows)
+    middle, most = _percent(errors[(len(errors) - 1) // 2]), _percent(errors[-1])
+    return f"{len(rows)} rows, half of them up to {middle}, all up to {most}."
+
+
+def _section(row: Row, entry: dict[str, Any]) -> str:
+    hidden = "" if entry["error"] > 0 else " (less than the references' own noise)"
+    notes = [f"relRMSE **{_percent(entry['error'])}**{hidden}", f"mean {_signed(entry['mean_ratio'] - 1)}"]
+    if row.limit != USUAL_LIMIT:
+        notes.append(f"{100 * row.limit:g} % are allowed")
+    if row.resolution != USUAL_RESOLUTION:
+        notes.append(f"{row.resolution}²")
+    notes.append(f"Cycles 2 × {row.samples} samples")
+    if row.needs > (4, 2):
+        notes.append("Blender {}.{} or newer".format(*row.needs))
+    link = f"images/gallery/{picture(row.name).name}"
+    return f"\n### {row.name}\n\n{row.title}. {', '.join(notes)}.\n\n![{row.title}]({link})\n"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2f} %"
+
+
+def _signed(share: float) -> str:
+    """Return a difference as a percentage with a sign, or none where it rounds to 0."""
+    tenths = round(1000 * share)
+    return f"{tenths / 10:+.1f} %" if tenths else "±0.0 %"
