@@ -15,6 +15,10 @@ from .visibility import RayCaster
 CHUNK_PAIRS = 1 << 18
 """Point and face pairs evaluated at once; bounds the temporaries to about 50 MB a thread."""
 
+ENDS = 2.0
+"""Surface offsets from an emissive face to where shadow rays end. Their starts are lifted by one, which
+must not put their ends back on the face."""
+
 
 class EmitterGroup:
     """Faces of one emission, lit points see them as one lamp.
@@ -26,7 +30,8 @@ class EmitterGroup:
     strength : (3,) float64
         Exitance [W/m²].
     offset : float
-        Shadow rays end this far off the surface, so that they do not meet it.
+        Shadow rays end this far off the surface, so that they do not meet it: `ENDS` times as far as
+        they start off theirs.
     level : (m,) float64 or None
         What part of `strength` each face emits; None for all of it.
     """
@@ -100,7 +105,10 @@ class EmitterGroup:
         return directions, distances, _balanced(weights, face, len(self._corners))
 
     def _factors(self, points: Array, normals: Array) -> Array:
-        """Return (n, m) form factors from points to faces, times the faces' levels."""
+        """Return (n, m) form factors from points to faces, times the faces' levels.
+
+        0 where not even the start of a ray, lifted off the surface, is in front of a face.
+        """
         count, faces = len(points), len(self._corners)
         shape = (count, faces, 3)
         factors = point_to_polygon(
@@ -110,15 +118,17 @@ class EmitterGroup:
             # Among the faces may be the back of the one the point is on.
             contact=False,
         )
-        return np.asarray(factors.reshape(count, faces) * self._level)
+        # A point of a footprint is rounded off its plane: a hair behind, it would see all of its own back.
+        origin = self._corners[0, 0]
+        height = (points - origin) @ self._normals.T
+        height -= np.einsum("mc,mc->m", self._corners[:, 0] - origin, self._normals)
+        height += (self._offset / ENDS) * (normals @ self._normals.T)
+        return np.where(height > 0.0, factors.reshape(count, faces) * self._level, 0.0)
 
 
 def end_offset(caster: RayCaster) -> float:
-    """Return how far off an emissive face shadow rays end [m].
-
-    Their starts are lifted by one offset, which must not put their ends back on the face.
-    """
-    return 2.0 * caster.surface_offset
+    """Return how far off an emissive face shadow rays end [m]."""
+    return ENDS * caster.surface_offset
 
 
 def _balanced(weights: Array, face: Array, faces: int) -> Array:

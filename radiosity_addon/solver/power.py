@@ -7,7 +7,7 @@ means over the three channels, in watts.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeGuard
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from .cluster_links import ClusterLinks, gather_at_clusters
 from .environment import SkyPatch
 from .hierarchy import Faces, Hierarchy, node_opacity
 from .light_base import Emitter
-from .lights import EnvironmentLight, SunLight
+from .lights import EnvironmentLight, Light, SunLight
 from .links import Links
 from .radiometry import irradiance_under_sky
 from .sampling import cosine_hemisphere, points_on_triangles, stratified_square, to_world
@@ -55,19 +55,23 @@ def light_power(scene: Scene, faces: Faces) -> float:
 def power_balance(state: SolverState) -> dict[str, float]:
     """Return the emitted, absorbed and escaped power [W].
 
-    Lamps and emission count over all their sides, sun and sky what arrives at the faces.
+    Lamps and emission count over all their sides, sun and sky what arrives at the faces. So does a
+    lamp without shadows: each surface on its light's way gets all of it. Other lamps count beside their
+    own power what arrives at faces that their light passes all the same.
     """
     hierarchy, scene = state.hierarchy, state.scene
     leaves = hierarchy.leaves
     emitted = float((hierarchy.area[leaves] @ hierarchy.emission[leaves]).mean()) if len(leaves) else 0.0
     receiver = state.light_links.receiver
     gain = hierarchy.area[receiver] * hierarchy.opacity[receiver] * state.light_links.gain.mean(axis=1)
+    # What stops a lamp's light has it from the lamp's power, all else on top of that.
+    stops = scene.in_shadows[hierarchy.faces.triangle[hierarchy.face[receiver]]]
     for number, light in enumerate(scene.lights):
-        if isinstance(light, SunLight | SkyPatch | EnvironmentLight):
-            arriving = float(gain[state.light_links.light == number].sum())
-            emitted += arriving * float(light.strength.mean())
-        elif isinstance(light, Emitter):
+        on_top = state.light_links.light == number
+        if _is_stopped(light):
             emitted += float(light.flux.mean())
+            on_top &= ~stops
+        emitted += float(gain[on_top].sum()) * float(light.strength.mean())
 
     kept = (hierarchy.opacity[leaves, None] - hierarchy.reflectance[leaves]) * state.irradiance[leaves]
     absorbed = float((hierarchy.area[leaves] @ kept).mean()) if len(leaves) else 0.0
@@ -78,6 +82,11 @@ def power_balance(state: SolverState) -> dict[str, float]:
         "absorbed": absorbed + from_surfaces[0] + from_lamps[0],
         "escaped": from_surfaces[1] + from_lamps[1],
     }
+
+
+def _is_stopped(light: Light) -> TypeGuard[Emitter]:
+    """Tell whether each part of a light's power ends at one surface, or none."""
+    return isinstance(light, Emitter) and light.casts_shadow
 
 
 def _follow_surfaces(state: SolverState) -> tuple[float, float]:
@@ -102,11 +111,11 @@ def _follow_surfaces(state: SolverState) -> tuple[float, float]:
 
 
 def _follow_lamps(state: SolverState) -> tuple[float, float]:
-    """Return the power [W] that leaves the lamps onto black backs, and out of the scene."""
+    """Return the power [W] that leaves lamps with shadows onto black backs, and out of the scene."""
     black_total = escaped_total = 0.0
     count = ESCAPE_RAYS // 8
     for number, light in enumerate(state.scene.lights):
-        if not isinstance(light, Emitter) or not light.flux.any():
+        if not _is_stopped(light) or not light.flux.any():
             continue
         seed = state.settings.seed + 21 + 2 * number
         place = stratified_square(np.zeros(1, np.int64), count, seed)[0]

@@ -18,12 +18,6 @@ SCALES = (1.0, 1.0, 1.0, 1e-3, 1e4)
 SCENES = 500
 """How many the tests try."""
 
-KNOWN = {
-    307: "absorbed and escaped power exceed the emitted by 6 %, allowed are 5 %",
-    317: "a texel between bunched gather points is 1.18 times as bright as anything can be",
-}
-"""Defects that are still to be mended; asked for alone (`--seeds 307:308`) they are tried all the same."""
-
 SMALL_METHODS = ("shooting", "gauss-seidel", "two-level", "multi-level")
 
 

@@ -180,3 +180,35 @@ def test_a_face_does_not_light_itself_from_behind() -> None:
     )
     alone = factors(wall, points, np.tile([0, 0, 1.0], (3, 1))).sum(axis=1)
     np.testing.assert_allclose(light, 0.3 * np.repeat(alone[:, None], 3, axis=1), rtol=1e-9)
+
+
+def test_a_footprint_that_is_rounded_off_its_plane_does_not_see_its_own_back() -> None:
+    """A slope whose both sides glow, far from the origin and beside a wall: points of single precision."""
+    here = np.array([30.0, -20.0, 10.0])
+    slope = rectangle(here, (1, 0.3, 0.2), (-0.3, 1, 0.7))
+    wall = rectangle(here, (-0.3, 1, 0.7), (0, 0, 1))
+    scene = Scene(np.concatenate([slope, wall]), grey(4, 0.4), grey(4, 0.3), two_sided=True)
+    faces = Faces(scene)
+    (group,) = EmitterGroup.of_faces(faces, EmbreeCaster(scene.triangles))
+    places = np.random.default_rng(7).uniform(0.2, 0.8, (300, 2))
+    places[:, 0] *= 0.1  # near the wall, which fills much of the view
+    across = slope[0, 1] - slope[0, 0], slope[1, 2] - slope[1, 0]
+    centre = here + places[:, :1] * across[0] + places[:, 1:] * across[1]
+    spread = SpreadPoints(
+        Footprints(
+            centre,
+            np.repeat(normals_of(slope)[:1], len(centre), axis=0),
+            np.arange(len(centre)),
+            lambda rows, u: centre[rows, None] + 0.01 * (u[..., :1] * across[0] + u[..., 1:] * across[1]),
+        ),
+        1,
+    )
+    points = spread.points(slice(None)).reshape(-1, 3)
+    above = (points - here) @ normals_of(slope)[0]
+    assert np.abs(above).max() < 1e-8
+    assert (above < -1e-10).mean() > 0.2
+    expected = factors(wall, points, np.repeat(spread.at.normals, spread.count, axis=0)).sum(axis=1)
+    expected += factors(wall[:, ::-1], points, np.repeat(spread.at.normals, spread.count, axis=0)).sum(axis=1)
+    gain = drain(spread.gain_steps(group, 0.05))
+    np.testing.assert_allclose(gain, expected.reshape(-1, spread.count).mean(axis=1), atol=1e-4)
+    assert gain.min() > 0.1

@@ -13,6 +13,9 @@ from tests.unit.solved_rooms import furnished, solved
 
 FLOOR = rectangle((-1, -1, 0), (2, 0, 0), (0, 2, 0))
 
+SHARE = np.arcsin(0.2) / np.pi
+"""Of all directions, those that a square fills from its width above its middle."""
+
 
 def scene_of(triangles: np.ndarray, reflectance: float = 0.5, **changed) -> Scene:
     return Scene(triangles, grey(len(triangles), reflectance), grey(len(triangles), 0.0), **changed)
@@ -69,6 +72,28 @@ def test_sun_and_sky_count_what_arrives() -> None:
     for power in (sun, sky):
         assert power["absorbed"] == pytest.approx(0.5 * power["emitted"], rel=1e-5)
         assert power["escaped"] == pytest.approx(0.5 * power["emitted"], rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("casts_shadow", "in_shadows", "emitted", "absorbed"),
+    [(True, True, 1.0, 1), (False, True, 2 * SHARE, 2), (True, False, 1.0 + SHARE, 2)],
+)
+def test_light_that_goes_on_behind_a_surface_counts_on_each(
+    casts_shadow: bool, in_shadows: bool, emitted: float, absorbed: int
+) -> None:
+    """A black plate just fills the view of a larger one: one of them has the lamp's light, or both."""
+    near = rectangle((-0.5, -0.5, 0), (1, 0, 0), (0, 1, 0))
+    far = rectangle((-1, -1, -1), (2, 0, 0), (0, 2, 0))
+    scene = scene_of(
+        np.concatenate([near, far]),
+        reflectance=0.0,
+        in_shadows=np.array([in_shadows, in_shadows, True, True]),
+        lights=[PointLight((0, 0, 1), 100.0, casts_shadow=casts_shadow)],
+    )
+    power = balance(scene, error=1e-3)
+    assert power["emitted"] == pytest.approx(100 * emitted, rel=0.005)
+    assert power["absorbed"] == pytest.approx(100 * SHARE * absorbed, rel=0.005)
+    assert power["absorbed"] + power["escaped"] == pytest.approx(power["emitted"], rel=0.005)
 
 
 def test_emission_counts_over_both_sides() -> None:
