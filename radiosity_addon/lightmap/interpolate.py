@@ -3,8 +3,10 @@
 A gather point may speak for a texel as far as irradiance can be expected to stay the
 same: distance times the mean closeness of what the point sees, plus the turn of the
 normal (the split-sphere estimate of Ward, Rubinstein and Clear 1988). Near a contact that
-reach goes to zero. It must also see the texel, just above the surface: in the open the
-reach is long, and a wall thin.
+reach goes to zero. What neighbours of a texel see d away, it sees no farther away than that and the
+way to them: so no point in the open speaks for texels beside a contact (neighbour clamping, Křivánek,
+Bouatouch, Pattanaik and Žára 2006). A point must also see the texel, just above the surface: in the
+open the reach is long, and a wall thin.
 """
 
 from __future__ import annotations
@@ -60,6 +62,7 @@ class GatherPoints:
         self._weighed = _Weighed.nothing()
         self._number = np.full(len(geometry), -1, dtype=np.int32)
         self._farthest = np.full(len(geometry), np.inf)
+        """[m]: what texels see is no farther off in the mean, by what points near them see."""
 
     def __len__(self) -> int:
         return len(self.texel)
@@ -96,7 +99,6 @@ class GatherPoints:
         of = self.texel.take(point)
         along = geometry.position.take(of, axis=0) - geometry.position.take(texels, axis=0)
         distance = np.sqrt(np.einsum("pk,pk->p", along, along))
-        self._bound_reach(texels, 1.0 / np.maximum(self.closeness.take(point), 1e-300) + distance)
         closeness = np.maximum(self.closeness.take(point), self._own_closeness(texels))
         change = distance * closeness
         # A texel that geometry cuts in two, or hoods, speaks for itself alone, and nobody for it.
@@ -121,22 +123,28 @@ class GatherPoints:
         return np.asarray(weight)
 
     def _own_closeness(self, texels: Array) -> Array:
-        """Return (p,) what texels that are points see themselves; 0 where they are none."""
+        """Return (p,) what texels that are points see themselves; elsewhere what their neighbours expect."""
         number = self._number.take(texels)
         if not len(self):
             return np.zeros(len(texels))
         around = 1.0 / self._farthest.take(texels)
         return np.where(number >= 0, self.closeness.take(np.maximum(number, 0)), around)
 
-    def _bound_reach(self, texels: Array, distance: Array) -> None:
-        """Note for texels (p,), sorted, that what they see is no farther (p,) than neighbours lead to expect."""
+    def _clamp(self, texels: Array, point: Array) -> None:
+        """Note how near things are to texels (p,), sorted, by what the points around them see, pair by pair."""
+        geometry = self._geometry
+        along = geometry.position[self.texel[point]] - geometry.position[texels]
+        farthest = 1.0 / np.maximum(self.closeness[point], 1e-300) + np.linalg.norm(along, axis=1)
         first = np.flatnonzero(np.diff(texels, prepend=-1))
         if len(first):
             some = texels[first]
-            self._farthest[some] = np.minimum(self._farthest[some], np.minimum.reduceat(distance, first))
+            self._farthest[some] = np.minimum(self._farthest[some], np.minimum.reduceat(farthest, first))
 
     def support(self, texels: Array) -> Array:
-        """Return (n,) the summed weights around texels: below 1 they need a point of their own."""
+        """Return (n,) the summed weights around texels: below 1 they need a point of their own.
+
+        From then on no point speaks for them that lies farther off than their neighbours allow.
+        """
         return drain(self.support_steps(texels))
 
     def support_steps(self, texels: Array) -> Generator[float, None, Array]:
@@ -146,6 +154,7 @@ class GatherPoints:
 
         def weigh(rows: slice) -> None:
             row, point = self.pairs(texels[rows])
+            self._clamp(texels[rows][row], point)
             weight = self.kernel(texels[rows][row], point)
             total[rows] = np.bincount(row, weight, minlength=len(texels[rows]))
             reached = np.flatnonzero(weight)

@@ -189,6 +189,26 @@ def test_a_point_near_something_listens_no_farther_than_it_speaks() -> None:
     np.testing.assert_allclose(again[near[0]], matrix[near[0]], atol=1e-6)
 
 
+def test_a_point_does_not_speak_for_texels_whose_neighbours_see_things_near() -> None:
+    """What a point sees at d metres, a texel s away from it sees at d + s, or nearer: a point in the open
+    is no longer heard there."""
+    geometry = geometry_of(rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0)))
+
+    def support(near: float) -> np.ndarray:
+        """Points on a lattice: the first column sees things `near`, all others see far."""
+        points = GatherPoints(geometry, caster_of(geometry), np.zeros(len(geometry), dtype=bool))
+        chosen = np.flatnonzero((geometry.row % 4 == 0) & (geometry.column % 4 == 0)).astype(np.int32)
+        points.add(4, chosen, np.where(geometry.column[chosen] == 0, 1.0 / near, 0.2))
+        return points.support(np.arange(len(geometry)))
+
+    beside, away = (geometry.column == 1) & (geometry.row % 4 != 0), geometry.column == 16
+    alone, together = support(5.0), support(0.01)
+    assert alone[beside].min() > 1.0
+    # A texel is 1 / 24 wide. In the next column the reach is 0.35 (0.01 + 1 / 24): no point is so near.
+    assert together[beside].max() == 0.0
+    np.testing.assert_allclose(together[away], alone[away])
+
+
 def test_a_texel_that_nothing_reaches_is_an_error() -> None:
     geometry = geometry_of(PLANE)
     with pytest.raises(ValueError, match="no gather point in reach"):
