@@ -131,7 +131,7 @@ class GatherPoints:
         return np.where(number >= 0, self.closeness.take(np.maximum(number, 0)), around)
 
     def _clamp(self, texels: Array, point: Array) -> None:
-        """Note how near things are to texels (p,), sorted, by what the points around them see, pair by pair."""
+        """Note how near things are to texels (p,), sorted, by what points around them see, pair by pair."""
         geometry = self._geometry
         along = geometry.position[self.texel[point]] - geometry.position[texels]
         farthest = 1.0 / np.maximum(self.closeness[point], 1e-300) + np.linalg.norm(along, axis=1)
