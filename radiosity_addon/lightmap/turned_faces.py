@@ -19,14 +19,15 @@ DARK = 0.02
 SEEN = 0.1
 """… and seen to be so where the back gets at least this part of what lit sides get on average."""
 
-MOST = 0.5
-"""Objects are warned of where so much of their area is like that."""
+MUCH = 0.1
+"""Objects are warned of where more than this part of their area is like that: walls often are one object,
+and closed ones, which are dark inside, never are."""
 
 
 def turned_away(
     objects: Iterable[BakeObject], areas: Array, fronts: Array, backs: Array
 ) -> Iterator[BakeWarning]:
-    """Yield a warning for each object that is lit from behind.
+    """Yield a warning for each object of which much is lit from behind.
 
     Parameters
     ----------
@@ -45,9 +46,11 @@ def turned_away(
     turned = (front < DARK * back) & (back > SEEN * mean)
     for item in objects:
         area = areas[item.rows]
-        if area.sum() > 0 and area @ turned[item.rows] > MOST * area.sum():
+        share = float(area @ turned[item.rows]) / max(float(area.sum()), 1e-300)
+        if share > MUCH:
             yield BakeWarning(
                 item.name,
-                f"object '{item.name}' is lit from behind only: its normals point away from the light, so "
-                "its lightmap is dark; flip them (Mesh → Normals → Flip) if that side is to be seen",
+                f"object '{item.name}' is lit from behind only on {share:.0%} of its surface: normals point "
+                "away from the light, so its lightmap is dark there; flip them (Mesh → Normals → Flip) if "
+                "that side is to be seen",
             )

@@ -36,18 +36,21 @@ def test_a_wall_whose_normals_point_out_of_its_room_is_warned_of(turned: bool) -
     assert told == (["Wall"] if turned else [])
     if turned:
         (message,) = (w.message for w in result.warnings if w.name == "Wall" and "behind" in w.message)
-        assert message.startswith("object 'Wall' is lit from behind only")
+        assert message.startswith("object 'Wall' is lit from behind only on 100% of its surface")
 
 
-def test_a_minority_of_turned_faces_and_what_is_nearly_dark_on_both_sides_are_not() -> None:
-    areas = np.ones(8)
-    fronts, backs = grey(8, 1.0), grey(8, 0.0)
-    fronts[:2], backs[:2] = 0.0, 1.0  # two of six are turned
-    fronts[6:], backs[6:] = 0.0, 0.05  # a closet: some light behind, but too little to see
-    objects = [bake_object("Mostly Right", 0, 6), bake_object("Closet", 6, 2)]
-    assert list(turned_away(objects, areas, fronts, backs)) == []
-    backs[6:] = 0.5
-    assert [warning.name for warning in turned_away(objects, areas, fronts, backs)] == ["Closet"]
+def test_one_wall_of_an_object_counts_but_not_a_scrap_nor_what_is_dark_on_both_sides() -> None:
+    areas = np.ones(48)
+    fronts, backs = grey(48, 1.0), grey(48, 0.0)
+    fronts[:2], backs[:2] = 0.0, 1.0
+    fronts[46:], backs[46:] = 0.0, 0.05
+    many = [bake_object("Mostly Right", 0, 30), bake_object("Closet", 46, 2)]
+    assert list(turned_away(many, areas, fronts, backs)) == []
+    (warning,) = turned_away([bake_object("Four Walls", 0, 8)], areas, fronts, backs)
+    assert warning.name == "Four Walls"
+    assert "on 25% of its surface" in warning.message
+    backs[46:] = 0.5
+    assert [warning.name for warning in turned_away(many, areas, fronts, backs)] == ["Closet"]
 
 
 def test_without_light_nothing_is_turned_away() -> None:
