@@ -8,6 +8,8 @@ import sys
 from collections.abc import Iterable
 from typing import Any, TextIO
 
+from .alike import one_of_each
+
 STEP = 10
 """Without a terminal a stage prints a line again after this many per cent."""
 
@@ -142,5 +144,5 @@ def summary(where: str, files: Iterable[tuple[str, str]], report: dict[str, Any]
     warnings = report["warnings"]
     if warnings:
         lines.append(f"{len(warnings)} warning{'s' if len(warnings) > 1 else ''}:")
-        lines += [f"  {warning['name']}: {warning['message']}" for warning in warnings]
+        lines += [f"  {warning['name']}: {warning['message']}" for warning in one_of_each(warnings)]
     return lines

@@ -36,6 +36,7 @@ from .lightmap.seams import Seams, find_seams
 from .lightmap.stitch import stitch_pages
 from .lightmap.texel_geometry import TexelGeometry
 from .lightmap.texel_materials import FOOTPRINT, texel_materials
+from .lightmap.turned_faces import turned_away
 from .quality import for_error, quality_of, used_settings
 from .report import solver_part
 from .settings import BakeSettings
@@ -112,7 +113,9 @@ def bake(bake_scene: BakeScene, settings: BakeSettings) -> Generator[Progress, N
     if settings.quantity == "residual":
         report["error_picture"] = summary(values)
     of_texels = _of_texels(bake_scene, baked, geometry)
-    warnings = (*bake_scene.warnings, *atlas.warnings, *of_texels, *_of_solution(solution, quality.solver))
+    sides = solution.triangle_irradiance, solution.back_irradiance
+    of_light = (*turned_away(baked, bake_scene.scene.areas, *sides), *_of_solution(solution, quality.solver))
+    warnings = (*bake_scene.warnings, *atlas.warnings, *of_texels, *of_light)
     objects = tuple(
         BakedObject(item, placed.uv, placed.page) for item, placed in zip(baked, atlas.objects, strict=True)
     )

@@ -8,6 +8,7 @@ from typing import Any
 
 import bpy
 
+from ..alike import one_of_each
 from ..errors import RadiosityError
 from . import live_view, runtime
 from .properties import settings_of
@@ -154,7 +155,7 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
             set_lightmap_only(True)
         taken = sum(report["seconds"].values())
         self.report({"INFO"}, f"Baked {len(report['objects'])} objects in {taken:.1f} s")
-        warnings = report["warnings"]
+        warnings = one_of_each(report["warnings"])
         for warning in warnings[:3]:
             self.report({"WARNING"}, f"{warning['name']}: {warning['message']}")
         if len(warnings) > 3:

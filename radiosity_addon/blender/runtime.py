@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import bpy
 
+from ..alike import one_of_each
 from ..methods import METHODS
 
 MAX_WARNINGS = 100
@@ -35,6 +36,7 @@ class LastBake:
 
     figures: tuple[tuple[str, str], ...] = ()
     warnings: tuple[tuple[str, str], ...] = ()
+    """One of each kind where there are many alike."""
     warning_count: int = 0
     folder: str = ""
 
@@ -66,14 +68,15 @@ def remember(scene: bpy.types.Scene, report: dict, folder: str) -> None:
     folder : str
         Where the files are; empty if they are packed.
     """
+    warnings = one_of_each(report["warnings"])
     scene.radiosity.last_bake = json.dumps(
         {
             "objects": len(report["objects"]),
             "images": len({entry["image"] for entry in report["objects"]}),
             "solver": {key: value for key, value in report["solver"].items() if key != "history"},
             "seconds": sum(report["seconds"].values()),
-            "warnings": [[w["name"], w["message"]] for w in report["warnings"][:MAX_WARNINGS]],
-            "warning_count": len(report["warnings"]),
+            "warnings": [[w["name"], w["message"]] for w in warnings[:MAX_WARNINGS]],
+            "warning_count": len(warnings),
             "folder": folder,
         }
     )

@@ -246,3 +246,15 @@ def test_what_somebody_else_wrote_is_no_last_bake(box: bpy.types.Scene) -> None:
     for text in ("", "{}", "[1]", "not json", '{"solver": {}, "seconds": "x"}'):
         box.radiosity.last_bake = text
         assert runtime.last_bake(box) is None
+
+
+def test_the_panel_shows_what_is_said_once_beside_many_warnings_alike(box: bpy.types.Scene) -> None:
+    names = [f"slot{number}" for number in range(120)]
+    missing = [{"name": name, "message": f"material '{name}': '{name}.jpg' is missing"} for name in names]
+    small = {"name": "map", "message": "map: 256 px is too small"}
+    solver = {"method": "hierarchical", "elements": 1, "links": 1, "rays": 1}
+    report = {"objects": [], "solver": solver, "seconds": {}, "warnings": [*missing, small]}
+    runtime.remember(box, report, "")
+    last = runtime.last_bake(box)
+    assert last.warning_count == 2
+    assert [name for name, _ in last.warnings] == ["slot0", "map"]

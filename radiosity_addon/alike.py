@@ -1,0 +1,51 @@
+"""Many warnings that say the same of different things, as few: a list that somebody will read.
+
+A map of a hundred materials without their images would else push what matters out of sight.
+The report has every warning; this is for consoles and panels.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+FEW = 3
+"""So many of a kind are shown one by one."""
+
+NAMED = 3
+"""So many others are named beside the first one of a kind."""
+
+_PARTICULARS = re.compile(r"'[^']*'|\d+(?:[.,]\d+)*")
+"""What differs between warnings of a kind: names and numbers."""
+
+
+def one_of_each(warnings: Sequence[dict[str, str]]) -> list[dict[str, str]]:
+    """Return the warnings to show, in the order in which each kind first came.
+
+    Parameters
+    ----------
+    warnings : sequence of dict
+        The report's: "name", of what it is about, and "message".
+
+    Returns
+    -------
+    shown : list of dict
+        Of more than `FEW` that differ in names and numbers only, the first, which tells of the others.
+    """
+    kinds: dict[str, list[dict[str, str]]] = {}
+    for warning in warnings:
+        kinds.setdefault(_PARTICULARS.sub("…", warning["message"]), []).append(warning)
+    shown = []
+    for alike in kinds.values():
+        shown += alike if len(alike) <= FEW else [_first_of(alike)]
+    return shown
+
+
+def _first_of(alike: Sequence[dict[str, str]]) -> dict[str, str]:
+    """Return the first of a kind, with how many others there are and whose some of them are."""
+    first, *others = alike
+    names = list(dict.fromkeys(warning["name"] for warning in others if warning["name"] != first["name"]))
+    told = f"{len(others)} more like this in report.json"
+    if names:
+        told += f", of {', '.join(names[:NAMED])}{' …' if len(names) > NAMED else ''}"
+    return {"name": first["name"], "message": f"{first['message']} ({told})"}
