@@ -44,11 +44,11 @@ RAYS = 32
 LAMP_RAYS = 512
 """Rays of a leaf that shines, where some of the others escape: most power starts there."""
 
-ROUNDS = 3
-"""How often both balances are struck in turn …"""
+ROUNDS = 8
+"""How often both balances are struck in turn at most, …"""
 
-ROUGH_ROUNDS = 1
-"""… and while links are still refined."""
+ENOUGH = 2e-3
+"""… until no face receives more or less by this part."""
 
 SURE = 0.01
 """Faces that receive less than this over links to clusters, which miss more than rays, know which of their
@@ -96,23 +96,34 @@ class Conservation:
         top: TreeTop,
         links: Links,
         cluster_links: ClusterLinks,
-        rounds: int = ROUNDS,
+        rough: bool = False,
     ) -> Balance:
-        """Return what to exchange light with, in place of what was measured."""
+        """Return what to exchange light with, in place of what was measured.
+
+        Parameters
+        ----------
+        rough : bool
+            While links are still refined: visibilities stay as they are, and one round has to do.
+        """
         self._measure(hierarchy)
         closed = self.closed(hierarchy)
         scale, received = np.ones((2, hierarchy.n_elements, 2))
-        if closed.any():
+        sure = closed & (received_over_clusters(hierarchy, top, cluster_links, scale) < SURE)
+        if sure.any() and not rough:
             rows = sum(received_by_leaves(hierarchy, top, links, cluster_links, scale))
             columns = sum(sent_by_leaves(hierarchy, top, links, cluster_links))
             sums = pull(hierarchy, np.stack([rows, columns], axis=1))[: len(hierarchy.faces)]
-            over_clusters = received_over_clusters(hierarchy, top, cluster_links, scale)
-            links = corrected(hierarchy, links, closed & (over_clusters < SURE), sums[:, 0], sums[:, 1])
+            links = corrected(hierarchy, links, sure, sums[:, 0], sums[:, 1])
         leaves = hierarchy.leaves
         leaves = leaves[closed[hierarchy.face[leaves]]]
         whole, split = leaves[leaves < len(closed)], leaves[leaves >= len(closed)]
-        for _ in range(rounds if len(leaves) else 0):
+        rounds = 1 if rough else ROUNDS
+        for number in range(rounds if len(leaves) else 0):
             own, shared = received_by_leaves(hierarchy, top, links, cluster_links, scale)
+            if number > 0:
+                sums = pull(hierarchy, received * np.stack([own, shared], axis=1)).sum(axis=1)
+                if np.abs(sums[: len(closed)][closed] - 1.0).max() < ENOUGH:
+                    break
             received[whole] = _over_all(own[whole] + shared[whole])[:, None]
             received[split] = _over_shared(np.ones(len(split)), own[split], shared[split])
             scale = self.factors(hierarchy, top, links, cluster_links, received)

@@ -17,7 +17,7 @@ from ..arrays import Array
 from ..bounce import bounce, reflect, relative_residual
 from ..cluster_links import ClusterLinks, join_cluster_links, no_cluster_links
 from ..cluster_pairs import measure_cluster_links
-from ..conservation import ROUGH_ROUNDS, ROUNDS, Balance, Conservation, received_by_faces
+from ..conservation import Balance, Conservation, received_by_faces
 from ..first_links import first_links
 from ..light_links import link_lights
 from ..link_census import elements_by_level, leaves_by_level, linked_leaves, links_by_level
@@ -216,10 +216,12 @@ def iterate(state: HierarchicalState, tolerance: float, last: bool = False) -> N
     hierarchy, cluster_links = state.hierarchy, state.cluster_links
     assert state.conservation is not None  # set when the state was made
     lights = state.direct()
-    state.top = top = _top(state)
-    rounds = ROUNDS if tolerance <= state.settings.tolerance else ROUGH_ROUNDS
-    balance = state.conservation.balance(hierarchy, top, state.links, cluster_links, rounds)
-    state.balance = balance
+    # The last time no link has been refined since.
+    if not last or state.balance is None or state.top is None:
+        state.top = _top(state)
+        rough = tolerance > state.settings.tolerance
+        state.balance = state.conservation.balance(hierarchy, state.top, state.links, cluster_links, rough)
+    top, balance = state.top, state.balance
     links, scale, received = balance.links, balance.sent, balance.received
     leaves = hierarchy.leaves
     least = state.emission[leaves]
