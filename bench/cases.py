@@ -133,7 +133,7 @@ CASES = {
     case.name: case
     for case in (
         Case("cornell", "Cornell box", "cornell", 256, (16, 64, 256, 1024), 2048),
-        Case("interior", "Office", "interior", 512, (16, 64, 256), 256),
+        Case("interior", "Office", "interior", 512, (4, 16, 64), 256),
         _file("staircase", "The Wooden Staircase (Wig42)", "staircase/staircase.blend"),
         _file("sponza", "Sponza (Dabrovic)", "sponza/sponza.blend"),
         _file("bevy-mixed", "Mixed lighting (Bevy)", "bevy-mixed/MixedLightingExample.gltf"),

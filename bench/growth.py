@@ -10,7 +10,7 @@ from .compare import Bench, say
 
 FIT_FROM = 10_000
 """Exponents are fitted from this size on: below it, fixed costs are the larger part."""
-MINUTES = 3.0
+MINUTES = 6.0
 BAKE_RESOLUTION = 1024
 
 
