@@ -50,6 +50,9 @@ ROUNDS = 8
 ENOUGH = 2e-3
 """… until no face receives more or less by this part."""
 
+AMONG_THEMSELVES = 0.65
+"""Closed faces are balanced that get more than this part of their light from closed ones."""
+
 SURE = 0.01
 """Faces that receive less than this over links to clusters, which miss more than rays, know which of their
 visibilities to blame for what they lack."""
@@ -115,6 +118,13 @@ class Conservation:
             sums = pull(hierarchy, np.stack([rows, columns], axis=1))[: len(hierarchy.faces)]
             links = corrected(hierarchy, links, sure, sums[:, 0], sums[:, 1])
         leaves = hierarchy.leaves
+        if closed.any() and not closed.all():
+            # What closed faces get from others, whose own sums nobody knows, is not theirs to correct.
+            among = np.where(closed[hierarchy.face], 1.0, 0.0)[:, None] * scale
+            get = sum(received_by_leaves(hierarchy, top, links, cluster_links, scale))
+            get_from_closed = sum(received_by_leaves(hierarchy, top, links, cluster_links, among))
+            gets = pull(hierarchy, np.stack([get, get_from_closed], axis=1))[: len(closed)]
+            closed &= gets[:, 1] > AMONG_THEMSELVES * gets[:, 0]
         leaves = leaves[closed[hierarchy.face[leaves]]]
         whole, split = leaves[leaves < len(closed)], leaves[leaves >= len(closed)]
         rounds = 1 if rough else ROUNDS
