@@ -8,7 +8,7 @@ from .arrays import Array
 from .cluster_links import ClusterLinks, gather_at_clusters
 from .links import Links
 from .state import SolverState
-from .transport import gather, node_radiosity, pull, push, push_pull, quarters_mean
+from .transport import gather, node_radiosity, pull, push, push_pull
 from .tree_top import TreeTop
 
 
@@ -35,9 +35,8 @@ def reflect(
         What the faces of clusters receive together.
     top : TreeTop or None
         With all clusters of both sets of links; needed for the second.
-    received : (e, 2) float64 or None
-        What the light that leaves gather is scaled with, over own links and over shared ones
-        (`conservation`).
+    received : (f,) float64 or None
+        What the light that faces gather is scaled with (`conservation`).
 
     Returns
     -------
@@ -45,17 +44,15 @@ def reflect(
     """
     hierarchy = state.hierarchy
     own = gather(hierarchy, links, state.radiosity, scale, top)
-    of_leaves = quarters_mean(own)
     if cluster_links is not None and top is not None:
         shared = state.radiosity if scale is None else scale[:, 1:] * state.radiosity
         sent = node_radiosity(hierarchy, pull(hierarchy, shared), top)
         # A face that looks past the horizon of what its neighbours see gets nothing, not less.
         shared = np.maximum(gather_at_clusters(hierarchy, top, cluster_links, sent), 0.0)
         own[: len(hierarchy.faces)] += shared[:, None]
-    gathered = push(hierarchy, own)
     if received is not None:
-        # Only leaves count, and these have from their ancestors what is not their own.
-        gathered = received[:, 1:] * (gathered - of_leaves) + received[:, :1] * of_leaves
+        own *= received[hierarchy.face][:, None, None]
+    gathered = push(hierarchy, own)
     return push_pull(hierarchy, lights, gathered, state.emission, state.reflectance)
 
 
