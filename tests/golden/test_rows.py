@@ -18,7 +18,6 @@ PICTURES = Path(__file__).resolve().parents[2] / "out" / "golden"
 MEAN = 0.015
 """Each bake's mean is this near to Cycles', whatever its RMSE may be."""
 
-
 TOLD = 0.001
 """The gallery's number is this near to what is measured now."""
 
