@@ -17,7 +17,7 @@ from ..solver.residual import Residual
 from ..solver.sampling import stratified_square
 from ..solver.solution import Solution
 from ..solver.steps import scaled
-from .crossings import Crossings, crossing_steps
+from .crossings import crossing_steps
 from .reconstruct import CROSSED, DIRECT, GATHERED, GatherSettings, footprints, gather_texels
 from .texel_geometry import TexelGeometry
 
@@ -38,7 +38,7 @@ def texel_residual(
     local, residual = solution.local_pass, solution.element_residual
     direct = yield from scaled(local.direct_steps(footprints(geometry, local)), 0.0, DIRECT)
     found = crossing_steps(geometry, local.caster, local.threads)
-    crossings = Crossings(geometry, local.caster, (yield from scaled(found, DIRECT, CROSSED)))
+    crossings = yield from scaled(found, DIRECT, CROSSED)
     stored = gather_texels(local, geometry, settings, crossings, local.leaves_of)
     links = yield from scaled(stored, CROSSED, GATHERED)
     arriving = links.irradiance_steps(residual.gathered(local), local.threads)

@@ -19,14 +19,18 @@ from ..solver.arrays import Array
 from ..solver.local_pass import NOTHING, Footprints, Gathered, LocalPass, Resolver
 from ..solver.scene import Scene
 from ..solver.steps import scaled
-from ..solver.visibility import Hits
-from .crossings import Crossings, crossing_steps
+from ..solver.visibility import Hits, sees
+from .crossings import LIFT, Crossings, crossing_steps
 from .interpolate import GatherPoints, fit_steps
-from .sweeps import StoredLinks, TexelLight, sweep_steps
+from .part_links import HitNumbers, gather_parts
+from .stored_links import StoredLinks
+from .sweeps import TexelLight, TexelTransport, sweep_steps
 from .terminator import SmoothLift
+from .texel_cells import TexelCells
 from .texel_geometry import NO_TEXEL, TexelGeometry
+from .texel_materials import texel_materials
 
-DIRECT, CROSSED, GATHERED = 0.25, 0.3, 0.85
+DIRECT, CROSSED, GATHERED, PARTS = 0.25, 0.3, 0.8, 0.9
 """How much is done when a part ends; rough, from rooms at medium quality."""
 
 STARTS = 16
@@ -71,13 +75,20 @@ def reconstruct(
     """Compute direct and indirect irradiance of all texels; yields the fraction done."""
     lamps = yield from scaled(local.direct_steps(footprints(geometry, local)), 0.0, DIRECT)
     found = crossing_steps(geometry, local.caster, local.threads)
-    crossings = Crossings(geometry, local.caster, (yield from scaled(found, DIRECT, CROSSED)))
-    resolve = _resolver(local, geometry, crossings)
+    crossings = yield from scaled(found, DIRECT, CROSSED)
+    cells = TexelCells(local, geometry, crossings.crossed | crossings.touched)
+    numbers = HitNumbers(local, cells, len(geometry))
+    resolve = _resolver(geometry, crossings, numbers)
     stored = gather_texels(local, geometry, settings, crossings, resolve)
     links = yield from scaled(stored, CROSSED, GATHERED)
-    limits = settings.sweeps, settings.tolerance
-    swept = sweep_steps(scene, local, geometry, links, lamps, resolve, *limits, crossings.gain)
-    light = yield from scaled(swept, GATHERED, 1.0)
+    reflectance, _ = texel_materials(scene, geometry)
+    start = local.reflected_at(geometry.triangle, geometry.barycentric)
+    further = gather_parts(numbers, links, resolve, start, reflectance)
+    links, parts = yield from scaled(further, GATHERED, PARTS)
+    transport = TexelTransport(links, parts, reflectance)
+    limits = settings.sweeps, settings.tolerance, local.threads
+    swept = sweep_steps(transport, start, lamps, local.beyond(), *limits)
+    light = yield from scaled(swept, PARTS, 1.0)
     yield 1.0
     return light
 
@@ -165,18 +176,33 @@ def _choose(
     return candidates.astype(np.int32)
 
 
-def _resolver(local: LocalPass, geometry: TexelGeometry, crossings: Crossings) -> Resolver:
-    """Number hits: texels by their own number, parts of leaf elements after the texels."""
+def _resolver(geometry: TexelGeometry, crossings: Crossings, numbers: HitNumbers) -> Resolver:
+    """Number hits: texels by their own number, then parts of leaf elements, then cells of divided texels."""
     wide = geometry.texel_area > (WIDE * geometry.texel_size) ** 2
+    local, cells = numbers.local, numbers.cells
 
     def resolve(hits: Hits) -> Array:
-        texel = crossings.look_up(geometry.texel_at(hits), hits)
-        doubtful = np.flatnonzero((texel >= 0) & wide[hits.triangle])
+        texel = geometry.texel_at(hits)
+        found = texel.copy()
+        divided = np.flatnonzero((texel != NO_TEXEL) & crossings.crossed[texel])
+        # What a touched texel ends at hides a corner of it: who hits that corner is not its own.
+        touched = np.flatnonzero((texel != NO_TEXEL) & crossings.touched[texel])
+        apart = touched[~_sees_centre(local, geometry, texel[touched], hits.take(touched))]
+        divided = np.concatenate([divided, apart])
+        cell = cells.at(texel[divided], hits.take(divided))
+        found[divided] = np.where(cell == NOTHING, NO_TEXEL, cell + numbers.first_cell)
+        doubtful = np.flatnonzero((found >= 0) & wide[hits.triangle])
         finer = local.leaf_areas(hits.take(doubtful)) < geometry.texel_area[hits.triangle[doubtful]]
-        texel[doubtful[finer]] = NO_TEXEL
-        elsewhere = texel == NO_TEXEL
+        found[doubtful[finer]] = NO_TEXEL
+        elsewhere = found == NO_TEXEL
         part = local.parts_of(hits.take(elsewhere))
-        texel[elsewhere] = np.where(part == NOTHING, NOTHING, part + len(geometry))
-        return texel
+        found[elsewhere] = np.where(part == NOTHING, NOTHING, part + len(geometry))
+        return found
 
     return resolve
+
+
+def _sees_centre(local: LocalPass, geometry: TexelGeometry, texel: Array, hits: Hits) -> Array:
+    """Return (h,) whether nothing is between hits and the centres of their texels."""
+    lift = LIFT * local.caster.surface_offset * geometry.surface_normal[texel]
+    return sees(local.caster, geometry.positions_of(hits) + lift, geometry.position[texel] + lift)

@@ -19,6 +19,9 @@ ENDS = 2.0
 """Surface offsets from an emissive face to where shadow rays end. Their starts are lifted by one, which
 must not put their ends back on the face."""
 
+NEAR_HORIZON = 1e-9
+"""So much of the group's extent a corner may seem to lie below the horizon and still be asked for."""
+
 
 class EmitterGroup:
     """Faces of one emission, lit points see them as one lamp.
@@ -44,6 +47,10 @@ class EmitterGroup:
         self._areas = 0.5 * np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
         self.strength = strength
         self._level = np.ones(len(corners)) if level is None else level
+        # From a corner of theirs: heights over planes far from the origin would be rounded off.
+        self._origin = corners[0, 0]
+        self._outlines = corners - self._origin
+        self._reach = float(np.abs(self._outlines).max())
 
     @staticmethod
     def of_faces(faces: Faces, caster: RayCaster, among: Array | None = None) -> list[EmitterGroup]:
@@ -109,21 +116,23 @@ class EmitterGroup:
 
         0 where not even the start of a ray, lifted off the surface, is in front of a face.
         """
-        count, faces = len(points), len(self._corners)
-        shape = (count, faces, 3)
-        factors = point_to_polygon(
-            np.broadcast_to(points[:, None], shape).reshape(-1, 3),
-            np.broadcast_to(normals[:, None], shape).reshape(-1, 3),
-            np.broadcast_to(self._corners[None], (count, faces, 3, 3)).reshape(-1, 3, 3),
-            # Among the faces may be the back of the one the point is on.
-            contact=False,
-        )
         # A point of a footprint is rounded off its plane: a hair behind, it would see all of its own back.
-        origin = self._corners[0, 0]
-        height = (points - origin) @ self._normals.T
-        height -= np.einsum("mc,mc->m", self._corners[:, 0] - origin, self._normals)
+        apart = points - self._origin
+        height = apart @ self._normals.T
+        height -= np.einsum("mc,mc->m", self._outlines[:, 0], self._normals)
         height += (self._offset / ENDS) * (normals @ self._normals.T)
-        return np.where(height > 0.0, factors.reshape(count, faces) * self._level, 0.0)
+        seen = height > 0.0
+        # What is below the horizon, corner by corner, needs no closed form.
+        horizon = np.einsum("nx,nx->n", apart, normals) - NEAR_HORIZON * self._reach
+        above = np.zeros_like(seen)
+        for corner in range(self._outlines.shape[1]):
+            above |= normals @ self._outlines[:, corner].T > horizon[:, None]
+        point, face = np.nonzero(seen & above)
+        factors = np.zeros(seen.shape)
+        # Among the faces may be the back of the one the point is on.
+        found = point_to_polygon(points[point], normals[point], self._corners[face], contact=False)
+        factors[point, face] = found * self._level[face]
+        return factors
 
 
 def end_offset(caster: RayCaster) -> float:

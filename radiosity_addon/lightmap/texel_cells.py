@@ -1,0 +1,143 @@
+"""Sixteenths of texels that geometry divides: what answers rays that hit such a texel.
+
+A texel that a wall stands on, or that a window's frame covers in part, shows the mean of what it
+holds, as it should. Light that comes back from it must not be the mean: a ray from inside a closed
+box would then bring the lit floor outside. Nor can a whole neighbour answer, for the strip beside a
+frame is darker than what lies a texel farther in the open. So a divided texel answers in cells,
+each as those of its points that see the cell's *anchor* in a straight line just above the surface;
+a hit asks the nearest cell whose anchor it sees (`solver/leaf_parts.py` does the same for elements).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+
+import numpy as np
+
+from ..solver.arrays import Array
+from ..solver.footprints import Footprints
+from ..solver.local_pass import NOTHING, LocalPass, Resolver
+from ..solver.parallel import chunk_steps
+from ..solver.visibility import Hits, sees
+from .texel_geometry import TexelGeometry
+
+ALONG = 4
+"""Cells along a texel's side."""
+
+CELLS = ALONG**2
+
+ANCHOR = np.array([0.54, 0.47])
+"""Of a cell. Near the middle, but off it: walls stand on round fractions of a floor."""
+
+RAYS = 16
+"""Gather rays of a cell. Many cells answer each point, so what noise they have averages out."""
+
+STARTS = 4
+"""Points of a cell that its gather rays start from: each costs a ray to the anchor."""
+
+SHADOW_RAYS = 4
+"""Of a cell to each lamp."""
+
+LIFT = 2.0
+"""Points see each other this many surface offsets above their texel."""
+
+SAME_SURFACE = 0.9
+"""Cosine between the normals of a texel's triangle and of another one that the texel lies on as well."""
+
+CHUNK_TEXELS = 1 << 13
+"""Texels divided at once; bounds the temporaries to about 20 MB."""
+
+_FIRST = np.stack(np.divmod(np.arange(CELLS), ALONG)[::-1], axis=1) / ALONG
+"""(16, 2): the corner of every cell next to the texel's own first one, in the texel's unit square."""
+
+
+class TexelCells:
+    """The cells of some texels, numbered texel by texel.
+
+    Parameters
+    ----------
+    local : LocalPass
+    geometry : TexelGeometry
+    divided : (n,) bool
+        The texels that have cells.
+    """
+
+    def __init__(self, local: LocalPass, geometry: TexelGeometry, divided: Array) -> None:
+        self._local, self._geometry = local, geometry
+        self.texel = np.flatnonzero(divided).astype(np.int32)
+        """(d,) The divided texels."""
+        self._rank = np.cumsum(divided, dtype=np.int32) - 1
+        self._anchors = np.empty((len(self.texel), CELLS, 3))
+        spots = _FIRST + ANCHOR / ALONG
+
+        def place(part: slice) -> None:
+            texel = self.texel[part]
+            every = np.broadcast_to(spots, (len(texel), CELLS, 2))
+            self._anchors[part] = geometry.sample(texel, every, 1.0) + self._lift(texel)[:, None]
+
+        for _ in chunk_steps(place, len(self.texel), CHUNK_TEXELS, local.threads):
+            pass
+
+    def __len__(self) -> int:
+        return CELLS * len(self.texel)
+
+    def texel_of(self, cell: Array) -> Array:
+        """Return (p,) the texel that each cell is of."""
+        return np.asarray(self.texel[cell // CELLS])
+
+    def at(self, texel: Array, hits: Hits) -> Array:
+        """Return (h,) int32: the nearest cell of its `texel` whose anchor each hit sees, or NOTHING."""
+        geometry, caster = self._geometry, self._local.caster
+        found = np.full(len(texel), NOTHING, dtype=np.int32)
+        normal = geometry.surface_normal[texel]
+        # On the page a texel may reach beyond its triangle onto one that looks elsewhere.
+        alike = np.einsum("hk,hk->h", geometry.face_normals[hits.triangle], normal) > SAME_SURFACE
+        waiting = np.flatnonzero(alike)
+        position = geometry.positions_of(hits) + self._lift(texel)
+        rank = self._rank[texel]
+        order = np.zeros((len(texel), CELLS), dtype=np.int8)
+        apart = self._anchors[rank[waiting]] - position[waiting, None]
+        order[waiting] = np.einsum("hkx,hkx->hk", apart, apart).argsort(axis=1, kind="stable")
+        for turn in range(CELLS):
+            if len(waiting) == 0:
+                break
+            cell = order[waiting, turn]
+            seen = sees(caster, position[waiting], self._anchors[rank[waiting], cell])
+            found[waiting[seen]] = CELLS * rank[waiting[seen]] + cell[seen]
+            waiting = waiting[~seen]
+        return found
+
+    def footprints(self, cell: Array) -> Footprints:
+        """Return cells as footprints: their samples see the anchor."""
+        geometry, caster = self._geometry, self._local.caster
+        texel, first = self.texel_of(cell), _FIRST[cell % CELLS]
+        lift = self._lift(texel)
+        anchor = self._anchors[cell // CELLS, cell % CELLS] - lift
+
+        def sample(rows: Array, u: Array) -> Array:
+            points = geometry.sample(texel[rows], first[rows][:, None] + u / ALONG, 1.0)
+            back = np.broadcast_to(anchor[rows][:, None], points.shape)
+            above = lift[rows][:, None]
+            seen = sees(caster, (points + above).reshape(-1, 3), (back + above).reshape(-1, 3))
+            # What lies behind a wall is not of this cell.
+            return np.asarray(np.where(seen.reshape(*points.shape[:2], 1), points, back))
+
+        return Footprints(anchor, geometry.normal[texel], len(geometry) + cell, sample, starts=STARTS)
+
+    def gather(self, cell: Array, resolve: Resolver) -> Generator[float, None, Array]:
+        """Gather over cells, (p, RAYS) sources; yields the fraction done."""
+        at, upright = self.footprints(cell), self._geometry.surface_normal[self.texel_of(cell)]
+        gathered = yield from self._local.gather_steps(at, upright, RAYS, resolve)
+        return gathered.sources
+
+    def direct(self, cell: Array) -> Generator[float, None, Array]:
+        """Compute (p, 3) the irradiance of cells' anchors straight from lamps and emissive faces [W/m²]."""
+        texel, geometry = self.texel_of(cell), self._geometry
+        expected = self._local.irradiance_at(geometry.triangle[texel], geometry.barycentric[texel])
+        anchor = self._anchors[cell // CELLS, cell % CELLS] - self._lift(texel)
+        at = Footprints(anchor, geometry.normal[texel], len(geometry) + cell, expected=expected)
+        return self._local.direct_steps(at, SHADOW_RAYS)
+
+    def _lift(self, texel: Array) -> Array:
+        offset = LIFT * self._local.caster.surface_offset
+        return np.asarray(offset * self._geometry.surface_normal[texel])
