@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -19,8 +20,14 @@ from .source_means import Means
 from .stored_links import StoredLinks
 from .texel_cells import TexelCells
 
-LEAF_RAYS = 64
-"""Gather rays of a part of a leaf element."""
+OFTEN = 32
+"""A part that so many rays met matters: …"""
+
+RAYS, MANY_RAYS = 16, 64
+"""… it gathers with more rays. Parts that few rays met answer few, and their noise averages out."""
+
+SHADOW_RAYS = 4
+"""Of a part to each lamp for `RAYS` gather rays; in proportion for more."""
 
 ROUNDS = 3
 """Rounds of asking the parts that parts met; beyond, the hierarchy's values stand for leaves."""
@@ -101,72 +108,104 @@ def gather_parts(
         Their sources are rows of the table.
     parts : Parts
     """
-    local, cells = numbers.local, numbers.cells
-    met = np.zeros(numbers.end + len(local.beyond()), dtype=bool)
-    met[links.sources.ravel()] = True
-    met[links.aimed.sources.ravel()] = True
-    known = np.zeros_like(met)
-    known[: numbers.texel_count] = known[numbers.end :] = True
-    of_leaves, of_cells, stages = _Found(), _Found(), ROUNDS + 1
+    gathering = _Gathering(numbers, resolve)
+    gathering.count(links.sources)
+    gathering.count(links.aimed.sources)
     for turn in range(ROUNDS):
-        new = np.flatnonzero(met & ~known)
-        if len(new) == 0:
-            break
-        known[new] = True
-        leaf, cell = new[new < numbers.first_cell], new[new >= numbers.first_cell]
-        rays = local.gather_at_parts(leaf - numbers.texel_count, LEAF_RAYS, resolve)
-        found = yield from scaled(rays, turn / stages, (turn + 0.5) / stages)
-        of_leaves.add(leaf, found)
-        met[found.ravel()] = True
-        rays = cells.gather(cell - numbers.first_cell, resolve)
-        found = yield from scaled(rays, (turn + 0.5) / stages, (turn + 1) / stages)
-        of_cells.add(cell, found)
-        met[found.ravel()] = True
-    # Whole elements have rows whether met or not: where nobody gathered, the hierarchy's values stand.
-    small = np.flatnonzero(met[: numbers.first_cell])
-    small = small[small >= numbers.elements]
-    rows = _Rows(numbers, np.concatenate([small, of_cells.number]))
-    start = np.concatenate(
-        [
-            local.reflected(),
-            local.reflected()[local.parts.leaf_of(small - numbers.texel_count)],
-            reflected[cells.texel_of(of_cells.number - numbers.first_cell)],
-        ]
-    )
-    made = []
-    if len(of_leaves.number):
-        part = of_leaves.number - numbers.texel_count
-        lamps = yield from scaled(local.part_direct(part), ROUNDS / stages, (ROUNDS + 0.5) / stages)
-        made.append(of_leaves.links(rows, local.part_reflectance(part), lamps))
-    if len(of_cells.number):
-        cell = of_cells.number - numbers.first_cell
-        lamps = yield from scaled(cells.direct(cell), (ROUNDS + 0.5) / stages, 1.0)
-        made.append(of_cells.links(rows, reflectance[cells.texel_of(cell)], lamps))
+        yield from scaled(gathering.ask_new(), 0.7 * turn / ROUNDS, 0.7 * (turn + 1) / ROUNDS)
+    made, start = yield from scaled(gathering.links(reflected, reflectance), 0.7, 1.0)
+    rows = gathering.rows
     aimed = replace(links.aimed, sources=rows(links.aimed.sources))
     return replace(links, sources=rows(links.sources), aimed=aimed), Parts(start, made)
 
 
-class _Found:
-    """Gathers round by round what parts saw."""
+class _Gathering:
+    """Gathers round by round what parts see.
 
-    def __init__(self) -> None:
-        self._numbers: list[Array] = [np.zeros(0, dtype=np.int64)]
-        self._sources: list[Array] = []
+    Parameters
+    ----------
+    numbers : HitNumbers
+    resolve : callable
+    """
 
-    def add(self, number: Array, sources: Array) -> None:
-        self._numbers.append(number)
-        self._sources.append(sources)
+    def __init__(self, numbers: HitNumbers, resolve: Resolver) -> None:
+        self._numbers, self._resolve = numbers, resolve
+        self._local, self._cells = numbers.local, numbers.cells
+        self._met = np.zeros(numbers.end - numbers.texel_count, dtype=np.int32)
+        self._asked = np.zeros(len(self._met), dtype=bool)
+        self._found: list[tuple[bool, int, Array, Array]] = []
 
-    @property
-    def number(self) -> Array:
-        """All parts, by ascending number."""
-        return np.sort(np.concatenate(self._numbers))
+    def count(self, sources: Array) -> None:
+        """Note which parts were met."""
+        parts = sources[sources >= self._numbers.texel_count] - self._numbers.texel_count
+        self._met += np.bincount(parts, minlength=len(self._met)).astype(np.int32)
 
-    def links(self, rows: _Rows, reflectance: Array, lamps: Array) -> PartLinks:
-        """Return links of the parts, given by ascending number as what they reflect and get from lamps."""
-        order = np.argsort(np.concatenate(self._numbers))
-        sources = np.concatenate(self._sources)[order]
-        return PartLinks(rows(self.number), rows(sources), reflectance, lamps)
+    def ask_new(self) -> Generator[float, None, None]:
+        """Look from the parts that were met but not asked yet; yields the fraction done."""
+        new = np.flatnonzero((self._met > 0) & ~self._asked)
+        self._asked[new] = True
+        often, leaf = self._met[new] >= OFTEN, new < self._numbers.first_cell - self._numbers.texel_count
+        groups = [
+            (is_leaf, rays, new[(leaf == is_leaf) & (often == (rays > RAYS))])
+            for is_leaf in (True, False)
+            for rays in (RAYS, MANY_RAYS)
+        ]
+        for turn, (is_leaf, rays, part) in enumerate(groups):
+            if len(part) == 0:
+                continue
+            steps = self._gather(is_leaf, rays, part)
+            sources = yield from scaled(steps, turn / len(groups), (turn + 1) / len(groups))
+            self.count(sources)
+            self._found.append((is_leaf, rays, part, sources))
+
+    def _gather(self, is_leaf: bool, rays: int, part: Array) -> Generator[float, None, Array]:
+        if is_leaf:
+            return self._local.gather_at_parts(part, rays, self._resolve)
+        return self._cells.gather(self._cell(part), rays, self._resolve)
+
+    def _cell(self, part: Array) -> Array:
+        return part - (self._numbers.first_cell - self._numbers.texel_count)
+
+    @cached_property
+    def _small(self) -> Array:
+        """(s,) int64, ascending: the sixteenths of elements that were met, and the cells that were asked.
+
+        Whole elements have rows whether met or not. Where nobody gathered, the hierarchy's values
+        stand; a cell has none.
+        """
+        elements, leaf_parts = len(self._local.reflected()), len(self._local.parts)
+        met = np.flatnonzero(self._met[elements:leaf_parts]) + elements
+        return np.concatenate([met, np.flatnonzero(self._asked[leaf_parts:]) + leaf_parts])
+
+    @cached_property
+    def rows(self) -> _Rows:
+        """What gives sources the rows of the table."""
+        return _Rows(self._numbers.elements, self._small + self._numbers.texel_count)
+
+    def links(
+        self, reflected: Array, reflectance: Array
+    ) -> Generator[float, None, tuple[list[PartLinks], Array]]:
+        """Make the links of the parts asked, and what all rows reflect at first; yields the fraction done."""
+        local, cells, first = self._local, self._cells, self._numbers.texel_count
+        of_leaves = self._small[self._small < len(local.parts)]
+        of_cells = self._cell(self._small[len(of_leaves) :])
+        by_elements = local.reflected()
+        start = [
+            by_elements,
+            by_elements[local.parts.leaf_of(of_leaves)],
+            reflected[cells.texel_of(of_cells)],
+        ]
+        made, count = [], max(len(self._found), 1)
+        for done, (is_leaf, rays, part, sources) in enumerate(self._found):
+            shadow_rays = SHADOW_RAYS * rays // RAYS
+            if is_leaf:
+                direct, share = local.part_direct(part, shadow_rays), local.part_reflectance(part)
+            else:
+                cell = self._cell(part)
+                direct, share = cells.direct(cell, shadow_rays), reflectance[cells.texel_of(cell)]
+            lamps = yield from scaled(direct, done / count, (done + 1) / count)
+            made.append(PartLinks(self.rows(first + part), self.rows(sources), share, lamps))
+        return made, np.concatenate(start)
 
 
 class _Rows:
@@ -174,13 +213,14 @@ class _Rows:
 
     Parameters
     ----------
-    numbers : HitNumbers
+    first : int
+        The first row of a small part.
     small : (s,) int64
-        Ascending. What else is small answers nothing.
+        The numbers of those that have a row, ascending. What else is small answers nothing.
     """
 
-    def __init__(self, numbers: HitNumbers, small: Array) -> None:
-        self._first, self._small = numbers.elements, small
+    def __init__(self, first: int, small: Array) -> None:
+        self._first, self._small = first, small
 
     def __call__(self, sources: Array) -> Array:
         """Return the rows of sources of any shape."""

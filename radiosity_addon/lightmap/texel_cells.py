@@ -29,14 +29,8 @@ CELLS = ALONG**2
 ANCHOR = np.array([0.54, 0.47])
 """Of a cell. Near the middle, but off it: walls stand on round fractions of a floor."""
 
-RAYS = 16
-"""Gather rays of a cell. Many cells answer each point, so what noise they have averages out."""
-
 STARTS = 4
 """Points of a cell that its gather rays start from: each costs a ray to the anchor."""
-
-SHADOW_RAYS = 4
-"""Of a cell to each lamp."""
 
 LIFT = 2.0
 """Points see each other this many surface offsets above their texel."""
@@ -124,19 +118,22 @@ class TexelCells:
 
         return Footprints(anchor, geometry.normal[texel], len(geometry) + cell, sample, starts=STARTS)
 
-    def gather(self, cell: Array, resolve: Resolver) -> Generator[float, None, Array]:
-        """Gather over cells, (p, RAYS) sources; yields the fraction done."""
+    def gather(self, cell: Array, rays: int, resolve: Resolver) -> Generator[float, None, Array]:
+        """Gather over cells, (p, rays) sources; yields the fraction done."""
         at, upright = self.footprints(cell), self._geometry.surface_normal[self.texel_of(cell)]
-        gathered = yield from self._local.gather_steps(at, upright, RAYS, resolve)
+        gathered = yield from self._local.gather_steps(at, upright, rays, resolve)
         return gathered.sources
 
-    def direct(self, cell: Array) -> Generator[float, None, Array]:
-        """Compute (p, 3) the irradiance of cells' anchors straight from lamps and emissive faces [W/m²]."""
+    def direct(self, cell: Array, rays: int) -> Generator[float, None, Array]:
+        """Compute (p, 3) the irradiance of cells' anchors straight from lamps and emissive faces [W/m²].
+
+        `rays` is for each lamp.
+        """
         texel, geometry = self.texel_of(cell), self._geometry
         expected = self._local.irradiance_at(geometry.triangle[texel], geometry.barycentric[texel])
         anchor = self._anchors[cell // CELLS, cell % CELLS] - self._lift(texel)
         at = Footprints(anchor, geometry.normal[texel], len(geometry) + cell, expected=expected)
-        return self._local.direct_steps(at, SHADOW_RAYS)
+        return self._local.direct_steps(at, rays)
 
     def _lift(self, texel: Array) -> Array:
         offset = LIFT * self._local.caster.surface_offset

@@ -230,10 +230,10 @@ class LocalPass:
         hierarchy = self._state.hierarchy
         return np.asarray(hierarchy.reflectance[elements] / hierarchy.opacity_where_hit[elements, None])
 
-    def part_direct(self, parts: Array) -> Generator[float, None, Array]:
-        """Compute (p, 3) the irradiance of parts straight from lamps and emissive faces."""
+    def part_direct(self, parts: Array, rays: int) -> Generator[float, None, Array]:
+        """Compute (p, 3) the irradiance of parts straight from lamps and emissive faces, by `rays` each."""
         expected = self._state.irradiance[self.parts.leaf_of(parts)].mean(axis=1)
-        return self.direct_steps(replace(self.parts.footprints(parts), expected=expected), rays=16)
+        return self.direct_steps(replace(self.parts.footprints(parts), expected=expected), rays)
 
     def beyond(self) -> Array:
         """Return (cells + 2, 3) the last rows of a table of radiosity [W/m²]: the sky's cells, and two dark.

@@ -9,7 +9,8 @@ from radiosity_addon.errors import UsageError
 from radiosity_addon.lightmap import accuracy
 from radiosity_addon.lightmap.interpolate import Interpolation
 from radiosity_addon.lightmap.reconstruct import GatherSettings
-from radiosity_addon.lightmap.sweeps import StoredLinks, TexelLight, estimated_error
+from radiosity_addon.lightmap.stored_links import StoredLinks
+from radiosity_addon.lightmap.sweeps import TexelLight, estimated_error
 from radiosity_addon.quality import LADDER, for_error
 from radiosity_addon.settings import BakeSettings
 

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 from radiosity_addon.lightmap.interpolate import Interpolation
+from radiosity_addon.lightmap.part_links import Parts
 from radiosity_addon.lightmap.reconstruct import GatherSettings, reconstruct
-from radiosity_addon.lightmap.sweeps import StoredLinks, TexelLight, _Means, mean_of_sources, sweep_steps
+from radiosity_addon.lightmap.source_means import Means, mean_of_sources
+from radiosity_addon.lightmap.stored_links import StoredLinks
+from radiosity_addon.lightmap.sweeps import TexelLight, TexelTransport, sweep_steps
 from radiosity_addon.lightmap.texel_geometry import TexelGeometry
 from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, SolverSettings, solve
 from radiosity_addon.solver.local_pass import NOTHING, SKY
@@ -54,7 +57,8 @@ def test_sweeps_converge_to_the_solution_of_the_stored_links() -> None:
     sources[rng.uniform(size=sources.shape) < 0.1] = NOTHING
     lamps = rng.uniform(0, 5, (count, 3))
     links = StoredLinks(sources, identity(count))
-    light = drain(sweep_steps(scene, local, geometry, links, lamps, _never, 40, tolerance=0.0))
+    transport = TexelTransport(links, Parts(np.zeros((0, 3)), []), np.full((count, 3), 0.5))
+    light = drain(sweep_steps(transport, np.zeros((count, 3)), lamps, local.beyond(), 40, tolerance=0.0))
     matrix = np.zeros((count, count))
     for ray in range(rays):
         hit = sources[:, ray] >= 0
@@ -72,13 +76,10 @@ def test_the_skys_share_of_the_rays_is_direct_light() -> None:
     sources[:, :3] = SKY
     lamps = np.zeros((count, 3))
     links = StoredLinks(sources, identity(count))
-    light = drain(sweep_steps(scene, local, geometry, links, lamps, _never, sweeps=3))
+    transport = TexelTransport(links, Parts(np.zeros((0, 3)), []), np.full((count, 3), 0.5))
+    light = drain(sweep_steps(transport, np.zeros((count, 3)), lamps, local.beyond(), sweeps=3))
     np.testing.assert_allclose(light.direct, np.tile([0.75 * np.pi, 1.5 * np.pi, 0.0], (count, 1)), rtol=1e-6)
     assert not light.indirect.any()
-
-
-def _never(hits) -> np.ndarray:
-    raise AssertionError("no leaf was met, so no ray should be traced")
 
 
 @pytest.mark.parametrize("reflectance", [0.0, 0.5, 0.9])
@@ -136,7 +137,7 @@ def test_only_what_sees_a_change_is_asked_again() -> None:
     random = np.random.default_rng(2)
     sources = random.integers(-2, 40, (300, 8)).astype(np.int32)
     table = random.random((42, 3)).astype(np.float32)
-    means = _Means(sources, 3, 2)
+    means = Means(sources, 3, 2)
     drain(means.steps(table, np.zeros(42, dtype=bool)))
     changed = np.zeros(42, dtype=bool)
     changed[[7, 41]] = True
