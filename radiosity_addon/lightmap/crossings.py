@@ -103,7 +103,7 @@ def crossing_steps(
         some = np.flatnonzero(doubtful)
         cut[some] = ~_segments_free(caster, centre[some] + INSET * from_centre[some], _DIAGONALS)
         spots = geometry.sample(rows, np.broadcast_to(_SPOTS, (len(rows), *_SPOTS.shape)), 1.0)
-        below = _hooded(geometry, caster, rows, spots)
+        below = below_hood(geometry, caster, rows, spots)
         result.rim[rows] = below.any(axis=1) & ~below.all(axis=1)
         result.hooded[rows] = below.all(axis=1) & ~cut
         result.cut[rows], result.touched[rows] = cut, doubtful & ~cut & ~result.rim[rows]
@@ -112,7 +112,7 @@ def crossing_steps(
     return result
 
 
-def _hooded(geometry: TexelGeometry, caster: RayCaster, texel: Array, spots: Array) -> Array:
+def below_hood(geometry: TexelGeometry, caster: RayCaster, texel: Array, spots: Array) -> Array:
     """Return (n, k) whether something is close above (n, k, 3) spots on texels."""
     lift, normal = LIFT * caster.surface_offset, geometry.surface_normal[texel]
     square = geometry.squares(texel)

@@ -76,7 +76,7 @@ def reconstruct(
     lamps = yield from scaled(local.direct_steps(footprints(geometry, local)), 0.0, DIRECT)
     found = crossing_steps(geometry, local.caster, local.threads)
     crossings = yield from scaled(found, DIRECT, CROSSED)
-    cells = TexelCells(local, geometry, crossings.crossed | crossings.touched)
+    cells = TexelCells(local, geometry, crossings)
     numbers = HitNumbers(local, cells, len(geometry))
     resolve = _resolver(geometry, crossings, numbers)
     stored = gather_texels(local, geometry, settings, crossings, resolve)

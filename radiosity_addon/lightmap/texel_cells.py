@@ -6,6 +6,7 @@ box would then bring the lit floor outside. Nor can a whole neighbour answer, fo
 frame is darker than what lies a texel farther in the open. So a divided texel answers in cells,
 each as those of its points that see the cell's *anchor* in a straight line just above the surface;
 a hit asks the nearest cell whose anchor it sees (`solver/leaf_parts.py` does the same for elements).
+Through a gap the line of sight is free: what is below a hood asks what is below it, the rest what is not.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from ..solver.footprints import Footprints
 from ..solver.local_pass import NOTHING, LocalPass, Resolver
 from ..solver.parallel import chunk_steps
 from ..solver.visibility import Hits, sees
+from .crossings import Crossings, below_hood
 from .texel_geometry import TexelGeometry
 
 ALONG = 4
@@ -52,22 +54,26 @@ class TexelCells:
     ----------
     local : LocalPass
     geometry : TexelGeometry
-    divided : (n,) bool
-        The texels that have cells.
+    crossings : Crossings
+        Those have cells that are crossed or touched.
     """
 
-    def __init__(self, local: LocalPass, geometry: TexelGeometry, divided: Array) -> None:
+    def __init__(self, local: LocalPass, geometry: TexelGeometry, crossings: Crossings) -> None:
         self._local, self._geometry = local, geometry
+        self._rim, divided = crossings.rim, crossings.crossed | crossings.touched
         self.texel = np.flatnonzero(divided).astype(np.int32)
         """(d,) The divided texels."""
         self._rank = np.cumsum(divided, dtype=np.int32) - 1
         self._anchors = np.empty((len(self.texel), CELLS, 3))
+        self._below = np.zeros((len(self.texel), CELLS), dtype=bool)
         spots = _FIRST + ANCHOR / ALONG
 
         def place(part: slice) -> None:
             texel = self.texel[part]
             every = np.broadcast_to(spots, (len(texel), CELLS, 2))
-            self._anchors[part] = geometry.sample(texel, every, 1.0) + self._lift(texel)[:, None]
+            spread = geometry.sample(texel, every, 1.0)
+            self._anchors[part] = spread + self._lift(texel)[:, None]
+            self._below[part] = self._below_hood(texel, spread)
 
         for _ in chunk_steps(place, len(self.texel), CHUNK_TEXELS, local.threads):
             pass
@@ -92,11 +98,15 @@ class TexelCells:
         order = np.zeros((len(texel), CELLS), dtype=np.int8)
         apart = self._anchors[rank[waiting]] - position[waiting, None]
         order[waiting] = np.einsum("hkx,hkx->hk", apart, apart).argsort(axis=1, kind="stable")
+        below = self._below_hood(texel, geometry.positions_of(hits)[:, None])[:, 0]
         for turn in range(CELLS):
             if len(waiting) == 0:
                 break
             cell = order[waiting, turn]
-            seen = sees(caster, position[waiting], self._anchors[rank[waiting], cell])
+            seen = self._below[rank[waiting], cell] == below[waiting]
+            alike = np.flatnonzero(seen)
+            asking = waiting[alike]
+            seen[alike] = sees(caster, position[asking], self._anchors[rank[asking], cell[alike]])
             found[waiting[seen]] = CELLS * rank[waiting[seen]] + cell[seen]
             waiting = waiting[~seen]
         return found
@@ -105,7 +115,7 @@ class TexelCells:
         """Return cells as footprints: their samples see the anchor."""
         geometry, caster = self._geometry, self._local.caster
         texel, first = self.texel_of(cell), _FIRST[cell % CELLS]
-        lift = self._lift(texel)
+        lift, below = self._lift(texel), self._below[cell // CELLS, cell % CELLS]
         anchor = self._anchors[cell // CELLS, cell % CELLS] - lift
 
         def sample(rows: Array, u: Array) -> Array:
@@ -113,8 +123,10 @@ class TexelCells:
             back = np.broadcast_to(anchor[rows][:, None], points.shape)
             above = lift[rows][:, None]
             seen = sees(caster, (points + above).reshape(-1, 3), (back + above).reshape(-1, 3))
-            # What lies behind a wall is not of this cell.
-            return np.asarray(np.where(seen.reshape(*points.shape[:2], 1), points, back))
+            # What lies behind a wall, or beyond the rim of a hood, is not of this cell.
+            own = seen.reshape(points.shape[:2])
+            own &= self._below_hood(texel[rows], points) == below[rows, None]
+            return np.asarray(np.where(own[..., None], points, back))
 
         return Footprints(anchor, geometry.normal[texel], len(geometry) + cell, sample, starts=STARTS)
 
@@ -134,6 +146,13 @@ class TexelCells:
         anchor = self._anchors[cell // CELLS, cell % CELLS] - self._lift(texel)
         at = Footprints(anchor, geometry.normal[texel], len(geometry) + cell, expected=expected)
         return self._local.direct_steps(at, rays)
+
+    def _below_hood(self, texel: Array, points: Array) -> Array:
+        """Return (n, k) whether (n, k, 3) points of texels at a rim are below the hood; False elsewhere."""
+        below = np.zeros(points.shape[:2], dtype=bool)
+        at_rim = np.flatnonzero(self._rim[texel])
+        below[at_rim] = below_hood(self._geometry, self._local.caster, texel[at_rim], points[at_rim])
+        return below
 
     def _lift(self, texel: Array) -> Array:
         offset = LIFT * self._local.caster.surface_offset

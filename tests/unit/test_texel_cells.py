@@ -31,7 +31,7 @@ def cells_of(*others: np.ndarray) -> tuple[TexelCells, TexelGeometry]:
     geometry = texel_geometry(scene, uv, SIZE, pages)
     local = solve(scene, SolverSettings(error=1e-2)).local_pass
     crossings = drain(crossing_steps(geometry, local.caster))
-    return TexelCells(local, geometry, crossings.crossed), geometry
+    return TexelCells(local, geometry, crossings), geometry
 
 
 def on_floor(x: np.ndarray, y: np.ndarray) -> Hits:
@@ -117,3 +117,21 @@ def test_inside_a_box_narrower_than_a_texel_hits_find_a_cell_or_nothing() -> Non
     cells, geometry = cells_of(solid_box((low, low, -0.1), (high, high, 0.5)))
     hits = on_floor(np.array([5.41]) / SIZE, np.array([5.41]) / SIZE)
     assert cells.at(geometry.texel_at(hits), hits)[0] == NOTHING
+
+
+def test_below_a_hood_only_what_is_below_it_answers() -> None:
+    """Through the gap each side sees the other's anchors: the line of sight is free."""
+    low, high = 3.55, 6.5
+    slab = rectangle((low / SIZE, -1, 0.05 / SIZE), (0, 3, 0), ((high - low) / SIZE, 0, 0))
+    cells, geometry = cells_of(slab)
+    x = np.linspace(3.02, 3.98, 40)
+    hits = on_floor(x / SIZE, np.full(40, 5.3) / SIZE)
+    cell = cells.at(geometry.texel_at(hits), hits)
+    assert (cell != NOTHING).all()
+    anchor = cells.footprints(cell).points[:, 0] * SIZE
+    np.testing.assert_array_equal(anchor > low, x > low)
+    every = np.arange(len(cells))
+    at_cells = cells.footprints(every)
+    points = at_cells.sampler(every, np.random.default_rng(3).uniform(size=(len(every), 8, 2)))[..., 0] * SIZE
+    below = (at_cells.points[:, 0] * SIZE > low) & (at_cells.points[:, 0] * SIZE < high)
+    np.testing.assert_array_equal((points > low) & (points < high), np.repeat(below[:, None], 8, axis=1))
