@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .clip import clip_to_unit_square, polygon_area_centroid, sample_polygons
+from .clip import area_in_unit_square, clip_to_unit_square, polygon_area_centroid, sample_polygons
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -248,8 +248,9 @@ def _overlaps(
     whole = (distance - reach >= 0).all(axis=1)
     area = whole.astype(np.float64)
     cut = np.flatnonzero(touches & ~whole)
-    polygon, _, _ = _clip(uv, resolution, triangle[cut], row[cut], column[cut])
-    area[cut] = polygon_area_centroid(polygon)[0]
+    corners = uv[triangle[cut]].astype(np.float64) * resolution
+    corners -= np.stack((column[cut], row[cut]), axis=-1)[:, None, :]
+    area[cut] = area_in_unit_square(corners)
     # A triangle smaller than the threshold still keeps the texel with most of its area.
     least = np.minimum(UNRESOLVED * resolution, 0.125 * np.abs(double_area[triangle]))
     keep = touches & (area > 0) & (centre | (area >= least))
