@@ -22,6 +22,7 @@ from ..solver.gathering import NOTHING
 from ..solver.parallel import chunk_steps
 from ..solver.steps import drain
 from ..solver.visibility import Hits, RayCaster
+from .clearance import clear_texels
 from .texel_geometry import NO_TEXEL, TexelGeometry
 
 CHUNK = 1 << 16
@@ -186,9 +187,10 @@ def crossing_steps(
     """Find the texels that geometry cuts, touches or hoods; yields the fraction done."""
     cut, touched, rim, hooded = np.zeros((4, len(geometry)), dtype=bool)
     result = CrossedTexels(cut, touched, rim, hooded, open_share=np.ones(len(geometry)))
+    doubted = np.flatnonzero(~clear_texels(geometry, OUTSET, HOOD, LIFT * caster.surface_offset))
 
     def find(part: slice) -> None:
-        rows = np.arange(part.start, part.stop)
+        rows = doubted[part]
         lift = LIFT * caster.surface_offset * geometry.surface_normal[rows][:, None]
         # Of the texel on the page: hits land on the part outside its triangle as well.
         square = geometry.squares(rows) + lift
@@ -213,7 +215,7 @@ def crossing_steps(
         spots = geometry.sample(at_rim, np.broadcast_to(_MIDDLES, (len(at_rim), *_MIDDLES.shape)))
         result.open_share[at_rim] = 1.0 - _hooded(geometry, caster, at_rim, spots).mean(axis=1)
 
-    yield from chunk_steps(find, len(geometry), CHUNK // 4, threads)
+    yield from chunk_steps(find, len(doubted), CHUNK // 4, threads)
     return result
 
 
