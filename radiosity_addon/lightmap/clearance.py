@@ -14,6 +14,7 @@ from itertools import product
 import numpy as np
 
 from ..solver.arrays import Array
+from ..solver.parallel import for_chunks
 from .texel_geometry import TexelGeometry
 
 CELL = 2.0
@@ -31,13 +32,15 @@ FLAT = 0.45
 ROUNDED = 1e-7
 """A sine less than this, of planes that are the same but for rounding, is 0."""
 
-CHUNK = 1 << 16
-"""Texels or pieces worked on at once; bounds the temporaries to about 40 MB."""
+CHUNK = 1 << 13
+"""Texels worked on at once; bounds the temporaries to about 5 MB a thread."""
 
 _CORNERS = list(product((0, 1), repeat=3))
 
 
-def clear_texels(geometry: TexelGeometry, outset: float, height: float, clearance: float) -> Array:
+def clear_texels(
+    geometry: TexelGeometry, outset: float, height: float, clearance: float, threads: int = 1
+) -> Array:
     """Find texels around which nothing rises off their plane.
 
     Parameters
@@ -48,6 +51,8 @@ def clear_texels(geometry: TexelGeometry, outset: float, height: float, clearanc
         And how far up that reaches, in widths of the texel.
     clearance : float
         What rises less than this off the plane does not count [m].
+    threads : int
+        0 means all cores.
 
     Returns
     -------
@@ -57,26 +62,29 @@ def clear_texels(geometry: TexelGeometry, outset: float, height: float, clearanc
     clear = np.zeros(len(geometry), dtype=bool)
     if len(geometry) == 0:
         return clear
-    low, high = _surroundings(geometry, outset, height, clearance)
+    low, high = _surroundings(geometry, outset, height, clearance, threads)
     cell = CELL * float(np.median(_largest(high - low)))
     cells = _Cells(low.min(axis=0), high.max(axis=0), cell)
     pieces = _pieces(geometry.triangles, cells, max(MOST_PIECES, 4 * len(geometry)))
     if pieces is None:
         return clear
     cells.fill(geometry, *pieces, FLAT * clearance)
-    for start in range(0, len(clear), CHUNK):
-        rows = slice(start, start + CHUNK)
+
+    def judge(rows: slice) -> None:
         clear[rows] = cells.all_flat(geometry, rows, low[rows], high[rows], FLAT * clearance)
+
+    for_chunks(judge, len(clear), CHUNK, threads)
     return clear
 
 
 def _surroundings(
-    geometry: TexelGeometry, outset: float, height: float, clearance: float
+    geometry: TexelGeometry, outset: float, height: float, clearance: float, threads: int
 ) -> tuple[Array, Array]:
     """Return (n, 3) lower and upper bounds of what is around each texel."""
     low, high = np.empty((2, len(geometry), 3))
-    for start in range(0, len(geometry), CHUNK):
-        rows = np.arange(start, min(start + CHUNK, len(geometry)))
+
+    def bound(part: slice) -> None:
+        rows = np.arange(part.start, part.stop)
         square = geometry.squares(rows)
         first, opposite = square[:, 0], square[:, 2]
         middle = 0.5 * (first + opposite)
@@ -86,8 +94,10 @@ def _surroundings(
         diagonal = opposite - first
         width = outset * np.sqrt(np.einsum("nk,nk->n", diagonal, diagonal))
         up = (height * width + 2.0 * clearance)[:, None] * geometry.surface_normal[rows]
-        low[rows] = middle - half + np.minimum(up, 0.0) - clearance
-        high[rows] = middle + half + np.maximum(up, 0.0) + clearance
+        low[part] = middle - half + np.minimum(up, 0.0) - clearance
+        high[part] = middle + half + np.maximum(up, 0.0) + clearance
+
+    for_chunks(bound, len(geometry), CHUNK, threads)
     return low, high
 
 

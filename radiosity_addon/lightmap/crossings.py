@@ -187,7 +187,8 @@ def crossing_steps(
     """Find the texels that geometry cuts, touches or hoods; yields the fraction done."""
     cut, touched, rim, hooded = np.zeros((4, len(geometry)), dtype=bool)
     result = CrossedTexels(cut, touched, rim, hooded, open_share=np.ones(len(geometry)))
-    doubted = np.flatnonzero(~clear_texels(geometry, OUTSET, HOOD, LIFT * caster.surface_offset))
+    clear = clear_texels(geometry, OUTSET, HOOD, LIFT * caster.surface_offset, threads)
+    doubted = np.flatnonzero(~clear)
 
     def find(part: slice) -> None:
         rows = doubted[part]

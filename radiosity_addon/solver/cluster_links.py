@@ -165,7 +165,7 @@ class _Gathering:
         return irradiance
 
     def _moments(self, radiosity: Array) -> list[Array]:
-        """Return 3 × (n_rows,) each cluster's mean of (y − c) B over its faces [W/m], of (n_nodes,) radiosity."""
+        """Return 3 × (n_rows,) each cluster's mean of (y − c) B over its faces [W/m], of nodes' radiosity."""
         sent = radiosity[self._first_face :].take(self._face_order)
         sums = self._top.sums_of([sent * arm for arm in self._arm])[self._held_row]
         moment = np.zeros((self._top.n_rows, 3))
