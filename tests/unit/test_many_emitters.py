@@ -112,6 +112,15 @@ def test_groups_send_what_their_faces_send(shape: str, rms: float, monkeypatch: 
     assert len(tree.ask(points, normals).row) < 0.1 * len(points) * len(triangles)
 
 
+def test_what_a_point_gets_does_not_depend_on_who_asks_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    points, normals = places(500, 0.4)
+    lamp = group(bulb(), 64, monkeypatch)
+    together = lamp.unit_irradiance(points, normals)
+    monkeypatch.setattr(emitters, "CHUNK_POINTS", 7)
+    np.testing.assert_array_equal(lamp.unit_irradiance(points, normals), together)
+    np.testing.assert_array_equal(lamp.unit_irradiance(points[::3], normals[::3]), together[::3])
+
+
 def test_levels_weigh_the_faces(monkeypatch: pytest.MonkeyPatch) -> None:
     triangles = ragged()
     level = np.random.default_rng(3).uniform(size=len(triangles))
