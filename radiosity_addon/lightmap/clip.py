@@ -30,20 +30,62 @@ def clip_to_unit_square(triangles: Float) -> Float:
 def _clip_half_plane(polygon: Float, distance: Float) -> Float:
     """Keep the part of (t, k, 2) convex polygons where `distance` (t, k) ≥ 0: (t, k + 1, 2)."""
     count, size = distance.shape
-    next_distance = np.roll(distance, -1, axis=1)
     inside = distance >= 0
+    result = np.empty((count, size + 1, 2))
+    result[:, :-1] = polygon
+    result[:, -1] = polygon[:, -1]
+    # Most polygons are on one side: only those that are cut take work.
+    result[~inside.any(axis=1)] = 0.0
+    cut = np.flatnonzero(inside.any(axis=1) & ~inside.all(axis=1))
+    if len(cut):
+        result[cut] = _cut_half_plane(polygon.take(cut, axis=0), distance.take(cut, axis=0))
+    return result
+
+
+def _cut_half_plane(polygon: Float, distance: Float) -> Float:
+    """Do the same for polygons that lie on both sides."""
+    count, size = distance.shape
+    inside = distance >= 0
+    following = np.concatenate([polygon[:, 1:], polygon[:, :1]], axis=1)
+    next_distance = np.concatenate([distance[:, 1:], distance[:, :1]], axis=1)
     crosses = inside != (next_distance >= 0)
     share = distance / np.where(crosses, distance - next_distance, 1.0)
-    crossing = polygon + share[..., None] * (np.roll(polygon, -1, axis=1) - polygon)
     # Each side gives its start, if kept, and then its crossing, if any; close the gaps.
+    corners = np.empty((count, size, 2, 2))
+    corners[:, :, 0] = polygon
+    corners[:, :, 1] = polygon + share[..., None] * (following - polygon)
     given = np.stack((inside, crosses), axis=-1).reshape(count, 2 * size)
-    corners = np.stack((polygon, crossing), axis=2).reshape(count, 2 * size, 2)
     place = np.cumsum(given, axis=1) - 1
-    row, slot = np.nonzero(given)
-    result = np.zeros((count, size + 1, 2))
-    result[row, place[row, slot]] = corners[row, slot]
-    last = np.minimum(np.arange(size + 1), np.maximum(place[:, -1:], 0))
-    return np.asarray(np.take_along_axis(result, last[..., None], axis=1))
+    kept = np.flatnonzero(given)
+    result = np.zeros((count * (size + 1), 2))
+    to = place.ravel().take(kept) + (size + 1) * (kept // (2 * size))
+    result[to] = corners.reshape(-1, 2).take(kept, axis=0)
+    last = np.minimum(np.arange(size + 1), place[:, -1:]) + (size + 1) * np.arange(count)[:, None]
+    return np.asarray(result.take(last, axis=0))
+
+
+def area_in_unit_square(triangles: Float) -> Float:
+    """Return (t,) the exact areas of (t, 3, 2) triangles within [0, 1]², without clipping them.
+
+    By Green, the area under the outline, ∮ clamp(y) dx over the part of it with x in [0, 1]: below the
+    square an edge counts nothing, beside it half the sum of its heights, above it 1.
+    """
+    total = np.zeros(len(triangles))
+    x, y = np.ascontiguousarray(triangles.transpose(2, 1, 0))
+    for start in range(3):
+        end = (start + 1) % 3
+        run, rise = x[end] - x[start], y[end] - y[start]
+        begin, stop = np.clip(x[start], 0.0, 1.0), np.clip(x[end], 0.0, 1.0)
+        slope = rise / np.where(run == 0.0, 1.0, run)
+        low, high = y[start] + (begin - x[start]) * slope, y[start] + (stop - x[start]) * slope
+        height = high - low
+        low_in, high_in = np.clip(low, 0.0, 1.0), np.clip(high, 0.0, 1.0)
+        flat = height == 0.0
+        per_height = 1.0 / np.where(flat, 1.0, height)
+        beside = np.where(flat, (low >= 0.0) & (low <= 1.0), (high_in - low_in) * per_height)
+        above = np.where(flat, low > 1.0, (np.maximum(high, 1.0) - np.maximum(low, 1.0)) * per_height)
+        total += (stop - begin) * (beside * 0.5 * (low_in + high_in) + above)
+    return np.abs(total)
 
 
 def polygon_area_centroid(polygon: Float) -> tuple[Float, Float]:

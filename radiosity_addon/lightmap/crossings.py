@@ -20,6 +20,7 @@ import numpy as np
 from ..solver.arrays import Array
 from ..solver.parallel import chunk_steps
 from ..solver.visibility import RayCaster
+from .clearance import clear_texels
 from .texel_geometry import TexelGeometry
 
 CHUNK = 1 << 14
@@ -84,9 +85,11 @@ def crossing_steps(
 ) -> Generator[float, None, Crossings]:
     """Find the texels that geometry cuts, touches or hoods; yields the fraction done."""
     result = Crossings(geometry, *np.zeros((4, len(geometry)), dtype=bool))
+    clear = clear_texels(geometry, OUTSET, HOOD, LIFT * caster.surface_offset, threads)
+    doubted = np.flatnonzero(~clear)
 
     def find(part: slice) -> None:
-        rows = np.arange(part.start, part.stop)
+        rows = doubted[part]
         lift = LIFT * caster.surface_offset * geometry.surface_normal[rows][:, None]
         # Of the texel on the page: hits land on the part outside its triangle as well.
         square = geometry.squares(rows) + lift
@@ -108,7 +111,7 @@ def crossing_steps(
         result.hooded[rows] = below.all(axis=1) & ~cut
         result.cut[rows], result.touched[rows] = cut, doubtful & ~cut & ~result.rim[rows]
 
-    yield from chunk_steps(find, len(geometry), CHUNK, threads)
+    yield from chunk_steps(find, len(doubted), CHUNK, threads)
     return result
 
 

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .clip import clip_to_unit_square, polygon_area_centroid, sample_polygons
+from .clip import area_in_unit_square, clip_to_unit_square, polygon_area_centroid, sample_polygons
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -233,7 +233,7 @@ def overlapping_pairs(uv: Float32, resolution: int, centres_only: bool = False) 
 def _centred(uv: Float32, resolution: int, triangle: Int32, row: Int32, column: Int32) -> _Pairs:
     """Return those of the candidate pairs whose centre is inside, off the triangle's sides."""
     distance, reach = _edge_distances(uv, resolution, triangle, row, column)
-    keep = (distance > 1e-3 * reach).all(axis=1)
+    keep = _all_three(distance > 1e-3 * reach)
     texel = row[keep].astype(np.int64) * resolution + column[keep]
     return _Pairs(texel, triangle[keep], np.ones(len(texel)), np.ones(len(texel), dtype=np.bool_))
 
@@ -243,13 +243,14 @@ def _overlaps(
 ) -> _Pairs:
     """Return those of the candidate pairs that overlap, with the exact area."""
     distance, reach = _edge_distances(uv, resolution, triangle, row, column)
-    centre = (distance >= 0).all(axis=1)
-    touches = (distance + reach > 0).all(axis=1)
-    whole = (distance - reach >= 0).all(axis=1)
+    centre = _all_three(distance >= 0)
+    touches = _all_three(distance + reach > 0)
+    whole = _all_three(distance - reach >= 0)
     area = whole.astype(np.float64)
     cut = np.flatnonzero(touches & ~whole)
-    polygon, _, _ = _clip(uv, resolution, triangle[cut], row[cut], column[cut])
-    area[cut] = polygon_area_centroid(polygon)[0]
+    corners = uv[triangle[cut]].astype(np.float64) * resolution
+    corners -= np.stack((column[cut], row[cut]), axis=-1)[:, None, :]
+    area[cut] = area_in_unit_square(corners)
     # A triangle smaller than the threshold still keeps the texel with most of its area.
     least = np.minimum(UNRESOLVED * resolution, 0.125 * np.abs(double_area[triangle]))
     keep = touches & (area > 0) & (centre | (area >= least))
@@ -283,8 +284,10 @@ def _columns(corners: Float, row: Int32, resolution: int) -> tuple[Int32, NDArra
     low, high = np.minimum(start, following[..., 1]), np.maximum(start, following[..., 1])
     apart = (high < bottom) | (low > bottom + 1)
     x_0, x_1 = corners[..., 0] + t_0 * run, corners[..., 0] + t_1 * run
-    left = np.where(apart, np.inf, np.minimum(x_0, x_1)).min(axis=1)
-    right = np.where(apart, -np.inf, np.maximum(x_0, x_1)).max(axis=1)
+    left = np.where(apart, np.inf, np.minimum(x_0, x_1))
+    right = np.where(apart, -np.inf, np.maximum(x_0, x_1))
+    left = np.minimum(np.minimum(left[:, 0], left[:, 1]), left[:, 2])
+    right = np.maximum(np.maximum(right[:, 0], right[:, 1]), right[:, 2])
     first = np.clip(np.floor(left), 0, resolution).astype(np.int32)
     last = np.clip(np.ceil(right), 0, resolution).astype(np.int64)
     return first, np.maximum(last - first, 0)
@@ -317,7 +320,7 @@ def _clip(
     corners = uv[triangle].astype(np.float64) * resolution
     corners -= np.stack((column, row), axis=-1)[:, None, :]
     distance, reach = _edge_distances(uv, resolution, triangle, row, column)
-    whole = (distance - reach >= 0).all(axis=1)
+    whole = _all_three(distance - reach >= 0)
     polygon = np.empty((len(corners), 7, 2))
     polygon[whole] = ((0, 0), (1, 0), (1, 1), (0, 1), (0, 1), (0, 1), (0, 1))
     cut = np.flatnonzero(~whole)
@@ -338,6 +341,11 @@ def _barycentric(points: Float, corners: Float) -> Float:
     # Rounding must not put a point outside its triangle.
     weights = np.maximum(np.stack((1 - second - third, second, third), axis=-1), 0)
     return np.asarray(weights / weights.sum(axis=-1, keepdims=True))
+
+
+def _all_three(sides: Bool) -> Bool:
+    """Return (p,) whether all sides say so, (p, 3); several times as fast as `all` along an axis."""
+    return np.asarray(sides[:, 0] & sides[:, 1] & sides[:, 2])
 
 
 def _double_area(corners: Float) -> Float:

@@ -8,7 +8,7 @@ from .arrays import Array
 from .cluster_links import ClusterLinks, gather_at_clusters
 from .links import Links
 from .state import SolverState
-from .transport import gather, node_radiosity, pull, push, push_pull
+from .transport import gather, push, push_pull, shared_means
 from .tree_top import TreeTop
 
 
@@ -43,16 +43,17 @@ def reflect(
     irradiance, radiosity : (e, 3) float64 [W/m²]
     """
     hierarchy = state.hierarchy
-    own = gather(hierarchy, links, state.radiosity, scale, top)
-    if cluster_links is not None and top is not None:
-        shared = state.radiosity if scale is None else scale[:, 1:] * state.radiosity
-        sent = node_radiosity(hierarchy, pull(hierarchy, shared), top)
+    means, sent = shared_means(hierarchy, state.radiosity, scale, top)
+    shared = None
+    if cluster_links is not None and len(cluster_links) and top is not None:
+        threads = state.settings.threads
         # A face that looks past the horizon of what its neighbours see gets nothing, not less.
-        shared = np.maximum(gather_at_clusters(hierarchy, top, cluster_links, sent), 0.0)
-        own[: len(hierarchy.faces)] += shared[:, None]
+        shared = np.maximum(gather_at_clusters(hierarchy, top, cluster_links, sent, threads), 0.0)
+    gathered = push(hierarchy, gather(hierarchy, links, state.radiosity, scale, top, (means, sent)))
+    if shared is not None:
+        gathered += shared.take(hierarchy.face, axis=0)
     if received is not None:
-        own *= received[hierarchy.face][:, None, None]
-    gathered = push(hierarchy, own)
+        gathered *= received.take(hierarchy.face)[:, None]
     return push_pull(hierarchy, lights, gathered, state.emission, state.reflectance)
 
 

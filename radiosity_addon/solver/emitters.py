@@ -5,15 +5,23 @@ from __future__ import annotations
 import numpy as np
 
 from .arrays import Array
+from .emitter_tree import EmitterTree
 from .form_factor import point_to_polygon
 from .geometry_term import ray_geometry_term, throughput
 from .hierarchy import Faces
+from .merged_faces import merge_flat
 from .radiometry import radiance_of_radiosity
 from .sampling import points_on_triangles
 from .visibility import RayCaster
 
 CHUNK_PAIRS = 1 << 18
 """Point and face pairs evaluated at once; bounds the temporaries to about 50 MB a thread."""
+
+MANY = 256
+"""More faces than these are asked in groups where they are far."""
+
+CHUNK_POINTS = 1 << 12
+"""Points that go down a tree of faces at once: each of them visits some hundred nodes."""
 
 ENDS = 2.0
 """Surface offsets from an emissive face to where shadow rays end. Their starts are lifted by one, which
@@ -51,6 +59,9 @@ class EmitterGroup:
         self._origin = corners[0, 0]
         self._outlines = corners - self._origin
         self._reach = float(np.abs(self._outlines).max())
+        self._tree = None
+        if len(corners) > MANY:
+            self._tree = EmitterTree(corners, normals, self._areas * self._level)
 
     @staticmethod
     def of_faces(faces: Faces, caster: RayCaster, among: Array | None = None) -> list[EmitterGroup]:
@@ -62,14 +73,22 @@ class EmitterGroup:
         colours, group = np.unique(faces.emission[rows], axis=0, return_inverse=True)
         group = group.reshape(-1)
         offset = end_offset(caster)
-        return [
-            EmitterGroup(faces.corners[rows[group == g]], faces.normal[rows[group == g]], colour, offset)
-            for g, colour in enumerate(colours)
-        ]
+        lamps = []
+        for number, colour in enumerate(colours):
+            some = rows[group == number]
+            corners, first = merge_flat(faces.corners[some])
+            lamps.append(EmitterGroup(corners, faces.normal[some[first]], colour, offset))
+        return lamps
 
     def unit_irradiance(self, points: Array, normals: Array) -> Array:
         """Return (n,) the unoccluded irradiance per unit of exitance: Σ_m F(point → face m) · level."""
         gain = np.empty(len(points))
+        if self._tree is not None:
+            for first in range(0, len(points), CHUNK_POINTS):
+                rows = slice(first, first + CHUNK_POINTS)
+                asked = self._tree.ask(points[rows], normals[rows])
+                gain[rows] = np.bincount(asked.row, asked.factor, minlength=len(points[rows]))
+            return gain
         step = max(CHUNK_PAIRS // len(self._corners), 1)
         for first in range(0, len(points), step):
             rows = slice(first, first + step)
@@ -87,6 +106,8 @@ class EmitterGroup:
         -------
         directions : (n, k, 3), distances : (n, k), weights : (n, k)
         """
+        if self._tree is not None:
+            return self._rays_by_tree(self._tree, points, normals, u)
         factors = self._factors(points, normals)
         running = np.cumsum(factors, axis=1)
         total = running[:, -1:]
@@ -97,19 +118,63 @@ class EmitterGroup:
         below = np.where(face > 0, running[rows, face - 1], 0.0)
         width = np.maximum(factors[rows, face], 1e-300)
         inside = np.stack([np.clip((pick - below) / width, 0.0, 1.0), u[..., 1]], axis=-1)
+        directions, distances, thrown = self._rays_to(points, normals, face, inside)
+        # A uniform point of a face stands for what the whole face would send, were it all there.
+        thrown *= self._level[face] * self._areas[face]
+        weights = np.where(total > 0, radiance_of_radiosity(thrown) / width, 0.0)
+        return directions, distances, _balanced(weights, face, len(self._corners))
+
+    def _rays_by_tree(
+        self, tree: EmitterTree, points: Array, normals: Array, u: Array
+    ) -> tuple[Array, Array, Array]:
+        """Aim (n, k) rays at nodes by what they send, and at faces of a node by their weights."""
+        asked = tree.ask(points, normals)
+        total = np.bincount(asked.row, asked.factor, minlength=len(points))
+        lit = np.flatnonzero(total > 0)
+        directions, (distances, weights) = np.zeros((*u.shape[:2], 3)), np.zeros((2, *u.shape[:2]))
+        directions[..., 2] = 1.0
+        if len(lit) == 0:
+            return directions, distances, weights
+        number = np.cumsum(total > 0) - 1
+        # One search for all points: those of the i-th lit one lie in (i, i + 1].
+        running = np.cumsum(asked.factor)
+        last = np.cumsum(np.bincount(asked.row, minlength=len(points)))[lit] - 1
+        first = np.append(0, last[:-1] + 1)
+        before = running[first] - asked.factor[first]
+        flat = (running - before[number[asked.row]]) / total[asked.row]
+        pick = np.clip(u[lit, :, 0].astype(np.float64), 0.0, 1.0 - 1e-12)
+        which = np.searchsorted(flat + number[asked.row], pick + np.arange(len(lit))[:, None], side="right")
+        which = np.clip(which, first[:, None], last[:, None])
+        share = asked.factor[which] / total[lit, None]
+        within = np.clip((pick - (flat[which] - share)) / share, 0.0, 1.0 - 1e-12)
+        node = asked.node[which]
+        low, high = tree.running[tree.begin[node]], tree.running[tree.end[node]]
+        wanted = low + within * (high - low)
+        slot = np.searchsorted(tree.running, wanted, side="right") - 1
+        slot = np.clip(slot, tree.begin[node], tree.end[node] - 1)
+        width = np.maximum(tree.running[slot + 1] - tree.running[slot], 1e-300)
+        inside = np.stack([np.clip((wanted - tree.running[slot]) / width, 0.0, 1.0), u[lit, :, 1]], axis=-1)
+        directions[lit], distances[lit], thrown = self._rays_to(
+            points[lit], normals[lit], tree.order[slot], inside
+        )
+        # A point of a node's faces stands for what the whole node would send, were it all there.
+        sent = radiance_of_radiosity(thrown * (high - low))
+        weights[lit] = _balanced(sent / np.maximum(asked.factor[which], 1e-300), which, len(asked.row))
+        return directions, distances, weights
+
+    def _rays_to(
+        self, points: Array, normals: Array, face: Array, inside: Array
+    ) -> tuple[Array, Array, Array]:
+        """Return directions, distances and throughput per area of rays to places on faces (n, k)."""
         corners = self._corners[face]
         targets = points_on_triangles(corners.reshape(-1, 3, 3), inside.reshape(-1, 1, 2))
         targets = targets.reshape(*face.shape, 3)
         along = targets + self._offset * self._normals[face] - points[:, None]
         distances = np.linalg.norm(along, axis=2)
         directions = along / np.maximum(distances, 1e-300)[..., None]
-        # A uniform point of a face stands for what the whole face would send, were it all there.
         cos_r = np.einsum("nkc,nc->nk", directions, normals)
         cos_s = -np.einsum("nkc,nkc->nk", directions, self._normals[face])
-        sent = self._level[face] * self._areas[face]
-        thrown = throughput(ray_geometry_term(cos_r, cos_s, distances), 1.0, sent)
-        weights = np.where(total > 0, radiance_of_radiosity(thrown) / width, 0.0)
-        return directions, distances, _balanced(weights, face, len(self._corners))
+        return directions, distances, throughput(ray_geometry_term(cos_r, cos_s, distances), 1.0, 1.0)
 
     def _factors(self, points: Array, normals: Array) -> Array:
         """Return (n, m) form factors from points to faces, times the faces' levels.

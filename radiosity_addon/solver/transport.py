@@ -16,6 +16,7 @@ def gather(
     radiosity: Array,
     scale: Array | None = None,
     top: TreeTop | None = None,
+    shared: tuple[Array, Array] | None = None,
 ) -> Array:
     """Collect the irradiance that arrives over each element's own links.
 
@@ -34,6 +35,8 @@ def gather(
         ancestors' means (`conservation`).
     top : TreeTop or None
         With all clusters of the links, if it is at hand.
+    shared : (e, k), (n_nodes, k) float64 or None
+        Means by `shared_means`, if they are at hand. The second is overwritten.
 
     Returns
     -------
@@ -47,8 +50,7 @@ def gather(
     first = np.flatnonzero(np.diff(links.receiver, prepend=-1))
     receivers = links.receiver[first]
     scale = np.ones((len(radiosity), 2)) if scale is None else scale
-    means = pull(hierarchy, scale[:, 1:] * radiosity)
-    nodes = node_radiosity(hierarchy, means, top)
+    means, nodes = shared_means(hierarchy, radiosity, scale, top) if shared is None else shared
     leaves = hierarchy.leaves
     nodes[hierarchy.n_clusters + leaves] = scale[leaves, :1] * radiosity[leaves]
     child = np.full(len(nodes), LEAF, dtype=np.int64)
@@ -68,6 +70,14 @@ def gather(
             share = np.add.reduceat(arriving * links.to_quarter[:, quarter], first)
             irradiance[receivers[split], quarter, channel] = share[split]
     return irradiance
+
+
+def shared_means(
+    hierarchy: Hierarchy, radiosity: Array, scale: Array | None = None, top: TreeTop | None = None
+) -> tuple[Array, Array]:
+    """Return what links to coarse sources see: (e, k) the elements' means, and (n_nodes, k) all nodes'."""
+    means = pull(hierarchy, radiosity if scale is None else scale[:, 1:] * radiosity)
+    return means, node_radiosity(hierarchy, means, top)
 
 
 def push(hierarchy: Hierarchy, own: Array) -> Array:

@@ -37,6 +37,8 @@ class TreeTop:
     def __init__(self, hierarchy: Hierarchy, *linked: Array) -> None:
         clusters = hierarchy.clusters
         self._clusters, self._area = clusters, hierarchy.faces.area
+        self.kept: object = None
+        """Whatever is prepared for links of these clusters, by whoever prepares it."""
         count, n_faces = len(clusters), len(hierarchy.faces)
         used = np.zeros(count + n_faces, dtype=bool)
         for nodes in linked:
@@ -78,9 +80,16 @@ class TreeTop:
         Never as differences of one running sum: in those the rounding of the large faces
         would drown clusters of tiny ones.
         """
-        total = np.zeros((self.n_rows, values.shape[1]))
-        for column in range(values.shape[1] if len(values) else 0):
-            ordered = np.ascontiguousarray(values[:, column])[self._clusters.order]
+        order = self._clusters.order
+        columns = [np.ascontiguousarray(values[:, column]).take(order) for column in range(values.shape[1])]
+        return self.sums_of(columns)
+
+    def sums_of(self, columns: list[Array]) -> Array:
+        """Return the same of columns (f,) in the order of the clusters' faces."""
+        total = np.zeros((self.n_rows, len(columns)))
+        if not len(self._area):
+            return total
+        for column, ordered in enumerate(columns):
             total[self.n_inner :, column] = np.add.reduceat(ordered, self._start)
         for level in reversed(self._levels):
             children = self._children[level]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from radiosity_addon.lightmap import rasterise as module
-from radiosity_addon.lightmap.clip import clip_to_unit_square, polygon_area_centroid
+from radiosity_addon.lightmap.clip import area_in_unit_square, clip_to_unit_square, polygon_area_centroid
 from radiosity_addon.lightmap.rasterise import coverage_sum, rasterise, sample_footprints
 
 SQUARE = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], dtype=np.float32)
@@ -211,3 +211,15 @@ def test_clipping_a_triangle_to_the_square_can_give_seven_corners():
     rng = np.random.default_rng(0)
     counted = inside(triangle[0], rng.uniform(0, 1, (400_000, 2))).mean()
     assert polygon_area_centroid(polygon)[0][0] == pytest.approx(counted, abs=3e-3)
+
+
+def test_the_area_in_the_square_is_that_of_the_clipped_polygon():
+    rng = np.random.default_rng(7)
+    centres = rng.uniform(-0.7, 1.7, (3000, 1, 2))
+    triangles = centres + rng.uniform(-1, 1, (3000, 3, 2)) * np.geomspace(0.01, 30, 3000)[:, None, None]
+    # Corners and sides on the square's own are what grids give.
+    on_lattice = rng.integers(-2, 5, (3000, 3, 2)) / 2
+    for shapes in (triangles, on_lattice):
+        expected, _ = polygon_area_centroid(clip_to_unit_square(shapes))
+        assert (expected > 0).sum() > 500
+        np.testing.assert_allclose(area_in_unit_square(shapes), expected, atol=1e-13)

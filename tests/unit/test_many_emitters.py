@@ -1,0 +1,169 @@
+"""Lamps of very many triangles: merged where they are flat, asked in groups where they are far."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from radiosity_addon.solver import emitters
+from radiosity_addon.solver.emitter_tree import EmitterTree
+from radiosity_addon.solver.emitters import EmitterGroup
+from radiosity_addon.solver.merged_faces import merge_flat
+from radiosity_addon.solver.sampling import stratified_square
+from tests.rooms import rectangle, sphere
+
+CENTRE = np.array([2.5, 2.0, 2.0])
+
+
+def normals_of(triangles: np.ndarray) -> np.ndarray:
+    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    return np.asarray(cross / np.linalg.norm(cross, axis=1, keepdims=True))
+
+
+def area(triangles: np.ndarray) -> float:
+    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    return float(0.5 * np.linalg.norm(cross, axis=1).sum())
+
+
+def panel(n: int = 20) -> np.ndarray:
+    return rectangle((1.6, 1.3, 3.0), (0.0, 1.4, 0.3), (1.7, 0.1, 0.0), n)
+
+
+def bulb() -> np.ndarray:
+    return sphere(4)[:, [0, 2, 1]] * 0.3 + CENTRE
+
+
+def ragged() -> np.ndarray:
+    triangles = panel()
+    middle = triangles.mean(axis=1)
+    return triangles[np.abs(middle[:, 0] - 2.45) + 0.1 * np.sin(37 * middle[:, 1]) < 0.7]
+
+
+def places(count: int, apart: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(4)
+    points = rng.uniform((0, 0, 0), (5, 4, 2.9), (3 * count, 3))
+    points = points[np.linalg.norm(points - CENTRE, axis=1) > apart][:count]
+    normals = rng.normal(size=points.shape)
+    return points, normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+def group(triangles: np.ndarray, many: int, monkeypatch: pytest.MonkeyPatch) -> EmitterGroup:
+    monkeypatch.setattr(emitters, "MANY", many)
+    return EmitterGroup(triangles, normals_of(triangles), np.ones(3), 1e-6)
+
+
+def test_a_tessellated_panel_is_two_triangles_that_send_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    every = panel()
+    corners, first = merge_flat(np.random.default_rng(1).permutation(every))
+    assert len(corners) == len(first) == 2
+    np.testing.assert_allclose(normals_of(corners), np.broadcast_to(normals_of(every)[0], (2, 3)), atol=1e-12)
+    points, normals = places(200)
+    one, other = (group(triangles, 10**9, monkeypatch) for triangles in (every, corners))
+    expected = one.unit_irradiance(points, normals)
+    assert expected.max() > 0.1
+    np.testing.assert_allclose(other.unit_irradiance(points, normals), expected, atol=1e-12)
+
+
+def test_an_l_shape_keeps_its_notch() -> None:
+    shape = np.concatenate(
+        [rectangle((0, 0, 0), (2, 0, 0), (0, 1, 0), 4), rectangle((0, 1, 0), (2, 0, 0), (0, 1, 0), 4)]
+    )
+    middle = shape.mean(axis=1)
+    shape = shape[(middle[:, 0] < 1) | (middle[:, 1] < 1)]
+    corners, _ = merge_flat(shape)
+    assert len(corners) == 4
+    assert area(corners) == pytest.approx(3.0)
+    assert not ((corners.mean(axis=1)[:, :2] > 1).all(axis=1)).any()
+
+
+@pytest.mark.parametrize("what", ["frame", "bulb", "sheets", "two"])
+def test_what_is_no_plain_outline_stays(what: str) -> None:
+    """A frame around a hole, a curved surface, sheets that lie on each other, and single pairs."""
+    grid = rectangle((0, 0, 0), (3, 0, 0), (0, 3, 0), 3)
+    hole = (np.abs(grid.mean(axis=1)[:, :2] - 1.5) < 0.5).all(axis=1)
+    shape = {
+        "frame": grid[~hole],
+        "bulb": bulb(),
+        "sheets": np.concatenate([grid, grid]),
+        "two": rectangle((0, 0, 0), (3, 0, 0), (0, 3, 0)),
+    }[what]
+    corners, first = merge_flat(shape)
+    np.testing.assert_array_equal(corners, shape)
+    np.testing.assert_array_equal(first, np.arange(len(shape)))
+
+
+def test_sides_and_separate_panels_are_merged_apart() -> None:
+    low, high = panel(6), panel(6) + np.array([0.0, 0.0, 1.0])
+    corners, first = merge_flat(np.concatenate([low, low[:, [0, 2, 1]], high]))
+    assert len(corners) == 6
+    up = normals_of(corners) @ normals_of(low)[0]
+    np.testing.assert_allclose(np.sort(up), [-1, -1, 1, 1, 1, 1])
+    np.testing.assert_array_equal(up > 0, (first < len(low)) | (first >= 2 * len(low)))
+
+
+@pytest.mark.parametrize(("shape", "rms"), [("ragged", 0.002), ("bulb", 0.01)])
+def test_groups_send_what_their_faces_send(shape: str, rms: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    triangles, apart = (ragged(), 0.0) if shape == "ragged" else (bulb(), 0.4)
+    points, normals = places(1000, apart)
+    expected = group(triangles, 10**9, monkeypatch).unit_irradiance(points, normals)
+    found = group(triangles, 64, monkeypatch).unit_irradiance(points, normals)
+    assert np.sqrt(((found - expected) ** 2).mean()) < rms * expected.mean()
+    tree = EmitterTree(triangles, normals_of(triangles), np.ones(len(triangles)))
+    assert len(tree.ask(points, normals).row) < 0.1 * len(points) * len(triangles)
+
+
+def test_what_a_point_gets_does_not_depend_on_who_asks_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    points, normals = places(500, 0.4)
+    lamp = group(bulb(), 64, monkeypatch)
+    together = lamp.unit_irradiance(points, normals)
+    monkeypatch.setattr(emitters, "CHUNK_POINTS", 7)
+    np.testing.assert_array_equal(lamp.unit_irradiance(points, normals), together)
+    np.testing.assert_array_equal(lamp.unit_irradiance(points[::3], normals[::3]), together[::3])
+
+
+def test_levels_weigh_the_faces(monkeypatch: pytest.MonkeyPatch) -> None:
+    triangles = ragged()
+    level = np.random.default_rng(3).uniform(size=len(triangles))
+    points, normals = places(300)
+    gains = []
+    for many in (10**9, 64):
+        monkeypatch.setattr(emitters, "MANY", many)
+        lamp = EmitterGroup(triangles, normals_of(triangles), np.ones(3), 1e-6, level)
+        gains.append(lamp.unit_irradiance(points, normals))
+    assert np.sqrt(((gains[1] - gains[0]) ** 2).mean()) < 0.005 * gains[0].mean()
+
+
+@pytest.mark.parametrize("shape", ["ragged", "bulb"])
+def test_rays_into_groups_tell_the_share_of_light_that_passes(
+    shape: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Hide what lies beyond a plane: the weighted share of the rays is that of the faces' factors."""
+    triangles = ragged() if shape == "ragged" else bulb()
+    points, normals = places(300, 0.4)
+    exact = group(triangles, 10**9, monkeypatch)
+    factors = exact._factors(points, normals)
+    lit = factors.sum(axis=1) > 0.02
+    points, normals, factors = points[lit], normals[lit], factors[lit]
+    seen = triangles.mean(axis=1)[:, 0] > 2.5
+    expected = factors[:, seen].sum(axis=1) / factors.sum(axis=1)
+    u = stratified_square(np.arange(len(points)), 256, 5)
+    lamp = group(triangles, 64, monkeypatch)
+    directions, distances, weights = lamp.shadow_rays(points, normals, u)
+    np.testing.assert_allclose(np.linalg.norm(directions, axis=2), 1.0)
+    ends = points[:, None] + directions * distances[..., None]
+    share = (weights * (ends[..., 0] > 2.5)).sum(axis=1) / weights.sum(axis=1)
+    assert 0.2 < expected.mean() < 0.8
+    assert np.abs(share - expected).mean() < 0.02
+    assert abs((share - expected).mean()) < 0.006
+
+
+def test_points_behind_every_face_get_no_weight(monkeypatch: pytest.MonkeyPatch) -> None:
+    points = np.array([[2.4, 2.0, 4.0], [2.4, 2.0, 0.5]])
+    normals = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]])
+    down = panel()[:, [0, 2, 1]] if normals_of(panel())[0, 2] > 0 else panel()
+    lamp = group(down, 64, monkeypatch)
+    gain = lamp.unit_irradiance(points, normals)
+    assert gain[0] == 0.0 < gain[1]
+    _, _, weights = lamp.shadow_rays(points, normals, stratified_square(np.arange(2), 16, 1))
+    assert not weights[0].any()
+    assert weights[1].mean() == pytest.approx(1.0, abs=1e-9)
