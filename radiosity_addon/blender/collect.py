@@ -14,6 +14,7 @@ from ..settings import BakeSettings
 from ..solver.lights import Light
 from .export_sources import ExportSource
 from .lamps import LampFactors, read_lamp
+from .light_linking import linking_warnings
 from .materials import DEFAULT_GREY, Surface, read_material
 from .mesh_arrays import MeshArrays, all_finite, no_triangles, not_finite_message, read_mesh
 from .object_roles import BAKE, BAKEABLE_TYPES, IGNORE, Role, role_of
@@ -54,6 +55,8 @@ class Piece:
     uv_layers : int
         The UV layers of the mesh that would get another.
     has_lightmap_layer : bool
+    linking : tuple of BakeWarning
+        What is not followed, should it emit.
     """
 
     source: ExportSource
@@ -67,6 +70,7 @@ class Piece:
     linked: bool
     uv_layers: int
     has_lightmap_layer: bool
+    linking: tuple[BakeWarning, ...]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -181,6 +185,7 @@ class _Collector:
                 linked=can_bake and owner.library is not None,
                 uv_layers=max(mesh.uv_layers, len(layers)),
                 has_lightmap_layer=mesh.lightmap_uv is not None or LIGHTMAP_UV_LAYER in layers,
+                linking=tuple(linking_warnings(shown, "emissive object")),
             )
         )
 

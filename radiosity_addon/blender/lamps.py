@@ -12,6 +12,7 @@ from ..errors import SceneError
 from ..solver.lights import AreaLight, Light, PointLight, SpotLight, SunLight
 from ..solver.radiometry import cone_projected_solid_angle, sphere_area
 from .lamp_pixels import lamp_factor
+from .light_linking import linking_warnings
 from .materials import read_radiance, uses_nodes
 from .mesh_arrays import all_finite
 
@@ -197,10 +198,8 @@ def _not_understood(lamp: bpy.types.Object) -> list[BakeWarning]:
     messages = []
     if data.type == "SPOT" and data.use_square:
         messages.append("the square cone is ignored; a round one is used")
-    linking = getattr(lamp, "light_linking", None)
-    if linking and (linking.receiver_collection or linking.blocker_collection):
-        messages.append("light linking is ignored: it lights everything")
-    return [BakeWarning(lamp.name, f"lamp '{lamp.name}': {message}") for message in messages]
+    warnings = [BakeWarning(lamp.name, f"lamp '{lamp.name}': {message}") for message in messages]
+    return warnings + linking_warnings(lamp, "lamp")
 
 
 _MAKE = {"POINT": _point, "SPOT": _spot, "SUN": _sun, "AREA": _area}
