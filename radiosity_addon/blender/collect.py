@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -158,6 +158,8 @@ class _Collector:
         role = role_of(shown, owner, _names(source), self._settings)
         # What is ignored stays known: it must still be shown where its instancer will be hidden.
         contents = _NOTHING if role.mode == IGNORE else self._contents(instance)
+        if contents is not None and self._is_fog(contents):
+            role, contents = replace(role, mode=IGNORE), _NOTHING
         if contents is None or not all_finite(matrix):
             raise SceneError(not_finite_message(shown.name))
         mesh = contents.mesh
@@ -188,6 +190,11 @@ class _Collector:
                 linking=tuple(linking_warnings(shown, "emissive object")),
             )
         )
+
+    def _is_fog(self, contents: _Contents) -> bool:
+        """Tell whether all there is of a mesh is what fills it."""
+        shown = np.unique(contents.surface)
+        return len(shown) > 0 and all(self.collected.surfaces[row].is_volume for row in shown)
 
     def _contents(self, instance: bpy.types.DepsgraphObjectInstance) -> _Contents | None:
         """Read the mesh and what it shows; None if a coordinate is NaN or infinite."""
