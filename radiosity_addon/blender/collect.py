@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -14,6 +14,7 @@ from ..settings import BakeSettings
 from ..solver.lights import Light
 from .export_sources import ExportSource
 from .lamps import LampFactors, read_lamp
+from .light_linking import linking_warnings
 from .materials import DEFAULT_GREY, Surface, read_material
 from .mesh_arrays import MeshArrays, all_finite, no_triangles, not_finite_message, read_mesh
 from .object_roles import BAKE, BAKEABLE_TYPES, IGNORE, Role, role_of
@@ -54,6 +55,8 @@ class Piece:
     uv_layers : int
         The UV layers of the mesh that would get another.
     has_lightmap_layer : bool
+    linking : tuple of BakeWarning
+        What is not followed, should it emit.
     """
 
     source: ExportSource
@@ -67,6 +70,7 @@ class Piece:
     linked: bool
     uv_layers: int
     has_lightmap_layer: bool
+    linking: tuple[BakeWarning, ...]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -154,6 +158,8 @@ class _Collector:
         role = role_of(shown, owner, _names(source), self._settings)
         # What is ignored stays known: it must still be shown where its instancer will be hidden.
         contents = _NOTHING if role.mode == IGNORE else self._contents(instance)
+        if contents is not None and self._is_fog(contents):
+            role, contents = replace(role, mode=IGNORE), _NOTHING
         if contents is None or not all_finite(matrix):
             raise SceneError(not_finite_message(shown.name))
         mesh = contents.mesh
@@ -181,8 +187,14 @@ class _Collector:
                 linked=can_bake and owner.library is not None,
                 uv_layers=max(mesh.uv_layers, len(layers)),
                 has_lightmap_layer=mesh.lightmap_uv is not None or LIGHTMAP_UV_LAYER in layers,
+                linking=tuple(linking_warnings(shown, "emissive object")),
             )
         )
+
+    def _is_fog(self, contents: _Contents) -> bool:
+        """Tell whether all there is of a mesh is what fills it."""
+        shown = np.unique(contents.surface)
+        return len(shown) > 0 and all(self.collected.surfaces[row].is_volume for row in shown)
 
     def _contents(self, instance: bpy.types.DepsgraphObjectInstance) -> _Contents | None:
         """Read the mesh and what it shows; None if a coordinate is NaN or infinite."""

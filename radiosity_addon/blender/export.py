@@ -122,6 +122,9 @@ def _assemble(
         in_bounces=np.concatenate(in_bounces),
         in_shadows=np.concatenate(in_shadows),
     )
+    for piece, obj in zip(collected.pieces, objects, strict=True):
+        if piece.linking and scene.emission[obj.rows].any():
+            warnings += piece.linking
     if not scene.lights and not scene.emission.any():
         if settings.sky:
             scene.lights = (EnvironmentLight(1.0),)

@@ -12,11 +12,15 @@ from ..errors import SceneError
 from ..solver.lights import AreaLight, Light, PointLight, SpotLight, SunLight
 from ..solver.radiometry import cone_projected_solid_angle, sphere_area
 from .lamp_pixels import lamp_factor
+from .light_linking import linking_warnings
 from .materials import read_radiance, uses_nodes
 from .mesh_arrays import all_finite
 
 _SAME_SCALE = 1e-4  # relative difference of axes below which a scale counts as uniform
 _EVEN = 0.02  # relative variation with direction below which a lamp's nodes count as constant
+
+ALL_BOUNCES = 1024
+"""A lamp's own limit in Cycles, unless it is set."""
 
 LampFactors = dict[str, tuple[np.ndarray, float]]
 """By a lamp's full name, what its nodes make of its light (see `lamp_factor`)."""
@@ -197,10 +201,11 @@ def _not_understood(lamp: bpy.types.Object) -> list[BakeWarning]:
     messages = []
     if data.type == "SPOT" and data.use_square:
         messages.append("the square cone is ignored; a round one is used")
-    linking = getattr(lamp, "light_linking", None)
-    if linking and (linking.receiver_collection or linking.blocker_collection):
-        messages.append("light linking is ignored: it lights everything")
-    return [BakeWarning(lamp.name, f"lamp '{lamp.name}': {message}") for message in messages]
+    cycles = getattr(data.original, "cycles", None)
+    if getattr(cycles, "max_bounces", ALL_BOUNCES) < ALL_BOUNCES:
+        messages.append("its limit of bounces is ignored: all its light is followed")
+    warnings = [BakeWarning(lamp.name, f"lamp '{lamp.name}': {message}") for message in messages]
+    return warnings + linking_warnings(lamp, "lamp")
 
 
 _MAKE = {"POINT": _point, "SPOT": _spot, "SUN": _sun, "AREA": _area}

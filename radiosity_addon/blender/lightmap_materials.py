@@ -13,7 +13,7 @@ from ..solver.radiometry import brdf_of_reflectance, radiance_of_radiosity
 from .bake_record import is_made, mark_made
 from .false_colors import false_colors
 from .images import image_scale
-from .materials import read_material, uses_nodes
+from .materials import is_volume, read_material, uses_nodes
 from .node_group import BASE_COLOR, EMISSION, LIGHTMAP, LIGHTMAP_ONLY, SCALE, SHADER, lightmap_group
 from .surface_nodes import BLACK, Surface, feed_color, feed_float, read_surface
 from .uv_pin import pin_uvs
@@ -80,6 +80,8 @@ class LightmapMaterials:
                 pin_uvs(copy.node_tree)
 
         for index, output in enumerate(outputs):
+            if is_volume(output):
+                continue
             surface = plain
             if material is not None and uses_nodes(material):
                 surface = read_surface(copy.node_tree, output.inputs["Surface"], plain)

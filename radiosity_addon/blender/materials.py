@@ -50,6 +50,8 @@ class Surface:
         Something it is made of varies over the surface, and means or defaults stand for it.
     fallbacks : tuple of BakeWarning
         Which; to be told of unless the material is evaluated.
+    is_volume : bool
+        It has a volume and no surface: fog, through which all light goes.
     """
 
     reflectance: np.ndarray
@@ -58,6 +60,7 @@ class Surface:
     warnings: tuple[BakeWarning, ...] = ()
     varies: bool = False
     fallbacks: tuple[BakeWarning, ...] = ()
+    is_volume: bool = False
 
     @property
     def is_plain(self) -> bool:
@@ -84,7 +87,15 @@ def read_material(material: bpy.types.Material | None) -> Surface:
         tuple(reader.warnings),
         reader.varies,
         tuple(reader.fallbacks),
+        reader.is_volume,
     )
+
+
+def is_volume(output: bpy.types.Node | None) -> bool:
+    """Tell whether a material's output has a volume and no surface."""
+    if output is None or feed_of(output.inputs["Surface"]).node is not None:
+        return False
+    return feed_of(output.inputs["Volume"]).node is not None
 
 
 def read_radiance(
@@ -134,6 +145,7 @@ class _Reader(ShaderTerms[Stack]):
         self.warnings: list[BakeWarning] = []
         self.fallbacks: list[BakeWarning] = []
         self.varies = False
+        self.is_volume = False
 
     def warn(self, message: str) -> None:
         self._add(self.warnings, message)
@@ -143,6 +155,10 @@ class _Reader(ShaderTerms[Stack]):
 
     def material(self, tree: bpy.types.NodeTree) -> Terms:
         output = output_node(tree)
+        self.is_volume = is_volume(output)
+        if self.is_volume:
+            self.warn("its volume is ignored: light goes straight through")
+            return Terms(np.zeros(3), np.zeros(3), np.ones(3))
         if output is None or feed_of(output.inputs["Surface"]).node is None:
             self.warn(f"it has no surface shader; reflectance {_text(np.zeros(3))} is used")
             return nothing()

@@ -95,6 +95,18 @@ class EmitterGroup:
             gain[rows] = self._factors(points[rows], normals[rows]).sum(axis=1)
         return gain
 
+    def beside(self, points: Array, reach: Array) -> Array:
+        """Whether the box around one of the faces is within `reach` (n,) [m] of points, (n,) bool."""
+        low, high = self._corners.min(axis=1), self._corners.max(axis=1)
+        close = _box_distance(points, low.min(axis=0), high.max(axis=0)) <= reach
+        rows = np.flatnonzero(close)
+        step = max(CHUNK_PAIRS // len(self._corners), 1)
+        for first in range(0, len(rows), step):
+            some = rows[first : first + step]
+            apart = _box_distance(points[some, None], low, high)
+            close[some] = (apart <= reach[some, None]).any(axis=1)
+        return np.asarray(close)
+
     def shadow_rays(self, points: Array, normals: Array, u: Array) -> tuple[Array, Array, Array]:
         """Aim (n, k) rays at the faces in proportion to their factors.
 
@@ -203,6 +215,12 @@ class EmitterGroup:
 def end_offset(caster: RayCaster) -> float:
     """Return how far off an emissive face shadow rays end [m]."""
     return ENDS * caster.surface_offset
+
+
+def _box_distance(points: Array, low: Array, high: Array) -> Array:
+    """Return (…) how far points (…, 3) are from boxes [m], 0 inside."""
+    outside = np.maximum(np.maximum(low - points, points - high), 0.0)
+    return np.asarray(np.sqrt(np.einsum("...c,...c->...", outside, outside)))
 
 
 def _balanced(weights: Array, face: Array, faces: int) -> Array:

@@ -123,8 +123,9 @@ class SpreadPoints:
     def gain_steps(self, light: Lamp | EmitterGroup, least: float = 0.0) -> Generator[float, None, Array]:
         """Compute (n,) the unoccluded irradiance per unit of strength, a mean over the footprint.
 
-        Where it is no more than `least` in the centre, that stands for all; without one, where the
-        farthest point gets the same.
+        Where it is no more than `least` in the centre, that stands for all, unless a glowing face is
+        no farther than the footprint is wide: it may shine on what is beside the centre only. Without
+        `least`, where the farthest point gets the same.
 
         Yields
         ------
@@ -138,8 +139,8 @@ class SpreadPoints:
             normals = at.normals[part]
             own = light.unit_irradiance(at.points[part], normals)
             if at.sampler is not None:
-                if least:
-                    varies[part] = own > least
+                if isinstance(light, EmitterGroup) and least:
+                    varies[part] = (own > least) | light.beside(at.points[part], self._width(part))
                 else:
                     spread = self.points(part)
                     far = spread[np.arange(len(own)), self._farthest[part]]
@@ -161,6 +162,10 @@ class SpreadPoints:
             rows = np.flatnonzero(at.near(jump) | (at.near(gain > 0) & at.near(gain <= 0)))
             gain[rows] = self._many(light, rows)
         return gain
+
+    def _width(self, part: slice) -> Array:
+        """Return (r,) how far a footprint reaches from its centre, twice: about its width [m]."""
+        return np.asarray(2.0 * np.sqrt((self._apart[part] ** 2).sum(axis=2).max(axis=1)))
 
     def _varying(self, light: Lamp | EmitterGroup, rows: Array) -> Array:
         """Return (r,) the mean gain at some rows, over which it varies."""

@@ -91,7 +91,7 @@ def measure_irradiance(meter: bpy.types.Object, samples: int = 16, size: int = 1
     Parameters
     ----------
     meter : bpy.types.Object
-        A mesh of one quad; its material is replaced.
+        A mesh whose first face is a quad, which is measured; its material is replaced.
     samples, size : int
         A texel's samples, and the texels along each side.
 
@@ -115,7 +115,8 @@ def measure_irradiance(meter: bpy.types.Object, samples: int = 16, size: int = 1
     meter.data.materials.clear()
     meter.data.materials.append(material)
     layer = meter.data.uv_layers.new(name="Meter")
-    layer.data.foreach_set("uv", [0, 0, 1, 0, 1, 1, 0, 1])
+    quad = [0, 0, 1, 0, 1, 1, 0, 1]
+    layer.data.foreach_set("uv", quad + [0] * (2 * len(layer.data) - len(quad)))
     bpy.context.view_layer.objects.active = meter
     meter.select_set(True)
     status = bpy.ops.object.bake(type="DIFFUSE", pass_filter={"DIRECT", "INDIRECT"}, margin=0)

@@ -197,6 +197,14 @@ def test_what_is_not_understood_warns(
     assert words in warning.message
 
 
+def test_a_lamps_own_limit_of_bounces_warns(meter: bpy.types.Object) -> None:
+    lamp = add_lamp("POINT", "Short", energy=7.0)
+    assert not _exported()[1]
+    lamp.data.cycles.max_bounces = 2
+    (warning,) = _exported()[1]
+    assert warning.message == "lamp 'Short': its limit of bounces is ignored: all its light is followed"
+
+
 def test_an_area_lamp_keeps_its_power_when_scaled() -> None:
     add_mesh("Floor")
     add_lamp("AREA", energy=5.0, shape="ELLIPSE", size=2.0, size_y=1.0, transform={"scale": (3.0, 2.0, 1.0)})

@@ -24,7 +24,7 @@ import numpy as np
 from tests.golden import references
 from tests.golden.comparison import Comparison, compare
 from tests.golden.gallery_page import IMAGES, PAGE, RECORD, page, picture
-from tests.golden.png import write_png
+from tests.golden.pictures import write_png
 from tests.golden.rows import ROWS, Row
 from tests.golden.view import render_view
 

@@ -19,7 +19,7 @@ from radiosity_addon.pipeline import bake
 from radiosity_addon.settings import BakeSettings
 from radiosity_addon.solver.steps import drain
 from tests.golden.cornell_reference import FILE, Reference, load
-from tests.golden.png import write_png
+from tests.golden.pictures import write_png
 
 RELATIVE_RMSE = 0.011
 """Promised are 1.5 %; 0.76 % is measured."""

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.golden import gallery, gallery_page
-from tests.golden.png import write_png
+from tests.golden.pictures import write_png
 from tests.golden.rows import ROWS
 from tests.golden.view import read_png
 

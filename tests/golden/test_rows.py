@@ -10,7 +10,7 @@ import pytest
 from tests.golden import references
 from tests.golden.comparison import compare
 from tests.golden.gallery import read_record
-from tests.golden.png import write_png
+from tests.golden.pictures import write_png
 from tests.golden.rows import FAMILIES, ROWS
 
 PICTURES = Path(__file__).resolve().parents[2] / "out" / "golden"

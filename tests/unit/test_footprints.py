@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from radiosity_addon.solver.embree import EmbreeCaster
+from radiosity_addon.solver.emitters import EmitterGroup
 from radiosity_addon.solver.footprints import Footprints, SpreadPoints
 from radiosity_addon.solver.lights import AreaLight, PointLight
 from radiosity_addon.solver.sampling import points_on_triangles, stratified_square
@@ -79,3 +80,37 @@ def test_the_threads_change_no_share() -> None:
     one = share_of(floor(1.0), blocker())
     for threads in (2, 3):
         np.testing.assert_array_equal(share_of(floor(1.0), blocker(), threads=threads), one)
+
+
+def test_a_glowing_edge_beside_the_centre_shines_on_its_part_of_the_footprint() -> None:
+    """A wide sheet a hair off the surface begins near a footprint's end: the centre gets next to nothing."""
+    half, begins, height = 0.5, 0.4, 0.02
+    sheet = rectangle((begins, -50, height), (0, 100, 0), (100, 0, 0))
+    group = EmitterGroup(sheet, np.tile([0.0, 0.0, -1.0], (2, 1)), np.ones(3), 1e-6)
+    centre = np.tile([0.0, 0.0, 0.0], (33, 1))
+    centre[-1, 0] = -3.0
+
+    def across(rows: np.ndarray, u: np.ndarray) -> np.ndarray:
+        return centre[rows, None] + np.concatenate([half * (2 * u - 1), 0 * u[..., :1]], axis=2)
+
+    at = Footprints(centre, np.tile([0.0, 0.0, 1.0], (33, 1)), np.arange(33), across)
+    gain = drain(SpreadPoints(at, 1).gain_steps(group, 0.05))
+    # Where x is past the edge: F = (1 + x/√(x² + h²))/2, whose integral is (x + √(x² + h²))/2.
+    ends = np.array([-half, half]) - begins
+    expected = np.diff(0.5 * (ends + np.hypot(ends, height)))[0] / (2 * half)
+    assert group.unit_irradiance(at.points[:1], at.normals[:1])[0] < 0.01 * expected
+    np.testing.assert_allclose(gain[:-1].mean(), expected, rtol=0.02)
+    assert np.abs(gain[:-1] / expected - 1.0).max() < 0.15
+    # Far from it the centre speaks for all.
+    assert gain[-1] == group.unit_irradiance(at.points[-1:], at.normals[-1:])[0]
+
+
+def test_what_lies_beside_a_face_is_told_by_the_boxes_of_faces() -> None:
+    """One box around all faces would take in what lies between them."""
+    left = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0))
+    right = rectangle((9, 0, 0), (1, 0, 0), (0, 1, 0))
+    group = EmitterGroup(np.concatenate([left, right]), np.tile([0.0, 0.0, 1.0], (4, 1)), np.ones(3), 1e-6)
+    points = np.array([[0.5, 0.5, 0.3], [1.2, 1.2, 0.0], [5.0, 0.5, 0.0], [9.5, 0.5, -0.5], [12.0, 0.5, 0.0]])
+    reach = np.array([0.31, 0.28, 0.3, 0.4, 2.1])
+    np.testing.assert_array_equal(group.beside(points, reach), [True, False, False, False, True])
+    assert group.beside(points[1:2], np.array([0.29]))[0]
