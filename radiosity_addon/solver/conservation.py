@@ -58,7 +58,7 @@ visibilities to blame for what they lack."""
 LIMIT = 2.0
 """Largest factor: a leaf with hardly any links is not blown up, …"""
 
-LIMIT_CLOSED = 8.0
+LIMIT_CLOSED = 32.0
 """… nor where all arrives; but there nothing is noise, and what is not sent is lost."""
 
 LIMIT_RECEIVED = 1.5
@@ -127,7 +127,6 @@ class Conservation:
             known &= gets[:, 1] > AMONG_THEMSELVES * gets[:, 0]
         if not (known & closed).any():
             return Balance(links, self.factors(hierarchy, top, links, cluster_links), received)
-        _, unscaled = sent_by_leaves(hierarchy, top, links, cluster_links)
         leaves = hierarchy.leaves[known[hierarchy.face[hierarchy.leaves]]]
         for number in range(ROUNDS):
             own, shared = received_by_leaves(hierarchy, top, links, cluster_links, scale)
@@ -136,7 +135,7 @@ class Conservation:
                 if np.abs(sums[: len(known)] - wanted)[known].max() < ENOUGH:
                     break
             received[leaves] = _receive(hierarchy, leaves, own, shared, wanted, closed)
-            scale = self.factors(hierarchy, top, links, cluster_links, received, unscaled)
+            scale = self.factors(hierarchy, top, links, cluster_links, received)
         return Balance(links, scale, received)
 
     def closed(self, hierarchy: Hierarchy) -> Array:
@@ -152,7 +151,6 @@ class Conservation:
         links: Links,
         cluster_links: ClusterLinks,
         received: Array | None = None,
-        unscaled: Array | None = None,
     ) -> Array:
         """Return (e, 2): what to scale leaves' radiosity with, over own links and over shared ones.
 
@@ -160,16 +158,14 @@ class Conservation:
         ----------
         received : (e, 2) float64 or None
             What the leaves' gathered light is scaled with, as from `balance`.
-        unscaled : (e,) float64 or None
-            What shared links carry of each leaf's light with `received` 1: the limits are against that.
         """
         self.arrivals.measure(hierarchy)
         leaves = hierarchy.leaves
         own, shared = sent_by_leaves(hierarchy, top, links, cluster_links, received)
-        unscaled = shared if unscaled is None else unscaled
         result = np.ones((hierarchy.n_elements, 2))
         arriving = self.arrivals.share[leaves]
-        result[leaves] = _over_shared(arriving, own[leaves], shared[leaves], unscaled[leaves])
+        limit = np.where(arriving == 1.0, LIMIT_CLOSED, LIMIT)
+        result[leaves] = _over_shared(arriving, own[leaves], shared[leaves], limit)
         # Own links are better than few rays: scaled down for rays' noise, and not up, they would lose power.
         most = np.minimum(arriving + DOUBT * self.arrivals.error(leaves), 1.0)
         result[leaves, 0] = np.minimum(1.0, most / np.maximum(own[leaves], 1e-300))
@@ -188,7 +184,7 @@ def _receive(
     of_faces = pull(hierarchy, np.stack([own, shared], axis=1))[: len(closed)]
     own = np.where(closed[face], own[leaves], of_faces[face, 0])
     shared = np.where(closed[face], shared[leaves], of_faces[face, 1])
-    result = _over_shared(wanted[face], own, shared, shared)
+    result = _over_shared(wanted[face], own, shared, LIMIT)
     whole = leaves < len(closed)
     result[whole] = _over_all(wanted[face], own + shared)[whole, None]
     return result
@@ -200,14 +196,9 @@ def _over_all(wanted: Array, sums: Array) -> Array:
     return np.where(sums > 0, scale, 1.0)
 
 
-def _over_shared(wanted: Array, own: Array, shared: Array, unscaled: Array) -> Array:
-    """Return (n, 2) what own and shared are scaled with to make `wanted`: own, if it can be, with 1.
-
-    Shared ones by no more than the limits, and what makes good for scaling on the other side.
-    """
+def _over_shared(wanted: Array, own: Array, shared: Array, limit: Array | float) -> Array:
+    """Return (n, 2) what own and shared are scaled with to make `wanted`: own, if it can be, with 1."""
     left = np.maximum(wanted - own, 0.0)
-    limit = np.where(wanted == 1.0, LIMIT_CLOSED, LIMIT)
-    limit = limit * np.maximum(unscaled / np.maximum(shared, 1e-300), 1.0)
     return np.stack(
         [
             np.minimum(1.0, wanted / np.maximum(own, 1e-300)),

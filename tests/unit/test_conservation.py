@@ -7,7 +7,7 @@ import pytest
 
 from radiosity_addon.solver import Scene
 from radiosity_addon.solver.cluster_links import gather_at_clusters
-from radiosity_addon.solver.conservation import LIMIT_CLOSED, Conservation
+from radiosity_addon.solver.conservation import LIMIT, LIMIT_CLOSED, LIMIT_RECEIVED, Conservation
 from radiosity_addon.solver.hierarchy import LEAF
 from radiosity_addon.solver.link_sums import sent, sent_by_leaves
 from radiosity_addon.solver.methods.hierarchical import HierarchicalState
@@ -72,6 +72,9 @@ def test_factors_are_bounded_and_only_the_leaves(closed: HierarchicalState) -> N
     assert (factor >= 0).all()
     assert (factor <= [1.0, LIMIT_CLOSED]).all()
     assert (factor[hierarchy.first_child != LEAF] == 1).all()
+    # However little rows leave: what rounding leaves of a sum must not be blown up to 1.
+    assert (closed.balance.sent <= [1.0, LIMIT_CLOSED]).all()
+    assert (closed.balance.received <= [LIMIT_RECEIVED, LIMIT]).all()
 
 
 def test_sent_is_the_transpose_of_gather(closed: HierarchicalState) -> None:
