@@ -8,7 +8,7 @@ from .arrays import Array
 from .cluster_links import ClusterLinks, gather_at_clusters
 from .links import Links
 from .state import SolverState
-from .transport import gather, push, push_pull, shared_means
+from .transport import gather, push, push_pull, quarters_mean, shared_means
 from .tree_top import TreeTop
 
 
@@ -35,8 +35,9 @@ def reflect(
         What the faces of clusters receive together.
     top : TreeTop or None
         With all clusters of both sets of links; needed for the second.
-    received : (f,) float64 or None
-        What the light that faces gather is scaled with (`conservation`).
+    received : (e, 2) float64 or None
+        What the light that leaves gather is scaled with, over own links and over shared ones
+        (`conservation`).
 
     Returns
     -------
@@ -49,11 +50,14 @@ def reflect(
         threads = state.settings.threads
         # A face that looks past the horizon of what its neighbours see gets nothing, not less.
         shared = np.maximum(gather_at_clusters(hierarchy, top, cluster_links, sent, threads), 0.0)
-    gathered = push(hierarchy, gather(hierarchy, links, state.radiosity, scale, top, (means, sent)))
+    own = gather(hierarchy, links, state.radiosity, scale, top, (means, sent))
+    gathered = push(hierarchy, own)
     if shared is not None:
         gathered += shared.take(hierarchy.face, axis=0)
     if received is not None:
-        gathered *= received.take(hierarchy.face)[:, None]
+        # Only leaves count, and these have from their ancestors what is not their own.
+        of_leaves = quarters_mean(own)
+        gathered = received[:, 1:] * (gathered - of_leaves) + received[:, :1] * of_leaves
     return push_pull(hierarchy, lights, gathered, state.emission, state.reflectance)
 
 

@@ -10,76 +10,138 @@ So rays find what share of each leaf's light arrives anywhere at all, in a close
 simply all of it. What the leaf's own links leave of that is what it sends over shared ones:
 its radiosity is scaled when they take their mean. Where its own links alone send more than
 it has (faces that lie in one another are all hit), those are scaled too: so no leaf ever
-sends more than it has, and the iteration converges whatever the scene. The factors in the links stay as they
-are: what they add up to, and so what a coarse visibility loses, is reported as the closure.
+sends more than it has, and the iteration converges whatever the scene.
+
+What a leaf receives is the same the other way round: where nothing escapes ΣFV = 1, and what its own links
+leave of that is what it receives over shared ones. A face that is its own leaf has all its light scaled, as
+links to clusters miss what is curved within them. Both balances are struck in turn (Sinkhorn 1964), and
+before them visibilities that few rays estimate are corrected (`known_sums`). The links as measured stay
+as they are: what they alone add up to is reported too.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from .arrays import Array
-from .cluster_links import ClusterLinks, gather_at_clusters
-from .hierarchy import LEAF, Hierarchy, node_opacity
+from .arrivals import Arrivals
+from .cluster_links import ClusterLinks
+from .hierarchy import Hierarchy
+from .known_sums import corrected
+from .link_sums import received_by_leaves, received_over_clusters, sent_by_leaves
 from .links import Links
-from .node_samples import node_samples
-from .parallel import for_chunks
-from .sampling import cosine_hemisphere, stratified_square, to_world
-from .transport import gather, node_radiosity, pull, push
+from .transport import pull
 from .tree_top import TreeTop
 from .visibility import RayCaster
 
-RAYS = 32
-"""Hemisphere rays of a leaf; in a closed scene they all agree, and there is no noise at all."""
+ROUNDS = 8
+"""How often both balances are struck in turn at most, …"""
 
-ROUNDS = 2
-"""How often both balances are struck in turn."""
+ENOUGH = 2e-3
+"""… until no face receives more or less by this part."""
 
-CHUNK = 1 << 13
-"""Leaves measured at once: their rays take about 30 MB a thread."""
+AMONG_THEMSELVES = 0.65
+"""Faces are balanced that get more than this part of their light from others whose sums are known."""
+
+KNOWN = 5e-3
+"""Standard error of what arrives from a face, if its sum is to count as known."""
+
+DOUBT = 3.0
+"""Standard errors that a leaf's own links may send more than its rays say arrives."""
+
+SURE = 0.01
+"""Faces that receive less than this over links to clusters, which miss more than rays, know which of their
+visibilities to blame for what they lack."""
 
 LIMIT = 2.0
-"""Largest factor: a leaf with hardly any links is not blown up."""
+"""Largest factor: a leaf with hardly any links is not blown up, …"""
+
+LIMIT_CLOSED = 32.0
+"""… nor where all arrives; but there nothing is noise, and what is not sent is lost."""
 
 LIMIT_RECEIVED = 1.5
 """Largest factor on what a face receives, and the inverse of the least: more is no error of a curve, and
 must not be hidden."""
 
 
+@dataclass(frozen=True)
+class Balance:
+    """What light is exchanged with.
+
+    Attributes
+    ----------
+    links : Links
+        To elements, their visibilities corrected (see `known_sums`).
+    sent, received : (e, 2) float64
+        What leaves' radiosity and their gathered light are scaled with, over their own links and
+        over those they share with their ancestors and clusters; 1 where nothing is known.
+    """
+
+    links: Links
+    sent: Array
+    received: Array
+
+
 class Conservation:
-    """Remembers what share of each leaf's light arrives, leaf by leaf as they appear."""
+    """Knows what share of each leaf's light arrives, and makes links exchange that."""
 
     def __init__(self, caster: RayCaster, min_area: float, seed: int, threads: int = 0) -> None:
-        self._caster, self._min_area, self._seed, self._threads = caster, min_area, seed, threads
-        self._arriving = np.zeros(0)
+        self.arrivals = Arrivals(caster, min_area, seed, threads)
 
     def balance(
-        self, hierarchy: Hierarchy, top: TreeTop, links: Links, cluster_links: ClusterLinks
-    ) -> tuple[Array, Array]:
-        """Return (e, 2) what leaves' radiosity, and (f,) what faces' gathered light is scaled with.
+        self,
+        hierarchy: Hierarchy,
+        top: TreeTop,
+        links: Links,
+        cluster_links: ClusterLinks,
+        rough: bool = False,
+    ) -> Balance:
+        """Return what to exchange light with, in place of what was measured.
 
-        The first as from `factors`, given the second, which is 1 where anything may escape,
-        where faces are split, and everywhere without links to clusters: a few large faces
-        are linked finely enough.
+        Parameters
+        ----------
+        rough : bool
+            While links are still refined: only what leaves send is balanced, to keep the power.
         """
-        scale = self.factors(hierarchy, top, links, cluster_links)
-        received = np.ones(len(hierarchy.faces))
-        if len(cluster_links) == 0:
-            return scale, received
-        # Leaves of a split face share light unevenly, rightly: no one number mends them.
-        whole = hierarchy.first_child[: len(hierarchy.faces)] == LEAF
-        closed = self.closed(hierarchy) & whole
-        for _ in range(ROUNDS):
-            sums = received_by_faces(hierarchy, top, links, cluster_links, scale)
-            wanted = np.clip(1.0 / np.maximum(sums, 1e-300), 1.0 / LIMIT_RECEIVED, LIMIT_RECEIVED)
-            received = np.where(closed & (sums > 0), wanted, 1.0)
+        self.arrivals.measure(hierarchy)
+        scale, received = np.ones((2, hierarchy.n_elements, 2))
+        if rough:
+            return Balance(links, self.factors(hierarchy, top, links, cluster_links), received)
+        closed = self.closed(hierarchy)
+        sure = closed & (received_over_clusters(hierarchy, top, cluster_links, scale) < SURE)
+        if sure.any():
+            rows = sum(received_by_leaves(hierarchy, top, links, cluster_links, scale))
+            columns = sum(sent_by_leaves(hierarchy, top, links, cluster_links))
+            sums = pull(hierarchy, np.stack([rows, columns], axis=1))[: len(closed)]
+            links = corrected(hierarchy, links, sure, sums[:, 0], sums[:, 1])
+        wanted, error, escapes = self.arrivals.of_faces(hierarchy)
+        known = closed | (~escapes & (error < KNOWN) & (wanted > 0.0))
+        if closed.any() and not known.all():
+            # What faces get from others, whose own sums nobody knows, is not theirs to correct.
+            among = np.where(known[hierarchy.face], 1.0, 0.0)[:, None] * scale
+            get = sum(received_by_leaves(hierarchy, top, links, cluster_links, scale))
+            get_from_known = sum(received_by_leaves(hierarchy, top, links, cluster_links, among))
+            gets = pull(hierarchy, np.stack([get, get_from_known], axis=1))[: len(known)]
+            known &= gets[:, 1] > AMONG_THEMSELVES * gets[:, 0]
+        if not (known & closed).any():
+            return Balance(links, self.factors(hierarchy, top, links, cluster_links), received)
+        leaves = hierarchy.leaves[known[hierarchy.face[hierarchy.leaves]]]
+        for number in range(ROUNDS):
+            own, shared = received_by_leaves(hierarchy, top, links, cluster_links, scale)
+            if number > 0:
+                sums = pull(hierarchy, received * np.stack([own, shared], axis=1)).sum(axis=1)
+                if np.abs(sums[: len(known)] - wanted)[known].max() < ENOUGH:
+                    break
+            received[leaves] = _receive(hierarchy, leaves, own, shared, wanted, closed)
             scale = self.factors(hierarchy, top, links, cluster_links, received)
-        return scale, received
+        return Balance(links, scale, received)
 
     def closed(self, hierarchy: Hierarchy) -> Array:
-        """Return (f,) whether no ray of a face left the scene; after `factors`."""
+        """Return (f,) whether all rays of a face arrived; after `factors`."""
         face = hierarchy.face[hierarchy.leaves]
-        arrived = self._arriving[hierarchy.leaves] == 1.0
+        arrived = self.arrivals.share[hierarchy.leaves] == 1.0
         return np.asarray(np.bincount(face, ~arrived, len(hierarchy.faces)) == 0)
 
     def factors(
@@ -94,166 +156,62 @@ class Conservation:
 
         Parameters
         ----------
-        received : (f,) float64 or None
-            What the faces' gathered light is scaled with.
+        received : (e, 2) float64 or None
+            What the leaves' gathered light is scaled with, as from `balance`.
         """
-        self._measure(hierarchy)
+        self.arrivals.measure(hierarchy)
         leaves = hierarchy.leaves
-        at_links = taken_at_links(hierarchy, links)
-        if received is not None:
-            at_links *= received[hierarchy.face[links.receiver]]
-        sums = sent(hierarchy, links, at_links)
-        own = sums[leaves].mean(axis=1)[:, 0]
-        at_clusters = Arriving(hierarchy, top, cluster_links, received)
-        sums = sums + sent_to_clusters(hierarchy, cluster_links, at_clusters)
-        from_clusters = _from_clusters(hierarchy, top, links, at_links, cluster_links, at_clusters)
-        shared = push(hierarchy, sums + from_clusters)[leaves, 0] - own
-        arriving = self._arriving[leaves]
-        left = np.maximum(arriving - own, 0.0)
+        own, shared = sent_by_leaves(hierarchy, top, links, cluster_links, received)
         result = np.ones((hierarchy.n_elements, 2))
-        result[leaves, 0] = np.minimum(1.0, arriving / np.maximum(own, 1e-300))
-        result[leaves, 1] = np.where(shared > 0, np.minimum(left / np.maximum(shared, 1e-300), LIMIT), 1.0)
+        arriving = self.arrivals.share[leaves]
+        limit = np.where(arriving == 1.0, LIMIT_CLOSED, LIMIT)
+        result[leaves] = _over_shared(arriving, own[leaves], shared[leaves], limit)
+        # Own links are better than few rays: scaled down for rays' noise, and not up, they would lose power.
+        most = np.minimum(arriving + DOUBT * self.arrivals.error(leaves), 1.0)
+        result[leaves, 0] = np.minimum(1.0, most / np.maximum(own[leaves], 1e-300))
         return result
 
-    def _measure(self, hierarchy: Hierarchy) -> None:
-        """Trace the rays of leaves that are new."""
-        known = len(self._arriving)
-        self._arriving = np.concatenate([self._arriving, np.full(hierarchy.n_elements - known, np.nan)])
-        leaves = hierarchy.leaves
-        new = leaves[np.isnan(self._arriving[leaves])]
-        faces = new[new < len(hierarchy.faces)]
-        if len(faces):
-            # Neighbours that together are no larger than an element may be share their rays.
-            large = np.flatnonzero(hierarchy.clusters.area > self._min_area)
-            top = TreeTop(hierarchy, large)
-            share = self._share(hierarchy, top.tips)
-            self._arriving[faces] = share[top.tip[faces] - top.n_inner]
-        below = new[len(faces) :]
-        self._arriving[below] = self._share(hierarchy, hierarchy.n_clusters + below)
 
-    def _share(self, hierarchy: Hierarchy, nodes: Array) -> Array:
-        """Return (n,) the share of the light of nodes that arrives anywhere."""
-        share = np.empty(len(nodes))
+def _receive(
+    hierarchy: Hierarchy, leaves: Array, own: Array, shared: Array, wanted: Array, closed: Array
+) -> Array:
+    """Return (n, 2) what to scale leaves' own and shared light with, that faces receive what is `wanted`.
 
-        def measure(rows: slice) -> None:
-            chosen = nodes[rows]
-            quarter = np.broadcast_to(np.arange(RAYS) % 4, (len(chosen), RAYS))
-            points, normals = node_samples(hierarchy, chosen, quarter, chosen, self._seed + 41)
-            unit = stratified_square(chosen, RAYS, self._seed + 42)
-            normals = normals.reshape(-1, 3)
-            directions = to_world(cosine_hemisphere(unit).reshape(-1, 1, 3), normals)[:, 0]
-            start = points.reshape(-1, 3) + self._caster.surface_offset * normals
-            escapes = self._caster.passing(start, directions, np.full(len(start), np.inf))
-            share[rows] = 1.0 - escapes.reshape(-1, RAYS).mean(axis=1)
-
-        for_chunks(measure, len(nodes), CHUNK, self._threads)
-        return share
-
-
-class Arriving:
-    """What the receivers of links to clusters take where they are there, per unit of the source's radiosity.
-
-    Parameters
-    ----------
-    received : (f,) float64 or None
-        What their faces' light is scaled with.
-
-    Attributes
-    ----------
-    power : (l,) float64
-        Σ A_f a_f (n_f·v + g·(x_f − c) + h) over the receiver's faces [m²].
-    area : (l,) float64
-        Σ A_f a_f [m²]
+    Leaf by leaf where all is 1. Where part ends on black backs, which few rays of a leaf tell roughly, by
+    one number a face.
     """
+    face = hierarchy.face[leaves]
+    of_faces = pull(hierarchy, np.stack([own, shared], axis=1))[: len(closed)]
+    own = np.where(closed[face], own[leaves], of_faces[face, 0])
+    shared = np.where(closed[face], shared[leaves], of_faces[face, 1])
+    result = _over_shared(wanted[face], own, shared, LIMIT)
+    whole = leaves < len(closed)
+    result[whole] = _over_all(wanted[face], own + shared)[whole, None]
+    return result
 
-    def __init__(
-        self, hierarchy: Hierarchy, top: TreeTop, links: ClusterLinks, received: Array | None
-    ) -> None:
-        clusters, faces = hierarchy.clusters, hierarchy.faces
-        if received is None:
-            self.area = (clusters.area * node_opacity(hierarchy)[: len(clusters)])[links.receiver]
-            self.power = self.area * links.factor * links.visibility
-            return
-        weight = (received * faces.area * faces.opacity)[:, None]
-        sums = top.sums(np.concatenate([weight, weight * faces.normal, weight * faces.centre], axis=1))
-        at = sums[top.row[links.receiver]]
-        self.area = at[:, 0]
-        offset = at[:, 4:] - at[:, :1] * clusters.centre[links.receiver]
-        self.power = at[:, 0] * links.even + np.einsum("lk,lk->l", at[:, 1:4], links.vector)
-        self.power += np.einsum("lk,lk->l", offset, links.gradient)
+
+def _over_all(wanted: Array, sums: Array) -> Array:
+    """Return (n,) what (n,) sums are scaled with to make `wanted`, within `LIMIT_RECEIVED`."""
+    scale = np.clip(wanted / np.maximum(sums, 1e-300), 1.0 / LIMIT_RECEIVED, LIMIT_RECEIVED)
+    return np.where(sums > 0, scale, 1.0)
+
+
+def _over_shared(wanted: Array, own: Array, shared: Array, limit: Array | float) -> Array:
+    """Return (n, 2) what own and shared are scaled with to make `wanted`: own, if it can be, with 1."""
+    left = np.maximum(wanted - own, 0.0)
+    return np.stack(
+        [
+            np.minimum(1.0, wanted / np.maximum(own, 1e-300)),
+            np.where(shared > 0, np.minimum(left / np.maximum(shared, 1e-300), limit), 1.0),
+        ],
+        axis=1,
+    )
 
 
 def received_by_faces(
-    hierarchy: Hierarchy, top: TreeTop, links: Links, cluster_links: ClusterLinks, scale: Array
+    hierarchy: Hierarchy, top: TreeTop, balance: Balance, cluster_links: ClusterLinks
 ) -> Array:
-    """Return (f,) ΣFV over each face's, its elements' and its clusters' links, sources scaled by `scale`."""
-    there = hierarchy.opacity[:, None]
-    own = pull(hierarchy, push(hierarchy, gather(hierarchy, links, there, scale, top)))
-    means = node_radiosity(hierarchy, pull(hierarchy, scale[:, 1:] * there), top)
-    shared = np.maximum(gather_at_clusters(hierarchy, top, cluster_links, means)[:, 0], 0.0)
-    return np.asarray(own[: len(hierarchy.faces), 0] + shared)
-
-
-def _from_clusters(
-    hierarchy: Hierarchy,
-    top: TreeTop,
-    links: Links,
-    at_links: Array,
-    cluster_links: ClusterLinks,
-    arriving: Arriving,
-) -> Array:
-    """Return (e, 4, 1) the share that the links of the clusters above each face carry."""
-    clusters, faces, count = hierarchy.clusters, hierarchy.faces, hierarchy.n_clusters
-    total = np.zeros((hierarchy.n_elements, 4, 1))
-    if count == 0:
-        return total
-    # Linear in the face's place: (1, y) times four numbers a cluster, as `gather_at_clusters` sends.
-    share = np.zeros((top.n_rows, 4))
-    grouped = np.flatnonzero(links.source < count)
-    source = links.source[grouped]
-    share[:, 0] += top.spread(source, at_links[grouped] / clusters.area[source])
-    grouped = np.flatnonzero(cluster_links.source < count)
-    source = cluster_links.source[grouped]
-    slope = (arriving.area[grouped] / clusters.area[source])[:, None] * cluster_links.gradient[grouped]
-    evenly = arriving.power[grouped] / clusters.area[source]
-    share[:, 0] += top.spread(source, evenly + np.einsum("lk,lk->l", slope, clusters.centre[source]))
-    for axis in range(3):
-        share[:, 1 + axis] -= top.spread(source, slope[:, axis])
-    carried = np.zeros(len(faces))
-    for term, pushed in zip((np.ones(1), *faces.centre.T), top.push(share).T, strict=True):
-        carried += term * pushed[top.tip]
-    total[: len(faces)] = np.maximum(carried, 0.0)[:, None, None]
-    return total
-
-
-def sent_to_clusters(hierarchy: Hierarchy, links: ClusterLinks, arriving: Arriving) -> Array:
-    """Return (e, 1, 1): the share of the light of each element that its own links to clusters carry."""
-    single = links.source >= hierarchy.n_clusters
-    element = links.source[single] - hierarchy.n_clusters
-    power = arriving.power[single]
-    return np.bincount(element, power / hierarchy.area[element], hierarchy.n_elements)[:, None, None]
-
-
-def taken_at_links(hierarchy: Hierarchy, links: Links) -> Array:
-    """Return (l,) A_r F_rs V_rs [m²] of links to elements, of each receiver's area A_r what is there."""
-    there = hierarchy.area * hierarchy.opacity
-    return np.asarray(there[links.receiver] * links.factor * links.visibility)
-
-
-def sent(hierarchy: Hierarchy, links: Links, at_links: Array | None = None) -> Array:
-    """Return (e, 4, 1): the share of the light of each element's quarters that its own links carry.
-
-    The transpose of `gather`, with reciprocity (handout (3.30)): Σ_r A_r F_rs V_rs / A_s, of each
-    receiver's area what is there; `at_links` (l,) are other A_r F_rs V_rs [m²], scaled.
-    """
-    if at_links is None:
-        at_links = taken_at_links(hierarchy, links)
-    single = links.source >= hierarchy.n_clusters
-    element = links.source[single] - hierarchy.n_clusters
-    per_element = at_links[single] / hierarchy.area[element]
-    inner = hierarchy.first_child[element] != LEAF
-    total = np.zeros((hierarchy.n_elements, 4, 1))
-    for quarter in range(4):
-        share = np.where(inner, links.of_quarter[single, quarter], 1.0)
-        total[:, quarter, 0] = np.bincount(element, per_element * share, hierarchy.n_elements)
-    return total
+    """Return (f,) ΣFV over each face's, its elements' and its clusters' links, as balanced."""
+    own, shared = received_by_leaves(hierarchy, top, balance.links, cluster_links, balance.sent)
+    balanced = balance.received * np.stack([own, shared], axis=1)
+    return np.asarray(pull(hierarchy, balanced)[: len(hierarchy.faces)].sum(axis=1))

@@ -35,8 +35,8 @@ def ray_caster(scene: Scene, threads: int = 0) -> RayCaster:
 
 def _caster(scene: Scene, threads: int, only: Array, for_lamps: RayCaster | None) -> RayCaster:
     if scene.images is None or not scene.images.cut_out.any():
-        return EmbreeCaster(scene.triangles, threads, only, for_lamps)
-    return CutOutCaster(scene.triangles, scene.images, threads, only, for_lamps)
+        return EmbreeCaster(scene.triangles, threads, only, for_lamps, scene.two_sided)
+    return CutOutCaster(scene.triangles, scene.images, threads, only, for_lamps, scene.two_sided)
 
 
 class CutOutCaster:
@@ -54,6 +54,8 @@ class CutOutCaster:
         The triangles that rays meet, where it is not all of them.
     for_lamps : RayCaster or None
         What stops the light of lamps, where that is something else.
+    two_sided : (t,) bool or None
+        The others' backs are black; None if that does not matter.
     """
 
     def __init__(
@@ -63,6 +65,7 @@ class CutOutCaster:
         threads: int = 0,
         only: Array | None = None,
         for_lamps: RayCaster | None = None,
+        two_sided: Array | None = None,
     ) -> None:
         self._own_rays = 0
         self._for_lamps = for_lamps
@@ -73,8 +76,9 @@ class CutOutCaster:
         whole, cut = met & ~images.cut_out, met & images.cut_out
         self._whole_rows = np.append(np.flatnonzero(whole), NO_HIT).astype(np.int32)
         self._cut_rows = np.append(np.flatnonzero(cut), NO_HIT).astype(np.int32)
-        self._whole = EmbreeCaster(triangles[whole], threads)
-        self._cut = EmbreeCaster(triangles[cut], threads)
+        sides = (None, None) if two_sided is None else (two_sided[whole], two_sided[cut])
+        self._whole = EmbreeCaster(triangles[whole], threads, two_sided=sides[0])
+        self._cut = EmbreeCaster(triangles[cut], threads, two_sided=sides[1])
 
     @property
     def for_lamps(self) -> RayCaster:

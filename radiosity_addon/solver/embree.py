@@ -1,7 +1,8 @@
 """Ray casting with Embree: the only module that imports embreex.
 
 It owns what Embree needs: float32, origins moved to the scene's centre (so that a scene
-far from the origin keeps its precision), batches on threads, the first query single.
+far from the origin keeps its precision), batches on threads, the first query single; and copies of
+what lies back to back with a black back (`coincident`).
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from threading import Lock
 import numpy as np
 
 from .arrays import Array
+from .coincident import facing_copies
 from .parallel import for_chunks
 from .visibility import NO_HIT, Hits, RayCaster, surface_offset
 
@@ -34,6 +36,8 @@ class EmbreeCaster:
         The triangles that rays meet, where it is not all of them.
     for_lamps : RayCaster or None
         What stops the light of lamps, where that is something else.
+    two_sided : (t,) bool or None
+        The others' backs are black; None if that does not matter.
     """
 
     def __init__(
@@ -42,6 +46,7 @@ class EmbreeCaster:
         threads: int = 0,
         only: Array | None = None,
         for_lamps: RayCaster | None = None,
+        two_sided: Array | None = None,
     ) -> None:
         from embreex.mesh_construction import TriangleMesh
         from embreex.rtcore_scene import EmbreeScene
@@ -54,12 +59,20 @@ class EmbreeCaster:
         self._rows = None if only is None or only.all() else np.flatnonzero(only)
         if self._rows is not None:
             triangles = triangles[self._rows]
+            two_sided = None if two_sided is None else two_sided[self._rows]
         self._empty = len(triangles) == 0
         if self._empty:
             return
         corners = triangles.reshape(-1, 3)
         self._centre = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
-        local = np.ascontiguousarray(triangles - self._centre, dtype=np.float32)
+        triangles = triangles - self._centre
+        if two_sided is not None and not two_sided.all():
+            copied, copies = facing_copies(triangles, two_sided, self.surface_offset)
+            triangles = np.concatenate([triangles, copies])
+            if len(copied):
+                rows = np.arange(len(two_sided)) if self._rows is None else self._rows
+                self._rows = np.concatenate([rows, rows[copied]])
+        local = np.ascontiguousarray(triangles, dtype=np.float32)
         self._scene = EmbreeScene()
         self._mesh = TriangleMesh(self._scene, local)
         edges = local[:, 1:] - local[:, :1]

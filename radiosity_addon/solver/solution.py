@@ -28,7 +28,7 @@ class Solution:
     back_radiosity, back_irradiance : (t, 3) float64
         The same for the backs; 0 where a triangle is one-sided.
     triangle_closure, back_closure : (t,) float64
-        Area mean of ΣFV: the share of what leaves a side that arrives at another.
+        Area mean of ΣFV, as light was exchanged: the share of what leaves a side that arrives at another.
     report : dict
         "method", "elements", "links", "rays", "iterations", "residual", "power_W" (emitted,
         absorbed, escaped), "closure_area_mean" (over the sides that receive light),
@@ -39,7 +39,7 @@ class Solution:
         self._state = state
         hierarchy = state.hierarchy
         face_count = len(hierarchy.faces)
-        shares = state.closure()
+        shares = state.balanced_closure()
         self.triangle_radiosity, self.back_radiosity = self._by_side(state.radiosity[:face_count])
         self.triangle_irradiance, self.back_irradiance = self._by_side(state.irradiance[:face_count])
         fronts, backs = self._by_side(shares[:, None])

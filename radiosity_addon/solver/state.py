@@ -134,6 +134,10 @@ class SolverState:
         """Return (f,) the area mean over each face of ΣFV: 1 in a closed scene."""
         return np.zeros(len(self.hierarchy.faces))
 
+    def balanced_closure(self) -> Array:
+        """Return the same as light was exchanged in the end, if the method balances what links lack."""
+        return self.closure()
+
     def note(self) -> None:
         """Add how far the method is to the history."""
         self.history.append(

@@ -111,6 +111,10 @@ class TreeTop:
             total[self._children[level]] += total[level][:, None]
         return total
 
-    def spread(self, links_at: Array, weights: Array) -> Array:
-        """Return (n_rows,): the `weights` of links added up at their clusters' rows."""
-        return np.bincount(self.row[links_at], weights, self.n_rows)
+    def rows(self, clusters: Array) -> Array:
+        """Return (n,) int64: the rows of linked clusters, for `spread`."""
+        return self.row[clusters].astype(np.int64)
+
+    def spread(self, rows: Array, weights: Array) -> Array:
+        """Return (n_rows,): the `weights` of links added up at the `rows` of their clusters."""
+        return np.bincount(rows, weights, self.n_rows)

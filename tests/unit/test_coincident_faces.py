@@ -7,6 +7,7 @@ import pytest
 
 from radiosity_addon.solver import Scene
 from radiosity_addon.solver.methods.hierarchical import HierarchicalState
+from radiosity_addon.solver.power import power_balance
 from tests.rooms import CEILING, box_room, grey, rectangle
 from tests.unit.solved_rooms import solved
 
@@ -52,6 +53,9 @@ def power_ratio(state: HierarchicalState) -> float:
 def test_sheets_back_to_back_are_one_two_sided_sheet(single: HierarchicalState) -> None:
     state = with_sheets("back to back")
     assert power_ratio(state) == pytest.approx(1.0, abs=1e-4)
+    # No ray ends on the black back that lies in the other sheet.
+    power = power_balance(state)
+    assert power["absorbed"] == pytest.approx(power["emitted"], rel=1e-4)
     (walls, up, down), (walls_alone, up_alone, down_alone) = light(state), light(single)
     assert len(up) == len(up_alone) == len(down) == len(down_alone) == 128
     assert walls.mean() == pytest.approx(walls_alone.mean(), rel=0.002)

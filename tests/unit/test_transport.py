@@ -184,13 +184,14 @@ def test_the_solution_is_a_fixed_point(state: HierarchicalState) -> None:
     """B = E + ρ K B at the leaves, to the residual reported, links to clusters included."""
     hierarchy = state.hierarchy
     assert len(state.cluster_links) > 0
-    scale, received = state.balance
-    own = gather(hierarchy, state.links, state.radiosity, scale)
-    sent = node_radiosity(hierarchy, pull(hierarchy, scale[:, 1:] * state.radiosity))
-    at_faces = gather_at_clusters(hierarchy, state.top, state.cluster_links, sent)
-    own[: len(hierarchy.faces)] += np.maximum(at_faces, 0.0)[:, None]
-    arriving = push(hierarchy, received[hierarchy.face][:, None, None] * own)
     leaves = hierarchy.leaves
+    scale, received = state.balance.sent, state.balance.received
+    gathered = gather(hierarchy, state.balance.links, state.radiosity, scale)
+    own = gathered.mean(axis=1)
+    sent = node_radiosity(hierarchy, pull(hierarchy, scale[:, 1:] * state.radiosity))
+    at_faces = np.maximum(gather_at_clusters(hierarchy, state.top, state.cluster_links, sent), 0.0)
+    shared = push(hierarchy, gathered) - own + at_faces[hierarchy.face]
+    arriving = received[:, :1] * own + received[:, 1:] * shared
     faces = hierarchy.face[leaves]
     again = hierarchy.faces.emission[faces] + hierarchy.faces.reflectance[faces] * arriving[leaves]
     change = hierarchy.area[leaves] @ np.abs(again - state.radiosity[leaves])

@@ -17,7 +17,7 @@ from ..arrays import Array
 from ..bounce import bounce, reflect, relative_residual
 from ..cluster_links import ClusterLinks, join_cluster_links, no_cluster_links
 from ..cluster_pairs import measure_cluster_links
-from ..conservation import Conservation, received_by_faces
+from ..conservation import Balance, Conservation, received_by_faces
 from ..first_links import first_links
 from ..light_links import link_lights
 from ..link_census import elements_by_level, leaves_by_level, linked_leaves, links_by_level
@@ -62,8 +62,8 @@ class HierarchicalState(SolverState):
     top: TreeTop | None = None
     """The clusters that the links use."""
     conservation: Conservation | None = None
-    balance: tuple[Array, Array] | None = None
-    """What was scaled at the end (see `Conservation.balance`)."""
+    balance: Balance | None = None
+    """What light was exchanged with at the end."""
 
     @property
     def n_links(self) -> int:
@@ -78,9 +78,7 @@ class HierarchicalState(SolverState):
         """Return (f,) ΣFV as light was sent and received in the end, scaled (see `conservation`)."""
         if self.balance is None or self.top is None:
             return self.closure()
-        scale, received = self.balance
-        sums = received_by_faces(self.hierarchy, self.top, self.links, self.cluster_links, scale)
-        return np.asarray(received * sums)
+        return received_by_faces(self.hierarchy, self.top, self.balance, self.cluster_links)
 
 
 def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float, HierarchicalState]]:
@@ -215,11 +213,15 @@ def iterate(state: HierarchicalState, tolerance: float, last: bool = False) -> N
     Each step tells the residual of the radiosity before it; that of the `last` one is measured
     for the radiosity that is left in the state.
     """
-    hierarchy, links, cluster_links = state.hierarchy, state.links, state.cluster_links
+    hierarchy, cluster_links = state.hierarchy, state.cluster_links
     assert state.conservation is not None  # set when the state was made
     lights = state.direct()
-    state.top = top = _top(state)
-    state.balance = scale, received = state.conservation.balance(hierarchy, top, links, cluster_links)
+    state.top = _top(state)
+    state.balance = state.conservation.balance(
+        hierarchy, state.top, state.links, cluster_links, rough=not last
+    )
+    top, balance = state.top, state.balance
+    links, scale, received = balance.links, balance.sent, balance.received
     leaves = hierarchy.leaves
     least = state.emission[leaves]
     mixer = Anderson(hierarchy.area[leaves])

@@ -1,0 +1,89 @@
+"""What arrives of the light of leaves: shared by neighbours, apart where they differ, and black backs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from radiosity_addon.solver import Scene, arrivals
+from radiosity_addon.solver.arrivals import HELD_RAYS, LAMP_RAYS, RAYS, Arrivals
+from radiosity_addon.solver.cut_outs import ray_caster
+from radiosity_addon.solver.hierarchy import Hierarchy
+from tests.rooms import CEILING, FLOOR, box_room, grey, rectangle
+
+EVERYTHING = 1e9
+"""Smallest area that makes all faces neighbours."""
+
+
+def measured(triangles: np.ndarray, min_area: float, shines: np.ndarray | bool = False) -> Arrivals:
+    emission = grey(len(triangles), 1.0) * np.broadcast_to(shines, len(triangles))[:, None]
+    scene = Scene(triangles, grey(len(triangles), 0.5), emission)
+    result = Arrivals(ray_caster(scene), min_area, seed=3)
+    result.measure(Hierarchy(scene))
+    return result
+
+
+def open_box() -> tuple[np.ndarray, np.ndarray]:
+    room, surface = box_room(n=4)
+    return room[surface != CEILING], surface[surface != CEILING]
+
+
+def test_in_a_closed_room_all_arrives_without_noise() -> None:
+    found = measured(box_room(n=3)[0], EVERYTHING)
+    assert (found.share == 1.0).all()
+    assert not found.escapes.any()
+    assert (found.error(np.arange(len(found.share))) == 0).all()
+
+
+def test_neighbours_whose_rays_disagree_ask_their_own() -> None:
+    triangles, surface = open_box()
+    shared, alone = measured(triangles, EVERYTHING), measured(triangles, 0.0)
+    np.testing.assert_array_equal(shared.share, alone.share)
+    # F from the floor of a cube to its ceiling is 0.19982.
+    assert alone.share[surface == FLOOR].mean() == pytest.approx(1 - 0.19982, abs=0.02)
+    assert len(np.unique(alone.share)) > 10
+
+
+def test_too_many_share_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(arrivals, "MOST_RAYS", 0)
+    assert len(np.unique(measured(open_box()[0], EVERYTHING).share)) == 1
+
+
+def test_black_backs_take_what_does_not_escape() -> None:
+    """A one-sided panel under the ceiling of a closed room: what is above sees its back."""
+    room, surface = box_room((2, 2, 2), n=2)
+    panel = rectangle((0.5, 0.5, 1.5), (0, 1, 0), (1, 0, 0))
+    triangles = np.concatenate([room, panel])
+    found = measured(triangles, 0.0)
+    above = np.flatnonzero(surface == CEILING)
+    assert not found.escapes.any()
+    assert ((found.share[above] > 0.2) & (found.share[above] < 0.95)).all()
+    assert (found.rays[above] == HELD_RAYS).all()
+    assert (found.error(above) > 0).all()
+    floor = np.flatnonzero(surface == FLOOR)
+    assert (found.share[floor] == 1.0).all()
+    assert (found.rays[floor] == RAYS).all()
+
+
+def test_what_shines_into_the_open_asks_more() -> None:
+    triangles, surface = open_box()
+    found = measured(triangles, 0.0, surface == FLOOR)
+    assert (found.rays[surface == FLOOR] == LAMP_RAYS).all()
+    others = (surface != FLOOR) & found.escapes
+    assert others.sum() > 10
+    assert (found.rays[others] == RAYS).all()
+
+
+def test_faces_average_their_leaves() -> None:
+    triangles, _ = open_box()
+    scene = Scene(triangles, grey(len(triangles), 0.5), grey(len(triangles), 0.0))
+    hierarchy = Hierarchy(scene)
+    hierarchy.subdivide(np.arange(5))
+    found = Arrivals(ray_caster(scene), 0.0, seed=3)
+    found.measure(hierarchy)
+    share, error, escapes = found.of_faces(hierarchy)
+    for face in range(5):
+        children = hierarchy.first_child[face] + np.arange(4)
+        assert share[face] == pytest.approx(found.share[children].mean())
+        assert error[face] == pytest.approx(np.sqrt(share[face] * (1 - share[face]) / (4 * RAYS)))
+        assert escapes[face] == found.escapes[children].any()
