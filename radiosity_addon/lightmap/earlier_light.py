@@ -50,3 +50,22 @@ class EarlierLight:
             for part, (_, table) in zip(share, self._known, strict=True):
                 result[:, channel] += np.float32(part) * table[:, channel]
         return np.maximum(result, 0.0)
+
+    def part_of(self, strengths: Array) -> tuple[Array, Array]:
+        """Return what of some strengths is known, as much as can be taken off without going below 0.
+
+        Returns
+        -------
+        table : (r, 3) float32 [W/m²]
+            What surfaces reflect of it.
+        left : (s, 3) float64
+            The strengths that are left.
+        """
+        left, table = strengths.copy(), np.zeros_like(self._known[0][1])
+        for known, of_known in reversed(self._known):
+            there = known > 0
+            ratio = np.where(there, left / np.where(there, known, 1.0), np.inf).min(axis=0)
+            share = np.where(there.any(axis=0), ratio, 0.0)
+            left = np.maximum(left - share * known, 0.0)
+            table += share.astype(np.float32) * of_known
+        return table, left

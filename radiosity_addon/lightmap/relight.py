@@ -48,10 +48,13 @@ def relight_steps(
     assert len(links) == len(parts.links)  # a kept bake keeps them all
     known = kept.earlier.mixed(strengths)
     if known is None:
-        reflected = local.reflected(solved.elements.irradiance(strengths))
-        start, of_parts = values_of(reflected, kept.element), values_of(reflected, parts.element)
+        table, left = kept.earlier.part_of(strengths)
+        reflected = local.reflected(solved.elements.irradiance(left))
+        rows = np.concatenate([kept.element, parts.element])
+        first = table + values_of(reflected, rows)
     else:
-        start, of_parts = known[: len(kept.element)], known[len(kept.element) :]
+        first = known
+    start, of_parts = first[: len(kept.element)], first[len(kept.element) :]
     yield SOLVED
     transport = replace(kept.transport, parts=replace(parts, start=of_parts, links=links))
     lamps = kept.gains.irradiance(given)

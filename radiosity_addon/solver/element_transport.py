@@ -94,8 +94,10 @@ class ElementTransport:
         if relit.power <= 0.0:
             relit.irradiance = lights
             return lights
-        scale, received = (None, None) if state.balance is None else state.balance
-        linked = relit.links, lights, scale, relit.cluster_links, relit.top, received
+        links, scale, received = state.links, None, None
+        if state.balance is not None:
+            links, scale, received = state.balance.links, state.balance.sent, state.balance.received
+        linked = links, lights, scale, relit.cluster_links, relit.top, received
         least, mixer = emission[leaves], Anderson(area)
         for _ in range(ITERATIONS):
             before = relit.radiosity[leaves]

@@ -109,3 +109,11 @@ def test_parts_are_scaled_to_sum_to_the_whole() -> None:
     whole = np.array([5.0, 2.0, 0.2, 0.1])
     found = shared_out(whole, parts)
     np.testing.assert_allclose(found, [[1.25, 0, 0, 0], [3.75, 2, 0.2, 0.1]], rtol=1e-6)
+
+
+def test_what_is_known_is_taken_off_and_nothing_falls_below_0() -> None:
+    known = np.array([[4.0, 4.0, 0.0], [2.0, 0.0, 0.0]])
+    earlier = EarlierLight(known, np.array([[10.0, 20.0, 0.0]], dtype=np.float32))
+    table, left = earlier.part_of(np.array([[3.0, 8.0, 1.0], [5.0, 1.0, 0.0]]))
+    np.testing.assert_allclose(left, [[0.0, 0.0, 1.0], [3.5, 1.0, 0.0]])
+    np.testing.assert_allclose(table, [[7.5, 40.0, 0.0]])
