@@ -19,6 +19,7 @@ from radiosity_addon.solver.steps import drain
 from tests.cornell import cornell_box
 from tests.relit_rooms import BAKED, CHANGED, NAMES, lit_bake, lit_room
 from tests.rooms import box_room, grey
+from tests.textured_rooms import furnace
 from tests.unit.texel_scenes import bake_scene
 
 SETTINGS = BakeSettings(resolution=64, quality="draft")
@@ -197,3 +198,13 @@ def test_groups_that_cannot_be_are_refused() -> None:
         BakeSettings(groups=(("Day", ("Sun",)), ("Noon", ("Sun",))))
     with pytest.raises(UsageError, match="shooting keeps no links"):
         BakeSettings(groups=(("Day", ("Sun",)),), method="shooting")
+
+
+def test_a_textured_furnace_scales_with_its_emission() -> None:
+    """E(x) = (1 − ρ(x)) c, textured: radiosity is c everywhere, in each channel as it is scaled."""
+    settings = BakeSettings(resolution=48, quality="draft", quantity="radiosity")
+    _, kept = drain(bake_and_keep(bake_scene(furnace(3.0), ("Room", 12)), settings))
+    found = pixels(drain(relight(kept, kept.strengths * (1.0, 2.0, 0.0))))
+    np.testing.assert_allclose(found.mean(axis=0), (3.0, 6.0, 0.0), rtol=0.005)
+    assert not found[:, 2].any()
+    assert np.sqrt(((found[:, 1] / 6.0 - 1) ** 2).mean()) < 0.03
