@@ -34,12 +34,12 @@ ROUNDS = 3
 """Rounds of asking the parts that parts met; beyond, the hierarchy's values stand for leaves."""
 
 SWEEPS = 4
-"""Sweeps among the parts for each over the texels, at most: they are few."""
+"""Sweeps among the parts for each over the texels, at most: the next one goes on where they ended."""
 
 
 @dataclass(frozen=True)
 class PartLinks:
-    """What p parts of one kind see.
+    """What p parts of one kind, that gather with as many rays, see.
 
     Attributes
     ----------
@@ -272,7 +272,7 @@ class PartSweeps:
         return more
 
     def sweep(self, table: Array, changed: Array, still: float) -> None:
-        """Update the parts' rows, among themselves to convergence.
+        """Update the parts' rows, among themselves until they rest, in `SWEEPS` sweeps at most.
 
         Parameters
         ----------

@@ -20,7 +20,7 @@ from ..solver.local_pass import NOTHING, Footprints, Gathered, LocalPass, Resolv
 from ..solver.scene import Scene
 from ..solver.steps import scaled
 from ..solver.visibility import Hits, sees
-from .crossings import LIFT, Crossings, crossing_steps
+from .crossings import LIFT, Crossings, below_hood, crossing_steps
 from .earlier_light import EarlierLight
 from .interpolate import GatherPoints, fit_steps
 from .part_links import HitNumbers, gather_parts
@@ -30,6 +30,7 @@ from .terminator import SmoothLift
 from .texel_cells import TexelCells
 from .texel_geometry import NO_TEXEL, TexelGeometry
 from .texel_materials import texel_materials
+from .whole_neighbours import whole_neighbour
 
 DIRECT, CROSSED, GATHERED, PARTS = 0.25, 0.3, 0.8, 0.9
 """How much is done when a part ends; rough, from rooms at medium quality."""
@@ -200,7 +201,9 @@ def _resolver(geometry: TexelGeometry, crossings: Crossings, numbers: HitNumbers
         apart = touched[~_sees_centre(local, geometry, texel[touched], hits.take(touched))]
         divided = np.concatenate([divided, apart])
         cell = cells.at(texel[divided], hits.take(divided))
-        found[divided] = np.where(cell == NOTHING, NO_TEXEL, cell + numbers.first_cell)
+        found[divided] = cell + numbers.first_cell
+        without = divided[cell == NOTHING]
+        found[without] = _beside(crossings, local, texel[without], hits.take(without))
         doubtful = np.flatnonzero((found >= 0) & wide[hits.triangle])
         finer = local.leaf_areas(hits.take(doubtful)) < geometry.texel_area[hits.triangle[doubtful]]
         found[doubtful[finer]] = NO_TEXEL
@@ -210,6 +213,18 @@ def _resolver(geometry: TexelGeometry, crossings: Crossings, numbers: HitNumbers
         return found
 
     return resolve
+
+
+def _beside(crossings: Crossings, local: LocalPass, texel: Array, hits: Hits) -> Array:
+    """Return (h,) what answers hits on texels without a cell for them: a neighbour, or NO_TEXEL.
+
+    NOTHING below a hood: elements do not know of hoods, and their light would be that of the open.
+    """
+    geometry, caster = crossings.geometry, local.caster
+    position = geometry.positions_of(hits)
+    below = below_hood(geometry, caster, texel, position[:, None])[:, 0]
+    found = whole_neighbour(crossings, caster, texel, position, below)
+    return np.where((found == NOTHING) & ~below, NO_TEXEL, found)
 
 
 def _sees_centre(local: LocalPass, geometry: TexelGeometry, texel: Array, hits: Hits) -> Array:
