@@ -72,11 +72,18 @@ class BakeScene:
     objects : tuple of BakeObject
         They partition the scene's triangles in order.
     warnings : tuple of BakeWarning
+    emitter : (t,) int32 or None
+        Which of the emissive materials each triangle has; any number where it emits nothing. None
+        takes every colour of emission for a material.
+    emitter_names : tuple of str
+        The names of those materials.
     """
 
     scene: Scene
     objects: tuple[BakeObject, ...]
     warnings: tuple[BakeWarning, ...] = ()
+    emitter: Array | None = None
+    emitter_names: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -138,6 +145,21 @@ class LightmapPage:
 
 
 @dataclass(frozen=True)
+class LightGroup:
+    """The lightmaps of one group's light.
+
+    Parameters
+    ----------
+    name : str
+    pages : tuple of LightmapPage
+        Parallel to the bake's; over all groups they sum to them.
+    """
+
+    name: str
+    pages: tuple[LightmapPage, ...]
+
+
+@dataclass(frozen=True)
 class BakedObject:
     """The lightmap of one object: its UVs and the page they point into.
 
@@ -174,6 +196,8 @@ class BakeResult:
     atlas : tuple of dict
         Parallel to `pages`: "resolution", "texels_per_metre" of objects at texel scale 1,
         "utilisation" (the share of texels that show a surface) and the number of "objects".
+    groups : tuple of LightGroup
+        Those that were asked for, and one of what is in none of them.
     """
 
     pages: tuple[LightmapPage, ...]
@@ -182,3 +206,4 @@ class BakeResult:
     warnings: tuple[BakeWarning, ...]
     seconds: dict[str, float] = field(default_factory=dict)
     atlas: tuple[dict[str, float], ...] = ()
+    groups: tuple[LightGroup, ...] = ()

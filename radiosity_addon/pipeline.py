@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
@@ -19,32 +20,46 @@ from .bake_scene import (
     BakeResult,
     BakeScene,
     BakeWarning,
+    LightGroup,
     LightmapPage,
     Picture,
     Progress,
 )
-from .errors import BakeError, SceneError
+from .errors import BakeError, SceneError, UsageError
+from .light_groups import group_pages
 from .lightmap.accuracy import light_within
 from .lightmap.atlas import Atlas, AtlasInput, AtlasOptions, build_atlas
-from .lightmap.dilate import dilate
-from .lightmap.encode import to_quantity
 from .lightmap.error_picture import summary, texel_residual
 from .lightmap.packing import Limits, padding_for
 from .lightmap.rasterise import rasterise
 from .lightmap.reconstruct import GatherSettings, reconstruct
 from .lightmap.seams import Seams, find_seams
-from .lightmap.stitch import stitch_pages
+from .lightmap.sweeps import TexelLight
 from .lightmap.texel_geometry import TexelGeometry
 from .lightmap.texel_materials import FOOTPRINT, texel_materials
+from .lightmap.texel_pages import texel_pages
 from .lightmap.turned_faces import turned_away
 from .quality import for_error, quality_of, used_settings
+from .relighting import KeptBake, shown
 from .report import solver_part
 from .settings import BakeSettings
 from .solver import Solution, SolverSettings, SolverState, solve_progress
 from .solver.arrays import Array
+from .solver.element_transport import Relightable
 from .solver.first_links import COARSEST_FAINT
 
 T = TypeVar("T")
+
+
+@dataclass(frozen=True, eq=False)
+class _Lit:
+    """What texels hold, (n, 3), and what it was made of: a residual of nothing else."""
+
+    values: Array
+    light: TexelLight | None = None
+    relightable: Relightable | None = None
+    materials: tuple[Array, ...] = ()
+
 
 UNWRAP, RASTERISE, SOLVE, LIGHT, ENCODE = 0.0, 0.15, 0.2, 0.5, 0.97
 """How far the whole is when each stage begins; rough, from bakes at medium quality."""
@@ -82,6 +97,34 @@ def bake(bake_scene: BakeScene, settings: BakeSettings) -> Generator[Progress, N
     BakeError
         If the lightmaps cannot be laid out.
     """
+    result, _ = yield from _bake(bake_scene, settings, keep=bool(settings.groups))
+    return result
+
+
+def bake_and_keep(
+    bake_scene: BakeScene, settings: BakeSettings
+) -> Generator[Progress, None, tuple[BakeResult, KeptBake]]:
+    """Bake lightmaps, and keep what lights them anew (`relighting.py`).
+
+    Every lamp is asked for with all its shadow rays, those that are dark now too, so that scenes of
+    many lamps take longer than by `bake`. Parameters, yields and errors are those of `bake`.
+
+    Raises
+    ------
+    UsageError
+        If the method keeps no links, or the quantity is the residual.
+    """
+    result, kept = yield from _bake(bake_scene, settings, keep=True)
+    assert kept is not None
+    return result, kept
+
+
+def _bake(
+    bake_scene: BakeScene, settings: BakeSettings, keep: bool
+) -> Generator[Progress, None, tuple[BakeResult, KeptBake | None]]:
+    """Bake, and keep what lights the scene anew if asked to."""
+    if keep and settings.quantity == "residual":
+        raise UsageError("a residual is of all light together: bake another quantity to light it anew")
     seconds: dict[str, float] = {}
     quality = quality_of(settings)
     baked = [item for item in bake_scene.objects if item.bake and item.count]
@@ -99,19 +142,28 @@ def bake(bake_scene: BakeScene, settings: BakeSettings) -> Generator[Progress, N
         solution = yield from _solve(bake_scene, quality.solver)
     yield Progress("light", LIGHT)
     with _timed(seconds, "light"):
-        steps = _texel_values(bake_scene, solution, geometry, quality.gather, settings)
-        values, error = yield from _staged(steps, "light", LIGHT, ENCODE)
+        steps = _texel_values(bake_scene, solution, geometry, quality.gather, settings, keep)
+        lit = yield from _staged(steps, "light", LIGHT, ENCODE)
     yield Progress("encode", ENCODE)
     with _timed(seconds, "encode"):
         seams = _seams(bake_scene, solution, geometry, settings)
-        pages = _pages(geometry, values, seams, max(DILATED, _padding(settings)))
+        rings = max(DILATED, _padding(settings))
+        pages = texel_pages(geometry, lit.values, seams, rings)
         _check(solution, pages)
+    kept = None
+    if lit.relightable is not None and lit.light is not None and lit.light.kept is not None:
+        laid = geometry, seams, rings
+        kept = KeptBake(bake_scene, settings, lit.relightable, lit.light.kept, *laid, *lit.materials)
+    groups: tuple[LightGroup, ...] = ()
+    if kept is not None and settings.groups:
+        with _timed(seconds, "groups"):
+            groups = yield from _staged(group_pages(kept, pages), "groups", ENCODE, 1.0)
 
     report = solver_part(solution.final_report(), used_settings(quality.solver), bake_scene.objects)
-    if error is not None:
-        report["estimated_error"] = error
+    if lit.light is not None:
+        report["estimated_error"] = lit.light.error
     if settings.quantity == "residual":
-        report["error_picture"] = summary(values)
+        report["error_picture"] = summary(lit.values)
     of_texels = _of_texels(bake_scene, baked, geometry)
     sides = solution.triangle_irradiance, solution.back_irradiance
     of_light = (*turned_away(baked, bake_scene.scene.areas, *sides), *_of_solution(solution, quality.solver))
@@ -119,7 +171,8 @@ def bake(bake_scene: BakeScene, settings: BakeSettings) -> Generator[Progress, N
     objects = tuple(
         BakedObject(item, placed.uv, placed.page) for item, placed in zip(baked, atlas.objects, strict=True)
     )
-    return BakeResult(pages, objects, report, warnings, seconds, _told(atlas, pages))
+    told = _told(atlas, pages)
+    return BakeResult(pages, objects, report, warnings, seconds, told, groups), kept
 
 
 def _unwrap(
@@ -219,26 +272,21 @@ def _texel_values(
     geometry: TexelGeometry,
     gather: GatherSettings,
     settings: BakeSettings,
-) -> Generator[float, None, tuple[Array, float | None]]:
-    """Compute (n, 3) the quantity asked for at all texels, and estimate the light's relative error."""
+    keep: bool,
+) -> Generator[float, None, _Lit]:
+    """Compute the quantity asked for at all texels, and estimate the light's relative error."""
     if settings.quantity == "residual":
         residual = yield from texel_residual(solution, geometry, gather)
-        return residual, None
-    where = bake_scene.scene, solution.local_pass, geometry
+        return _Lit(residual)
+    relightable = solution.relightable(bake_scene.emitter) if keep else None
+    local = solution.local_pass if relightable is None else relightable.local
+    where = bake_scene.scene, local, geometry
     if settings.relative_error is None:
         light = yield from reconstruct(*where, gather)
     else:
         light = yield from light_within(*where, lambda e: for_error(e).gather, settings.relative_error)
-    irradiance = {
-        "all": light.direct + light.indirect,
-        "direct": light.direct,
-        "indirect": light.indirect,
-    }[settings.light]
-    reflectance, emission = texel_materials(bake_scene.scene, geometry, FOOTPRINT)
-    if settings.light == "indirect":
-        emission = np.zeros_like(emission)
-    values = to_quantity(irradiance, reflectance, emission, settings.quantity)
-    return values, light.error
+    materials = texel_materials(bake_scene.scene, geometry, FOOTPRINT)
+    return _Lit(shown(light, *materials, settings), light, relightable, materials)
 
 
 def _seams(
@@ -249,22 +297,6 @@ def _seams(
         return None
     seams = find_seams(bake_scene.scene, geometry, solution.local_pass.caster)
     return seams if settings.quantity != "radiosity" else seams.of_one_material(bake_scene.scene)
-
-
-def _pages(
-    geometry: TexelGeometry, values: Array, seams: Seams | None, rings: int
-) -> tuple[LightmapPage, ...]:
-    """Put texels' values on their pages, filled `rings` past the charts' borders, and stitch the seams."""
-    pages = []
-    for number, index in enumerate(geometry.index):
-        pixels = np.zeros((*index.shape, 3), dtype=np.float32)
-        coverage = index >= 0
-        pixels[coverage] = values[geometry.page == number][index[coverage] - geometry.first(number)]
-        pages.append(LightmapPage(dilate(pixels, coverage, rings), coverage))
-    if seams is None or not len(seams):
-        return tuple(pages)
-    stitched = stitch_pages([page.pixels for page in pages], geometry, seams)
-    return tuple(LightmapPage(pixels, page.coverage) for pixels, page in zip(stitched, pages, strict=True))
 
 
 def _check(solution: Solution, pages: tuple[LightmapPage, ...]) -> None:

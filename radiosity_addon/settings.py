@@ -20,6 +20,9 @@ MAX_MIP_LEVELS = 8
 MAX_PADDING = 512
 MIN_ERROR, MAX_ERROR = 0.002, 0.2
 
+GroupSetting = tuple[str, tuple[str, ...]]
+"""A light group: its name, and the names of its lamps, emissive materials and the world."""
+
 
 @dataclass(frozen=True)
 class BakeSettings:
@@ -63,6 +66,9 @@ class BakeSettings:
         Add a white sky of strength 1 where the scene has no light at all.
     keep_uvs : bool
         Use an existing UV layer `Lightmap` instead of unwrapping anew.
+    groups : tuple of (str, tuple of str)
+        Light groups: each one's name, and the names of the lamps, emissive materials and world in it.
+        Each gets lightmaps of its own; so does what is in none of them.
     seed : int
     threads : int
         0 means all cores. The result does not depend on it.
@@ -96,6 +102,7 @@ class BakeSettings:
     ignore: tuple[str, ...] = ()
     sky: bool = False
     keep_uvs: bool = False
+    groups: tuple[GroupSetting, ...] = ()
     seed: int = 0
     threads: int = 0
     method: str = "hierarchical"
@@ -140,6 +147,7 @@ class BakeSettings:
                 raise UsageError(f"{name} {value!r} is not one of {', '.join(allowed)}")
         if self.quantity == "residual":
             self._check_residual()
+        self._check_groups()
         check_method(self.method, self.method_settings())
 
     def _check_atlas(self) -> None:
@@ -169,6 +177,19 @@ class BakeSettings:
             raise UsageError(
                 f"a residual is of the whole solution, not of its {self.light} light: take light all"
             )
+
+    def _check_groups(self) -> None:
+        """Refuse what light groups cannot be."""
+        names = [name for name, _ in self.groups]
+        inside = [member for _, group in self.groups for member in group]
+        for kind, found in (("light group", names), ("member of light groups", inside)):
+            twice = next((name for name in found if found.count(name) > 1), None)
+            if twice is not None:
+                raise UsageError(f"{kind} '{twice}' is there twice")
+        if self.groups and self.method != "hierarchical":
+            raise UsageError(f"light groups need the hierarchical method; {self.method} keeps no links")
+        if self.groups and self.quantity == "residual":
+            raise UsageError("a residual is of all light together: bake another quantity for light groups")
 
     def method_settings(self) -> dict[str, Any]:
         """Return the settings of the method that were given, by name."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Sequence
 
 import bpy
 import numpy as np
@@ -138,10 +139,23 @@ def _assemble(
             for piece in collected.pieces
             if piece.role.in_bounces != piece.role.in_shadows and len(piece.mesh)
         ]
+    emitters = _emitters(scene, surface, collected.materials)
     return Export(
-        BakeScene(scene, tuple(objects), tuple(dict.fromkeys(warnings))),
+        BakeScene(scene, tuple(objects), tuple(dict.fromkeys(warnings)), *emitters),
         tuple(piece.source for piece in collected.pieces),
     )
+
+
+def _emitters(
+    scene: Scene, surface: np.ndarray, materials: Sequence[bpy.types.Material | None]
+) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Number the materials that emit: (t,) int32 whose each triangle is, and their names."""
+    emits = scene.emission.any(axis=1)
+    rows, number = np.unique(surface[emits], return_inverse=True)
+    emitter = np.zeros(len(scene), dtype=np.int32)
+    emitter[emits] = number.reshape(-1)
+    # Without a material nothing emits.
+    return emitter, tuple(getattr(materials[row], "name", "") for row in rows)
 
 
 def _chosen(context: bpy.types.Context, pieces: list[Piece], names: tuple[str, ...] | None) -> list[Piece]:

@@ -8,13 +8,14 @@ foot or into a closed box does not come back.
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from ..solver.arrays import Array
-from ..solver.local_pass import NOTHING, LocalPass, Resolver
+from ..solver.light_gains import LightGains
+from ..solver.local_pass import NOTHING, LocalPass, Resolver, values_of
 from ..solver.steps import drain, scaled
 from .source_means import Means
 from .stored_links import StoredLinks
@@ -49,12 +50,15 @@ class PartLinks:
     reflectance : (p, 3) float64
     lamps : (p, 3) float64 [W/m²]
         Irradiance straight from lamps and emissive faces.
+    gains : LightGains or None
+        The same for each light apart, if it is kept.
     """
 
     rows: Array
     sources: Array
     reflectance: Array
     lamps: Array
+    gains: LightGains | None = None
 
 
 @dataclass(frozen=True)
@@ -66,10 +70,13 @@ class Parts:
     start : (r, 3) float64 [W/m²]
         What the hierarchy says that they reflect.
     links : sequence of PartLinks
+    element : (r,) int
+        Whose light `start` is, or NOTHING.
     """
 
     start: Array
     links: Sequence[PartLinks]
+    element: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
 
 class HitNumbers:
@@ -91,7 +98,7 @@ class HitNumbers:
 
 
 def gather_parts(
-    numbers: HitNumbers, links: StoredLinks, resolve: Resolver, reflected: Array, reflectance: Array
+    numbers: HitNumbers, links: StoredLinks, resolve: Resolver, element: Array, reflectance: Array
 ) -> Generator[float, None, tuple[StoredLinks, Parts]]:
     """Look from the parts that links met, and from those that these met; yields the fraction done.
 
@@ -99,8 +106,10 @@ def gather_parts(
     ----------
     links : StoredLinks
         Their sources are as `resolve` numbers them.
-    reflected, reflectance : (n, 3)
-        Of the texels: what the hierarchy says they reflect, and the part of irradiance that they do.
+    element : (n,) int32
+        Of the texels: the leaf elements below them, or NOTHING.
+    reflectance : (n, 3)
+        Theirs.
 
     Returns
     -------
@@ -113,10 +122,10 @@ def gather_parts(
     gathering.count(links.aimed.sources)
     for turn in range(ROUNDS):
         yield from scaled(gathering.ask_new(), 0.7 * turn / ROUNDS, 0.7 * (turn + 1) / ROUNDS)
-    made, start = yield from scaled(gathering.links(reflected, reflectance), 0.7, 1.0)
-    rows = gathering.rows
+    made, of = yield from scaled(gathering.links(element, reflectance), 0.7, 1.0)
+    start, rows = values_of(numbers.local.reflected(), of), gathering.rows
     aimed = replace(links.aimed, sources=rows(links.aimed.sources))
-    return replace(links, sources=rows(links.sources), aimed=aimed), Parts(start, made)
+    return replace(links, sources=rows(links.sources), aimed=aimed), Parts(start, made, of)
 
 
 class _Gathering:
@@ -183,28 +192,24 @@ class _Gathering:
         return _Rows(self._numbers.elements, self._small + self._numbers.texel_count)
 
     def links(
-        self, reflected: Array, reflectance: Array
+        self, element: Array, reflectance: Array
     ) -> Generator[float, None, tuple[list[PartLinks], Array]]:
-        """Make the links of the parts asked, and what all rows reflect at first; yields the fraction done."""
+        """Make the links of the parts asked, and tell whose light rows start with; yields how far it is."""
         local, cells, first = self._local, self._cells, self._numbers.texel_count
         of_leaves = self._small[self._small < len(local.parts)]
         of_cells = self._cell(self._small[len(of_leaves) :])
-        by_elements = local.reflected()
-        start = [
-            by_elements,
-            by_elements[local.parts.leaf_of(of_leaves)],
-            reflected[cells.texel_of(of_cells)],
-        ]
+        whole = np.arange(self._numbers.elements - first)
+        start = [whole, local.parts.leaf_of(of_leaves), element[cells.texel_of(of_cells)]]
         made, count = [], max(len(self._found), 1)
         for done, (is_leaf, rays, part, sources) in enumerate(self._found):
-            shadow_rays = SHADOW_RAYS * rays // RAYS
+            asked = SHADOW_RAYS * rays // RAYS, local.new_gains(len(part))
             if is_leaf:
-                direct, share = local.part_direct(part, shadow_rays), local.part_reflectance(part)
+                direct, share = local.part_direct(part, *asked), local.part_reflectance(part)
             else:
                 cell = self._cell(part)
-                direct, share = cells.direct(cell, shadow_rays), reflectance[cells.texel_of(cell)]
+                direct, share = cells.direct(cell, *asked), reflectance[cells.texel_of(cell)]
             lamps = yield from scaled(direct, done / count, (done + 1) / count)
-            made.append(PartLinks(self.rows(first + part), self.rows(sources), share, lamps))
+            made.append(PartLinks(self.rows(first + part), self.rows(sources), share, lamps, asked[1]))
         return made, np.concatenate(start)
 
 

@@ -9,22 +9,23 @@ trace nothing, remove what the coarse hierarchy got wrong.
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from ..solver.aiming import AimedRays
 from ..solver.arrays import Array
-from ..solver.local_pass import NOTHING, Footprints, Gathered, LocalPass, Resolver
+from ..solver.local_pass import NOTHING, Footprints, Gathered, LocalPass, Resolver, values_of
 from ..solver.scene import Scene
 from ..solver.steps import scaled
 from ..solver.visibility import Hits, sees
 from .crossings import LIFT, Crossings, below_hood, crossing_steps
+from .earlier_light import EarlierLight
 from .interpolate import GatherPoints, fit_steps
 from .part_links import HitNumbers, gather_parts
 from .stored_links import StoredLinks
-from .sweeps import TexelLight, TexelTransport, sweep_steps
+from .sweeps import LitTexels, TexelLight, TexelTransport, sweep_steps
 from .terminator import SmoothLift
 from .texel_cells import TexelCells
 from .texel_geometry import NO_TEXEL, TexelGeometry
@@ -73,8 +74,13 @@ class GatherSettings:
 def reconstruct(
     scene: Scene, local: LocalPass, geometry: TexelGeometry, settings: GatherSettings
 ) -> Generator[float, None, TexelLight]:
-    """Compute direct and indirect irradiance of all texels; yields the fraction done."""
-    lamps = yield from scaled(local.direct_steps(footprints(geometry, local)), 0.0, DIRECT)
+    """Compute direct and indirect irradiance of all texels; yields the fraction done.
+
+    If `local` can ask for every light apart, what lights the texels anew is kept.
+    """
+    gains = local.new_gains(len(geometry))
+    direct = local.direct_steps(footprints(geometry, local), gains=gains)
+    lamps = yield from scaled(direct, 0.0, DIRECT)
     found = crossing_steps(geometry, local.caster, local.threads)
     crossings = yield from scaled(found, DIRECT, CROSSED)
     cells = TexelCells(local, geometry, crossings)
@@ -83,15 +89,19 @@ def reconstruct(
     stored = gather_texels(local, geometry, settings, crossings, resolve)
     links = yield from scaled(stored, CROSSED, GATHERED)
     reflectance, _ = texel_materials(scene, geometry)
-    start = local.reflected_at(geometry.triangle, geometry.barycentric)
-    further = gather_parts(numbers, links, resolve, start, reflectance)
+    element = local.leaf_at_fronts(geometry.triangle, geometry.barycentric)
+    further = gather_parts(numbers, links, resolve, element, reflectance)
     links, parts = yield from scaled(further, GATHERED, PARTS)
     transport = TexelTransport(links, parts, reflectance)
-    limits = settings.sweeps, settings.tolerance, local.threads
-    swept = sweep_steps(transport, start, lamps, local.beyond(), *limits)
+    limits = settings.sweeps, settings.tolerance
+    start = values_of(local.reflected(), element)
+    swept = sweep_steps(transport, start, lamps, local.beyond(), *limits, local.threads)
     light = yield from scaled(swept, PARTS, 1.0)
     yield 1.0
-    return light
+    if gains is None or local.sources is None or light.table is None:
+        return light
+    earlier = EarlierLight(local.sources.strengths, light.table)
+    return replace(light, kept=LitTexels(transport, gains, element, *limits, earlier))
 
 
 def footprints(geometry: TexelGeometry, local: LocalPass) -> Footprints:

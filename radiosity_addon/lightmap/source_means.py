@@ -13,6 +13,9 @@ from ..solver.steps import drain
 CHUNK_HITS = 1 << 18
 """Hits averaged at once: their values stay in the processor's cache."""
 
+MUCH = 0.1
+"""A change of more of the table than this part asks all rows again."""
+
 
 class Means:
     """Means over rows of sources, of which only those are made anew that see something changed.
@@ -37,17 +40,19 @@ class Means:
             Which rows changed since the last call; the first call asks all.
         """
         columns = _columns(table)
+        # Where much changed every row sees some of it: to look for those that do not takes as long.
+        anew = not self._known or float(changed.mean()) > MUCH
 
         def average(rows: slice) -> None:
             seen = self._sources[rows]
-            if not self._known:
+            if anew:
                 self._mean[rows] = _mean_of(columns, seen)
                 return
             again = np.flatnonzero(changed.take(seen, mode="wrap").any(axis=1))
             if len(again):
                 self._mean[rows.start + again] = _mean_of(columns, seen[again])
 
-        if not self._known or changed.any():
+        if anew or changed.any():
             chunk = max(CHUNK_HITS // max(self._sources.shape[1], 1), 1)
             yield from chunk_steps(average, len(self._sources), chunk, self._threads)
         self._known = True

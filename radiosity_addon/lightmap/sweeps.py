@@ -11,7 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..solver.arrays import Array
+from ..solver.light_gains import LightGains
 from ..solver.steps import drain, scaled
+from .earlier_light import EarlierLight
 from .part_links import Parts, PartSweeps
 from .source_means import CHUNK_HITS, Means, mean_steps
 from .stored_links import StoredLinks
@@ -38,12 +40,18 @@ class TexelLight:
     direct, indirect : (n, 3) float64 [W/m²]
         Their sum is the whole.
     error : float
-        Estimate of the whole's RMS error, relative to its mean.
+        Estimate of the whole's RMS error, relative to its mean; 0 if it was not asked for.
+    table : (surfaces, 3) float32 or None [W/m²]
+        What texels and parts reflected in the end.
+    kept : LitTexels or None
+        What lights them anew, if it is kept.
     """
 
     direct: Array
     indirect: Array
     error: float = 0.0
+    table: Array | None = None
+    kept: LitTexels | None = None
 
 
 @dataclass(frozen=True)
@@ -63,6 +71,32 @@ class TexelTransport:
     reflectance: Array
 
 
+@dataclass(frozen=True)
+class LitTexels:
+    """How light gets to n texels from each light, and on from texel to texel.
+
+    Attributes
+    ----------
+    transport : TexelTransport
+        Its parts keep gains as well.
+    gains : LightGains
+        Of the texels.
+    element : (n,) int32
+        The leaf element below each, whose light the sweeps start with, or NOTHING.
+    sweeps, tolerance
+        As for `sweep_steps`.
+    earlier : EarlierLight
+        What was solved before, the bake's own light first.
+    """
+
+    transport: TexelTransport
+    gains: LightGains
+    element: Array
+    sweeps: int
+    tolerance: float
+    earlier: EarlierLight
+
+
 def sweep_steps(
     transport: TexelTransport,
     start: Array,
@@ -71,6 +105,7 @@ def sweep_steps(
     sweeps: int,
     tolerance: float = TOLERANCE,
     threads: int = 0,
+    estimate: bool = True,
 ) -> Generator[float, None, TexelLight]:
     """Iterate H = direct + Σ ρ H over the stored hits, started from the hierarchy's solution.
 
@@ -87,6 +122,8 @@ def sweep_steps(
         At most so many, …
     tolerance : float
         … or until no texel changes by more than this part of the mean.
+    estimate : bool
+        Whether the error is estimated.
 
     Yields
     ------
@@ -126,7 +163,8 @@ def sweep_steps(
         table[:texel_count][changed[:texel_count]] = radiosity[changed[:texel_count]]
         if change.max(initial=0.0) <= tolerance * radiosity.mean():
             break
-    return TexelLight(direct, indirect, estimated_error(links, table, direct + indirect, threads))
+    error = estimated_error(links, table, direct + indirect, threads) if estimate else 0.0
+    return TexelLight(direct, indirect, error, table[:surfaces])
 
 
 def estimated_error(links: StoredLinks, table: Array, irradiance: Array, threads: int = 0) -> float:

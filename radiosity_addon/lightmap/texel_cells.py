@@ -17,6 +17,7 @@ import numpy as np
 
 from ..solver.arrays import Array
 from ..solver.footprints import Footprints
+from ..solver.light_gains import LightGains
 from ..solver.local_pass import NOTHING, LocalPass, Resolver
 from ..solver.parallel import chunk_steps
 from ..solver.visibility import Hits, sees
@@ -136,16 +137,18 @@ class TexelCells:
         gathered = yield from self._local.gather_steps(at, upright, rays, resolve)
         return gathered.sources
 
-    def direct(self, cell: Array, rays: int) -> Generator[float, None, Array]:
+    def direct(
+        self, cell: Array, rays: int, gains: LightGains | None = None
+    ) -> Generator[float, None, Array]:
         """Compute (p, 3) the irradiance of cells' anchors straight from lamps and emissive faces [W/m²].
 
-        `rays` is for each lamp.
+        `rays` is for each lamp; `gains` as in `LocalPass.direct_steps`.
         """
         texel, geometry = self.texel_of(cell), self._geometry
         expected = self._local.irradiance_at(geometry.triangle[texel], geometry.barycentric[texel])
         anchor = self._anchors[cell // CELLS, cell % CELLS] - self._lift(texel)
         at = Footprints(anchor, geometry.normal[texel], len(geometry) + cell, expected=expected)
-        return self._local.direct_steps(at, rays)
+        return self._local.direct_steps(at, rays, gains)
 
     def _below_hood(self, texel: Array, points: Array) -> Array:
         """Return (n, k) whether (n, k, 3) points of texels at a rim are below the hood; False elsewhere."""

@@ -250,16 +250,23 @@ class SkyTable:
     Parameters
     ----------
     lights : sequence of Light
+    strengths : (l, 3) float64 or None [W/m²/sr]
+        What the lights have instead of their own strengths.
     """
 
-    def __init__(self, lights: Sequence[Light]) -> None:
-        skies = [light for light in lights if isinstance(light, EnvironmentLight)]
-        images = [light for light in skies if isinstance(light, EnvironmentImage)]
+    def __init__(self, lights: Sequence[Light], strengths: Float64Array | None = None) -> None:
+        given = [light.strength for light in lights] if strengths is None else strengths
+        skies = [
+            (light, strength)
+            for light, strength in zip(lights, given, strict=True)
+            if isinstance(light, EnvironmentLight)
+        ]
+        images = [light for light, _ in skies if isinstance(light, EnvironmentImage)]
         self.shape = max((light.shape for light in images), default=(1, 1))
         toward = cell_directions(self.shape)
         total = np.zeros((len(toward), 3))
-        for light in skies:
-            total += light.relative(toward)[:, None] * light.strength
+        for light, strength in skies:
+            total += light.relative(toward)[:, None] * strength
         self.radiosity: Float64Array = irradiance_under_sky(total)
         """(cells, 3) float64: the radiosity equivalent πL [W/m²]."""
 

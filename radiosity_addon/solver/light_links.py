@@ -77,6 +77,15 @@ def light_strengths(lights: Sequence[Light]) -> Array:
     return np.array([light.strength for light in lights], dtype=np.float64).reshape(-1, 3)
 
 
+def join_light_links(one: LightLinks, other: LightLinks) -> LightLinks:
+    """Return the links of both."""
+    return LightLinks(
+        np.concatenate([one.receiver, other.receiver]),
+        np.concatenate([one.light, other.light]),
+        np.concatenate([one.gain, other.gain]),
+    )
+
+
 def link_lights(
     hierarchy: Hierarchy,
     lights: Sequence[Light],
@@ -86,6 +95,7 @@ def link_lights(
     seed: int,
     threads: int = 0,
     most_elements: int = 1 << 30,
+    as_if: Array | None = None,
 ) -> LightLinks:
     """Link every light to the elements it reaches, splitting where its light varies.
 
@@ -97,11 +107,13 @@ def link_lights(
         A_ε [m²]: no element becomes smaller.
     most_elements : int
         How many the hierarchy may grow to; the largest and most doubtful are split first.
+    as_if : (n_lights,) float64 or None
+        What the lights count for instead of their strengths; those at 0 get no links.
     """
     receivers, numbers, gains = [], [], []
     coarse_area = float(hierarchy.faces.area.sum()) / COARSEST
     for number, light in enumerate(lights):
-        strength = float(np.max(light.strength))
+        strength = float(np.max(light.strength)) if as_if is None else float(as_if[number])
         if strength <= 0.0 or not isinstance(light, Lamp | EnvironmentLight):
             continue
         waiting = np.arange(len(hierarchy.faces))

@@ -22,6 +22,8 @@ from .environment import SkyTable
 from .footprints import Footprints, Sampler, SpreadPoints
 from .gathering import NOTHING, SKY, Gathered, Gathering, Resolver
 from .leaf_parts import LeafParts
+from .light_gains import LightGains
+from .light_sources import LightSources
 from .lights import Lamp
 from .shadow_share import ShadowShare
 from .steps import drain, scaled
@@ -31,23 +33,35 @@ from .visibility import Hits
 if TYPE_CHECKING:
     from .state import SolverState
 
-__all__ = ["NOTHING", "SKY", "Footprints", "Gathered", "LocalPass", "Resolver", "Sampler"]
+__all__ = ["NOTHING", "SKY", "Footprints", "Gathered", "LocalPass", "Resolver", "Sampler", "values_of"]
 
 NEAR = 0.05
 """Form factor beyond which emissive faces are so near that it may change over a texel."""
 
 
 class LocalPass:
-    """Asks for the light at points of a solved scene."""
+    """Asks for the light at points of a solved scene.
 
-    def __init__(self, state: SolverState) -> None:
+    Parameters
+    ----------
+    state : SolverState
+    sources : LightSources or None
+        Given, every light can be asked for apart (`LightGains`), for relighting.
+    """
+
+    def __init__(self, state: SolverState, sources: LightSources | None = None) -> None:
         self._state = state
+        self.sources = sources
         self.caster = state.caster
         """Casts this scene's rays."""
         self._seed = state.settings.seed
         self.threads = state.settings.threads
         """0 means all cores."""
-        self.emitters = emitter_groups(state.scene, state.hierarchy.faces, state.caster)
+        self.emitters = (
+            emitter_groups(state.scene, state.hierarchy.faces, state.caster)
+            if sources is None
+            else sources.groups
+        )
 
     def direct(
         self,
@@ -61,7 +75,9 @@ class LocalPass:
         """Return `direct_steps` at points, (n, 3) float64 [W/m²]; see `Footprints` for what they are."""
         return drain(self.direct_steps(Footprints(points, normals, keys, sampler, near), rays))
 
-    def direct_steps(self, at: Footprints, rays: int | None = None) -> Generator[float, None, Array]:
+    def direct_steps(
+        self, at: Footprints, rays: int | None = None, gains: LightGains | None = None
+    ) -> Generator[float, None, Array]:
         """Compute the irradiance straight from lamps and emissive surfaces, the sky's apart.
 
         Parameters
@@ -69,6 +85,10 @@ class LocalPass:
         at : Footprints
         rays : int or None
             Shadow rays a point and lamp; None takes the settings'.
+        gains : LightGains or None
+            If given, takes what every light adds: lamps by their number among the scene's lights, those
+            without strength too, then emissive groups. Each is asked as if it were the only one, which
+            it may become.
 
         Yields
         ------
@@ -80,22 +100,37 @@ class LocalPass:
         """
         total = np.zeros((len(at), 3))
         shadow_rays = rays or self._state.settings.shadow_rays
-        lamps = [lit for lit in self._state.scene.lights if isinstance(lit, Lamp) and lit.strength.any()]
-        seeds = [self._seed + 31 + 7 * number for number in range(len(lamps))]
+        numbered = [
+            (number, lit)
+            for number, lit in enumerate(self._state.scene.lights)
+            if isinstance(lit, Lamp) and (gains is not None or lit.strength.any())
+        ]
+        seeds = [self._seed + 31 + 7 * number for number in range(len(numbered))]
         seeds += [self._seed + 17 + 7 * number for number in range(len(self.emitters))]
         count = len(seeds)
-        lights: list[Lamp | EmitterGroup] = [*lamps, *self.emitters]
+        lights: list[Lamp | EmitterGroup] = [*(lamp for _, lamp in numbered), *self.emitters]
+        numbers = [number for number, _ in numbered]
+        numbers += [len(self._state.scene.lights) + number for number in range(len(self.emitters))]
+        if gains is not None:
+            at = replace(at, expected=None)
         spread = SpreadPoints(at, self._seed + 2, self.threads)
         for done, (light, seed) in enumerate(zip(lights, seeds, strict=True)):
             begin, end = done / count, (done + 1) / count
             glows = isinstance(light, EmitterGroup)
             caster = self.caster if glows else self.caster.for_lamps
-            gains = spread.gain_steps(light, NEAR if glows else 0.0)
-            gain = yield from scaled(gains, begin, begin + 0.1 / count)
+            asked = spread.gain_steps(light, NEAR if glows else 0.0)
+            gain = yield from scaled(asked, begin, begin + 0.1 / count)
             share = ShadowShare(caster, light, spread, seed, self.threads).steps(gain, shadow_rays)
             unblocked = yield from scaled(share, begin + 0.1 / count, end)
-            total += (gain * unblocked)[:, None] * light.strength
+            arriving = gain * unblocked
+            total += arriving[:, None] * light.strength
+            if gains is not None:
+                gains.put(numbers[done], arriving)
         return total
+
+    def new_gains(self, count: int) -> LightGains | None:
+        """Return where `count` points keep each light apart; None if lights cannot be asked for apart."""
+        return None if self.sources is None else LightGains(count)
 
     def gather(
         self,
@@ -182,30 +217,31 @@ class LocalPass:
         leaf = self.leaves_of(hits)
         return np.asarray(np.where(leaf == NOTHING, np.inf, self._state.hierarchy.area[leaf]))
 
-    def reflected(self) -> Array:
+    def reflected(self, irradiance: Array | None = None) -> Array:
         """Return (e, 3): the part of every element's radiosity it does not emit itself [W/m²].
 
-        Where its surface is there, as it is for rays that hit it.
+        Where its surface is there, as it is for rays that hit it. Of the solution's irradiance, or
+        another (e, 3) one.
         """
         every = np.arange(self._state.hierarchy.n_elements)
-        return np.asarray(self._reflectance_where_hit(every) * self._state.irradiance)
-
-    def reflected_at(self, triangle: Array, barycentric: Array) -> Array:
-        """Return (n, 3): the same at points of triangles' fronts, (n, 2) weights of corners 2 and 3."""
-        return self._at_fronts(triangle, barycentric, self.reflected())
+        arriving = self._state.irradiance if irradiance is None else irradiance
+        return np.asarray(self._reflectance_where_hit(every) * arriving)
 
     def irradiance_at(self, triangle: Array, barycentric: Array) -> Array:
-        """Return (n,) the elements' irradiance there, a mean of the channels [W/m²]."""
-        return self._at_fronts(triangle, barycentric, self._state.irradiance.mean(axis=1))
+        """Return (n,) the elements' irradiance at points of triangles' fronts, a mean of the channels [W/m²].
 
-    def _at_fronts(self, triangle: Array, barycentric: Array, values: Array) -> Array:
-        """Return the (e, …) values of the leaves at points of triangles' fronts; 0 where there is none."""
+        `barycentric` (n, 2) are weights of corners 2 and 3.
+        """
+        return values_of(self._state.irradiance.mean(axis=1), self.leaf_at_fronts(triangle, barycentric))
+
+    def leaf_at_fronts(self, triangle: Array, barycentric: Array) -> Array:
+        """Return (n,) int32 the leaf elements at such points, or NOTHING where there is none."""
         hierarchy = self._state.hierarchy
         face = hierarchy.faces.of_triangle[0, triangle]
         on_face = face >= 0
-        found = np.zeros((len(face), *values.shape[1:]))
-        found[on_face] = values[hierarchy.leaf_at(face[on_face], barycentric[on_face])]
-        return found
+        leaf = np.full(len(face), NOTHING, dtype=np.int32)
+        leaf[on_face] = hierarchy.leaf_at(face[on_face], barycentric[on_face])
+        return leaf
 
     @cached_property
     def parts(self) -> LeafParts:
@@ -230,19 +266,30 @@ class LocalPass:
         hierarchy = self._state.hierarchy
         return np.asarray(hierarchy.reflectance[elements] / hierarchy.opacity_where_hit[elements, None])
 
-    def part_direct(self, parts: Array, rays: int) -> Generator[float, None, Array]:
+    def part_direct(
+        self, parts: Array, rays: int, gains: LightGains | None = None
+    ) -> Generator[float, None, Array]:
         """Compute (p, 3) the irradiance of parts straight from lamps and emissive faces, by `rays` each."""
         expected = self._state.irradiance[self.parts.leaf_of(parts)].mean(axis=1)
-        return self.direct_steps(replace(self.parts.footprints(parts), expected=expected), rays)
+        return self.direct_steps(replace(self.parts.footprints(parts), expected=expected), rays, gains)
 
-    def beyond(self) -> Array:
+    def beyond(self, sky: SkyTable | None = None) -> Array:
         """Return (cells + 2, 3) the last rows of a table of radiosity [W/m²]: the sky's cells, and two dark.
 
-        So the negative numbers of what rays found index them.
+        So the negative numbers of what rays found index them. Of the scene's sky, or another with the
+        same cells.
         """
         assert (NOTHING, SKY) == (-2, -3)
-        return np.concatenate([self._sky.radiosity[::-1], np.zeros((2, 3))])
+        return np.concatenate([(sky or self._sky).radiosity[::-1], np.zeros((2, 3))])
 
     @cached_property
     def _sky(self) -> SkyTable:
         return SkyTable(self._state.scene.lights)
+
+
+def values_of(values: Array, elements: Array) -> Array:
+    """Return the (e, …) values at elements (n,); 0 at NOTHING."""
+    found = np.zeros((len(elements), *values.shape[1:]))
+    there = elements != NOTHING
+    found[there] = values[elements[there]]
+    return found

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .arrays import Array
+from .element_transport import Relightable
 from .local_pass import LocalPass
 from .power import power_balance
 from .residual import Residual
@@ -78,6 +79,21 @@ class Solution:
     def local_pass(self) -> LocalPass:
         """The local pass over this solution: direct light and gather rays at points."""
         return LocalPass(self._state)
+
+    def relightable(self, emitter: Array | None = None) -> Relightable:
+        """Return what lights this scene anew.
+
+        Parameters
+        ----------
+        emitter : (t,) int or None
+            Which emissive material each triangle has, see `LightSources`.
+
+        Raises
+        ------
+        UsageError
+            If the method keeps no links.
+        """
+        return Relightable.of(self._state, emitter)
 
     @property
     def element_residual(self) -> Residual:

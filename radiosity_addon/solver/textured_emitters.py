@@ -26,13 +26,16 @@ SAME_COLOUR = 1e-3
 """Pieces whose channels are in one proportion, to this much, are one lamp."""
 
 
-def emitter_groups(scene: Scene, faces: Faces, caster: RayCaster) -> list[EmitterGroup]:
-    """Return the emissive faces as lamps, those of one constant colour together."""
+def emitter_groups(
+    scene: Scene, faces: Faces, caster: RayCaster, among: Array | None = None
+) -> list[EmitterGroup]:
+    """Return the emissive faces, if given those of a (f,) mask, as lamps, those of one colour together."""
     if scene.images is None:
-        return EmitterGroup.of_faces(faces, caster)
+        return EmitterGroup.of_faces(faces, caster, among)
+    among = np.ones(len(faces), dtype=bool) if among is None else among
     textured = scene.images.textured[faces.triangle]
-    plain = EmitterGroup.of_faces(faces, caster, ~textured)
-    shines = textured & (faces.emission.max(axis=1, initial=0.0) > 0)
+    plain = EmitterGroup.of_faces(faces, caster, ~textured & among)
+    shines = textured & among & (faces.emission.max(axis=1, initial=0.0) > 0)
     return plain + _of_pieces(faces, *emissive_pieces(faces, np.flatnonzero(shines), scene.images), caster)
 
 

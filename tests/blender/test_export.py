@@ -19,7 +19,7 @@ from tests.blender.exporting import (
     sphere_nodes,
     triangles_of,
 )
-from tests.blender.scenes import add_mesh, add_object
+from tests.blender.scenes import add_mesh, add_object, shader_material
 
 
 @pytest.mark.parametrize(
@@ -160,3 +160,20 @@ def test_kept_uvs_go_with_their_corners(mirrored: bool) -> None:
     np.testing.assert_array_equal(obj.uv, uv[obj.loops])
     layer.name = "Other"
     assert export_with(keep_uvs=True).bake_scene.objects[0].uv is None
+
+
+def test_triangles_tell_which_material_makes_them_emit() -> None:
+    """For light groups: materials that emit have a number and a name, others none."""
+    for name, strength in (("Dull", None), ("Sign", 2.0), ("Panel", 5.0)):
+        cube = add_cube(name, location=(3.0 * len(name), 0, 0))
+        inputs = {} if strength is None else {"Strength": strength}
+        kind = "ShaderNodeBsdfDiffuse" if strength is None else "ShaderNodeEmission"
+        cube.data.materials.append(shader_material(f"{name} paint", kind, **inputs))
+    export = export_with()
+    scene, emitter = export.bake_scene.scene, export.bake_scene.emitter
+    assert emitter is not None
+    assert sorted(export.bake_scene.emitter_names) == ["Panel paint", "Sign paint"]
+    for name in ("Sign", "Panel"):
+        rows = objects_by_name(export)[name].rows
+        assert scene.emission[rows].all()
+        assert {export.bake_scene.emitter_names[number] for number in emitter[rows]} == {f"{name} paint"}

@@ -11,7 +11,12 @@ PACKAGE = "radiosity_addon"
 
 # Each layer may import those after it, front doors any.
 LAYERS = ("blender", "pipeline", "lightmap", "solver")
-LAYER_OF = {**{layer: layer for layer in LAYERS}, "quality": "pipeline"}
+LAYER_OF = {
+    **{layer: layer for layer in LAYERS},
+    "quality": "pipeline",
+    "relighting": "pipeline",
+    "light_groups": "pipeline",
+}
 FRONT_DOORS = ("", "__main__", "cli", "console", "interrupts")
 
 # Every other module stands beside the layers, for all to import, and knows none of them; only the

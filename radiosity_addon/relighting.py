@@ -1,0 +1,179 @@
+"""A bake kept in memory, and its lightmaps for other strengths of its lights: no ray is traced.
+
+What is kept is light-independent (geometry and reflectance): gather hits, each lamp's gain at each texel,
+the hierarchy's links. Colour and power of lamps, emission, and the world's colour and strength may change;
+whatever moves, turns or reflects otherwise needs a new bake.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from .bake_scene import BakeScene, LightmapPage, Progress
+from .errors import SceneError
+from .lightmap.encode import to_quantity
+from .lightmap.relight import kept_bytes, relight_steps
+from .lightmap.seams import Seams
+from .lightmap.sweeps import LitTexels, TexelLight
+from .lightmap.texel_geometry import TexelGeometry
+from .lightmap.texel_pages import texel_pages
+from .settings import BakeSettings
+from .solver.arrays import Array
+from .solver.element_transport import Relightable
+from .solver.light_sources import LightSources
+from .solver.lights import Light
+from .solver.scene import Scene
+
+STRENGTHS = ("power", "irradiance", "radiance")
+"""The fields of lights that may change."""
+
+SAME = 1e-5
+"""Emission that differs from what its material's strength says by no more than this part is as expected."""
+
+
+@dataclass(frozen=True, eq=False)
+class KeptBake:
+    """All that relighting needs of a bake.
+
+    Attributes
+    ----------
+    bake_scene, settings
+        The bake's.
+    solved : Relightable
+    lit : LitTexels
+    geometry, seams, rings
+        The texels, what is stitched, and how far pages are dilated [texels].
+    reflectance, emission : (n, 3) float64
+        Of the texels as they show; emission [W/m²] as it was baked.
+    """
+
+    bake_scene: BakeScene
+    settings: BakeSettings
+    solved: Relightable
+    lit: LitTexels
+    geometry: TexelGeometry
+    seams: Seams | None
+    rings: int
+    reflectance: Array
+    emission: Array
+
+    @property
+    def sources(self) -> LightSources:
+        """What can be changed."""
+        return self.solved.sources
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the sources: lamps', the world's, and emissive materials'."""
+        names = [light.name for light in self.sources.lights]
+        count = len(self.sources) - len(names)
+        given = self.bake_scene.emitter_names or tuple(f"emission {1 + row}" for row in range(count))
+        return (*names, *given[:count])
+
+    @property
+    def strengths(self) -> Array:
+        """(s, 3) The sources' strengths as they were baked, see `LightSources`."""
+        return np.asarray(self.sources.strengths)
+
+    @property
+    def nbytes(self) -> int:
+        """What the texels' part takes in memory."""
+        return kept_bytes(self.lit)
+
+    def strengths_of(self, scene: Scene) -> Array:
+        """Return (s, 3) the strengths of the sources in a scene that differs in them alone.
+
+        Raises
+        ------
+        SceneError
+            If anything else differs.
+        """
+        before = self.bake_scene.scene
+        alike = len(scene) == len(before) and len(scene.lights) == len(before.lights)
+        alike = alike and all(
+            np.array_equal(getattr(scene, name), getattr(before, name))
+            for name in (
+                "triangles",
+                "normals",
+                "reflectance",
+                "opacity",
+                "two_sided",
+                "in_bounces",
+                "in_shadows",
+            )
+        )
+        if not alike:
+            raise SceneError("a surface, a reflectance or the number of lamps has changed; bake again")
+        for light, other in zip(before.lights, scene.lights, strict=True):
+            if not _same_but_strength(light, other):
+                raise SceneError(f"lamp '{light.name}' has changed in more than its strength; bake again")
+        exitance = np.zeros((len(self.sources) - len(scene.lights), 3))
+        emits = self.sources.emitter >= 0
+        np.maximum.at(exitance, self.sources.emitter[emits], scene.emission[emits])
+        lamps = np.array([light.strength for light in scene.lights]).reshape(-1, 3)
+        strengths = self.sources.checked(np.concatenate([lamps, exitance]))
+        told = self.sources.emission(before.emission, np.arange(len(scene)), strengths)
+        if np.abs(told - scene.emission).max(initial=0.0) > SAME * scene.emission.max(initial=0.0):
+            raise SceneError(
+                "emission has changed in more than its strength, or is new somewhere; bake again"
+            )
+        return strengths
+
+
+def relight(kept: KeptBake, strengths: Array) -> Generator[Progress, None, tuple[LightmapPage, ...]]:
+    """Compute the lightmaps for other strengths of the sources.
+
+    Parameters
+    ----------
+    strengths : (s, 3) float
+        See `KeptBake.strengths`.
+
+    Raises
+    ------
+    SceneError
+        If the sources cannot have them.
+    """
+    wanted = kept.sources.checked(strengths)
+    steps = relight_steps(kept.lit, kept.solved, wanted)
+    while True:
+        try:
+            yield Progress("relight", 0.95 * next(steps))
+        except StopIteration as done:
+            light: TexelLight = done.value
+            break
+    emission = kept.sources.emission(kept.emission, kept.geometry.triangle, wanted)
+    values = shown(light, kept.reflectance, emission, kept.settings)
+    pages = texel_pages(kept.geometry, values, kept.seams, kept.rings)
+    yield Progress("relight", 1.0)
+    return pages
+
+
+def shown(light: TexelLight, reflectance: Array, emission: Array, settings: BakeSettings) -> Array:
+    """Return (n, 3) what texels are to hold of their light; reflectance and emission as they show."""
+    irradiance = {
+        "all": light.direct + light.indirect,
+        "direct": light.direct,
+        "indirect": light.indirect,
+    }[settings.light]
+    if settings.light == "indirect":
+        emission = np.zeros_like(emission)
+    return to_quantity(irradiance, reflectance, emission, settings.quantity)
+
+
+def _same_but_strength(one: Light, other: Light) -> bool:
+    """Tell whether two lights differ at most in colour and strength."""
+    if type(one) is not type(other):
+        return False
+    return all(
+        _equal(getattr(one, entry.name), getattr(other, entry.name))
+        for entry in fields(one)
+        if entry.name not in STRENGTHS
+    )
+
+
+def _equal(one: Any, other: Any) -> bool:
+    return bool(np.array_equal(one, other)) if isinstance(one, np.ndarray) else bool(one == other)

@@ -1,0 +1,131 @@
+"""The hierarchy's links kept, to solve them anew for other light without a ray.
+
+Links, and what keeps their light conserved, are of geometry and reflectance alone; only how finely the
+hierarchy was refined, and where, came from the light that it was solved for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+
+import numpy as np
+
+from ..errors import UsageError
+from .anderson import Anderson
+from .arrays import Array
+from .bounce import bounce
+from .light_links import join_light_links, link_lights
+from .light_sources import LightSources
+from .local_pass import LocalPass
+from .methods.hierarchical import HierarchicalState
+from .state import SolverState
+from .transport import push
+
+ITERATIONS = 100
+"""At most: accelerated, a digit takes some three."""
+
+
+@dataclass
+class _Relit(HierarchicalState):
+    """A solved state with another emission."""
+
+    own_emission: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    """(e, 3) float64 [W/m²]"""
+
+    @property
+    def emission(self) -> Array:
+        """(e, 3) float64: own emission of every element [W/m²]."""
+        return self.own_emission
+
+
+class ElementTransport:
+    """How light gets from the sources to the elements, and from element to element.
+
+    Parameters
+    ----------
+    state : SolverState
+        Solved by the refined hierarchy.
+    sources : LightSources
+
+    Raises
+    ------
+    UsageError
+        If another method solved it.
+    """
+
+    def __init__(self, state: SolverState, sources: LightSources) -> None:
+        if not isinstance(state, HierarchicalState):
+            raise UsageError(
+                f"the {state.settings.method} method keeps no links to light anew by; "
+                "bake by the hierarchical method"
+            )
+        self._state, self._sources = state, sources
+        hierarchy, settings = state.hierarchy, state.settings
+        # Lamps that were dark have no links yet; elements stay as they are for them.
+        dark = np.array([not light.strength.any() for light in sources.lights], dtype=bool)
+        linked = np.bincount(state.light_links.light, minlength=len(dark)) > 0
+        missing = (dark | ~linked).astype(np.float64)
+        further = link_lights(
+            hierarchy,
+            sources.lights,
+            state.caster,
+            0.0,
+            np.inf,
+            settings.seed,
+            settings.threads,
+            as_if=missing,
+        )
+        self._light_links = join_light_links(state.light_links, further)
+
+    def irradiance(self, strengths: Array) -> Array:
+        """Solve for (s, 3) strengths of the sources: (e, 3) area means over every element [W/m²]."""
+        state, hierarchy = self._state, self._state.hierarchy
+        triangle = hierarchy.faces.triangle[hierarchy.face]
+        emission = self._sources.emission(hierarchy.emission, triangle, strengths)
+        own = {entry.name: getattr(state, entry.name) for entry in fields(HierarchicalState)}
+        relit = _Relit(**{**own, "history": [], "own_emission": emission, "iterations": 0})
+        relit.reset()
+        given = strengths[: len(self._sources.lights)]
+        lights = push(hierarchy, self._light_links.irradiance(given, hierarchy.n_elements))
+        leaves = hierarchy.leaves
+        area = hierarchy.area[leaves]
+        entering = emission[leaves] + hierarchy.reflectance[leaves] * lights[leaves]
+        relit.power = float((area @ entering).max(initial=0.0))
+        if relit.power <= 0.0:
+            relit.irradiance = lights
+            return lights
+        links, scale, received = state.links, None, None
+        if state.balance is not None:
+            links, scale, received = state.balance.links, state.balance.sent, state.balance.received
+        linked = links, lights, scale, relit.cluster_links, relit.top, received
+        least, mixer = emission[leaves], Anderson(area)
+        for _ in range(ITERATIONS):
+            before = relit.radiosity[leaves]
+            bounce(relit, *linked)
+            if relit.residual < state.settings.tolerance:
+                break
+            relit.radiosity[leaves] = np.maximum(mixer.next(before, relit.radiosity[leaves]), least)
+        return relit.irradiance
+
+
+@dataclass(frozen=True, eq=False)
+class Relightable:
+    """A solved scene that can be lit anew.
+
+    Attributes
+    ----------
+    sources : LightSources
+    elements : ElementTransport
+    local : LocalPass
+        Asks for every light apart.
+    """
+
+    sources: LightSources
+    elements: ElementTransport
+    local: LocalPass
+
+    @staticmethod
+    def of(state: SolverState, emitter: Array | None = None) -> Relightable:
+        """Keep a state; `emitter` as for `LightSources`, errors as of `ElementTransport`."""
+        sources = LightSources(state.scene, state.hierarchy.faces, state.caster, emitter)
+        return Relightable(sources, ElementTransport(state, sources), LocalPass(state, sources))
