@@ -6,15 +6,13 @@ plane and lays its texels in the same way, nothing ends at that edge: the texel 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ..solver.arrays import Array
-from .rasterise import Texels, overlap_areas
-
-if TYPE_CHECKING:
-    from .texel_geometry import TexelGeometry
+from ..solver.visibility import RayCaster
+from .crossings import LIFT, free_inside
+from .rasterise import overlap_areas
+from .texel_geometry import TexelGeometry
 
 ASIDE = 0.01
 """Texels by which two triangles may lay the same texel apart from each other along their plane."""
@@ -32,30 +30,28 @@ _THREE_CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 _NEIGHBOURS = np.array([(y, x) for y in (-1, 0, 1) for x in (-1, 0, 1) if (y, x) != (0, 0)])
 
 
-def continued(geometry: TexelGeometry, number: int, page: Texels, offset: float) -> Array:
-    """Tell which texels are not whole on their triangle, but are on all that go on in its plane.
+def join_continued(geometry: TexelGeometry, caster: RayCaster) -> None:
+    """Make texels whole that their triangle and those that go on in its plane cover together.
+
+    Not where something stands on them: at a wall on the edge between two triangles, a texel of one of
+    them is better than one of both.
+    """
+    found = [_continued_on(geometry, number, caster.surface_offset) for number in range(len(geometry.texels))]
+    rows = np.concatenate(found)
+    lift = LIFT * caster.surface_offset * geometry.surface_normal[rows][:, None]
+    geometry.make_whole(rows[free_inside(caster, geometry.squares(rows) + lift)])
+
+
+def _continued_on(geometry: TexelGeometry, number: int, offset: float) -> Array:
+    """Return the texels of a page that several triangles of one plane cover together.
 
     Looked at are the triangles of the eight texels around: one too small to have any of them counts
-    as missing.
-
-    Parameters
-    ----------
-    geometry : TexelGeometry
-    number : int
-        Of a page.
-    page : Texels
-        Its p texels.
-    offset : float
-        What rays leave surfaces by [m].
-
-    Returns
-    -------
-    (p,) bool
+    as missing. `offset` is what rays leave surfaces by [m].
     """
-    found = np.zeros(len(page), dtype=bool)
-    first = geometry.first(number)
+    page, first = geometry.texels[number], geometry.first(number)
     framed = np.pad(geometry.index[number], 1, constant_values=-1)
     cut = np.flatnonzero(page.centre_inside & (page.area < 1.0))
+    found = np.zeros(len(cut), dtype=bool)
     for start in range(0, len(cut), CHUNK):
         texel = cut[start : start + CHUNK]
         rows, columns = page.row[texel] + 1, page.column[texel] + 1
@@ -71,8 +67,8 @@ def continued(geometry: TexelGeometry, number: int, page: Texels, offset: float)
         covered = page.area[texel].astype(np.float64)
         row, column = page.row[texel[of]], page.column[texel[of]]
         np.add.at(covered, of, overlap_areas(geometry.uv, page.resolution, other, row, column))
-        found[texel] = covered >= 1.0 - UNCOVERED
-    return found
+        found[start : start + CHUNK] = covered >= 1.0 - UNCOVERED
+    return first + cut[found]
 
 
 def _alike(geometry: TexelGeometry, texel: Array, other: Array, offset: float) -> Array:

@@ -10,7 +10,6 @@ import numpy as np
 from ..solver.arrays import Array
 from ..solver.scene import Scene
 from ..solver.visibility import Hits, surface_offset
-from .continued import continued
 from .rasterise import FOOTPRINT, Texels, centre_weights, sample_footprints
 
 NO_TEXEL = -1
@@ -62,7 +61,7 @@ class TexelGeometry:
         self._scene = scene
         self.uv, self.page_of_triangle = uv, page_of_triangle
         self.triangles, self.face_normals, self.normals = scene.triangles, scene.face_normals, scene.normals
-        self._texels = list(texels)
+        self.texels = list(texels)
         self._first = np.cumsum([0] + [len(page) for page in texels])
         self.page = np.repeat(np.arange(len(texels), dtype=np.int32), np.diff(self._first))
         self.row = np.concatenate([page.row for page in texels])
@@ -78,27 +77,33 @@ class TexelGeometry:
             numbers[page.row, page.column] = self._first[number] + np.arange(len(page))
             self.index.append(numbers)
         self._inset = _edge_inset(scene)
-        whole, middle = zip(*(self._whole(number) for number in range(len(texels))), strict=True)
-        self.whole = np.concatenate(whole)
-        weights, ends = np.concatenate(middle), np.flatnonzero(~self.whole)
-        weights[ends] = self._drawn_in(weights[ends, None], self.triangle[ends])[:, 0]
-        self.barycentric = weights[:, 1:].astype(np.float32)
-        self.position = _at(scene.triangles[self.triangle], weights[:, None])[:, 0]
-        shading = np.einsum("nc,nck->nk", weights, scene.normals[self.triangle])
+        self.whole = np.concatenate([page.area for page in texels]) >= 1.0
+        centroid = np.concatenate([page.centroid for page in texels]).astype(np.float64)
+        weights = self._drawn_in(centroid[:, None], self.triangle)[:, 0]
+        self.barycentric = np.empty((len(weights), 2), dtype=np.float32)
+        self.position, self.normal = np.empty((2, len(weights), 3))
+        self._put(np.arange(len(weights)), weights)
+
+    def _put(self, rows: Array, weights: Array) -> None:
+        """Put texels where barycentric weights (r, 3) of their triangles say."""
+        triangle, upright = self.triangle[rows], self.surface_normal[rows]
+        self.barycentric[rows] = weights[:, 1:]
+        self.position[rows] = _at(self.triangles[triangle], weights[:, None])[:, 0]
+        shading = np.einsum("nc,nck->nk", weights, self.normals[triangle])
         length = np.linalg.norm(shading, axis=1, keepdims=True)
         # A shading normal that vanished or turned behind the surface says nothing.
-        sane = (length[:, 0] > 1e-6) & (np.einsum("nk,nk->n", shading, self.surface_normal) > 0)
-        self.normal = np.where(sane[:, None], shading / np.maximum(length, 1e-6), self.surface_normal)
+        sane = (length[:, 0] > 1e-6) & (np.einsum("nk,nk->n", shading, upright) > 0)
+        self.normal[rows] = np.where(sane[:, None], shading / np.maximum(length, 1e-6), upright)
 
-    def _whole(self, number: int) -> tuple[Array, Array]:
-        """Return which of a page's texels are whole, (p,), and weights (p, 3) of what their light is for."""
-        page = self._texels[number]
-        own = slice(self._first[number], self._first[number + 1])
-        further = continued(self, number, page, surface_offset(self.triangles))
-        middle = page.centroid.astype(np.float64)
-        rows, triangle = page.row[further], self.triangle[own][further]
-        middle[further] = centre_weights(self.uv, page.resolution, triangle, rows, page.column[further])
-        return (page.area >= 1.0) | further, middle
+    def make_whole(self, rows: Array) -> None:
+        """Count texels (r,), in ascending order, as whole: other triangles cover what theirs does not."""
+        self.whole[rows] = True
+        for number, page in enumerate(self.texels):
+            first, last = np.searchsorted(rows, self._first[number : number + 2])
+            own = rows[first:last] - self._first[number]
+            triangle = self.triangle[rows[first:last]]
+            at = self.uv, page.resolution, triangle, page.row[own], page.column[own]
+            self._put(rows[first:last], centre_weights(*at))
 
     def __len__(self) -> int:
         return len(self.page)
@@ -164,7 +169,7 @@ class TexelGeometry:
     def sample_weights(self, rows: Array, u: Array, width: float = FOOTPRINT) -> Array:
         """Return (r, k, 3) the barycentric weights of the same points in the texels' triangles."""
         weights = np.empty((len(rows), u.shape[1], 3))
-        for number, page in enumerate(self._texels):
+        for number, page in enumerate(self.texels):
             mine = np.flatnonzero(self.page[rows] == number)
             if len(mine) == 0:
                 continue
@@ -195,7 +200,7 @@ class TexelGeometry:
     def _framed(self) -> list[Array]:
         """Per page, where its texels lie in a page that is one texel larger all around, row by row."""
         return [
-            (page.row.astype(np.int64) + 1) * (page.resolution + 2) + page.column + 1 for page in self._texels
+            (page.row.astype(np.int64) + 1) * (page.resolution + 2) + page.column + 1 for page in self.texels
         ]
 
     def positions_of(self, hits: Hits) -> Array:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from radiosity_addon.lightmap.continued import join_continued
 from radiosity_addon.lightmap.texel_geometry import TexelGeometry
 from radiosity_addon.solver import Scene
-from tests.rooms import grey
+from radiosity_addon.solver.embree import EmbreeCaster
+from tests.rooms import grey, rectangle
 from tests.unit.texel_scenes import QUAD_UV, texel_geometry
 
 SIZE = 12
@@ -17,8 +19,17 @@ CORNERS = np.array([(0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0)], dtype=float)
 
 def quad(corners: np.ndarray = CORNERS, uv: np.ndarray = QUAD_UV) -> TexelGeometry:
     """Two triangles, over the page's whole square unless `uv` says otherwise."""
-    triangles = corners[[[0, 1, 2], [0, 2, 3]]]
-    return texel_geometry(Scene(triangles, grey(2, 0.5), grey(2, 0.0)), uv, SIZE)
+    return joined(corners[[[0, 1, 2], [0, 2, 3]]], uv)
+
+
+def joined(triangles: np.ndarray, uv: np.ndarray, *others: np.ndarray) -> TexelGeometry:
+    """Texels of triangles among others without a lightmap."""
+    count, scene = len(triangles), np.concatenate([triangles, *others])
+    pages = np.where(np.arange(len(scene)) < count, 0, -1)
+    all_uv = np.concatenate([uv, np.zeros((len(scene) - count, 3, 2), dtype=np.float32)])
+    geometry = texel_geometry(Scene(scene, grey(len(scene), 0.5), grey(len(scene), 0.0)), all_uv, SIZE, pages)
+    join_continued(geometry, EmbreeCaster(scene))
+    return geometry
 
 
 def on_diagonal(geometry: TexelGeometry) -> np.ndarray:
@@ -90,8 +101,17 @@ def test_many_triangles_about_one_corner_cover_its_texel() -> None:
     middle = 6.5 / SIZE
     uv = (middle + flat * 0.4).astype(np.float32)
     triangles = np.concatenate([flat, np.zeros((8, 3, 1))], axis=2)
-    geometry = texel_geometry(Scene(triangles, grey(8, 0.5), grey(8, 0.0)), uv, SIZE)
+    geometry = joined(triangles, uv)
     at = geometry.index[0][6, 6]
     assert geometry.whole[at]
     np.testing.assert_allclose(geometry.position[at], 0.0, atol=1e-5)
     np.testing.assert_allclose(spread(geometry)[at].mean(axis=0), 0.0, atol=1e-5)
+
+
+def test_a_wall_on_the_diagonal_keeps_its_two_sides_apart() -> None:
+    """Half of it: beyond its end the floor goes on."""
+    wall = rectangle((0.5 / SIZE, 0.5 / SIZE, -0.5), (1, 1, 0), (0, 0, 1))
+    geometry = joined(CORNERS[[[0, 1, 2], [0, 2, 3]]], QUAD_UV, wall)
+    diagonal = np.flatnonzero(on_diagonal(geometry))
+    np.testing.assert_array_equal(geometry.whole[diagonal], geometry.column[diagonal] > SIZE // 2)
+    assert geometry.whole[~on_diagonal(geometry)].all()
