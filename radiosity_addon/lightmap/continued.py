@@ -68,7 +68,7 @@ def _continued_on(geometry: TexelGeometry, number: int, offset: float) -> Array:
         row, column = page.row[texel[of]], page.column[texel[of]]
         np.add.at(covered, of, overlap_areas(geometry.uv, page.resolution, other, row, column))
         found[start : start + CHUNK] = covered >= 1.0 - UNCOVERED
-    return first + cut[found]
+    return np.asarray(first + cut[found])
 
 
 def _alike(geometry: TexelGeometry, texel: Array, other: Array, offset: float) -> Array:
