@@ -15,9 +15,10 @@ from ..solver.lights import Light
 from .export_sources import ExportSource
 from .lamps import LampFactors, read_lamp
 from .light_linking import linking_warnings
-from .materials import DEFAULT_GREY, Surface, read_material
+from .materials import DEFAULT_GREY, Surface, ray_doubts, read_material, uses_nodes
 from .mesh_arrays import MeshArrays, all_finite, no_triangles, not_finite_message, read_mesh
 from .object_roles import BAKE, BAKEABLE_TYPES, IGNORE, Role, role_of
+from .render_state import background_scenes
 from .scene_objects import (
     is_generated,
     materials_of,
@@ -27,7 +28,14 @@ from .scene_objects import (
     unknown_objects,
     visible_objects,
 )
-from .shading_inputs import MeshValues, asked_by_material, doubts, read_mesh_inputs, read_object_inputs
+from .shading_inputs import (
+    MeshValues,
+    asked_by_material,
+    doubts,
+    eevee_only,
+    read_mesh_inputs,
+    read_object_inputs,
+)
 from .surface_bake import can_evaluate
 
 
@@ -137,6 +145,15 @@ class _Collector:
         self._surface_of: dict[str | None, int] = {}
         # A curve's mesh comes as an instance, and may have the curve's own name.
         self._taken = {obj.name for obj in bpy.data.objects if obj.library is None and obj.type == "MESH"}
+        layer = depsgraph.view_layer
+        self._held_out = {obj.name_full for obj in layer.objects if obj.holdout_get(view_layer=layer)}
+        own = {obj.name_full for obj in layer.objects}
+        self._background = {
+            obj.name_full: scene.name
+            for scene in background_scenes(depsgraph.scene)
+            for obj in scene.objects
+            if obj.name_full not in own
+        }
         self._instancers = {
             instance.parent.original.name
             for instance in visible_objects(depsgraph)
@@ -155,7 +172,9 @@ class _Collector:
         owner = instance.parent.original if instance.is_instance else shown
         name = self._unique_name(instance)
         source = source_of(instance, name, not instance.is_instance and shown.name in self._instancers)
-        role = role_of(shown, owner, _names(source), self._settings)
+        held_out = owner.name_full in self._held_out
+        background = self._background.get(owner.name_full)
+        role = role_of(shown, owner, _names(source), self._settings, held_out, background)
         # What is ignored stays known: it must still be shown where its instancer will be hidden.
         contents = _NOTHING if role.mode == IGNORE else self._contents(instance)
         if contents is not None and self._is_fog(contents):
@@ -263,16 +282,20 @@ class _Collector:
                 asked_by_material(material.node_tree) if material and surface.varies else frozenset()
             )
             self._warn(surface.warnings)
+            if material is not None and uses_nodes(material):
+                self._warn(_told_of(material, eevee_only(material.node_tree)))
+                self._warn(_told_of(material, ray_doubts(material, surface)))
             if material is not None and surface.varies:
-                said = [
-                    BakeWarning(material.name, f"material '{material.name}': {doubt}")
-                    for doubt in doubts(material.node_tree)
-                ]
+                said = _told_of(material, doubts(material.node_tree))
                 self._warn(said if can_evaluate() else surface.fallbacks)
         return self._surface_of[key]
 
     def _warn(self, warnings: Sequence[BakeWarning]) -> None:
         self.collected.warnings.extend(warnings)
+
+
+def _told_of(material: bpy.types.Material, messages: Sequence[str]) -> list[BakeWarning]:
+    return [BakeWarning(material.name, f"material '{material.name}': {message}") for message in messages]
 
 
 def _read_evaluated(mesh: bpy.types.Mesh, asked: frozenset[str]) -> tuple[MeshArrays | None, MeshValues]:

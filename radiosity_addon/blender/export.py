@@ -18,6 +18,7 @@ from .export_sources import Export
 from .lamps import lamp_factors
 from .mesh_arrays import all_finite, degenerate, not_finite_message, world_from_object
 from .object_roles import BAKE, BAKEABLE_TYPES, half_visible
+from .render_options import option_warnings, world_of
 from .render_state import leave_edit_mode, render_depsgraph
 from .surface_evaluation import evaluate_surfaces
 from .world import read_world
@@ -51,8 +52,9 @@ def export_scene(context: bpy.types.Context, settings: BakeSettings) -> Export:
     factors = lamp_factors()
     with render_depsgraph(context) as depsgraph:
         collected = collect(depsgraph, factors, settings)
+        collected.warnings.extend(option_warnings(context))
     # After that: Cycles may have to render it, which no evaluated object would survive.
-    world, warnings = read_world(context.scene.world)
+    world, warnings = read_world(world_of(context))
     collected.lights.extend(world)
     collected.warnings.extend(warnings)
     _check_names(context, collected.pieces, settings)

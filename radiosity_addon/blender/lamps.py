@@ -15,6 +15,7 @@ from .lamp_pixels import lamp_factor
 from .light_linking import linking_warnings
 from .materials import read_radiance, uses_nodes
 from .mesh_arrays import all_finite
+from .shading_inputs import asks_light_path
 
 _SAME_SCALE = 1e-4  # relative difference of axes below which a scale counts as uniform
 _EVEN = 0.02  # relative variation with direction below which a lamp's nodes count as constant
@@ -95,6 +96,9 @@ def _strength(name: str, data: bpy.types.Light, factors: LampFactors) -> tuple[n
         return strength * factor, [BakeWarning(name, warning.message) for warning in warnings]
     mean, variation = measured
     notes = []
+    if _asks_for_distance(data.node_tree):
+        message = "its nodes change its light with distance; what they make of it at 1 m is used"
+        notes.append(BakeWarning(name, f"lamp '{name}': {message}"))
     if variation > _EVEN:
         message = "its nodes shine unevenly; their mean over all directions is used"
         notes.append(BakeWarning(name, f"lamp '{name}': {message}"))
@@ -194,6 +198,19 @@ def _casts_shadow(data: bpy.types.Light) -> bool:
 
 def _is_portal(data: bpy.types.Light) -> bool:
     return data.type == "AREA" and bool(getattr(getattr(data, "cycles", None), "is_portal", False))
+
+
+def _asks_for_distance(tree: bpy.types.NodeTree) -> bool:
+    """Tell whether nodes make light fall off otherwise than with the square of the distance."""
+    for node in tree.nodes:
+        if node.type == "LIGHT_FALLOFF":
+            linked = {output.name for output in node.outputs if output.is_linked}
+            smooth = node.inputs["Smooth"]
+            if linked - {"Quadratic"} or (linked and (smooth.is_linked or smooth.default_value > 0)):
+                return True
+        if node.type == "GROUP" and node.node_tree is not None and _asks_for_distance(node.node_tree):
+            return True
+    return asks_light_path(tree, ("Ray Length",))
 
 
 def _not_understood(lamp: bpy.types.Object) -> list[BakeWarning]:

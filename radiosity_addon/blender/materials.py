@@ -27,6 +27,7 @@ from .shader_nodes import (
     output_node,
 )
 from .shader_terms import ShaderTerms, Terms, nothing
+from .shading_inputs import LIGHT_PATHS, asks_light_path
 from .surface_terms import surface_of_terms
 
 DEFAULT_GREY = 0.8
@@ -89,6 +90,28 @@ def read_material(material: bpy.types.Material | None) -> Surface:
         tuple(reader.fallbacks),
         reader.is_volume,
     )
+
+
+def ray_doubts(material: bpy.types.Material, surface: Surface) -> list[str]:
+    """Say what Cycles has otherwise because it is a matter of what a ray is for."""
+    said = []
+    passes = surface.opacity < 1.0 or (surface.varies and _may_pass(material.node_tree))
+    if passes and not getattr(material, "use_transparent_shadow", True):
+        said.append("Transparent Shadows is off, which is ignored: lamps shine through it as it looks")
+    if surface.emission.any() and asks_light_path(material.node_tree, tuple(LIGHT_PATHS)):
+        said.append("its emission asks for diffuse rays: it gets them all, where Cycles only counts some")
+    return said
+
+
+def _may_pass(tree: bpy.types.NodeTree) -> bool:
+    """Tell whether a tree has what could let light through."""
+    for node in tree.nodes:
+        alpha = node.inputs.get("Alpha") if node.type == "BSDF_PRINCIPLED" else None
+        if node.type == "BSDF_TRANSPARENT" or (alpha is not None and alpha.is_linked):
+            return True
+        if node.type == "GROUP" and node.node_tree is not None and _may_pass(node.node_tree):
+            return True
+    return False
 
 
 def is_volume(output: bpy.types.Node | None) -> bool:
@@ -169,6 +192,8 @@ class _Reader(ShaderTerms[Stack]):
 
     def shader(self, socket: bpy.types.NodeSocket, place: Stack) -> Terms:
         feed = feed_of(socket, place)
+        if feed.socket.type != "SHADER":
+            return self.glow(self.color(socket, place))
         return nothing() if feed.node is None else self.terms(feed.node, feed.stack)
 
     def color(self, socket: bpy.types.NodeSocket, place: Stack) -> np.ndarray:

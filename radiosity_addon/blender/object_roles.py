@@ -75,7 +75,12 @@ def unregister() -> None:
 
 
 def role_of(
-    shown: bpy.types.Object, owner: bpy.types.Object, names: Sequence[str], settings: BakeSettings
+    shown: bpy.types.Object,
+    owner: bpy.types.Object,
+    names: Sequence[str],
+    settings: BakeSettings,
+    held_out: bool = False,
+    background: str | None = None,
 ) -> Role:
     """Return the role of an object.
 
@@ -87,6 +92,10 @@ def role_of(
         What the user may call it.
     settings : BakeSettings
         `ignore` and `light_only` win over the objects' own modes.
+    held_out : bool
+        A collection it is in is a holdout.
+    background : str or None
+        The background scene it is of; None for what is of the scene itself.
     """
     from ..bake_scene import BakeWarning  # with the solver, which registering is not to load
 
@@ -99,11 +108,19 @@ def role_of(
         mode = IGNORE
     warnings = []
     if mode == BAKE:
-        for attribute, what in (("is_holdout", "a holdout"), ("is_shadow_catcher", "a shadow catcher")):
-            if any(getattr(obj, attribute, False) for obj in both):
+        told = {
+            "a holdout": held_out or any(obj.is_holdout for obj in both),
+            "a shadow catcher": any(obj.is_shadow_catcher for obj in both),
+        }
+        for what, is_so in told.items():
+            if is_so:
                 mode = LIGHT_ONLY
                 message = f"object '{shown.name}' is {what}: it lights and blocks but gets no lightmap"
                 warnings.append(BakeWarning(shown.name, message))
+    if mode == BAKE and background is not None:
+        mode = LIGHT_ONLY
+        message = f"background scene '{background}': its objects light and block but get no lightmaps"
+        warnings.append(BakeWarning(background, f"{message}; open it to bake them"))
     scale = 1.0
     for obj in both:
         scale *= getattr(obj, "radiosity_texel_scale", 1.0)

@@ -11,7 +11,7 @@ action or a driver animates, which win over what is switched here.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -47,26 +47,42 @@ def render_depsgraph(context: bpy.types.Context) -> Iterator[bpy.types.Depsgraph
     Yields the evaluated dependency graph, valid inside the `with` block only.
     """
     layer = context.view_layer
-    selected = [obj for obj in layer.objects if obj.select_get()]
-    active = layer.objects.active
+    layers = [layer, *(_render_layer(scene) for scene in background_scenes(context.scene))]
+    selected = [(obj, of) for of in layers for obj in of.objects if obj.select_get(view_layer=of)]
+    active = [of.objects.active for of in layers]
     changes = _Changes()
-    hidden = [obj for obj in layer.objects if obj.hide_get()]
+    hidden = [(obj, of) for of in layers for obj in of.objects if obj.hide_get(view_layer=of)]
     try:
-        for obj in hidden:
-            obj.hide_set(False)
-        _switch_visibility(layer, changes)
+        for obj, of in hidden:
+            obj.hide_set(False, view_layer=of)
+        _switch_visibility(layers, changes)
         _switch_levels(context.scene, changes)
         layer.update()
         yield context.evaluated_depsgraph_get()
     finally:
         changes.undo()
         layer.update()
-        for obj in hidden:
-            obj.hide_set(True)
+        for obj, of in hidden:
+            obj.hide_set(True, view_layer=of)
         # Hiding an object deselects it, so this comes last.
-        layer.objects.active = active
-        for obj in selected:
-            obj.select_set(True)
+        for of, was_active in zip(layers, active, strict=True):
+            of.objects.active = was_active
+        for obj, of in selected:
+            obj.select_set(True, view_layer=of)
+
+
+def background_scenes(scene: bpy.types.Scene) -> list[bpy.types.Scene]:
+    """Return the scenes a render shows behind a scene: its background set, that one's, and so on."""
+    behind: list[bpy.types.Scene] = []
+    while scene.background_set is not None and scene.background_set not in behind:
+        scene = scene.background_set
+        behind.append(scene)
+    return behind
+
+
+def _render_layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
+    """Return the view layer that shows where a scene is the background of another."""
+    return next((layer for layer in scene.view_layers if layer.use), scene.view_layers[0])
 
 
 class _Changes:
@@ -86,14 +102,15 @@ class _Changes:
             setattr(owner, attribute, before)
 
 
-def _switch_visibility(layer: bpy.types.ViewLayer, changes: _Changes) -> None:
+def _switch_visibility(layers: Sequence[bpy.types.ViewLayer], changes: _Changes) -> None:
     for obj in bpy.data.objects:
         changes.set(obj, "hide_viewport", obj.hide_render)
         changes.set(obj, "show_instancer_for_viewport", obj.show_instancer_for_render)
     for collection in bpy.data.collections:
         changes.set(collection, "hide_viewport", collection.hide_render)
-    for child in _layer_collections(layer.layer_collection):
-        changes.set(child, "hide_viewport", False)
+    for layer in layers:
+        for child in _layer_collections(layer.layer_collection):
+            changes.set(child, "hide_viewport", False)
 
 
 def _layer_collections(root: bpy.types.LayerCollection) -> Iterator[bpy.types.LayerCollection]:

@@ -13,6 +13,7 @@ import bpy
 import numpy as np
 
 from .image_values import image_mean
+from .shading_inputs import LIGHT_PATHS
 
 Stack = tuple[bpy.types.Node, ...]
 """The group nodes a walk has entered, outermost first."""
@@ -68,6 +69,8 @@ def feed_of(socket: bpy.types.NodeSocket, stack: Stack = (), enter_groups: bool 
         if not links:
             return Feed(None, socket, stack)
         node, output = links[0].from_node, links[0].from_socket
+        if node.type == "SHADERTORGB":  # Cycles does not know it, and drops its links
+            return Feed(None, socket, stack)
         if node.mute:
             inner = [link.from_socket for link in node.internal_links if link.to_socket == output]
             if not inner:
@@ -157,11 +160,9 @@ def _checker(node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -
 
 
 def _light_path(_: bpy.types.Node, output: bpy.types.NodeSocket, _stack: Stack) -> Value:
-    # A lightmap sees diffuse bounces only.
-    known = {"Is Camera Ray": 0.0, "Is Diffuse Ray": 1.0, "Is Glossy Ray": 0.0, "Is Transmission Ray": 0.0}
-    if output.name not in known:
+    if not output.name.startswith("Is ") or output.name == "Is Shadow Ray":
         raise NotConstantError(f"Light Path '{output.name}'")
-    return Value(np.full(3, known[output.name]))
+    return Value(np.full(3, LIGHT_PATHS.get(output.name, 0.0)))
 
 
 def _mix(node: bpy.types.Node, _: bpy.types.NodeSocket, stack: Stack) -> Value:

@@ -94,6 +94,10 @@ class ShaderTerms(ABC, Generic[Place]):
     def not_understood(self, node: bpy.types.Node, /) -> Terms:
         """Return what stands for a shader that is none of the known ones."""
 
+    def glow(self, color: Color) -> Terms:
+        """Return what a color comes to where a shader is asked for: emission of strength 1, as in Cycles."""
+        return Terms(np.zeros(3), color, np.zeros(3))
+
     def terms(self, node: bpy.types.Node, place: Place) -> Terms:
         """Return what a shader node comes to."""
         if node.type == "BSDF_PRINCIPLED":

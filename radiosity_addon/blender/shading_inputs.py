@@ -25,8 +25,8 @@ _GENERATED_TEXTURES = frozenset(
 )  # fmt: skip
 """Textures that take generated coordinates where nothing feeds their Vector."""
 
-LIGHT_PATHS = {"Is Camera Ray": 0.0, "Is Diffuse Ray": 1.0}
-"""A lightmap sees diffuse bounces only: the other outputs are 0."""
+LIGHT_PATHS = {"Is Diffuse Ray": 1.0, "Is Reflection Ray": 1.0}
+"""What a Light Path node says of the rays a lightmap is made of, diffuse bounces; all else is 0 of them."""
 
 _VIEW_DEPENDENT = {
     "FRESNEL": "seen straight on",
@@ -38,6 +38,8 @@ _VIEW_DEPENDENT = {
     "HAIR_INFO": "without hair",
     "PARTICLE_INFO": "without particles",
     "POINT_INFO": "without points",
+    "SCRIPT": "without its script",
+    "TANGENT": "with tangents of triangles",
     "VECT_TRANSFORM": "as if the object stood at the origin",
 }
 _OUTPUTS_ASKED_IN_VAIN = {
@@ -125,6 +127,19 @@ def doubts(tree: bpy.types.NodeTree) -> list[str]:
         if node.type == "TEX_IMAGE" and (node.image is None or 0 in node.image.size):
             said.append("an image texture has no pixels (is its file missing?)")
     return list(dict.fromkeys(said))
+
+
+def eevee_only(tree: bpy.types.NodeTree) -> list[str]:
+    """Say which of a material's nodes Cycles does not know; what they feed counts as not linked there."""
+    nodes = (node for node in _all_nodes(tree) if node.type == "SHADERTORGB")
+    linked = {node.bl_label for node in nodes if any(output.is_linked for output in node.outputs)}
+    return [f"node '{label}' is EEVEE's: as in Cycles, what it feeds keeps its own value" for label in linked]
+
+
+def asks_light_path(tree: bpy.types.NodeTree, names: tuple[str, ...]) -> bool:
+    """Tell whether one of these outputs of a Light Path node is linked in a tree or its groups."""
+    nodes = (node for node in _all_nodes(tree) if node.type == "LIGHT_PATH")
+    return any(output.is_linked for node in nodes for output in node.outputs if output.name in names)
 
 
 def read_mesh_inputs(mesh: bpy.types.Mesh, loops: np.ndarray, asked: Iterable[str]) -> MeshValues:

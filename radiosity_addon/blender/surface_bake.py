@@ -48,7 +48,7 @@ class SurfaceBake:
             for row in sorted(needed):
                 self._rewired[row] = RewiredMaterial(materials[row], self._attributes)
                 self._made += self._rewired[row].made
-            self._scene = _new_scene(context.scene, settings)
+            self._scene = _new_scene(context.scene, context.view_layer, settings)
             self._made.append(self._scene)
         except BaseException:
             self.remove()
@@ -130,9 +130,18 @@ def bake_emission() -> set[str]:
     )
 
 
-def _new_scene(shown: bpy.types.Scene, settings: BakeSettings) -> bpy.types.Scene:
+def _copy_numbers(owner: bpy.types.bpy_struct, to: bpy.types.bpy_struct) -> None:
+    """Copy custom properties that Attribute nodes of the view layer could ask for."""
+    for name, value in owner.items():
+        if isinstance(value, (int, float)) or (hasattr(value, "typecode") and len(value) <= 4):
+            to[name] = value
+
+
+def _new_scene(shown: bpy.types.Scene, layer: bpy.types.ViewLayer, settings: BakeSettings) -> bpy.types.Scene:
     scene = bpy.data.scenes.new("Radiosity Surfaces")
     scene.frame_current, scene.frame_subframe = shown.frame_current, shown.frame_subframe
+    _copy_numbers(shown, scene)
+    _copy_numbers(layer, scene.view_layers[0])
     scene.render.engine = "CYCLES"
     scene.cycles.device = "CPU"
     scene.cycles.samples = 1

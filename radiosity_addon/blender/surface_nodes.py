@@ -59,6 +59,8 @@ def read_surface(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, unknown
     source = feeding_socket(socket)
     if source is None:
         return Surface(BLACK)
+    if source.type != "SHADER" and source.node.type not in ("GROUP", "GROUP_INPUT"):
+        return Surface(BLACK, source)
     node = source.node
     if node.type == "BSDF_PRINCIPLED":
         emission = _scaled(tree, node.inputs["Emission Color"], node.inputs["Emission Strength"])

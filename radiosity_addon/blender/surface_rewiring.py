@@ -99,9 +99,9 @@ class RewiredMaterial:
 
     def _prepare_light_path(self, tree: bpy.types.NodeTree, node: bpy.types.Node) -> None:
         for output in node.outputs:
-            if not output.is_linked or output.name in LIGHT_PATHS:
+            if not output.is_linked:
                 continue
-            number = _number(tree, 0.0)
+            number = _number(tree, LIGHT_PATHS.get(output.name, 0.0))
             if output.name == "Is Shadow Ray":
                 self._shadow_switches.append(number)
                 # Not a constant: it is another one for each channel.
@@ -147,6 +147,8 @@ class _Rewiring(ShaderTerms[_Place]):
             return self._from_inside(node, feed.socket.identifier, place)
         if node.type == "GROUP_INPUT" and place.outer is not None:
             return self._from_outside(feed.socket.identifier, place)
+        if feed.socket.type != "SHADER":
+            return self.glow(self.color(socket, place))
         return self.terms(node, place)
 
     def color(self, socket: bpy.types.NodeSocket, place: _Place) -> Color:

@@ -15,6 +15,7 @@ from ..solver.environment import (
     solid_angles,
 )
 from ..solver.lights import EnvironmentLight, Light
+from .lamps import ALL_BOUNCES
 from .materials import read_radiance, uses_nodes
 from .world_pixels import world_pixels
 
@@ -40,14 +41,15 @@ def read_world(world: bpy.types.World | None) -> tuple[list[Light], tuple[BakeWa
     """
     if world is None or not _lights_surfaces(world):
         return [], ()
+    limited = _limited(world)
     if not uses_nodes(world):
-        return _constant(np.array(world.color[:3], dtype=np.float64), world.name), ()
+        return _constant(np.array(world.color[:3], dtype=np.float64), world.name), limited
     radiance, warnings = read_radiance(world, "world")
     # The walk through the nodes warns of whatever is not constant: then Cycles knows better.
     beside = tuple(warning for warning in warnings if "volume" in warning.message)
     if len(beside) == len(warnings):
-        return _constant(radiance, world.name), beside
-    return _sampled(world), beside
+        return _constant(radiance, world.name), beside + limited
+    return _sampled(world), beside + limited
 
 
 def _constant(radiance: np.ndarray, name: str) -> list[Light]:
@@ -57,6 +59,13 @@ def _constant(radiance: np.ndarray, name: str) -> list[Light]:
 def _lights_surfaces(world: bpy.types.World) -> bool:
     visibility = getattr(world, "cycles_visibility", None)
     return bool(getattr(visibility, "diffuse", True))
+
+
+def _limited(world: bpy.types.World) -> tuple[BakeWarning, ...]:
+    if getattr(getattr(world, "cycles", None), "max_bounces", ALL_BOUNCES) >= ALL_BOUNCES:
+        return ()
+    message = f"world '{world.name}': its limit of bounces is ignored: all its light is followed"
+    return (BakeWarning(world.name, message),)
 
 
 def _sampled(world: bpy.types.World) -> list[Light]:

@@ -149,14 +149,23 @@ def rasterise(uv: Float32, resolution: int) -> Texels:
     centroid = np.empty((len(covered), 3), dtype=np.float32)
     whole = best[covered] >= _CENTRE + 1
     for some in _runs(np.flatnonzero(whole)):
-        origin = uv[triangle[some]].astype(np.float64) * resolution
-        origin -= np.stack((column[some], row[some]), axis=-1)[:, None, :]
-        centroid[some] = _barycentric(np.full((len(some), 1, 2), 0.5), origin)[:, 0]
+        centroid[some] = centre_weights(uv, resolution, triangle[some], row[some], column[some])
     for some in _runs(np.flatnonzero(~whole)):
         polygon, origin, _ = _clip(uv, resolution, triangle[some], row[some], column[some])
         area[some], middle = polygon_area_centroid(polygon)
         centroid[some] = _barycentric(middle[:, None], origin)[:, 0]
     return Texels(resolution, uv, row, column, triangle, area, centroid, best[covered] >= _CENTRE)
+
+
+def centre_weights(uv: Float32, resolution: int, triangle: Int32, row: Int32, column: Int32) -> Float:
+    """Return (p, 3) the barycentric coordinates, each in its triangle, of texels' centres."""
+    origin = _around_texels(uv, resolution, triangle, row, column)
+    return _barycentric(np.full((len(triangle), 1, 2), 0.5), origin)[:, 0]
+
+
+def overlap_areas(uv: Float32, resolution: int, triangle: Int32, row: Int32, column: Int32) -> Float:
+    """Return (p,) the part of each texel that its triangle covers, 0 to 1."""
+    return area_in_unit_square(_around_texels(uv, resolution, triangle, row, column))
 
 
 def _runs(rows: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
@@ -248,9 +257,7 @@ def _overlaps(
     whole = _all_three(distance - reach >= 0)
     area = whole.astype(np.float64)
     cut = np.flatnonzero(touches & ~whole)
-    corners = uv[triangle[cut]].astype(np.float64) * resolution
-    corners -= np.stack((column[cut], row[cut]), axis=-1)[:, None, :]
-    area[cut] = area_in_unit_square(corners)
+    area[cut] = overlap_areas(uv, resolution, triangle[cut], row[cut], column[cut])
     # A triangle smaller than the threshold still keeps the texel with most of its area.
     least = np.minimum(UNRESOLVED * resolution, 0.125 * np.abs(double_area[triangle]))
     keep = touches & (area > 0) & (centre | (area >= least))
@@ -317,8 +324,7 @@ def _clip(
     Returns the (t, 7, 2) footprints and the (t, 3, 2) triangles, both with the texel's lower
     left corner as the origin, and which texels are covered whole.
     """
-    corners = uv[triangle].astype(np.float64) * resolution
-    corners -= np.stack((column, row), axis=-1)[:, None, :]
+    corners = _around_texels(uv, resolution, triangle, row, column)
     distance, reach = _edge_distances(uv, resolution, triangle, row, column)
     whole = _all_three(distance - reach >= 0)
     polygon = np.empty((len(corners), 7, 2))
@@ -328,6 +334,13 @@ def _clip(
     middle = np.broadcast_to(width, len(corners))[cut, None, None]
     polygon[cut] = 0.5 + (clip_to_unit_square(0.5 + (corners[cut] - 0.5) / middle) - 0.5) * middle
     return polygon, corners, whole
+
+
+def _around_texels(uv: Float32, resolution: int, triangle: Int32, row: Int32, column: Int32) -> Float:
+    """Return (p, 3, 2) corners of triangles as seen from texels that are unit squares at the origin."""
+    corners = uv[triangle].astype(np.float64) * resolution
+    corners -= np.stack((column, row), axis=-1)[:, None, :]
+    return corners
 
 
 def _barycentric(points: Float, corners: Float) -> Float:

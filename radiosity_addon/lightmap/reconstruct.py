@@ -20,6 +20,7 @@ from ..solver.local_pass import NOTHING, Footprints, Gathered, LocalPass, Resolv
 from ..solver.scene import Scene
 from ..solver.steps import scaled
 from ..solver.visibility import Hits, sees
+from .continued import join_continued
 from .crossings import LIFT, Crossings, below_hood, crossing_steps
 from .earlier_light import EarlierLight
 from .interpolate import GatherPoints, fit_steps
@@ -78,6 +79,7 @@ def reconstruct(
 
     If `local` can ask for every light apart, what lights the texels anew is kept.
     """
+    join_continued(geometry, local.caster)
     gains = local.new_gains(len(geometry))
     direct = local.direct_steps(footprints(geometry, local), gains=gains)
     lamps = yield from scaled(direct, 0.0, DIRECT)

@@ -10,7 +10,7 @@ import numpy as np
 from ..solver.arrays import Array
 from ..solver.scene import Scene
 from ..solver.visibility import Hits, surface_offset
-from .rasterise import FOOTPRINT, Texels, sample_footprints
+from .rasterise import FOOTPRINT, Texels, centre_weights, sample_footprints
 
 NO_TEXEL = -1
 
@@ -40,8 +40,10 @@ class TexelGeometry:
     uv, page_of_triangle, triangles, face_normals, normals
         Of every scene triangle, as given.
     page, row, column, triangle : (n,) int32
-    centre_inside, whole : (n,) bool
-        Whether the texel's centre, and all of the texel, is on its triangle.
+    centre_inside : (n,) bool
+        Whether the texel's centre is on its triangle.
+    whole : (n,) bool
+        Whether all of the texel is: on its triangle, or on others too that go on in its plane.
     barycentric : (n, 2) float32
         Weights of the triangle's second and third corner at the centre of the footprint.
     position, normal, surface_normal : (n, 3) float64
@@ -59,32 +61,49 @@ class TexelGeometry:
         self._scene = scene
         self.uv, self.page_of_triangle = uv, page_of_triangle
         self.triangles, self.face_normals, self.normals = scene.triangles, scene.face_normals, scene.normals
-        self._texels = list(texels)
+        self.texels = list(texels)
         self._first = np.cumsum([0] + [len(page) for page in texels])
         self.page = np.repeat(np.arange(len(texels), dtype=np.int32), np.diff(self._first))
         self.row = np.concatenate([page.row for page in texels])
         self.column = np.concatenate([page.column for page in texels])
         self.centre_inside = np.concatenate([page.centre_inside for page in texels])
-        self.whole = np.concatenate([page.area for page in texels]) >= 1.0
         triangles = [of[page.triangle] for of, page in zip(rows, texels, strict=True)]
         self.triangle = np.concatenate(triangles).astype(np.int32)
-        self._inset = _edge_inset(scene)
-        centroid = np.concatenate([page.centroid for page in texels]).astype(np.float64)
-        weights = self._drawn_in(centroid[:, None], self.triangle)[:, 0]
-        self.barycentric = weights[:, 1:].astype(np.float32)
-        self.position = _at(scene.triangles[self.triangle], weights[:, None])[:, 0]
         self.surface_normal = scene.face_normals[self.triangle]
-        shading = np.einsum("nc,nck->nk", weights, scene.normals[self.triangle])
-        length = np.linalg.norm(shading, axis=1, keepdims=True)
-        # A shading normal that vanished or turned behind the surface says nothing.
-        sane = (length[:, 0] > 1e-6) & (np.einsum("nk,nk->n", shading, self.surface_normal) > 0)
-        self.normal = np.where(sane[:, None], shading / np.maximum(length, 1e-6), self.surface_normal)
         self.index = []
         """per page (height, width) int32: the texel's number, or NO_TEXEL"""
         for number, page in enumerate(texels):
             numbers = np.full((page.resolution,) * 2, NO_TEXEL, dtype=np.int32)
             numbers[page.row, page.column] = self._first[number] + np.arange(len(page))
             self.index.append(numbers)
+        self._inset = _edge_inset(scene)
+        self.whole = np.concatenate([page.area for page in texels]) >= 1.0
+        centroid = np.concatenate([page.centroid for page in texels]).astype(np.float64)
+        weights = self._drawn_in(centroid[:, None], self.triangle)[:, 0]
+        self.barycentric = np.empty((len(weights), 2), dtype=np.float32)
+        self.position, self.normal = np.empty((2, len(weights), 3))
+        self._put(np.arange(len(weights)), weights)
+
+    def _put(self, rows: Array, weights: Array) -> None:
+        """Put texels where barycentric weights (r, 3) of their triangles say."""
+        triangle, upright = self.triangle[rows], self.surface_normal[rows]
+        self.barycentric[rows] = weights[:, 1:]
+        self.position[rows] = _at(self.triangles[triangle], weights[:, None])[:, 0]
+        shading = np.einsum("nc,nck->nk", weights, self.normals[triangle])
+        length = np.linalg.norm(shading, axis=1, keepdims=True)
+        # A shading normal that vanished or turned behind the surface says nothing.
+        sane = (length[:, 0] > 1e-6) & (np.einsum("nk,nk->n", shading, upright) > 0)
+        self.normal[rows] = np.where(sane[:, None], shading / np.maximum(length, 1e-6), upright)
+
+    def make_whole(self, rows: Array) -> None:
+        """Count texels (r,), in ascending order, as whole: other triangles cover what theirs does not."""
+        self.whole[rows] = True
+        for number, page in enumerate(self.texels):
+            first, last = np.searchsorted(rows, self._first[number : number + 2])
+            own = rows[first:last] - self._first[number]
+            triangle = self.triangle[rows[first:last]]
+            at = self.uv, page.resolution, triangle, page.row[own], page.column[own]
+            self._put(rows[first:last], centre_weights(*at))
 
     def __len__(self) -> int:
         return len(self.page)
@@ -109,21 +128,24 @@ class TexelGeometry:
     def sample(self, rows: Array, u: Array, width: float = FOOTPRINT) -> Array:
         """Return (r, k, 3) points spread over the middle `width` of r texels by u (r, k, 2)."""
         points = np.empty((len(rows), u.shape[1], 3))
-        # What is inside a texel that is whole on its triangle needs no clipping.
+        # What is inside a texel that is whole in its plane needs no clipping.
         inner = self.whole[rows] & ((width < 1.0) | ((u > 0.0) & (u < 1.0)).all(axis=(1, 2)))
         plain, cut = np.flatnonzero(inner), np.flatnonzero(~inner)
-        points[plain] = self._in_plane(rows[plain], 0.5 + (u[plain].astype(np.float64) - 0.5) * width)
+        points[plain] = self.in_plane(rows[plain], 0.5 + (u[plain].astype(np.float64) - 0.5) * width)
         corners = self._scene.triangles[self.triangle[rows[cut]]]
         points[cut] = _at(corners, self.sample_weights(rows[cut], u[cut], width))
         return points
 
     def squares(self, rows: Array) -> Array:
         """Return (r, 4, 3) the corners of whole texels, in their triangles' planes but not cut by them."""
-        return self._in_plane(rows, np.broadcast_to(_SQUARE, (len(rows), 4, 2)))
+        return self.in_plane(rows, np.broadcast_to(_SQUARE, (len(rows), 4, 2)))
 
-    def _in_plane(self, rows: Array, spots: Array) -> Array:
-        """Return (r, k, 3) points in the triangles' planes at places (r, k, 2) of texels as unit squares."""
-        triangle = self.triangle[rows]
+    def in_plane(self, rows: Array, spots: Array, triangle: Array | None = None) -> Array:
+        """Return (r, k, 3) points at places (r, k, 2) of texels as unit squares.
+
+        In the planes of the texels' own triangles, or of others (r,) of the same pages.
+        """
+        triangle = self.triangle[rows] if triangle is None else triangle
         start = np.stack([self.column[rows], self.row[rows]], axis=1) - self._places[triangle, :2]
         across, up = self._texel_edges
         points = spots[..., :1] * across[triangle, None]
@@ -147,7 +169,7 @@ class TexelGeometry:
     def sample_weights(self, rows: Array, u: Array, width: float = FOOTPRINT) -> Array:
         """Return (r, k, 3) the barycentric weights of the same points in the texels' triangles."""
         weights = np.empty((len(rows), u.shape[1], 3))
-        for number, page in enumerate(self._texels):
+        for number, page in enumerate(self.texels):
             mine = np.flatnonzero(self.page[rows] == number)
             if len(mine) == 0:
                 continue
@@ -178,7 +200,7 @@ class TexelGeometry:
     def _framed(self) -> list[Array]:
         """Per page, where its texels lie in a page that is one texel larger all around, row by row."""
         return [
-            (page.row.astype(np.int64) + 1) * (page.resolution + 2) + page.column + 1 for page in self._texels
+            (page.row.astype(np.int64) + 1) * (page.resolution + 2) + page.column + 1 for page in self.texels
         ]
 
     def positions_of(self, hits: Hits) -> Array:

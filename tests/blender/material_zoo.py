@@ -62,6 +62,18 @@ def cut_out() -> bpy.types.Material:
     return material
 
 
+def _bare_color() -> bpy.types.Material:
+    """A color where a shader belongs: it glows."""
+    material = shader_material("M", "ShaderNodeMixShader", Fac=0.3)
+    tree = material.node_tree
+    mix = next(node for node in tree.nodes if node.type == "MIX_SHADER")
+    color = tree.nodes.new("ShaderNodeRGB")
+    color.outputs[0].default_value = BLUE
+    tree.links.new(color.outputs[0], mix.inputs[1])
+    tree.links.new(add_node(tree, "ShaderNodeBsdfDiffuse", Color=RED).outputs[0], mix.inputs[2])
+    return material
+
+
 def _grouped() -> bpy.types.Material:
     """A group in a group: the inner takes a color, and mixes a shader it is given with its own."""
     inner = bpy.data.node_groups.new("Inner", "ShaderNodeTree")
@@ -110,6 +122,7 @@ ZOO: dict[str, Callable[[], bpy.types.Material]] = {
     "mixed": lambda: _mixed("ShaderNodeMixShader"),
     "added": lambda: _mixed("ShaderNodeAddShader"),
     "cut out": cut_out,
+    "bare color": _bare_color,
     "grouped": _grouped,
     "glossy": lambda: shader_material("M", "ShaderNodeBsdfAnisotropic", Color=RED),
 }

@@ -318,3 +318,24 @@ def test_the_file_is_the_same_afterwards() -> None:
     before = _tidy_dump()
     assert _scene().images is not None
     assert _differences_since(before) == []
+
+
+def test_what_only_the_camera_sees_is_left_out_where_colors_vary() -> None:
+    material, mix = diffuse_of("ShaderNodeMixRGB", Color1=RED)
+    tree = material.node_tree
+    tree.links.new(tree.nodes.new("ShaderNodeLightPath").outputs["Is Camera Ray"], mix.inputs[0])
+    tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs["Color"], mix.inputs["Color2"])
+    add_mesh("Quad", material=material)
+    values, _ = _samples(_images(), 0)
+    np.testing.assert_allclose(values[:, :3], np.tile(RED[:3], (len(values), 1)), atol=1e-5)
+
+
+@pytest.mark.parametrize("of", ["scene", "view layer"])
+def test_attributes_of_the_view_layer(of: str) -> None:
+    owner = bpy.context.scene if of == "scene" else bpy.context.view_layer
+    owner["grey"], owner["note"] = 0.25, "not a number"
+    material, node = diffuse_of("ShaderNodeAttribute")
+    node.attribute_type, node.attribute_name = "VIEW_LAYER", "grey"
+    add_mesh("Quad", material=material)
+    values, _ = _samples(_images(), 0)
+    np.testing.assert_allclose(values[:, :3], 0.25, atol=1e-5)

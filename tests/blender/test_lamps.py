@@ -212,3 +212,18 @@ def test_an_area_lamp_keeps_its_power_when_scaled() -> None:
     assert isinstance(light, AreaLight)
     assert light.area == pytest.approx(math.pi / 4 * 6.0 * 2.0, rel=1e-6)
     np.testing.assert_allclose(light.power, 5.0)
+
+
+@pytest.mark.parametrize("output", ["Quadratic", "Linear", "Constant"])
+def test_nodes_that_change_light_with_distance_warn(meter: bpy.types.Object, output: str) -> None:
+    lamp = add_lamp("POINT", energy=1.0)
+    if bpy.app.version < (5, 1):
+        lamp.data.use_nodes = True
+    tree = with_nodes(lamp.data)
+    emission, falloff = (add_node(tree, f"ShaderNode{kind}") for kind in ("Emission", "LightFalloff"))
+    falloff.inputs["Strength"].default_value = 1.0
+    tree.links.new(falloff.outputs[output], emission.inputs["Strength"])
+    tree.links.new(emission.outputs[0], tree.nodes.new("ShaderNodeOutputLight").inputs["Surface"])
+    said = [warning.message for warning in _exported()[1]]
+    message = "lamp 'Lamp': its nodes change its light with distance; what they make of it at 1 m is used"
+    assert said == ([] if output == "Quadratic" else [message])

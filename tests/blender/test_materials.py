@@ -13,7 +13,7 @@ from radiosity_addon.blender.export import export_scene
 from radiosity_addon.blender.image_values import image_mean, linear_from_srgb
 from radiosity_addon.blender.materials import Surface, read_material
 from radiosity_addon.settings import BakeSettings
-from tests.blender.scenes import add_mesh, add_node, shader_material, with_nodes
+from tests.blender.scenes import add_mesh, add_node, measure_irradiance, shader_material, with_nodes
 
 _RED = (0.6, 0.2, 0.1, 1.0)
 _BLUE = (0.1, 0.2, 0.8, 1.0)
@@ -317,3 +317,76 @@ def test_an_empty_slot_is_grey_and_warns_and_a_missing_slot_is_the_last() -> Non
     np.testing.assert_allclose(baked.scene.reflectance, [_RED[:3], (0.8, 0.8, 0.8)], rtol=1e-6)
     (warning,) = baked.warnings
     assert (warning.name, "empty material slot" in warning.message) == ("Bare", True)
+
+
+@pytest.mark.parametrize("kind", ["ShaderNodeRGB", "ShaderNodeValue"])
+def test_a_color_in_a_shader_s_place_glows_as_in_cycles(kind: str) -> None:
+    """Blender makes an emission of strength 1 of it."""
+    material = bpy.data.materials.new("Glow")
+    tree = with_nodes(material)
+    node = tree.nodes.new(kind)
+    node.outputs[0].default_value = 2.0 if kind == "ShaderNodeValue" else (1.0, 0.5, 0.25, 1.0)
+    tree.links.new(node.outputs[0], tree.nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
+    read = read_material(material)
+    radiance = np.full(3, 2.0) if kind == "ShaderNodeValue" else np.array([1.0, 0.5, 0.25])
+    np.testing.assert_allclose(read.emission, np.pi * radiance, rtol=1e-6)
+    assert not read.warnings
+    assert not read.reflectance.any()
+    # Two squares 2 m wide and 1 m apart.
+    floor = add_mesh("Floor")
+    add_mesh("Glow", material=material, location=(0, 0, 1))
+    measured = measure_irradiance(floor, samples=64)
+    np.testing.assert_allclose(measured, np.pi * 0.4153 * radiance, rtol=0.02)
+
+
+def _through_shader_to_rgb(target: str) -> bpy.types.Material:
+    """A red diffuse shader as a color: of a green emission, or where a shader belongs."""
+    material = bpy.data.materials.new("Toon")
+    tree = with_nodes(material)
+    color = tree.nodes.new("ShaderNodeShaderToRGB")
+    tree.links.new(add_node(tree, "ShaderNodeBsdfDiffuse", Color=_RED).outputs[0], color.inputs[0])
+    glow = add_node(tree, "ShaderNodeEmission", Color=(0.0, 1.0, 0.0, 1.0), Strength=2.0)
+    surface = _output(tree).inputs["Surface"]
+    if target == "Color":
+        tree.links.new(glow.outputs[0], surface)
+    tree.links.new(color.outputs["Color"], surface if target == "Surface" else glow.inputs["Color"])
+    return material
+
+
+@pytest.mark.parametrize("target", ["Color", "Surface"])
+def test_shader_to_rgb_is_unknown_to_cycles_and_told(target: str) -> None:
+    material = _through_shader_to_rgb(target)
+    floor = add_mesh("Floor")
+    add_mesh("Toon", material=material, location=(0, 0, 1))
+    export = export_scene(bpy.context, BakeSettings(sky=True)).bake_scene
+    said = "material 'Toon': node 'Shader to RGB' is EEVEE's: as in Cycles, what it feeds keeps its own value"
+    assert said in [warning.message for warning in export.warnings]
+    ours = export.scene.emission.max(axis=0)
+    np.testing.assert_allclose(ours, [0.0, 2 * np.pi if target == "Color" else 0.0, 0.0], rtol=1e-6)
+    np.testing.assert_allclose(measure_irradiance(floor, samples=64), 0.4153 * ours, rtol=0.02)
+
+
+def test_transparent_shadows_that_are_off_are_told() -> None:
+    material = shader_material("Pane", "ShaderNodeBsdfTransparent", Color=(0.5, 0.5, 0.5, 1.0))
+    add_mesh("Pane", material=material)
+
+    def said() -> str:
+        export = export_scene(bpy.context, BakeSettings(sky=True))
+        return "\n".join(warning.message for warning in export.bake_scene.warnings)
+
+    assert "Transparent Shadows" not in said()
+    material.use_transparent_shadow = False
+    assert "material 'Pane': Transparent Shadows is off, which is ignored" in said()
+
+
+def test_emission_for_diffuse_rays_is_told() -> None:
+    material = shader_material("Glow", "ShaderNodeEmission")
+    tree = material.node_tree
+    glow = next(node for node in tree.nodes if node.type == "EMISSION")
+    path = tree.nodes.new("ShaderNodeLightPath")
+    for name, told in (("Is Camera Ray", False), ("Is Diffuse Ray", True), ("Is Reflection Ray", True)):
+        tree.links.new(path.outputs[name], glow.inputs["Strength"])
+        add_mesh("Glow", material=material)
+        export = export_scene(bpy.context, BakeSettings(sky=True)).bake_scene
+        assert export.scene.emission.any() == told
+        assert any("asks for diffuse rays" in warning.message for warning in export.warnings) == told

@@ -132,3 +132,12 @@ def test_a_surface_emits_from_both_sides_as_in_cycles(shader: str, turned: bool)
     ]
     expected = sum(factors) * scene.scene.emission[2]
     np.testing.assert_allclose(expected, measure_irradiance(meter, samples=64), rtol=3e-3)
+
+
+def test_a_world_s_limit_of_bounces_warns() -> None:
+    add_mesh("Floor")
+    world = set_world(1.0, 1.0, 1.0)
+    assert not _exported().warnings
+    world.cycles.max_bounces = 2
+    (warning,) = _exported().warnings
+    assert warning.message == "world 'World': its limit of bounces is ignored: all its light is followed"
