@@ -16,8 +16,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from .errors import BakeError
+
+Array = npt.NDArray[Any]
 
 BLOCK = 1 << 22
 """Bytes of an array that are compressed at a time: blocks are independent, a thread each."""
@@ -50,7 +53,7 @@ class ArrayFileError(BakeError):
     """A file that cannot be used; the message says what is wrong with it, without its name."""
 
 
-def write_arrays(path: Path, magic: bytes, version: int, told: Any, arrays: list[np.ndarray]) -> int:
+def write_arrays(path: Path, magic: bytes, version: int, told: Any, arrays: list[Array]) -> int:
     """Write a description and arrays; return the bytes that they take.
 
     Parameters
@@ -83,7 +86,7 @@ def write_arrays(path: Path, magic: bytes, version: int, told: Any, arrays: list
         return file.tell()
 
 
-def read_arrays(path: Path, magic: bytes, version: int) -> tuple[Any, list[np.ndarray]]:
+def read_arrays(path: Path, magic: bytes, version: int) -> tuple[Any, list[Array]]:
     """Read what `write_arrays` wrote.
 
     Raises
@@ -111,7 +114,7 @@ def read_arrays(path: Path, magic: bytes, version: int) -> tuple[Any, list[np.nd
         raise ArrayFileError("it is damaged") from error
 
 
-def _blocks(array: np.ndarray) -> list[np.ndarray]:
+def _blocks(array: Array) -> list[Array]:
     """Cut an array into flat blocks."""
     if array.dtype.name not in KINDS:
         raise TypeError(f"arrays of {array.dtype} cannot be stored")
@@ -120,13 +123,13 @@ def _blocks(array: np.ndarray) -> list[np.ndarray]:
     return [flat[first : first + step] for first in range(0, len(flat), step)]
 
 
-def _compressed(block: np.ndarray) -> bytes:
+def _compressed(block: Array) -> bytes:
     width = block.dtype.itemsize
     planes = np.ascontiguousarray(block.view(np.uint8).reshape(-1, width).T)
     return zlib.compress(planes.tobytes(), LEVEL)
 
 
-def _read(body: memoryview, entries: list[dict[str, Any]]) -> list[np.ndarray]:
+def _read(body: memoryview, entries: list[dict[str, Any]]) -> list[Array]:
     """Return the arrays that entries tell of."""
     made, jobs, at, total = [], [], 0, 0
     for entry in entries:
@@ -150,7 +153,7 @@ def _read(body: memoryview, entries: list[dict[str, Any]]) -> list[np.ndarray]:
     return made
 
 
-def _expand(job: tuple[np.ndarray, memoryview]) -> None:
+def _expand(job: tuple[Array, memoryview]) -> None:
     """Fill a block from its compressed bytes."""
     target, packed = job
     width = target.dtype.itemsize

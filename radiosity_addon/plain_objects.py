@@ -10,14 +10,15 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[Any]
 
 Table = Mapping[type, Sequence[str]]
 """Classes, and which of their attributes are kept; the others come back as None."""
 
 
-def flatten(
-    value: Any, table: Table, skipped: Sequence[tuple[Any, str]] = ()
-) -> tuple[Any, list[np.ndarray]]:
+def flatten(value: Any, table: Table, skipped: Sequence[tuple[Any, str]] = ()) -> tuple[Any, list[Array]]:
     """Return what JSON can hold of a value, and the arrays it refers to.
 
     Parameters
@@ -35,7 +36,7 @@ def flatten(
     return {"tree": tree, "objects": writer.objects}, writer.arrays
 
 
-def restore(told: Any, arrays: list[np.ndarray], table: Table, dropped: Mapping[type, Sequence[str]]) -> Any:
+def restore(told: Any, arrays: list[Array], table: Table, dropped: Mapping[type, Sequence[str]]) -> Any:
     """Return the value that `flatten` took apart.
 
     Parameters
@@ -68,7 +69,7 @@ class _Writer:
         self._object_of: dict[int, int] = {}
         self._array_of: dict[int, int] = {}
         self.objects: list[dict[str, Any]] = []
-        self.arrays: list[np.ndarray] = []
+        self.arrays: list[Array] = []
 
     def node(self, value: Any) -> Any:
         """Return what stands for a value."""
@@ -87,7 +88,7 @@ class _Writer:
             return {"dict": [[self.node(key), self.node(item)] for key, item in value.items()]}
         return {"object": self._object(value)}
 
-    def _array(self, value: np.ndarray) -> int:
+    def _array(self, value: Array) -> int:
         if id(value) not in self._array_of:
             self._array_of[id(value)] = len(self.arrays)
             self.arrays.append(value)
@@ -110,10 +111,10 @@ class _Reader:
     """Puts a value together again."""
 
     def __init__(
-        self, arrays: list[np.ndarray], classes: Mapping[str, type], objects: list[dict[str, Any]]
+        self, arrays: list[Array], classes: Mapping[str, type], objects: list[dict[str, Any]]
     ) -> None:
         self._arrays = arrays
-        self.made = [object.__new__(classes[entry["class"]]) for entry in objects]
+        self.made: list[Any] = [object.__new__(classes[entry["class"]]) for entry in objects]
 
     def value(self, node: Any) -> Any:
         """Return what a node stands for."""

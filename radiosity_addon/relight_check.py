@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -59,4 +60,5 @@ def aligned(before: Sequence[Light], now: Sequence[Light]) -> tuple[Light, ...]:
 def dark(light: Light) -> Light:
     """Return the light without strength."""
     field = next(name for name in STRENGTHS if hasattr(light, name))
-    return replace(light, **{field: np.zeros(3)})
+    nothing: dict[str, Any] = {field: np.zeros(3)}
+    return replace(light, **nothing)

@@ -79,4 +79,4 @@ class Responses:
             self._kept.sources.checked(wanted)
         except SceneError:
             return np.asarray(known)
-        return wanted[source]
+        return np.asarray(wanted[source])

@@ -58,7 +58,7 @@ def run_relight(
     held, strengths = read_strengths(context)
     same = np.array_equal(strengths, held.shown)
     steps = lit(held.bake, strengths)
-    pages, groups = yield from (in_thread_steps(steps) if patient else steps)
+    pages, groups = yield from _shown(in_thread(steps) if patient else steps)
     yield Progress("write", LIT)
     mark = kept_bakes.mark_of(context.scene)
     taken = time.perf_counter() - started
@@ -76,13 +76,13 @@ def read_strengths(context: bpy.types.Context) -> tuple[InMemory, Array]:
     """
     scene = context.scene
     held = kept_bakes.find(scene)
-    stored = None if held is not None else stored_bake(scene)
-    settings = held.bake.settings if stored is None else stored.settings
+    stored: KeptBake | StoredBake = stored_bake(scene) if held is None else held.bake
     with originals_shown(context):
-        export = export_scene(context, settings, dark=True)
-    if stored is not None:
+        export = export_scene(context, stored.settings, dark=True)
+    if isinstance(stored, StoredBake):
         held = kept_bakes.put(scene, kept_bakes.mark_of(scene), stored.kept(export.bake_scene))
         held.shown = _noted(scene, held)
+    assert held is not None
     return held, strengths_in(held.bake, export.bake_scene)
 
 
@@ -107,12 +107,12 @@ def stored_bake(scene: bpy.types.Scene) -> StoredBake:
     return stored
 
 
-def lit(kept: KeptBake, strengths: Array) -> Generator[Progress, None, Relit]:
-    """Compute the pages of a kept bake, and those of its light groups; plain arrays."""
+def lit(kept: KeptBake, strengths: Array) -> Generator[float, None, Relit]:
+    """Compute the pages of a kept bake, and those of its light groups; yields the fraction done."""
     steps = relight(kept, strengths)
     while True:
         try:
-            yield Progress("relight", READ + (LIT - READ) * next(steps).fraction)
+            yield next(steps).fraction
         except StopIteration as done:
             pages = done.value
             break
@@ -121,18 +121,18 @@ def lit(kept: KeptBake, strengths: Array) -> Generator[Progress, None, Relit]:
     return pages, drain(group_pages(kept, pages))
 
 
-def in_thread_steps(steps: Generator[Progress, None, Relit]) -> Generator[Progress, None, Relit]:
-    """Take the steps in a thread, for a window; always yields how far it is."""
-    taken, shown = in_thread(steps), Progress("relight", READ)
+def _shown(steps: Generator[float | None, None, Relit]) -> Generator[Progress, None, Relit]:
+    """Tell of the steps as progress."""
+    fraction = 0.0
     try:
         while True:
             try:
-                shown = next(taken) or shown
+                fraction = next(steps) or fraction
             except StopIteration as done:
                 return done.value
-            yield shown
+            yield Progress("relight", READ + (LIT - READ) * fraction)
     finally:
-        taken.close()
+        steps.close()
 
 
 def note_shown(scene: bpy.types.Scene, held: InMemory, strengths: Array) -> None:

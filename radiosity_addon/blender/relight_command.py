@@ -17,7 +17,11 @@ from ..relight_check import strengths_in
 from ..report import BakeReport
 from ..settings import BakeSettings
 from ..sidecar import SIDECAR_NAME, StoredBake, read_sidecar
+from ..solver.steps import drain
 from .commands import check_writable, open_or_build, registered, same_file, written_files
+
+EXPORT, RELIGHT, APPLY = 0.1, 0.2, 0.5
+"""How far the whole is when each part begins; rough."""
 
 
 def relight(
@@ -97,13 +101,14 @@ def relight_into(
 
     seconds: dict[str, float] = {}
     with OutputFolder(folder) as output:
-        yield Progress("export", 0.05)
+        yield Progress("export", EXPORT)
         with timed(seconds, "export"), originals_shown(context):
             export = export_scene(context, stored.settings, dark=True)
         with timed(seconds, "relight"):
             kept = stored.kept(export.bake_scene)
-            pages, groups = yield from lit(kept, strengths_in(kept, export.bake_scene))
+            yield Progress("relight", RELIGHT)
+            pages, groups = drain(lit(kept, strengths_in(kept, export.bake_scene)))
         result = replace(stored.result(export.bake_scene, pages), groups=groups)
-        yield Progress("apply", 0.5)
+        yield Progress("apply", APPLY)
         keeping = Keeping(mark=stored.mark)
         return (yield from deliver(context, stored.settings, export, result, output, seconds, keeping))
