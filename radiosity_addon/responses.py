@@ -16,6 +16,9 @@ from .errors import SceneError
 from .relighting import KeptBake, relight
 from .solver.arrays import Array
 
+MOST = 1 << 28
+"""Bytes that responses may take when lightmaps are exact; the last ones are kept, and four in any case."""
+
 
 class Responses:
     """Pages of a kept bake for strengths near those of exact ones.
@@ -37,6 +40,9 @@ class Responses:
         """Start from other pages, lit exactly."""
         self.strengths = strengths.copy()
         self._pages = tuple(page.pixels for page in pages)
+        self.room = max(MOST // max(sum(page.nbytes for page in self._pages), 1), 4)
+        """So many sources' responses are kept."""
+        self._of = dict(list(self._of.items())[-self.room :])
 
     def missing(self, strengths: Array) -> list[int]:
         """Return the sources that have changed and whose response is not known."""

@@ -16,6 +16,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from bpy.app.handlers import persistent
 
 from ..background import in_thread
 from ..bake_scene import LightGroup, LightmapPage
@@ -46,11 +47,13 @@ class LiveRelight:
     ----------
     latency : float
         Seconds that the last change took to get into the images.
+    changes : int
+        How often the images have followed.
     """
 
     def __init__(self, scene: bpy.types.Scene) -> None:
         self._scene = scene.name_full
-        self.latency = 0.0
+        self.latency, self.changes = 0.0, 0
         self._reader: StrengthReader | None = None
         self._fits: LiveScene | None = None
         self._responses: Responses | None = None
@@ -63,54 +66,41 @@ class LiveRelight:
         self._doing: int | None = None
         """The source whose response is found out; None for exact pages."""
         self._lit_by = self._strengths
-        bpy.app.handlers.depsgraph_update_post.append(self._notice)
-        bpy.app.handlers.load_pre.append(_stop_with_the_file)
-        bpy.app.timers.register(self._tick, first_interval=0.0)
+        for handlers, ours in _handlers():
+            if ours not in handlers:
+                handlers.append(ours)
+        _wake()
 
     def close(self) -> None:
         """Follow nothing any more."""
-        for handlers, ours in (
-            (bpy.app.handlers.depsgraph_update_post, self._notice),
-            (bpy.app.handlers.load_pre, _stop_with_the_file),
-        ):
+        for handlers, ours in _handlers():
             if ours in handlers:
                 handlers.remove(ours)
-        if bpy.app.timers.is_registered(self._tick):
-            bpy.app.timers.unregister(self._tick)
+        if bpy.app.timers.is_registered(_tick):
+            bpy.app.timers.unregister(_tick)
         self._end_work()
 
     def settle(self) -> None:
         """Do at one go what the timer would do: for scripts, where no timer fires."""
-        while live_state.state.live is self and self._step(patient=False):
+        while live_state.state.live is self and self.step(patient=False):
             pass
 
-    def _notice(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-        """Take a note of what changed; the handler, which must not raise."""
-        try:
-            if scene.name_full != self._scene or self._fits is None:
-                return
-            if self._fits.note(depsgraph) and not self._dirty:
+    def note(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+        """Take a note of what changed."""
+        if scene.name_full != self._scene or self._fits is None:
+            return
+        if self._fits.note(depsgraph):
+            if not self._dirty:
                 self._dirty, self._noticed = True, time.perf_counter()
-                if not bpy.app.timers.is_registered(self._tick):
-                    bpy.app.timers.register(self._tick, first_interval=0.0)
-        except Exception as error:  # noqa: BLE001 (Blender would print it at every change)
-            live_state.stop(f"Live is off: {type(error).__name__}: {error}")
+            _wake()
 
-    def _tick(self) -> float | None:
-        """Carry on; the timer."""
-        try:
-            return TICK if self._step(patient=True) else None
-        except Exception as error:  # noqa: BLE001 (as above)
-            live_state.stop(f"Live is off: {type(error).__name__}: {error}")
-            return None
-
-    def _step(self, patient: bool) -> bool:
+    def step(self, patient: bool) -> bool:
         """Do the next thing; False if there is nothing left to do."""
         try:
             if self._reader is None:
                 self._begin()
             if self._dirty:
-                self._read()
+                self.read()
             if self._work is None and not self._choose_work(patient):
                 return not self._exact
             if self._work is not None:
@@ -131,7 +121,7 @@ class LiveRelight:
         self._dirty, self._noticed = False, time.perf_counter()
         self._start(None, lit(held.bake, self._strengths))
 
-    def _read(self) -> None:
+    def read(self) -> None:
         """Read the strengths, and show them as far as it can be done at once."""
         assert self._reader is not None
         assert self._fits is not None
@@ -161,10 +151,12 @@ class LiveRelight:
         show_pages(images, pages, held.bake.settings.format)
         changed = (self._strengths != self._shown).any(axis=1)
         lights = len(held.bake.sources.lights)
-        show_emission({held.bake.names[row] for row in np.flatnonzero(changed) if row >= lights})
+        if held.bake.settings.quantity != "radiosity":
+            show_emission({held.bake.names[row] for row in np.flatnonzero(changed) if row >= lights})
         self._of_scene().radiosity_relight.strengths = json.dumps(self._strengths.tolist())
         self._shown = self._strengths
         self.latency = time.perf_counter() - self._noticed
+        self.changes += 1
         _redraw()
 
     def _choose_work(self, patient: bool) -> bool:
@@ -180,7 +172,7 @@ class LiveRelight:
             self._start(None, lit(self._held().bake, self._strengths))
             return True
         ahead = self._responses.unknown()
-        if self._exact and ahead and ahead[0] < AHEAD:
+        if self._exact and ahead and len(self._strengths) - len(ahead) < min(AHEAD, self._responses.room):
             self._start(ahead[0], self._responses.steps(ahead[0]))
             return True
         return False
@@ -242,6 +234,39 @@ class LiveRelight:
         return held
 
 
+def _handlers() -> tuple[tuple[list[Any], Any], ...]:
+    return (
+        (bpy.app.handlers.depsgraph_update_post, _notice),
+        (bpy.app.handlers.load_pre, _stop_with_the_file),
+    )
+
+
+def _wake() -> None:
+    """Have the timer carry on. Persistent, for undo takes other timers away."""
+    if not bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.register(_tick, first_interval=0.0, persistent=True)
+
+
+@persistent
+def _notice(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    """Blender says that something has changed; nothing may be raised."""
+    try:
+        if live_state.state.live is not None:
+            live_state.state.live.note(scene, depsgraph)
+    except Exception as error:  # noqa: BLE001 (Blender would print it at every change)
+        live_state.stop(f"Live is off: {type(error).__name__}: {error}")
+
+
+def _tick() -> float | None:
+    """Carry on, as long as there is something to do; nothing may be raised."""
+    try:
+        live = live_state.state.live
+        return TICK if live is not None and live.step(patient=True) else None
+    except Exception as error:  # noqa: BLE001 (as above)
+        live_state.stop(f"Live is off: {type(error).__name__}: {error}")
+        return None
+
+
 def _redraw() -> None:
     """Have every 3D viewport drawn again."""
     manager = bpy.context.window_manager
@@ -251,6 +276,7 @@ def _redraw() -> None:
                 area.tag_redraw()
 
 
+@persistent
 def _stop_with_the_file(*_: object) -> None:
     """Another file is being opened."""
     live_state.stop()

@@ -10,7 +10,7 @@ import bpy
 
 from ..alike import one_of_each
 from ..errors import RadiosityError
-from . import kept_bakes, live_view, runtime
+from . import kept_bakes, live_state, live_view, runtime
 from .properties import settings_of
 from .relight_properties import keeps
 
@@ -114,6 +114,7 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
         from .job import run_bake
         from .output import OutputFolder
 
+        live_state.stop()
         self._was_editing = context.mode == "EDIT_MESH"
         settings = settings_of(context)
         folder = output_folder(context)
@@ -213,6 +214,7 @@ class RADIOSITY_OT_restore(bpy.types.Operator):
         """Bring every baked object of the file back."""
         from .restore import restore
 
+        live_state.stop()
         count = restore(context)
         for scene in bpy.data.scenes:
             runtime.forget(scene)

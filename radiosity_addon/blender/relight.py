@@ -25,7 +25,7 @@ from .export import export_scene
 from .kept_bakes import InMemory
 from .rebake import originals_shown
 from .relit_images import rewrite
-from .relit_materials import remake
+from .relit_materials import refresh
 
 READ, LIT = 0.3, 0.95
 """How far the whole is when the scene is read, and when it is lit."""
@@ -140,7 +140,8 @@ def note_shown(scene: bpy.types.Scene, held: InMemory, strengths: Array) -> None
     lights = len(held.bake.sources.lights)
     changed = (strengths != held.shown).any(axis=1)
     names = {name for row, name in enumerate(held.bake.names) if changed[row] and row >= lights}
-    remake(scene, names, held.bake.settings.quantity)
+    if held.bake.settings.quantity != "radiosity":  # there the lightmap itself holds it
+        refresh(names)
     held.shown = strengths
     scene.radiosity_relight.strengths = json.dumps(strengths.tolist())
 

@@ -11,6 +11,8 @@ import pytest
 
 import radiosity_addon
 from radiosity_addon.blender import kept_bakes, live_state
+from radiosity_addon.blender.live_relight import _notice
+from radiosity_addon.blender.node_group import EMISSION
 from tests.blender.scenes import shader_material
 from tests.blender.test_relight import change_lights, glowing, lightmap, relative, relight, room
 
@@ -53,7 +55,7 @@ def follow() -> None:
     """As `settle`, but stop where sums of responses are shown."""
     bpy.context.view_layer.update()
     live = live_state.state.live
-    live._read()
+    live.read()
     assert live._dirty is False
 
 
@@ -85,7 +87,7 @@ def test_what_it_writes_itself_starts_nothing(live: bpy.types.WindowManager) -> 
     running = live_state.state.live
     for _ in range(3):
         bpy.context.view_layer.update()
-        assert not running._step(patient=True)
+        assert not running.step(patient=True)
 
 
 @pytest.mark.parametrize(
@@ -95,7 +97,7 @@ def test_what_it_writes_itself_starts_nothing(live: bpy.types.WindowManager) -> 
         ("mesh", "object 'Panel' has changed its shape"),
         ("paint", "material 'Glow' reflects otherwise"),
         ("lamp", "lamp 'Bulb' has changed in more than its strength"),
-        ("restore", "the bake that was kept is not there any more"),
+        ("forget", "the bake that was kept is not there any more"),
     ],
 )
 def test_it_goes_off_where_the_scene_no_longer_fits(
@@ -115,7 +117,7 @@ def test_it_goes_off_where_the_scene_no_longer_fits(
     elif change == "lamp":
         bpy.data.objects["Bulb"].data.shadow_soft_size = 0.5
     else:
-        bpy.ops.radiosity.restore("EXEC_DEFAULT")
+        kept_bakes.drop_all()
         bpy.data.objects["Bulb"].data.energy = 1.0
     settle()
     assert not live.radiosity_live
@@ -123,20 +125,38 @@ def test_it_goes_off_where_the_scene_no_longer_fits(
     assert live_state.state.live is None
 
 
+def test_restore_switches_it_off(live: bpy.types.WindowManager) -> None:
+    assert bpy.ops.radiosity.restore("EXEC_DEFAULT") == {"FINISHED"}
+    assert live_state.state.live is None
+    assert not live.radiosity_live
+    assert live_state.state.message == ""
+
+
+def test_undo_takes_the_light_back_with_the_lamp(live: bpy.types.WindowManager) -> None:
+    before = lightmap()
+    bpy.ops.ed.undo_push(message="on")
+    bpy.data.objects["Bulb"].data.energy *= 4.0
+    settle()
+    bpy.ops.ed.undo_push(message="brighter")
+    assert lightmap().mean() > 1.1 * before.mean()
+    bpy.ops.ed.undo()
+    settle()
+    assert relative(lightmap(), before) < 2e-3
+    assert bpy.context.window_manager.radiosity_live
+
+
 def test_nothing_is_raised_from_the_handler(
     live: bpy.types.WindowManager, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    running = live_state.state.live
-
     def broken(*_: object) -> bool:
         raise ZeroDivisionError("by zero")
 
-    monkeypatch.setattr(running._fits, "note", broken)
+    monkeypatch.setattr(live_state.state.live._fits, "note", broken)
     bpy.data.objects["Bulb"].data.energy *= 2.0
     bpy.context.view_layer.update()
     assert live_state.state.message == "Live is off: ZeroDivisionError: by zero"
     assert not live.radiosity_live
-    assert running._notice not in bpy.app.handlers.depsgraph_update_post
+    assert _notice not in bpy.app.handlers.depsgraph_update_post
 
 
 def test_it_cannot_be_switched_on_without_a_bake(saved: Path) -> None:
@@ -149,11 +169,10 @@ def test_it_cannot_be_switched_on_without_a_bake(saved: Path) -> None:
 
 def test_it_ends_with_the_file(live: bpy.types.WindowManager) -> None:
     handlers = bpy.app.handlers.depsgraph_update_post
-    ours = live_state.state.live._notice
-    assert ours in handlers
+    assert _notice in handlers
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     assert live_state.state.live is None
-    assert ours not in handlers
+    assert _notice not in handlers
     assert not bpy.context.window_manager.radiosity_live
 
 
@@ -177,3 +196,8 @@ def test_emission_that_varies_follows_its_slider(saved: Path, tmp_path: Path) ->
     manager.radiosity_live = False
     assert relight() == {"FINISHED"}
     np.testing.assert_allclose(shown, lightmap(), rtol=5e-3, atol=1e-4)
+    (slot,) = bpy.data.objects["Panel"].material_slots
+    (group,) = (node for node in slot.material.node_tree.nodes if node.type == "GROUP")
+    (link,) = group.inputs[EMISSION].links
+    assert link.from_node.type == "VECT_MATH"
+    assert link.from_node.inputs["Scale"].default_value == 9.0
