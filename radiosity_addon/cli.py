@@ -284,11 +284,11 @@ def _run(
             if settings is not None and request.relight:
                 from .blender.relight_command import relight
 
-                given = request.output, settings, request.report
-                relight(request.scene, loaded, *given, console, interrupts)
+                folder = request.output, settings, request.report
+                relight(request.scene, loaded, *folder, console, interrupts)
             elif settings is not None:
-                files = request.output, settings, request.report, request.plot
-                commands.bake(request.scene, loaded, *files, console, interrupts, request.keep)
+                given = request.output, settings, request.report, request.plot, request.keep
+                commands.bake(request.scene, loaded, *given, console, interrupts)
             else:
                 commands.restore(request.scene, loaded, request.output, console)
     except KeyboardInterrupt:

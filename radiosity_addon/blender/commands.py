@@ -28,9 +28,9 @@ def bake(
     settings: BakeSettings,
     report_copy: Path | None,
     plot: Path | None,
+    keep: bool,
     console: Console,
     interrupts: Interrupts,
-    keep: bool = False,
 ) -> None:
     """Bake a scene file, the file that is open, or the bundled Cornell box.
 
@@ -47,10 +47,10 @@ def bake(
         Second copy of the report.
     plot : Path or None
         Where the history is drawn to.
-    console : Console
-    interrupts : Interrupts
     keep : bool
         Whether a sidecar is written, by which the bake can be lit anew.
+    console : Console
+    interrupts : Interrupts
     """
     with registered():
         from .job import WRITING_STAGES, run_bake

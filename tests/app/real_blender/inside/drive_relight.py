@@ -72,9 +72,10 @@ def script():
         lambda: drawn.append(time.perf_counter()), (), "WINDOW", "POST_PIXEL"
     )
     yield from events.open_sidebar("Radiosity")
+    bpy.context.scene.radiosity.show_result = False
     yield from events.click_down(HEADER, baking)
     yield from events.until(not_baking, 240)
-    # Textures on plain surfaces: quick to draw without a graphics card, unlike materials.
+    # Textures on plain surfaces are quick to draw without a graphics card, and materials are not.
     shading = events.area_3d().spaces.active.shading
     shading.type, shading.color_type = "SOLID", "TEXTURE"
     yield 1.0
