@@ -25,7 +25,7 @@ from .export_sources import Export
 from .images import lightmap_files, set_folder, write_pages
 from .live_picture import seen_triangles
 from .output import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, OutputFolder, save_copy
-from .preview import render_preview
+from .preview import SAMPLES, render_preview
 from .rebake import originals_shown, replacing_earlier, seal
 from .restore import restore
 
@@ -149,6 +149,7 @@ def deliver(
     output: OutputFolder,
     seconds: dict[str, float],
     keeping: Keeping | None,
+    samples: int = SAMPLES,
 ) -> BakeJob:
     """Show the lightmaps, save the scene beside them, render it, and publish all at once."""
     with replacing_earlier(context), timed(seconds, "apply"):
@@ -163,7 +164,7 @@ def deliver(
             save_copy(output.staging / BLEND_NAME, output.path)
         yield Progress("preview", PREVIEW)
         with timed(seconds, "preview"):
-            render_preview(context, output.staging / PREVIEW_NAME, settings)
+            render_preview(context, output.staging / PREVIEW_NAME, settings, samples)
         report = BakeReport.of(result, lightmap_files(images, settings), seconds)
         report.write(output.staging / REPORT_NAME)
         yield Progress("write", 1.0)

@@ -96,6 +96,7 @@ def relight_into(
     from .export import export_scene
     from .job import deliver, timed
     from .output import OutputFolder
+    from .preview import QUICK_SAMPLES
     from .rebake import originals_shown
     from .relight import lit
 
@@ -111,4 +112,5 @@ def relight_into(
         result = replace(stored.result(export.bake_scene, pages), groups=groups)
         yield Progress("apply", APPLY)
         keeping = Keeping(mark=stored.mark)
-        return (yield from deliver(context, stored.settings, export, result, output, seconds, keeping))
+        made = export, result, output, seconds, keeping
+        return (yield from deliver(context, stored.settings, *made, QUICK_SAMPLES))
