@@ -20,7 +20,9 @@ from .apply import apply_lightmaps, check_targets
 from .bake_record import remove_datablocks
 from .export import export_scene
 from .export_sources import Export
+from .group_images import GroupImages, each_image, write_groups
 from .images import lightmap_files, set_folder, write_pages
+from .light_shares import crowded_materials
 from .live_picture import seen_triangles
 from .output import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, OutputFolder, save_copy
 from .preview import render_preview
@@ -93,8 +95,8 @@ def run_bake(
         if with_copy and output is not None:
             return (yield from _deliver(context, settings, export, result, output, seconds))
         with replacing_earlier(context), _timed(seconds, "apply"):
-            images = _show(context, settings, export, result, output)
-            report = BakeReport.of(result, lightmap_files(images, settings), seconds)
+            images, groups = _show(context, settings, export, result, output)
+            report = _report(result, images, groups, settings, seconds)
             if output is not None:
                 report.write(output.staging / REPORT_NAME)
                 output.publish()
@@ -135,10 +137,10 @@ def _deliver(
 ) -> BakeJob:
     """Show the lightmaps, save the scene beside them, render it, and publish all at once."""
     with replacing_earlier(context), _timed(seconds, "apply"):
-        images = _show(context, settings, export, result, output)
+        images, groups = _show(context, settings, export, result, output)
     try:
         # The copy tells of its bake too; what is left to do is not in its times.
-        so_far = BakeReport.of(result, lightmap_files(images, settings), seconds)
+        so_far = _report(result, images, groups, settings, seconds)
         runtime.remember(context.scene, so_far.as_dict(), "//")
         yield Progress("save", SAVE)
         with _timed(seconds, "save"):
@@ -146,7 +148,7 @@ def _deliver(
         yield Progress("preview", PREVIEW)
         with _timed(seconds, "preview"):
             render_preview(context, output.staging / PREVIEW_NAME, settings)
-        report = BakeReport.of(result, lightmap_files(images, settings), seconds)
+        report = _report(result, images, groups, settings, seconds)
         report.write(output.staging / REPORT_NAME)
         yield Progress("write", 1.0)
         output.publish()
@@ -163,18 +165,35 @@ def _show(
     export: Export,
     result: BakeResult,
     output: OutputFolder | None,
-) -> list[bpy.types.Image]:
-    """Make the images and put them on the objects."""
-    images = write_pages(result, settings, None if output is None else output.staging)
+) -> tuple[list[bpy.types.Image], GroupImages]:
+    """Make the images, also those of light groups, and put them on the objects."""
+    folder = None if output is None else output.staging
+    images = write_pages(result, settings, folder)
+    groups: GroupImages = {}
     try:
+        groups = write_groups(result, settings, folder)
         if output is not None:
-            set_folder(images, output.path)
-        apply_lightmaps(context, export, result, images, settings)
+            set_folder([*images, *each_image(groups)], output.path)
+        apply_lightmaps(context, export, result, images, settings, groups)
         seal()
     except BaseException:
-        remove_datablocks(images)
+        remove_datablocks([*images, *each_image(groups)])
         raise
-    return images
+    return images, groups
+
+
+def _report(
+    result: BakeResult,
+    images: list[bpy.types.Image],
+    groups: GroupImages,
+    settings: BakeSettings,
+    seconds: dict[str, float],
+) -> BakeReport:
+    """Report a bake and its files."""
+    shares = [lightmap_files(of, settings) for of in groups.values()]
+    if groups:
+        result = replace(result, warnings=(*result.warnings, *crowded_materials()))
+    return BakeReport.of(result, lightmap_files(images, settings), seconds, shares)
 
 
 @contextmanager

@@ -8,9 +8,25 @@ from functools import partial
 
 import bpy
 
-from . import bake_record, cli_host, object_roles, operators, panels, properties, runtime
+from . import (
+    bake_record,
+    cli_host,
+    light_group_operators,
+    light_group_panels,
+    light_group_properties,
+    object_roles,
+    operators,
+    panels,
+    properties,
+    runtime,
+)
 
-CLASSES = (*operators.CLASSES, *panels.CLASSES)
+CLASSES = (
+    *operators.CLASSES,
+    *light_group_operators.CLASSES,
+    *panels.CLASSES,
+    *light_group_panels.CLASSES,
+)
 
 _undo: list[Callable[[], None]] = []
 
@@ -20,7 +36,7 @@ def register() -> None:
     if _undo:
         return
     try:
-        for module in (bake_record, object_roles, properties):
+        for module in (bake_record, object_roles, light_group_properties, properties):
             module.register()
             _undo.append(module.unregister)
         for cls in CLASSES:
