@@ -15,7 +15,7 @@ def _on_selection(cls: type[bpy.types.Operator], context: bpy.types.Context) -> 
     if runtime.running.active:
         cls.poll_message_set("A bake is running; press Esc to cancel it")
         return False
-    if not context.selected_objects:
+    if not context.view_layer.objects.selected:
         cls.poll_message_set("Select lamps or objects that emit light first")
         return False
     return True
@@ -136,7 +136,7 @@ class RADIOSITY_OT_light_group_reset(bpy.types.Operator):
 
 def _name_on_all(context: bpy.types.Context, name: str) -> int | None:
     """Name a group on the selected objects; None where one of them is another file's."""
-    objects = context.selected_objects
+    objects = list(context.view_layer.objects.selected)
     if not all(obj.is_editable for obj in objects):
         return None
     for obj in objects:

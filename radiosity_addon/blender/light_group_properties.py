@@ -79,7 +79,7 @@ def _listed(scene: bpy.types.Scene) -> list[ListedGroup]:
         count(name, "collections")
     if name_on(scene.world):
         count(name_on(scene.world), "worlds")
-    return [found[name] for name in sorted(found, key=str.casefold)]
+    return [found[name] for name in sorted(found, key=lambda name: (name.casefold(), name))]
 
 
 def _changed(_owner: bpy.types.ID, _context: bpy.types.Context) -> None:
