@@ -16,7 +16,7 @@ from .console import Console
 from .errors import RadiosityError, UsageError
 from .interrupts import Interrupts
 from .methods import METHODS, SETTINGS
-from .settings import ATLASES, FORMATS, LIGHTS, QUALITIES, QUANTITIES, BakeSettings
+from .settings import ATLASES, FORMATS, LIGHTS, QUALITIES, QUANTITIES, BakeSettings, GroupSetting
 
 EXIT_DONE = 0
 EXIT_FAILED = 1
@@ -26,7 +26,7 @@ EXIT_INTERRUPTED = 130
 SHARED_FIELDS = (
     *("texel_density", "pages", "max_resolution", "mip_levels", "padding", "unwrap_seconds"),
     *("atlas", "quality", "relative_error", "quantity", "light", "format"),
-    *("sky", "keep_uvs", "seed", "threads", "method", *SETTINGS),
+    *("sky", "keep_uvs", "light_groups", "seed", "threads", "method", *SETTINGS),
 )
 """Settings whose option says exactly what the field says."""
 
@@ -88,7 +88,25 @@ def settings_of(request: argparse.Namespace) -> BakeSettings:
     for name in ("objects", "light_only", "ignore"):
         if getattr(request, name) is not None:
             given[name] = tuple(getattr(request, name))
+    given["groups"] = tuple(map(light_group, request.groups or ()))
     return BakeSettings(**given)
+
+
+def light_group(text: str) -> GroupSetting:
+    """Read a light group as the command line has it: NAME=MEMBER,MEMBER…
+
+    Raises
+    ------
+    UsageError
+        If it is not of this form.
+    """
+    name, _, members = text.partition("=")
+    wanted = tuple(filter(None, (member.strip() for member in members.split(","))))
+    if not name.strip() or not wanted:
+        raise UsageError(
+            f"--light-group {text}: give a name and what is in it, such as Kitchen=Lamp,Stove,World"
+        )
+    return name.strip(), wanted
 
 
 def bake_output(request: argparse.Namespace, loaded: Path | None) -> Path:
@@ -211,6 +229,14 @@ def _add_bake(parser: argparse.ArgumentParser) -> None:
         "--sky", action="store_true", help="add a white sky of strength 1 where the scene has no light at all"
     )
     add("--keep-uvs", action="store_true", help="use an existing UV layer Lightmap as it is")
+    add("--light-groups", action="store_true", help="a lightmap also for each light group of the scene")
+    add(
+        "--light-group",
+        dest="groups",
+        action="append",
+        metavar="NAME=MEMBER,…",
+        help="a lightmap also for these lamps, emissive materials or the world (may be repeated)",
+    )
     add("--seed", type=int, default=default.seed, metavar="N", help="random seed (default 0)")
     add("--threads", type=int, default=default.threads, metavar="N", help="threads (default: all cores)")
     keeping = parser.add_mutually_exclusive_group()

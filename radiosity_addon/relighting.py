@@ -75,6 +75,13 @@ class KeptBake:
         return (*names, *given[:count])
 
     @property
+    def groups(self) -> tuple[str, ...]:
+        """The light groups that the scene puts the sources in; "" where in none."""
+        lights = self.bake_scene.light_groups or ("",) * len(self.sources.lights)
+        count = len(self.sources) - len(lights)
+        return (*lights, *(self.bake_scene.emitter_groups or ("",) * count)[:count])
+
+    @property
     def strengths(self) -> Array:
         """(s, 3) The sources' strengths as they were baked, see `LightSources`."""
         return np.asarray(self.sources.strengths)

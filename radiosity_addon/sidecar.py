@@ -51,7 +51,7 @@ SIDECAR_NAME = "lightmap.relight"
 MAGIC, VERSION = b"RADIOSITYRELIGHT", 1
 
 
-OF_SOURCES = ("emitter", "emitter_names")
+OF_SOURCES = ("emitter", "emitter_names", "light_groups", "emitter_groups")
 """What a scene says of its sources beside their strengths: it stays as it was baked."""
 
 

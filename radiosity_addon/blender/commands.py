@@ -139,6 +139,7 @@ def written_files(report: dict) -> list[tuple[str, str]]:
     shown = images if len(images) <= MAX_IMAGES else [f"{images[0]} … {images[-1]}"]
     return [
         (BLEND_NAME, "the scene with its lightmaps"),
+        *_group_files(report),
         *(
             (image, "lightmap" if len(shown) == len(images) else f"{len(images)} lightmaps")
             for image in shown
@@ -146,6 +147,16 @@ def written_files(report: dict) -> list[tuple[str, str]]:
         (PREVIEW_NAME, "what it looks like"),
         (REPORT_NAME, "objects, figures and warnings"),
     ]
+
+
+def _group_files(report: dict) -> list[tuple[str, str]]:
+    """What there is of each light group."""
+    files = []
+    for group in report.get("light_groups", ()):
+        names = [page["image"] for page in group["pages"]]
+        shown = names[0] if len(names) == 1 else f"{names[0]} … {names[-1]}"
+        files.append((shown, f"light of group '{group['group']}'"))
+    return files
 
 
 def _make_folder_of(path: Path) -> None:

@@ -22,7 +22,9 @@ from .apply import apply_lightmaps, check_targets
 from .bake_record import remove_datablocks
 from .export import export_scene
 from .export_sources import Export
+from .group_images import GroupImages, each_image, write_groups
 from .images import lightmap_files, set_folder, write_pages
+from .light_shares import crowded_materials
 from .live_picture import seen_triangles
 from .output import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, OutputFolder, save_copy
 from .preview import SAMPLES, render_preview
@@ -100,8 +102,8 @@ def run_bake(
         if with_copy and output is not None:
             return (yield from deliver(context, settings, export, result, output, seconds, keeping))
         with replacing_earlier(context), timed(seconds, "apply"):
-            images = _show(context, settings, export, result, output, keeping)
-            report = BakeReport.of(result, lightmap_files(images, settings), seconds)
+            images, groups = _show(context, settings, export, result, output, keeping)
+            report = _report(result, images, groups, settings, seconds)
             if output is not None:
                 report.write(output.staging / REPORT_NAME)
                 output.publish()
@@ -153,10 +155,10 @@ def deliver(
 ) -> BakeJob:
     """Show the lightmaps, save the scene beside them, render it, and publish all at once."""
     with replacing_earlier(context), timed(seconds, "apply"):
-        images = _show(context, settings, export, result, output, keeping)
+        images, groups = _show(context, settings, export, result, output, keeping)
     try:
         # The copy tells of its bake too; what is left to do is not in its times.
-        so_far = BakeReport.of(result, lightmap_files(images, settings), seconds)
+        so_far = _report(result, images, groups, settings, seconds)
         runtime.remember(context.scene, so_far.as_dict(), "//")
         _remember_kept(context.scene, keeping, None)
         yield Progress("save", SAVE)
@@ -165,7 +167,7 @@ def deliver(
         yield Progress("preview", PREVIEW)
         with timed(seconds, "preview"):
             render_preview(context, output.staging / PREVIEW_NAME, settings, samples)
-        report = BakeReport.of(result, lightmap_files(images, settings), seconds)
+        report = _report(result, images, groups, settings, seconds)
         report.write(output.staging / REPORT_NAME)
         yield Progress("write", 1.0)
         output.publish()
@@ -184,20 +186,37 @@ def _show(
     result: BakeResult,
     output: OutputFolder | None,
     keeping: Keeping | None,
-) -> list[bpy.types.Image]:
-    """Make the images and put them on the objects."""
-    images = write_pages(result, settings, None if output is None else output.staging)
+) -> tuple[list[bpy.types.Image], GroupImages]:
+    """Make the images, also those of light groups, and put them on the objects."""
+    folder = None if output is None else output.staging
+    images = write_pages(result, settings, folder)
+    groups: GroupImages = {}
     try:
+        groups = write_groups(result, settings, folder)
         if output is not None:
-            set_folder(images, output.path)
+            set_folder([*images, *each_image(groups)], output.path)
         if keeping is not None:
-            kept_bakes.mark_images(images, keeping.mark)
-        apply_lightmaps(context, export, result, images, settings)
+            kept_bakes.mark_images([*images, *each_image(groups)], keeping.mark)
+        apply_lightmaps(context, export, result, images, settings, groups)
         seal()
     except BaseException:
-        remove_datablocks(images)
+        remove_datablocks([*images, *each_image(groups)])
         raise
-    return images
+    return images, groups
+
+
+def _report(
+    result: BakeResult,
+    images: list[bpy.types.Image],
+    groups: GroupImages,
+    settings: BakeSettings,
+    seconds: dict[str, float],
+) -> BakeReport:
+    """Report a bake and its files."""
+    shares = [lightmap_files(of, settings) for of in groups.values()]
+    if groups:
+        result = replace(result, warnings=(*result.warnings, *crowded_materials()))
+    return BakeReport.of(result, lightmap_files(images, settings), seconds, shares)
 
 
 @contextmanager

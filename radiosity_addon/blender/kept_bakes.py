@@ -14,13 +14,14 @@ import bpy
 from bpy.app.handlers import persistent
 
 from .bake_record import is_made
+from .images import GROUP, PAGE
 
 if TYPE_CHECKING:
     from ..relighting import KeptBake
     from ..solver.arrays import Array
 
-MARK, PAGE = "radiosity_mark", "radiosity_page"
-"""Custom properties of a lightmap's image: the mark of its bake, and which page it is."""
+MARK = "radiosity_mark"
+"""Custom property of a lightmap's image: the mark of its bake."""
 
 
 @dataclass
@@ -85,18 +86,28 @@ def drop_all() -> None:
 
 
 def mark_images(images: Sequence[bpy.types.Image], mark: str) -> None:
-    """Have a bake's images, in the order of its pages, known as its own."""
-    for page, image in enumerate(images):
-        image[MARK], image[PAGE] = mark, page
+    """Have a bake's images known as its own."""
+    for image in images:
+        image[MARK] = mark
 
 
 def images_of(mark: str) -> dict[int, bpy.types.Image]:
-    """Return a bake's images by page."""
-    return {
-        int(image[PAGE]): image
-        for image in bpy.data.images
-        if image.library is None and is_made(image) and image.get(MARK) == mark
-    }
+    """Return a bake's images of all light by page."""
+    return {int(image[PAGE]): image for image in _marked(mark) if not image[GROUP]}
+
+
+def group_images_of(mark: str) -> dict[str, list[bpy.types.Image]]:
+    """Return the images of a bake's light groups, by group, in the order of its pages."""
+    found: dict[str, list[bpy.types.Image]] = {}
+    for image in sorted(_marked(mark), key=lambda image: int(image[PAGE])):
+        if image[GROUP]:
+            found.setdefault(image[GROUP], []).append(image)
+    return found
+
+
+def _marked(mark: str) -> list[bpy.types.Image]:
+    own = [image for image in bpy.data.images if image.library is None and is_made(image)]
+    return [image for image in own if image.get(MARK) == mark]
 
 
 @persistent

@@ -21,13 +21,15 @@ from bpy.app.handlers import persistent
 from ..background import in_thread
 from ..bake_scene import LightGroup, LightmapPage
 from ..errors import BakeError, RadiosityError
+from ..light_groups import are_wanted
 from ..responses import Responses
 from ..solver.arrays import Array
 from . import kept_bakes, live_state
+from .group_images import update_images
 from .live_scene import LiveScene
 from .live_strengths import StrengthReader
 from .relight import lit, note_shown, read_strengths
-from .relit_images import check_images, rewrite, show_pages
+from .relit_images import check_images, rewrite
 from .relit_materials import show_emission
 
 TICK = 0.02
@@ -116,6 +118,8 @@ class LiveRelight:
         if context.scene.name_full != self._scene:
             raise BakeError("another scene is shown")
         held, self._strengths = read_strengths(context)
+        if are_wanted(held.bake.bake_scene, held.bake.settings):
+            raise BakeError("the bake has light groups, whose own sliders change the light at once")
         self._reader = StrengthReader(context.scene, held.bake, self._strengths)
         self._fits = LiveScene(context.scene)
         self._dirty, self._noticed = False, time.perf_counter()
@@ -148,7 +152,7 @@ class LiveRelight:
             LightmapPage(pixels, np.zeros(0, dtype=bool)) for pixels in self._responses.pages(self._strengths)
         )
         check_images(images, pages)
-        show_pages(images, pages, held.bake.settings.format)
+        update_images([images[number] for number in range(len(pages))], pages, {})
         changed = (self._strengths != self._shown).any(axis=1)
         lights = len(held.bake.sources.lights)
         if held.bake.settings.quantity != "radiosity":
@@ -211,7 +215,7 @@ class LiveRelight:
         if not np.array_equal(strengths, self._strengths):
             return
         scene = self._of_scene()
-        rewrite(kept_bakes.mark_of(scene), pages, groups, held.bake.settings.format, 0.0)
+        rewrite(kept_bakes.mark_of(scene), pages, groups, 0.0)
         note_shown(scene, held, strengths)
         self._shown, self._exact = strengths, True
         _redraw()

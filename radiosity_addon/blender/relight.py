@@ -14,7 +14,7 @@ import numpy as np
 from ..background import in_thread
 from ..bake_scene import LightGroup, LightmapPage, Progress
 from ..errors import BakeError, RadiosityError
-from ..light_groups import group_pages
+from ..light_groups import are_wanted, group_pages
 from ..relight_check import strengths_in
 from ..relighting import KeptBake, relight
 from ..sidecar import SIDECAR_NAME, StoredBake, read_sidecar
@@ -62,7 +62,7 @@ def run_relight(
     yield Progress("write", LIT)
     mark = kept_bakes.mark_of(context.scene)
     taken = time.perf_counter() - started
-    rewrite(mark, pages, groups, held.bake.settings.format, taken)
+    rewrite(mark, pages, groups, taken)
     note_shown(context.scene, held, strengths)
     return RelightReport(time.perf_counter() - started, not same)
 
@@ -116,9 +116,9 @@ def lit(kept: KeptBake, strengths: Array) -> Generator[float, None, Relit]:
         except StopIteration as done:
             pages = done.value
             break
-    if not kept.settings.groups:
+    if not are_wanted(kept.bake_scene, kept.settings):
         return pages, ()
-    return pages, drain(group_pages(kept, pages))
+    return pages, (yield from group_pages(kept, pages, strengths))
 
 
 def _shown(steps: Generator[float | None, None, Relit]) -> Generator[Progress, None, Relit]:
@@ -166,7 +166,7 @@ def follow_undo() -> None:
             continue
         try:
             pages, groups = drain(lit(held.bake, noted))
-            rewrite(kept_bakes.mark_of(scene), pages, groups, held.bake.settings.format, 0.0)
+            rewrite(kept_bakes.mark_of(scene), pages, groups, 0.0)
         except RadiosityError:
             continue  # undone to before the images were there
         held.shown = noted

@@ -13,19 +13,15 @@ import numpy as np
 
 from ..bake_scene import LightGroup, LightmapPage
 from ..errors import BakeError
-from ..lightmap.encode import encode_png16, png16_scale
-from .bake_record import is_made
+from .group_images import rescale_materials, update_images
 from .images import SCALE_PROPERTY, image_scale
-from .kept_bakes import images_of
-from .node_group import SCALE
+from .kept_bakes import group_images_of, images_of
 from .output import REPORT_NAME, OutputFolder
 
 Images = Mapping[int, bpy.types.Image]
 
 
-def rewrite(
-    mark: str, pages: Sequence[LightmapPage], groups: Sequence[LightGroup], file_format: str, seconds: float
-) -> None:
+def rewrite(mark: str, pages: Sequence[LightmapPage], groups: Sequence[LightGroup], seconds: float) -> None:
     """Show a bake's new pages, and replace its files by them, all or none.
 
     Parameters
@@ -35,8 +31,6 @@ def rewrite(
     pages : sequence of LightmapPage
     groups : sequence of LightGroup
         Of its light groups, if it has any.
-    file_format : str
-        See `BakeSettings`.
     seconds : float
         How long lighting anew took, for the report.
 
@@ -45,12 +39,13 @@ def rewrite(
     BakeError
         If an image is not there any more, or a file cannot be replaced.
     """
-    del groups  # no images of groups are made yet
-    images = images_of(mark)
+    images, group_images = images_of(mark), group_images_of(mark)
     check_images(images, pages)
-    with _as_before_on_failure(images):
-        show_pages(images, pages, file_format)
-        store(images, seconds)
+    shown = [images[number] for number in range(len(pages))]
+    every = [*shown, *(image for of in group_images.values() for image in of)]
+    with _as_before_on_failure(every):
+        update_images(shown, pages, group_images, groups)
+        store(every, seconds)
 
 
 def check_images(images: Images, pages: Sequence[LightmapPage]) -> None:
@@ -69,28 +64,7 @@ def check_images(images: Images, pages: Sequence[LightmapPage]) -> None:
             raise BakeError(f"lightmap '{image.name}' has lost its file, or was scaled: bake again")
 
 
-def show_pages(images: Images, pages: Sequence[LightmapPage], file_format: str) -> None:
-    """Put pages into their images."""
-    scale = png16_scale(*[page.pixels for page in pages]) if file_format == "png16" else None
-    for number, page in enumerate(pages):
-        image = images[number]
-        if scale is None:
-            show_pixels(image, page.pixels)
-        else:
-            show_pixels(image, encode_png16(page.pixels, scale))
-            _set_scale(image, scale)
-
-
-def show_pixels(image: bpy.types.Image, pixels: np.ndarray) -> None:
-    """Put (h, w, 3) float32 pixels into an image."""
-    values = np.ones((*pixels.shape[:2], 4), dtype=np.float32)
-    values[..., :3] = pixels
-    image.pixels.foreach_set(values.ravel())
-    image.update()
-    image.update_tag()
-
-
-def store(images: Images, seconds: float) -> None:
+def store(images: Sequence[bpy.types.Image], seconds: float) -> None:
     """Write the images to their files, and to the report beside them; pack anew those that are packed.
 
     Raises
@@ -98,11 +72,11 @@ def store(images: Images, seconds: float) -> None:
     BakeError
         If a file cannot be replaced.
     """
-    for image in images.values():
+    for image in images:
         if image.packed_file is not None:
             image.pack()
     folders: dict[Path, list[bpy.types.Image]] = {}
-    for image in images.values():
+    for image in images:
         if image.packed_file is None:
             folders.setdefault(Path(bpy.path.abspath(image.filepath_raw)).parent, []).append(image)
     for folder, inside in folders.items():
@@ -131,7 +105,8 @@ def _report(output: OutputFolder, images: Sequence[bpy.types.Image], seconds: fl
     try:
         told: dict[str, Any] = json.loads((output.path / REPORT_NAME).read_text(encoding="utf-8"))
         scales = {Path(bpy.path.abspath(image.filepath_raw)).name: image_scale(image) for image in images}
-        for entry in told["objects"]:
+        of_groups = [page for group in told.get("light_groups", ()) for page in group["pages"]]
+        for entry in (*told["objects"], *of_groups):
             if "scale" in entry:
                 entry["scale"] = scales.get(entry["image"], entry["scale"])
     except (OSError, ValueError, KeyError, TypeError):
@@ -141,25 +116,11 @@ def _report(output: OutputFolder, images: Sequence[bpy.types.Image], seconds: fl
     (output.staging / REPORT_NAME).write_text(text, encoding="utf-8")
 
 
-def _set_scale(image: bpy.types.Image, scale: float) -> None:
-    """Note the scale with the image, and have the materials that show it multiply by it."""
-    ratio = scale / image_scale(image)
-    image[SCALE_PROPERTY] = scale
-    for material in bpy.data.materials:
-        if not is_made(material) or material.node_tree is None:
-            continue
-        nodes = material.node_tree.nodes
-        if any(node.type == "TEX_IMAGE" and node.image == image for node in nodes):
-            for node in nodes:
-                if node.type == "GROUP" and SCALE in node.inputs:
-                    node.inputs[SCALE].default_value *= ratio
-
-
 @contextmanager
-def _as_before_on_failure(images: Images) -> Iterator[None]:
+def _as_before_on_failure(images: Sequence[bpy.types.Image]) -> Iterator[None]:
     """Put the images' pixels and scales back if the block fails."""
     before = []
-    for image in images.values():
+    for image in images:
         pixels = np.empty(len(image.pixels), dtype=np.float32)
         image.pixels.foreach_get(pixels)
         before.append((image, pixels, image_scale(image)))
@@ -170,5 +131,6 @@ def _as_before_on_failure(images: Images) -> Iterator[None]:
             image.pixels.foreach_set(pixels)
             image.update()
             if SCALE_PROPERTY in image.keys():  # noqa: SIM118 (an ID is no dict)
-                _set_scale(image, scale)
+                rescale_materials(image, scale)
+                image[SCALE_PROPERTY] = scale
         raise

@@ -61,6 +61,23 @@ def test_defaults_are_those_of_the_settings(verbs: list[tuple]) -> None:
     )
 
 
+def test_light_groups_arrive_those_of_the_file_and_those_that_are_named(verbs: list[tuple]) -> None:
+    line = ["bake", "s.blend", "--output", "o", "--light-groups", "--light-group", "Day=Sun, World"]
+    assert cli.main([*line, "--light-group", "Küche=Lamp.001"]) == 0
+    settings = verbs[0][4]
+    assert settings.light_groups
+    assert settings.groups == (("Day", ("Sun", "World")), ("Küche", ("Lamp.001",)))
+
+
+@pytest.mark.parametrize("text", ["Day", "Day=", "=Sun", "Day= ,"])
+def test_a_light_group_needs_a_name_and_members(
+    text: str, verbs: list[tuple], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["bake", "s.blend", "--output", "o", "--light-group", text]) == 2
+    assert f"--light-group {text}: give a name and what is in it" in capsys.readouterr().err
+    assert not verbs
+
+
 def test_every_option_arrives(verbs: list[tuple]) -> None:
     line = (
         "bake s.glb --output o --texel-density 12.5 --atlas per-object --quality high --quantity radiosity "
