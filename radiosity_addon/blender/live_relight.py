@@ -48,7 +48,7 @@ class LiveRelight:
     Attributes
     ----------
     latency : float
-        Seconds that the last change took to get into the images.
+        Seconds from reading the last change to having it in the images.
     changes : int
         How often the images have followed.
     """
@@ -129,7 +129,7 @@ class LiveRelight:
         """Read the strengths, and show them as far as it can be done at once."""
         assert self._reader is not None
         assert self._fits is not None
-        self._dirty = False
+        self._dirty, started = False, time.perf_counter()
         self._fits.check(self._reader)
         strengths = self._held().bake.sources.checked(self._reader.read())
         if np.array_equal(strengths, self._strengths):
@@ -138,6 +138,7 @@ class LiveRelight:
         if self._responses is not None and self._work is not None and self._doing not in self._wanted():
             self._end_work()
         self._show()
+        self.latency = time.perf_counter() - started
 
     def _show(self) -> None:
         """Bring the images to the strengths read last, if all responses are there."""
@@ -159,7 +160,6 @@ class LiveRelight:
             show_emission({held.bake.names[row] for row in np.flatnonzero(changed) if row >= lights})
         self._of_scene().radiosity_relight.strengths = json.dumps(self._strengths.tolist())
         self._shown = self._strengths
-        self.latency = time.perf_counter() - self._noticed
         self.changes += 1
         _redraw()
 

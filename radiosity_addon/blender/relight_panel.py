@@ -18,7 +18,7 @@ class RADIOSITY_PT_relight(_Panel, bpy.types.Panel):
     bl_idname = "RADIOSITY_PT_relight"
     bl_label = "Relight"
     bl_parent_id = "RADIOSITY_PT_main"
-    bl_order = 10
+    bl_order = -1
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:

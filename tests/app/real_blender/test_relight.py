@@ -30,7 +30,7 @@ def seen(installed: Installed, cornell_blend: Path) -> dict[str, Any]:
         "--",
         answer,
         window=True,
-        timeout=200,
+        timeout=400,
     )
     PICTURES.mkdir(parents=True, exist_ok=True)
     for picture in answer.parent.glob("relight-*.png"):
@@ -55,6 +55,7 @@ def test_undo_takes_lamp_and_light_back(seen: dict[str, Any]) -> None:
 
 def test_the_lightmap_follows_within_a_fifth_of_a_second(seen: dict[str, Any]) -> None:
     """The image, at each step; to draw it is the graphics card's part, for which CI has a slow stand-in."""
+    assert len(seen["latencies"]) == 4
     assert max(seen["latencies"]) < 0.2
 
 

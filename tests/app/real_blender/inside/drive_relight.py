@@ -18,7 +18,7 @@ import events
 ANSWER = Path(sys.argv[sys.argv.index("--") + 1])
 MODULE = "bl_ext.user_default.radiosity_addon.blender"
 HEADER = 34  # pixels at the sidebar's top: the panel's title, which a click would fold
-STEPS = 12
+STEPS = 4
 
 PATIENCE = 10.0  # seconds for one change to be seen
 
@@ -133,7 +133,7 @@ def drag():
 
 
 def follow():
-    """Change the power step by step; note how long it takes into the image, and until it is drawn."""
+    """Change the power step by step; note how long the image takes, and how long until it is drawn."""
     live = module("live_state").state.live
     latencies, frames = [], []
     for step in range(STEPS):
@@ -143,7 +143,7 @@ def follow():
         lamp().energy = seen["power"] * (1.0 + 0.1 * step) * 1.01
         while live.changes == shown and time.perf_counter() - start < PATIENCE:
             yield 0.0
-        latencies.append(time.perf_counter() - start)
+        latencies.append(live.latency)
         changed = time.perf_counter()
         while not [at for at in drawn if at > changed] and time.perf_counter() - start < PATIENCE:
             yield 0.0
