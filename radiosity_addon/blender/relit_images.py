@@ -43,6 +43,10 @@ def rewrite(mark: str, pages: Sequence[LightmapPage], groups: Sequence[LightGrou
     check_images(images, pages)
     shown = [images[number] for number in range(len(pages))]
     every = [*shown, *(image for of in group_images.values() for image in of)]
+    # Of a group in which nothing shines any more there are no pages.
+    told = {group.name for group in groups}
+    dark = tuple(LightmapPage(np.zeros_like(page.pixels), page.coverage) for page in pages)
+    groups = [*groups, *(LightGroup(name, dark) for name in group_images if name not in told)]
     with _as_before_on_failure(every):
         update_images(shown, pages, group_images, groups)
         store(every, seconds)
