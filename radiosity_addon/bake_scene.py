@@ -76,7 +76,10 @@ class BakeScene:
         Which of the emissive materials each triangle has; any number where it emits nothing. None
         takes every colour of emission for a material.
     emitter_names : tuple of str
-        The names of those materials.
+        The names of those materials; one that is in several light groups is there once for each.
+    light_groups, emitter_groups : tuple of str
+        The light groups that the scene puts its lights and those materials in, "" where in none; nothing
+        where it knows none.
     """
 
     scene: Scene
@@ -84,6 +87,8 @@ class BakeScene:
     warnings: tuple[BakeWarning, ...] = ()
     emitter: Array | None = None
     emitter_names: tuple[str, ...] = ()
+    light_groups: tuple[str, ...] = ()
+    emitter_groups: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -153,10 +158,13 @@ class LightGroup:
     name : str
     pages : tuple of LightmapPage
         Parallel to the bake's; over all groups they sum to them.
+    sources : tuple of str
+        The names of the lamps, emissive materials and the world in it, each once.
     """
 
     name: str
     pages: tuple[LightmapPage, ...]
+    sources: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

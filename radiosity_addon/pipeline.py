@@ -26,7 +26,7 @@ from .bake_scene import (
     Progress,
 )
 from .errors import BakeError, SceneError, UsageError
-from .light_groups import group_pages
+from .light_groups import are_wanted, check_groups, group_pages
 from .lightmap.accuracy import light_within
 from .lightmap.atlas import Atlas, AtlasInput, AtlasOptions, build_atlas
 from .lightmap.error_picture import summary, texel_residual
@@ -97,7 +97,7 @@ def bake(bake_scene: BakeScene, settings: BakeSettings) -> Generator[Progress, N
     BakeError
         If the lightmaps cannot be laid out.
     """
-    result, _ = yield from _bake(bake_scene, settings, keep=bool(settings.groups))
+    result, _ = yield from _bake(bake_scene, settings, keep=are_wanted(bake_scene, settings))
     return result
 
 
@@ -125,6 +125,9 @@ def _bake(
     """Bake, and keep what lights the scene anew if asked to."""
     if keep and settings.quantity == "residual":
         raise UsageError("a residual is of all light together: bake another quantity to light it anew")
+    grouped = are_wanted(bake_scene, settings)
+    if grouped:
+        check_groups(bake_scene, settings)
     seconds: dict[str, float] = {}
     quality = quality_of(settings)
     baked = [item for item in bake_scene.objects if item.bake and item.count]
@@ -155,7 +158,7 @@ def _bake(
         laid = geometry, seams, rings
         kept = KeptBake(bake_scene, settings, lit.relightable, lit.light.kept, *laid, *lit.materials)
     groups: tuple[LightGroup, ...] = ()
-    if kept is not None and settings.groups:
+    if kept is not None and grouped:
         with _timed(seconds, "groups"):
             groups = yield from _staged(group_pages(kept, pages), "groups", ENCODE, 1.0)
 

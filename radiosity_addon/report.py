@@ -47,7 +47,13 @@ class BakeReport:
     data: dict[str, Any]
 
     @classmethod
-    def of(cls, result: BakeResult, files: Sequence[LightmapFile], seconds: dict[str, float]) -> BakeReport:
+    def of(
+        cls,
+        result: BakeResult,
+        files: Sequence[LightmapFile],
+        seconds: dict[str, float],
+        groups: Sequence[Sequence[LightmapFile]] = (),
+    ) -> BakeReport:
         """Report a bake.
 
         Parameters
@@ -57,6 +63,8 @@ class BakeReport:
             Parallel to `result.pages`.
         seconds : dict of str to float
             Wall-clock time of every stage, those outside the pipeline included.
+        groups : sequence of sequence of LightmapFile
+            Parallel to `result.groups`, and each to `result.pages`.
         """
         told = result.atlas or ({},) * len(files)
         pages = [{"image": file.path, **_plain(page)} for file, page in zip(files, told, strict=True)]
@@ -76,11 +84,16 @@ class BakeReport:
             objects.append(entry)
         solver = {key: value for key, value in result.solver.items() if key != "history"}
         solver["history"] = thinned(result.solver.get("history", ()))
+        shares = [
+            {"group": group.name, "sources": list(group.sources), "pages": [_file(file) for file in of]}
+            for group, of in zip(result.groups, groups, strict=True)
+        ]
         return cls(
             {
                 "version": VERSION,
                 "objects": objects,
                 "pages": pages,
+                **({"light_groups": shares} if shares else {}),
                 "solver": _plain(solver),
                 "warnings": [{"name": w.name, "message": w.message} for w in result.warnings],
                 "seconds": {stage: round(float(taken), 4) for stage, taken in seconds.items()},
@@ -134,6 +147,11 @@ def _named(block: Mapping[str, Any], objects: Sequence[BakeObject]) -> dict[str,
     owners = sorted({bisect_right(firsts, triangle) - 1 for triangle in block["triangles"]})
     names = list(dict.fromkeys(objects[owner].name for owner in owners))
     return {"objects": names, **{key: value for key, value in block.items() if key != "triangles"}}
+
+
+def _file(file: LightmapFile) -> dict[str, Any]:
+    """Tell of an image: its name, and its scale where it has one."""
+    return {"image": file.path} if file.scale is None else {"image": file.path, "scale": file.scale}
 
 
 def thinned(history: Sequence[T], most: int = MAX_HISTORY) -> list[T]:

@@ -102,8 +102,12 @@ def remove_made() -> None:
 
 
 def remove_datablocks(datablocks: Iterable[bpy.types.ID]) -> None:
-    """Remove datablocks from the file, all at once."""
-    bpy.data.batch_remove(list(datablocks))
+    """Remove datablocks from the file, all at once, and the keyframes that nothing else uses."""
+    blocks = list(datablocks)
+    animated = [tree.animation_data for tree in blocks if isinstance(tree, bpy.types.NodeTree)]
+    actions = {data.action for data in animated if data is not None and data.action is not None}
+    bpy.data.batch_remove(blocks)
+    bpy.data.batch_remove([action for action in actions if action.users == 0])
 
 
 def record_mesh_swap(obj: bpy.types.Object) -> None:

@@ -206,6 +206,12 @@ class RadiositySettings(MethodProperties, bpy.types.PropertyGroup):
         subtype="DIR_PATH",
         options=_RELATIVE_PATH,
     )
+    use_light_groups: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Light Groups",
+        description="Bake a lightmap for each light group as well, which the materials mix: colors and "
+        "strengths can then be changed without baking",
+        default=DEFAULTS.light_groups,
+    )
     show_while_solving: bpy.props.BoolProperty(  # type: ignore[valid-type]
         name="Show While Solving",
         description="Draw the elements over the objects in the viewports while a bake is solving, as bright "
@@ -250,6 +256,7 @@ def settings_of(context: bpy.types.Context) -> BakeSettings:
         relative_error=group.relative_error if by_error else None,
         pages=group.pages if group.atlas == "shared" and not by_density else 1,
         objects=chosen,
+        light_groups=group.use_light_groups,
         **{name: getattr(group, name) for name in SHARED_FIELDS},
         **given_settings(group),
     )

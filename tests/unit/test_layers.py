@@ -16,6 +16,11 @@ LAYER_OF = {
     "quality": "pipeline",
     "relighting": "pipeline",
     "light_groups": "pipeline",
+    "relight_check": "pipeline",
+    "fingerprint": "pipeline",
+    "sidecar": "pipeline",
+    "keeping": "pipeline",
+    "responses": "pipeline",
 }
 FRONT_DOORS = ("", "__main__", "cli", "console", "interrupts")
 
