@@ -15,12 +15,14 @@ import numpy as np
 
 from .bake_scene import BakeScene, LightmapPage, Progress
 from .errors import SceneError
+from .lightmap.atlas import Atlas
 from .lightmap.encode import to_quantity
 from .lightmap.relight import kept_bytes, relight_steps
 from .lightmap.seams import Seams
 from .lightmap.sweeps import LitTexels, TexelLight
 from .lightmap.texel_geometry import TexelGeometry
 from .lightmap.texel_pages import texel_pages
+from .lightmap.traced_texels import TracedTexels
 from .settings import BakeSettings
 from .solver.arrays import Array
 from .solver.element_transport import Relightable
@@ -49,6 +51,10 @@ class KeptBake:
         The texels, what is stitched, and how far pages are dilated [texels].
     reflectance, emission : (n, 3) float64
         Of the texels as they show; emission [W/m²] as it was baked.
+    atlas : Atlas or None
+        Where charts lie, …
+    traced : TracedTexels or None
+        … and how texels were lit: without these nothing can be moved (`rebaking.py`).
     """
 
     bake_scene: BakeScene
@@ -60,6 +66,8 @@ class KeptBake:
     rings: int
     reflectance: Array
     emission: Array
+    atlas: Atlas | None = None
+    traced: TracedTexels | None = None
 
     @property
     def sources(self) -> LightSources:
@@ -173,6 +181,12 @@ def _same_but_strength(one: Light, other: Light) -> bool:
         for entry in fields(one)
         if entry.name not in STRENGTHS
     )
+
+
+def same_light(one: Light, other: Light) -> bool:
+    """Tell whether two lights are the same."""
+    alike = type(one) is type(other)
+    return alike and all(_equal(getattr(one, e.name), getattr(other, e.name)) for e in fields(one))
 
 
 def _equal(one: Any, other: Any) -> bool:

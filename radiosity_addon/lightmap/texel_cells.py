@@ -64,6 +64,7 @@ class TexelCells:
         self._rim, divided = crossings.rim, crossings.crossed | crossings.touched
         self.texel = np.flatnonzero(divided).astype(np.int32)
         """(d,) The divided texels."""
+        self._divided = divided
         self._rank = np.cumsum(divided, dtype=np.int32) - 1
         self._anchors = np.empty((len(self.texel), CELLS, 3))
         self._below = np.zeros((len(self.texel), CELLS), dtype=bool)
@@ -85,6 +86,16 @@ class TexelCells:
     def texel_of(self, cell: Array) -> Array:
         """Return (p,) the texel that each cell is of."""
         return np.asarray(self.texel[cell // CELLS])
+
+    def renumbered(self, other: TexelCells) -> Array:
+        """Return (cells,) int32 the numbers that these cells have among another's, or NOTHING."""
+        number = np.where(other._divided[self.texel], other._rank[self.texel], NOTHING)
+        cell = CELLS * number[:, None] + np.arange(CELLS)
+        return np.where(number[:, None] == NOTHING, NOTHING, cell).ravel().astype(np.int32)
+
+    def anchors(self, cell: Array) -> Array:
+        """Return (p, 3) where the cells' anchors are."""
+        return np.asarray(self._anchors[cell // CELLS, cell % CELLS])
 
     def at(self, texel: Array, hits: Hits) -> Array:
         """Return (h,) int32: the nearest cell of its `texel` whose anchor each hit sees, or NOTHING."""
@@ -131,10 +142,15 @@ class TexelCells:
 
         return Footprints(anchor, geometry.normal[texel], len(geometry) + cell, sample, starts=STARTS)
 
+    def upright(self, cell: Array) -> Array:
+        """Return (p, 3) the normals of the triangles that cells are on."""
+        return np.asarray(self._geometry.surface_normal[self.texel_of(cell)])
+
     def gather(self, cell: Array, rays: int, resolve: Resolver) -> Generator[float, None, Array]:
         """Gather over cells, (p, rays) sources; yields the fraction done."""
-        at, upright = self.footprints(cell), self._geometry.surface_normal[self.texel_of(cell)]
-        gathered = yield from self._local.gather_steps(at, upright, rays, resolve)
+        gathered = yield from self._local.gather_steps(
+            self.footprints(cell), self.upright(cell), rays, resolve
+        )
         return gathered.sources
 
     def direct(
