@@ -10,7 +10,7 @@ import time
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -39,13 +39,14 @@ from .lightmap.texel_materials import FOOTPRINT, texel_materials
 from .lightmap.texel_pages import texel_pages
 from .lightmap.turned_faces import turned_away
 from .quality import for_error, quality_of, used_settings
-from .relighting import KeptBake, shown
+from .relighting import KeptBake, Moves, Solved, shown
 from .remarks import of_solution, small_objects
 from .report import solver_part
 from .settings import BakeSettings
 from .solver import Solution, SolverSettings, SolverState, solve_progress
 from .solver.arrays import Array
 from .solver.element_transport import Relightable
+from .solver.visibility import RayCaster
 
 T = TypeVar("T")
 
@@ -55,6 +56,7 @@ class Lit:
     """What texels hold, (n, 3), and what it was made of: a residual of nothing else."""
 
     values: Array
+    caster: RayCaster
     light: TexelLight | None = None
     relightable: Relightable | None = None
     materials: tuple[Array, ...] = ()
@@ -140,7 +142,11 @@ def _bake(
     with timed(seconds, "light"):
         steps = _texel_values(bake_scene, solution, geometry, quality.gather, settings, keep)
         lit = yield from staged(steps, "light", LIGHT, ENCODE)
-    return (yield from finish(bake_scene, settings, atlas, geometry, solution, lit, seconds))
+    report = solver_part(solution.final_report(), used_settings(quality.solver), bake_scene.objects)
+    sides = solution.triangle_irradiance, solution.back_irradiance
+    of_light = (*turned_away(baked, bake_scene.scene.areas, *sides), *of_solution(solution, quality.solver))
+    solved = Solved(report, (*atlas.warnings, *of_light))
+    return (yield from finish(bake_scene, settings, atlas, geometry, solved, lit, seconds))
 
 
 def finish(
@@ -148,39 +154,36 @@ def finish(
     settings: BakeSettings,
     atlas: Atlas,
     geometry: TexelGeometry,
-    solution: Solution,
+    solved: Solved,
     lit: Lit,
     seconds: dict[str, float],
 ) -> Generator[Progress, None, tuple[BakeResult, KeptBake | None]]:
     """Put what texels hold on pages, and tell of the bake; what was kept goes on in the kept bake."""
-    baked, quality = baked_objects(bake_scene), quality_of(settings)
+    baked = baked_objects(bake_scene)
     yield Progress("encode", ENCODE)
     with timed(seconds, "encode"):
-        seams = _seams(bake_scene, solution, geometry, settings)
+        seams = _seams(bake_scene, lit.caster, geometry, settings)
         rings = max(DILATED, _padding(settings))
         pages = texel_pages(geometry, lit.values, seams, rings)
-        _check(solution, pages)
+        _check(solved.report, pages)
     kept = None
     if lit.relightable is not None and lit.light is not None and lit.light.kept is not None:
         laid = geometry, seams, rings
-        of_texels = lit.relightable, lit.light.kept
-        kept = KeptBake(
-            bake_scene, settings, *of_texels, *laid, *lit.materials, atlas=atlas, traced=lit.light.traced
-        )
+        lighting = lit.relightable, lit.light.kept
+        moves = None if lit.light.traced is None else Moves(atlas, lit.light.traced, solved)
+        kept = KeptBake(bake_scene, settings, *lighting, *laid, *lit.materials, moves)
     groups: tuple[LightGroup, ...] = ()
     if kept is not None and settings.groups:
         with timed(seconds, "groups"):
             groups = yield from staged(group_pages(kept, pages), "groups", ENCODE, 1.0)
 
-    report = solver_part(solution.final_report(), used_settings(quality.solver), bake_scene.objects)
+    report = dict(solved.report)
     if lit.light is not None:
         report["estimated_error"] = lit.light.error
     if settings.quantity == "residual":
         report["error_picture"] = summary(lit.values)
     of_texels = small_objects(bake_scene, baked, geometry)
-    sides = solution.triangle_irradiance, solution.back_irradiance
-    of_light = (*turned_away(baked, bake_scene.scene.areas, *sides), *of_solution(solution, quality.solver))
-    warnings = (*bake_scene.warnings, *atlas.warnings, *of_texels, *of_light)
+    warnings = (*bake_scene.warnings, *of_texels, *solved.warnings)
     objects = tuple(
         BakedObject(item, placed.uv, placed.page) for item, placed in zip(baked, atlas.objects, strict=True)
     )
@@ -295,7 +298,7 @@ def _texel_values(
     """Compute the quantity asked for at all texels, and estimate the light's relative error."""
     if settings.quantity == "residual":
         residual = yield from texel_residual(solution, geometry, gather)
-        return Lit(residual)
+        return Lit(residual, solution.local_pass.caster)
     relightable = solution.relightable(bake_scene.emitter) if keep else None
     local = solution.local_pass if relightable is None else relightable.local
     where = bake_scene.scene, local, geometry
@@ -304,22 +307,22 @@ def _texel_values(
     else:
         light = yield from light_within(*where, lambda e: for_error(e).gather, settings.relative_error)
     materials = texel_materials(bake_scene.scene, geometry, FOOTPRINT)
-    return Lit(shown(light, *materials, settings), light, relightable, materials)
+    return Lit(shown(light, *materials, settings), local.caster, light, relightable, materials)
 
 
 def _seams(
-    bake_scene: BakeScene, solution: Solution, geometry: TexelGeometry, settings: BakeSettings
+    bake_scene: BakeScene, caster: RayCaster, geometry: TexelGeometry, settings: BakeSettings
 ) -> Seams | None:
     """Find the seams to stitch; None for an error picture, which is to show what is there."""
     if settings.quantity == "residual":
         return None
-    seams = find_seams(bake_scene.scene, geometry, solution.local_pass.caster)
+    seams = find_seams(bake_scene.scene, geometry, caster)
     return seams if settings.quantity != "radiosity" else seams.of_one_material(bake_scene.scene)
 
 
-def _check(solution: Solution, pages: tuple[LightmapPage, ...]) -> None:
+def _check(report: dict[str, Any], pages: tuple[LightmapPage, ...]) -> None:
     """Refuse to hand out a result that is not finite: a defect must not look like a dark room."""
-    if not np.isfinite(solution.report["residual"]) or not all(np.isfinite(p.pixels).all() for p in pages):
+    if not np.isfinite(report["residual"]) or not all(np.isfinite(p.pixels).all() for p in pages):
         raise BakeError(
             "the solution is not finite: this is a defect of the solver; please report the scene, "
             "and try another quality meanwhile"

@@ -15,11 +15,10 @@ from .bake_scene import BakeObject, BakeResult, BakeScene, BakeWarning, Progress
 from .errors import SceneError
 from .lightmap.disturbance import Disturbance
 from .lightmap.moved import LitBefore, moved_steps
-from .pipeline import LIGHT, Lit, finish, solve, staged, timed
-from .quality import quality_of
-from .relighting import KeptBake, same_light, shown
+from .pipeline import Lit, finish, staged, timed
+from .relighting import KeptBake, Solved, same_light, shown
 from .solver.arrays import Array
-from .solver.carried import on_scene
+from .solver.carried import carried
 from .solver.light_sources import NO_SOURCE
 from .solver.scene import Scene
 from .solver.surface_images import SurfaceImages
@@ -32,7 +31,7 @@ LIT = 0.97
 
 
 def moved_objects(kept: KeptBake, bake_scene: BakeScene) -> tuple[str, ...]:
-    """Return the names of the objects that are elsewhere than when the bake was kept; none if all is as it was.
+    """Return the names of the objects that are elsewhere than when the bake was kept.
 
     Raises
     ------
@@ -69,24 +68,25 @@ def bake_moved(
     moved = _moved(kept, bake_scene)
     if not moved:
         raise SceneError("nothing has moved since the last bake; there is nothing to bake anew")
-    assert kept.traced is not None and kept.atlas is not None  # or `_moved` refuses
-    settings, quality = kept.settings, quality_of(kept.settings)
-    with timed(seconds, "solve"):
-        solution = yield from solve(bake_scene, quality.solver)
-        elements = on_scene(kept.solved.local.hierarchy, bake_scene.scene)
-        solved = solution.carried(elements, bake_scene.emitter)
-    yield Progress("light", LIGHT)
+    moves, settings = kept.moves, kept.settings
+    assert moves is not None  # or `_moved` refuses
+    yield Progress("light", 0.0)
     with timed(seconds, "light"):
+        solved = carried(kept.solved, bake_scene.scene, bake_scene.emitter)
         geometry = kept.geometry.on(bake_scene.scene)
         rows = [np.arange(item.first, item.first + item.count) for item in moved]
         offset = solved.local.caster.surface_offset
         disturbance = Disturbance.of(kept.geometry, geometry, rows, offset)
-        before = LitBefore(kept.lit, kept.traced, kept.solved.local)
+        before = LitBefore(kept.lit, moves.traced, kept.solved.local)
         steps = moved_steps(before, solved.local, disturbance)
-        light = yield from staged(steps, "light", LIGHT, LIT)
+        light, local = yield from staged(steps, "light", 0.0, LIT)
     materials = kept.reflectance, kept.emission
-    lit = Lit(shown(light, *materials, settings), light, solved, materials)
-    result, after = yield from finish(bake_scene, settings, kept.atlas, geometry, solution, lit, seconds)
+    values = shown(light, *materials, settings)
+    lit = Lit(values, local.caster, light, replace(solved, local=local), materials)
+    rays, names = local.caster.rays, [item.name for item in moved]
+    told = Solved({**moves.solved.report, "rays": rays, "moved": names}, moves.solved.warnings)
+    finished = finish(bake_scene, settings, moves.atlas, geometry, told, lit, seconds)
+    result, after = yield from finished
     assert after is not None  # it keeps what it was given
     warnings = (*result.warnings, *_resized(moved, kept.bake_scene.scene, bake_scene.scene))
     return replace(result, warnings=warnings), after
@@ -94,7 +94,7 @@ def bake_moved(
 
 def _moved(kept: KeptBake, bake_scene: BakeScene) -> list[BakeObject]:
     """Return the objects that are elsewhere; see `moved_objects`."""
-    if kept.traced is None or kept.atlas is None:
+    if kept.moves is None:
         raise SceneError("the kept bake can be lit anew, but nothing in it moved; bake again")
     _check_objects(kept.bake_scene, bake_scene)
     _check_surfaces(kept.bake_scene, bake_scene)

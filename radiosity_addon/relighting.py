@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from .bake_scene import BakeScene, LightmapPage, Progress
+from .bake_scene import BakeScene, BakeWarning, LightmapPage, Progress
 from .errors import SceneError
 from .lightmap.atlas import Atlas
 from .lightmap.encode import to_quantity
@@ -38,6 +38,33 @@ SAME = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
+class Solved:
+    """What a bake tells of its hierarchy: the solver's part of the report, and warnings."""
+
+    report: dict[str, Any]
+    warnings: tuple[BakeWarning, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Moves:
+    """What baking anew needs of a kept bake after some objects moved (`rebaking.py`).
+
+    Attributes
+    ----------
+    atlas : Atlas
+        Where charts lie.
+    traced : TracedTexels
+        How texels were lit.
+    solved : Solved
+        Of the bake that the hierarchy was solved for.
+    """
+
+    atlas: Atlas
+    traced: TracedTexels
+    solved: Solved
+
+
+@dataclass(frozen=True, eq=False)
 class KeptBake:
     """All that relighting needs of a bake.
 
@@ -51,10 +78,8 @@ class KeptBake:
         The texels, what is stitched, and how far pages are dilated [texels].
     reflectance, emission : (n, 3) float64
         Of the texels as they show; emission [W/m²] as it was baked.
-    atlas : Atlas or None
-        Where charts lie, …
-    traced : TracedTexels or None
-        … and how texels were lit: without these nothing can be moved (`rebaking.py`).
+    moves : Moves or None
+        Without it nothing can be moved.
     """
 
     bake_scene: BakeScene
@@ -66,8 +91,7 @@ class KeptBake:
     rings: int
     reflectance: Array
     emission: Array
-    atlas: Atlas | None = None
-    traced: TracedTexels | None = None
+    moves: Moves | None = None
 
     @property
     def sources(self) -> LightSources:

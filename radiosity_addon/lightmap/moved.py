@@ -51,19 +51,28 @@ class LitBefore:
 
 def moved_steps(
     before: LitBefore, local: LocalPass, disturbance: Disturbance
-) -> Generator[float, None, TexelLight]:
+) -> Generator[float, None, tuple[TexelLight, LocalPass]]:
     """Light the texels of a scene in which something moved; yields the fraction done.
 
     Parameters
     ----------
     before : LitBefore
     local : LocalPass
-        Of the scene as it is, by the same elements, able to ask for every light apart.
+        Of the scene as it is, by the same elements with the light they had, able to ask for every light
+        apart.
     disturbance : Disturbance
+
+    Returns
+    -------
+    light : TexelLight
+    local : LocalPass
+        With elements that are lit as their texels are.
     """
     lit, traced, geometry = before.lit, before.traced, disturbance.geometry
     asked = texel_gains(lit.gains, local, before.local, disturbance)
     gains = yield from scaled(asked, 0.0, DIRECT)
+    direct = local.lit_by(gains)
+    local = _brightened(local, lit.element, direct - local.lit_by(lit.gains))
     near = np.flatnonzero(disturbance.near)
     found = crossing_steps(geometry, local.caster, local.threads, traced.crossings, near)
     crossings = yield from scaled(found, DIRECT, CROSSED)
@@ -73,7 +82,8 @@ def moved_steps(
     now = disturbance.renumbered(traced, numbers, divided)
 
     where = local, before.local, disturbance, traced.settings, crossings, divided, resolve
-    stored = MovedPoints(*where).steps(_renumbered(lit.transport.links, traced, now), traced.points)
+    bright = traced.bright | local.bright
+    stored = MovedPoints(*where, bright).steps(_renumbered(lit.transport.links, traced, now), traced.points)
     links, points = yield from scaled(stored, CROSSED, GATHERED)
 
     known: list[KnownParts] = []
@@ -88,24 +98,43 @@ def moved_steps(
     links, parts = yield from scaled(further, at, PARTS)
 
     transport = TexelTransport(links, parts, reflectance)
-    traced = TracedTexels(traced.settings, crossings, numbers, KeptPoints.of(points), parts.small)
+    traced = TracedTexels(traced.settings, crossings, numbers, KeptPoints.of(points), parts.small, bright)
     start = _start(before, traced, local, parts, now)
     transport = replace(transport, parts=replace(parts, start=start[len(geometry) :]))
     limits = lit.sweeps, lit.tolerance
-    swept = sweep_steps(
-        transport, start[: len(geometry)], local.lit_by(gains), local.beyond(), *limits, local.threads
-    )
+    swept = sweep_steps(transport, start[: len(geometry)], direct, local.beyond(), *limits, local.threads)
     light = yield from scaled(swept, PARTS, 1.0)
-    assert local.sources is not None and light.table is not None  # it asks for lights apart
+    assert local.sources is not None  # it asks for lights apart
+    assert light.table is not None
     earlier = EarlierLight(local.sources.strengths, light.table)
     lit = LitTexels(transport, gains, lit.element, *limits, earlier)
-    return replace(light, kept=lit, traced=traced)
+    return replace(light, kept=lit, traced=traced), _lit_as(local, lit.element, light)
 
 
 def _renumbered(links: StoredLinks, traced: TracedTexels, now: Array) -> StoredLinks:
     """Return stored links with sources as hits are numbered now."""
     aimed = replace(links.aimed, sources=renumbered(traced.numbered(links.aimed.sources), now))
     return replace(links, sources=renumbered(traced.numbered(links.sources), now), aimed=aimed)
+
+
+def _brightened(local: LocalPass, element: Array, more: Array) -> LocalPass:
+    """Add what texels get more of lamps, (n, 3) [W/m²], to their elements' light, in the mean."""
+    change, _ = _means(local, element, more)
+    return local.with_irradiance(np.maximum(local.state.irradiance + change, 0.0))
+
+
+def _lit_as(local: LocalPass, element: Array, light: TexelLight) -> LocalPass:
+    """Give elements the mean light of their texels, where they have any."""
+    mean, count = _means(local, element, light.direct + light.indirect)
+    return local.with_irradiance(np.where(count[:, None] > 0, mean, local.state.irradiance))
+
+
+def _means(local: LocalPass, element: Array, values: Array) -> tuple[Array, Array]:
+    """Return (e, 3) texels' mean values over elements, and (e,) how many texels there are."""
+    rows, total = element >= 0, local.hierarchy.n_elements
+    count = np.bincount(element[rows], minlength=total)
+    sums = [np.bincount(element[rows], values[rows, channel], minlength=total) for channel in range(3)]
+    return np.stack(sums, axis=1) / np.maximum(count, 1)[:, None], count
 
 
 def _start(before: LitBefore, traced: TracedTexels, local: LocalPass, parts: Parts, now: Array) -> Array:

@@ -45,6 +45,8 @@ class MovedPoints:
     divided : (n,) bool
         See `Disturbance.divided`.
     resolve : callable
+    bright : (e,) bool
+        Elements that rays are or were aimed at.
     """
 
     def __init__(
@@ -56,10 +58,11 @@ class MovedPoints:
         crossings: Crossings,
         divided: Array,
         resolve: Resolver,
+        bright: Array,
     ) -> None:
         self._local, self._before, self._disturbance = local, before, disturbance
         self._settings, self._crossings, self._resolve = settings, crossings, resolve
-        self._divided = divided
+        self._divided, self._bright = divided, bright
         self._geometry = disturbance.geometry
 
     def steps(
@@ -113,7 +116,7 @@ class MovedPoints:
         low, high = corners.min(axis=2), corners.max(axis=2)
         aimed_at = 0.5 * (low + high), 0.5 * (high - low)
         boxes, widen = self._disturbance.boxes, self._disturbance.widen[texel]
-        earlier = Before(before, aimed_at, self._before.caster, boxes, widen)
+        earlier = Before(before, aimed_at, self._before.caster, boxes, widen, self._bright)
         expected = local.irradiance_at(geometry.triangle[texel], geometry.barycentric[texel])
         at = gather_footprints(geometry, texel, starts)
         upright = geometry.surface_normal[texel]

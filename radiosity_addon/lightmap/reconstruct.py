@@ -103,7 +103,7 @@ def reconstruct(
         return light
     earlier = EarlierLight(local.sources.strengths, light.table)
     lit = LitTexels(transport, gains, element, *limits, earlier)
-    traced = TracedTexels(settings, crossings, numbers, KeptPoints.of(points), parts.small)
+    traced = TracedTexels(settings, crossings, numbers, KeptPoints.of(points), parts.small, local.bright)
     return replace(light, kept=lit, traced=traced)
 
 

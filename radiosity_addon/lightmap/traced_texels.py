@@ -52,6 +52,8 @@ class TracedTexels:
         Parallel to the stored links' rows.
     small : (s,) int64
         The parts that the table's last rows are, see `Parts`.
+    bright : (e,) bool
+        The elements that rays were aimed at.
     """
 
     settings: GatherSettings
@@ -59,6 +61,7 @@ class TracedTexels:
     numbers: HitNumbers
     points: KeptPoints
     small: Array
+    bright: Array
 
     def numbered(self, rows: Array) -> Array:
         """Return the numbers that rows of the table had as hits; negative ones stay."""

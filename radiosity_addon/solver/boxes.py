@@ -115,7 +115,7 @@ class Boxes:
                 for axis in range(3):
                     below = (start[:, axis] - lower[axis] + widen)[:, None]
                     over = (upper[axis] + widen - start[:, axis])[:, None]
-                    # So far along, the fan's lower side must be below the top, its upper side over the bottom.
+                    # There the fan's lower side must be below the top, and its upper side over the bottom.
                     for slope, room in (
                         (along[..., axis] - grow[..., axis], over),
                         (-along[..., axis] - grow[..., axis], below),

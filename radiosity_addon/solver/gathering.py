@@ -137,6 +137,11 @@ class Gathering:
         self._cosine(rows, bright, shares)
         return self._aim(rows, bright, shares)
 
+    def on_any(self, elements: Array, hits: Hits) -> Array:
+        """Return (h,) whether hits are on some elements, (e,) bool."""
+        leaf = self._leaves_of(hits)
+        return np.asarray((leaf >= 0) & elements[np.maximum(leaf, 0)])
+
     def planes(self, rows: Array) -> tuple[Array, Array]:
         """Return (r, 3) twice: the points, and the normals of the hemispheres that rays leave by."""
         return self._at.points[rows], self._at.normals[rows]
@@ -156,27 +161,37 @@ class Gathering:
 
     def trace_again(
         self, rows: Array, ray: Array, directions: Array, stale: Array, before: RayCaster
-    ) -> None:
-        """Trace some cosine-distributed rays of rows that aim at nothing.
+    ) -> tuple[Array, Hits]:
+        """Trace some cosine-distributed rays, as if their points aimed at nothing.
 
         Parameters
         ----------
         rows, ray : (p,) int
+            In order of the rows.
         directions : (p, 3) float32
         stale : (p,) bool
             Whether what was hit must be numbered anew even if it is hit again.
         before : RayCaster
             Of the scene as it was: its hits tell what changed.
+
+        Returns
+        -------
+        changed : (c,) int
+            Which of the rays have another source now.
+        hits : Hits
+            What these met.
         """
         start = self._starts_of(rows, ray)
         hits, old = self._caster.first_hits(start, directions), before.first_hits(start, directions)
         same = (hits.triangle == old.triangle) & (hits.front == old.front) & ~stale
         same &= (np.abs(hits.barycentric - old.barycentric) < SAME_PLACE).all(axis=1)
         changed = np.flatnonzero(~same)
-        self._sources[rows[changed], ray[changed]] = self._found(hits.take(changed), directions[changed])
+        others = hits.take(changed)
+        self._sources[rows[changed], ray[changed]] = self._found(others, directions[changed])
         least = self._caster.surface_offset
         nearer = 1.0 / np.maximum(hits.distance, least) - 1.0 / np.maximum(old.distance, least)
         np.add.at(self._closeness, rows, nearer.astype(np.float64) / self._rays)
+        return changed, others
 
     def _cosine(self, rows: Array, bright: BrightElements | None, shares: Array | None) -> None:
         """Trace the cosine-distributed rays of some rows, and keep what they hit."""
@@ -238,6 +253,8 @@ class Gathering:
             return np.asarray(at.points[rows] + lift)
         some = min(at.starts or self._rays, self._rays)
         distinct, of = np.unique(rows, return_inverse=True)
+        of, place = of.reshape(-1), ray * some // self._rays
         unit = stratified_square(at.keys[distinct], some, self._seed + 4)
-        unit = unit[of.reshape(-1), ray * some // self._rays]
-        return np.asarray(at.sampler(rows, unit[:, None])[:, 0] + lift)
+        if len(rows) < some * len(distinct):
+            return np.asarray(at.sampler(rows, unit[of, place][:, None])[:, 0] + lift)
+        return np.asarray(at.sampler(distinct, unit)[of, place] + lift)

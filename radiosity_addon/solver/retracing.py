@@ -37,6 +37,8 @@ class Before:
         Around what moved, where it was and where it is.
     widen : (g,) float64 [m]
         How far from a point its rays start.
+    bright : (e,) bool
+        Elements that are or were bright enough to aim at.
     """
 
     gathered: Gathered
@@ -44,13 +46,14 @@ class Before:
     caster: RayCaster
     boxes: Boxes
     widen: Array
+    bright: Array
 
 
 class Retracing:
     """Traces again what the boxes touch.
 
-    Points that aim at bright elements, or would now, are gathered from anew as a whole if any of
-    their rays is touched: which elements they aim at decides what their other rays leave out.
+    Which bright elements a point aims at decides what its other rays leave out. So where an aimed ray is
+    touched, or another one meets a bright element now, the point is gathered from anew as a whole.
 
     Parameters
     ----------
@@ -85,18 +88,20 @@ class Retracing:
             points, _ = gathering.planes(rows)
             touched = before.boxes.met_by(points, directions, before.widen[rows])
             touched = (touched | stale) & upward
-            disturbed = touched.any(axis=1) | aims_past[rows]
-            afresh = disturbed & aims[rows]
-            shares = None
-            if bright is not None and len(bright) and disturbed.any():
-                some = np.flatnonzero(disturbed)
-                shares = gathering.shares(rows[some], bright, irradiance)
-                afresh[some] |= shares.any(axis=1)
-                shares = shares[afresh[some]]
-            touched[afresh] = False
+            past = aims_past[rows]
+            touched[past] = False
             row, ray = np.nonzero(touched)
-            gathering.trace_again(rows[row], ray, directions[row, ray], stale[row, ray], before.caster)
-            again = rows[afresh]
+            asked = rows[row], ray, directions[row, ray], stale[row, ray]
+            changed, hits = gathering.trace_again(*asked, before.caster)
+            past[row[changed[gathering.on_any(before.bright, hits)]]] = True
+            again = rows[past]
+            shares = None
+            if bright is not None and len(bright) and len(again):
+                shares = gathering.shares(again, bright, irradiance)
+                wanted = aims[again] | shares.any(axis=1)
+                again, shares = again[wanted], shares[wanted]
+            else:
+                again = again[aims[again]]
             if len(again):
                 whole[again] = True
                 found = gathering.trace_rows(again, bright, shares)

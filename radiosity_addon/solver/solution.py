@@ -9,9 +9,7 @@ from typing import Any
 import numpy as np
 
 from .arrays import Array
-from .carried import carried
 from .element_transport import Relightable
-from .hierarchy import Hierarchy
 from .local_pass import LocalPass
 from .power import power_balance
 from .residual import Residual
@@ -96,16 +94,6 @@ class Solution:
             If the method keeps no links.
         """
         return Relightable.of(self._state, emitter)
-
-    def carried(self, elements: Hierarchy, emitter: Array | None = None) -> Relightable:
-        """Return the same by other elements over its faces, which hits are numbered by (`carried.py`).
-
-        Raises
-        ------
-        UsageError
-            If the method keeps no links.
-        """
-        return carried(self._state, elements, emitter)
 
     @property
     def element_residual(self) -> Residual:
