@@ -12,7 +12,9 @@ import numpy as np
 
 from ..solver.arrays import Array
 from ..solver.boxes import Boxes
-from ..solver.retracing import STALE
+from ..solver.embree import EmbreeCaster
+from ..solver.retracing import STALE, Moved
+from ..solver.visibility import RayCaster
 from .crossings import LIFT, Crossings
 from .part_links import HitNumbers
 from .terminator import SmoothLift
@@ -58,6 +60,15 @@ class Disturbance:
     def texels(self) -> Array:
         """(n,) bool: those that moved."""
         return np.asarray(self.moved[self.geometry.triangle])
+
+    def traced(self, before: RayCaster) -> Moved:
+        """Return what tells the rays that what moved is in the way of; `before` casts those of before."""
+        return Moved(self.boxes, self._alone, before)
+
+    @cached_property
+    def _alone(self) -> RayCaster:
+        both = [some.triangles[self.moved] for some in (self.before, self.geometry)]
+        return EmbreeCaster(np.concatenate(both), threads=1)
 
     @cached_property
     def near(self) -> Array:

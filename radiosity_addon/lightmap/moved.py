@@ -72,7 +72,8 @@ def moved_steps(
     asked = texel_gains(lit.gains, local, before.local, disturbance)
     gains = yield from scaled(asked, 0.0, DIRECT)
     direct = local.lit_by(gains)
-    local = _brightened(local, lit.element, direct - local.lit_by(lit.gains))
+    more = direct - local.lit_by(lit.gains)
+    local = _brightened(local, lit.element, more)
     near = np.flatnonzero(disturbance.near)
     found = crossing_steps(geometry, local.caster, local.threads, traced.crossings, near)
     crossings = yield from scaled(found, DIRECT, CROSSED)
@@ -100,9 +101,10 @@ def moved_steps(
     transport = TexelTransport(links, parts, reflectance)
     traced = TracedTexels(traced.settings, crossings, numbers, KeptPoints.of(points), parts.small, bright)
     start = _start(before, traced, local, parts, now)
+    of_texels = np.maximum(start[: len(geometry)] + reflectance * more, 0.0)
     transport = replace(transport, parts=replace(parts, start=start[len(geometry) :]))
     limits = lit.sweeps, lit.tolerance
-    swept = sweep_steps(transport, start[: len(geometry)], direct, local.beyond(), *limits, local.threads)
+    swept = sweep_steps(transport, of_texels, direct, local.beyond(), *limits, local.threads)
     light = yield from scaled(swept, PARTS, 1.0)
     assert local.sources is not None  # it asks for lights apart
     assert light.table is not None

@@ -77,8 +77,12 @@ def look_again(
         widen = disturbance.widen[numbers.cells.texel_of(cell)]
     nowhere = np.zeros((0, 1, 3))
     gathered = Gathered(parts.sources, np.zeros(len(parts.part)), AimedRays.none())
-    nothing = np.zeros(local.hierarchy.n_elements, dtype=bool)
-    earlier = Before(gathered, (nowhere, nowhere), before.caster, disturbance.boxes, widen, nothing)
+    aimed = (
+        np.zeros(local.hierarchy.n_elements, dtype=bool),
+        np.zeros(len(disturbance.moved), dtype=bool),
+    )
+    moved = disturbance.traced(before.caster)
+    earlier = Before(gathered, (nowhere, nowhere), moved, widen, *aimed)
     found = yield from scaled(local.regather_steps(at, upright, resolve, earlier), 0.0, 0.6)
     asked = part_gains(parts, numbers, before, disturbance.boxes, at.points, widen)
     gains = yield from scaled(asked, 0.6, 1.0)

@@ -28,6 +28,9 @@ from .traced_texels import KeptPoints
 CLOSER = 1.05
 """Points that see things closer by more than this factor speak for fewer texels than before."""
 
+CELLS_ACROSS = 3.0
+"""A gather point that speaks for a texel is no more of its lattice's cells away."""
+
 Entries = tuple[Array, Array, Array]
 """Of texels one after the other: how many each has, and all their points and weights."""
 
@@ -61,6 +64,7 @@ class MovedPoints:
         bright: Array,
     ) -> None:
         self._local, self._before, self._disturbance = local, before, disturbance
+        self._moved = disturbance.traced(before.caster)
         self._settings, self._crossings, self._resolve = settings, crossings, resolve
         self._divided, self._bright = divided, bright
         self._geometry = disturbance.geometry
@@ -115,8 +119,11 @@ class MovedPoints:
         corners = self._before.hierarchy.corners[before.aimed.element]
         low, high = corners.min(axis=2), corners.max(axis=2)
         aimed_at = 0.5 * (low + high), 0.5 * (high - low)
-        boxes, widen = self._disturbance.boxes, self._disturbance.widen[texel]
-        earlier = Before(before, aimed_at, self._before.caster, boxes, widen, self._bright)
+        hierarchy = local.hierarchy
+        hosts = np.zeros(len(geometry.triangles), dtype=bool)
+        hosts[hierarchy.faces.triangle[hierarchy.face[self._bright]]] = True
+        widen = self._disturbance.widen[texel]
+        earlier = Before(before, aimed_at, self._moved, widen, self._bright, hosts)
         expected = local.irradiance_at(geometry.triangle[texel], geometry.barycentric[texel])
         at = gather_footprints(geometry, texel, starts)
         upright = geometry.surface_normal[texel]
@@ -126,14 +133,22 @@ class MovedPoints:
         """Return (n,) bool: the texels whose points are to be weighed again."""
         geometry, moved = self._geometry, self._disturbance
         doubted = moved.texels | geometry.neighbourhood(self._divided) | spread.any_of(closer)
-        count = np.diff(np.append(spread.first, len(spread.point)))
-        texel, point = np.repeat(np.arange(len(count)), count), points.texel[spread.point]
+        # A texel's points are in cells beside its own, no wider than the coarsest lattice.
+        farthest = CELLS_ACROSS * max(*self._settings.strides, 1.5) * geometry.texel_size
+        some = np.flatnonzero(moved.boxes.near(geometry.position, np.full(len(geometry), farthest)))
+        ends = np.append(spread.first, len(spread.point))
+        count = ends[some + 1] - ends[some]
+        first = np.cumsum(count) - count
+        entry = np.arange(int(count.sum())) + np.repeat(ends[some] - first, count)
+        texel, point = np.repeat(some, count), points.texel[spread.point[entry]]
         start, normal = geometry.position[texel], geometry.normal[texel]
         along = geometry.position[point] - start
         bend = np.sqrt(np.maximum(1.0 - np.einsum("pk,pk->p", normal, geometry.normal[point]), 0.0))
         rise = LIFT * self._local.caster.surface_offset + SAGITTA * np.linalg.norm(along, axis=1) * bend
         crosses = moved.boxes.met_by(start, along[:, None], rise, 1.0)[:, 0]
-        return np.asarray(doubted | np.logical_or.reduceat(crosses, spread.first))
+        if len(some):
+            doubted[some] |= np.logical_or.reduceat(crosses, first)
+        return np.asarray(doubted)
 
     def _choose(
         self, points: KeptPoints, rows: Array, kept: Gathered, doubted: Array

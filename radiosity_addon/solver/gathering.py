@@ -137,10 +137,13 @@ class Gathering:
         self._cosine(rows, bright, shares)
         return self._aim(rows, bright, shares)
 
-    def on_any(self, elements: Array, hits: Hits) -> Array:
-        """Return (h,) whether hits are on some elements, (e,) bool."""
-        leaf = self._leaves_of(hits)
-        return np.asarray((leaf >= 0) & elements[np.maximum(leaf, 0)])
+    def on_any(self, elements: Array, hosts: Array, hits: Hits) -> Array:
+        """Return (h,) whether hits are on some elements, (e,) bool, of some triangles, (t,) bool."""
+        found = (hits.triangle >= 0) & hosts[hits.triangle]
+        rows = np.flatnonzero(found)
+        leaf = self._leaves_of(hits.take(rows))
+        found[rows] = (leaf >= 0) & elements[np.maximum(leaf, 0)]
+        return np.asarray(found)
 
     def planes(self, rows: Array) -> tuple[Array, Array]:
         """Return (r, 3) twice: the points, and the normals of the hemispheres that rays leave by."""
@@ -160,7 +163,7 @@ class Gathering:
         return directions, (directions @ surface[:, :, None])[:, :, 0] > 0
 
     def trace_again(
-        self, rows: Array, ray: Array, directions: Array, stale: Array, before: RayCaster
+        self, rows: Array, ray: Array, directions: Array, stale: Array, casters: tuple[RayCaster, RayCaster]
     ) -> tuple[Array, Hits]:
         """Trace some cosine-distributed rays, as if their points aimed at nothing.
 
@@ -171,27 +174,32 @@ class Gathering:
         directions : (p, 3) float32
         stale : (p,) bool
             Whether what was hit must be numbered anew even if it is hit again.
-        before : RayCaster
-            Of the scene as it was: its hits tell what changed.
+        casters : RayCaster twice
+            Of what moved alone, where it was and where it is: who meets none of it has not changed. And of
+            the scene as it was: it tells how far rays went.
 
         Returns
         -------
         changed : (c,) int
-            Which of the rays have another source now.
+            Which of the rays may have another source now.
         hits : Hits
             What these met.
         """
+        moved, before = casters
         start = self._starts_of(rows, ray)
-        hits, old = self._caster.first_hits(start, directions), before.first_hits(start, directions)
-        same = (hits.triangle == old.triangle) & (hits.front == old.front) & ~stale
+        missed = moved.visible(start, directions, np.full(len(rows), np.inf))
+        asked = np.flatnonzero(~missed | stale)
+        start, along = start[asked], directions[asked]
+        hits, old = self._caster.first_hits(start, along), before.first_hits(start, along)
+        same = (hits.triangle == old.triangle) & (hits.front == old.front) & ~stale[asked]
         same &= (np.abs(hits.barycentric - old.barycentric) < SAME_PLACE).all(axis=1)
-        changed = np.flatnonzero(~same)
-        others = hits.take(changed)
-        self._sources[rows[changed], ray[changed]] = self._found(others, directions[changed])
+        other = np.flatnonzero(~same)
+        changed, hits, old = asked[other], hits.take(other), old.take(other)
+        self._sources[rows[changed], ray[changed]] = self._found(hits, along[other])
         least = self._caster.surface_offset
         nearer = 1.0 / np.maximum(hits.distance, least) - 1.0 / np.maximum(old.distance, least)
-        np.add.at(self._closeness, rows, nearer.astype(np.float64) / self._rays)
-        return changed, others
+        np.add.at(self._closeness, rows[changed], nearer.astype(np.float64) / self._rays)
+        return changed, hits
 
     def _cosine(self, rows: Array, bright: BrightElements | None, shares: Array | None) -> None:
         """Trace the cosine-distributed rays of some rows, and keep what they hit."""

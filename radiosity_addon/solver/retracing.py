@@ -22,6 +22,25 @@ STALE = -1
 
 
 @dataclass(frozen=True)
+class Moved:
+    """What moved, where it was and where it is.
+
+    Attributes
+    ----------
+    boxes : Boxes
+        Around it.
+    alone : RayCaster
+        Of it alone, at both places.
+    before : RayCaster
+        Of the scene as it was.
+    """
+
+    boxes: Boxes
+    alone: RayCaster
+    before: RayCaster
+
+
+@dataclass(frozen=True)
 class Before:
     """What the rays of g points met before something moved.
 
@@ -31,22 +50,19 @@ class Before:
         Sources numbered as they are now, or STALE.
     aimed_at : (a, k, 3) float64 twice
         Of its aimed rays: the middles of the boxes around the elements aimed at, and half their sizes.
-    caster : RayCaster
-        Of the scene as it was.
-    boxes : Boxes
-        Around what moved, where it was and where it is.
+    moved : Moved
     widen : (g,) float64 [m]
         How far from a point its rays start.
-    bright : (e,) bool
-        Elements that are or were bright enough to aim at.
+    bright, hosts : (e,) bool, (t,) bool
+        Elements that are or were bright enough to aim at, and triangles that have some.
     """
 
     gathered: Gathered
     aimed_at: tuple[Array, Array]
-    caster: RayCaster
-    boxes: Boxes
+    moved: Moved
     widen: Array
     bright: Array
+    hosts: Array
 
 
 class Retracing:
@@ -80,20 +96,21 @@ class Retracing:
             rows = np.arange(part.start, part.stop)
             stale = before.gathered.sources[rows] == STALE
             asked = stale.any(axis=1) | aims_past[rows]
-            asked |= before.boxes.above(*gathering.planes(rows), before.widen[rows])
+            asked |= before.moved.boxes.above(*gathering.planes(rows), before.widen[rows])
             rows, stale = rows[asked], stale[asked]
             if len(rows) == 0:
                 return
             directions, upward = gathering.directions(rows)
             points, _ = gathering.planes(rows)
-            touched = before.boxes.met_by(points, directions, before.widen[rows])
+            touched = before.moved.boxes.met_by(points, directions, before.widen[rows])
             touched = (touched | stale) & upward
             past = aims_past[rows]
             touched[past] = False
             row, ray = np.nonzero(touched)
             asked = rows[row], ray, directions[row, ray], stale[row, ray]
-            changed, hits = gathering.trace_again(*asked, before.caster)
-            past[row[changed[gathering.on_any(before.bright, hits)]]] = True
+            moved = before.moved
+            changed, hits = gathering.trace_again(*asked, (moved.alone, moved.before))
+            past[row[changed[gathering.on_any(before.bright, before.hosts, hits)]]] = True
             again = rows[past]
             shares = None
             if bright is not None and len(bright) and len(again):
@@ -124,6 +141,6 @@ class Retracing:
         points, _ = self._gathering.planes(row)
         middle, half = before.aimed_at
         along = middle - points[:, None]
-        found[row] = before.boxes.met_by_fans(points, along, half, before.widen[row]).any(axis=1)
+        found[row] = before.moved.boxes.met_by_fans(points, along, half, before.widen[row]).any(axis=1)
         found[row] |= (before.gathered.aimed.sources == STALE).any(axis=1)
         return found
