@@ -31,7 +31,7 @@ class EarlierLight:
         self._known = [(strengths.copy(), table)]
 
     @property
-    def first(self) -> Array:
+    def baked(self) -> Array:
         """(r, 3) float32: the first solution, of the strengths that were baked [W/m²]."""
         return self._known[0][1]
 

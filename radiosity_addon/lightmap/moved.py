@@ -150,5 +150,5 @@ def _start(before: LitBefore, traced: TracedTexels, local: LocalPass, parts: Par
     place[traced.numbered(np.arange(traced.row_count))] = np.arange(traced.row_count)
     row = place[number[stands]]
     known = row >= 0
-    start[row[known]] = before.lit.earlier.first[stands][known]
+    start[row[known]] = before.lit.earlier.baked[stands][known]
     return start

@@ -7,7 +7,6 @@ again: texels bring what has changed (`lightmap/moved.py`), and the hierarchy is
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import replace
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from .element_transport import Relightable
 from .hierarchy import LEAF, Faces, Hierarchy, split_in_four
 from .light_sources import LightSources
 from .local_pass import LocalPass
+from .methods.hierarchical import HierarchicalState
 from .scene import Scene
 
 
@@ -62,5 +62,15 @@ def carried(solved: Relightable, scene: Scene, emitter: Array | None = None) -> 
     elements = on_scene(local.hierarchy, scene)
     caster = ray_caster(scene, local.threads)
     sources = LightSources(scene, elements.faces, caster, emitter)
-    state = replace(local.state, scene=scene, hierarchy=elements, caster=caster)
+    before = local.state
+    # Without links: those that `elements` solves by are the hierarchy's own.
+    state = HierarchicalState(
+        scene,
+        before.settings,
+        elements,
+        caster,
+        before.power,
+        irradiance=before.irradiance,
+        radiosity=before.radiosity,
+    )
     return Relightable(sources, solved.elements, LocalPass(state, sources))

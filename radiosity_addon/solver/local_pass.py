@@ -61,8 +61,7 @@ class LocalPass:
     """
 
     def __init__(self, state: SolverState, sources: LightSources | None = None) -> None:
-        self.state = state
-        """What was solved."""
+        self._state = state
         self.sources = sources
         self.caster = state.caster
         """Casts this scene's rays."""
@@ -77,7 +76,7 @@ class LocalPass:
 
     def with_irradiance(self, irradiance: Array) -> LocalPass:
         """Return the same with other light at the elements, (e, 3) [W/m²]."""
-        return LocalPass(replace(self.state, irradiance=irradiance), self.sources)
+        return LocalPass(replace(self._state, irradiance=irradiance), self.sources)
 
     def direct(
         self,
@@ -131,10 +130,10 @@ class LocalPass:
         """Return the lamps, if they are `dark` as well, and the emissive groups that shine on points."""
         lamps = [
             (number, lit)
-            for number, lit in enumerate(self.state.scene.lights)
+            for number, lit in enumerate(self._state.scene.lights)
             if isinstance(lit, Lamp) and (dark or lit.strength.any())
         ]
-        first, seed = len(self.state.scene.lights), self._seed
+        first, seed = len(self._state.scene.lights), self._seed
         asked = [AskedLight(lit, row, seed + 31 + 7 * place) for place, (row, lit) in enumerate(lamps)]
         groups = enumerate(self.emitters)
         return asked + [AskedLight(lit, first + place, seed + 17 + 7 * place) for place, lit in groups]
@@ -150,7 +149,7 @@ class LocalPass:
         self, asked: AskedLight, spread: SpreadPoints, rays: int | None
     ) -> Generator[float, None, Array]:
         """Compute (n,) unoccluded irradiance per unit of a light's strength times visibility."""
-        light, shadow_rays = asked.light, rays or self.state.settings.shadow_rays
+        light, shadow_rays = asked.light, rays or self._state.settings.shadow_rays
         glows = isinstance(light, EmitterGroup)
         caster = self.caster if glows else self.caster.for_lamps
         gain = yield from scaled(spread.gain_steps(light, NEAR if glows else 0.0), 0.0, 0.1)
@@ -240,7 +239,7 @@ class LocalPass:
 
     @cached_property
     def _bright(self) -> BrightElements:
-        return BrightElements(self.state.hierarchy, self.reflected(), self._unshadowed)
+        return BrightElements(self._state.hierarchy, self.reflected(), self._unshadowed)
 
     @property
     def bright(self) -> Array:
@@ -252,14 +251,14 @@ class LocalPass:
     def _unshadowed(self, points: Array, normals: Array) -> Array:
         """Return (n,) the irradiance straight from lamps were nothing in the way, a mean of the channels."""
         total = np.zeros(len(points))
-        for light in self.state.scene.lights:
+        for light in self._state.scene.lights:
             if isinstance(light, Lamp):
                 total += light.unit_irradiance(points, normals) * light.strength.mean()
         return total
 
     def leaves_of(self, hits: Hits) -> Array:
         """Return (n,) int32: the leaf element under each hit; NOTHING for none or a black back."""
-        hierarchy = self.state.hierarchy
+        hierarchy = self._state.hierarchy
         face = hierarchy.faces.of_triangle[(~hits.front).astype(np.int8), hits.triangle]
         on_face = (hits.triangle >= 0) & (face >= 0)
         leaf = np.full(len(face), NOTHING, dtype=np.int32)
@@ -269,7 +268,7 @@ class LocalPass:
     def leaf_areas(self, hits: Hits) -> Array:
         """Return (n,) float64 the area of the leaf element under each hit [m²]; endless for none."""
         leaf = self.leaves_of(hits)
-        return np.asarray(np.where(leaf == NOTHING, np.inf, self.state.hierarchy.area[leaf]))
+        return np.asarray(np.where(leaf == NOTHING, np.inf, self._state.hierarchy.area[leaf]))
 
     def reflected(self, irradiance: Array | None = None) -> Array:
         """Return (e, 3): the part of every element's radiosity it does not emit itself [W/m²].
@@ -277,8 +276,8 @@ class LocalPass:
         Where its surface is there, as it is for rays that hit it. Of the solution's irradiance, or
         another (e, 3) one.
         """
-        every = np.arange(self.state.hierarchy.n_elements)
-        arriving = self.state.irradiance if irradiance is None else irradiance
+        every = np.arange(self._state.hierarchy.n_elements)
+        arriving = self._state.irradiance if irradiance is None else irradiance
         return np.asarray(self._reflectance_where_hit(every) * arriving)
 
     def irradiance_at(self, triangle: Array, barycentric: Array) -> Array:
@@ -286,16 +285,21 @@ class LocalPass:
 
         `barycentric` (n, 2) are weights of corners 2 and 3.
         """
-        return values_of(self.state.irradiance.mean(axis=1), self.leaf_at_fronts(triangle, barycentric))
+        return values_of(self._state.irradiance.mean(axis=1), self.leaf_at_fronts(triangle, barycentric))
+
+    @property
+    def state(self) -> SolverState:
+        """What was solved."""
+        return self._state
 
     @property
     def hierarchy(self) -> Hierarchy:
         """The elements that hits are numbered by."""
-        return self.state.hierarchy
+        return self._state.hierarchy
 
     def leaf_at_fronts(self, triangle: Array, barycentric: Array) -> Array:
         """Return (n,) int32 the leaf elements at such points, or NOTHING where there is none."""
-        hierarchy = self.state.hierarchy
+        hierarchy = self._state.hierarchy
         face = hierarchy.faces.of_triangle[0, triangle]
         on_face = face >= 0
         leaf = np.full(len(face), NOTHING, dtype=np.int32)
@@ -305,7 +309,7 @@ class LocalPass:
     @cached_property
     def parts(self) -> LeafParts:
         """The parts of leaf elements that rays may hit."""
-        return LeafParts(self.state.hierarchy, self.caster)
+        return LeafParts(self._state.hierarchy, self.caster)
 
     def parts_of(self, hits: Hits) -> Array:
         """Return (n,) int32: the part of a leaf element under each hit; NOTHING for none or a black back."""
@@ -322,14 +326,14 @@ class LocalPass:
         return self._reflectance_where_hit(self.parts.leaf_of(parts))
 
     def _reflectance_where_hit(self, elements: Array) -> Array:
-        hierarchy = self.state.hierarchy
+        hierarchy = self._state.hierarchy
         return np.asarray(hierarchy.reflectance[elements] / hierarchy.opacity_where_hit[elements, None])
 
     def part_direct(
         self, parts: Array, rays: int, gains: LightGains | None = None
     ) -> Generator[float, None, Array]:
         """Compute (p, 3) the irradiance of parts straight from lamps and emissive faces, by `rays` each."""
-        expected = self.state.irradiance[self.parts.leaf_of(parts)].mean(axis=1)
+        expected = self._state.irradiance[self.parts.leaf_of(parts)].mean(axis=1)
         return self.direct_steps(replace(self.parts.footprints(parts), expected=expected), rays, gains)
 
     def beyond(self, sky: SkyTable | None = None) -> Array:
@@ -343,7 +347,7 @@ class LocalPass:
 
     @cached_property
     def _sky(self) -> SkyTable:
-        return SkyTable(self.state.scene.lights)
+        return SkyTable(self._state.scene.lights)
 
 
 def values_of(values: Array, elements: Array) -> Array:
