@@ -13,7 +13,7 @@ from ..solver.light_gains import LightGains
 from ..solver.local_pass import AskedLight, Footprints, LocalPass
 from ..solver.steps import scaled
 from .disturbance import Disturbance
-from .part_links import HitNumbers, KnownParts, part_direct
+from .part_links import HitNumbers, KnownParts, lit_footprints
 from .reconstruct import sample_of
 from .terminator import SmoothLift
 from .texel_geometry import TexelGeometry
@@ -54,21 +54,17 @@ def texel_gains(
 def part_gains(
     parts: KnownParts, numbers: HitNumbers, before: LocalPass, boxes: Boxes, at: Array, widen: Array
 ) -> Generator[float, None, LightGains]:
-    """Ask for the lights of those parts, at (p, 3) anchors, for which one may have changed."""
+    """Ask for every light at those parts, at (p, 3) anchors, where it may have changed."""
     assert parts.gains is not None  # kept parts keep them
     local = numbers.local
-    touched = np.zeros(len(parts.part), dtype=bool)
     lights = changed_lights(local, before)
-    for asked, moved in lights:
-        touched |= moved | boxes.between(at, asked.light, widen)
-    rows = np.flatnonzero(touched)
-    some = KnownParts(parts.is_leaf, parts.part[rows], parts.sources[rows])
-    new = LightGains(len(rows))
-    yield from part_direct(numbers, some, new)
     gains = LightGains(len(parts.part))
-    for asked, _ in lights:
+    for done, (asked, moved) in enumerate(lights):
         gain = parts.gains.of(asked.number)
-        gain[rows] = new.of(asked.number)
+        rows = np.flatnonzero(moved | boxes.between(at, asked.light, widen))
+        some = KnownParts(parts.is_leaf, parts.part[rows], parts.sources[rows])
+        steps = local.gain_steps(asked, lit_footprints(numbers, some), some.shadow_rays)
+        gain[rows] = yield from scaled(steps, done / len(lights), (done + 1) / len(lights))
         gains.put(asked.number, gain)
     return gains
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..solver.arrays import Array
 from ..solver.light_gains import LightGains
-from ..solver.local_pass import NOTHING, LocalPass, Resolver, values_of
+from ..solver.local_pass import NOTHING, Footprints, LocalPass, Resolver, values_of
 from ..solver.steps import drain, scaled
 from .source_means import Means
 from .stored_links import StoredLinks
@@ -130,6 +130,11 @@ class KnownParts:
         """That each gathers with."""
         return int(self.sources.shape[1])
 
+    @property
+    def shadow_rays(self) -> int:
+        """Of each to every lamp."""
+        return SHADOW_RAYS * self.rays // RAYS
+
 
 def gather_parts(
     numbers: HitNumbers,
@@ -169,17 +174,11 @@ def gather_parts(
     return replace(links, sources=rows(links.sources), aimed=aimed), Parts(start, made, of, gathering.small)
 
 
-def part_direct(
-    numbers: HitNumbers, parts: KnownParts, gains: LightGains | None
-) -> Generator[float, None, Array]:
-    """Compute (p, 3) the irradiance of parts straight from lamps and emissive faces [W/m²].
-
-    `gains` as in `LocalPass.direct_steps`.
-    """
-    rays = SHADOW_RAYS * parts.rays // RAYS
+def lit_footprints(numbers: HitNumbers, parts: KnownParts) -> Footprints:
+    """Return where parts ask for lamps' light."""
     if parts.is_leaf:
-        return numbers.local.part_direct(parts.part, rays, gains)
-    return numbers.cells.direct(numbers.cell(parts.part), rays, gains)
+        return numbers.local.lit_parts(parts.part)
+    return numbers.cells.lit(numbers.cell(parts.part))
 
 
 class _Gathering:
@@ -264,7 +263,8 @@ class _Gathering:
                 share = reflectance[cells.texel_of(self._numbers.cell(part))]
             if found.gains is None:
                 gains = local.new_gains(len(part))
-                direct = part_direct(self._numbers, found, gains)
+                at = lit_footprints(self._numbers, found)
+                direct = local.direct_steps(at, found.shadow_rays, gains)
                 lamps = yield from scaled(direct, done / count, (done + 1) / count)
             else:
                 gains, lamps = found.gains, local.lit_by(found.gains)

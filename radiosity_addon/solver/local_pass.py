@@ -329,12 +329,10 @@ class LocalPass:
         hierarchy = self._state.hierarchy
         return np.asarray(hierarchy.reflectance[elements] / hierarchy.opacity_where_hit[elements, None])
 
-    def part_direct(
-        self, parts: Array, rays: int, gains: LightGains | None = None
-    ) -> Generator[float, None, Array]:
-        """Compute (p, 3) the irradiance of parts straight from lamps and emissive faces, by `rays` each."""
+    def lit_parts(self, parts: Array) -> Footprints:
+        """Return parts as footprints that ask for lamps, and what elements lead them to expect."""
         expected = self._state.irradiance[self.parts.leaf_of(parts)].mean(axis=1)
-        return self.direct_steps(replace(self.parts.footprints(parts), expected=expected), rays, gains)
+        return replace(self.parts.footprints(parts), expected=expected)
 
     def beyond(self, sky: SkyTable | None = None) -> Array:
         """Return (cells + 2, 3) the last rows of a table of radiosity [W/m²]: the sky's cells, and two dark.
