@@ -17,6 +17,7 @@ from .lightmap.disturbance import Disturbance
 from .lightmap.moved import LitBefore, moved_steps
 from .pipeline import Lit, finish, staged, timed
 from .relighting import KeptBake, Solved, same_light, shown
+from .settings import BakeSettings
 from .solver.arrays import Array
 from .solver.carried import carried
 from .solver.light_sources import NO_SOURCE
@@ -39,6 +40,14 @@ def moved_objects(kept: KeptBake, bake_scene: BakeScene) -> tuple[str, ...]:
         If anything else differs, or the kept bake lacks what `bake_moved` needs.
     """
     return tuple(item.name for item in _moved(kept, bake_scene))
+
+
+def can_move(kept: KeptBake, bake_scene: BakeScene, settings: BakeSettings) -> bool:
+    """Tell whether `bake_moved` can give what a bake of a scene by these settings would."""
+    try:
+        return kept.settings == settings and bool(moved_objects(kept, bake_scene))
+    except SceneError:
+        return False
 
 
 def bake_moved(

@@ -10,7 +10,7 @@ import pytest
 from radiosity_addon.bake_scene import BakeResult, BakeScene
 from radiosity_addon.errors import SceneError
 from radiosity_addon.pipeline import bake, bake_and_keep
-from radiosity_addon.rebaking import bake_moved, moved_objects
+from radiosity_addon.rebaking import bake_moved, can_move, moved_objects
 from radiosity_addon.relighting import KeptBake, relight
 from radiosity_addon.settings import BakeSettings
 from radiosity_addon.solver import PointLight, Scene
@@ -151,6 +151,13 @@ def test_what_moved_is_told_by_name(kept: KeptBake) -> None:
     assert moved_objects(kept, room(turn=1.0, panel=0.1)) == ("Box", "Panel")
     with pytest.raises(SceneError, match="nothing has moved"):
         drain(bake_moved(kept, room()))
+
+
+def test_who_bakes_may_ask_whether_it_can_be(kept: KeptBake) -> None:
+    assert can_move(kept, room(ELSEWHERE), SETTINGS)
+    assert not can_move(kept, room(), SETTINGS)
+    assert not can_move(kept, room(ELSEWHERE), replace(SETTINGS, resolution=128))
+    assert not can_move(kept, altered(lights=()), SETTINGS)
 
 
 def altered(**changes: np.ndarray | tuple) -> BakeScene:
