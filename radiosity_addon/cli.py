@@ -62,6 +62,7 @@ def main(
         if settings is not None:
             request.output = bake_output(request, loaded)
             check_plot(request.plot)
+            check_keeping(request, settings)
     except RadiosityError as error:
         return _fail(str(error), error.exit_code)
     except SystemExit as help_was_asked:
@@ -98,6 +99,16 @@ def bake_output(request: argparse.Namespace, loaded: Path | None) -> Path:
     if request.scene is not None or loaded is not None:
         raise UsageError("bake needs --output DIR, the folder everything is written to")
     return BUNDLED_OUTPUT
+
+
+def check_keeping(request: argparse.Namespace, settings: BakeSettings) -> None:
+    """Refuse to keep what cannot be lit anew, and to relight otherwise than it was baked."""
+    if request.keep and settings.method != "hierarchical":
+        raise UsageError(f"--keep needs the hierarchical method; {settings.method} keeps no links")
+    if request.keep and settings.quantity == "residual":
+        raise UsageError("--keep: a residual is of all light together; bake another quantity")
+    if request.relight and request.plot is not None:
+        raise UsageError("--relight solves nothing whose history --plot could draw")
 
 
 def check_plot(plot: Path | None) -> None:
@@ -202,6 +213,15 @@ def _add_bake(parser: argparse.ArgumentParser) -> None:
     add("--keep-uvs", action="store_true", help="use an existing UV layer Lightmap as it is")
     add("--seed", type=int, default=default.seed, metavar="N", help="random seed (default 0)")
     add("--threads", type=int, default=default.threads, metavar="N", help="threads (default: all cores)")
+    keeping = parser.add_mutually_exclusive_group()
+    keeping.add_argument(
+        "--keep", action="store_true", help="also write a sidecar, by which --relight lights the bake anew"
+    )
+    keeping.add_argument(
+        "--relight",
+        action="store_true",
+        help="light the bake in DIR anew, by other strengths of its lights, with the settings that it has",
+    )
     _add_common(parser)
     add("--report", type=Path, metavar="FILE", help="second copy of report.json")
     add("--plot", type=Path, metavar="FILE.png", help="draw the history of residual, elements and links")
@@ -261,9 +281,14 @@ def _run(
         )
     try:
         with Console(quiet=request.quiet) as console:
-            if settings is not None:
-                files = request.output, settings, request.report, request.plot
-                commands.bake(request.scene, loaded, *files, console, interrupts)
+            if settings is not None and request.relight:
+                from .blender.relight_command import relight
+
+                folder = request.output, settings, request.report
+                relight(request.scene, loaded, *folder, console, interrupts)
+            elif settings is not None:
+                given = request.output, settings, request.report, request.plot, request.keep
+                commands.bake(request.scene, loaded, *given, console, interrupts)
             else:
                 commands.restore(request.scene, loaded, request.output, console)
     except KeyboardInterrupt:

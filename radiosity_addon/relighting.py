@@ -141,7 +141,7 @@ class KeptBake:
         if not alike:
             raise SceneError("a surface, a reflectance or the number of lamps has changed; bake again")
         for light, other in zip(before.lights, scene.lights, strict=True):
-            if not _same_but_strength(light, other):
+            if not differs_in_strength_alone(light, other):
                 raise SceneError(f"lamp '{light.name}' has changed in more than its strength; bake again")
         exitance = np.zeros((len(self.sources) - len(scene.lights), 3))
         emits = self.sources.emitter >= 0
@@ -196,8 +196,8 @@ def shown(light: TexelLight, reflectance: Array, emission: Array, settings: Bake
     return to_quantity(irradiance, reflectance, emission, settings.quantity)
 
 
-def _same_but_strength(one: Light, other: Light) -> bool:
-    """Tell whether two lights differ at most in colour and strength."""
+def differs_in_strength_alone(one: Light, other: Light) -> bool:
+    """Tell whether two lights differ at most in colour and strength, but for rounding."""
     if type(one) is not type(other):
         return False
     return all(
@@ -214,4 +214,9 @@ def same_light(one: Light, other: Light) -> bool:
 
 
 def _equal(one: Any, other: Any) -> bool:
-    return bool(np.array_equal(one, other)) if isinstance(one, np.ndarray) else bool(one == other)
+    """Tell whether values are the same: of skies, whose pictures are rendered anew, but for rounding."""
+    if not isinstance(one, np.ndarray) or not isinstance(other, np.ndarray):
+        return bool(one == other)
+    if one.shape != other.shape:
+        return False
+    return bool(np.abs(one - other).max(initial=0.0) <= SAME * np.abs(one).max(initial=0.0))

@@ -103,18 +103,22 @@ class Collected:
 
 
 def collect(
-    depsgraph: bpy.types.Depsgraph, factors: LampFactors, settings: BakeSettings | None = None
+    depsgraph: bpy.types.Depsgraph,
+    factors: LampFactors,
+    settings: BakeSettings | None = None,
+    dark: bool = False,
 ) -> Collected:
     """Read meshes, materials and lamps of an evaluated scene; `factors` are those of `lamp_factors`.
 
-    `settings.ignore` and `settings.light_only` name objects to leave out, or without lightmaps.
+    `settings.ignore` and `settings.light_only` name objects to leave out, or without lightmaps; `dark` takes
+    lamps without power too.
 
     Raises
     ------
     SceneError
         If a coordinate is NaN or infinite.
     """
-    collector = _Collector(depsgraph, factors, settings or BakeSettings())
+    collector = _Collector(depsgraph, factors, settings or BakeSettings(), dark)
     for instance in visible_objects(depsgraph):
         if instance.object.type == "LIGHT":
             collector.lamp(instance)
@@ -127,8 +131,10 @@ def collect(
 
 
 class _Collector:
-    def __init__(self, depsgraph: bpy.types.Depsgraph, factors: LampFactors, settings: BakeSettings) -> None:
-        self._factors = factors
+    def __init__(
+        self, depsgraph: bpy.types.Depsgraph, factors: LampFactors, settings: BakeSettings, dark: bool
+    ) -> None:
+        self._factors, self._dark = factors, dark
         self._settings = settings
         self.collected = Collected([], [], [], [], [])
         self._override = depsgraph.view_layer_eval.material_override
@@ -144,7 +150,7 @@ class _Collector:
         }
 
     def lamp(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
-        light, warnings = read_lamp(instance.object, matrix_of(instance), self._factors)
+        light, warnings = read_lamp(instance.object, matrix_of(instance), self._factors, self._dark)
         self._warn(warnings)
         if light is not None:
             self.collected.lights.append(light)

@@ -13,8 +13,9 @@ from .. import register, unregister
 from ..console import Console, summary
 from ..errors import BakeError, SceneError, UsageError
 from ..interrupts import Interrupts
+from ..keeping import Keeping
 from ..settings import BakeSettings
-from . import runtime
+from . import kept_bakes, runtime
 
 MAX_IMAGES = 8
 """The closing lines name so many lightmaps one by one."""
@@ -27,6 +28,7 @@ def bake(
     settings: BakeSettings,
     report_copy: Path | None,
     plot: Path | None,
+    keep: bool,
     console: Console,
     interrupts: Interrupts,
 ) -> None:
@@ -45,22 +47,25 @@ def bake(
         Second copy of the report.
     plot : Path or None
         Where the history is drawn to.
+    keep : bool
+        Whether a sidecar is written, by which the bake can be lit anew.
     console : Console
     interrupts : Interrupts
     """
-    with _registered():
+    with registered():
         from .job import WRITING_STAGES, run_bake
         from .output import BLEND_NAME, OutputFolder
 
         source = scene or loaded
-        if source is not None and _same_file(source, output / BLEND_NAME):
+        if source is not None and same_file(source, output / BLEND_NAME):
             raise UsageError(f"--output {output} would overwrite the scene '{source}'; choose another folder")
         for path in filter(None, (report_copy, plot)):
             # Now, not after all the work.
-            _check_writable(path)
+            check_writable(path)
         console.progress("open", 0.0)
-        _open(scene, loaded)
-        job = run_bake(bpy.context, settings, OutputFolder(output), with_copy=True)
+        open_or_build(scene, loaded)
+        keeping = Keeping(sidecar=True) if keep else None
+        job = run_bake(bpy.context, settings, OutputFolder(output), with_copy=True, keeping=keeping)
         try:
             while True:
                 try:
@@ -76,7 +81,7 @@ def bake(
             job.close()
         if report_copy is not None:
             report.write(report_copy)
-        files = _files(report.as_dict())
+        files = written_files(report.as_dict())
         if plot is not None:
             from .plot import render_plot
 
@@ -94,7 +99,7 @@ def restore(scene: Path | None, loaded: Path | None, output: Path, console: Cons
     SceneError
         If the file shows no bake.
     """
-    with _registered():
+    with registered():
         from .files import open_scene
         from .output import save_copy
         from .restore import restore as restore_file
@@ -108,12 +113,13 @@ def restore(scene: Path | None, loaded: Path | None, output: Path, console: Cons
             raise SceneError(f"'{scene or loaded}' shows no bake; there is nothing to restore")
         for each in bpy.data.scenes:
             runtime.forget(each)
+            kept_bakes.drop(each)
         _make_folder_of(output)
         save_copy(output)
         console.lines([f"{count} object{'' if count == 1 else 's'} restored, written to {output}"])
 
 
-def _open(scene: Path | None, loaded: Path | None) -> None:
+def open_or_build(scene: Path | None, loaded: Path | None) -> None:
     """Have the scene to bake as the open file's scene."""
     from .cornell import build_cornell_box
     from .files import empty_scene, open_scene
@@ -125,7 +131,7 @@ def _open(scene: Path | None, loaded: Path | None) -> None:
         build_cornell_box()
 
 
-def _files(report: dict) -> list[tuple[str, str]]:
+def written_files(report: dict) -> list[tuple[str, str]]:
     """What a bake has left in its folder, for people to read."""
     from .output import BLEND_NAME, PREVIEW_NAME, REPORT_NAME
 
@@ -150,7 +156,7 @@ def _make_folder_of(path: Path) -> None:
         raise BakeError(f"cannot write '{path}': its folder cannot be made ({error.strerror})") from error
 
 
-def _check_writable(path: Path) -> None:
+def check_writable(path: Path) -> None:
     """Make the folder of a file to be written later, and see that files can be written there.
 
     Raises
@@ -169,13 +175,13 @@ def _check_writable(path: Path) -> None:
         raise BakeError(f"cannot write '{path}': {error.strerror}") from error
 
 
-def _same_file(one: Path, other: Path) -> bool:
+def same_file(one: Path, other: Path) -> bool:
     """Whether both name one existing file."""
     return one.exists() and other.exists() and one.samefile(other)
 
 
 @contextmanager
-def _registered() -> Iterator[None]:
+def registered() -> Iterator[None]:
     """Register the extension for a command, unless the host has done so already."""
     if hasattr(bpy.types.Scene, "radiosity"):
         yield

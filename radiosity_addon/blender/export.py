@@ -25,7 +25,7 @@ from .world import read_world
 MAX_UV_LAYERS = 8
 
 
-def export_scene(context: bpy.types.Context, settings: BakeSettings) -> Export:
+def export_scene(context: bpy.types.Context, settings: BakeSettings, dark: bool = False) -> Export:
     """Read the context's view layer as a render would see it.
 
     Parameters
@@ -34,6 +34,8 @@ def export_scene(context: bpy.types.Context, settings: BakeSettings) -> Export:
         Of a scene without lightmaps: restore an earlier bake first.
     settings : BakeSettings
         `objects`, `light_only`, `ignore`, `sky` and `keep_uvs` matter here.
+    dark : bool
+        Whether lamps without power and a black world are lights too, for a bake that is kept.
 
     Returns
     -------
@@ -50,9 +52,9 @@ def export_scene(context: bpy.types.Context, settings: BakeSettings) -> Export:
     leave_edit_mode(context)
     factors = lamp_factors()
     with render_depsgraph(context) as depsgraph:
-        collected = collect(depsgraph, factors, settings)
+        collected = collect(depsgraph, factors, settings, dark)
     # After that: Cycles may have to render it, which no evaluated object would survive.
-    world, warnings = read_world(context.scene.world)
+    world, warnings = read_world(context.scene.world, dark)
     collected.lights.extend(world)
     collected.warnings.extend(warnings)
     _check_names(context, collected.pieces, settings)
@@ -126,12 +128,13 @@ def _assemble(
     for piece, obj in zip(collected.pieces, objects, strict=True):
         if piece.linking and scene.emission[obj.rows].any():
             warnings += piece.linking
-    if not scene.lights and not scene.emission.any():
+    shining = [light for light in scene.lights if light.strength.any()]
+    if not shining and not scene.emission.any():
         if settings.sky:
-            scene.lights = (EnvironmentLight(1.0),)
+            scene.lights = (*scene.lights, EnvironmentLight(1.0))
         else:
             warnings.append(_no_light(context))
-    if scene.emission.any() or any(isinstance(light, EnvironmentLight) for light in scene.lights):
+    if scene.emission.any() or any(isinstance(light, EnvironmentLight) for light in shining):
         warnings += [
             half_visible(piece.source.object_name)
             for piece in collected.pieces

@@ -9,13 +9,15 @@ from dataclasses import replace
 
 import bpy
 
-from .. import pipeline
 from ..background import in_thread
 from ..bake_scene import BakeResult, Progress
+from ..keeping import Keeping, bake_steps
+from ..relighting import KeptBake
 from ..report import BakeReport
 from ..settings import BakeSettings
+from ..sidecar import SIDECAR_NAME
 from ..solver.arrays import Array
-from . import runtime
+from . import kept_bakes, runtime
 from .apply import apply_lightmaps, check_targets
 from .bake_record import remove_datablocks
 from .export import export_scene
@@ -23,7 +25,7 @@ from .export_sources import Export
 from .images import lightmap_files, set_folder, write_pages
 from .live_picture import seen_triangles
 from .output import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, OutputFolder, save_copy
-from .preview import render_preview
+from .preview import SAMPLES, render_preview
 from .rebake import originals_shown, replacing_earlier, seal
 from .restore import restore
 
@@ -42,6 +44,7 @@ def run_bake(
     output: OutputFolder | None,
     with_copy: bool = False,
     patient: bool = False,
+    keeping: Keeping | None = None,
 ) -> BakeJob:
     """Bake the context's scene and show the lightmaps on its objects.
 
@@ -61,6 +64,8 @@ def run_bake(
     patient : bool
         Return from every `next` within a moment, for a window: the steps between the
         export and the lightmaps, which know nothing of Blender, run in a thread.
+    keeping : Keeping or None
+        If given, the bake is kept for relighting: in memory, and in a sidecar if that is asked for.
 
     Yields
     ------
@@ -82,31 +87,33 @@ def run_bake(
             # Opened first: a folder that cannot be written is no news for after the work.
             stack.enter_context(output)
         yield Progress("export", 0.0)
-        with _timed(seconds, "export"), originals_shown(context) as edited:
-            export = export_scene(context, settings)
+        with timed(seconds, "export"), originals_shown(context) as edited:
+            export = export_scene(context, settings, dark=keeping is not None)
             check_targets(export)
             seen = seen_triangles(context, export)
-        result = yield from _solve(export, settings, seen, patient)
+        sidecar = output.staging / SIDECAR_NAME if output and keeping and keeping.sidecar else None
+        steps = bake_steps(export.bake_scene, settings, keeping, sidecar)
+        result, kept = yield from _solve(steps, seen, patient)
         result = replace(result, warnings=(*edited, *result.warnings))
         seconds.update(result.seconds)
         yield Progress("apply", APPLY)
         if with_copy and output is not None:
-            return (yield from _deliver(context, settings, export, result, output, seconds))
-        with replacing_earlier(context), _timed(seconds, "apply"):
-            images = _show(context, settings, export, result, output)
+            return (yield from deliver(context, settings, export, result, output, seconds, keeping))
+        with replacing_earlier(context), timed(seconds, "apply"):
+            images = _show(context, settings, export, result, output, keeping)
             report = BakeReport.of(result, lightmap_files(images, settings), seconds)
             if output is not None:
                 report.write(output.staging / REPORT_NAME)
                 output.publish()
         runtime.remember(context.scene, report.as_dict(), "" if output is None else str(output.path))
+        _remember_kept(context.scene, keeping, kept)
     return report
 
 
 def _solve(
-    export: Export, settings: BakeSettings, seen: Array, patient: bool
-) -> Generator[Progress, None, BakeResult]:
+    baking: Generator[Progress, None, tuple[BakeResult, KeptBake | None]], seen: Array, patient: bool
+) -> Generator[Progress, None, tuple[BakeResult, KeptBake | None]]:
     """Run the pipeline, its progress scaled to its share of the whole, its pictures to what is `seen`."""
-    baking = pipeline.bake(export.bake_scene, settings)
     steps = in_thread(baking) if patient else baking
     shown = Progress("unwrap", SOLVE)
     try:
@@ -125,27 +132,39 @@ def _solve(
         steps.close()
 
 
-def _deliver(
+def _remember_kept(scene: bpy.types.Scene, keeping: Keeping | None, kept: KeptBake | None) -> None:
+    """Keep the bake with its scene; the one before it is gone whether this one is kept or not."""
+    kept_bakes.drop(scene)
+    if keeping is not None:
+        kept_bakes.set_mark(scene, keeping.mark)
+        if kept is not None:
+            kept_bakes.put(scene, keeping.mark, kept)
+
+
+def deliver(
     context: bpy.types.Context,
     settings: BakeSettings,
     export: Export,
     result: BakeResult,
     output: OutputFolder,
     seconds: dict[str, float],
+    keeping: Keeping | None,
+    samples: int = SAMPLES,
 ) -> BakeJob:
     """Show the lightmaps, save the scene beside them, render it, and publish all at once."""
-    with replacing_earlier(context), _timed(seconds, "apply"):
-        images = _show(context, settings, export, result, output)
+    with replacing_earlier(context), timed(seconds, "apply"):
+        images = _show(context, settings, export, result, output, keeping)
     try:
         # The copy tells of its bake too; what is left to do is not in its times.
         so_far = BakeReport.of(result, lightmap_files(images, settings), seconds)
         runtime.remember(context.scene, so_far.as_dict(), "//")
+        _remember_kept(context.scene, keeping, None)
         yield Progress("save", SAVE)
-        with _timed(seconds, "save"):
+        with timed(seconds, "save"):
             save_copy(output.staging / BLEND_NAME, output.path)
         yield Progress("preview", PREVIEW)
-        with _timed(seconds, "preview"):
-            render_preview(context, output.staging / PREVIEW_NAME, settings)
+        with timed(seconds, "preview"):
+            render_preview(context, output.staging / PREVIEW_NAME, settings, samples)
         report = BakeReport.of(result, lightmap_files(images, settings), seconds)
         report.write(output.staging / REPORT_NAME)
         yield Progress("write", 1.0)
@@ -153,6 +172,7 @@ def _deliver(
     except BaseException:
         restore(context)
         runtime.forget(context.scene)
+        kept_bakes.drop(context.scene)
         raise
     return report
 
@@ -163,12 +183,15 @@ def _show(
     export: Export,
     result: BakeResult,
     output: OutputFolder | None,
+    keeping: Keeping | None,
 ) -> list[bpy.types.Image]:
     """Make the images and put them on the objects."""
     images = write_pages(result, settings, None if output is None else output.staging)
     try:
         if output is not None:
             set_folder(images, output.path)
+        if keeping is not None:
+            kept_bakes.mark_images(images, keeping.mark)
         apply_lightmaps(context, export, result, images, settings)
         seal()
     except BaseException:
@@ -178,7 +201,7 @@ def _show(
 
 
 @contextmanager
-def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
+def timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
     """Add what the block takes to a stage's time."""
     start = time.perf_counter()
     yield

@@ -29,6 +29,10 @@ RADIANCE_PER_TEXEL = {
 residual is shown ten times its size: an error of a tenth looks as bright as the light itself."""
 
 
+ORIGINAL = "radiosity_original"
+"""Custom property of a copy: the material that it is of."""
+
+
 class LightmapMaterials:
     """Makes the lightmap copies of materials for one bake, each once."""
 
@@ -64,6 +68,7 @@ class LightmapMaterials:
         else:
             copy = material.copy()
             copy.name = f"{material.name} (Lightmap)"
+            copy[ORIGINAL] = material
         mark_made(copy)
         constant = read_material(material)
         radiance = radiance_of_radiosity(constant.emission)

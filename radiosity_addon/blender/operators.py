@@ -10,8 +10,9 @@ import bpy
 
 from ..alike import one_of_each
 from ..errors import RadiosityError
-from . import live_view, runtime
+from . import kept_bakes, live_state, live_view, runtime
 from .properties import settings_of
+from .relight_properties import keeps
 
 TICK = 0.03
 """Seconds of baking between two redraws."""
@@ -109,15 +110,21 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
         self._end(context)
 
     def _begin(self, context: bpy.types.Context, in_window: bool) -> None:
+        from ..keeping import Keeping
         from .job import run_bake
         from .output import OutputFolder
 
+        live_state.stop()
         self._was_editing = context.mode == "EDIT_MESH"
         settings = settings_of(context)
         folder = output_folder(context)
         self._report = None
         output = None if folder is None else OutputFolder(folder)
-        self._job = run_bake(context, settings, output, patient=in_window)
+        chosen = context.scene.radiosity_relight
+        held = kept_bakes.find(context.scene) if chosen.only_moved else None
+        earlier = None if held is None else held.bake
+        keeping = Keeping(chosen.sidecar, earlier=earlier) if keeps(context.scene, settings) else None
+        self._job = run_bake(context, settings, output, patient=in_window, keeping=keeping)
         runtime.running.active = True
         runtime.running.stop = lambda: self._end(bpy.context)
         runtime.running.stage, runtime.running.fraction = "Starting", 0.0
@@ -209,9 +216,11 @@ class RADIOSITY_OT_restore(bpy.types.Operator):
         """Bring every baked object of the file back."""
         from .restore import restore
 
+        live_state.stop()
         count = restore(context)
         for scene in bpy.data.scenes:
             runtime.forget(scene)
+            kept_bakes.drop(scene)
         redraw_sidebars(context)
         if not count:
             self.report({"INFO"}, "Nothing to restore: no object shows a lightmap")

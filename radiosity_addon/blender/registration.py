@@ -8,9 +8,26 @@ from functools import partial
 
 import bpy
 
-from . import bake_record, cli_host, object_roles, operators, panels, properties, runtime
+from . import (
+    bake_record,
+    cli_host,
+    kept_bakes,
+    object_roles,
+    operators,
+    panels,
+    properties,
+    relight_operators,
+    relight_panel,
+    relight_properties,
+    runtime,
+)
 
-CLASSES = (*operators.CLASSES, *panels.CLASSES)
+CLASSES = (
+    *operators.CLASSES,
+    *relight_operators.CLASSES,
+    *panels.CLASSES,
+    *relight_panel.CLASSES,
+)
 
 _undo: list[Callable[[], None]] = []
 
@@ -20,7 +37,7 @@ def register() -> None:
     if _undo:
         return
     try:
-        for module in (bake_record, object_roles, properties):
+        for module in (bake_record, object_roles, properties, kept_bakes, relight_properties):
             module.register()
             _undo.append(module.unregister)
         for cls in CLASSES:

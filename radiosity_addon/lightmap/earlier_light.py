@@ -40,6 +40,10 @@ class EarlierLight:
         first, *others = self._known
         self._known = [first, *others[-(MOST - 2) :], (strengths.copy(), table)]
 
+    def first(self) -> EarlierLight:
+        """Return what remembers the first solution alone."""
+        return EarlierLight(*self._known[0])
+
     def mixed(self, strengths: Array) -> Array | None:
         """Return (r, 3) what surfaces reflect at (s, 3) strengths; None if they are no such mixture."""
         result = np.zeros_like(self._known[0][1])

@@ -69,9 +69,9 @@ def test_every_option_arrives(verbs: list[tuple]) -> None:
         "--memory-limit 0.5"
     )
     assert cli.main(line.split()) == 0
-    (_, scene, _, output, settings, report, plot, console, _) = verbs[0]
+    (_, scene, _, output, settings, report, plot, keep, console, _) = verbs[0]
     assert (scene, output, console.quiet) == (Path("s.glb"), Path("o"), True)
-    assert (report, plot) == (Path("r.json"), Path("p.PNG"))
+    assert (report, plot, keep) == (Path("r.json"), Path("p.PNG"), False)
     assert settings == BakeSettings(
         texel_density=12.5,
         atlas="per-object",
@@ -90,6 +90,20 @@ def test_every_option_arrives(verbs: list[tuple]) -> None:
         contrast=0.25,
         memory_limit=0.5,
     )
+
+
+def test_a_bake_is_kept_if_it_can_be(verbs: list[tuple], capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["bake", "--keep"]) == 0
+    assert verbs[0][-3] is True
+    for line, message in (
+        ("--keep --method shooting", "needs the hierarchical method"),
+        ("--keep --quantity residual", "a residual is of all light together"),
+        ("--keep --relight", "not allowed with"),
+        ("--relight --plot p.png", "solves nothing"),
+    ):
+        assert cli.main(["bake", *line.split()]) == 2
+        assert message in capsys.readouterr().err
+    assert len(verbs) == 1
 
 
 @pytest.mark.parametrize(

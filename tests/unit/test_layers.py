@@ -18,6 +18,11 @@ LAYER_OF = {
     "light_groups": "pipeline",
     "rebaking": "pipeline",
     "remarks": "pipeline",
+    "relight_check": "pipeline",
+    "fingerprint": "pipeline",
+    "sidecar": "pipeline",
+    "keeping": "pipeline",
+    "responses": "pipeline",
 }
 FRONT_DOORS = ("", "__main__", "cli", "console", "interrupts")
 
