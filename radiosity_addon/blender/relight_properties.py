@@ -34,8 +34,8 @@ class RelightSettings(bpy.types.PropertyGroup):
     )
     only_moved: bpy.props.BoolProperty(  # type: ignore[valid-type]
         name="Only What Moved",
-        description="When nothing but places of objects has changed since a bake that is still in memory, bake "
-        "anew only what they touch: the same light in a third of the time or less. The layout of the "
+        description="When nothing but places of objects has changed since a bake that is still in memory, "
+        "bake anew only what they touch: the same light in less than half of the time. The layout of the "
         "lightmaps stays",
         default=True,
     )

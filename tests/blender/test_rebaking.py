@@ -15,7 +15,7 @@ from tests.blender.scenes import add_lamp, add_mesh
 
 @pytest.fixture(scope="module")
 def lightmaps() -> Iterator[dict[str, np.ndarray]]:
-    """Of a scene, of the same after its board moved, and of that baked as a whole; and what is told of each."""
+    """Of a scene, of the same after its board moved, and of that baked as a whole."""
     radiosity_addon.register()
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     add_mesh("Floor")
@@ -23,7 +23,7 @@ def lightmaps() -> Iterator[dict[str, np.ndarray]]:
     add_lamp("POINT", "Bulb", {"location": (0.0, 0.0, 1.2)}, energy=40.0, shadow_soft_size=0.1)
     scene = bpy.context.scene
     scene.radiosity.resolution, scene.radiosity.quality = 32, "draft"
-    yield {name: each for name, each in bakes(scene)}
+    yield dict(bakes(scene))
     radiosity_addon.unregister()
 
 
@@ -37,7 +37,7 @@ def bakes(scene: bpy.types.Scene) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def bake(scene: bpy.types.Scene) -> np.ndarray:
-    """Bake, and return the lightmap's (h, w, 3) pixels and, in a last row, whether it tells of objects moved."""
+    """Bake; return the (h, w, 3) pixels, and in a last row whether objects are said to have moved."""
     assert bpy.ops.radiosity.bake("EXEC_DEFAULT") == {"FINISHED"}
     held = kept_bakes.find(scene)
     assert held is not None
