@@ -92,8 +92,10 @@ def bake_moved(
     materials = kept.reflectance, kept.emission
     values = shown(light, *materials, settings)
     lit = Lit(values, local.caster, light, replace(solved, local=local), materials)
-    rays, names = local.caster.rays, [item.name for item in moved]
-    told = Solved({**moves.solved.report, "rays": rays, "moved": names}, moves.solved.warnings)
+    report = moves.solved.report
+    names = dict.fromkeys([*report.get("moved", ()), *(item.name for item in moved)])
+    report = {**report, "rays": local.caster.rays, "moved": list(names)}
+    told = Solved(report, moves.solved.warnings)
     finished = finish(bake_scene, settings, moves.atlas, geometry, told, lit, seconds)
     result, after = yield from finished
     assert after is not None  # it keeps what it was given

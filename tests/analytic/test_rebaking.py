@@ -88,6 +88,7 @@ def test_what_moved_can_move_back(
     """On from what was baked anew: errors do not pile up, nor do points."""
     result, back = drain(bake_moved(moved[1], room()))
     before = full(room(), kept)
+    assert result.solver["moved"] == ["Box"]
     assert relative(pixels(result), before) < 0.01
     again, after = drain(bake_moved(back, room(ELSEWHERE, 30.0)))
     assert relative(pixels(again), expected) < 0.01
