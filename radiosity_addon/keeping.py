@@ -9,6 +9,7 @@ from pathlib import Path
 
 from .bake_scene import BakeResult, BakeScene, Progress
 from .pipeline import bake, bake_and_keep
+from .rebaking import bake_moved, can_move
 from .relighting import KeptBake
 from .settings import BakeSettings
 from .sidecar import write_sidecar
@@ -24,10 +25,14 @@ class Keeping:
         Whether it is written to a file beside its lightmaps.
     mark : str
         The bake's own name, by which its images and its sidecar are known to belong together.
+    earlier : KeptBake or None
+        A kept bake of the same scene: if only places of objects have changed since, just what they touch
+        is baked anew.
     """
 
     sidecar: bool = False
     mark: str = field(default_factory=lambda: uuid.uuid4().hex)
+    earlier: KeptBake | None = field(default=None, repr=False, compare=False)
 
 
 def can_keep(settings: BakeSettings) -> bool:
@@ -53,7 +58,11 @@ def bake_steps(
     """
     if keeping is None:
         return (yield from bake(bake_scene, settings)), None
-    result, kept = yield from bake_and_keep(bake_scene, settings)
+    earlier = keeping.earlier
+    if earlier is not None and can_move(earlier, bake_scene, settings):
+        result, kept = yield from bake_moved(earlier, bake_scene)
+    else:
+        result, kept = yield from bake_and_keep(bake_scene, settings)
     if sidecar is not None:
         yield Progress("sidecar", 1.0)
         write_sidecar(sidecar, kept, result, keeping.mark)

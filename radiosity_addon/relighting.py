@@ -13,14 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from .bake_scene import BakeScene, LightmapPage, Progress
+from .bake_scene import BakeScene, BakeWarning, LightmapPage, Progress
 from .errors import SceneError
+from .lightmap.atlas import Atlas
 from .lightmap.encode import to_quantity
 from .lightmap.relight import kept_bytes, relight_steps
 from .lightmap.seams import Seams
 from .lightmap.sweeps import LitTexels, TexelLight
 from .lightmap.texel_geometry import TexelGeometry
 from .lightmap.texel_pages import texel_pages
+from .lightmap.traced_texels import TracedTexels
 from .settings import BakeSettings
 from .solver.arrays import Array
 from .solver.element_transport import Relightable
@@ -33,6 +35,33 @@ STRENGTHS = ("power", "irradiance", "radiance")
 
 SAME = 1e-5
 """Emission that differs from what its material's strength says by no more than this part is as expected."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """What a bake tells of its hierarchy: the solver's part of the report, and warnings."""
+
+    report: dict[str, Any]
+    warnings: tuple[BakeWarning, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Moves:
+    """What baking anew needs of a kept bake after some objects moved (`rebaking.py`).
+
+    Attributes
+    ----------
+    atlas : Atlas
+        Where charts lie.
+    traced : TracedTexels
+        How texels were lit.
+    solved : Solved
+        Of the bake that the hierarchy was solved for.
+    """
+
+    atlas: Atlas
+    traced: TracedTexels
+    solved: Solved
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +78,8 @@ class KeptBake:
         The texels, what is stitched, and how far pages are dilated [texels].
     reflectance, emission : (n, 3) float64
         Of the texels as they show; emission [W/m²] as it was baked.
+    moves : Moves or None
+        Without it nothing can be moved.
     """
 
     bake_scene: BakeScene
@@ -60,6 +91,7 @@ class KeptBake:
     rings: int
     reflectance: Array
     emission: Array
+    moves: Moves | None = None
 
     @property
     def sources(self) -> LightSources:
@@ -180,6 +212,12 @@ def differs_in_strength_alone(one: Light, other: Light) -> bool:
         for entry in fields(one)
         if entry.name not in STRENGTHS
     )
+
+
+def same_light(one: Light, other: Light) -> bool:
+    """Tell whether two lights are the same."""
+    alike = type(one) is type(other)
+    return alike and all(_equal(getattr(one, e.name), getattr(other, e.name)) for e in fields(one))
 
 
 def _equal(one: Any, other: Any) -> bool:

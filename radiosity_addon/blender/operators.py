@@ -121,7 +121,9 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
         self._report = None
         output = None if folder is None else OutputFolder(folder)
         chosen = context.scene.radiosity_relight
-        keeping = Keeping(chosen.sidecar) if keeps(context.scene, settings) else None
+        held = kept_bakes.find(context.scene) if chosen.only_moved else None
+        earlier = None if held is None else held.bake
+        keeping = Keeping(chosen.sidecar, earlier=earlier) if keeps(context.scene, settings) else None
         self._job = run_bake(context, settings, output, patient=in_window, keeping=keeping)
         runtime.running.active = True
         runtime.running.stop = lambda: self._end(bpy.context)

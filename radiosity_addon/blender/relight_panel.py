@@ -42,6 +42,7 @@ class RADIOSITY_PT_relight(_Panel, bpy.types.Panel):
         column = layout.column(heading="Next Bake")
         column.prop(chosen, "keep")
         column.prop(chosen, "sidecar")
+        column.prop(chosen, "only_moved")
 
 
 class RADIOSITY_PT_relight_lights(_Panel, bpy.types.Panel):

@@ -32,6 +32,13 @@ class RelightSettings(bpy.types.PropertyGroup):
         "the scene was closed. About half as large as in memory",
         default=False,
     )
+    only_moved: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Only What Moved",
+        description="When nothing but places of objects has changed since a bake that is still in memory, "
+        "bake anew only what they touch: the same light in less than half of the time. The layout of the "
+        "lightmaps stays",
+        default=True,
+    )
     mark: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Mark", description="Which bake the scene shows", options={"HIDDEN"}
     )

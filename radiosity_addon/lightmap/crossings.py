@@ -81,12 +81,23 @@ class Crossings:
 
 
 def crossing_steps(
-    geometry: TexelGeometry, caster: RayCaster, threads: int = 0
+    geometry: TexelGeometry,
+    caster: RayCaster,
+    threads: int = 0,
+    before: Crossings | None = None,
+    anew: Array | None = None,
 ) -> Generator[float, None, Crossings]:
-    """Find the texels that geometry cuts, touches or hoods; yields the fraction done."""
-    result = Crossings(geometry, *np.zeros((4, len(geometry)), dtype=bool))
-    clear = clear_texels(geometry, OUTSET, HOOD, LIFT * caster.surface_offset, threads)
-    doubted = np.flatnonzero(~clear)
+    """Find the texels that geometry cuts, touches or hoods; yields the fraction done.
+
+    Given how it was `before`, only some texels, row numbers, are tried `anew`.
+    """
+    if before is None or anew is None:
+        result = Crossings(geometry, *np.zeros((4, len(geometry)), dtype=bool))
+        clear = clear_texels(geometry, OUTSET, HOOD, LIFT * caster.surface_offset, threads)
+        doubted = np.flatnonzero(~clear)
+    else:
+        were = (before.cut, before.touched, before.rim, before.hooded)
+        result, doubted = Crossings(geometry, *(flags.copy() for flags in were)), anew
 
     def find(part: slice) -> None:
         rows = doubted[part]

@@ -30,6 +30,11 @@ class EarlierLight:
     def __init__(self, strengths: Array, table: Array) -> None:
         self._known = [(strengths.copy(), table)]
 
+    @property
+    def baked(self) -> Array:
+        """(r, 3) float32: the first solution, of the strengths that were baked [W/m²]."""
+        return self._known[0][1]
+
     def add(self, strengths: Array, table: Array) -> None:
         """Remember another solution, for the oldest if there are many."""
         first, *others = self._known

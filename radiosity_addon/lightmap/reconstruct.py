@@ -31,6 +31,7 @@ from .terminator import SmoothLift
 from .texel_cells import TexelCells
 from .texel_geometry import NO_TEXEL, TexelGeometry
 from .texel_materials import texel_materials
+from .traced_texels import KeptPoints, TracedTexels
 from .whole_neighbours import whole_neighbour
 
 DIRECT, CROSSED, GATHERED, PARTS = 0.25, 0.3, 0.8, 0.9
@@ -87,9 +88,9 @@ def reconstruct(
     crossings = yield from scaled(found, DIRECT, CROSSED)
     cells = TexelCells(local, geometry, crossings)
     numbers = HitNumbers(local, cells, len(geometry))
-    resolve = _resolver(geometry, crossings, numbers)
+    resolve = resolver(geometry, crossings, numbers)
     stored = gather_texels(local, geometry, settings, crossings, resolve)
-    links = yield from scaled(stored, CROSSED, GATHERED)
+    links, points = yield from scaled(stored, CROSSED, GATHERED)
     reflectance, _ = texel_materials(scene, geometry)
     element = local.leaf_at_fronts(geometry.triangle, geometry.barycentric)
     further = gather_parts(numbers, links, resolve, element, reflectance)
@@ -103,7 +104,9 @@ def reconstruct(
     if gains is None or local.sources is None or light.table is None:
         return light
     earlier = EarlierLight(local.sources.strengths, light.table)
-    return replace(light, kept=LitTexels(transport, gains, element, *limits, earlier))
+    lit = LitTexels(transport, gains, element, *limits, earlier)
+    traced = TracedTexels(settings, crossings, numbers, KeptPoints.of(points), parts.small, local.bright)
+    return replace(light, kept=lit, traced=traced)
 
 
 def footprints(geometry: TexelGeometry, local: LocalPass) -> Footprints:
@@ -125,7 +128,7 @@ def gather_texels(
     settings: GatherSettings,
     crossings: Crossings,
     resolve: Resolver,
-) -> Generator[float, None, StoredLinks]:
+) -> Generator[float, None, tuple[StoredLinks, GatherPoints]]:
     """Gather at few texels, densely where others do not reach; yields the fraction done."""
     points = GatherPoints(geometry, local.caster, crossings.alone, local.threads)
     found: list[Gathered] = []
@@ -140,7 +143,7 @@ def gather_texels(
         at, closeness = begin + 0.2 * width, []
         for some, starts in ((chosen[~edge], STARTS), (chosen[edge], None)):
             end = at + 0.8 * width * len(some) / max(len(chosen), 1)
-            rays = _gather(local, geometry, some, starts, settings.rays, resolve)
+            rays = gather_at(local, geometry, some, starts, settings.rays, resolve)
             gathered = yield from scaled(rays, at, end)
             first.append(sum(len(before.sources) for before in found))
             found.append(gathered)
@@ -149,25 +152,31 @@ def gather_texels(
         points.add(stride, np.concatenate([chosen[~edge], chosen[edge]]), np.concatenate(closeness))
     spread = yield from scaled(fit_steps(points, geometry), 1.0 - FIT, 1.0)
     sources = np.concatenate([gathered.sources for gathered in found])
-    return StoredLinks(sources, spread, AimedRays.joined([gathered.aimed for gathered in found], first))
+    aimed = AimedRays.joined([gathered.aimed for gathered in found], first)
+    return StoredLinks(sources, spread, aimed), points
 
 
-def _gather(
+def gather_at(
     local: LocalPass, geometry: TexelGeometry, chosen: Array, starts: int | None, rays: int, resolve: Resolver
 ) -> Generator[float, None, Gathered]:
     """Gather at some texels; yields the fraction done."""
-    at = Footprints(
-        geometry.position[chosen],
-        geometry.normal[chosen],
-        chosen,
-        partial(_sample_of, geometry, chosen),
-        starts=starts,
-    )
+    at = gather_footprints(geometry, chosen, starts)
     expected = local.irradiance_at(geometry.triangle[chosen], geometry.barycentric[chosen])
     return (yield from local.gather_steps(at, geometry.surface_normal[chosen], rays, resolve, expected))
 
 
-def _sample_of(geometry: TexelGeometry, chosen: Array, rows: Array, u: Array) -> Array:
+def gather_footprints(geometry: TexelGeometry, chosen: Array, starts: int | None) -> Footprints:
+    """Return where some texels gather, each from so many points."""
+    return Footprints(
+        geometry.position[chosen],
+        geometry.normal[chosen],
+        chosen,
+        partial(sample_of, geometry, chosen),
+        starts=starts,
+    )
+
+
+def sample_of(geometry: TexelGeometry, chosen: Array, rows: Array, u: Array) -> Array:
     """Spread points over the footprints of some of the chosen texels."""
     return geometry.sample(chosen[rows], u)
 
@@ -189,7 +198,7 @@ def _choose(
     return candidates.astype(np.int32)
 
 
-def _resolver(geometry: TexelGeometry, crossings: Crossings, numbers: HitNumbers) -> Resolver:
+def resolver(geometry: TexelGeometry, crossings: Crossings, numbers: HitNumbers) -> Resolver:
     """Number hits: texels by their own number, then parts of leaf elements, then cells of divided texels."""
     wide = geometry.texel_area > (WIDE * geometry.texel_size) ** 2
     local, cells = numbers.local, numbers.cells

@@ -17,6 +17,7 @@ from .earlier_light import EarlierLight
 from .part_links import Parts, PartSweeps
 from .source_means import CHUNK_HITS, Means, mean_steps
 from .stored_links import StoredLinks
+from .traced_texels import TracedTexels
 
 TOLERANCE = 2e-4
 """Largest change of any texel, relative to the mean, at which the sweeps end by default. Most texels are
@@ -44,7 +45,9 @@ class TexelLight:
     table : (surfaces, 3) float32 or None [W/m²]
         What texels and parts reflected in the end.
     kept : LitTexels or None
-        What lights them anew, if it is kept.
+        What lights them anew, if it is kept, …
+    traced : TracedTexels or None
+        … and how they were lit.
     """
 
     direct: Array
@@ -52,6 +55,7 @@ class TexelLight:
     error: float = 0.0
     table: Array | None = None
     kept: LitTexels | None = None
+    traced: TracedTexels | None = None
 
 
 @dataclass(frozen=True)

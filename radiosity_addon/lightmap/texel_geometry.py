@@ -121,6 +121,17 @@ class TexelGeometry:
         flat *= np.array([len(numbers) ** 2 for numbers in self.index])[np.maximum(self.page_of_triangle, 0)]
         return np.asarray(self._scene.areas / np.maximum(flat, 1e-300))
 
+    @property
+    def reach(self) -> Array:
+        """(n,) float64: no point of a texel is farther from another one of it [m]."""
+        across, up = self._texel_edges
+        return np.asarray((np.linalg.norm(across, axis=1) + np.linalg.norm(up, axis=1))[self.triangle])
+
+    def on(self, scene: Scene) -> TexelGeometry:
+        """Return the same texels over a scene whose triangles have moved."""
+        rows = [np.flatnonzero(self.page_of_triangle == page) for page in range(len(self.texels))]
+        return TexelGeometry(scene, self.uv, self.page_of_triangle, self.texels, rows)
+
     def first(self, page: int) -> int:
         """Return the number of a page's first texel."""
         return int(self._first[page])

@@ -16,6 +16,8 @@ LAYER_OF = {
     "quality": "pipeline",
     "relighting": "pipeline",
     "light_groups": "pipeline",
+    "rebaking": "pipeline",
+    "remarks": "pipeline",
     "relight_check": "pipeline",
     "fingerprint": "pipeline",
     "sidecar": "pipeline",
