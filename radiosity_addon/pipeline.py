@@ -14,6 +14,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from .bake_details import more_of
 from .bake_scene import (
     BakedObject,
     BakeObject,
@@ -30,6 +31,7 @@ from .light_groups import group_pages
 from .lightmap.accuracy import light_within
 from .lightmap.atlas import Atlas, AtlasInput, AtlasOptions, build_atlas
 from .lightmap.error_picture import summary, texel_residual
+from .lightmap.light_so_far import LightSoFar
 from .lightmap.packing import Limits, padding_for
 from .lightmap.rasterise import rasterise
 from .lightmap.reconstruct import GatherSettings, reconstruct
@@ -47,6 +49,7 @@ from .solver import Solution, SolverSettings, SolverState, solve_progress
 from .solver.arrays import Array
 from .solver.element_transport import Relightable
 from .solver.first_links import COARSEST_FAINT
+from .texel_pictures import TexelPictures
 
 T = TypeVar("T")
 
@@ -142,8 +145,9 @@ def _bake(
         solution = yield from _solve(bake_scene, quality.solver)
     yield Progress("light", LIGHT)
     with _timed(seconds, "light"):
-        steps = _texel_values(bake_scene, solution, geometry, quality.gather, settings, keep)
-        lit = yield from _staged(steps, "light", LIGHT, ENCODE)
+        so_far = LightSoFar()
+        steps = _texel_values(bake_scene, solution, geometry, quality.gather, settings, keep, so_far)
+        lit = yield from _staged(steps, "light", LIGHT, ENCODE, TexelPictures(so_far))
     yield Progress("encode", ENCODE)
     with _timed(seconds, "encode"):
         seams = _seams(bake_scene, solution, geometry, settings)
@@ -172,7 +176,8 @@ def _bake(
         BakedObject(item, placed.uv, placed.page) for item, placed in zip(baked, atlas.objects, strict=True)
     )
     told = _told(atlas, pages)
-    return BakeResult(pages, objects, report, warnings, seconds, told, groups), kept
+    more = more_of(solution, baked, geometry, lit.light, settings.light)
+    return BakeResult(pages, objects, report, warnings, seconds, told, groups, *more), kept
 
 
 def _unwrap(
@@ -254,7 +259,11 @@ def _picture(state: SolverState) -> Picture | None:
 
 
 def _staged(
-    steps: Generator[float, None, T], stage: str, begin: float, end: float
+    steps: Generator[float, None, T],
+    stage: str,
+    begin: float,
+    end: float,
+    pictures: TexelPictures | None = None,
 ) -> Generator[Progress, None, T]:
     """Run steps that yield the fraction they have done as one stage, from `begin` to `end` of the whole."""
     while True:
@@ -263,7 +272,8 @@ def _staged(
         except StopIteration as done:
             result: T = done.value
             return result
-        yield Progress(stage, begin + (end - begin) * fraction)
+        texels = None if pictures is None else pictures.next()
+        yield Progress(stage, begin + (end - begin) * fraction, texels=texels)
 
 
 def _texel_values(
@@ -273,6 +283,7 @@ def _texel_values(
     gather: GatherSettings,
     settings: BakeSettings,
     keep: bool,
+    so_far: LightSoFar,
 ) -> Generator[float, None, _Lit]:
     """Compute the quantity asked for at all texels, and estimate the light's relative error."""
     if settings.quantity == "residual":
@@ -282,9 +293,10 @@ def _texel_values(
     local = solution.local_pass if relightable is None else relightable.local
     where = bake_scene.scene, local, geometry
     if settings.relative_error is None:
-        light = yield from reconstruct(*where, gather)
+        light = yield from reconstruct(*where, gather, so_far)
     else:
-        light = yield from light_within(*where, lambda e: for_error(e).gather, settings.relative_error)
+        within = settings.relative_error, so_far
+        light = yield from light_within(*where, lambda e: for_error(e).gather, *within)
     materials = texel_materials(bake_scene.scene, geometry, FOOTPRINT)
     return _Lit(shown(light, *materials, settings), light, relightable, materials)
 

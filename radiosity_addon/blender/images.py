@@ -24,6 +24,9 @@ from .bake_record import mark_made, remove_datablocks
 SCALE_PROPERTY = "radiosity_lightmap_scale"
 """Custom property of an image: multiply a texel by it to get the quantity."""
 
+QUANTITY_PROPERTY = "radiosity_lightmap_quantity"
+"""Custom property of an image: the quantity that it holds."""
+
 _FILE_FORMATS = {"exr": ("OPEN_EXR", ".exr"), "png16": ("PNG", ".png")}
 _RESERVED_NAMES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 
@@ -82,6 +85,7 @@ def write_pages(result: BakeResult, settings: BakeSettings, folder: Path | None)
     try:
         for page, file_name in zip(result.pages, page_file_names(result, settings), strict=True):
             images.append(_new_image(page, settings.format, file_name, scale))
+            images[-1][QUANTITY_PROPERTY] = settings.quantity
             _store(images[-1], folder, file_name)
     except BaseException:
         remove_datablocks(images)

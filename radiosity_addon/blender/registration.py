@@ -8,9 +8,24 @@ from functools import partial
 
 import bpy
 
-from . import bake_record, cli_host, object_roles, operators, panels, properties, runtime
+from . import (
+    bake_record,
+    cli_host,
+    object_roles,
+    operators,
+    overlay_panel,
+    overlay_properties,
+    overlay_view,
+    panels,
+    properties,
+    runtime,
+)
 
-CLASSES = (*operators.CLASSES, *panels.CLASSES)
+CLASSES = (
+    *operators.CLASSES,
+    *panels.CLASSES,
+    *overlay_panel.CLASSES,
+)
 
 _undo: list[Callable[[], None]] = []
 
@@ -20,7 +35,7 @@ def register() -> None:
     if _undo:
         return
     try:
-        for module in (bake_record, object_roles, properties):
+        for module in (bake_record, object_roles, properties, overlay_properties, overlay_view):
             module.register()
             _undo.append(module.unregister)
         for cls in CLASSES:

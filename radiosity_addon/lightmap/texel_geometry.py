@@ -40,6 +40,8 @@ class TexelGeometry:
     uv, page_of_triangle, triangles, face_normals, normals
         Of every scene triangle, as given.
     page, row, column, triangle : (n,) int32
+    share : (n,) float32
+        What part of the texel its triangle covers.
     centre_inside, whole : (n,) bool
         Whether the texel's centre, and all of the texel, is on its triangle.
     barycentric : (n, 2) float32
@@ -65,7 +67,8 @@ class TexelGeometry:
         self.row = np.concatenate([page.row for page in texels])
         self.column = np.concatenate([page.column for page in texels])
         self.centre_inside = np.concatenate([page.centre_inside for page in texels])
-        self.whole = np.concatenate([page.area for page in texels]) >= 1.0
+        self.share = np.concatenate([page.area for page in texels])
+        self.whole = self.share >= 1.0
         triangles = [of[page.triangle] for of, page in zip(rows, texels, strict=True)]
         self.triangle = np.concatenate(triangles).astype(np.int32)
         self._inset = _edge_inset(scene)

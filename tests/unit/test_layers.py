@@ -16,6 +16,8 @@ LAYER_OF = {
     "quality": "pipeline",
     "relighting": "pipeline",
     "light_groups": "pipeline",
+    "bake_details": "pipeline",
+    "texel_pictures": "pipeline",
 }
 FRONT_DOORS = ("", "__main__", "cli", "console", "interrupts")
 
