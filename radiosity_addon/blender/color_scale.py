@@ -32,7 +32,7 @@ _BLUE_TO_RED = (
 
 _ROUND = (1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12)
 
-NEARLY_ALL = 99.5
+NEARLY_ALL = 98.0
 """Percentile that an automatic scale reaches: a few texels beside a lamp would leave the rest no colours."""
 
 

@@ -24,8 +24,13 @@ void main()
 }
 """
 
-# What is given is display colors; the framebuffer may be one that encodes what it is given.
+# What is given is display colors; what the viewport draws over the scene encodes what it is given.
 _FRAGMENT = """
+vec3 decoded(vec3 srgb)
+{
+  return mix(srgb / 12.92, pow((srgb + 0.055) / 1.055, vec3(2.4)), step(0.04045, srgb));
+}
+
 void main()
 {
   ivec2 size = textureSize(page, 0);
@@ -34,7 +39,7 @@ void main()
   if (shown.a <= 0.0) {
     discard;
   }
-  color = blender_srgb_to_framebuffer_space(shown);
+  color = vec4(decoded(shown.rgb), shown.a);
 }
 """
 

@@ -161,8 +161,8 @@ def _false_colors(context: bpy.types.Context, shown: list[ShownLightmap]) -> Ove
         return None
     measured = {name: page.measured(settings.unit, settings.efficacy) for name, page in pages.items()}
     quantity = next(iter(pages.values())).quantity
-    # Not every pixel shows a surface, but those that do not are filled from those that do.
-    values = np.concatenate([page.ravel() for page in measured.values()])
+    # Pixels that show no surface are filled from those that do, or 0 farther off.
+    values = np.concatenate([page[page != 0.0] for page in measured.values()])
     scale = _scale(context, values, quantity == "residual")
     painted = {name: _opaque(scale(page)) for name, page in measured.items()}
     titles = {"residual": "Residual", "radiosity": "Radiosity"}
@@ -182,7 +182,11 @@ def _density(context: bpy.types.Context, shown: list[ShownLightmap]) -> OverlayP
     density = np.concatenate(
         [texels_per_metre(found, size) for found, size in zip(shown, sizes, strict=True)]
     )
-    scale = _scale(context, density, False)
+    # What most has gets the middle colour: blue is coarser, red finer.
+    usual = float(np.median(density))
+    scale = (
+        ColorScale(0.0, 2.0 * usual) if settings.automatic and usual > 0 else _scale(context, density, False)
+    )
     # A page of one texel a triangle: each has one colour.
     side = int(np.ceil(np.sqrt(len(density))))
     page = np.zeros((side**2, 4), dtype=np.float32)
