@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .bake_scene import NO_TEXEL_HERE, SHUT_IN, BakeDetails, BakeObject, PageDetails
+from .bake_scene import NO_TEXEL_HERE, SHUT_IN, TOUCHED, BakeDetails, BakeObject, PageDetails
 from .lightmap.light_statistics import light_statistics, told_texels
 from .lightmap.sweeps import TexelLight
 from .lightmap.texel_geometry import TexelGeometry
@@ -65,7 +65,7 @@ def texel_state(light: TexelLight) -> Array:
     """Return (n,) uint8 the state of texels: what geometry does to them, or that they are shut in."""
     lit = (light.direct + light.indirect).any(axis=1)
     known = np.zeros(len(lit), dtype=np.uint8) if light.state is None else light.state
-    return np.where((known == 0) & ~lit, SHUT_IN, known).astype(np.uint8)
+    return np.where(((known == 0) | (known == TOUCHED)) & ~lit, SHUT_IN, known).astype(np.uint8)
 
 
 def statistics(

@@ -8,7 +8,7 @@ import numpy as np
 
 from .bake_scene import LitSurfaces, TexelPicture
 from .lightmap.light_so_far import LightSoFar
-from .lightmap.texel_geometry import TexelGeometry
+from .lightmap.texel_geometry import NO_TEXEL, TexelGeometry
 from .solver.arrays import Array
 
 SECONDS = 0.25
@@ -52,18 +52,28 @@ class TexelPictures:
 def lit_surfaces(geometry: TexelGeometry) -> LitSurfaces:
     """Return the triangles with a lightmap, and which texels lie on them."""
     triangle = np.flatnonzero(geometry.page_of_triangle >= 0).astype(np.int32)
+    page = geometry.page_of_triangle[triangle]
+    pages = [coarser(index, WIDEST) for index in geometry.index]
+    stretch = np.array([stretch for _, stretch in pages], dtype=np.float32)
     return LitSurfaces(
         geometry.triangles[triangle].astype(np.float32),
-        geometry.uv[triangle],
-        geometry.page_of_triangle[triangle],
+        geometry.uv[triangle] * stretch[page][:, None, None],
+        page,
         triangle,
-        tuple(coarser(index, WIDEST) for index in geometry.index),
+        tuple(index for index, _ in pages),
     )
 
 
-def coarser(index: Array, widest: int) -> Array:
-    """Return (h, w) numbers of texels on a page of at most `widest` pixels: of every block one texel's."""
-    if len(index) <= widest:
-        return index
-    starts = np.arange(widest) * len(index) // widest
-    return np.asarray(np.maximum.reduceat(np.maximum.reduceat(index, starts, axis=0), starts, axis=1))
+def coarser(index: Array, widest: int) -> tuple[Array, float]:
+    """Return numbers of texels on a page of at most `widest` pixels, of every block one texel's.
+
+    And what UVs are to be multiplied with, for the last block may reach beyond the page.
+    """
+    every = -(-len(index) // widest)
+    if every == 1:
+        return index, 1.0
+    count = -(-len(index) // every)
+    padded = np.full((count * every, count * every), NO_TEXEL, dtype=index.dtype)
+    padded[: len(index), : len(index)] = index
+    blocks = padded.reshape(count, every, count, every).max(axis=(1, 3))
+    return np.asarray(blocks), len(index) / (count * every)
