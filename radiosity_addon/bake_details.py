@@ -89,7 +89,7 @@ def statistics(
     state = texel_state(light)
     order = np.argsort(geometry.triangle, kind="stable")
     of = geometry.triangle[order]
-    found = []
+    found: list[dict[str, Any]] = []
     for item in baked:
         mine = order[np.searchsorted(of, item.first) : np.searchsorted(of, item.first + item.count)]
         mine = mine[told_texels(state[mine])] if len(mine) else mine

@@ -278,7 +278,7 @@ class BakeDetails:
     def nbytes(self) -> int:
         """Memory it takes."""
         arrays = [getattr(page, name) for page in self.pages for name in ("state", "noise", "misfit")]
-        return self.links.nbytes + sum(array.nbytes for array in arrays)
+        return self.links.nbytes + sum(int(array.nbytes) for array in arrays)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import bpy
-import numpy as np
 
 if TYPE_CHECKING:
     from ..solver.arrays import Array
@@ -75,6 +74,7 @@ class PagedSurfaces:
     """
 
     def __init__(self, corners: Array, uv: Array, page: Array) -> None:
+        import numpy as np
         from gpu_extras.batch import batch_for_shader
 
         shader = page_shader()
@@ -91,6 +91,7 @@ class PagedSurfaces:
     def paint(self, pages: Sequence[Array]) -> None:
         """Give the pages their colors: (height, width, 4) float32 each; what has no alpha is not drawn."""
         import gpu
+        import numpy as np
 
         self._textures = []
         for colors in pages:

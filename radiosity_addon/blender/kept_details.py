@@ -7,10 +7,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import bpy
-import numpy as np
 
 if TYPE_CHECKING:
     from ..bake_scene import BakeDetails, BakeObject, BakeResult, PageDetails
+    from ..solver.arrays import Array
+
+
+STAND_IN_SUFFIX = " (Lightmap)"
+"""What the name of an object ends with that shows the lightmap of an instance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,23 +42,17 @@ class KeptDetails:
         known = dict(zip(self.images, self.details.pages, strict=False))
         return known.get(image)
 
-    def seen(self) -> np.ndarray:
+    def seen(self) -> Array:
         """Return (t,) bool which of the scene's triangles are on objects with a lightmap that are shown."""
+        import numpy as np
+
         record = self.details.links
-        count = max(
-            [
-                int(record.triangle.max(initial=-1)) + 1,
-                *(item.first + item.count for item in self.objects.values()),
-            ]
-        )
-        seen = np.zeros(count, dtype=bool)
+        ends = [item.first + item.count for item in self.objects.values()]
+        seen = np.zeros(max([int(record.triangle.max(initial=-1)) + 1, *ends]), dtype=bool)
         for name, item in self.objects.items():
             seen[item.rows] = _is_shown(name)
         return seen
 
-
-STAND_IN_SUFFIX = " (Lightmap)"
-"""What the name of an object ends with that shows the lightmap of an instance."""
 
 _kept: dict[str, KeptDetails] = {}
 

@@ -303,4 +303,4 @@ def _opaque(colors: Array) -> Array:
 def _edges(corners: Array, color: tuple[float, ...], width: float = 1.0) -> Lines:
     """Return the edges of (n, 3, 3) triangles."""
     ends = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2, 3)
-    return Lines(ends, np.broadcast_to(np.float32(color), (len(ends), 4)), width)
+    return Lines(ends, np.broadcast_to(np.array(color, dtype=np.float32), (len(ends), 4)), width)

@@ -6,7 +6,6 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 import bpy
-import numpy as np
 from bpy.app.handlers import persistent
 
 from . import kept_details, runtime
@@ -105,6 +104,7 @@ def _key(context: bpy.types.Context) -> tuple[object, ...]:
 def _upload(picture: OverlayPicture) -> None:
     """Hand a picture to the graphics card."""
     import gpu
+    import numpy as np
     from gpu_extras.batch import batch_for_shader
 
     if picture.surfaces is not None:

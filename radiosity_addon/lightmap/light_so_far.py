@@ -144,7 +144,7 @@ class LightSoFar:
             seen = self._values_at(aimed.sources)
             seen[aimed.sources < 0] = 0.0
             mean[aimed.row] += np.einsum("akc,ak->ac", seen, aimed.weights)
-        return mean
+        return np.asarray(mean)
 
     def _values_at(self, sources: Array) -> Array:
         """Return (g, k, 3) the radiosity of (g, k) hits as they are numbered before the table is made."""
@@ -161,4 +161,4 @@ class LightSoFar:
         element[flat >= numbers.first_cell] = self._element[numbers.cells.texel_of(cell)]
         values = values_of(local.reflected(), element)
         values[flat < 0] = local.beyond()[flat[flat < 0]]
-        return values.reshape(*sources.shape, 3)
+        return np.asarray(values.reshape(*sources.shape, 3))

@@ -62,7 +62,7 @@ class LinkRecord:
     @property
     def nbytes(self) -> int:
         """Memory it takes."""
-        return sum(getattr(self, entry.name).nbytes for entry in fields(self))
+        return sum(int(getattr(self, entry.name).nbytes) for entry in fields(self))
 
     @property
     def n_clusters(self) -> int:

@@ -32,6 +32,7 @@ HOMES = {
     "mathutils": "blender",
     "bpy_extras": "blender",
     "gpu": "blender",
+    "blf": "blender",
     "xatlas": "lightmap.growers",
     "embreex": "solver.embree",
 }
