@@ -133,7 +133,10 @@ def page_values(image: bpy.types.Image) -> PageValues | None:
         if width * height == 0 or image.channels == 0:
             return None
         pixels = np.empty(width * height * image.channels, dtype=np.float32)
-        image.pixels.foreach_get(pixels)
+        try:
+            image.pixels.foreach_get(pixels)
+        except (RuntimeError, TypeError):  # a file that Blender names but cannot decode
+            return None
         values = pixels.reshape(height, width, image.channels)[..., :3]
         quantity = str(image.get(QUANTITY_PROPERTY, "irradiance_over_pi"))
         factor = image_scale(image)

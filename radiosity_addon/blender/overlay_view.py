@@ -80,7 +80,9 @@ def _current(context: bpy.types.Context) -> OverlayPicture | None:
         from .overlay_pictures import overlay_picture
 
         _drawn.clear()
-        _drawn.key, _drawn.picture = key, overlay_picture(context)
+        # The key first: what cannot be made is not tried again at every redraw.
+        _drawn.key = key
+        _drawn.picture = overlay_picture(context)
         if _drawn.picture is not None:
             _upload(_drawn.picture)
     return _drawn.picture

@@ -1,6 +1,7 @@
 """Bake in a window, choose each overlay in turn and photograph it; then none, Restore, and a reload.
 
-Usage: blender cornell.blend --enable-event-simulate --python drive_overlays.py -- ANSWER.json
+Usage: blender cornell.blend --enable-event-simulate --python drive_overlays.py -- \\
+    ANSWER.json RESOLUTION QUALITY
 """
 
 import importlib
@@ -14,15 +15,20 @@ sys.path.insert(0, str(Path(__file__).parent))
 import events
 from file_dump import differences, dump_file
 
-ANSWER = Path(sys.argv[sys.argv.index("--") + 1])
+ANSWER, RESOLUTION, QUALITY = sys.argv[sys.argv.index("--") + 1 :]
+ANSWER = Path(ANSWER)
 MODULE = "bl_ext.user_default.radiosity_addon"
 live_view = importlib.import_module(f"{MODULE}.blender.live_view")
 kept_details = importlib.import_module(f"{MODULE}.blender.kept_details")
 overlay_pictures = importlib.import_module(f"{MODULE}.blender.overlay_pictures")
+overlay_panel = importlib.import_module(f"{MODULE}.blender.overlay_panel")
 runtime = importlib.import_module(f"{MODULE}.blender.runtime")
 texel_pictures = importlib.import_module(f"{MODULE}.texel_pictures")
 
 OVERLAYS = ("FALSE_COLOR", "DENSITY", "CHECKER", "TEXELS", "ELEMENTS", "LINKS", "ERROR")
+CURSOR = (-0.6, 1.2, 0.0)
+"""On the floor, in front of the blocks."""
+
 seen = {"texels": 0, "missing": {}}
 
 
@@ -77,13 +83,48 @@ def missing():
     return told
 
 
+class PanelAlone(bpy.types.Panel):
+    """The panel in a tab of its own, where no other panel hides it."""
+
+    bl_idname, bl_label, bl_category = "RADIOSITY_PT_alone", "Overlays", "Overlays"
+    bl_space_type, bl_region_type = "VIEW_3D", "UI"
+
+    def draw(self, context):
+        overlay_panel.RADIOSITY_PT_overlays.draw(self, context)
+
+
+def every_panel(overlay):
+    """Have the panel drawn with each overlay."""
+    bpy.utils.register_class(PanelAlone)
+    yield from events.open_sidebar("Overlays")
+    drawn = []
+    draw = overlay_panel._draw_statistics
+
+    def drawing(layout, context):
+        drawn.append(context.active_object.name)
+        draw(layout, context)
+
+    overlay_panel._draw_statistics = drawing
+    for name in OVERLAYS[::-1]:
+        overlay.show = name
+        yield 0.2
+    yield from photograph("overlay-panel.png")
+    seen["statistics_of"] = drawn
+    overlay_panel._draw_statistics = draw
+    overlay.show = "NONE"
+    events.area_3d().spaces.active.show_region_ui = False
+    bpy.utils.unregister_class(PanelAlone)
+    yield 0.3
+
+
 def script():
     view = events.centre("WINDOW")
     scene = bpy.context.scene
     scene.radiosity.show_result = False
-    scene.radiosity.quality = "draft"
-    scene.radiosity.resolution = 96
+    scene.radiosity.quality = QUALITY
+    scene.radiosity.resolution = int(RESOLUTION)
     bpy.context.view_layer.objects.active = bpy.data.objects["Floor"]
+    scene.cursor.location = CURSOR
     bpy.ops.ed.undo_push(message="Settings")
     events.area_3d().spaces.active.show_region_toolbar = False
     yield from events.hover(*view)
@@ -93,20 +134,20 @@ def script():
     before = dump_file()
 
     bake()
-    yield from events.until(texels_drawn, 120)
+    yield from events.until(texels_drawn, 300)
     yield from photograph("overlay-live.png")
-    yield from events.until(settled, 120)
+    yield from events.until(settled, 300)
     yield 0.5
     yield from photograph("overlay-none.png")
     seen["missing"]["baked"] = missing()
     overlay = bpy.context.window_manager.radiosity_overlay
     for name in OVERLAYS:
         overlay.show = name
-        overlay.links_of = "FACE"
         yield 0.2
         yield from photograph(f"overlay-{name.lower()}.png")
     overlay.show = "NONE"
     yield from photograph("overlay-again.png")
+    yield from every_panel(overlay)
 
     overlay.show = "FALSE_COLOR"
     path = ANSWER.with_name("baked.blend")
