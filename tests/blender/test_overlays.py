@@ -20,7 +20,9 @@ from radiosity_addon.blender.lightmap_values import lightmap_of, object_statisti
 from radiosity_addon.blender.overlay_pictures import (
     CHECKERS,
     STATE_COLORS,
+    WIDEST,
     OverlayPicture,
+    _thinned,
     chosen_elements,
     missing,
     overlay_picture,
@@ -272,6 +274,14 @@ def test_an_unregistered_overlay_leaves_nothing() -> None:
     for listed in (handlers.load_pre, handlers.undo_post, handlers.redo_post, handlers.depsgraph_update_post):
         assert not [handler for handler in listed if handler.__module__ == overlay_view.__name__]
     assert not hasattr(bpy.types.WindowManager, "radiosity_overlay")
+
+
+def test_large_pages_are_drawn_coarser() -> None:
+    page = np.arange(2 * WIDEST)[:, None] + np.zeros(2 * WIDEST)
+    thin = _thinned(page)
+    assert thin.shape == (WIDEST, WIDEST)
+    assert np.abs(thin[:, 0] / 2 - np.arange(WIDEST)).max() <= 1.0
+    assert _thinned(thin) is thin
 
 
 def test_scales_end_at_round_numbers_and_clip() -> None:
