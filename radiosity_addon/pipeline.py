@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from .bake_details import More, more_of
 from .bake_scene import (
     BakedObject,
     BakeObject,
@@ -29,6 +30,7 @@ from .light_groups import are_wanted, check_groups, group_pages
 from .lightmap.accuracy import light_within
 from .lightmap.atlas import Atlas, AtlasInput, AtlasOptions, build_atlas
 from .lightmap.error_picture import summary, texel_residual
+from .lightmap.light_so_far import LightSoFar
 from .lightmap.packing import Limits, padding_for
 from .lightmap.rasterise import rasterise
 from .lightmap.reconstruct import GatherSettings, reconstruct
@@ -47,6 +49,7 @@ from .solver import Solution, SolverSettings, SolverState, solve_progress
 from .solver.arrays import Array
 from .solver.element_transport import Relightable
 from .solver.visibility import RayCaster
+from .texel_pictures import TexelPictures
 
 T = TypeVar("T")
 
@@ -59,7 +62,7 @@ class Lit:
     caster: RayCaster
     light: TexelLight | None = None
     relightable: Relightable | None = None
-    materials: tuple[Array, ...] = ()
+    materials: tuple[Array, Array] | None = None
 
 
 UNWRAP, RASTERISE, SOLVE, LIGHT, ENCODE = 0.0, 0.15, 0.2, 0.5, 0.97
@@ -142,13 +145,15 @@ def _bake(
         solution = yield from solve(bake_scene, quality.solver)
     yield Progress("light", LIGHT)
     with timed(seconds, "light"):
-        steps = _texel_values(bake_scene, solution, geometry, quality.gather, settings, keep)
-        lit = yield from staged(steps, "light", LIGHT, ENCODE)
+        so_far = LightSoFar()
+        steps = _texel_values(bake_scene, solution, geometry, quality.gather, settings, keep, so_far)
+        lit = yield from staged(steps, "light", LIGHT, ENCODE, TexelPictures(so_far))
     report = solver_part(solution.final_report(), used_settings(quality.solver), bake_scene.objects)
     sides = solution.triangle_irradiance, solution.back_irradiance
     of_light = (*turned_away(baked, bake_scene.scene.areas, *sides), *of_solution(solution, quality.solver))
     solved = Solved(report, (*atlas.warnings, *of_light))
-    return (yield from finish(bake_scene, settings, atlas, geometry, solved, lit, seconds))
+    more = more_of(solution, baked, geometry, lit.light, settings.light)
+    return (yield from finish(bake_scene, settings, atlas, geometry, solved, lit, more, seconds))
 
 
 def finish(
@@ -158,6 +163,7 @@ def finish(
     geometry: TexelGeometry,
     solved: Solved,
     lit: Lit,
+    more: More,
     seconds: dict[str, float],
 ) -> Generator[Progress, None, tuple[BakeResult, KeptBake | None]]:
     """Put what texels hold on pages, and tell of the bake; what was kept goes on in the kept bake."""
@@ -169,7 +175,7 @@ def finish(
         pages = texel_pages(geometry, lit.values, seams, rings)
         _check(solved.report, pages)
     kept = None
-    if lit.relightable is not None and lit.light is not None and lit.light.kept is not None:
+    if lit.relightable and lit.materials and lit.light is not None and lit.light.kept is not None:
         lighting = lit.relightable, lit.light.kept
         moves = None if lit.light.traced is None else Moves(atlas, lit.light.traced, solved)
         kept = KeptBake(bake_scene, settings, *lighting, geometry, seams, rings, *lit.materials, moves)
@@ -189,7 +195,7 @@ def finish(
         BakedObject(item, placed.uv, placed.page) for item, placed in zip(baked, atlas.objects, strict=True)
     )
     told = _told(atlas, pages)
-    return BakeResult(pages, objects, report, warnings, seconds, told, groups), kept
+    return BakeResult(pages, objects, report, warnings, seconds, told, groups, *more), kept
 
 
 def baked_objects(bake_scene: BakeScene) -> list[BakeObject]:
@@ -276,7 +282,11 @@ def _picture(state: SolverState) -> Picture | None:
 
 
 def staged(
-    steps: Generator[float, None, T], stage: str, begin: float, end: float
+    steps: Generator[float, None, T],
+    stage: str,
+    begin: float,
+    end: float,
+    pictures: TexelPictures | None = None,
 ) -> Generator[Progress, None, T]:
     """Run steps that yield the fraction they have done as one stage, from `begin` to `end` of the whole."""
     while True:
@@ -285,7 +295,8 @@ def staged(
         except StopIteration as done:
             result: T = done.value
             return result
-        yield Progress(stage, begin + (end - begin) * fraction)
+        texels = None if pictures is None else pictures.next()
+        yield Progress(stage, begin + (end - begin) * fraction, texels=texels)
 
 
 def _texel_values(
@@ -295,6 +306,7 @@ def _texel_values(
     gather: GatherSettings,
     settings: BakeSettings,
     keep: bool,
+    so_far: LightSoFar,
 ) -> Generator[float, None, Lit]:
     """Compute the quantity asked for at all texels, and estimate the light's relative error."""
     if settings.quantity == "residual":
@@ -304,9 +316,10 @@ def _texel_values(
     local = solution.local_pass if relightable is None else relightable.local
     where = bake_scene.scene, local, geometry
     if settings.relative_error is None:
-        light = yield from reconstruct(*where, gather)
+        light = yield from reconstruct(*where, gather, so_far)
     else:
-        light = yield from light_within(*where, lambda e: for_error(e).gather, settings.relative_error)
+        within = settings.relative_error, so_far
+        light = yield from light_within(*where, lambda e: for_error(e).gather, *within)
     materials = texel_materials(bake_scene.scene, geometry, FOOTPRINT)
     return Lit(shown(light, *materials, settings), local.caster, light, relightable, materials)
 

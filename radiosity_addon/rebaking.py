@@ -11,12 +11,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from .bake_details import statistics
 from .bake_scene import BakeObject, BakeResult, BakeScene, BakeWarning, Progress
 from .errors import SceneError
 from .lightmap.continued import join_continued
 from .lightmap.disturbance import Disturbance
 from .lightmap.moved import LitBefore, moved_steps
-from .pipeline import Lit, finish, staged, timed
+from .pipeline import Lit, baked_objects, finish, staged, timed
 from .relighting import KeptBake, Solved, same_light, shown
 from .settings import BakeSettings
 from .solver.arrays import Array
@@ -98,7 +99,9 @@ def bake_moved(
     names = dict.fromkeys([*report.get("moved", ()), *(item.name for item in moved)])
     report = {**report, "rays": local.caster.rays, "moved": list(names)}
     told = Solved(report, moves.solved.warnings)
-    finished = finish(bake_scene, settings, moves.atlas, geometry, told, lit, seconds)
+    baked = baked_objects(bake_scene)
+    more = statistics(baked, geometry, light, settings.light), None
+    finished = finish(bake_scene, settings, moves.atlas, geometry, told, lit, more, seconds)
     result, after = yield from finished
     assert after is not None  # it keeps what it was given
     warnings = (*result.warnings, *_resized(moved, kept.bake_scene.scene, bake_scene.scene))

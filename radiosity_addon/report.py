@@ -69,7 +69,8 @@ class BakeReport:
         told = result.atlas or ({},) * len(files)
         pages = [{"image": file.path, **_plain(page)} for file, page in zip(files, told, strict=True)]
         objects = []
-        for baked in result.objects:
+        light = result.light or ({},) * len(result.objects)
+        for baked, of_light in zip(result.objects, light, strict=True):
             height, width = result.pages[baked.page].pixels.shape[:2]
             file = files[baked.page]
             entry: dict[str, Any] = {
@@ -81,7 +82,7 @@ class BakeReport:
             }
             if file.scale is not None:
                 entry["scale"] = file.scale
-            objects.append(entry)
+            objects.append({**entry, **_plain(of_light)})
         solver = {key: value for key, value in result.solver.items() if key != "history"}
         solver["history"] = thinned(result.solver.get("history", ()))
         shares = [

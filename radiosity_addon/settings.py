@@ -18,6 +18,9 @@ MAX_RESOLUTION = 16384
 MAX_PAGES = 64
 MAX_MIP_LEVELS = 8
 MAX_PADDING = 512
+EFFICACY = 683.0
+"""Lumens a watt of green light of 555 nm; taken for all light where nothing else is said [lm/W]."""
+
 MIN_ERROR, MAX_ERROR = 0.002, 0.2
 MAX_GROUPS = 24
 """Light groups of a bake: each is an image that its materials read, and graphics cards take 32, some 16."""

@@ -26,6 +26,8 @@ SCALE_PROPERTY = "radiosity_lightmap_scale"
 
 PAGE, GROUP = "radiosity_page", "radiosity_light_group"
 """Custom properties of an image: its page's number, and the light group it shows, "" for all light."""
+QUANTITY_PROPERTY = "radiosity_lightmap_quantity"
+"""Custom property of an image: the quantity that it holds."""
 
 _FILE_FORMATS = {"exr": ("OPEN_EXR", ".exr"), "png16": ("PNG", ".png")}
 _RESERVED_NAMES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
@@ -115,6 +117,7 @@ def write_images(
         for number, (page, file_name) in enumerate(zip(pages, file_names, strict=True)):
             images.append(_new_image(page, settings.format, file_name, scale))
             images[-1][PAGE], images[-1][GROUP] = number, group
+            images[-1][QUANTITY_PROPERTY] = settings.quantity
             _store(images[-1], folder, file_name)
     except BaseException:
         remove_datablocks(images)

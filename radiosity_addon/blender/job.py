@@ -17,7 +17,7 @@ from ..report import BakeReport
 from ..settings import BakeSettings
 from ..sidecar import SIDECAR_NAME
 from ..solver.arrays import Array
-from . import kept_bakes, runtime
+from . import kept_bakes, kept_details, runtime
 from .apply import apply_lightmaps, check_targets
 from .bake_record import remove_datablocks
 from .export import export_scene
@@ -25,7 +25,7 @@ from .export_sources import Export
 from .group_images import GroupImages, each_image, write_groups
 from .images import lightmap_files, set_folder, write_pages
 from .light_shares import crowded_materials
-from .live_picture import seen_triangles
+from .live_picture import Seen, seen_triangles
 from .output import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, OutputFolder, save_copy
 from .preview import SAMPLES, render_preview
 from .rebake import originals_shown, replacing_earlier, seal
@@ -109,6 +109,7 @@ def run_bake(
                 output.publish()
         runtime.remember(context.scene, report.as_dict(), "" if output is None else str(output.path))
         _remember_kept(context.scene, keeping, kept)
+        kept_details.keep(context.scene, result, [image.name for image in images])
     return report
 
 
@@ -117,19 +118,19 @@ def _solve(
 ) -> Generator[Progress, None, tuple[BakeResult, KeptBake | None]]:
     """Run the pipeline, its progress scaled to its share of the whole, its pictures to what is `seen`."""
     steps = in_thread(baking) if patient else baking
-    shown = Progress("unwrap", SOLVE)
+    shown, only = Progress("unwrap", SOLVE), Seen(seen)
     try:
         while True:
             try:
                 progress = next(steps)
             except StopIteration as done:
                 return done.value
-            picture = None
+            picture = texels = None
             if progress is not None:
                 shown = Progress(progress.stage, SOLVE + (APPLY - SOLVE) * progress.fraction)
-                picture = progress.picture
+                picture, texels = only.of_elements(progress.picture), only.of_texels(progress.texels)
             # Each picture comes once, however long the step after it takes.
-            yield shown if picture is None else replace(shown, picture=picture.only(seen[picture.triangle]))
+            yield replace(shown, picture=picture, texels=texels)
     finally:
         steps.close()
 

@@ -143,6 +143,8 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
             runtime.running.stage, runtime.running.fraction = progress.stage, progress.fraction
             if progress.picture is not None:
                 live_view.show(progress.picture)
+            if progress.texels is not None:
+                live_view.show_texels(progress.texels)
         return False
 
     def _show_progress(self, context: bpy.types.Context) -> None:

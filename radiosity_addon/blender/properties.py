@@ -214,8 +214,8 @@ class RadiositySettings(MethodProperties, bpy.types.PropertyGroup):
     )
     show_while_solving: bpy.props.BoolProperty(  # type: ignore[valid-type]
         name="Show While Solving",
-        description="Draw the elements over the objects in the viewports while a bake is solving, as bright "
-        "as they are at that moment",
+        description="Draw the light over the objects in the viewports while a bake runs, as far as it is "
+        "known: the elements while it solves, then the texels",
         default=True,
     )
     show_result: bpy.props.BoolProperty(  # type: ignore[valid-type]

@@ -17,6 +17,9 @@ from . import (
     light_group_properties,
     object_roles,
     operators,
+    overlay_panel,
+    overlay_properties,
+    overlay_view,
     panels,
     properties,
     relight_operators,
@@ -32,6 +35,7 @@ CLASSES = (
     *panels.CLASSES,
     *relight_panel.CLASSES,
     *light_group_panels.CLASSES,
+    *overlay_panel.CLASSES,
 )
 
 _undo: list[Callable[[], None]] = []
@@ -44,7 +48,7 @@ def register() -> None:
     try:
         for module in (
             *(bake_record, object_roles, light_group_properties, properties),
-            *(kept_bakes, relight_properties),
+            *(kept_bakes, relight_properties, overlay_properties, overlay_view),
         ):
             module.register()
             _undo.append(module.unregister)

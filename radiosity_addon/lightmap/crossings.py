@@ -17,6 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..bake_scene import DIVIDED, HOODED, TOUCHED
 from ..solver.arrays import Array
 from ..solver.parallel import chunk_steps
 from ..solver.visibility import RayCaster
@@ -68,6 +69,14 @@ class Crossings:
     def crossed(self) -> Array:
         """Texels that are cut or at a rim: more than one light falls on them."""
         return self.cut | self.rim
+
+    @property
+    def state(self) -> Array:
+        """(n,) uint8: see `TEXEL_STATES`."""
+        state = np.where(
+            self.crossed, DIVIDED, np.where(self.hooded, HOODED, np.where(self.touched, TOUCHED, 0))
+        )
+        return np.asarray(state, dtype=np.uint8)
 
     @cached_property
     def alone(self) -> Array:

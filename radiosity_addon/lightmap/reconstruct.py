@@ -8,7 +8,7 @@ trace nothing, remove what the coarse hierarchy got wrong.
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -24,6 +24,7 @@ from .continued import join_continued
 from .crossings import LIFT, Crossings, below_hood, crossing_steps
 from .earlier_light import EarlierLight
 from .interpolate import GatherPoints, fit_steps
+from .light_so_far import LightSoFar
 from .part_links import HitNumbers, gather_parts
 from .stored_links import StoredLinks
 from .sweeps import LitTexels, TexelLight, TexelTransport, sweep_steps
@@ -74,32 +75,44 @@ class GatherSettings:
 
 
 def reconstruct(
-    scene: Scene, local: LocalPass, geometry: TexelGeometry, settings: GatherSettings
+    scene: Scene,
+    local: LocalPass,
+    geometry: TexelGeometry,
+    settings: GatherSettings,
+    so_far: LightSoFar | None = None,
 ) -> Generator[float, None, TexelLight]:
     """Compute direct and indirect irradiance of all texels; yields the fraction done.
 
-    If `local` can ask for every light apart, what lights the texels anew is kept.
+    If `local` can ask for every light apart, what lights the texels anew is kept. `so_far` is told what is
+    known on the way.
     """
     join_continued(geometry, local.caster)
     gains = local.new_gains(len(geometry))
-    direct = local.direct_steps(footprints(geometry, local), gains=gains)
+    lamps = np.zeros((len(geometry), 3))
+    reflectance, emission = texel_materials(scene, geometry)
+    element = local.leaf_at_fronts(geometry.triangle, geometry.barycentric)
+    if so_far is not None:
+        so_far.begin(local, geometry, element, lamps, (reflectance, emission))
+    tell = None if so_far is None else so_far.asked
+    direct = local.direct_steps(footprints(geometry, local), gains=gains, total=lamps, tell=tell)
     lamps = yield from scaled(direct, 0.0, DIRECT)
     found = crossing_steps(geometry, local.caster, local.threads)
     crossings = yield from scaled(found, DIRECT, CROSSED)
     cells = TexelCells(local, geometry, crossings)
     numbers = HitNumbers(local, cells, len(geometry))
     resolve = resolver(geometry, crossings, numbers)
-    stored = gather_texels(local, geometry, settings, crossings, resolve)
+    met = None if so_far is None else partial(so_far.met, numbers)
+    stored = gather_texels(local, geometry, settings, crossings, resolve, met)
     links, points = yield from scaled(stored, CROSSED, GATHERED)
-    reflectance, _ = texel_materials(scene, geometry)
-    element = local.leaf_at_fronts(geometry.triangle, geometry.barycentric)
     further = gather_parts(numbers, links, resolve, element, reflectance)
     links, parts = yield from scaled(further, GATHERED, PARTS)
     transport = TexelTransport(links, parts, reflectance)
     limits = settings.sweeps, settings.tolerance
     start = values_of(local.reflected(), element)
-    swept = sweep_steps(transport, start, lamps, local.beyond(), *limits, local.threads)
+    seen = None if so_far is None else so_far.swept
+    swept = sweep_steps(transport, start, lamps, local.beyond(), *limits, local.threads, seen=seen)
     light = yield from scaled(swept, PARTS, 1.0)
+    light = replace(light, state=crossings.state)
     yield 1.0
     if gains is None or local.sources is None or light.table is None:
         return light
@@ -128,8 +141,12 @@ def gather_texels(
     settings: GatherSettings,
     crossings: Crossings,
     resolve: Resolver,
+    met: Callable[[Array, Gathered, int], None] | None = None,
 ) -> Generator[float, None, tuple[StoredLinks, GatherPoints]]:
-    """Gather at few texels, densely where others do not reach; yields the fraction done."""
+    """Gather at few texels, densely where others do not reach; yields the fraction done.
+
+    `met` is told of texels that have gathered, and how far they are apart.
+    """
     points = GatherPoints(geometry, local.caster, crossings.alone, local.threads)
     found: list[Gathered] = []
     first: list[int] = []
@@ -147,6 +164,8 @@ def gather_texels(
             gathered = yield from scaled(rays, at, end)
             first.append(sum(len(before.sources) for before in found))
             found.append(gathered)
+            if met is not None:
+                met(some, gathered, stride)
             closeness.append(gathered.closeness)
             at = end
         points.add(stride, np.concatenate([chosen[~edge], chosen[edge]]), np.concatenate(closeness))

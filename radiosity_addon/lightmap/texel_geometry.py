@@ -40,6 +40,8 @@ class TexelGeometry:
     uv, page_of_triangle, triangles, face_normals, normals
         Of every scene triangle, as given.
     page, row, column, triangle : (n,) int32
+    share : (n,) float32
+        What part of the texel surfaces cover: its triangle, or all that go on in its plane.
     centre_inside : (n,) bool
         Whether the texel's centre is on its triangle.
     whole : (n,) bool
@@ -67,6 +69,8 @@ class TexelGeometry:
         self.row = np.concatenate([page.row for page in texels])
         self.column = np.concatenate([page.column for page in texels])
         self.centre_inside = np.concatenate([page.centre_inside for page in texels])
+        self.share = np.concatenate([page.area for page in texels])
+        self.whole = self.share >= 1.0
         triangles = [of[page.triangle] for of, page in zip(rows, texels, strict=True)]
         self.triangle = np.concatenate(triangles).astype(np.int32)
         self.surface_normal = scene.face_normals[self.triangle]
@@ -77,7 +81,6 @@ class TexelGeometry:
             numbers[page.row, page.column] = self._first[number] + np.arange(len(page))
             self.index.append(numbers)
         self._inset = _edge_inset(scene)
-        self.whole = np.concatenate([page.area for page in texels]) >= 1.0
         centroid = np.concatenate([page.centroid for page in texels]).astype(np.float64)
         weights = self._drawn_in(centroid[:, None], self.triangle)[:, 0]
         self.barycentric = np.empty((len(weights), 2), dtype=np.float32)
@@ -97,7 +100,7 @@ class TexelGeometry:
 
     def make_whole(self, rows: Array) -> None:
         """Count texels (r,), in ascending order, as whole: other triangles cover what theirs does not."""
-        self.whole[rows] = True
+        self.whole[rows], self.share[rows] = True, 1.0
         for number, page in enumerate(self.texels):
             first, last = np.searchsorted(rows, self._first[number : number + 2])
             own = rows[first:last] - self._first[number]

@@ -91,7 +91,12 @@ class LocalPass:
         return drain(self.direct_steps(Footprints(points, normals, keys, sampler, near), rays))
 
     def direct_steps(
-        self, at: Footprints, rays: int | None = None, gains: LightGains | None = None
+        self,
+        at: Footprints,
+        rays: int | None = None,
+        gains: LightGains | None = None,
+        total: Array | None = None,
+        tell: Callable[[], None] | None = None,
     ) -> Generator[float, None, Array]:
         """Compute the irradiance straight from lamps and emissive surfaces, the sky's apart.
 
@@ -104,6 +109,10 @@ class LocalPass:
             If given, takes what every light adds: lamps by their number among the scene's lights, those
             without strength too, then emissive groups. Each is asked as if it were the only one, which
             it may become.
+        total : (n, 3) float64 or None
+            If given, all 0, the result grows in it, one light after the other, …
+        tell : callable or None
+            … and this is called after each.
 
         Yields
         ------
@@ -113,7 +122,7 @@ class LocalPass:
         -------
         irradiance : (n, 3) float64 [W/m²]
         """
-        total = np.zeros((len(at), 3))
+        total = np.zeros((len(at), 3)) if total is None else total
         lights = self.lights(dark=gains is not None)
         if gains is not None:
             at = replace(at, expected=None)
@@ -124,6 +133,8 @@ class LocalPass:
             total += arriving[:, None] * asked.light.strength
             if gains is not None:
                 gains.put(asked.number, arriving)
+            if tell is not None:
+                tell()
         return total
 
     def lights(self, dark: bool = True) -> list[AskedLight]:
@@ -279,6 +290,11 @@ class LocalPass:
         every = np.arange(self._state.hierarchy.n_elements)
         arriving = self._state.irradiance if irradiance is None else irradiance
         return np.asarray(self._reflectance_where_hit(every) * arriving)
+
+    @property
+    def irradiance(self) -> Array:
+        """(e, 3) float64: the elements' irradiance [W/m²]."""
+        return self._state.irradiance
 
     def irradiance_at(self, triangle: Array, barycentric: Array) -> Array:
         """Return (n,) the elements' irradiance at points of triangles' fronts, a mean of the channels [W/m²].

@@ -23,6 +23,8 @@ LAYER_OF = {
     "sidecar": "pipeline",
     "keeping": "pipeline",
     "responses": "pipeline",
+    "bake_details": "pipeline",
+    "texel_pictures": "pipeline",
 }
 FRONT_DOORS = ("", "__main__", "cli", "console", "interrupts")
 
@@ -37,6 +39,7 @@ HOMES = {
     "mathutils": "blender",
     "bpy_extras": "blender",
     "gpu": "blender",
+    "blf": "blender",
     "xatlas": "lightmap.growers",
     "embreex": "solver.embree",
 }
