@@ -59,7 +59,7 @@ def main(
     try:
         request = build_parser(prog).parse_args(sys.argv[1:] if argv is None else list(argv))
         settings = settings_of(request) if request.verb == "bake" else None
-        if settings is not None:
+        if settings is not None and not request.check:
             request.output = bake_output(request, loaded)
             check_plot(request.plot)
     except RadiosityError as error:
@@ -202,6 +202,7 @@ def _add_bake(parser: argparse.ArgumentParser) -> None:
     add("--keep-uvs", action="store_true", help="use an existing UV layer Lightmap as it is")
     add("--seed", type=int, default=default.seed, metavar="N", help="random seed (default 0)")
     add("--threads", type=int, default=default.threads, metavar="N", help="threads (default: all cores)")
+    add("--check", action="store_true", help="bake nothing; say what would be baked, and what is odd")
     _add_common(parser)
     add("--report", type=Path, metavar="FILE", help="second copy of report.json")
     add("--plot", type=Path, metavar="FILE.png", help="draw the history of residual, elements and links")
@@ -261,6 +262,8 @@ def _run(
         )
     try:
         with Console(quiet=request.quiet) as console:
+            if settings is not None and request.check:
+                return commands.check(request.scene, loaded, request.output, settings, console)
             if settings is not None:
                 files = request.output, settings, request.report, request.plot
                 commands.bake(request.scene, loaded, *files, console, interrupts)

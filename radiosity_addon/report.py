@@ -15,6 +15,7 @@ import numpy as np
 
 from .bake_scene import LIGHTMAP_UV_LAYER, BakeObject, BakeResult
 from .errors import BakeError
+from .manifest import FILES
 
 T = TypeVar("T")
 
@@ -90,6 +91,10 @@ class BakeReport:
     def as_dict(self) -> dict[str, Any]:
         """The report as report.json holds it."""
         return self.data
+
+    def listing(self, files: Mapping[str, Mapping[str, Any]]) -> BakeReport:
+        """Return the report with a list of all that bakes have written beside it, see `manifest.py`."""
+        return BakeReport({**self.data, FILES: {name: dict(told) for name, told in files.items()}})
 
     def write(self, path: Path) -> None:
         """Write the report as JSON, over an older one only once it is whole.

@@ -32,6 +32,9 @@ BakeJob = Generator[Progress, None, BakeReport]
 # How far the whole is when each part begins; rough, from bakes at medium quality.
 SOLVE, APPLY, SAVE, PREVIEW = 0.03, 0.85, 0.89, 0.92
 
+APPLY_ALONE = 0.98
+"""How far it is when applying begins, where neither a copy nor a preview is written."""
+
 WRITING_STAGES = frozenset({"apply", "save", "preview", "write"})
 """Stages in which an exception from outside, such as Ctrl-C, would be lost or do harm."""
 
@@ -86,24 +89,25 @@ def run_bake(
             export = export_scene(context, settings)
             check_targets(export)
             seen = seen_triangles(context, export)
-        result = yield from _solve(export, settings, seen, patient)
+        solved = APPLY if with_copy else APPLY_ALONE
+        result = yield from _solve(export, settings, seen, patient, solved)
         result = replace(result, warnings=(*edited, *result.warnings))
         seconds.update(result.seconds)
-        yield Progress("apply", APPLY)
+        yield Progress("apply", solved)
         if with_copy and output is not None:
             return (yield from _deliver(context, settings, export, result, output, seconds))
         with replacing_earlier(context), _timed(seconds, "apply"):
             images = _show(context, settings, export, result, output)
             report = BakeReport.of(result, lightmap_files(images, settings), seconds)
             if output is not None:
-                report.write(output.staging / REPORT_NAME)
+                report.listing(output.files()).write(output.staging / REPORT_NAME)
                 output.publish()
         runtime.remember(context.scene, report.as_dict(), "" if output is None else str(output.path))
     return report
 
 
 def _solve(
-    export: Export, settings: BakeSettings, seen: Array, patient: bool
+    export: Export, settings: BakeSettings, seen: Array, patient: bool, end: float
 ) -> Generator[Progress, None, BakeResult]:
     """Run the pipeline, its progress scaled to its share of the whole, its pictures to what is `seen`."""
     baking = pipeline.bake(export.bake_scene, settings)
@@ -117,7 +121,7 @@ def _solve(
                 return done.value
             picture = None
             if progress is not None:
-                shown = Progress(progress.stage, SOLVE + (APPLY - SOLVE) * progress.fraction)
+                shown = Progress(progress.stage, SOLVE + (end - SOLVE) * progress.fraction)
                 picture = progress.picture
             # Each picture comes once, however long the step after it takes.
             yield shown if picture is None else replace(shown, picture=picture.only(seen[picture.triangle]))
@@ -147,7 +151,7 @@ def _deliver(
         with _timed(seconds, "preview"):
             render_preview(context, output.staging / PREVIEW_NAME, settings)
         report = BakeReport.of(result, lightmap_files(images, settings), seconds)
-        report.write(output.staging / REPORT_NAME)
+        report.listing(output.files()).write(output.staging / REPORT_NAME)
         yield Progress("write", 1.0)
         output.publish()
     except BaseException:

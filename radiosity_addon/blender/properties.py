@@ -20,16 +20,15 @@ from ..settings import (
 )
 from .method_properties import MethodProperties, given_settings
 from .object_roles import BAKE, BAKEABLE_TYPES
+from .preferences import DEFAULT_FOLDER, memory_limit_of, threads_of
 
 DEFAULTS = BakeSettings()
 
 SHARED_FIELDS = (
     *("atlas", "quantity", "light", "format"),
-    *("max_resolution", "mip_levels", "sky", "keep_uvs", "seed", "threads"),
+    *("max_resolution", "mip_levels", "sky", "keep_uvs", "seed"),
 )
 """Settings of the panel that a bake takes as they are."""
-
-DEFAULT_FOLDER = "//lightmaps/"
 
 _LABELS = {
     "shared": ("Shared", "One image for all objects"),
@@ -251,7 +250,8 @@ def settings_of(context: bpy.types.Context) -> BakeSettings:
         pages=group.pages if group.atlas == "shared" and not by_density else 1,
         objects=chosen,
         **{name: getattr(group, name) for name in SHARED_FIELDS},
-        **given_settings(group),
+        threads=threads_of(context),
+        **{"memory_limit": memory_limit_of(context), **given_settings(group)},
     )
 
 

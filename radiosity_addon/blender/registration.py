@@ -8,9 +8,30 @@ from functools import partial
 
 import bpy
 
-from . import bake_record, cli_host, object_roles, operators, panels, properties, runtime
+from . import (
+    bake_record,
+    check_panel,
+    cleaning,
+    cli_host,
+    object_panel,
+    object_roles,
+    operators,
+    panels,
+    preferences,
+    preset_menu,
+    properties,
+    runtime,
+)
 
-CLASSES = (*operators.CLASSES, *panels.CLASSES)
+CLASSES = (
+    *preferences.CLASSES,
+    *operators.CLASSES,
+    *preset_menu.CLASSES,
+    *panels.CLASSES,
+    *check_panel.CLASSES,
+    *object_panel.CLASSES,
+    *cleaning.CLASSES,
+)
 
 _undo: list[Callable[[], None]] = []
 
@@ -26,6 +47,10 @@ def register() -> None:
         for cls in CLASSES:
             bpy.utils.register_class(cls)
             _undo.append(partial(bpy.utils.unregister_class, cls))
+        for module in (preset_menu, cleaning):
+            module.register()
+            _undo.append(module.unregister)
+        _undo.append(check_panel.forget_checks)
         _undo.append(runtime.stop_running)
         cli_host.register()
         _undo.append(cli_host.unregister)

@@ -26,6 +26,8 @@ class Running:
     active: bool = False
     stage: str = ""
     fraction: float = 0.0
+    seconds_left: float | None = None
+    """About how long it still takes; None as long as nobody can know."""
     stop: Callable[[], None] | None = None
     """Ends it from outside its operator."""
 

@@ -16,6 +16,7 @@ LAYER_OF = {
     "quality": "pipeline",
     "relighting": "pipeline",
     "light_groups": "pipeline",
+    "foresight": "pipeline",
 }
 FRONT_DOORS = ("", "__main__", "cli", "console", "interrupts")
 

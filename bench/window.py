@@ -1,0 +1,87 @@
+"""How long a window stands still while it bakes, and how soon Esc works: `python3 -m bench.window`.
+
+A real Blender with the extension's own zip and a virtual screen, drawn by software; the Cornell box.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import sys
+from pathlib import Path
+
+from build_tools import extension, real_blender
+from build_tools.environments import Environment
+from tests.app.real_blender.installed import Installed
+
+from .compare import say
+from .report import context
+
+ROOT = Path(__file__).resolve().parents[1]
+INSIDE = ROOT / "tests" / "app" / "real_blender" / "inside"
+RESULT = ROOT / "bench" / "results" / "window.json"
+
+MOST_SECONDS, MOST_ESCAPE = 0.1, 0.5
+
+
+def measure(quality: str, resolution: int, bakes: int) -> dict:
+    """Bake in a window and return what was seen."""
+    blender = real_blender.find()
+    if blender is None:
+        sys.exit("bench.window: no real Blender here; see `python3 build.py real-blender`")
+    with blender.shared_folder() as folder:
+        zips = extension.build(ROOT, Environment(ROOT, Path(sys.prefix)), folder / "zips")
+        for script in [*INSIDE.glob("*.py"), ROOT / "tests" / "blender" / "file_dump.py"]:
+            shutil.copy(script, folder)
+        installed = Installed(blender, folder, folder / "user")
+        installed.resources.mkdir()
+        zip_file = next(path for path in zips if "linux_x64" in path.name)
+        install = ["--command", "extension", "install-file", "-r", "user_default", "-e", zip_file]
+        _must(installed.run(*install))
+        scene, answer = folder / "cornell.blend", folder / "frames.json"
+        _must(installed.script("save_cornell_box.py", scene))
+        drive = [scene, "--enable-event-simulate", "--window-geometry", "0", "0", "1280", "800"]
+        drive += ["--python", folder / "drive_frames.py", "--", answer, quality, str(resolution), str(bakes)]
+        done = installed.run(*drive, window=True, timeout=1200)
+        if not answer.exists():
+            sys.exit(done.stdout)
+        seen: dict = json.loads(answer.read_text())
+        if seen["failure"] or "Traceback" in done.stdout:
+            sys.exit(f"{seen['failure']}\n{done.stdout}")
+        return seen
+
+
+def _must(done) -> None:
+    if done.returncode != 0:
+        sys.exit(done.stdout)
+
+
+def tell(seen: dict) -> None:
+    """Say the figures that count."""
+    idle = seen["idle"]["idle"]
+    say(f"frames without a bake: median {idle['median_ms']} ms, longest {idle['longest_ms']} ms")
+    for bake in seen["bakes"]:
+        worst = {stage: told["longest_ms"] for stage, told in bake["stages"].items()}
+        say(f"bake of {bake['seconds']} s at load {bake['load_before']}: longest frames [ms] {worst}")
+    for pressed in seen["escapes"]:
+        left = "as before" if not pressed["changed"] else f"CHANGED {pressed['changed']}"
+        say(f"Esc in {pressed['moment']} ({pressed['stage']}): {pressed['seconds']} s, {left}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quality", default="medium")
+    parser.add_argument("--resolution", type=int, default=256)
+    parser.add_argument("--bakes", type=int, default=3)
+    parser.add_argument("--try", action="store_true", dest="trial", help="write no result")
+    options = parser.parse_args()
+    seen = measure(options.quality, options.resolution, options.bakes)
+    tell(seen)
+    if not options.trial:
+        chosen = {"quality": options.quality, "resolution": options.resolution}
+        RESULT.write_text(json.dumps({**chosen, **seen, "context": context(0)}, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()
