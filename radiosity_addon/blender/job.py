@@ -20,7 +20,7 @@ from .apply import apply_lightmaps, check_targets
 from .bake_record import remove_datablocks
 from .export import export_scene
 from .export_sources import Export
-from .images import lightmap_files, set_folder, write_pages
+from .images import lightmap_files, relative_path, set_folder, write_pages
 from .live_picture import seen_triangles
 from .output import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, OutputFolder, save_copy
 from .preview import render_preview
@@ -102,7 +102,9 @@ def run_bake(
             if output is not None:
                 report.listing(output.files()).write(output.staging / REPORT_NAME)
                 output.publish()
-        runtime.remember(context.scene, report.as_dict(), "" if output is None else str(output.path))
+        runtime.remember(
+            context.scene, report.as_dict(), "" if output is None else relative_path(output.path)
+        )
     return report
 
 
