@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import threading
 from collections.abc import Generator
@@ -13,15 +12,12 @@ from typing import TypeVar
 T = TypeVar("T")
 R = TypeVar("R")
 
-PATIENCE = 0.01
+PATIENCE = 0.005
 """Seconds that one `next` waits for a step to end."""
 
 TURN = 0.001
 """Seconds after which a thread that runs Python hands over to one that waits, instead of Python's 5 ms: to
 draw a window once takes dozens of turns."""
-
-NICENESS = 5
-"""How far the threads of a bake stand back for the window's, where the system can tell threads apart."""
 
 
 def in_thread(steps: Generator[T, None, R]) -> Generator[T | None, None, R]:
@@ -70,7 +66,6 @@ def in_thread(steps: Generator[T, None, R]) -> Generator[T | None, None, R]:
 
 def _run(steps: Generator[T, None, R], yielded: SimpleQueue[T], closed: threading.Event) -> R:
     """Take all steps and return what the generator returns; stop after the one in which it is closed."""
-    _stand_back()
     try:
         while not closed.is_set():
             try:
@@ -81,14 +76,3 @@ def _run(steps: Generator[T, None, R], yielded: SimpleQueue[T], closed: threadin
     finally:
         steps.close()
     raise GeneratorExit
-
-
-def _stand_back() -> None:
-    """Let other threads go first from here on; those that this one starts stand back as well."""
-    if not sys.platform.startswith("linux"):
-        return  # elsewhere priorities are of whole processes
-    try:
-        thread = threading.get_native_id()
-        os.setpriority(os.PRIO_PROCESS, thread, max(os.getpriority(os.PRIO_PROCESS, thread), NICENESS))
-    except OSError:
-        return

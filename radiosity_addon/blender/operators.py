@@ -19,8 +19,11 @@ from .preferences import folder_of
 from .progress_text import progress_text
 from .properties import settings_of
 
-TICK = 0.03
-"""Seconds of baking between two redraws."""
+TICK = 0.005
+"""Seconds of looking after the bake between two redraws: the work itself goes on in its thread."""
+
+TURNS = 0.01
+"""Seconds between two looks."""
 
 # What still works while a bake runs: looking around.
 _NAVIGATION = {
@@ -88,7 +91,7 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
         except RadiosityError as error:
             return self._fail(context, error)
         manager = context.window_manager
-        self._timer = manager.event_timer_add(TICK / 3, window=context.window)
+        self._timer = manager.event_timer_add(TURNS, window=context.window)
         manager.progress_begin(0, 100)
         context.workspace.status_text_set(iface_("Esc cancels"))
         manager.modal_handler_add(self)

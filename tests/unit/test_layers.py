@@ -31,7 +31,7 @@ HOMES = {
     "mathutils": "blender",
     "bpy_extras": "blender",
     "gpu": "blender",
-    "xatlas": "lightmap.growers",
+    "xatlas": "lightmap.chart_process",
     "embreex": "solver.embree",
 }
 
