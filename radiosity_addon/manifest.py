@@ -67,7 +67,7 @@ def listed(report: Path) -> dict[str, dict[str, Any]]:
 def is_as_written(path: Path, told: dict[str, Any]) -> bool:
     """Tell whether a file is, to the byte, what a bake wrote."""
     try:
-        return path.stat().st_size == told["bytes"] and digest(path) == told["sha256"]
+        return bool(path.stat().st_size == told["bytes"] and digest(path) == told["sha256"])
     except OSError:
         return False
 

@@ -51,6 +51,12 @@ class BakeRecord(bpy.types.PropertyGroup):
     modifiers: bpy.props.CollectionProperty(  # type: ignore[valid-type]
         type=ModifierRecord, description="Modifiers that were switched off: their result is in the baked copy"
     )
+    fingerprint: bpy.props.StringProperty(  # type: ignore[valid-type]
+        description="What shape and reflectance were when the object was baked"
+    )
+    texels_per_metre: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        description="How fine the lightmap is, for a texel scale of 1"
+    )
     is_hidden: bpy.props.BoolProperty(  # type: ignore[valid-type]
         description="Stand-ins replace the object, which was hidden"
     )

@@ -28,10 +28,13 @@ _FILE_FORMATS = {"exr": ("OPEN_EXR", ".exr"), "png16": ("PNG", ".png")}
 _RESERVED_NAMES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 
 
-def page_file_names(result: BakeResult, settings: BakeSettings) -> list[str]:
+def page_file_names(
+    result: BakeResult, settings: BakeSettings, others: frozenset[str] = frozenset()
+) -> list[str]:
     """Name the file of every page: `lightmap.exr`, or one after each object.
 
-    The names differ from each other even where upper and lower case do not count.
+    The names differ from each other, and from stems of `others` in lower case, even where upper and lower
+    case do not count.
     """
     extension = _FILE_FORMATS[settings.format][1]
     stems = ["lightmap"] * len(result.pages)
@@ -39,7 +42,7 @@ def page_file_names(result: BakeResult, settings: BakeSettings) -> list[str]:
         for baked in result.objects:
             stems[baked.page] = sanitised_stem(baked.object.name)
     names: list[str] = []
-    taken: set[str] = set()
+    taken = set(others)
     for stem in stems:
         unique, number = stem, 1
         while unique.lower() in taken:
@@ -56,7 +59,9 @@ def sanitised_stem(name: str) -> str:
     return f"_{stem}" if not stem or _RESERVED_NAMES.fullmatch(stem) else stem
 
 
-def write_pages(result: BakeResult, settings: BakeSettings, folder: Path | None) -> list[bpy.types.Image]:
+def write_pages(
+    result: BakeResult, settings: BakeSettings, folder: Path | None, others: frozenset[str] = frozenset()
+) -> list[bpy.types.Image]:
     """Make an image of each page, saved into `folder` or packed into the .blend.
 
     Parameters
@@ -66,6 +71,8 @@ def write_pages(result: BakeResult, settings: BakeSettings, folder: Path | None)
         Its format and atlas name the files.
     folder : Path or None
         None packs the images.
+    others : frozenset of str
+        Stems of file names, in lower case, that are taken.
 
     Returns
     -------
@@ -80,7 +87,7 @@ def write_pages(result: BakeResult, settings: BakeSettings, folder: Path | None)
     scale = png16_scale(*[page.pixels for page in result.pages]) if settings.format == "png16" else None
     images: list[bpy.types.Image] = []
     try:
-        for page, file_name in zip(result.pages, page_file_names(result, settings), strict=True):
+        for page, file_name in zip(result.pages, page_file_names(result, settings, others), strict=True):
             images.append(_new_image(page, settings.format, file_name, scale))
             _store(images[-1], folder, file_name)
     except BaseException:

@@ -22,6 +22,7 @@ from .export import export_scene
 from .export_sources import Export
 from .images import lightmap_files, relative_path, set_folder, write_pages
 from .live_picture import seen_triangles
+from .only_changed import Kept, narrow, remember
 from .output import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, OutputFolder, save_copy
 from .preview import render_preview
 from .rebake import originals_shown, replacing_earlier, seal
@@ -45,6 +46,7 @@ def run_bake(
     output: OutputFolder | None,
     with_copy: bool = False,
     patient: bool = False,
+    only_changed: bool = False,
 ) -> BakeJob:
     """Bake the context's scene and show the lightmaps on its objects.
 
@@ -64,6 +66,8 @@ def run_bake(
     patient : bool
         Return from every `next` within a moment, for a window: the steps between the
         export and the lightmaps, which know nothing of Blender, run in a thread.
+    only_changed : bool
+        Give new lightmaps to what has changed since the last bake, see `only_changed.py`.
 
     Yields
     ------
@@ -80,6 +84,7 @@ def run_bake(
         Whatever cannot be baked or written, in one line.
     """
     seconds: dict[str, float] = {}
+    wanted = settings
     with ExitStack() as stack:
         if output is not None:
             # Opened first: a folder that cannot be written is no news for after the work.
@@ -89,19 +94,24 @@ def run_bake(
             export = export_scene(context, settings)
             check_targets(export)
             seen = seen_triangles(context, export)
+        kept = Kept()
+        if only_changed:
+            export, settings, kept = narrow(context.scene, export, settings)
         solved = APPLY if with_copy else APPLY_ALONE
         result = yield from _solve(export, settings, seen, patient, solved)
-        result = replace(result, warnings=(*edited, *result.warnings))
+        result = replace(result, warnings=(*edited, *kept.warnings(), *result.warnings))
         seconds.update(result.seconds)
         yield Progress("apply", solved)
         if with_copy and output is not None:
             return (yield from _deliver(context, settings, export, result, output, seconds))
-        with replacing_earlier(context), _timed(seconds, "apply"):
-            images = _show(context, settings, export, result, output)
+        with replacing_earlier(context, kept.objects), _timed(seconds, "apply"):
+            images = _show(context, settings, export, result, output, kept)
             report = BakeReport.of(result, lightmap_files(images, settings), seconds)
             if output is not None:
-                report.listing(output.files()).write(output.staging / REPORT_NAME)
+                whole = report.joined(output.path / REPORT_NAME, kept.objects)
+                whole.listing(output.files()).write(output.staging / REPORT_NAME)
                 output.publish()
+            remember(context.scene, export, result, wanted)
         runtime.remember(
             context.scene, report.as_dict(), "" if output is None else relative_path(output.path)
         )
@@ -169,9 +179,11 @@ def _show(
     export: Export,
     result: BakeResult,
     output: OutputFolder | None,
+    kept: Kept | None = None,
 ) -> list[bpy.types.Image]:
-    """Make the images and put them on the objects."""
-    images = write_pages(result, settings, None if output is None else output.staging)
+    """Make the images and put them on the objects; files of what is kept stay."""
+    others = frozenset() if kept is None else kept.files
+    images = write_pages(result, settings, None if output is None else output.staging, others)
     try:
         if output is not None:
             set_folder(images, output.path)

@@ -11,7 +11,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..alike import one_of_each
-from ..errors import RadiosityError
+from ..errors import NothingToDoError, RadiosityError
 from ..remaining import RemainingTime
 from . import live_view, runtime
 from .check_panel import look_first
@@ -131,7 +131,8 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
         folder = output_folder(context)
         self._report = None
         output = None if folder is None else OutputFolder(folder)
-        self._job = run_bake(context, settings, output, patient=in_window)
+        changed = context.scene.radiosity.scope == "changed"
+        self._job = run_bake(context, settings, output, patient=in_window, only_changed=changed)
         runtime.running.active = True
         runtime.running.stop = lambda: self._end(bpy.context)
         runtime.running.stage, runtime.running.fraction = "export", 0.0
@@ -182,7 +183,8 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
     def _fail(self, context: bpy.types.Context, error: RadiosityError) -> set[str]:
         self._end(context)
         self._return_to_edit_mode(context)
-        self.report({"ERROR"}, " ".join(str(error).split()))
+        kind = "INFO" if isinstance(error, NothingToDoError) else "ERROR"
+        self.report({kind}, " ".join(str(error).split()))
         return {"CANCELLED"}
 
     def _return_to_edit_mode(self, context: bpy.types.Context) -> None:

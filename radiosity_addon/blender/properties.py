@@ -81,6 +81,12 @@ class RadiositySettings(MethodProperties, bpy.types.PropertyGroup):
         items=[
             ("all", "All", "Every mesh that shows in renders"),
             ("selected", "Selected", "The selected meshes that show in renders"),
+            (
+                "changed",
+                "Changed",
+                "Those whose shape, place or reflectance differs from the last bake; others keep their "
+                "lightmaps, without new shadows. All, where the light has changed",
+            ),
         ],
         default="all",
     )
@@ -221,6 +227,11 @@ class RadiositySettings(MethodProperties, bpy.types.PropertyGroup):
         description="Show the lightmaps alone instead of base color × lightmap",
         default=False,
         update=_show_lightmap_only,
+    )
+    baked_light: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Baked Light",
+        description="What lamps and settings were at the last bake",
+        options={"HIDDEN"},
     )
     last_bake: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Last Bake",

@@ -88,6 +88,7 @@ def forget(scene: bpy.types.Scene) -> None:
     """Drop the scene's memory of its last bake, and all trace of us where nothing else was set."""
     group = scene.radiosity
     group.property_unset("last_bake")
+    group.property_unset("baked_light")
     names = [prop.identifier for prop in group.bl_rna.properties if not prop.is_readonly]
     if not any(map(group.is_property_set, names)):
         scene.property_unset("radiosity")
