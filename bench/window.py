@@ -9,7 +9,10 @@ import argparse
 import json
 import os
 import shutil
+import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from build_tools import extension, real_blender
@@ -29,6 +32,15 @@ WINDOW = ("640", "400")
 
 def measure(quality: str, resolution: int, bakes: int, priority: int) -> dict:
     """Bake in a window and return what was seen."""
+    with cornell_window() as (installed, scene):
+        if priority:
+            os.nice(-priority)
+        return drive(installed, scene, "drive_frames.py", WINDOW, quality, str(resolution), str(bakes))
+
+
+@contextmanager
+def cornell_window() -> Iterator[tuple[Installed, Path]]:
+    """A real Blender with the extension as it is here, and the Cornell box as a .blend."""
     blender = real_blender.find()
     if blender is None:
         sys.exit("bench.window: no real Blender here; see `python3 build.py real-blender`")
@@ -39,24 +51,27 @@ def measure(quality: str, resolution: int, bakes: int, priority: int) -> dict:
         installed = Installed(blender, folder, folder / "user")
         installed.resources.mkdir()
         zip_file = next(path for path in zips if "linux_x64" in path.name)
-        install = ["--command", "extension", "install-file", "-r", "user_default", "-e", zip_file]
-        _must(installed.run(*install))
-        scene, answer = folder / "cornell.blend", folder / "frames.json"
+        _must(installed.run("--command", "extension", "install-file", "-r", "user_default", "-e", zip_file))
+        scene = folder / "cornell.blend"
         _must(installed.script("save_cornell_box.py", scene))
-        drive = [scene, "--enable-event-simulate", "--window-geometry", "0", "0", *WINDOW]
-        drive += ["--python", folder / "drive_frames.py", "--", answer, quality, str(resolution), str(bakes)]
-        if priority:
-            os.nice(-priority)
-        done = installed.run(*drive, window=True, timeout=1200)
-        if not answer.exists():
-            sys.exit(done.stdout)
-        seen: dict = json.loads(answer.read_text())
-        if seen["failure"] or "Traceback" in done.stdout:
-            sys.exit(f"{seen['failure']}\n{done.stdout}")
-        return seen
+        yield installed, scene
 
 
-def _must(done) -> None:
+def drive(installed: Installed, scene: Path, script: str, window: tuple[str, str], *words: str) -> dict:
+    """Run a script of `inside/` in a window and return its answer."""
+    answer = scene.with_name("answer.json")
+    command = [scene, "--enable-event-simulate", "--window-geometry", "0", "0", *window]
+    command += ["--python", installed.folder / script, "--", answer, *words]
+    done = installed.run(*command, window=True, timeout=1200)
+    if not answer.exists():
+        sys.exit(done.stdout)
+    seen: dict = json.loads(answer.read_text())
+    if seen["failure"] or "Traceback" in done.stdout:
+        sys.exit(f"{seen['failure']}\n{done.stdout}")
+    return seen
+
+
+def _must(done: subprocess.CompletedProcess[str]) -> None:
     if done.returncode != 0:
         sys.exit(done.stdout)
 

@@ -7,7 +7,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 
-FIRST_SECONDS, FIRST_FRACTION = 1.0, 0.02
+FIRST_SECONDS, FIRST_FRACTION = 1.0, 0.1
 """Nothing is said before so much time and so much of the work: the first steps tell nothing of the others."""
 
 RECENT = 0.35
