@@ -7,7 +7,6 @@ says which; whoever finds it later puts the earlier ones back, so that a result 
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import shutil
@@ -75,15 +74,18 @@ class Staging:
 def clean_up(target: Path) -> bool:
     """Undo what killed bakes have left in a folder; True if a half-published result was taken back.
 
-    Only folders with our mark that no living process holds are touched.
+    Only folders with our mark that no living process holds are touched; one whose earlier files cannot be put
+    back is kept, for they are in it.
     """
     taken_back = False
     for path in _abandoned(target):
         journal = path / JOURNAL
         if journal.exists():
-            with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
+            try:
                 _take_back(path, target, json.loads(journal.read_text(encoding="utf-8"))["names"])
-                taken_back = True
+            except (OSError, ValueError, KeyError, TypeError):
+                continue
+            taken_back = True
         shutil.rmtree(path, ignore_errors=True)
     return taken_back
 

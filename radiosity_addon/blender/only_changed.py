@@ -9,7 +9,6 @@ not renewed.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -82,15 +81,18 @@ def narrow(
             densities.append(record.texels_per_metre)
     if not kept or scene.radiosity.baked_light != light_fingerprint(bake_scene, settings):
         return everything
+    files = {name: _files(name) for name in kept}
+    if any(len(of) > 1 for of in files.values()):
+        return everything  # light groups, whose lightmaps are made together
     if len(kept) == len(pairs):
         raise NothingToDoError("nothing has changed since the last bake: there is nothing to do")
     narrowed = tuple(replace(item, bake=item.bake and item.name not in kept) for item in bake_scene.objects)
     if settings.atlas == "shared" and settings.texel_density is None:
         # As sharp as what is kept, on a page of their own.
         settings = replace(settings, texel_density=float(np.median(densities)), pages=1)
-    files = frozenset(_files(kept))
     narrow_scene = replace(bake_scene, objects=narrowed)
-    return replace(export, bake_scene=narrow_scene), settings, Kept(frozenset(kept), files)
+    taken = frozenset().union(*files.values())
+    return replace(export, bake_scene=narrow_scene), settings, Kept(frozenset(kept), taken)
 
 
 def remember(scene: bpy.types.Scene, export: Export, result: BakeResult, settings: BakeSettings) -> None:
@@ -151,17 +153,16 @@ def _bytes(value: Any) -> bytes:
     return np.round(np.asarray(value, dtype=np.float64), 5).astype(np.float32).tobytes()
 
 
-def _files(names: Iterable[str]) -> set[str]:
-    """Return the file names, without endings, of the images that these objects show."""
+def _files(name: str) -> frozenset[str]:
+    """Return the stems of the files, in lower case, of the lightmaps that an object shows."""
     found = set()
-    for name in names:
-        materials = bpy.data.objects[name, None].data.materials
-        trees = [material.node_tree for material in materials if material is not None]
-        while trees:
-            tree = trees.pop()
-            for node in tree.nodes if tree is not None else ():
-                if node.type == "GROUP" and node.node_tree is not None and is_made(node.node_tree):
-                    trees.append(node.node_tree)
-                elif node.type == "TEX_IMAGE" and node.image is not None and is_made(node.image):
-                    found.add(Path(node.image.filepath_raw or node.image.name).stem.lower())
-    return found
+    materials = bpy.data.objects[name, None].data.materials
+    trees = [material.node_tree for material in materials if material is not None]
+    while trees:
+        tree = trees.pop()
+        for node in tree.nodes if tree is not None else ():
+            if node.type == "GROUP" and node.node_tree is not None and is_made(node.node_tree):
+                trees.append(node.node_tree)
+            elif node.type == "TEX_IMAGE" and node.image is not None and is_made(node.image):
+                found.add(Path(node.image.filepath_raw or node.image.name).stem.lower())
+    return frozenset(found)

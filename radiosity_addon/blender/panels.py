@@ -107,6 +107,7 @@ class RADIOSITY_PT_advanced(_Panel, bpy.types.Panel):
         column = layout.column(heading="Viewport")
         column.prop(settings, "show_while_solving")
         column.prop(settings, "show_result")
+        layout.operator("radiosity.clean", icon="BRUSH_DATA")
 
 
 class RADIOSITY_PT_object(_Panel, bpy.types.Panel):
@@ -176,7 +177,6 @@ class RADIOSITY_PT_last_bake(_Panel, bpy.types.Panel):
         self.layout.prop(context.scene.radiosity, "lightmap_only")
         if last.folder:
             self.layout.operator("radiosity.open_folder", icon="FILE_FOLDER")
-        self.layout.operator("radiosity.clean", icon="BRUSH_DATA")
 
 
 class RADIOSITY_PT_warnings(_Panel, bpy.types.Panel):

@@ -13,7 +13,7 @@ import pytest
 
 import radiosity_addon
 from radiosity_addon.blender import runtime
-from radiosity_addon.blender.bake_record import recorded_objects
+from radiosity_addon.blender.bake_record import mark_made, recorded_objects
 from tests.blender.scenes import add_lamp, add_mesh, shader_material
 
 
@@ -189,3 +189,14 @@ def test_a_cancelled_one_leaves_the_earlier_bake(room: Path) -> None:
     job.close()
     assert shown() == ONE_PAGE
     assert digests(room) == before
+
+
+def test_objects_with_several_lightmaps_are_all_lit_anew(room: Path) -> None:
+    """As light groups have them, which are made together."""
+    image = bpy.data.images.new("lightmap_Kitchen", 4, 4)
+    mark_made(image)
+    (material,) = bpy.data.objects["Floor"].data.materials
+    material.node_tree.nodes.new("ShaderNodeTexImage").image = image
+    bpy.data.objects["Box"].location.x -= 0.5
+    assert bake() == {"FINISHED"}
+    assert shown() == ONE_PAGE

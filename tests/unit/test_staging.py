@@ -97,11 +97,11 @@ def test_folders_without_our_mark_are_left_alone(tmp_path: Path) -> None:
     assert (tmp_path / "thesis").read_text() == "years of work"
 
 
-def test_a_damaged_journal_takes_nothing_back(tmp_path: Path) -> None:
+def test_a_damaged_journal_takes_nothing_back_and_loses_nothing(tmp_path: Path) -> None:
     (tmp_path / "a").write_text("old")
     killed(tmp_path, -1)
     (folder,) = staging_folders(tmp_path)
     (folder / JOURNAL).write_text("{")
     assert not clean_up(tmp_path)
     assert contents(tmp_path) == {"a": "old"}
-    assert staging_folders(tmp_path) == []
+    assert staging_folders(tmp_path) == [folder]
