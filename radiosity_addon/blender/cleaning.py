@@ -13,11 +13,8 @@ import bpy
 from bpy.app.handlers import persistent
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ..manifest import LIGHTMAPS, forget, is_as_written, listed
-from ..staging import clean_up
 from . import runtime
 from .operators import output_folder
-from .output import BLEND_NAME, PREVIEW_NAME, REPORT_NAME
 
 
 @dataclass(frozen=True)
@@ -38,6 +35,9 @@ class Unused:
 
 def unused_lightmaps(context: bpy.types.Context) -> Unused:
     """Find the lightmaps that bakes of the open file wrote and that it does not show."""
+    from ..manifest import LIGHTMAPS, is_as_written, listed
+    from .output import BLEND_NAME, PREVIEW_NAME, REPORT_NAME
+
     images = [image for image in bpy.data.images if image.filepath_raw]
     shown = {Path(bpy.path.abspath(each.filepath_raw, library=each.library)).resolve() for each in images}
     here = Path(bpy.data.filepath).resolve() if bpy.data.filepath else None
@@ -66,6 +66,9 @@ def delete(unused: Unused) -> int:
     OSError
         If one cannot be deleted; those before it are gone.
     """
+    from ..manifest import forget
+    from .output import REPORT_NAME
+
     for path in unused.files:
         path.unlink()
         forget(path.parent / REPORT_NAME, [path.name])
@@ -129,6 +132,8 @@ class RADIOSITY_OT_clean(bpy.types.Operator):
 @persistent
 def _recover(*_: object) -> None:
     """Put back what a bake that was killed while it wrote has left half done beside the file just opened."""
+    from ..staging import clean_up
+
     for folder in {scene_folder for scene in bpy.data.scenes if (scene_folder := _last_folder(scene))}:
         if clean_up(folder):
             for image in bpy.data.images:
