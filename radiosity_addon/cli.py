@@ -59,7 +59,7 @@ def main(
     try:
         request = build_parser(prog).parse_args(sys.argv[1:] if argv is None else list(argv))
         settings = settings_of(request) if request.verb == "bake" else None
-        if settings is not None:
+        if settings is not None and not request.check:
             request.output = bake_output(request, loaded)
             check_plot(request.plot)
             check_keeping(request, settings)
@@ -239,6 +239,7 @@ def _add_bake(parser: argparse.ArgumentParser) -> None:
     )
     add("--seed", type=int, default=default.seed, metavar="N", help="random seed (default 0)")
     add("--threads", type=int, default=default.threads, metavar="N", help="threads (default: all cores)")
+    add("--check", action="store_true", help="bake nothing; say what would be baked, and what is odd")
     keeping = parser.add_mutually_exclusive_group()
     keeping.add_argument(
         "--keep", action="store_true", help="also write a sidecar, by which --relight lights the bake anew"
@@ -307,6 +308,8 @@ def _run(
         )
     try:
         with Console(quiet=request.quiet) as console:
+            if settings is not None and request.check:
+                return commands.check(request.scene, loaded, request.output, settings, console)
             if settings is not None and request.relight:
                 from .blender.relight_command import relight
 

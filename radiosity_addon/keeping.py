@@ -40,6 +40,12 @@ def can_keep(settings: BakeSettings) -> bool:
     return settings.method == "hierarchical" and settings.quantity != "residual"
 
 
+def moves_alone(bake_scene: BakeScene, settings: BakeSettings, keeping: Keeping | None) -> bool:
+    """Tell whether all that a bake has to do is to follow what moved since an earlier one that was kept."""
+    earlier = None if keeping is None else keeping.earlier
+    return earlier is not None and can_move(earlier, bake_scene, settings)
+
+
 def bake_steps(
     bake_scene: BakeScene, settings: BakeSettings, keeping: Keeping | None, sidecar: Path | None
 ) -> Generator[Progress, None, tuple[BakeResult, KeptBake | None]]:
@@ -58,9 +64,8 @@ def bake_steps(
     """
     if keeping is None:
         return (yield from bake(bake_scene, settings)), None
-    earlier = keeping.earlier
-    if earlier is not None and can_move(earlier, bake_scene, settings):
-        result, kept = yield from bake_moved(earlier, bake_scene)
+    if keeping.earlier is not None and moves_alone(bake_scene, settings, keeping):
+        result, kept = yield from bake_moved(keeping.earlier, bake_scene)
     else:
         result, kept = yield from bake_and_keep(bake_scene, settings)
     if sidecar is not None:

@@ -6,7 +6,7 @@ import json
 import math
 import os
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -15,6 +15,7 @@ import numpy as np
 
 from .bake_scene import LIGHTMAP_UV_LAYER, BakeObject, BakeResult
 from .errors import BakeError
+from .manifest import FILES
 
 T = TypeVar("T")
 
@@ -104,6 +105,25 @@ class BakeReport:
     def as_dict(self) -> dict[str, Any]:
         """The report as report.json holds it."""
         return self.data
+
+    def joined(self, earlier: Path, objects: Collection[str]) -> BakeReport:
+        """Return the report with what the one before says of objects that have kept their lightmaps."""
+        try:
+            told = json.loads(earlier.read_text(encoding="utf-8")) if objects else {}
+            entries = [dict(entry) for entry in told.get("objects", ()) if entry["object"] in objects]
+            numbers = sorted({entry["atlas"] for entry in entries})
+            pages = [told["pages"][number] for number in numbers]
+        except (OSError, ValueError, KeyError, TypeError, IndexError, AttributeError):
+            return self
+        count = len(self.data["pages"])
+        for entry in entries:
+            entry["atlas"] = count + numbers.index(entry["atlas"])
+        joined = {"objects": [*self.data["objects"], *entries], "pages": [*self.data["pages"], *pages]}
+        return BakeReport({**self.data, **joined})
+
+    def listing(self, files: Mapping[str, Mapping[str, Any]]) -> BakeReport:
+        """Return the report with a list of all that bakes have written beside it, see `manifest.py`."""
+        return BakeReport({**self.data, FILES: {name: dict(told) for name, told in files.items()}})
 
     def write(self, path: Path) -> None:
         """Write the report as JSON, over an older one only once it is whole.

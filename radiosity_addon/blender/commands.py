@@ -91,6 +91,32 @@ def bake(
         console.lines(summary(str(output), files, report.as_dict()))
 
 
+def check(
+    scene: Path | None, loaded: Path | None, output: Path | None, settings: BakeSettings, console: Console
+) -> int:
+    """Say what a bake would be and what is odd, without baking; 1 where it would stop, 0 otherwise.
+
+    Parameters
+    ----------
+    scene, loaded : Path or None
+        As for `bake`.
+    output : Path or None
+        Where the bake would write.
+    """
+    with registered():
+        from .check_panel import figures
+        from .inspection import ERROR, inspect
+
+        console.progress("open", 0.0)
+        open_or_build(scene, loaded)
+        folder = output.expanduser().resolve() if output is not None else Path.cwd()
+        found = inspect(bpy.context, settings, folder)
+        lines = [f"  {name:<12} {value}" for name, value in figures(found)]
+        odd = [f"  {finding.level.lower():<8} {finding.message}" for finding in found.findings]
+        console.lines(["a bake would be:", *lines, *(["what is odd:", *odd] if odd else ["nothing is odd"])])
+        return int(any(finding.level == ERROR for finding in found.findings))
+
+
 def restore(scene: Path | None, loaded: Path | None, output: Path, console: Console) -> None:
     """Take the bake out of a file and write the result to another.
 

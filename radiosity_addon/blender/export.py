@@ -62,7 +62,7 @@ def export_scene(context: bpy.types.Context, settings: BakeSettings, dark: bool 
     collected.groups.extend([name_on(shown)] * len(world))
     collected.warnings.extend(warnings)
     _check_names(context, collected.pieces, settings)
-    chosen = _chosen(context, collected.pieces, settings.objects)
+    chosen = chosen_pieces(context, collected.pieces, settings.objects)
     for piece in chosen:
         _check_uv_layers(piece)
     return _assemble(context, collected, {piece.source.name for piece in chosen}, settings)
@@ -193,8 +193,16 @@ def _emitters(
     return emitter, materials, tuple(names[group] for _, group in rows)
 
 
-def _chosen(context: bpy.types.Context, pieces: list[Piece], names: tuple[str, ...] | None) -> list[Piece]:
-    """Return the pieces that get a lightmap."""
+def chosen_pieces(
+    context: bpy.types.Context, pieces: list[Piece], names: tuple[str, ...] | None
+) -> list[Piece]:
+    """Return the pieces that get a lightmap.
+
+    Raises
+    ------
+    SceneError, UsageError
+        If there is none, or one that was asked for by name can have none.
+    """
     if names is None:
         bakeable = [piece for piece in pieces if piece.bakeable]
         if not bakeable:

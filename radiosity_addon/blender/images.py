@@ -33,12 +33,15 @@ _FILE_FORMATS = {"exr": ("OPEN_EXR", ".exr"), "png16": ("PNG", ".png")}
 _RESERVED_NAMES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 
 
-def page_file_names(result: BakeResult, settings: BakeSettings) -> list[str]:
+def page_file_names(
+    result: BakeResult, settings: BakeSettings, others: frozenset[str] = frozenset()
+) -> list[str]:
     """Name the file of every page: `lightmap.exr`, or one after each object.
 
-    The names differ from each other even where upper and lower case do not count.
+    The names differ from each other, and from stems of `others` in lower case, even where upper and lower
+    case do not count.
     """
-    return _file_names(_stems(result, settings), settings, set())
+    return _file_names(_stems(result, settings), settings, set(others))
 
 
 def group_file_names(result: BakeResult, settings: BakeSettings) -> list[list[str]]:
@@ -79,7 +82,9 @@ def sanitised_stem(name: str) -> str:
     return f"_{stem}" if not stem or _RESERVED_NAMES.fullmatch(stem) else stem
 
 
-def write_pages(result: BakeResult, settings: BakeSettings, folder: Path | None) -> list[bpy.types.Image]:
+def write_pages(
+    result: BakeResult, settings: BakeSettings, folder: Path | None, others: frozenset[str] = frozenset()
+) -> list[bpy.types.Image]:
     """Make an image of each page, saved into `folder` or packed into the .blend.
 
     Parameters
@@ -89,6 +94,8 @@ def write_pages(result: BakeResult, settings: BakeSettings, folder: Path | None)
         Its format and atlas name the files.
     folder : Path or None
         None packs the images.
+    others : frozenset of str
+        Stems of file names, in lower case, that are taken.
 
     Returns
     -------
@@ -100,7 +107,7 @@ def write_pages(result: BakeResult, settings: BakeSettings, folder: Path | None)
     BakeError
         If a file cannot be written.
     """
-    return write_images(result.pages, page_file_names(result, settings), settings, folder)
+    return write_images(result.pages, page_file_names(result, settings, others), settings, folder)
 
 
 def write_images(

@@ -11,7 +11,7 @@ import bpy
 
 from ..background import in_thread
 from ..bake_scene import BakeResult, Progress
-from ..keeping import Keeping, bake_steps
+from ..keeping import Keeping, bake_steps, moves_alone
 from ..relighting import KeptBake
 from ..report import BakeReport
 from ..settings import BakeSettings
@@ -23,9 +23,11 @@ from .bake_record import remove_datablocks
 from .export import export_scene
 from .export_sources import Export
 from .group_images import GroupImages, each_image, write_groups
-from .images import lightmap_files, set_folder, write_pages
+from .images import lightmap_files, relative_path, set_folder, write_pages
 from .light_shares import crowded_materials
 from .live_picture import Seen, seen_triangles
+from .only_changed import Kept as Others
+from .only_changed import narrow, remember
 from .output import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, OutputFolder, save_copy
 from .preview import SAMPLES, render_preview
 from .rebake import originals_shown, replacing_earlier, seal
@@ -35,6 +37,9 @@ BakeJob = Generator[Progress, None, BakeReport]
 
 # How far the whole is when each part begins; rough, from bakes at medium quality.
 SOLVE, APPLY, SAVE, PREVIEW = 0.03, 0.85, 0.89, 0.92
+
+APPLY_ALONE = 0.98
+"""How far it is when applying begins, where neither a copy nor a preview is written."""
 
 WRITING_STAGES = frozenset({"apply", "save", "preview", "write"})
 """Stages in which an exception from outside, such as Ctrl-C, would be lost or do harm."""
@@ -47,6 +52,7 @@ def run_bake(
     with_copy: bool = False,
     patient: bool = False,
     keeping: Keeping | None = None,
+    only_changed: bool = False,
 ) -> BakeJob:
     """Bake the context's scene and show the lightmaps on its objects.
 
@@ -68,6 +74,9 @@ def run_bake(
         export and the lightmaps, which know nothing of Blender, run in a thread.
     keeping : Keeping or None
         If given, the bake is kept for relighting: in memory, and in a sidecar if that is asked for.
+    only_changed : bool
+        Give new lightmaps to what has changed since the last bake, see `only_changed.py`, which cannot be
+        kept then; if things have only moved since a bake that was kept, all lightmaps follow.
 
     Yields
     ------
@@ -84,6 +93,7 @@ def run_bake(
         Whatever cannot be baked or written, in one line.
     """
     seconds: dict[str, float] = {}
+    wanted = settings
     with ExitStack() as stack:
         if output is not None:
             # Opened first: a folder that cannot be written is no news for after the work.
@@ -93,28 +103,39 @@ def run_bake(
             export = export_scene(context, settings, dark=keeping is not None)
             check_targets(export)
             seen = seen_triangles(context, export)
+        others = Others()
+        if only_changed and not moves_alone(export.bake_scene, settings, keeping):
+            export, settings, others = narrow(context.scene, export, settings)
+            keeping = None if others.objects else keeping
+        solved = APPLY if with_copy else APPLY_ALONE
         sidecar = output.staging / SIDECAR_NAME if output and keeping and keeping.sidecar else None
         steps = bake_steps(export.bake_scene, settings, keeping, sidecar)
-        result, kept = yield from _solve(steps, seen, patient)
-        result = replace(result, warnings=(*edited, *result.warnings))
+        result, kept = yield from _solve(steps, seen, patient, solved)
+        result = replace(result, warnings=(*edited, *others.warnings(), *result.warnings))
         seconds.update(result.seconds)
-        yield Progress("apply", APPLY)
+        yield Progress("apply", solved)
         if with_copy and output is not None:
             return (yield from deliver(context, settings, export, result, output, seconds, keeping))
-        with replacing_earlier(context), timed(seconds, "apply"):
-            images, groups = _show(context, settings, export, result, output, keeping)
+        with replacing_earlier(context, others.objects), timed(seconds, "apply"):
+            images, groups = _show(context, settings, export, result, output, keeping, others.files)
             report = _report(result, images, groups, settings, seconds)
             if output is not None:
-                report.write(output.staging / REPORT_NAME)
+                whole = report.joined(output.path / REPORT_NAME, others.objects)
+                whole.listing(output.files()).write(output.staging / REPORT_NAME)
                 output.publish()
-        runtime.remember(context.scene, report.as_dict(), "" if output is None else str(output.path))
+            remember(context.scene, export, result, wanted)
+        folder = "" if output is None else relative_path(output.path)
+        runtime.remember(context.scene, report.as_dict(), folder)
         _remember_kept(context.scene, keeping, kept)
         kept_details.keep(context.scene, result, [image.name for image in images])
     return report
 
 
 def _solve(
-    baking: Generator[Progress, None, tuple[BakeResult, KeptBake | None]], seen: Array, patient: bool
+    baking: Generator[Progress, None, tuple[BakeResult, KeptBake | None]],
+    seen: Array,
+    patient: bool,
+    end: float,
 ) -> Generator[Progress, None, tuple[BakeResult, KeptBake | None]]:
     """Run the pipeline, its progress scaled to its share of the whole, its pictures to what is `seen`."""
     steps = in_thread(baking) if patient else baking
@@ -127,7 +148,7 @@ def _solve(
                 return done.value
             picture = texels = None
             if progress is not None:
-                shown = Progress(progress.stage, SOLVE + (APPLY - SOLVE) * progress.fraction)
+                shown = Progress(progress.stage, SOLVE + (end - SOLVE) * progress.fraction)
                 picture, texels = only.of_elements(progress.picture), only.of_texels(progress.texels)
             # Each picture comes once, however long the step after it takes.
             yield replace(shown, picture=picture, texels=texels)
@@ -169,7 +190,7 @@ def deliver(
         with timed(seconds, "preview"):
             render_preview(context, output.staging / PREVIEW_NAME, settings, samples)
         report = _report(result, images, groups, settings, seconds)
-        report.write(output.staging / REPORT_NAME)
+        report.listing(output.files()).write(output.staging / REPORT_NAME)
         yield Progress("write", 1.0)
         output.publish()
     except BaseException:
@@ -187,10 +208,11 @@ def _show(
     result: BakeResult,
     output: OutputFolder | None,
     keeping: Keeping | None,
+    taken: frozenset[str] = frozenset(),
 ) -> tuple[list[bpy.types.Image], GroupImages]:
-    """Make the images, also those of light groups, and put them on the objects."""
+    """Make the images, also those of light groups, and put them on the objects; files `taken` stay."""
     folder = None if output is None else output.staging
-    images = write_pages(result, settings, folder)
+    images = write_pages(result, settings, folder, taken)
     groups: GroupImages = {}
     try:
         groups = write_groups(result, settings, folder)

@@ -4,18 +4,31 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..alike import one_of_each
-from ..errors import RadiosityError
+from ..errors import NothingToDoError, RadiosityError
+from ..remaining import RemainingTime
 from . import kept_bakes, live_state, live_view, runtime
+from .check_panel import look_first
+from .preferences import folder_of
+from .progress_text import progress_text
 from .properties import settings_of
 from .relight_properties import keeps
 
-TICK = 0.03
-"""Seconds of baking between two redraws."""
+if TYPE_CHECKING:
+    from ..keeping import Keeping
+    from ..settings import BakeSettings
+
+TICK = 0.005
+"""Seconds of looking after the bake between two redraws: the work itself goes on in its thread."""
+
+TURNS = 0.01
+"""Seconds between two looks."""
 
 # What still works while a bake runs: looking around.
 _NAVIGATION = {
@@ -44,6 +57,7 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
     _job: Any = None  # BakeJob while a bake runs
     _report: Any = None  # BakeReport once it is done
     _timer: bpy.types.Timer | None = None
+    _remaining: Any = None  # RemainingTime of the bake that runs
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -74,13 +88,17 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
         if bpy.app.background or context.window is None:
             return self.execute(context)
         try:
+            if look_first(context):
+                self.report({"INFO"}, "Look at what is odd before this scene is baked for the first time")
+                bpy.ops.radiosity.check("INVOKE_DEFAULT")
+                return {"CANCELLED"}
             self._begin(context, in_window=True)
         except RadiosityError as error:
             return self._fail(context, error)
         manager = context.window_manager
-        self._timer = manager.event_timer_add(TICK / 3, window=context.window)
+        self._timer = manager.event_timer_add(TURNS, window=context.window)
         manager.progress_begin(0, 100)
-        context.workspace.status_text_set("Baking radiosity…  Esc: cancel")
+        context.workspace.status_text_set(iface_("Esc cancels"))
         manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
@@ -110,7 +128,6 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
         self._end(context)
 
     def _begin(self, context: bpy.types.Context, in_window: bool) -> None:
-        from ..keeping import Keeping
         from .job import run_bake
         from .output import OutputFolder
 
@@ -120,16 +137,29 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
         folder = output_folder(context)
         self._report = None
         output = None if folder is None else OutputFolder(folder)
-        chosen = context.scene.radiosity_relight
-        held = kept_bakes.find(context.scene) if chosen.only_moved else None
-        earlier = None if held is None else held.bake
-        keeping = Keeping(chosen.sidecar, earlier=earlier) if keeps(context.scene, settings) else None
-        self._job = run_bake(context, settings, output, patient=in_window, keeping=keeping)
+        changed = context.scene.radiosity.scope == "changed"
+        keeping = self._keeping(context.scene, settings)
+        self._job = run_bake(
+            context, settings, output, patient=in_window, keeping=keeping, only_changed=changed
+        )
         runtime.running.active = True
         runtime.running.stop = lambda: self._end(bpy.context)
-        runtime.running.stage, runtime.running.fraction = "Starting", 0.0
+        runtime.running.stage, runtime.running.fraction = "export", 0.0
+        runtime.running.seconds_left = None
+        self._remaining = RemainingTime()
         if in_window and context.scene.radiosity.show_while_solving:
             live_view.begin(context.scene)
+
+    @staticmethod
+    def _keeping(scene: bpy.types.Scene, settings: BakeSettings) -> Keeping | None:
+        """Return how the bake is to be kept for relighting; None if it is not."""
+        from ..keeping import Keeping
+
+        if not keeps(scene, settings):
+            return None
+        chosen = scene.radiosity_relight
+        held = kept_bakes.find(scene) if chosen.only_moved else None
+        return Keeping(chosen.sidecar, earlier=None if held is None else held.bake)
 
     def _advance(self, seconds: float) -> bool:
         """Bake for about so long; True once it is done."""
@@ -141,6 +171,7 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
                 self._report = done.value
                 return True
             runtime.running.stage, runtime.running.fraction = progress.stage, progress.fraction
+            runtime.running.seconds_left = self._remaining.update(progress.fraction)
             if progress.picture is not None:
                 live_view.show(progress.picture)
             if progress.texels is not None:
@@ -150,9 +181,7 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
     def _show_progress(self, context: bpy.types.Context) -> None:
         running = runtime.running
         context.window_manager.progress_update(int(100 * running.fraction))
-        context.workspace.status_text_set(
-            f"Baking radiosity: {running.stage}, {running.fraction:.0%}    Esc: cancel"
-        )
+        context.workspace.status_text_set(f"{progress_text(running)}    {iface_('Esc cancels')}")
         redraw_sidebars(context)
 
     def _finish(self, context: bpy.types.Context) -> set[str]:
@@ -163,18 +192,21 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
         if context.scene.radiosity.lightmap_only:
             set_lightmap_only(True)
         taken = sum(report["seconds"].values())
-        self.report({"INFO"}, f"Baked {len(report['objects'])} objects in {taken:.1f} s")
+        message = rpt_("Baked {} objects in {:.1f} s")
+        self.report({"INFO"}, message.format(len(report["objects"]), taken))
         warnings = one_of_each(report["warnings"])
         for warning in warnings[:3]:
             self.report({"WARNING"}, f"{warning['name']}: {warning['message']}")
         if len(warnings) > 3:
-            self.report({"WARNING"}, f"and {len(warnings) - 3} more warnings, listed in the panel")
+            message = rpt_("and {} more warnings, listed in the panel")
+            self.report({"WARNING"}, message.format(len(warnings) - 3))
         return {"FINISHED"}
 
     def _fail(self, context: bpy.types.Context, error: RadiosityError) -> set[str]:
         self._end(context)
         self._return_to_edit_mode(context)
-        self.report({"ERROR"}, " ".join(str(error).split()))
+        kind = "INFO" if isinstance(error, NothingToDoError) else "ERROR"
+        self.report({kind}, " ".join(str(error).split()))
         return {"CANCELLED"}
 
     def _return_to_edit_mode(self, context: bpy.types.Context) -> None:
@@ -227,7 +259,7 @@ class RADIOSITY_OT_restore(bpy.types.Operator):
         if not count:
             self.report({"INFO"}, "Nothing to restore: no object shows a lightmap")
             return {"CANCELLED"}
-        self.report({"INFO"}, f"Restored {count} objects")
+        self.report({"INFO"}, rpt_("Restored {} objects").format(count))
         return {"FINISHED"}
 
 
@@ -241,7 +273,10 @@ class RADIOSITY_OT_add_cornell_box(bpy.types.Operator):
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
         """Offer it unless a bake is running."""
-        return not runtime.running.active
+        if runtime.running.active:
+            cls.poll_message_set("A bake is running; press Esc to cancel it")
+            return False
+        return True
 
     def execute(self, _context: bpy.types.Context) -> set[str]:
         """Build the box, in this scene if it is empty, and show it."""
@@ -271,7 +306,7 @@ class RADIOSITY_OT_open_folder(bpy.types.Operator):
         last = runtime.last_bake(context.scene)
         folder = bpy.path.abspath(last.folder) if last is not None else ""
         if not Path(folder).is_dir():
-            self.report({"ERROR"}, f"The folder '{folder}' is not there any more")
+            self.report({"ERROR"}, rpt_("The folder '{}' is not there any more").format(folder))
             return {"CANCELLED"}
         bpy.ops.wm.path_open(filepath=folder)
         return {"FINISHED"}
@@ -279,9 +314,7 @@ class RADIOSITY_OT_open_folder(bpy.types.Operator):
 
 def output_folder(context: bpy.types.Context) -> Path | None:
     """Return where the panel's bake writes; None packs, for an unsaved file has no place."""
-    from .properties import DEFAULT_FOLDER
-
-    folder = context.scene.radiosity.output_folder.strip() or DEFAULT_FOLDER
+    folder = folder_of(context)
     if folder.startswith("//") and not bpy.data.filepath:
         return None
     return Path(bpy.path.abspath(folder)).resolve()

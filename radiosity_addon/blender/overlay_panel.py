@@ -10,7 +10,7 @@ from . import overlay_properties as kinds
 from . import runtime
 from .kept_details import details_of
 from .overlay_properties import overlay_of
-from .panels import _draw_text, _Panel
+from .panels import _Panel, draw_text
 
 _SETTINGS = {
     kinds.FALSE_COLOR: ("unit",),
@@ -45,7 +45,7 @@ class RADIOSITY_PT_overlays(_Panel, bpy.types.Panel):
         layout.prop(settings, "show")
         reason = missing(context)
         if reason:
-            _draw_text(layout.box(), reason, "INFO", context)
+            draw_text(layout.box(), reason, "INFO", context)
             return
         column = layout.column()
         for name in _SETTINGS.get(settings.show, ()):

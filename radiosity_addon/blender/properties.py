@@ -20,16 +20,15 @@ from ..settings import (
 )
 from .method_properties import MethodProperties, given_settings
 from .object_roles import BAKE, BAKEABLE_TYPES
+from .preferences import DEFAULT_FOLDER, memory_limit_of, threads_of
 
 DEFAULTS = BakeSettings()
 
 SHARED_FIELDS = (
     *("atlas", "quantity", "light", "format"),
-    *("max_resolution", "mip_levels", "sky", "keep_uvs", "seed", "threads"),
+    *("max_resolution", "mip_levels", "sky", "keep_uvs", "seed"),
 )
 """Settings of the panel that a bake takes as they are."""
-
-DEFAULT_FOLDER = "//lightmaps/"
 
 _LABELS = {
     "shared": ("Shared", "One image for all objects"),
@@ -82,6 +81,12 @@ class RadiositySettings(MethodProperties, bpy.types.PropertyGroup):
         items=[
             ("all", "All", "Every mesh that shows in renders"),
             ("selected", "Selected", "The selected meshes that show in renders"),
+            (
+                "changed",
+                "Changed",
+                "Those whose shape, place or reflectance differs from the last bake; others keep their "
+                "lightmaps, without new shadows. All, where the light has changed",
+            ),
         ],
         default="all",
     )
@@ -229,6 +234,11 @@ class RadiositySettings(MethodProperties, bpy.types.PropertyGroup):
         default=False,
         update=_show_lightmap_only,
     )
+    baked_light: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Baked Light",
+        description="What lamps and settings were at the last bake",
+        options={"HIDDEN"},
+    )
     last_bake: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Last Bake",
         description="Figures and warnings of the last bake",
@@ -258,7 +268,8 @@ def settings_of(context: bpy.types.Context) -> BakeSettings:
         objects=chosen,
         light_groups=group.use_light_groups,
         **{name: getattr(group, name) for name in SHARED_FIELDS},
-        **given_settings(group),
+        threads=threads_of(context),
+        **{"memory_limit": memory_limit_of(context), **given_settings(group)},
     )
 
 

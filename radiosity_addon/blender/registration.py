@@ -10,17 +10,22 @@ import bpy
 
 from . import (
     bake_record,
+    check_panel,
+    cleaning,
     cli_host,
     kept_bakes,
     light_group_operators,
     light_group_panels,
     light_group_properties,
+    object_panel,
     object_roles,
     operators,
     overlay_panel,
     overlay_properties,
     overlay_view,
     panels,
+    preferences,
+    preset_menu,
     properties,
     relight_operators,
     relight_panel,
@@ -29,13 +34,18 @@ from . import (
 )
 
 CLASSES = (
+    *preferences.CLASSES,
     *operators.CLASSES,
     *relight_operators.CLASSES,
     *light_group_operators.CLASSES,
+    *preset_menu.CLASSES,
     *panels.CLASSES,
     *relight_panel.CLASSES,
     *light_group_panels.CLASSES,
     *overlay_panel.CLASSES,
+    *check_panel.CLASSES,
+    *object_panel.CLASSES,
+    *cleaning.CLASSES,
 )
 
 _undo: list[Callable[[], None]] = []
@@ -55,6 +65,10 @@ def register() -> None:
         for cls in CLASSES:
             bpy.utils.register_class(cls)
             _undo.append(partial(bpy.utils.unregister_class, cls))
+        for module in (preset_menu, cleaning):
+            module.register()
+            _undo.append(module.unregister)
+        _undo.append(check_panel.forget_checks)
         _undo.append(runtime.stop_running)
         cli_host.register()
         _undo.append(cli_host.unregister)

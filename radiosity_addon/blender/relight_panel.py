@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 
 from . import kept_bakes, live_state, runtime
-from .panels import _draw_text, _Panel
+from .panels import _Panel, draw_text
 
 SHOWN_LIGHTS = 16
 
@@ -36,7 +36,7 @@ class RADIOSITY_PT_relight(_Panel, bpy.types.Panel):
         live.enabled = bool(chosen.mark)
         live.prop(context.window_manager, "radiosity_live", toggle=True, icon="REC")
         if live_state.state.message:
-            _draw_text(layout.box(), live_state.state.message, "ERROR", context)
+            draw_text(layout.box(), live_state.state.message, "ERROR", context)
         layout.use_property_split = True
         layout.use_property_decorate = False
         column = layout.column(heading="Next Bake")

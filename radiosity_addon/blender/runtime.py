@@ -27,6 +27,8 @@ class Running:
     active: bool = False
     stage: str = ""
     fraction: float = 0.0
+    seconds_left: float | None = None
+    """About how long it still takes; None as long as nobody can know."""
     stop: Callable[[], None] | None = None
     """Ends it from outside its operator."""
 
@@ -88,6 +90,7 @@ def forget(scene: bpy.types.Scene) -> None:
     kept_details.drop(scene)
     group = scene.radiosity
     group.property_unset("last_bake")
+    group.property_unset("baked_light")
     names = [prop.identifier for prop in group.bl_rna.properties if not prop.is_readonly]
     if not any(map(group.is_property_set, names)):
         scene.property_unset("radiosity")

@@ -25,6 +25,7 @@ LAYER_OF = {
     "responses": "pipeline",
     "bake_details": "pipeline",
     "texel_pictures": "pipeline",
+    "foresight": "pipeline",
 }
 FRONT_DOORS = ("", "__main__", "cli", "console", "interrupts")
 
@@ -40,7 +41,7 @@ HOMES = {
     "bpy_extras": "blender",
     "gpu": "blender",
     "blf": "blender",
-    "xatlas": "lightmap.growers",
+    "xatlas": "lightmap.chart_process",
     "embreex": "solver.embree",
 }
 
