@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 
 from . import kept_bakes, live_state, runtime
 from .panels import _draw_text, _Panel
@@ -72,7 +73,7 @@ class RADIOSITY_PT_relight_lights(_Panel, bpy.types.Panel):
             row.label(text=name, icon=inputs.icon if inputs else "ERROR", translate=False)
             _draw_inputs(row, inputs)
         if len(named) > SHOWN_LIGHTS:
-            layout.label(text=f"and {len(named) - SHOWN_LIGHTS} more")
+            layout.label(text=iface_("and {} more").format(len(named) - SHOWN_LIGHTS))
 
 
 def _draw_inputs(row: Any, inputs: Any) -> None:
