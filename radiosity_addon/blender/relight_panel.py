@@ -19,7 +19,7 @@ class RADIOSITY_PT_relight(_Panel, bpy.types.Panel):
     bl_idname = "RADIOSITY_PT_relight"
     bl_label = "Relight"
     bl_parent_id = "RADIOSITY_PT_main"
-    bl_order = -1
+    bl_order = 10
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
@@ -27,15 +27,9 @@ class RADIOSITY_PT_relight(_Panel, bpy.types.Panel):
         return not runtime.running.active
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Draw the buttons, and what is kept of the next bake."""
+        """Draw what Live has to say, and what is kept of the next bake."""
         layout = self.layout
         chosen = context.scene.radiosity_relight
-        row = layout.row(align=True)
-        row.scale_y = 1.3
-        row.operator("radiosity.relight", icon="OUTLINER_OB_LIGHT")
-        live = row.row(align=True)
-        live.enabled = bool(chosen.mark)
-        live.prop(context.window_manager, "radiosity_live", toggle=True, icon="REC")
         if live_state.state.message:
             _draw_text(layout.box(), live_state.state.message, "ERROR", context)
         layout.use_property_split = True
