@@ -11,6 +11,7 @@ from .method_properties import AUTOMATIC, shown_settings
 from .object_roles import BAKE, BAKEABLE_TYPES
 from .operators import output_folder
 from .properties import BY_ERROR
+from .relight_buttons import draw_relight_buttons
 
 SHOWN_WARNINGS = 12
 
@@ -40,6 +41,7 @@ class RADIOSITY_PT_main(_Panel, bpy.types.Panel):
         column.scale_y = 1.5
         column.operator("radiosity.bake", text="Bake Radiosity", icon="LIGHT_AREA")
         layout.operator("radiosity.restore", icon="LOOP_BACK")
+        draw_relight_buttons(layout, context)
         layout.prop(settings, "scope", expand=True)
         layout.prop(settings, "size_mode", expand=True)
 
