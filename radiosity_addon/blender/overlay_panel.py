@@ -10,7 +10,8 @@ from . import overlay_properties as kinds
 from . import runtime
 from .kept_details import details_of
 from .overlay_properties import overlay_of
-from .panels import _Panel, draw_text
+from .panels import _Panel
+from .wrapped_text import draw_text
 
 _SETTINGS = {
     kinds.FALSE_COLOR: ("unit",),

@@ -15,6 +15,7 @@ from .preferences import folder_of, preferences
 from .preset_menu import RADIOSITY_PT_presets
 from .progress_text import progress_text
 from .properties import BY_ERROR
+from .relight_buttons import draw_relight_buttons
 from .wrapped_text import draw_text
 
 SHOWN_WARNINGS = 12
@@ -49,6 +50,7 @@ class RADIOSITY_PT_main(_Panel, bpy.types.Panel):
         column.scale_y = 1.5
         column.operator("radiosity.bake", text="Bake Radiosity", icon="LIGHT_AREA")
         layout.operator("radiosity.restore", icon="LOOP_BACK")
+        draw_relight_buttons(layout, context)
         layout.prop(settings, "scope", expand=True)
         layout.prop(settings, "size_mode", expand=True)
 

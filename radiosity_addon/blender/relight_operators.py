@@ -6,6 +6,7 @@ import time
 from typing import Any
 
 import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..errors import RadiosityError
 from . import kept_bakes, live_state, runtime
@@ -107,7 +108,7 @@ class RADIOSITY_OT_relight(bpy.types.Operator):
 
     def _finish(self, context: bpy.types.Context) -> set[str]:
         self._end(context)
-        self.report({"INFO"}, f"Relit in {self._report.seconds:.2f} s")
+        self.report({"INFO"}, rpt_("Relit in {:.2f} s").format(self._report.seconds))
         return {"FINISHED"}
 
     def _fail(self, context: bpy.types.Context, error: RadiosityError) -> set[str]:

@@ -5,9 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 
 from . import kept_bakes, live_state, runtime
-from .panels import _Panel, draw_text
+from .panels import _Panel
+from .wrapped_text import draw_text
 
 SHOWN_LIGHTS = 16
 
@@ -18,7 +20,7 @@ class RADIOSITY_PT_relight(_Panel, bpy.types.Panel):
     bl_idname = "RADIOSITY_PT_relight"
     bl_label = "Relight"
     bl_parent_id = "RADIOSITY_PT_main"
-    bl_order = -1
+    bl_order = 10
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
@@ -26,15 +28,9 @@ class RADIOSITY_PT_relight(_Panel, bpy.types.Panel):
         return not runtime.running.active
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Draw the buttons, and what is kept of the next bake."""
+        """Draw what Live has to say, and what is kept of the next bake."""
         layout = self.layout
         chosen = context.scene.radiosity_relight
-        row = layout.row(align=True)
-        row.scale_y = 1.3
-        row.operator("radiosity.relight", icon="OUTLINER_OB_LIGHT")
-        live = row.row(align=True)
-        live.enabled = bool(chosen.mark)
-        live.prop(context.window_manager, "radiosity_live", toggle=True, icon="REC")
         if live_state.state.message:
             draw_text(layout.box(), live_state.state.message, "ERROR", context)
         layout.use_property_split = True
@@ -73,7 +69,7 @@ class RADIOSITY_PT_relight_lights(_Panel, bpy.types.Panel):
             row.label(text=name, icon=inputs.icon if inputs else "ERROR", translate=False)
             _draw_inputs(row, inputs)
         if len(named) > SHOWN_LIGHTS:
-            layout.label(text=f"and {len(named) - SHOWN_LIGHTS} more")
+            layout.label(text=iface_("and {} more").format(len(named) - SHOWN_LIGHTS))
 
 
 def _draw_inputs(row: Any, inputs: Any) -> None:

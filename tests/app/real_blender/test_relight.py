@@ -59,6 +59,11 @@ def test_the_lightmap_follows_within_a_fifth_of_a_second(seen: dict[str, Any]) -
     assert max(seen["latencies"]) < 0.2
 
 
+def test_relight_runs_beside_the_window(seen: dict[str, Any]) -> None:
+    assert seen["modal"]
+    assert seen["halved"] == pytest.approx(0.5 * seen["baked"], rel=1e-3)
+
+
 def test_it_rests_when_nothing_changes(seen: dict[str, Any]) -> None:
     assert seen["still_resting"]
     assert seen["on"]

@@ -44,6 +44,16 @@ def not_baking():
     return not baking()
 
 
+def relighting():
+    """The button's operator runs."""
+    return running("RADIOSITY_OT_relight")
+
+
+def not_relighting():
+    """The button's operator has ended."""
+    return not relighting()
+
+
 def resting():
     """Live has nothing left to do."""
     live = module("live_state").state.live
@@ -99,8 +109,16 @@ def script():
     yield 1.0
     seen["still_resting"] = resting()
 
-    seen["followed"] = light()
     seen["on"] = bpy.context.window_manager.radiosity_live
+
+    bpy.context.window_manager.radiosity_live = False
+    lamp().energy = 0.5 * seen["power"]
+    window, area = events.window(), events.area_3d()
+    with bpy.context.temp_override(window=window, area=area, region=events.region("WINDOW")):
+        bpy.ops.radiosity.relight("INVOKE_DEFAULT")
+    seen["modal"] = relighting()
+    yield from events.until(not_relighting, 60)
+    seen["halved"] = light()
 
 
 class PowerSlider(bpy.types.Panel):
