@@ -159,7 +159,7 @@ def test_the_rule_sees_a_wrong_import(module: str, source: str) -> None:
     [
         ("blender.export", "import bpy\nfrom ..solver import scene\nfrom ..pipeline import bake"),
         (
-            "lightmap.growers",
+            "lightmap.chart_process",
             "import xatlas\nfrom ..solver.scene import Scene\nfrom ..errors import BakeError",
         ),
         ("solver.embree", "from embreex import rtcore_scene\nimport numpy as np"),
