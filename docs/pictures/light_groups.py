@@ -107,9 +107,9 @@ def main() -> None:
     assert error < 0.02, f"the groups' pictures miss their sum by {error:.2%}"
     gap = np.full((len(pictures[0]), 6, 3), 255, dtype=np.uint8)
     row = [part for picture in pictures for part in (picture, gap)][:-1]
-    image = Image.fromarray(np.concatenate(row, axis=1))
-    image = image.quantize(256, method=Image.Quantize.MEDIANCUT)
-    image.save(ROOT / "docs" / "images" / "light-groups.png", optimize=True)
+    Image.fromarray(np.concatenate(row, axis=1)).save(
+        ROOT / "docs" / "images" / "light-groups.png", optimize=True
+    )
 
 
 if __name__ == "__main__":
