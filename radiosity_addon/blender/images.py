@@ -24,7 +24,7 @@ from .bake_record import mark_made, remove_datablocks
 SCALE_PROPERTY = "radiosity_lightmap_scale"
 """Custom property of an image: multiply a texel by it to get the quantity."""
 
-PAGE, GROUP = "radiosity_page", "radiosity_light_group"
+PAGE, GROUP = "radiosity_page", "radiosity_group_shown"
 """Custom properties of an image: its page's number, and the light group it shows, "" for all light."""
 QUANTITY_PROPERTY = "radiosity_lightmap_quantity"
 """Custom property of an image: the quantity that it holds."""

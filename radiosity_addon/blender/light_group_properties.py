@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import bpy
 
+from .bake_record import is_made
 from .light_membership import NAME, lamps_by_group, name_on, named
 
 LONGEST_NAME = 48
@@ -73,7 +74,7 @@ def _listed(scene: bpy.types.Scene) -> list[ListedGroup]:
             count(name, "lamps", len(lamps))
     for name, _ in named(obj for obj in scene.objects if obj.type != "LIGHT"):
         count(name, "objects")
-    for name, _ in named(bpy.data.materials):
+    for name, _ in named(material for material in bpy.data.materials if not is_made(material)):
         count(name, "materials")
     for name, _ in named((scene.collection, *scene.collection.children_recursive)):
         count(name, "collections")

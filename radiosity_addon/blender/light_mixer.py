@@ -25,7 +25,7 @@ LIGHTMAP = "Lightmap"
 KIND = "radiosity_mixer"
 """Custom property of the mixer, also where it is set aside."""
 
-GROUP = "radiosity_light_group"
+GROUP = "radiosity_group_shown"
 """Custom property of a node in the mixer: the group whose sliders it holds."""
 
 WHITE = (1.0, 1.0, 1.0, 1.0)

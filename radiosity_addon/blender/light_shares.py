@@ -98,7 +98,7 @@ class LightShares:
             texture.extension, texture.interpolation = page.extension, page.interpolation
             texture.location = (x, y + 300 * (1 + row))
             tree.links.new(uv, texture.inputs["Vector"])
-            tree.links.new(texture.outputs["Color"], node.inputs[row])
+            tree.links.new(texture.outputs["Color"], node.inputs[name])
         page.label = "All light (not used)"
         return node
 

@@ -132,7 +132,7 @@ class _Layout:
 
 
 def test_the_panel_draws_groups_and_sliders(lamps: dict) -> None:
-    lit_plane()
+    lit_plane().active_material.radiosity_light_group = "Glow"
     lamps["one"].radiosity_light_group = "Lamps"
     bake_groups()
     outdate()
@@ -140,8 +140,9 @@ def test_the_panel_draws_groups_and_sliders(lamps: dict) -> None:
     panel = light_group_panels.RADIOSITY_PT_light_groups
     panel.draw(type("Panel", (), {"layout": _Layout(notes)})(), bpy.context)
     labels = [words.get("text") for name, _, words in notes if name == "label"]
-    # Each group in the list with the number of what is in it, and again with its sliders.
-    assert labels == ["Glow", "1", "Lamps", "1", "Lamps", "Glow"]
+    # Each group in the list with the numbers of what is in it (an object and a material, whose lightmap
+    # copy does not count), and again with its sliders.
+    assert labels == ["Glow", "1", "1", "Lamps", "1", "Lamps", "Glow"]
     drawn = [args[0] for name, args, _ in notes if name == "prop" and args[1] == "default_value"]
     assert drawn == [
         socket for sliders in sliders_of(mixers()[0]) for socket in (sliders.color, sliders.strength)

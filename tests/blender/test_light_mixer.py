@@ -14,9 +14,12 @@ import radiosity_addon
 from radiosity_addon.blender.bake_record import made_datablocks
 from radiosity_addon.blender.group_images import shown_images, update_images
 from radiosity_addon.blender.light_mixer import mixers, sliders_of
+from radiosity_addon.blender.light_shares import MANY_IMAGES, LightShares, crowded_materials
+from radiosity_addon.blender.lightmap_materials import LightmapMaterials
 from radiosity_addon.blender.rebake import replacing_earlier
 from radiosity_addon.blender.restore import restore
 from radiosity_addon.errors import BakeError
+from radiosity_addon.settings import BakeSettings
 from tests.blender.file_dump import differences_since, dump_file
 from tests.blender.group_bake import (
     EMISSION,
@@ -29,7 +32,7 @@ from tests.blender.group_bake import (
     page,
     slide,
 )
-from tests.blender.hand_bake import BASE, bake_by_hand, seen_from_above
+from tests.blender.hand_bake import BASE, add_plane, bake_by_hand, principled_material, seen_from_above
 
 
 @pytest.fixture(autouse=True)
@@ -190,3 +193,36 @@ def test_light_that_does_not_fit_the_images_is_refused() -> None:
     images[0].scale(4, 4)
     with pytest.raises(BakeError, match="8 × 4 pixels any more"):
         update_images(images, (page(LAMP),), groups, light_groups())
+
+
+def test_materials_that_read_many_images_are_warned_of() -> None:
+    bake_groups({f"group {number}": LAMP for number in range(MANY_IMAGES)})
+    assert crowded_materials() == []
+    restore(bpy.context)
+    bake_groups({f"group {number}": LAMP for number in range(MANY_IMAGES + 1)})
+    (warning,) = crowded_materials()
+    assert warning.name == "Paint (Lightmap)"
+    assert f"reads {MANY_IMAGES + 1} images" in warning.message
+
+
+def test_materials_can_be_made_anew_from_what_is_shown(tmp_path: Path, plane: bpy.types.Object) -> None:
+    paint = plane.active_material
+    bake_groups()
+    slide("Glow", 2.0)
+    shares = LightShares.shown(bpy.context.scene, BakeSettings(light_groups=True))
+    (image,), _ = shown_images()
+    anew = LightmapMaterials("irradiance_over_pi", shares).copy_of(paint, image, True, "Glow")
+    plane.data.materials[0] = anew
+    assert len(mixers()) == 1
+    np.testing.assert_allclose(seen(tmp_path), expected(1, 2), rtol=1e-4)
+    restore(bpy.context)
+    assert LightShares.shown(bpy.context.scene, BakeSettings(light_groups=True)) is None
+
+
+def test_one_copy_of_a_material_that_does_not_glow_serves_all_groups(plane: bpy.types.Object) -> None:
+    plain = principled_material(name="Plain")
+    for name in ("a", "b"):
+        add_plane(name, plain).radiosity_light_group = name
+    bake_groups({"a": LAMP, "b": LAMP, **GROUPS})
+    copies = [material.name for material in bpy.data.materials if material.name.startswith("Plain (")]
+    assert copies == ["Plain (Lightmap)"]
