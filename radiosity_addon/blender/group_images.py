@@ -13,7 +13,8 @@ from ..errors import BakeError
 from ..lightmap.encode import png16_scale
 from ..settings import BakeSettings
 from .bake_record import is_made, remove_datablocks
-from .images import GROUP, PAGE, SCALE_PROPERTY, group_file_names, image_scale, set_pixels, write_images
+from .image_marks import GROUP, PAGE, SCALE_PROPERTY
+from .images import group_file_names, image_scale, set_pixels, write_images
 from .light_mixer import KIND, set_scale
 from .node_group import SCALE
 

@@ -20,14 +20,7 @@ from ..lightmap.encode import encode_png16, png16_scale
 from ..report import LightmapFile
 from ..settings import BakeSettings
 from .bake_record import mark_made, remove_datablocks
-
-SCALE_PROPERTY = "radiosity_lightmap_scale"
-"""Custom property of an image: multiply a texel by it to get the quantity."""
-
-PAGE, GROUP = "radiosity_page", "radiosity_group_shown"
-"""Custom properties of an image: its page's number, and the light group it shows, "" for all light."""
-QUANTITY_PROPERTY = "radiosity_lightmap_quantity"
-"""Custom property of an image: the quantity that it holds."""
+from .image_marks import GROUP, PAGE, QUANTITY_PROPERTY, SCALE_PROPERTY
 
 _FILE_FORMATS = {"exr": ("OPEN_EXR", ".exr"), "png16": ("PNG", ".png")}
 _RESERVED_NAMES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)

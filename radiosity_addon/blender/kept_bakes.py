@@ -14,14 +14,11 @@ import bpy
 from bpy.app.handlers import persistent
 
 from .bake_record import is_made
-from .images import GROUP, PAGE
+from .image_marks import GROUP, MARK, PAGE
 
 if TYPE_CHECKING:
     from ..relighting import KeptBake
     from ..solver.arrays import Array
-
-MARK = "radiosity_mark"
-"""Custom property of a lightmap's image: the mark of its bake."""
 
 
 @dataclass

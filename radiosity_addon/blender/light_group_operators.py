@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from . import runtime
 from .light_group_properties import LONGEST_NAME, outdate
@@ -56,7 +57,8 @@ class RADIOSITY_OT_light_group_assign(bpy.types.Operator):
         if changed is None:
             self.report({"ERROR"}, "Linked objects cannot be changed: make them local or library overrides")
             return {"CANCELLED"}
-        self.report({"INFO"}, f"{changed} objects are in light group '{name}'")
+        message = rpt_("{} objects are in light group '{}'")
+        self.report({"INFO"}, message.format(changed, name))
         return {"FINISHED"}
 
 

@@ -14,7 +14,8 @@ from ..bake_scene import LIGHTMAP_UV_LAYER
 from ..solver.radiometry import brdf_of_reflectance, radiance_of_radiosity
 from .bake_record import is_made, mark_made
 from .false_colors import false_colors
-from .images import GROUP, image_scale
+from .image_marks import GROUP
+from .images import image_scale
 from .light_mixer import factor_of
 from .light_shares import LightShares
 from .materials import is_volume, read_material, uses_nodes

@@ -16,7 +16,8 @@ from ..solver.arrays import Array
 from ..solver.radiometry import irradiance_under_sky, luminous
 from . import kept_details
 from .bake_record import is_made
-from .images import QUANTITY_PROPERTY, image_scale
+from .image_marks import QUANTITY_PROPERTY
+from .images import image_scale
 from .mesh_arrays import read_mesh, world_from_object
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 
 from . import overlay_properties as kinds
 from . import runtime
@@ -62,7 +63,8 @@ class RADIOSITY_PT_overlays(_Panel, bpy.types.Panel):
             by_hand.prop(settings, "high")
         kept = details_of(context.scene)
         if settings.show in kinds.OF_THE_BAKE and kept is not None:
-            layout.label(text=f"{kept.details.nbytes / 2**20:.1f} MiB in memory", icon="MEMORY")
+            text = iface_("{} MiB in memory").format(f"{kept.details.nbytes / 2**20:.1f}")
+            layout.label(text=text, icon="MEMORY", translate=False)
         if settings.show == kinds.FALSE_COLOR:
             _draw_statistics(layout, context)
 

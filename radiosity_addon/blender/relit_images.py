@@ -14,7 +14,8 @@ import numpy as np
 from ..bake_scene import LightGroup, LightmapPage
 from ..errors import BakeError
 from .group_images import rescale_materials, update_images
-from .images import SCALE_PROPERTY, image_scale
+from .image_marks import SCALE_PROPERTY
+from .images import image_scale
 from .kept_bakes import group_images_of, images_of
 from .output import REPORT_NAME, OutputFolder
 

@@ -41,7 +41,7 @@ class TexelGeometry:
         Of every scene triangle, as given.
     page, row, column, triangle : (n,) int32
     share : (n,) float32
-        What part of the texel surfaces cover: its triangle, or all that go on in its plane.
+        What part of the texel its triangle covers.
     centre_inside : (n,) bool
         Whether the texel's centre is on its triangle.
     whole : (n,) bool
@@ -100,7 +100,7 @@ class TexelGeometry:
 
     def make_whole(self, rows: Array) -> None:
         """Count texels (r,), in ascending order, as whole: other triangles cover what theirs does not."""
-        self.whole[rows], self.share[rows] = True, 1.0
+        self.whole[rows] = True
         for number, page in enumerate(self.texels):
             first, last = np.searchsorted(rows, self._first[number : number + 2])
             own = rows[first:last] - self._first[number]
