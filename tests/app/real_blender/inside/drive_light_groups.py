@@ -45,13 +45,6 @@ def active(name):
 def script():
     for name in ("RADIOSITY_PT_light_groups", *PLACES.values()):
         opened(name)
-    # What would push it out of sight comes after it.
-    last = [bpy.types.RADIOSITY_PT_last_bake, bpy.types.RADIOSITY_PT_warnings]
-    for panel in reversed(last):
-        bpy.utils.unregister_class(panel)
-    for panel in last:
-        panel.bl_order = 9
-        bpy.utils.register_class(panel)
     scene = bpy.context.scene
     group = scene.radiosity
     group.resolution, group.quality, group.use_light_groups = 64, "draft", True
