@@ -162,6 +162,7 @@ class RADIOSITY_PT_last_bake(_Panel, bpy.types.Panel):
     bl_idname = "RADIOSITY_PT_last_bake"
     bl_label = "Last Bake"
     bl_parent_id = "RADIOSITY_PT_main"
+    bl_order = 9  # below all settings
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
