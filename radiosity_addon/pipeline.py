@@ -168,10 +168,20 @@ def finish(
         _check(solved.report, pages)
     kept = None
     if lit.relightable is not None and lit.light is not None and lit.light.kept is not None:
-        laid = geometry, seams, rings
-        lighting = lit.relightable, lit.light.kept
         moves = None if lit.light.traced is None else Moves(atlas, lit.light.traced, solved)
-        kept = KeptBake(bake_scene, settings, *lighting, *laid, *lit.materials, moves)
+        reflectance, emission = lit.materials
+        kept = KeptBake(
+            bake_scene,
+            settings,
+            lit.relightable,
+            lit.light.kept,
+            geometry,
+            seams,
+            rings,
+            reflectance,
+            emission,
+            moves,
+        )
     groups: tuple[LightGroup, ...] = ()
     if kept is not None and settings.groups:
         with timed(seconds, "groups"):

@@ -99,18 +99,20 @@ def moved_steps(
     links, parts = yield from scaled(further, at, PARTS)
 
     transport = TexelTransport(links, parts, reflectance)
-    traced = TracedTexels(traced.settings, crossings, numbers, KeptPoints.of(points), parts.small, bright)
+    chosen, error = KeptPoints.of(points), traced.error
+    traced = TracedTexels(traced.settings, crossings, numbers, chosen, parts.small, bright, error)
     start = _start(before, traced, local, parts, now)
     of_texels = np.maximum(start[: len(geometry)] + reflectance * more, 0.0)
     transport = replace(transport, parts=replace(parts, start=start[len(geometry) :]))
-    limits = lit.sweeps, lit.tolerance
-    swept = sweep_steps(transport, of_texels, direct, local.beyond(), *limits, local.threads)
+    limits = lit.sweeps, lit.tolerance, local.threads, False
+    swept = sweep_steps(transport, of_texels, direct, local.beyond(), *limits)
     light = yield from scaled(swept, PARTS, 1.0)
     assert local.sources is not None  # it asks for lights apart
     assert light.table is not None
     earlier = EarlierLight(local.sources.strengths, light.table)
-    lit = LitTexels(transport, gains, lit.element, *limits, earlier)
-    return replace(light, kept=lit, traced=traced), _lit_as(local, lit.element, light)
+    lit = replace(lit, transport=transport, gains=gains, earlier=earlier)
+    light = replace(light, error=error, kept=lit, traced=traced)
+    return light, _lit_as(local, lit.element, light)
 
 
 def _renumbered(links: StoredLinks, traced: TracedTexels, now: Array) -> StoredLinks:

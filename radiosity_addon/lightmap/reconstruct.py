@@ -103,7 +103,8 @@ def reconstruct(
         return light
     earlier = EarlierLight(local.sources.strengths, light.table)
     lit = LitTexels(transport, gains, element, *limits, earlier)
-    traced = TracedTexels(settings, crossings, numbers, KeptPoints.of(points), parts.small, local.bright)
+    chosen = KeptPoints.of(points)
+    traced = TracedTexels(settings, crossings, numbers, chosen, parts.small, local.bright, light.error)
     return replace(light, kept=lit, traced=traced)
 
 

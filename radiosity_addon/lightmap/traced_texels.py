@@ -54,6 +54,8 @@ class TracedTexels:
         The parts that the table's last rows are, see `Parts`.
     bright : (e,) bool
         The elements that rays were aimed at.
+    error : float
+        Estimate of the light's relative RMS error (see `TexelLight`). Rays traced again are as many.
     """
 
     settings: GatherSettings
@@ -62,6 +64,7 @@ class TracedTexels:
     points: KeptPoints
     small: Array
     bright: Array
+    error: float
 
     def numbered(self, rows: Array) -> Array:
         """Return the numbers that rows of the table had as hits; negative ones stay."""
