@@ -76,7 +76,9 @@ def look_again(
         at, upright = numbers.cells.footprints(cell), numbers.cells.upright(cell)
         widen = disturbance.widen[numbers.cells.texel_of(cell)]
     nowhere = np.zeros((0, 1, 3))
-    gathered = Gathered(parts.sources, np.zeros(len(parts.part)), AimedRays.none())
+    # Parts speak for nobody: how close things are to them is not asked.
+    unasked = np.full(len(parts.part), np.inf)
+    gathered = Gathered(parts.sources, unasked, AimedRays.none())
     aimed = (
         np.zeros(local.hierarchy.n_elements, dtype=bool),
         np.zeros(len(disturbance.moved), dtype=bool),

@@ -164,7 +164,7 @@ class Gathering:
 
     def trace_again(
         self, rows: Array, ray: Array, directions: Array, stale: Array, casters: tuple[RayCaster, RayCaster]
-    ) -> tuple[Array, Hits]:
+    ) -> tuple[Array, Hits, Array]:
         """Trace some cosine-distributed rays, as if their points aimed at nothing.
 
         Parameters
@@ -184,6 +184,8 @@ class Gathering:
             Which of the rays may have another source now.
         hits : Hits
             What these met.
+        nearer : (c,) float64 [1/m]
+            What they add to their points' closeness.
         """
         moved, before = casters
         start = self._starts_of(rows, ray)
@@ -198,8 +200,9 @@ class Gathering:
         self._sources[rows[changed], ray[changed]] = self._found(hits, along[other])
         least = self._caster.surface_offset
         nearer = 1.0 / np.maximum(hits.distance, least) - 1.0 / np.maximum(old.distance, least)
-        np.add.at(self._closeness, rows[changed], nearer.astype(np.float64) / self._rays)
-        return changed, hits
+        nearer = nearer.astype(np.float64) / self._rays
+        np.add.at(self._closeness, rows[changed], nearer)
+        return changed, hits, nearer
 
     def _cosine(self, rows: Array, bright: BrightElements | None, shares: Array | None) -> None:
         """Trace the cosine-distributed rays of some rows, and keep what they hit."""

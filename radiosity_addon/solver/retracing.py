@@ -17,6 +17,10 @@ from .gathering import CHUNK_RAYS, Gathered, Gathering
 from .parallel import chunk_steps
 from .visibility import RayCaster
 
+RENEWED = 0.2
+"""A point whose closeness changes by more than this part is gathered from anew: what single rays take off
+a sum that a few very short ones dominate may leave anything, even less than nothing."""
+
 STALE = -1
 """A source that is no more, or may be another one now."""
 
@@ -109,16 +113,17 @@ class Retracing:
             row, ray = np.nonzero(touched)
             asked = rows[row], ray, directions[row, ray], stale[row, ray]
             moved = before.moved
-            changed, hits = gathering.trace_again(*asked, (moved.alone, moved.before))
+            changed, hits, nearer = gathering.trace_again(*asked, (moved.alone, moved.before))
             past[row[changed[gathering.on_any(before.bright, before.hosts, hits)]]] = True
-            again = rows[past]
-            shares = None
+            closer = np.bincount(row[changed], nearer, minlength=len(rows))
+            renewed = np.abs(closer) > RENEWED * before.gathered.closeness[rows]
+            again, shares = rows[past | renewed], None
             if bright is not None and len(bright) and len(again):
                 shares = gathering.shares(again, bright, irradiance)
-                wanted = aims[again] | shares.any(axis=1)
+                wanted = aims[again] | shares.any(axis=1) | renewed[past | renewed]
                 again, shares = again[wanted], shares[wanted]
             else:
-                again = again[aims[again]]
+                again = rows[renewed | (past & aims[rows])]
             if len(again):
                 whole[again] = True
                 found = gathering.trace_rows(again, bright, shares)

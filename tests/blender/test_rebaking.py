@@ -28,6 +28,7 @@ def lightmaps() -> Iterator[dict[str, np.ndarray]]:
 
 
 def bakes(scene: bpy.types.Scene) -> Iterator[tuple[str, np.ndarray]]:
+    scene.radiosity_relight.only_moved = True
     yield "before", bake(scene)
     bpy.data.objects["Board"].location.x = 0.4
     yield "moved", bake(scene)
