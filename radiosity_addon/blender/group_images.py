@@ -12,6 +12,7 @@ from ..bake_scene import BakeResult, LightGroup, LightmapPage
 from ..errors import BakeError
 from ..lightmap.encode import png16_scale
 from ..settings import BakeSettings
+from . import overlay_view
 from .bake_record import is_made, remove_datablocks
 from .image_marks import GROUP, PAGE, SCALE_PROPERTY
 from .images import group_file_names, image_scale, set_pixels, write_images
@@ -102,6 +103,7 @@ def update_images(
             if scale is not None:
                 rescale_materials(image, scale)
             set_pixels(image, page, scale)
+    overlay_view.changed()
 
 
 def _check_fit(images: Sequence[bpy.types.Image], pages: Sequence[LightmapPage]) -> None:

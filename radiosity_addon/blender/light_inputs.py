@@ -54,9 +54,14 @@ def inputs_of(scene: bpy.types.Scene, name: str, emits: bool) -> LightInputs | N
     if lamp is not None and lamp.type == "LIGHT":
         data = lamp.data
         return LightInputs(f"LIGHT_{data.type}", (data, "color"), (data, "energy"))
-    if scene.world is not None and scene.world.name == name:
-        return _of_nodes(scene.world, "WORLD")
-    return None
+    world = shown_world(scene, name)
+    return None if world is None else _of_nodes(world, "WORLD")
+
+
+def shown_world(scene: bpy.types.Scene, name: str) -> bpy.types.World | None:
+    """Return the world of a name if the scene, or one of its view layers, shows it."""
+    own = [getattr(layer, "world_override", None) for layer in scene.view_layers]
+    return next((world for world in (*own, scene.world) if world is not None and world.name == name), None)
 
 
 def _of_nodes(owner: Any, icon: str) -> LightInputs:

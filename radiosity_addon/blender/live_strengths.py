@@ -15,6 +15,7 @@ from ..solver.arrays import Array
 from ..solver.environment import SkyPatch
 from ..solver.lights import EnvironmentLight, Light
 from .lamps import read_lamp
+from .light_inputs import shown_world
 from .materials import read_material, read_radiance, uses_nodes
 
 SAME = 1e-5
@@ -92,8 +93,8 @@ class StrengthReader:
         return now.strength
 
     def _of_world(self, name: str) -> Array:
-        world = bpy.data.scenes[self._scene].world
-        if world is None or world.name != name:
+        world = shown_world(bpy.data.scenes[self._scene], name)
+        if world is None:
             return np.zeros(3)
         if not uses_nodes(world):
             return np.array(world.color[:3], dtype=np.float64)

@@ -13,11 +13,15 @@ import numpy as np
 
 from ..bake_scene import LightGroup, LightmapPage
 from ..errors import BakeError
+from ..manifest import FILES
 from .group_images import rescale_materials, update_images
 from .image_marks import SCALE_PROPERTY
 from .images import image_scale
 from .kept_bakes import group_images_of, images_of
 from .output import REPORT_NAME, OutputFolder
+
+OF_LIGHT = ("irradiance_W_m2", "illuminance_lx")
+"""What the report says of the light on objects: of other light than this, it must not stay."""
 
 Images = Mapping[int, bpy.types.Image]
 
@@ -116,6 +120,10 @@ def _report(output: OutputFolder, images: Sequence[bpy.types.Image], seconds: fl
                 entry["scale"] = scales.get(entry["image"], entry["scale"])
     except (OSError, ValueError, KeyError, TypeError):
         return
+    for entry in told["objects"]:
+        for name in OF_LIGHT:
+            entry.pop(name, None)
+    told[FILES] = output.files()
     told["relit"] = {"seconds": round(seconds, 4)}
     text = json.dumps(told, indent=2, ensure_ascii=False) + "\n"
     (output.staging / REPORT_NAME).write_text(text, encoding="utf-8")

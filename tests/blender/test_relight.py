@@ -18,6 +18,7 @@ from radiosity_addon.blender.images import image_scale
 from radiosity_addon.blender.light_inputs import inputs_of
 from radiosity_addon.blender.node_group import EMISSION, SCALE
 from radiosity_addon.cli import main
+from radiosity_addon.manifest import is_as_written
 from tests.blender.scenes import add_lamp, add_mesh, add_object, set_world, shader_material
 
 LIGHTMAP = "lightmap.exr"
@@ -119,7 +120,11 @@ def test_other_light_gives_what_a_full_bake_gives_in_place(baked: Path) -> None:
     assert {image.name for image in bpy.data.images} == images
     assert {obj.name: obj.data.name for obj in bpy.data.objects if obj.type == "MESH"} == shown
     assert not bpy.data.images[LIGHTMAP].is_dirty
-    assert "relit" in json.loads((baked / "lightmaps" / "report.json").read_text())
+    report = json.loads((baked / "lightmaps" / "report.json").read_text())
+    assert "relit" in report
+    # What is told of the light is gone, and the files are still known as ours.
+    assert not any("irradiance_W_m2" in entry for entry in report["objects"])
+    assert all(is_as_written(baked / "lightmaps" / name, told) for name, told in report["files"].items())
     on_disk = bpy.data.images.load(str(baked / "lightmaps" / LIGHTMAP))
     np.testing.assert_array_equal(lightmap(on_disk.name), relit)
     np.testing.assert_allclose(glow, (1.2, 6.0, 2.4), rtol=1e-5)
