@@ -17,8 +17,8 @@ from .gathering import CHUNK_RAYS, Gathered, Gathering
 from .parallel import chunk_steps
 from .visibility import RayCaster
 
-RENEWED = 0.2
-"""A point whose closeness changes by more than this part is gathered from anew: what single rays take off
+RENEWED = 0.3
+"""A point whose closeness falls by more than this part is gathered from anew: what single rays take off
 a sum that a few very short ones dominate may leave anything, even less than nothing."""
 
 STALE = -1
@@ -116,7 +116,7 @@ class Retracing:
             changed, hits, nearer = gathering.trace_again(*asked, (moved.alone, moved.before))
             past[row[changed[gathering.on_any(before.bright, before.hosts, hits)]]] = True
             closer = np.bincount(row[changed], nearer, minlength=len(rows))
-            renewed = np.abs(closer) > RENEWED * before.gathered.closeness[rows]
+            renewed = -closer > RENEWED * before.gathered.closeness[rows]
             again, shares = rows[past | renewed], None
             if bright is not None and len(bright) and len(again):
                 shares = gathering.shares(again, bright, irradiance)
