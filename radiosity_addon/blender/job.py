@@ -189,8 +189,8 @@ def deliver(
         yield Progress("preview", PREVIEW)
         with timed(seconds, "preview"):
             render_preview(context, output.staging / PREVIEW_NAME, settings, samples)
-        report = _report(result, images, groups, settings, seconds)
-        report.listing(output.files()).write(output.staging / REPORT_NAME)
+        report = _report(result, images, groups, settings, seconds).listing(output.files())
+        report.write(output.staging / REPORT_NAME)
         yield Progress("write", 1.0)
         output.publish()
     except BaseException:
