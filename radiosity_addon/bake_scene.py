@@ -6,13 +6,22 @@ pipeline between them knows nothing of Blender.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from .solver.arrays import Array
+from .solver.link_record import LinkRecord
 from .solver.scene import Scene
 
 LIGHTMAP_UV_LAYER = "Lightmap"
+
+NO_TEXEL_HERE = 255
+"""The state of a pixel that shows no surface: it was filled from its neighbours."""
+
+DIVIDED, HOODED, TOUCHED, SHUT_IN = 1, 2, 3, 4
+TEXEL_STATES = (0, DIVIDED, HOODED, TOUCHED, SHUT_IN)
+"""0: nothing is the matter. Geometry stands on the texel or a close rim is above it; something is close above
+all of it; it ends at geometry; no light at all reaches it, for it is inside of something or behind it."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +85,10 @@ class BakeScene:
         Which of the emissive materials each triangle has; any number where it emits nothing. None
         takes every colour of emission for a material.
     emitter_names : tuple of str
-        The names of those materials.
+        The names of those materials; one that is in several light groups is there once for each.
+    light_groups, emitter_groups : tuple of str
+        The light groups that the scene puts its lights and those materials in, "" where in none; nothing
+        where it knows none.
     """
 
     scene: Scene
@@ -84,6 +96,8 @@ class BakeScene:
     warnings: tuple[BakeWarning, ...] = ()
     emitter: Array | None = None
     emitter_names: tuple[str, ...] = ()
+    light_groups: tuple[str, ...] = ()
+    emitter_groups: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -116,16 +130,68 @@ class Picture:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class LitSurfaces:
+    """Triangles with a lightmap, and the texels on them.
+
+    Parameters
+    ----------
+    corners : (t, 3, 3) float32
+        World space, counter-clockwise from the front.
+    uv : (t, 3, 2) float32
+    page : (t,) int32
+    triangle : (t,) int32
+        The scene's triangle that each is.
+    texels : tuple of (height, width) int32
+        Per page, the number of the texel there, −1 for none. A large page may come coarser than it is.
+    """
+
+    corners: Array
+    uv: Array
+    page: Array
+    triangle: Array
+    texels: tuple[Array, ...]
+
+    def only(self, triangles: Array) -> LitSurfaces:
+        """Return those of the scene's triangles that are marked in a (scene triangles,) mask."""
+        mine = triangles[self.triangle]
+        return replace(
+            self,
+            corners=self.corners[mine],
+            uv=self.uv[mine],
+            page=self.page[mine],
+            triangle=self.triangle[mine],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class TexelPicture:
+    """What the lightmaps look like so far.
+
+    Parameters
+    ----------
+    surfaces : LitSurfaces
+        The same for all pictures of a bake.
+    radiosity : (n, 3) float32 [W/m²]
+        Of the texels.
+    """
+
+    surfaces: LitSurfaces
+    radiosity: Array
+
+
 @dataclass(frozen=True)
 class Progress:
     """Where a bake is: the stage's name and the overall fraction done, 0 to 1.
 
-    While the scene is being solved some come with a picture of the solution so far.
+    While the scene is being solved some come with a picture of the solution so far, while its texels are
+    being lit with one of these.
     """
 
     stage: str
     fraction: float
     picture: Picture | None = None
+    texels: TexelPicture | None = None
 
 
 @dataclass(frozen=True)
@@ -153,10 +219,13 @@ class LightGroup:
     name : str
     pages : tuple of LightmapPage
         Parallel to the bake's; over all groups they sum to them.
+    sources : tuple of str
+        The names of the lamps, emissive materials and the world in it, each once.
     """
 
     name: str
     pages: tuple[LightmapPage, ...]
+    sources: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -175,6 +244,49 @@ class BakedObject:
     object: BakeObject
     uv: Array
     page: int
+
+
+@dataclass(frozen=True, eq=False)
+class PageDetails:
+    """What is known of a page's texels besides their light.
+
+    Parameters
+    ----------
+    state : (height, width) uint8
+        One of `TEXEL_STATES`, or `NO_TEXEL_HERE`.
+    noise : (height, width) float16
+        Estimated error of the irradiance, in units of `unit`.
+    misfit : (height, width) float16
+        Irradiance of the solver's element less that of the texel, in units of `unit`: what of the element's
+        light was wrong, or too coarse.
+    unit : float [W/m²]
+    """
+
+    state: Array
+    noise: Array
+    misfit: Array
+    unit: float
+
+
+@dataclass(frozen=True, eq=False)
+class BakeDetails:
+    """What overlays show of a bake.
+
+    Parameters
+    ----------
+    links : LinkRecord
+    pages : tuple of PageDetails
+        Parallel to the bake's; none for a bake of a residual.
+    """
+
+    links: LinkRecord
+    pages: tuple[PageDetails, ...]
+
+    @property
+    def nbytes(self) -> int:
+        """Memory it takes."""
+        arrays = [getattr(page, name) for page in self.pages for name in ("state", "noise", "misfit")]
+        return self.links.nbytes + sum(int(array.nbytes) for array in arrays)
 
 
 @dataclass(frozen=True)
@@ -198,6 +310,9 @@ class BakeResult:
         "utilisation" (the share of texels that show a surface) and the number of "objects".
     groups : tuple of LightGroup
         Those that were asked for, and one of what is in none of them.
+    light : tuple of dict
+        Parallel to `objects`: statistics of the light on their fronts, see `bake_details.statistics`.
+    details : BakeDetails or None
     """
 
     pages: tuple[LightmapPage, ...]
@@ -207,3 +322,5 @@ class BakeResult:
     seconds: dict[str, float] = field(default_factory=dict)
     atlas: tuple[dict[str, float], ...] = ()
     groups: tuple[LightGroup, ...] = ()
+    light: tuple[dict[str, Any], ...] = ()
+    details: BakeDetails | None = None

@@ -16,7 +16,7 @@ from .console import Console
 from .errors import RadiosityError, UsageError
 from .interrupts import Interrupts
 from .methods import METHODS, SETTINGS
-from .settings import ATLASES, FORMATS, LIGHTS, QUALITIES, QUANTITIES, BakeSettings
+from .settings import ATLASES, FORMATS, LIGHTS, QUALITIES, QUANTITIES, BakeSettings, GroupSetting
 
 EXIT_DONE = 0
 EXIT_FAILED = 1
@@ -26,7 +26,7 @@ EXIT_INTERRUPTED = 130
 SHARED_FIELDS = (
     *("texel_density", "pages", "max_resolution", "mip_levels", "padding", "unwrap_seconds"),
     *("atlas", "quality", "relative_error", "quantity", "light", "format"),
-    *("sky", "keep_uvs", "seed", "threads", "method", *SETTINGS),
+    *("sky", "keep_uvs", "light_groups", "seed", "threads", "method", *SETTINGS),
 )
 """Settings whose option says exactly what the field says."""
 
@@ -59,9 +59,10 @@ def main(
     try:
         request = build_parser(prog).parse_args(sys.argv[1:] if argv is None else list(argv))
         settings = settings_of(request) if request.verb == "bake" else None
-        if settings is not None:
+        if settings is not None and not request.check:
             request.output = bake_output(request, loaded)
             check_plot(request.plot)
+            check_keeping(request, settings)
     except RadiosityError as error:
         return _fail(str(error), error.exit_code)
     except SystemExit as help_was_asked:
@@ -87,7 +88,25 @@ def settings_of(request: argparse.Namespace) -> BakeSettings:
     for name in ("objects", "light_only", "ignore"):
         if getattr(request, name) is not None:
             given[name] = tuple(getattr(request, name))
+    given["groups"] = tuple(map(light_group, request.groups or ()))
     return BakeSettings(**given)
+
+
+def light_group(text: str) -> GroupSetting:
+    """Read a light group as the command line has it: NAME=MEMBER,MEMBER…
+
+    Raises
+    ------
+    UsageError
+        If it is not of this form.
+    """
+    name, _, members = text.partition("=")
+    wanted = tuple(filter(None, (member.strip() for member in members.split(","))))
+    if not name.strip() or not wanted:
+        raise UsageError(
+            f"--light-group {text}: give a name and what is in it, such as Kitchen=Lamp,Stove,World"
+        )
+    return name.strip(), wanted
 
 
 def bake_output(request: argparse.Namespace, loaded: Path | None) -> Path:
@@ -98,6 +117,16 @@ def bake_output(request: argparse.Namespace, loaded: Path | None) -> Path:
     if request.scene is not None or loaded is not None:
         raise UsageError("bake needs --output DIR, the folder everything is written to")
     return BUNDLED_OUTPUT
+
+
+def check_keeping(request: argparse.Namespace, settings: BakeSettings) -> None:
+    """Refuse to keep what cannot be lit anew, and to relight otherwise than it was baked."""
+    if request.keep and settings.method != "hierarchical":
+        raise UsageError(f"--keep needs the hierarchical method; {settings.method} keeps no links")
+    if request.keep and settings.quantity == "residual":
+        raise UsageError("--keep: a residual is of all light together; bake another quantity")
+    if request.relight and request.plot is not None:
+        raise UsageError("--relight solves nothing whose history --plot could draw")
 
 
 def check_plot(plot: Path | None) -> None:
@@ -200,8 +229,26 @@ def _add_bake(parser: argparse.ArgumentParser) -> None:
         "--sky", action="store_true", help="add a white sky of strength 1 where the scene has no light at all"
     )
     add("--keep-uvs", action="store_true", help="use an existing UV layer Lightmap as it is")
+    add("--light-groups", action="store_true", help="a lightmap also for each light group of the scene")
+    add(
+        "--light-group",
+        dest="groups",
+        action="append",
+        metavar="NAME=MEMBER,…",
+        help="a lightmap also for these lamps, emissive materials or the world (may be repeated)",
+    )
     add("--seed", type=int, default=default.seed, metavar="N", help="random seed (default 0)")
     add("--threads", type=int, default=default.threads, metavar="N", help="threads (default: all cores)")
+    add("--check", action="store_true", help="bake nothing; say what would be baked, and what is odd")
+    keeping = parser.add_mutually_exclusive_group()
+    keeping.add_argument(
+        "--keep", action="store_true", help="also write a sidecar, by which --relight lights the bake anew"
+    )
+    keeping.add_argument(
+        "--relight",
+        action="store_true",
+        help="light the bake in DIR anew, by other strengths of its lights, with the settings that it has",
+    )
     _add_common(parser)
     add("--report", type=Path, metavar="FILE", help="second copy of report.json")
     add("--plot", type=Path, metavar="FILE.png", help="draw the history of residual, elements and links")
@@ -261,9 +308,16 @@ def _run(
         )
     try:
         with Console(quiet=request.quiet) as console:
-            if settings is not None:
-                files = request.output, settings, request.report, request.plot
-                commands.bake(request.scene, loaded, *files, console, interrupts)
+            if settings is not None and request.check:
+                return commands.check(request.scene, loaded, request.output, settings, console)
+            if settings is not None and request.relight:
+                from .blender.relight_command import relight
+
+                folder = request.output, settings, request.report
+                relight(request.scene, loaded, *folder, console, interrupts)
+            elif settings is not None:
+                given = request.output, settings, request.report, request.plot, request.keep
+                commands.bake(request.scene, loaded, *given, console, interrupts)
             else:
                 commands.restore(request.scene, loaded, request.output, console)
     except KeyboardInterrupt:

@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from typing import Any, TextIO
 
 from .alike import one_of_each
+from .remaining import RemainingTime, duration
 
 STEP = 10
 """Without a terminal a stage prints a line again after this many per cent."""
@@ -34,6 +35,7 @@ class Console:
         self._stage = ""
         self._percent = -STEP
         self._open_line = False
+        self._remaining = RemainingTime()
 
     def __enter__(self) -> Console:
         self._stream = sys.stdout
@@ -66,18 +68,20 @@ class Console:
             self._stream = sys.stdout
 
     def progress(self, stage: str, fraction: float) -> None:
-        """Show the stage and how much of the whole is done, `fraction` in 0 to 1."""
+        """Show the stage, how much of the whole is done (0 to 1), and about how long it still takes."""
         if self.quiet:
             return
+        seconds = self._remaining.update(fraction)
+        left = "" if seconds is None or fraction >= 1.0 else f", about {duration(seconds)} left"
         percent = int(100 * min(max(fraction, 0.0), 1.0))
         if self._stream.isatty():
             if (stage, percent) != (self._stage, self._percent):
-                self._stream.write(f"\r\x1b[K[{percent:3d} %] {stage}")
+                self._stream.write(f"\r\x1b[K[{percent:3d} %] {stage}{left}")
                 self._stream.flush()
                 self._open_line = True
                 self._stage, self._percent = stage, percent
         elif stage != self._stage or percent >= self._percent + STEP:
-            self._stream.write(f"[{percent:3d} %] {stage}\n")
+            self._stream.write(f"[{percent:3d} %] {stage}{left}\n")
             self._stream.flush()
             self._stage, self._percent = stage, percent
 

@@ -25,3 +25,7 @@ class UsageError(RadiosityError):
     """The request itself makes no sense: an unknown object, options that exclude each other."""
 
     exit_code = 2
+
+
+class NothingToDoError(RadiosityError):
+    """What was asked for is done already."""

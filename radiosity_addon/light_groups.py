@@ -6,20 +6,71 @@ from collections.abc import Generator, Sequence
 
 import numpy as np
 
-from .bake_scene import LightGroup, LightmapPage
+from .bake_scene import BakeScene, LightGroup, LightmapPage
 from .errors import UsageError
 from .relighting import KeptBake, relight
-from .settings import GroupSetting
+from .settings import MAX_GROUPS, OTHERS, BakeSettings
 from .solver.arrays import Array
 
-OTHERS = "others"
-"""The group of what is in none."""
+
+def are_wanted(bake_scene: BakeScene, settings: BakeSettings) -> bool:
+    """Tell whether a bake makes lightmaps of light groups."""
+    known = any((*bake_scene.light_groups, *bake_scene.emitter_groups))
+    return bool(settings.groups) or (settings.light_groups and known)
+
+
+def group_of(name: str, of_scene: str, settings: BakeSettings) -> str:
+    """Return the group of a source, `OTHERS` if it is in none.
+
+    Parameters
+    ----------
+    name : str
+        The source's.
+    of_scene : str
+        The group that the scene puts it in, or "".
+    """
+    for group, wanted in settings.groups:
+        if name in wanted:
+            return group
+    return (of_scene if settings.light_groups else "") or OTHERS
+
+
+def check_groups(bake_scene: BakeScene, settings: BakeSettings) -> None:
+    """Refuse before the work what light groups cannot be.
+
+    Raises
+    ------
+    UsageError
+        If a member is no source, or there are too many groups.
+    """
+    lights, emitters = bake_scene.scene.lights, bake_scene.emitter_names
+    names = (*(light.name for light in lights), *emitters)
+    if bake_scene.emitter is not None:
+        _check_members(settings, names)
+    given = (
+        *(bake_scene.light_groups or ("",) * len(lights)),
+        *(bake_scene.emitter_groups or ("",) * len(emitters)),
+    )
+    found = {group_of(*of, settings) for of in zip(names, given, strict=True)}
+    if len(found) > MAX_GROUPS:
+        raise UsageError(
+            f"{len(found)} light groups are more than the {MAX_GROUPS} that materials can mix: join some"
+        )
+
+
+def _check_members(settings: BakeSettings, names: Sequence[str]) -> None:
+    for name, wanted in settings.groups:
+        for member in wanted:
+            if member not in names:
+                raise UsageError(
+                    f"light group '{name}': there is no lamp, emissive material or world '{member}'"
+                )
 
 
 def group_pages(
-    kept: KeptBake, pages: tuple[LightmapPage, ...]
+    kept: KeptBake, pages: tuple[LightmapPage, ...], strengths: Array | None = None
 ) -> Generator[float, None, tuple[LightGroup, ...]]:
-    """Compute the lightmaps of each of the settings' light groups; yields the fraction done.
+    """Compute the lightmaps of each of the light groups; yields the fraction done.
 
     They sum to the whole: what sweeps that end, clamps at 0 and stitching leave of it, a small
     part, is shared out over the groups in proportion.
@@ -28,11 +79,14 @@ def group_pages(
     ----------
     pages : tuple of LightmapPage
         Those of all light together.
+    strengths : (s, 3) float64 or None
+        The sources', with which `pages` were lit; None for those of the bake.
     """
-    chosen = members(kept.settings.groups, kept.names, kept.strengths)
+    given = kept.strengths if strengths is None else kept.sources.checked(strengths)
+    chosen = members(kept.settings, kept.names, kept.groups, given)
     found = []
     for number, (_, rows) in enumerate(chosen):
-        steps = relight(kept, kept.strengths * rows[:, None])
+        steps = relight(kept, given * rows[:, None])
         while True:
             try:
                 fraction = next(steps).fraction
@@ -48,8 +102,9 @@ def group_pages(
         LightGroup(
             name,
             tuple(LightmapPage(part[group], page.coverage) for part, page in zip(pixels, pages, strict=True)),
+            tuple(dict.fromkeys(np.array(kept.names, dtype=object)[rows])),
         )
-        for group, (name, _) in enumerate(chosen)
+        for group, (name, rows) in enumerate(chosen)
     )
 
 
@@ -67,36 +122,33 @@ def shared_out(whole: Array, parts: Array) -> Array:
 
 
 def members(
-    groups: Sequence[GroupSetting], names: Sequence[str], strengths: Array
+    settings: BakeSettings, names: Sequence[str], of_scene: Sequence[str], strengths: Array
 ) -> list[tuple[str, Array]]:
     """Tell which sources are in which group.
 
     Parameters
     ----------
-    names : sequence of str
-        The sources'.
+    names, of_scene : sequence of str
+        The s sources' names, and the groups that the scene puts them in.
     strengths : (s, 3) float64
-        Theirs: what is in no group is gathered in `OTHERS`, if it shines.
+        Theirs: `OTHERS` is there only if it was asked for, or something in it shines.
 
     Returns
     -------
     members : list of (str, (s,) bool)
+        The settings' groups in their order, then the scene's by name, `OTHERS` last.
 
     Raises
     ------
     UsageError
         If a member is no source.
     """
-    known = np.array(names, dtype=object)
-    found = []
-    for name, wanted in groups:
-        for member in wanted:
-            if member not in names:
-                raise UsageError(
-                    f"light group '{name}': there is no lamp, emissive material or world '{member}'"
-                )
-        found.append((name, np.isin(known, np.array(wanted, dtype=object))))
-    left = ~np.any([rows for _, rows in found], axis=0) if found else np.ones(len(known), dtype=bool)
-    if (left & strengths.any(axis=1)).any():
+    _check_members(settings, names)
+    label = np.array([group_of(*of, settings) for of in zip(names, of_scene, strict=True)], dtype=object)
+    asked = [name for name, _ in settings.groups]
+    rest = sorted(set(label) - {*asked, OTHERS})
+    found = [(name, label == name) for name in (*asked, *rest)]
+    left = label == OTHERS
+    if OTHERS not in asked and (left & strengths.any(axis=1)).any():
         found.append((OTHERS, left))
     return found

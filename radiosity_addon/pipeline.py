@@ -10,26 +10,27 @@ import time
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
+from .bake_details import More, more_of
 from .bake_scene import (
     BakedObject,
     BakeObject,
     BakeResult,
     BakeScene,
-    BakeWarning,
     LightGroup,
     LightmapPage,
     Picture,
     Progress,
 )
 from .errors import BakeError, SceneError, UsageError
-from .light_groups import group_pages
+from .light_groups import are_wanted, check_groups, group_pages
 from .lightmap.accuracy import light_within
 from .lightmap.atlas import Atlas, AtlasInput, AtlasOptions, build_atlas
 from .lightmap.error_picture import summary, texel_residual
+from .lightmap.light_so_far import LightSoFar
 from .lightmap.packing import Limits, padding_for
 from .lightmap.rasterise import rasterise
 from .lightmap.reconstruct import GatherSettings, reconstruct
@@ -40,35 +41,36 @@ from .lightmap.texel_materials import FOOTPRINT, texel_materials
 from .lightmap.texel_pages import texel_pages
 from .lightmap.turned_faces import turned_away
 from .quality import for_error, quality_of, used_settings
-from .relighting import KeptBake, shown
+from .relighting import KeptBake, Moves, Solved, shown
+from .remarks import of_solution, small_objects
 from .report import solver_part
 from .settings import BakeSettings
 from .solver import Solution, SolverSettings, SolverState, solve_progress
 from .solver.arrays import Array
 from .solver.element_transport import Relightable
-from .solver.first_links import COARSEST_FAINT
+from .solver.visibility import RayCaster
+from .texel_pictures import TexelPictures
 
 T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
-class _Lit:
+class Lit:
     """What texels hold, (n, 3), and what it was made of: a residual of nothing else."""
 
     values: Array
+    caster: RayCaster
     light: TexelLight | None = None
     relightable: Relightable | None = None
-    materials: tuple[Array, ...] = ()
+    materials: tuple[Array, Array] | None = None
 
 
-UNWRAP, RASTERISE, SOLVE, LIGHT, ENCODE = 0.0, 0.15, 0.2, 0.5, 0.97
-"""How far the whole is when each stage begins; rough, from bakes at medium quality."""
+UNWRAP, RASTERISE, SOLVE, LIGHT, ENCODE = 0.0, 0.02, 0.04, 0.29, 0.98
+"""How far the whole is when each stage begins: shares of the time of the box and the office at medium quality
+(bench/results), of which the time left is reckoned."""
 
 DILATED = 8
 """Texels past the charts that are filled ring by ring, if not more are free."""
-
-FEW_TEXELS = 8
-"""An object with fewer than the square of so many texels is warned of."""
 
 PICTURE_SECONDS = 0.25
 """Time between two pictures of the solution: often enough to watch, too rarely to cost much."""
@@ -97,7 +99,7 @@ def bake(bake_scene: BakeScene, settings: BakeSettings) -> Generator[Progress, N
     BakeError
         If the lightmaps cannot be laid out.
     """
-    result, _ = yield from _bake(bake_scene, settings, keep=bool(settings.groups))
+    result, _ = yield from _bake(bake_scene, settings, keep=are_wanted(bake_scene, settings))
     return result
 
 
@@ -125,54 +127,81 @@ def _bake(
     """Bake, and keep what lights the scene anew if asked to."""
     if keep and settings.quantity == "residual":
         raise UsageError("a residual is of all light together: bake another quantity to light it anew")
+    if are_wanted(bake_scene, settings):
+        check_groups(bake_scene, settings)
     seconds: dict[str, float] = {}
     quality = quality_of(settings)
-    baked = [item for item in bake_scene.objects if item.bake and item.count]
+    baked = baked_objects(bake_scene)
     if not baked:
         raise SceneError("nothing to bake: give the scene a render-visible mesh with faces")
 
     yield Progress("unwrap", UNWRAP)
-    with _timed(seconds, "unwrap"):
+    with timed(seconds, "unwrap"):
         atlas = yield from _unwrap(bake_scene, baked, settings)
     yield Progress("rasterise", RASTERISE)
-    with _timed(seconds, "rasterise"):
+    with timed(seconds, "rasterise"):
         geometry = _texels(bake_scene, baked, atlas)
     yield Progress("solve", SOLVE)
-    with _timed(seconds, "solve"):
-        solution = yield from _solve(bake_scene, quality.solver)
+    with timed(seconds, "solve"):
+        solution = yield from solve(bake_scene, quality.solver)
     yield Progress("light", LIGHT)
-    with _timed(seconds, "light"):
-        steps = _texel_values(bake_scene, solution, geometry, quality.gather, settings, keep)
-        lit = yield from _staged(steps, "light", LIGHT, ENCODE)
+    with timed(seconds, "light"):
+        so_far = LightSoFar()
+        steps = _texel_values(bake_scene, solution, geometry, quality.gather, settings, keep, so_far)
+        lit = yield from staged(steps, "light", LIGHT, ENCODE, TexelPictures(so_far))
+    report = solver_part(solution.final_report(), used_settings(quality.solver), bake_scene.objects)
+    sides = solution.triangle_irradiance, solution.back_irradiance
+    of_light = (*turned_away(baked, bake_scene.scene.areas, *sides), *of_solution(solution, quality.solver))
+    solved = Solved(report, (*atlas.warnings, *of_light))
+    more = more_of(solution, baked, geometry, lit.light, settings.light)
+    return (yield from finish(bake_scene, settings, atlas, geometry, solved, lit, more, seconds))
+
+
+def finish(
+    bake_scene: BakeScene,
+    settings: BakeSettings,
+    atlas: Atlas,
+    geometry: TexelGeometry,
+    solved: Solved,
+    lit: Lit,
+    more: More,
+    seconds: dict[str, float],
+) -> Generator[Progress, None, tuple[BakeResult, KeptBake | None]]:
+    """Put what texels hold on pages, and tell of the bake; what was kept goes on in the kept bake."""
+    baked = baked_objects(bake_scene)
     yield Progress("encode", ENCODE)
-    with _timed(seconds, "encode"):
-        seams = _seams(bake_scene, solution, geometry, settings)
+    with timed(seconds, "encode"):
+        seams = _seams(bake_scene, lit.caster, geometry, settings)
         rings = max(DILATED, _padding(settings))
         pages = texel_pages(geometry, lit.values, seams, rings)
-        _check(solution, pages)
+        _check(solved.report, pages)
     kept = None
-    if lit.relightable is not None and lit.light is not None and lit.light.kept is not None:
-        laid = geometry, seams, rings
-        kept = KeptBake(bake_scene, settings, lit.relightable, lit.light.kept, *laid, *lit.materials)
+    if lit.relightable and lit.materials and lit.light is not None and lit.light.kept is not None:
+        lighting = lit.relightable, lit.light.kept
+        moves = None if lit.light.traced is None else Moves(atlas, lit.light.traced, solved)
+        kept = KeptBake(bake_scene, settings, *lighting, geometry, seams, rings, *lit.materials, moves)
     groups: tuple[LightGroup, ...] = ()
-    if kept is not None and settings.groups:
-        with _timed(seconds, "groups"):
-            groups = yield from _staged(group_pages(kept, pages), "groups", ENCODE, 1.0)
+    if kept is not None and are_wanted(bake_scene, settings):
+        with timed(seconds, "groups"):
+            groups = yield from staged(group_pages(kept, pages), "groups", ENCODE, 1.0)
 
-    report = solver_part(solution.final_report(), used_settings(quality.solver), bake_scene.objects)
+    report = dict(solved.report)
     if lit.light is not None:
         report["estimated_error"] = lit.light.error
     if settings.quantity == "residual":
         report["error_picture"] = summary(lit.values)
-    of_texels = _of_texels(bake_scene, baked, geometry)
-    sides = solution.triangle_irradiance, solution.back_irradiance
-    of_light = (*turned_away(baked, bake_scene.scene.areas, *sides), *_of_solution(solution, quality.solver))
-    warnings = (*bake_scene.warnings, *atlas.warnings, *of_texels, *of_light)
+    of_texels = small_objects(bake_scene, baked, geometry)
+    warnings = (*bake_scene.warnings, *of_texels, *solved.warnings)
     objects = tuple(
         BakedObject(item, placed.uv, placed.page) for item, placed in zip(baked, atlas.objects, strict=True)
     )
     told = _told(atlas, pages)
-    return BakeResult(pages, objects, report, warnings, seconds, told, groups), kept
+    return BakeResult(pages, objects, report, warnings, seconds, told, groups, *more), kept
+
+
+def baked_objects(bake_scene: BakeScene) -> list[BakeObject]:
+    """Return the objects that get lightmaps."""
+    return [item for item in bake_scene.objects if item.bake and item.count]
 
 
 def _unwrap(
@@ -218,7 +247,7 @@ def _texels(bake_scene: BakeScene, baked: list[BakeObject], atlas: Atlas) -> Tex
     return TexelGeometry(bake_scene.scene, uv, page_of_triangle, texels, rows)
 
 
-def _solve(bake_scene: BakeScene, settings: SolverSettings) -> Generator[Progress, None, Solution]:
+def solve(bake_scene: BakeScene, settings: SolverSettings) -> Generator[Progress, None, Solution]:
     """Solve, with a picture of the solution at first, now and then, and at the end."""
     steps = solve_progress(bake_scene.scene, settings)
     state: SolverState | None = None
@@ -253,8 +282,12 @@ def _picture(state: SolverState) -> Picture | None:
     )
 
 
-def _staged(
-    steps: Generator[float, None, T], stage: str, begin: float, end: float
+def staged(
+    steps: Generator[float, None, T],
+    stage: str,
+    begin: float,
+    end: float,
+    pictures: TexelPictures | None = None,
 ) -> Generator[Progress, None, T]:
     """Run steps that yield the fraction they have done as one stage, from `begin` to `end` of the whole."""
     while True:
@@ -263,7 +296,8 @@ def _staged(
         except StopIteration as done:
             result: T = done.value
             return result
-        yield Progress(stage, begin + (end - begin) * fraction)
+        texels = None if pictures is None else pictures.next()
+        yield Progress(stage, begin + (end - begin) * fraction, texels=texels)
 
 
 def _texel_values(
@@ -273,35 +307,37 @@ def _texel_values(
     gather: GatherSettings,
     settings: BakeSettings,
     keep: bool,
-) -> Generator[float, None, _Lit]:
+    so_far: LightSoFar,
+) -> Generator[float, None, Lit]:
     """Compute the quantity asked for at all texels, and estimate the light's relative error."""
     if settings.quantity == "residual":
         residual = yield from texel_residual(solution, geometry, gather)
-        return _Lit(residual)
+        return Lit(residual, solution.local_pass.caster)
     relightable = solution.relightable(bake_scene.emitter) if keep else None
     local = solution.local_pass if relightable is None else relightable.local
     where = bake_scene.scene, local, geometry
     if settings.relative_error is None:
-        light = yield from reconstruct(*where, gather)
+        light = yield from reconstruct(*where, gather, so_far)
     else:
-        light = yield from light_within(*where, lambda e: for_error(e).gather, settings.relative_error)
+        within = settings.relative_error, so_far
+        light = yield from light_within(*where, lambda e: for_error(e).gather, *within)
     materials = texel_materials(bake_scene.scene, geometry, FOOTPRINT)
-    return _Lit(shown(light, *materials, settings), light, relightable, materials)
+    return Lit(shown(light, *materials, settings), local.caster, light, relightable, materials)
 
 
 def _seams(
-    bake_scene: BakeScene, solution: Solution, geometry: TexelGeometry, settings: BakeSettings
+    bake_scene: BakeScene, caster: RayCaster, geometry: TexelGeometry, settings: BakeSettings
 ) -> Seams | None:
     """Find the seams to stitch; None for an error picture, which is to show what is there."""
     if settings.quantity == "residual":
         return None
-    seams = find_seams(bake_scene.scene, geometry, solution.local_pass.caster)
+    seams = find_seams(bake_scene.scene, geometry, caster)
     return seams if settings.quantity != "radiosity" else seams.of_one_material(bake_scene.scene)
 
 
-def _check(solution: Solution, pages: tuple[LightmapPage, ...]) -> None:
+def _check(report: dict[str, Any], pages: tuple[LightmapPage, ...]) -> None:
     """Refuse to hand out a result that is not finite: a defect must not look like a dark room."""
-    if not np.isfinite(solution.report["residual"]) or not all(np.isfinite(p.pixels).all() for p in pages):
+    if not np.isfinite(report["residual"]) or not all(np.isfinite(p.pixels).all() for p in pages):
         raise BakeError(
             "the solution is not finite: this is a defect of the solver; please report the scene, "
             "and try another quality meanwhile"
@@ -321,64 +357,8 @@ def _told(atlas: Atlas, pages: tuple[LightmapPage, ...]) -> tuple[dict[str, floa
     )
 
 
-def _of_texels(
-    bake_scene: BakeScene, baked: list[BakeObject], geometry: TexelGeometry
-) -> Iterator[BakeWarning]:
-    """Warn of objects that get hardly any texels."""
-    counts = np.bincount(geometry.triangle, minlength=len(bake_scene.scene))
-    for item in baked:
-        texels, surface = int(counts[item.rows].sum()), bake_scene.scene.areas[item.rows].sum()
-        if surface > 0 and texels < FEW_TEXELS**2:
-            yield BakeWarning(
-                item.name,
-                f"object '{item.name}' gets only {texels} texels, fewer than {FEW_TEXELS} × {FEW_TEXELS}: "
-                "raise the resolution or its texel scale",
-            )
-
-
-def _of_solution(solution: Solution, settings: SolverSettings) -> tuple[BakeWarning, ...]:
-    """Warn where nothing shines, or the solver had to stop early."""
-    warnings = []
-    if solution.report["power_W"]["emitted"] == 0:
-        warnings.append(
-            BakeWarning(
-                "scene",
-                "no lamp, emissive material or world light reaches anything: the lightmaps are black; "
-                "add a lamp, or bake with a sky",
-            )
-        )
-    if solution.over_budget > 0:
-        warnings.append(
-            BakeWarning(
-                "scene",
-                f"refinement stopped at its budget of links; single links may misplace up to "
-                f"{solution.over_budget:.2%} of the light: bake at a lower quality, or fewer objects",
-            )
-        )
-    if solution.first_faint > COARSEST_FAINT * settings.error:
-        warnings.append(
-            BakeWarning(
-                "scene",
-                f"so many small surfaces that links begin coarse, between parts that may exchange up to "
-                f"{solution.first_faint:.2%} of all light: single small faces may be lit unevenly; "
-                "raise the most links and the memory limit, or bake fewer objects",
-            )
-        )
-    residual, tolerance = solution.report["residual"], used_settings(settings).get("tolerance", np.inf)
-    if residual > tolerance:
-        warnings.append(
-            BakeWarning(
-                "scene",
-                f"the {settings.method} method stopped after {solution.report['iterations']:,} iterations "
-                f"at a residual of {residual:.1e}, above the tolerance of {tolerance:.1e}: allow more "
-                "iterations, or a larger tolerance",
-            )
-        )
-    return tuple(warnings)
-
-
 @contextmanager
-def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
+def timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
     """Note how long a stage took."""
     started = time.perf_counter()
     try:

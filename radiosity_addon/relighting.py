@@ -13,14 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from .bake_scene import BakeScene, LightmapPage, Progress
+from .bake_scene import BakeScene, BakeWarning, LightmapPage, Progress
 from .errors import SceneError
+from .lightmap.atlas import Atlas
 from .lightmap.encode import to_quantity
 from .lightmap.relight import kept_bytes, relight_steps
 from .lightmap.seams import Seams
 from .lightmap.sweeps import LitTexels, TexelLight
 from .lightmap.texel_geometry import TexelGeometry
 from .lightmap.texel_pages import texel_pages
+from .lightmap.traced_texels import TracedTexels
 from .settings import BakeSettings
 from .solver.arrays import Array
 from .solver.element_transport import Relightable
@@ -33,6 +35,33 @@ STRENGTHS = ("power", "irradiance", "radiance")
 
 SAME = 1e-5
 """Emission that differs from what its material's strength says by no more than this part is as expected."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """What a bake tells of its hierarchy: the solver's part of the report, and warnings."""
+
+    report: dict[str, Any]
+    warnings: tuple[BakeWarning, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Moves:
+    """What baking anew needs of a kept bake after some objects moved (`rebaking.py`).
+
+    Attributes
+    ----------
+    atlas : Atlas
+        Where charts lie.
+    traced : TracedTexels
+        How texels were lit.
+    solved : Solved
+        Of the bake that the hierarchy was solved for.
+    """
+
+    atlas: Atlas
+    traced: TracedTexels
+    solved: Solved
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +78,8 @@ class KeptBake:
         The texels, what is stitched, and how far pages are dilated [texels].
     reflectance, emission : (n, 3) float64
         Of the texels as they show; emission [W/m²] as it was baked.
+    moves : Moves or None
+        Without it nothing can be moved.
     """
 
     bake_scene: BakeScene
@@ -60,6 +91,7 @@ class KeptBake:
     rings: int
     reflectance: Array
     emission: Array
+    moves: Moves | None = None
 
     @property
     def sources(self) -> LightSources:
@@ -73,6 +105,13 @@ class KeptBake:
         count = len(self.sources) - len(names)
         given = self.bake_scene.emitter_names or tuple(f"emission {1 + row}" for row in range(count))
         return (*names, *given[:count])
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """The light groups that the scene puts the sources in; "" where in none."""
+        lights = self.bake_scene.light_groups or ("",) * len(self.sources.lights)
+        count = len(self.sources) - len(lights)
+        return (*lights, *(self.bake_scene.emitter_groups or ("",) * count)[:count])
 
     @property
     def strengths(self) -> Array:
@@ -109,7 +148,7 @@ class KeptBake:
         if not alike:
             raise SceneError("a surface, a reflectance or the number of lamps has changed; bake again")
         for light, other in zip(before.lights, scene.lights, strict=True):
-            if not _same_but_strength(light, other):
+            if not differs_in_strength_alone(light, other):
                 raise SceneError(f"lamp '{light.name}' has changed in more than its strength; bake again")
         exitance = np.zeros((len(self.sources) - len(scene.lights), 3))
         emits = self.sources.emitter >= 0
@@ -164,8 +203,8 @@ def shown(light: TexelLight, reflectance: Array, emission: Array, settings: Bake
     return to_quantity(irradiance, reflectance, emission, settings.quantity)
 
 
-def _same_but_strength(one: Light, other: Light) -> bool:
-    """Tell whether two lights differ at most in colour and strength."""
+def differs_in_strength_alone(one: Light, other: Light) -> bool:
+    """Tell whether two lights differ at most in colour and strength, but for rounding."""
     if type(one) is not type(other):
         return False
     return all(
@@ -175,5 +214,16 @@ def _same_but_strength(one: Light, other: Light) -> bool:
     )
 
 
+def same_light(one: Light, other: Light) -> bool:
+    """Tell whether two lights are the same."""
+    alike = type(one) is type(other)
+    return alike and all(_equal(getattr(one, e.name), getattr(other, e.name)) for e in fields(one))
+
+
 def _equal(one: Any, other: Any) -> bool:
-    return bool(np.array_equal(one, other)) if isinstance(one, np.ndarray) else bool(one == other)
+    """Tell whether values are the same: of skies, whose pictures are rendered anew, but for rounding."""
+    if not isinstance(one, np.ndarray) or not isinstance(other, np.ndarray):
+        return bool(one == other)
+    if one.shape != other.shape:
+        return False
+    return bool(np.abs(one - other).max(initial=0.0) <= SAME * np.abs(one).max(initial=0.0))

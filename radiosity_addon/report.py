@@ -6,7 +6,7 @@ import json
 import math
 import os
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -15,6 +15,7 @@ import numpy as np
 
 from .bake_scene import LIGHTMAP_UV_LAYER, BakeObject, BakeResult
 from .errors import BakeError
+from .manifest import FILES
 
 T = TypeVar("T")
 
@@ -47,7 +48,13 @@ class BakeReport:
     data: dict[str, Any]
 
     @classmethod
-    def of(cls, result: BakeResult, files: Sequence[LightmapFile], seconds: dict[str, float]) -> BakeReport:
+    def of(
+        cls,
+        result: BakeResult,
+        files: Sequence[LightmapFile],
+        seconds: dict[str, float],
+        groups: Sequence[Sequence[LightmapFile]] = (),
+    ) -> BakeReport:
         """Report a bake.
 
         Parameters
@@ -57,11 +64,14 @@ class BakeReport:
             Parallel to `result.pages`.
         seconds : dict of str to float
             Wall-clock time of every stage, those outside the pipeline included.
+        groups : sequence of sequence of LightmapFile
+            Parallel to `result.groups`, and each to `result.pages`.
         """
         told = result.atlas or ({},) * len(files)
         pages = [{"image": file.path, **_plain(page)} for file, page in zip(files, told, strict=True)]
         objects = []
-        for baked in result.objects:
+        light = result.light or ({},) * len(result.objects)
+        for baked, of_light in zip(result.objects, light, strict=True):
             height, width = result.pages[baked.page].pixels.shape[:2]
             file = files[baked.page]
             entry: dict[str, Any] = {
@@ -73,14 +83,19 @@ class BakeReport:
             }
             if file.scale is not None:
                 entry["scale"] = file.scale
-            objects.append(entry)
+            objects.append({**entry, **_plain(of_light)})
         solver = {key: value for key, value in result.solver.items() if key != "history"}
         solver["history"] = thinned(result.solver.get("history", ()))
+        shares = [
+            {"group": group.name, "sources": list(group.sources), "pages": [_file(file) for file in of]}
+            for group, of in zip(result.groups, groups, strict=True)
+        ]
         return cls(
             {
                 "version": VERSION,
                 "objects": objects,
                 "pages": pages,
+                **({"light_groups": shares} if shares else {}),
                 "solver": _plain(solver),
                 "warnings": [{"name": w.name, "message": w.message} for w in result.warnings],
                 "seconds": {stage: round(float(taken), 4) for stage, taken in seconds.items()},
@@ -90,6 +105,25 @@ class BakeReport:
     def as_dict(self) -> dict[str, Any]:
         """The report as report.json holds it."""
         return self.data
+
+    def joined(self, earlier: Path, objects: Collection[str]) -> BakeReport:
+        """Return the report with what the one before says of objects that have kept their lightmaps."""
+        try:
+            told = json.loads(earlier.read_text(encoding="utf-8")) if objects else {}
+            entries = [dict(entry) for entry in told.get("objects", ()) if entry["object"] in objects]
+            numbers = sorted({entry["atlas"] for entry in entries})
+            pages = [told["pages"][number] for number in numbers]
+        except (OSError, ValueError, KeyError, TypeError, IndexError, AttributeError):
+            return self
+        count = len(self.data["pages"])
+        for entry in entries:
+            entry["atlas"] = count + numbers.index(entry["atlas"])
+        joined = {"objects": [*self.data["objects"], *entries], "pages": [*self.data["pages"], *pages]}
+        return BakeReport({**self.data, **joined})
+
+    def listing(self, files: Mapping[str, Mapping[str, Any]]) -> BakeReport:
+        """Return the report with a list of all that bakes have written beside it, see `manifest.py`."""
+        return BakeReport({**self.data, FILES: {name: dict(told) for name, told in files.items()}})
 
     def write(self, path: Path) -> None:
         """Write the report as JSON, over an older one only once it is whole.
@@ -134,6 +168,11 @@ def _named(block: Mapping[str, Any], objects: Sequence[BakeObject]) -> dict[str,
     owners = sorted({bisect_right(firsts, triangle) - 1 for triangle in block["triangles"]})
     names = list(dict.fromkeys(objects[owner].name for owner in owners))
     return {"objects": names, **{key: value for key, value in block.items() if key != "triangles"}}
+
+
+def _file(file: LightmapFile) -> dict[str, Any]:
+    """Tell of an image: its name, and its scale where it has one."""
+    return {"image": file.path} if file.scale is None else {"image": file.path, "scale": file.scale}
 
 
 def thinned(history: Sequence[T], most: int = MAX_HISTORY) -> list[T]:

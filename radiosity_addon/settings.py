@@ -18,10 +18,18 @@ MAX_RESOLUTION = 16384
 MAX_PAGES = 64
 MAX_MIP_LEVELS = 8
 MAX_PADDING = 512
+EFFICACY = 683.0
+"""Lumens a watt of green light of 555 nm; taken for all light where nothing else is said [lm/W]."""
+
 MIN_ERROR, MAX_ERROR = 0.002, 0.2
+MAX_GROUPS = 24
+"""Light groups of a bake: each is an image that its materials read, and graphics cards take 32, some 16."""
 
 GroupSetting = tuple[str, tuple[str, ...]]
 """A light group: its name, and the names of its lamps, emissive materials and the world."""
+
+OTHERS = "others"
+"""The light group of what is in none."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +77,8 @@ class BakeSettings:
     groups : tuple of (str, tuple of str)
         Light groups: each one's name, and the names of the lamps, emissive materials and world in it.
         Each gets lightmaps of its own; so does what is in none of them.
+    light_groups : bool
+        Also bake the light groups that the scene itself has; `groups` win where both say something.
     seed : int
     threads : int
         0 means all cores. The result does not depend on it.
@@ -103,6 +113,7 @@ class BakeSettings:
     sky: bool = False
     keep_uvs: bool = False
     groups: tuple[GroupSetting, ...] = ()
+    light_groups: bool = False
     seed: int = 0
     threads: int = 0
     method: str = "hierarchical"
@@ -181,14 +192,17 @@ class BakeSettings:
     def _check_groups(self) -> None:
         """Refuse what light groups cannot be."""
         names = [name for name, _ in self.groups]
+        if "" in names:
+            raise UsageError("a light group has no name")
         inside = [member for _, group in self.groups for member in group]
         for kind, found in (("light group", names), ("member of light groups", inside)):
             twice = next((name for name in found if found.count(name) > 1), None)
             if twice is not None:
                 raise UsageError(f"{kind} '{twice}' is there twice")
-        if self.groups and self.method != "hierarchical":
+        wanted = bool(self.groups) or self.light_groups
+        if wanted and self.method != "hierarchical":
             raise UsageError(f"light groups need the hierarchical method; {self.method} keeps no links")
-        if self.groups and self.quantity == "residual":
+        if wanted and self.quantity == "residual":
             raise UsageError("a residual is of all light together: bake another quantity for light groups")
 
     def method_settings(self) -> dict[str, Any]:

@@ -27,6 +27,8 @@ from .bake_record import (
     remove_datablocks,
 )
 from .export_sources import Export, ExportSource
+from .group_images import GroupImages
+from .light_shares import LightShares
 from .lightmap_materials import LightmapMaterials
 from .mesh_copies import copy_meshes, set_materials
 from .restore import leave_edit_modes
@@ -55,6 +57,7 @@ def apply_lightmaps(
     result: BakeResult,
     images: Sequence[bpy.types.Image],
     settings: BakeSettings,
+    groups: GroupImages | None = None,
 ) -> None:
     """Show the lightmaps on the baked objects; `restore` undoes it.
 
@@ -69,6 +72,8 @@ def apply_lightmaps(
         Parallel to `result.pages`, from `write_pages`.
     settings : BakeSettings
         The quantity decides what the materials do with a texel.
+    groups : mapping of str to list of Image
+        Those of each light group, parallel to `images`: then materials mix these.
 
     Raises
     ------
@@ -82,7 +87,8 @@ def apply_lightmaps(
     before = set(made_datablocks())
     try:
         replacements = _make_replacements(context, export, result)
-        _dress(replacements, images, settings.quantity)
+        shares = LightShares(context.scene, images, groups, settings) if groups else None
+        _dress(replacements, images, settings.quantity, shares)
     except BaseException:
         remove_datablocks([datablock for datablock in made_datablocks() if datablock not in before])
         raise
@@ -148,9 +154,14 @@ def _real_objects(sources: Sequence[ExportSource]) -> list[bpy.types.Object]:
     return [bpy.data.objects[name, None] for name in names if (name, None) in bpy.data.objects]
 
 
-def _dress(replacements: Sequence[_Replacement], images: Sequence[bpy.types.Image], quantity: str) -> None:
+def _dress(
+    replacements: Sequence[_Replacement],
+    images: Sequence[bpy.types.Image],
+    quantity: str,
+    shares: LightShares | None,
+) -> None:
     """Give the mesh copies their lightmap UVs and materials."""
-    materials = LightmapMaterials(quantity)
+    materials = LightmapMaterials(quantity, shares)
     for replacement in replacements:
         mesh, baked, name = replacement.mesh, replacement.baked, replacement.source.name
         mesh.name = f"{name} (Lightmap)"
@@ -161,7 +172,12 @@ def _dress(replacements: Sequence[_Replacement], images: Sequence[bpy.types.Imag
             # A mesh without slots is drawn grey; its lightmap needs a slot to sit in.
             drawn = list(mesh.materials) or [None]
             image = images[baked.page]
-            set_materials(mesh, [materials.copy_of(material, image, pinned) for material in drawn])
+            groups = [shares.emission_group(replacement.source, each) if shares else "" for each in drawn]
+            copies = [
+                materials.copy_of(material, image, pinned, group)
+                for material, group in zip(drawn, groups, strict=True)
+            ]
+            set_materials(mesh, copies)
 
 
 def _show(context: bpy.types.Context, replacements: Sequence[_Replacement]) -> None:

@@ -25,8 +25,12 @@ class ModifierRecord(bpy.types.PropertyGroup):
     """A modifier that was switched off because its result is in the baked mesh copy."""
 
     # `name` comes with PropertyGroup and is the modifier's.
-    show_viewport: bpy.props.BoolProperty()  # type: ignore[valid-type]
-    show_render: bpy.props.BoolProperty()  # type: ignore[valid-type]
+    show_viewport: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        description="The modifier showed in the viewport before the bake"
+    )
+    show_render: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        description="The modifier showed in renders before the bake"
+    )
 
 
 class BakeRecord(bpy.types.PropertyGroup):
@@ -35,17 +39,33 @@ class BakeRecord(bpy.types.PropertyGroup):
     is_baked: bpy.props.BoolProperty(  # type: ignore[valid-type]
         name="Baked", description="The object shows a lightmap; Restore brings the original back"
     )
-    original_mesh: bpy.props.PointerProperty(type=bpy.types.Mesh)  # type: ignore[valid-type]
+    original_mesh: bpy.props.PointerProperty(  # type: ignore[valid-type]
+        type=bpy.types.Mesh, description="The mesh that the object showed before the bake"
+    )
     object_slots: bpy.props.StringProperty(  # type: ignore[valid-type]
         description="Indices of the material slots that were linked to the object, not its data"
     )
-    active_material_index: bpy.props.IntProperty()  # type: ignore[valid-type]
-    modifiers: bpy.props.CollectionProperty(type=ModifierRecord)  # type: ignore[valid-type]
+    active_material_index: bpy.props.IntProperty(  # type: ignore[valid-type]
+        description="The material slot that was active before the bake"
+    )
+    modifiers: bpy.props.CollectionProperty(  # type: ignore[valid-type]
+        type=ModifierRecord, description="Modifiers that were switched off: their result is in the baked copy"
+    )
+    fingerprint: bpy.props.StringProperty(  # type: ignore[valid-type]
+        description="What shape and reflectance were when the object was baked"
+    )
+    texels_per_metre: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        description="How fine the lightmap is, for a texel scale of 1"
+    )
     is_hidden: bpy.props.BoolProperty(  # type: ignore[valid-type]
         description="Stand-ins replace the object, which was hidden"
     )
-    hide_viewport: bpy.props.BoolProperty()  # type: ignore[valid-type]
-    hide_render: bpy.props.BoolProperty()  # type: ignore[valid-type]
+    hide_viewport: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        description="The object was hidden in viewports before the bake"
+    )
+    hide_render: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        description="The object was hidden from renders before the bake"
+    )
 
 
 def register() -> None:
@@ -102,8 +122,12 @@ def remove_made() -> None:
 
 
 def remove_datablocks(datablocks: Iterable[bpy.types.ID]) -> None:
-    """Remove datablocks from the file, all at once."""
-    bpy.data.batch_remove(list(datablocks))
+    """Remove datablocks from the file, all at once, and the keyframes that nothing else uses."""
+    blocks = list(datablocks)
+    animated = [tree.animation_data for tree in blocks if isinstance(tree, bpy.types.NodeTree)]
+    actions = {data.action for data in animated if data is not None and data.action is not None}
+    bpy.data.batch_remove(blocks)
+    bpy.data.batch_remove([action for action in actions if action.users == 0])
 
 
 def record_mesh_swap(obj: bpy.types.Object) -> None:

@@ -15,6 +15,7 @@ from ..solver.lights import Light
 from .export_sources import ExportSource
 from .lamps import LampFactors, read_lamp
 from .light_linking import linking_warnings
+from .light_membership import Membership, PlaceGroups
 from .materials import DEFAULT_GREY, Surface, ray_doubts, read_material, uses_nodes
 from .mesh_arrays import MeshArrays, all_finite, no_triangles, not_finite_message, read_mesh
 from .object_roles import BAKE, BAKEABLE_TYPES, IGNORE, Role, role_of
@@ -65,6 +66,8 @@ class Piece:
     has_lightmap_layer : bool
     linking : tuple of BakeWarning
         What is not followed, should it emit.
+    groups : PlaceGroups
+        The light group of what it emits.
     """
 
     source: ExportSource
@@ -79,6 +82,7 @@ class Piece:
     uv_layers: int
     has_lightmap_layer: bool
     linking: tuple[BakeWarning, ...]
+    groups: PlaceGroups
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -101,28 +105,36 @@ _NOTHING = _Contents(no_triangles(), np.zeros(0, dtype=np.int32), frozenset(), {
 
 @dataclass(frozen=True)
 class Collected:
-    """All that was found. `surfaces` and `materials` are indexed by `Piece.surface`."""
+    """All that was found. `surfaces` and `materials` are indexed by `Piece.surface`.
+
+    `groups` are the lights' light groups, parallel to them, "" for those in none.
+    """
 
     pieces: list[Piece]
     surfaces: list[Surface]
     materials: list[bpy.types.Material | None]
     lights: list[Light]
     warnings: list[BakeWarning]
+    groups: list[str]
 
 
 def collect(
-    depsgraph: bpy.types.Depsgraph, factors: LampFactors, settings: BakeSettings | None = None
+    depsgraph: bpy.types.Depsgraph,
+    factors: LampFactors,
+    settings: BakeSettings | None = None,
+    dark: bool = False,
 ) -> Collected:
     """Read meshes, materials and lamps of an evaluated scene; `factors` are those of `lamp_factors`.
 
-    `settings.ignore` and `settings.light_only` name objects to leave out, or without lightmaps.
+    `settings.ignore` and `settings.light_only` name objects to leave out, or without lightmaps; `dark` takes
+    lamps without power too.
 
     Raises
     ------
     SceneError
         If a coordinate is NaN or infinite.
     """
-    collector = _Collector(depsgraph, factors, settings or BakeSettings())
+    collector = _Collector(depsgraph, factors, settings or BakeSettings(), dark)
     for instance in visible_objects(depsgraph):
         if instance.object.type == "LIGHT":
             collector.lamp(instance)
@@ -135,10 +147,13 @@ def collect(
 
 
 class _Collector:
-    def __init__(self, depsgraph: bpy.types.Depsgraph, factors: LampFactors, settings: BakeSettings) -> None:
-        self._factors = factors
+    def __init__(
+        self, depsgraph: bpy.types.Depsgraph, factors: LampFactors, settings: BakeSettings, dark: bool
+    ) -> None:
+        self._factors, self._dark = factors, dark
         self._settings = settings
-        self.collected = Collected([], [], [], [], [])
+        self.collected = Collected([], [], [], [], [], [])
+        self._membership = Membership(depsgraph.scene.original)
         self._override = depsgraph.view_layer_eval.material_override
         self._meshes: dict[tuple[int, frozenset[str]], tuple[MeshArrays | None, MeshValues]] = {}
         self._asked: list[frozenset[str]] = []
@@ -161,10 +176,11 @@ class _Collector:
         }
 
     def lamp(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
-        light, warnings = read_lamp(instance.object, matrix_of(instance), self._factors)
+        light, warnings = read_lamp(instance.object, matrix_of(instance), self._factors, self._dark)
         self._warn(warnings)
         if light is not None:
             self.collected.lights.append(light)
+            self.collected.groups.append(self._groups(instance).of_lamp)
 
     def mesh(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
         shown = original_object(instance)
@@ -207,8 +223,13 @@ class _Collector:
                 uv_layers=max(mesh.uv_layers, len(layers)),
                 has_lightmap_layer=mesh.lightmap_uv is not None or LIGHTMAP_UV_LAYER in layers,
                 linking=tuple(linking_warnings(shown, "emissive object")),
+                groups=self._groups(instance),
             )
         )
+
+    def _groups(self, instance: bpy.types.DepsgraphObjectInstance) -> PlaceGroups:
+        shown = original_object(instance)
+        return self._membership.at(shown, instance.parent.original if instance.is_instance else shown)
 
     def _is_fog(self, contents: _Contents) -> bool:
         """Tell whether all there is of a mesh is what fills it."""

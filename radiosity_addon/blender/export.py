@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Sequence
 
 import bpy
 import numpy as np
@@ -16,6 +15,7 @@ from ..solver.scene import Scene
 from .collect import Collected, Piece, collect
 from .export_sources import Export
 from .lamps import lamp_factors
+from .light_membership import name_on
 from .mesh_arrays import all_finite, degenerate, not_finite_message, world_from_object
 from .object_roles import BAKE, BAKEABLE_TYPES, half_visible
 from .render_options import option_warnings, world_of
@@ -26,7 +26,7 @@ from .world import read_world
 MAX_UV_LAYERS = 8
 
 
-def export_scene(context: bpy.types.Context, settings: BakeSettings) -> Export:
+def export_scene(context: bpy.types.Context, settings: BakeSettings, dark: bool = False) -> Export:
     """Read the context's view layer as a render would see it.
 
     Parameters
@@ -35,6 +35,8 @@ def export_scene(context: bpy.types.Context, settings: BakeSettings) -> Export:
         Of a scene without lightmaps: restore an earlier bake first.
     settings : BakeSettings
         `objects`, `light_only`, `ignore`, `sky` and `keep_uvs` matter here.
+    dark : bool
+        Whether lamps without power and a black world are lights too, for a bake that is kept.
 
     Returns
     -------
@@ -51,14 +53,16 @@ def export_scene(context: bpy.types.Context, settings: BakeSettings) -> Export:
     leave_edit_mode(context)
     factors = lamp_factors()
     with render_depsgraph(context) as depsgraph:
-        collected = collect(depsgraph, factors, settings)
+        collected = collect(depsgraph, factors, settings, dark)
         collected.warnings.extend(option_warnings(context))
+    shown = world_of(context)
     # After that: Cycles may have to render it, which no evaluated object would survive.
-    world, warnings = read_world(world_of(context))
+    world, warnings = read_world(shown, dark)
     collected.lights.extend(world)
+    collected.groups.extend([name_on(shown)] * len(world))
     collected.warnings.extend(warnings)
     _check_names(context, collected.pieces, settings)
-    chosen = _chosen(context, collected.pieces, settings.objects)
+    chosen = chosen_pieces(context, collected.pieces, settings.objects)
     for piece in chosen:
         _check_uv_layers(piece)
     return _assemble(context, collected, {piece.source.name for piece in chosen}, settings)
@@ -128,38 +132,77 @@ def _assemble(
     for piece, obj in zip(collected.pieces, objects, strict=True):
         if piece.linking and scene.emission[obj.rows].any():
             warnings += piece.linking
-    if not scene.lights and not scene.emission.any():
+    shining = [light for light in scene.lights if light.strength.any()]
+    if not shining and not scene.emission.any():
         if settings.sky:
-            scene.lights = (EnvironmentLight(1.0),)
+            scene.lights = (*scene.lights, EnvironmentLight(1.0))
         else:
             warnings.append(_no_light(context))
-    if scene.emission.any() or any(isinstance(light, EnvironmentLight) for light in scene.lights):
+    if scene.emission.any() or any(isinstance(light, EnvironmentLight) for light in shining):
         warnings += [
             half_visible(piece.source.object_name)
             for piece in collected.pieces
             if piece.role.in_bounces != piece.role.in_shadows and len(piece.mesh)
         ]
-    emitters = _emitters(scene, surface, collected.materials)
+    emitter, emitting, emitter_groups = _emitters(scene, surface, collected)
+    if settings.light_groups and not any((*collected.groups, *emitter_groups)):
+        warnings.append(_no_groups(context))
+    # A sky that was added belongs to nobody.
+    of_lights = (*collected.groups, *("",) * (len(scene.lights) - len(collected.groups)))
     return Export(
-        BakeScene(scene, tuple(objects), tuple(dict.fromkeys(warnings)), *emitters),
+        BakeScene(
+            scene,
+            tuple(objects),
+            tuple(dict.fromkeys(warnings)),
+            emitter,
+            emitting,
+            of_lights,
+            emitter_groups,
+        ),
         tuple(piece.source for piece in collected.pieces),
     )
 
 
 def _emitters(
-    scene: Scene, surface: np.ndarray, materials: Sequence[bpy.types.Material | None]
-) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Number the materials that emit: (t,) int32 whose each triangle is, and their names."""
+    scene: Scene, surface: np.ndarray, collected: Collected
+) -> tuple[np.ndarray, tuple[str, ...], tuple[str, ...]]:
+    """Number the materials that emit, each once for every light group that it is in.
+
+    Returns
+    -------
+    emitter : (t,) int32
+        Whose each triangle is.
+    names, groups : tuple of str
+        The materials', and the light groups they are in.
+    """
+    names: list[str] = []
+    place = []
+    for piece in collected.pieces:
+        here = {row: piece.groups.of_material(collected.materials[row]) for row in np.unique(piece.surface)}
+        names += [name for name in here.values() if name not in names]
+        numbers = np.zeros(len(collected.surfaces), dtype=np.int32)
+        numbers[list(here)] = [names.index(name) for name in here.values()]
+        place.append(numbers[piece.surface])
     emits = scene.emission.any(axis=1)
-    rows, number = np.unique(surface[emits], return_inverse=True)
+    of = np.stack([surface, np.concatenate(place)], axis=1)[emits]
+    rows, number = np.unique(of, axis=0, return_inverse=True)
     emitter = np.zeros(len(scene), dtype=np.int32)
     emitter[emits] = number.reshape(-1)
     # Without a material nothing emits.
-    return emitter, tuple(getattr(materials[row], "name", "") for row in rows)
+    materials = tuple(getattr(collected.materials[row], "name", "") for row, _ in rows)
+    return emitter, materials, tuple(names[group] for _, group in rows)
 
 
-def _chosen(context: bpy.types.Context, pieces: list[Piece], names: tuple[str, ...] | None) -> list[Piece]:
-    """Return the pieces that get a lightmap."""
+def chosen_pieces(
+    context: bpy.types.Context, pieces: list[Piece], names: tuple[str, ...] | None
+) -> list[Piece]:
+    """Return the pieces that get a lightmap.
+
+    Raises
+    ------
+    SceneError, UsageError
+        If there is none, or one that was asked for by name can have none.
+    """
     if names is None:
         bakeable = [piece for piece in pieces if piece.bakeable]
         if not bakeable:
@@ -229,6 +272,12 @@ def _no_light(context: bpy.types.Context) -> BakeWarning:
     return BakeWarning(
         name, f"scene '{name}' has no light at all: the lightmaps are black; add a lamp or the sky"
     )
+
+
+def _no_groups(context: bpy.types.Context) -> BakeWarning:
+    name = context.scene.name
+    message = f"scene '{name}': no lamp, emissive material or world is in a light group; none is baked"
+    return BakeWarning(name, message)
 
 
 def _nothing_to_bake(context: bpy.types.Context) -> str:

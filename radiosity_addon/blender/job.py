@@ -9,21 +9,27 @@ from dataclasses import replace
 
 import bpy
 
-from .. import pipeline
 from ..background import in_thread
 from ..bake_scene import BakeResult, Progress
+from ..keeping import Keeping, bake_steps, moves_alone
+from ..relighting import KeptBake
 from ..report import BakeReport
 from ..settings import BakeSettings
+from ..sidecar import SIDECAR_NAME
 from ..solver.arrays import Array
-from . import runtime
+from . import kept_bakes, kept_details, runtime
 from .apply import apply_lightmaps, check_targets
 from .bake_record import remove_datablocks
 from .export import export_scene
 from .export_sources import Export
-from .images import lightmap_files, set_folder, write_pages
-from .live_picture import seen_triangles
+from .group_images import GroupImages, each_image, write_groups
+from .images import lightmap_files, relative_path, set_folder, write_pages
+from .light_shares import crowded_materials
+from .live_picture import Seen, seen_triangles
+from .only_changed import Kept as Others
+from .only_changed import narrow, remember
 from .output import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, OutputFolder, save_copy
-from .preview import render_preview
+from .preview import SAMPLES, render_preview
 from .rebake import originals_shown, replacing_earlier, seal
 from .restore import restore
 
@@ -31,6 +37,9 @@ BakeJob = Generator[Progress, None, BakeReport]
 
 # How far the whole is when each part begins; rough, from bakes at medium quality.
 SOLVE, APPLY, SAVE, PREVIEW = 0.03, 0.85, 0.89, 0.92
+
+APPLY_ALONE = 0.98
+"""How far it is when applying begins, where neither a copy nor a preview is written."""
 
 WRITING_STAGES = frozenset({"apply", "save", "preview", "write"})
 """Stages in which an exception from outside, such as Ctrl-C, would be lost or do harm."""
@@ -42,6 +51,8 @@ def run_bake(
     output: OutputFolder | None,
     with_copy: bool = False,
     patient: bool = False,
+    keeping: Keeping | None = None,
+    only_changed: bool = False,
 ) -> BakeJob:
     """Bake the context's scene and show the lightmaps on its objects.
 
@@ -61,6 +72,11 @@ def run_bake(
     patient : bool
         Return from every `next` within a moment, for a window: the steps between the
         export and the lightmaps, which know nothing of Blender, run in a thread.
+    keeping : Keeping or None
+        If given, the bake is kept for relighting: in memory, and in a sidecar if that is asked for.
+    only_changed : bool
+        Give new lightmaps to what has changed since the last bake, see `only_changed.py`, which cannot be
+        kept then; if things have only moved since a bake that was kept, all lightmaps follow.
 
     Yields
     ------
@@ -77,82 +93,110 @@ def run_bake(
         Whatever cannot be baked or written, in one line.
     """
     seconds: dict[str, float] = {}
+    wanted = settings
     with ExitStack() as stack:
         if output is not None:
             # Opened first: a folder that cannot be written is no news for after the work.
             stack.enter_context(output)
         yield Progress("export", 0.0)
-        with _timed(seconds, "export"), originals_shown(context) as edited:
-            export = export_scene(context, settings)
+        with timed(seconds, "export"), originals_shown(context) as edited:
+            export = export_scene(context, settings, dark=keeping is not None)
             check_targets(export)
             seen = seen_triangles(context, export)
-        result = yield from _solve(export, settings, seen, patient)
-        result = replace(result, warnings=(*edited, *result.warnings))
+        others = Others()
+        if only_changed and not moves_alone(export.bake_scene, settings, keeping):
+            export, settings, others = narrow(context.scene, export, settings)
+            keeping = None if others.objects else keeping
+        solved = APPLY if with_copy else APPLY_ALONE
+        sidecar = output.staging / SIDECAR_NAME if output and keeping and keeping.sidecar else None
+        steps = bake_steps(export.bake_scene, settings, keeping, sidecar)
+        result, kept = yield from _solve(steps, seen, patient, solved)
+        result = replace(result, warnings=(*edited, *others.warnings(), *result.warnings))
         seconds.update(result.seconds)
-        yield Progress("apply", APPLY)
+        yield Progress("apply", solved)
         if with_copy and output is not None:
-            return (yield from _deliver(context, settings, export, result, output, seconds))
-        with replacing_earlier(context), _timed(seconds, "apply"):
-            images = _show(context, settings, export, result, output)
-            report = BakeReport.of(result, lightmap_files(images, settings), seconds)
+            return (yield from deliver(context, settings, export, result, output, seconds, keeping))
+        with replacing_earlier(context, others.objects), timed(seconds, "apply"):
+            images, groups = _show(context, settings, export, result, output, keeping, others.files)
+            report = _report(result, images, groups, settings, seconds)
             if output is not None:
-                report.write(output.staging / REPORT_NAME)
+                whole = report.joined(output.path / REPORT_NAME, others.objects)
+                whole.listing(output.files()).write(output.staging / REPORT_NAME)
                 output.publish()
-        runtime.remember(context.scene, report.as_dict(), "" if output is None else str(output.path))
+            remember(context.scene, export, result, wanted)
+        folder = "" if output is None else relative_path(output.path)
+        runtime.remember(context.scene, report.as_dict(), folder)
+        _remember_kept(context.scene, keeping, kept)
+        kept_details.keep(context.scene, result, [image.name for image in images])
     return report
 
 
 def _solve(
-    export: Export, settings: BakeSettings, seen: Array, patient: bool
-) -> Generator[Progress, None, BakeResult]:
+    baking: Generator[Progress, None, tuple[BakeResult, KeptBake | None]],
+    seen: Array,
+    patient: bool,
+    end: float,
+) -> Generator[Progress, None, tuple[BakeResult, KeptBake | None]]:
     """Run the pipeline, its progress scaled to its share of the whole, its pictures to what is `seen`."""
-    baking = pipeline.bake(export.bake_scene, settings)
     steps = in_thread(baking) if patient else baking
-    shown = Progress("unwrap", SOLVE)
+    shown, only = Progress("unwrap", SOLVE), Seen(seen)
     try:
         while True:
             try:
                 progress = next(steps)
             except StopIteration as done:
                 return done.value
-            picture = None
+            picture = texels = None
             if progress is not None:
-                shown = Progress(progress.stage, SOLVE + (APPLY - SOLVE) * progress.fraction)
-                picture = progress.picture
+                shown = Progress(progress.stage, SOLVE + (end - SOLVE) * progress.fraction)
+                picture, texels = only.of_elements(progress.picture), only.of_texels(progress.texels)
             # Each picture comes once, however long the step after it takes.
-            yield shown if picture is None else replace(shown, picture=picture.only(seen[picture.triangle]))
+            yield replace(shown, picture=picture, texels=texels)
     finally:
         steps.close()
 
 
-def _deliver(
+def _remember_kept(scene: bpy.types.Scene, keeping: Keeping | None, kept: KeptBake | None) -> None:
+    """Keep the bake with its scene; the one before it is gone whether this one is kept or not."""
+    kept_bakes.drop(scene)
+    if keeping is not None:
+        kept_bakes.set_mark(scene, keeping.mark)
+        if kept is not None:
+            kept_bakes.put(scene, keeping.mark, kept)
+
+
+def deliver(
     context: bpy.types.Context,
     settings: BakeSettings,
     export: Export,
     result: BakeResult,
     output: OutputFolder,
     seconds: dict[str, float],
+    keeping: Keeping | None,
+    samples: int = SAMPLES,
 ) -> BakeJob:
     """Show the lightmaps, save the scene beside them, render it, and publish all at once."""
-    with replacing_earlier(context), _timed(seconds, "apply"):
-        images = _show(context, settings, export, result, output)
+    with replacing_earlier(context), timed(seconds, "apply"):
+        images, groups = _show(context, settings, export, result, output, keeping)
     try:
         # The copy tells of its bake too; what is left to do is not in its times.
-        so_far = BakeReport.of(result, lightmap_files(images, settings), seconds)
+        so_far = _report(result, images, groups, settings, seconds)
         runtime.remember(context.scene, so_far.as_dict(), "//")
+        _remember_kept(context.scene, keeping, None)
         yield Progress("save", SAVE)
-        with _timed(seconds, "save"):
+        with timed(seconds, "save"):
             save_copy(output.staging / BLEND_NAME, output.path)
         yield Progress("preview", PREVIEW)
-        with _timed(seconds, "preview"):
-            render_preview(context, output.staging / PREVIEW_NAME, settings)
-        report = BakeReport.of(result, lightmap_files(images, settings), seconds)
+        with timed(seconds, "preview"):
+            render_preview(context, output.staging / PREVIEW_NAME, settings, samples)
+        report = _report(result, images, groups, settings, seconds).listing(output.files())
         report.write(output.staging / REPORT_NAME)
         yield Progress("write", 1.0)
         output.publish()
     except BaseException:
         restore(context)
         runtime.forget(context.scene)
+        kept_bakes.drop(context.scene)
         raise
     return report
 
@@ -163,22 +207,43 @@ def _show(
     export: Export,
     result: BakeResult,
     output: OutputFolder | None,
-) -> list[bpy.types.Image]:
-    """Make the images and put them on the objects."""
-    images = write_pages(result, settings, None if output is None else output.staging)
+    keeping: Keeping | None,
+    taken: frozenset[str] = frozenset(),
+) -> tuple[list[bpy.types.Image], GroupImages]:
+    """Make the images, also those of light groups, and put them on the objects; files `taken` stay."""
+    folder = None if output is None else output.staging
+    images = write_pages(result, settings, folder, taken)
+    groups: GroupImages = {}
     try:
+        groups = write_groups(result, settings, folder)
         if output is not None:
-            set_folder(images, output.path)
-        apply_lightmaps(context, export, result, images, settings)
+            set_folder([*images, *each_image(groups)], output.path)
+        if keeping is not None:
+            kept_bakes.mark_images([*images, *each_image(groups)], keeping.mark)
+        apply_lightmaps(context, export, result, images, settings, groups)
         seal()
     except BaseException:
-        remove_datablocks(images)
+        remove_datablocks([*images, *each_image(groups)])
         raise
-    return images
+    return images, groups
+
+
+def _report(
+    result: BakeResult,
+    images: list[bpy.types.Image],
+    groups: GroupImages,
+    settings: BakeSettings,
+    seconds: dict[str, float],
+) -> BakeReport:
+    """Report a bake and its files."""
+    shares = [lightmap_files(of, settings) for of in groups.values()]
+    if groups:
+        result = replace(result, warnings=(*result.warnings, *crowded_materials()))
+    return BakeReport.of(result, lightmap_files(images, settings), seconds, shares)
 
 
 @contextmanager
-def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
+def timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
     """Add what the block takes to a stage's time."""
     start = time.perf_counter()
     yield

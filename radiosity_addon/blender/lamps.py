@@ -40,7 +40,7 @@ def lamp_factors() -> LampFactors:
 
 
 def read_lamp(
-    lamp: bpy.types.Object, matrix_world: np.ndarray, factors: LampFactors
+    lamp: bpy.types.Object, matrix_world: np.ndarray, factors: LampFactors, dark: bool = False
 ) -> tuple[Light | None, tuple[BakeWarning, ...]]:
     """Return the light that a lamp object, or an instance of one, is.
 
@@ -50,6 +50,8 @@ def read_lamp(
     matrix_world : (4, 4) float64
     factors : dict
         Of `lamp_factors`.
+    dark : bool
+        Whether a lamp without power is a light as well: it may get some later.
 
     Returns
     -------
@@ -76,7 +78,7 @@ def read_lamp(
     if (strength < 0).any():
         warnings.append(BakeWarning(name, f"lamp '{name}': negative power is not possible; 0 is used"))
         strength = np.maximum(strength, 0.0)
-    if not strength.any():
+    if not strength.any() and not dark:
         return None, tuple(warnings)
     light, notes = _MAKE[data.type](name, data, matrix_world, strength)
     return light, tuple(warnings + notes)

@@ -6,15 +6,29 @@ which these are the same. The originals are never edited.
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 
 from ..bake_scene import LIGHTMAP_UV_LAYER
 from ..solver.radiometry import brdf_of_reflectance, radiance_of_radiosity
 from .bake_record import is_made, mark_made
 from .false_colors import false_colors
+from .image_marks import GROUP
 from .images import image_scale
+from .light_mixer import factor_of
+from .light_shares import LightShares
 from .materials import is_volume, read_material, uses_nodes
-from .node_group import BASE_COLOR, EMISSION, LIGHTMAP, LIGHTMAP_ONLY, SCALE, SHADER, lightmap_group
+from .node_group import (
+    BASE_COLOR,
+    EMISSION,
+    EMISSION_FACTOR,
+    LIGHTMAP,
+    LIGHTMAP_ONLY,
+    SCALE,
+    SHADER,
+    lightmap_group,
+)
 from .surface_nodes import BLACK, Surface, feed_color, feed_float, read_surface
 from .uv_pin import pin_uvs
 
@@ -29,15 +43,25 @@ RADIANCE_PER_TEXEL = {
 residual is shown ten times its size: an error of a tenth looks as bright as the light itself."""
 
 
-class LightmapMaterials:
-    """Makes the lightmap copies of materials for one bake, each once."""
+ORIGINAL = "radiosity_original"
+"""Custom property of a copy: the material that it is of."""
 
-    def __init__(self, quantity: str) -> None:
+
+class LightmapMaterials:
+    """Makes the lightmap copies of materials for one bake, each once; `shares` where it has light groups."""
+
+    def __init__(self, quantity: str, shares: LightShares | None = None) -> None:
         self._quantity = quantity
-        self._made: dict[tuple[bpy.types.Material | None, bpy.types.Image, bool], bpy.types.Material] = {}
+        self._shares = shares
+        self._made: dict[tuple[Any, ...], bpy.types.Material] = {}
+        self._glows: dict[bpy.types.Material | None, bool] = {}
 
     def copy_of(
-        self, material: bpy.types.Material | None, image: bpy.types.Image, pinned: bool
+        self,
+        material: bpy.types.Material | None,
+        image: bpy.types.Image,
+        pinned: bool,
+        group: str = "",
     ) -> bpy.types.Material:
         """Return the copy of `material` that shows `image`.
 
@@ -49,14 +73,19 @@ class LightmapMaterials:
             The lightmap page.
         pinned : bool
             The object had no UV layer of its own.
+        group : str
+            The light group whose sliders its own light follows, if it has any; "" for none.
         """
-        key = (material, image, pinned)
+        group = group if self._glows.get(material, True) else ""
+        key = (material, image, pinned, group)
         if key not in self._made:
-            self._made[key] = self._make(material, image, pinned)
+            self._made[key] = self._make(material, image, pinned, group)
+            if not self._glows.setdefault(material, False):
+                self._made[material, image, pinned, ""] = self._made[key]
         return self._made[key]
 
     def _make(
-        self, material: bpy.types.Material | None, image: bpy.types.Image, pinned: bool
+        self, material: bpy.types.Material | None, image: bpy.types.Image, pinned: bool, group: str
     ) -> bpy.types.Material:
         """Build one copy."""
         if material is None:
@@ -64,6 +93,7 @@ class LightmapMaterials:
         else:
             copy = material.copy()
             copy.name = f"{material.name} (Lightmap)"
+            copy[ORIGINAL] = material
         mark_made(copy)
         constant = read_material(material)
         radiance = radiance_of_radiosity(constant.emission)
@@ -85,7 +115,9 @@ class LightmapMaterials:
             surface = plain
             if material is not None and uses_nodes(material):
                 surface = read_surface(copy.node_tree, output.inputs["Surface"], plain)
-            self._wire(copy.node_tree, output, surface, image)
+            self._wire(copy.node_tree, output, surface, image, group)
+            if surface.emission != BLACK:
+                self._glows[material], copy[GROUP] = True, group
             if index == 0:
                 _skip_light_sampling(copy, surface)
         return copy
@@ -96,6 +128,7 @@ class LightmapMaterials:
         output: bpy.types.Node,
         surface: Surface,
         image: bpy.types.Image,
+        light_group: str,
     ) -> None:
         """Wire UV Map → Image → group → output; the transparent part stays so."""
         x, y = output.location
@@ -113,11 +146,16 @@ class LightmapMaterials:
         group.name = group.label = group.node_tree.name
         group.location = (x + 300, y + 300)
         tree.links.new(uv_map.outputs["UV"], texture.inputs["Vector"])
-        texel = texture.outputs["Color"]
+        texel, scale = texture.outputs["Color"], image_scale(image)
         if self._quantity == "residual":
             texel = false_colors(tree, texel)
+        if self._shares is not None:
+            mixer = self._shares.wire(tree, texture, uv_map.outputs["UV"])
+            texel, scale = mixer.outputs[0], 1.0
+            if light_group:
+                tree.links.new(factor_of(mixer, light_group), group.inputs[EMISSION_FACTOR])
         tree.links.new(texel, group.inputs[LIGHTMAP])
-        group.inputs[SCALE].default_value = RADIANCE_PER_TEXEL[self._quantity] * image_scale(image)
+        group.inputs[SCALE].default_value = RADIANCE_PER_TEXEL[self._quantity] * scale
 
         # Radiosity already holds what the surface reflects and emits, and so does its error.
         if self._quantity not in ("radiosity", "residual"):

@@ -1,24 +1,24 @@
-"""The solution in the viewports while it is being solved: the method's elements, drawn over the objects.
+"""The light in the viewports while it is being computed, drawn over the objects.
 
-Nothing of it is in the file: the elements are drawn by a handler of Blender's 3D viewports that
+First the method's elements, while it solves; then the texels of the lightmaps, as they are lit.
+
+Nothing of it is in the file: all is drawn by a handler of Blender's 3D viewports that
 is there between `begin` and `end`. Without a window there is nothing to draw to, and all of
 this does nothing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import bpy
 from bpy.app.handlers import persistent
 
-if TYPE_CHECKING:
-    from ..bake_scene import Picture
+from .drawing import PagedSurfaces, over_the_objects
+from .drawing import redraw_viewports as _redraw
 
-NEARER = 2e-5
-"""How much nearer than its object an element is drawn, as a share of half the range of depths."""
+if TYPE_CHECKING:
+    from ..bake_scene import LitSurfaces, Picture, TexelPicture
 
 WHITE = 16.0
 """Radiance that view transforms with soft highlights (AgX, Filmic) show white, at exposure 0 [W/m²/sr]."""
@@ -36,6 +36,9 @@ class _LiveView:
         self._exposure = 2.0**scene.view_settings.exposure
         self._white = 1.0 if scene.view_settings.view_transform in _HARD else WHITE
         self._picture: Picture | None = None
+        self._texels: TexelPicture | None = None
+        self._lit: tuple[LitSurfaces, PagedSurfaces] | None = None
+        self._painted: tuple[TexelPicture, float] | None = None
         self._batches: dict[float, list[tuple[bool, Any]]] = {}
         self._shader: Any = None
         self._handler = bpy.types.SpaceView3D.draw_handler_add(self._draw, (), "WINDOW", "POST_VIEW")
@@ -44,23 +47,48 @@ class _LiveView:
         """Draw this from now on."""
         self._picture, self._batches = picture, {}
 
+    def show_texels(self, picture: TexelPicture) -> None:
+        """Draw texels in place of the elements below them from now on."""
+        if self._picture is not None and self._texels is None:
+            from .live_picture import beside
+
+            self.show(beside(self._picture, picture.surfaces))
+        self._texels = picture
+
     def close(self) -> None:
         """Draw nothing any more."""
         bpy.types.SpaceView3D.draw_handler_remove(self._handler, "WINDOW")
         self._picture, self._batches, self._shader = None, {}, None
+        self._texels = self._lit = self._painted = None
 
     def _draw(self) -> None:
         """Draw the elements into the viewport whose turn it is."""
-        if self._picture is None or bpy.context.scene.name_full != self._scene:
+        if (self._picture is None and self._texels is None) or bpy.context.scene.name_full != self._scene:
             return
         shading = bpy.context.space_data.shading
         exposure = self._exposure if _uses_exposure(shading) else 1.0
-        if exposure not in self._batches:
+        if self._picture is not None and exposure not in self._batches:
             self._batches[exposure] = self._upload(self._picture, exposure)
-        with _over_the_objects():
-            for front, batch in self._batches[exposure]:
+        # The two sides of a triangle lie in one place, each counter-clockwise as seen from its own.
+        with over_the_objects():
+            for front, batch in self._batches.get(exposure, ()):
                 if front or not shading.show_backface_culling:
                     batch.draw(self._shader)
+            if self._texels is not None:
+                self._surfaces(self._texels, exposure).draw()
+
+    def _surfaces(self, picture: TexelPicture, exposure: float) -> PagedSurfaces:
+        """Return the texels on the graphics card: the surfaces go there once, the texels for each picture."""
+        from .live_picture import page_colors
+
+        surfaces = picture.surfaces
+        if self._lit is None or self._lit[0] is not surfaces:
+            self._lit = surfaces, PagedSurfaces(surfaces.corners, surfaces.uv, surfaces.page)
+            self._painted = None
+        if self._painted is None or self._painted != (picture, exposure):
+            self._lit[1].paint(page_colors(picture, exposure, self._white))
+            self._painted = picture, exposure
+        return self._lit[1]
 
     def _upload(self, picture: Picture, exposure: float) -> list[tuple[bool, Any]]:
         """Hand the picture to the graphics card, fronts and backs apart: once, however often it is drawn."""
@@ -92,28 +120,6 @@ def _uses_exposure(shading: bpy.types.View3DShading) -> bool:
     return shading.use_scene_lights or shading.use_scene_world
 
 
-@contextmanager
-def _over_the_objects() -> Iterator[None]:
-    """Draw what lies where the objects lie, in front of them."""
-    import gpu
-    from mathutils import Matrix
-
-    depth_test, depth_mask = gpu.state.depth_test_get(), gpu.state.depth_mask_get()
-    nearer = Matrix.Translation((0.0, 0.0, -NEARER)) @ gpu.matrix.get_projection_matrix()
-    gpu.state.depth_test_set("LESS_EQUAL")
-    gpu.state.depth_mask_set(True)
-    # The two sides of a triangle lie in one place, each counter-clockwise as seen from its own.
-    gpu.state.face_culling_set("BACK")
-    try:
-        with gpu.matrix.push_pop_projection():
-            gpu.matrix.load_projection_matrix(nearer)
-            yield
-    finally:
-        gpu.state.face_culling_set("NONE")
-        gpu.state.depth_mask_set(depth_mask)
-        gpu.state.depth_test_set(depth_test)
-
-
 _view: _LiveView | None = None
 
 
@@ -134,6 +140,13 @@ def show(picture: Picture) -> None:
         _redraw()
 
 
+def show_texels(picture: TexelPicture) -> None:
+    """Draw texels as far as they are lit, in place of the elements on their surfaces."""
+    if _view is not None:
+        _view.show_texels(picture)
+        _redraw()
+
+
 def end() -> None:
     """Leave the viewports as they were; harmless where nothing was begun."""
     global _view
@@ -147,17 +160,6 @@ def end() -> None:
 def is_active() -> bool:
     """Tell whether pictures are being drawn."""
     return _view is not None
-
-
-def _redraw() -> None:
-    """Have every 3D viewport drawn again."""
-    manager = bpy.context.window_manager
-    for window in manager.windows if manager is not None else ():
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                for region in area.regions:
-                    if region.type == "WINDOW":
-                        region.tag_redraw()
 
 
 @persistent

@@ -13,6 +13,7 @@ GROUP_NAME = "Radiosity Lightmap"
 BASE_COLOR = "Base Color"
 LIGHTMAP = "Lightmap"
 EMISSION = "Emission"
+EMISSION_FACTOR = "Emission Factor"
 SCALE = "Scale"
 LIGHTMAP_ONLY = "Lightmap Only"
 SHADER = "Shader"
@@ -22,10 +23,10 @@ def lightmap_group() -> bpy.types.NodeTree:
     """Return the node group, made anew where this file has none of ours yet.
 
     radiance = Scale · Lightmap · (Base Color, or white if Lightmap Only)
-               + Emission · (1 − Lightmap Only)
+               + Emission · Emission Factor · (1 − Lightmap Only)
 
     `Scale` brings the texel to what a white surface would send out [W/m²/sr]; materials set
-    it to suit the quantity their lightmap holds.
+    it to suit the quantity their lightmap holds. `Emission Factor` is that of the emission's light group.
     """
     for tree in bpy.data.node_groups:
         if is_made(tree) and tree.name.startswith(GROUP_NAME):
@@ -48,6 +49,8 @@ def _declare_sockets(tree: bpy.types.NodeTree) -> None:
     declare(BASE_COLOR, "NodeSocketColor", "What the surface reflects", (1.0, 1.0, 1.0, 1.0))
     declare(LIGHTMAP, "NodeSocketColor", "The lightmap's texel", (0.0, 0.0, 0.0, 1.0))
     declare(EMISSION, "NodeSocketColor", "Light of its own, strength included", (0.0, 0.0, 0.0, 1.0))
+    factor = declare(EMISSION_FACTOR, "NodeSocketColor", "Multiplies the emission", (1.0, 1.0, 1.0, 1.0))
+    factor.hide_value = True
     scale = declare(SCALE, "NodeSocketFloat", "Radiance of a white surface per texel value", 1.0)
     scale.hide_value = True
     switch = declare(LIGHTMAP_ONLY, "NodeSocketFloat", "1 shows the lightmap without base color", 0.0)
@@ -81,9 +84,13 @@ def _build(tree: bpy.types.NodeTree) -> None:
     share.operation = "SUBTRACT"
     share.inputs[0].default_value = 1.0
     links.new(given.outputs[LIGHTMAP_ONLY], share.inputs[1])
+    factored = _place(nodes.new("ShaderNodeVectorMath"), 2, -2)
+    factored.operation = "MULTIPLY"
+    links.new(given.outputs[EMISSION], factored.inputs[0])
+    links.new(given.outputs[EMISSION_FACTOR], factored.inputs[1])
     own = _place(nodes.new("ShaderNodeVectorMath"), 3, -1)
     own.operation = "SCALE"
-    links.new(given.outputs[EMISSION], own.inputs["Vector"])
+    links.new(factored.outputs["Vector"], own.inputs["Vector"])
     links.new(share.outputs["Value"], own.inputs["Scale"])
 
     total = _place(nodes.new("ShaderNodeVectorMath"), 4, 0)

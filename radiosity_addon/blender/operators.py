@@ -2,36 +2,27 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..alike import one_of_each
 from ..errors import RadiosityError
-from . import live_view, runtime
+from . import kept_bakes, live_state, live_view, runtime
+from .check_panel import look_first
+from .preferences import folder_of
 from .properties import settings_of
+from .relight_properties import keeps
+from .window_job import WindowJob, redraw_sidebars
 
-TICK = 0.03
-"""Seconds of baking between two redraws."""
-
-# What still works while a bake runs: looking around.
-_NAVIGATION = {
-    "MOUSEMOVE",
-    "INBETWEEN_MOUSEMOVE",
-    "MIDDLEMOUSE",
-    "WHEELUPMOUSE",
-    "WHEELDOWNMOUSE",
-    "TRACKPADPAN",
-    "TRACKPADZOOM",
-    "MOUSEROTATE",
-    "NDOF_MOTION",
-    "WINDOW_DEACTIVATE",
-}
+if TYPE_CHECKING:
+    from ..keeping import Keeping
+    from ..settings import BakeSettings
 
 
-class RADIOSITY_OT_bake(bpy.types.Operator):
+class RADIOSITY_OT_bake(WindowJob, bpy.types.Operator):
     """Bake the light of the scene into lightmaps and show them on the objects"""
 
     bl_idname = "radiosity.bake"
@@ -39,10 +30,6 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     _was_editing = False
-    # Blender evaluates annotations when it registers the class: no names of later imports.
-    _job: Any = None  # BakeJob while a bake runs
-    _report: Any = None  # BakeReport once it is done
-    _timer: bpy.types.Timer | None = None
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -55,139 +42,72 @@ class RADIOSITY_OT_bake(bpy.types.Operator):
             return False
         return True
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        """Run the bake through."""
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Start the bake, unless there is something to be looked at first."""
         try:
-            self._begin(context, in_window=False)
-            while not self._advance(float("inf")):
-                pass
+            in_window = not bpy.app.background and context.window is not None
+            if in_window and look_first(context):
+                self.report({"INFO"}, "Look at what is odd before this scene is baked for the first time")
+                bpy.ops.radiosity.check("INVOKE_DEFAULT")
+                return {"CANCELLED"}
         except RadiosityError as error:
             return self._fail(context, error)
-        except BaseException:
-            self._end(context)
-            raise
-        return self._finish(context)
+        return WindowJob.invoke(self, context, event)
 
-    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        """Start the bake; a timer carries it on."""
-        if bpy.app.background or context.window is None:
-            return self.execute(context)
-        try:
-            self._begin(context, in_window=True)
-        except RadiosityError as error:
-            return self._fail(context, error)
-        manager = context.window_manager
-        self._timer = manager.event_timer_add(TICK / 3, window=context.window)
-        manager.progress_begin(0, 100)
-        context.workspace.status_text_set("Baking radiosity…  Esc: cancel")
-        manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
-
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Carry on for a tick, or cancel."""
-        if event.type == "ESC" and event.value == "PRESS":
-            self._end(context)
-            self._return_to_edit_mode(context)
-            self.report({"INFO"}, "Bake cancelled; everything is as it was")
-            return {"CANCELLED"}
-        if event.type != "TIMER":
-            return {"PASS_THROUGH"} if event.type in _NAVIGATION else {"RUNNING_MODAL"}
-        try:
-            if not self._advance(TICK):
-                self._show_progress(context)
-                return {"RUNNING_MODAL"}
-        except RadiosityError as error:
-            return self._fail(context, error)
-        except BaseException:
-            self._end(context)
-            raise
-        show_result(context)
-        return self._finish(context)
-
-    def cancel(self, context: bpy.types.Context) -> None:
-        """Blender ends the operator from outside: a window closes, or Blender quits."""
-        self._end(context)
-
-    def _begin(self, context: bpy.types.Context, in_window: bool) -> None:
+    def _start(self, context: bpy.types.Context, in_window: bool) -> Any:
         from .job import run_bake
         from .output import OutputFolder
 
+        live_state.stop()
         self._was_editing = context.mode == "EDIT_MESH"
         settings = settings_of(context)
         folder = output_folder(context)
-        self._report = None
         output = None if folder is None else OutputFolder(folder)
-        self._job = run_bake(context, settings, output, patient=in_window)
-        runtime.running.active = True
-        runtime.running.stop = lambda: self._end(bpy.context)
-        runtime.running.stage, runtime.running.fraction = "Starting", 0.0
+        changed = context.scene.radiosity.scope == "changed"
+        keeping = self._keeping(context.scene, settings)
         if in_window and context.scene.radiosity.show_while_solving:
             live_view.begin(context.scene)
+        return run_bake(context, settings, output, patient=in_window, keeping=keeping, only_changed=changed)
 
-    def _advance(self, seconds: float) -> bool:
-        """Bake for about so long; True once it is done."""
-        until = time.perf_counter() + seconds
-        while time.perf_counter() < until:
-            try:
-                progress = next(self._job)
-            except StopIteration as done:
-                self._report = done.value
-                return True
-            runtime.running.stage, runtime.running.fraction = progress.stage, progress.fraction
-            if progress.picture is not None:
-                live_view.show(progress.picture)
-        return False
+    @staticmethod
+    def _keeping(scene: bpy.types.Scene, settings: BakeSettings) -> Keeping | None:
+        """Return how the bake is to be kept for relighting; None if it is not."""
+        from ..keeping import Keeping
 
-    def _show_progress(self, context: bpy.types.Context) -> None:
-        running = runtime.running
-        context.window_manager.progress_update(int(100 * running.fraction))
-        context.workspace.status_text_set(
-            f"Baking radiosity: {running.stage}, {running.fraction:.0%}    Esc: cancel"
-        )
-        redraw_sidebars(context)
+        if not keeps(scene, settings):
+            return None
+        chosen = scene.radiosity_relight
+        held = kept_bakes.find(scene) if chosen.only_moved else None
+        return Keeping(chosen.sidecar, earlier=None if held is None else held.bake)
 
-    def _finish(self, context: bpy.types.Context) -> set[str]:
-        from .lightmap_materials import set_lightmap_only
+    def _follow(self, progress: Any) -> None:
+        if progress.picture is not None:
+            live_view.show(progress.picture)
+        if progress.texels is not None:
+            live_view.show_texels(progress.texels)
 
-        self._end(context)
-        report = self._report.as_dict()
-        if context.scene.radiosity.lightmap_only:
-            set_lightmap_only(True)
-        taken = sum(report["seconds"].values())
-        self.report({"INFO"}, f"Baked {len(report['objects'])} objects in {taken:.1f} s")
-        warnings = one_of_each(report["warnings"])
-        for warning in warnings[:3]:
-            self.report({"WARNING"}, f"{warning['name']}: {warning['message']}")
-        if len(warnings) > 3:
-            self.report({"WARNING"}, f"and {len(warnings) - 3} more warnings, listed in the panel")
-        return {"FINISHED"}
-
-    def _fail(self, context: bpy.types.Context, error: RadiosityError) -> set[str]:
-        self._end(context)
-        self._return_to_edit_mode(context)
-        self.report({"ERROR"}, " ".join(str(error).split()))
-        return {"CANCELLED"}
-
-    def _return_to_edit_mode(self, context: bpy.types.Context) -> None:
+    def _undone(self, context: bpy.types.Context) -> None:
         """Go on with the editing that the export had to leave."""
         if self._was_editing and context.mode == "OBJECT" and bpy.ops.object.mode_set.poll():
             bpy.ops.object.mode_set(mode="EDIT")
 
-    def _end(self, context: bpy.types.Context) -> None:
-        """Close the bake, whatever state it is in, and everything shown about it."""
-        job, self._job = self._job, None
-        try:
-            if job is not None:
-                job.close()
-        finally:
-            runtime.running.active, runtime.running.stop = False, None
-            live_view.end()
-            if self._timer is not None:
-                context.window_manager.event_timer_remove(self._timer)
-                context.window_manager.progress_end()
-                context.workspace.status_text_set(None)
-                self._timer = None
-            redraw_sidebars(context)
+    def _succeeded(self, context: bpy.types.Context, in_window: bool) -> None:
+        from .lightmap_materials import set_lightmap_only
+
+        if in_window:
+            show_result(context)
+        report = self._report.as_dict()
+        if context.scene.radiosity.lightmap_only:
+            set_lightmap_only(True)
+        taken = sum(report["seconds"].values())
+        message = rpt_("Baked {} objects in {:.1f} s")
+        self.report({"INFO"}, message.format(len(report["objects"]), taken))
+        warnings = one_of_each(report["warnings"])
+        for warning in warnings[:3]:
+            self.report({"WARNING"}, f"{warning['name']}: {warning['message']}")
+        if len(warnings) > 3:
+            message = rpt_("and {} more warnings, listed in the panel")
+            self.report({"WARNING"}, message.format(len(warnings) - 3))
 
 
 class RADIOSITY_OT_restore(bpy.types.Operator):
@@ -209,14 +129,16 @@ class RADIOSITY_OT_restore(bpy.types.Operator):
         """Bring every baked object of the file back."""
         from .restore import restore
 
+        live_state.stop()
         count = restore(context)
         for scene in bpy.data.scenes:
             runtime.forget(scene)
+            kept_bakes.drop(scene)
         redraw_sidebars(context)
         if not count:
             self.report({"INFO"}, "Nothing to restore: no object shows a lightmap")
             return {"CANCELLED"}
-        self.report({"INFO"}, f"Restored {count} objects")
+        self.report({"INFO"}, rpt_("Restored {} objects").format(count))
         return {"FINISHED"}
 
 
@@ -230,7 +152,10 @@ class RADIOSITY_OT_add_cornell_box(bpy.types.Operator):
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
         """Offer it unless a bake is running."""
-        return not runtime.running.active
+        if runtime.running.active:
+            cls.poll_message_set("A bake is running; press Esc to cancel it")
+            return False
+        return True
 
     def execute(self, _context: bpy.types.Context) -> set[str]:
         """Build the box, in this scene if it is empty, and show it."""
@@ -260,7 +185,7 @@ class RADIOSITY_OT_open_folder(bpy.types.Operator):
         last = runtime.last_bake(context.scene)
         folder = bpy.path.abspath(last.folder) if last is not None else ""
         if not Path(folder).is_dir():
-            self.report({"ERROR"}, f"The folder '{folder}' is not there any more")
+            self.report({"ERROR"}, rpt_("The folder '{}' is not there any more").format(folder))
             return {"CANCELLED"}
         bpy.ops.wm.path_open(filepath=folder)
         return {"FINISHED"}
@@ -268,9 +193,7 @@ class RADIOSITY_OT_open_folder(bpy.types.Operator):
 
 def output_folder(context: bpy.types.Context) -> Path | None:
     """Return where the panel's bake writes; None packs, for an unsaved file has no place."""
-    from .properties import DEFAULT_FOLDER
-
-    folder = context.scene.radiosity.output_folder.strip() or DEFAULT_FOLDER
+    folder = folder_of(context)
     if folder.startswith("//") and not bpy.data.filepath:
         return None
     return Path(bpy.path.abspath(folder)).resolve()
@@ -282,16 +205,6 @@ def show_result(context: bpy.types.Context) -> None:
     wanted = context.scene.radiosity.show_result
     if wanted and isinstance(space, bpy.types.SpaceView3D) and space.shading.type in {"WIREFRAME", "SOLID"}:
         space.shading.type = "MATERIAL"
-
-
-def redraw_sidebars(context: bpy.types.Context) -> None:
-    """Have the panel drawn again in every 3D viewport."""
-    for window in context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                for region in area.regions:
-                    if region.type == "UI":
-                        region.tag_redraw()
 
 
 CLASSES = (RADIOSITY_OT_bake, RADIOSITY_OT_restore, RADIOSITY_OT_add_cornell_box, RADIOSITY_OT_open_folder)

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import os
-import shutil
-import tempfile
 import uuid
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
+from typing import Any
 
 import bpy
 
+from .. import manifest
 from ..errors import BakeError
+from ..staging import Staging, clean_up
 from .bake_record import is_made
 
 BLEND_NAME = "baked.blend"
@@ -40,23 +40,31 @@ class OutputFolder:
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path).expanduser().resolve()
-        self._staging: Path | None = None
+        self._staging: Staging | None = None
         self._made: list[Path] = []
 
     @property
     def staging(self) -> Path:
         """Where to write, while the folder is open."""
+        return self._open.path
+
+    @property
+    def _open(self) -> Staging:
         if self._staging is None:
             raise RuntimeError("the output folder is not open")
         return self._staging
 
     def __enter__(self) -> OutputFolder:
-        """Make the folder and its staging folder; a BakeError names one that cannot be written."""
+        """Make the folder and its staging folder; a BakeError names one that cannot be written.
+
+        What a killed bake has left there is cleaned up first.
+        """
         missing = [folder for folder in (self.path, *self.path.parents) if not folder.exists()]
         try:
             self.path.mkdir(parents=True, exist_ok=True)
             self._made = missing
-            self._staging = Path(tempfile.mkdtemp(prefix=".radiosity-", dir=self.path))
+            clean_up(self.path)
+            self._staging = Staging(self.path)
         except OSError as error:
             self._remove_made()
             raise BakeError(
@@ -71,12 +79,19 @@ class OutputFolder:
         _trace: TracebackType | None,
     ) -> None:
         """Remove what was not published, and folders that were made for nothing."""
-        shutil.rmtree(self.staging, ignore_errors=True)
+        self._open.close()
         self._staging = None
         self._remove_made()
 
+    def files(self) -> dict[str, dict[str, Any]]:
+        """Return what the report is to list of the files here: those staged, and those of earlier bakes."""
+        staged = [self.staging / name for name in self._open.names() if name != REPORT_NAME]
+        return manifest.entries(staged, self.path / REPORT_NAME, bpy.data.filepath)
+
     def publish(self) -> list[Path]:
         """Rename all staged files to their places; undone as a whole if one fails.
+
+        Killed meanwhile, the next bake into the folder, or opening the file, puts the earlier ones back.
 
         Returns
         -------
@@ -88,30 +103,12 @@ class OutputFolder:
         BakeError
             If a file cannot be replaced.
         """
-        names = [path.name for path in self.staging.iterdir() if path.is_file()]
-        names.sort(key=lambda name: (name == REPORT_NAME, name))
-        earlier = self.staging / "earlier"
-        earlier.mkdir()
-        done: list[str] = []
+        names = sorted(self._open.names(), key=lambda name: (name == REPORT_NAME, name))
         try:
-            for name in names:
-                _keep(self.path / name, earlier / name)
-                done.append(name)
-                (self.staging / name).replace(self.path / name)
-        except BaseException as error:
-            self._take_back(done, earlier)
-            if isinstance(error, OSError):
-                raise BakeError(f"cannot replace '{self.path / name}': {error.strerror}") from error
-            raise
+            self._open.publish(names)
+        except OSError as error:
+            raise BakeError(f"cannot replace '{error.filename}': {error.strerror}") from error
         return [self.path / name for name in names]
-
-    def _take_back(self, names: Sequence[str], earlier: Path) -> None:
-        """Put the earlier files back where new ones have taken their places."""
-        for name in names:
-            if (earlier / name).exists():
-                (earlier / name).replace(self.path / name)
-            elif not (self.staging / name).exists():
-                (self.path / name).unlink(missing_ok=True)
 
     def _remove_made(self) -> None:
         """Remove the folders made on entering that are still empty, innermost first."""
@@ -176,15 +173,3 @@ def _lightmaps_relative_to(folder: Path) -> Iterator[None]:
     finally:
         for image, stored in before:
             image.filepath_raw = stored
-
-
-def _keep(path: Path, kept: Path) -> None:
-    """Keep a file under a second name; nothing to do where there is none."""
-    if path.is_dir():
-        raise IsADirectoryError(21, "it is a folder")
-    if not path.exists():
-        return
-    try:
-        os.link(path, kept)
-    except OSError:
-        shutil.copy2(path, kept)

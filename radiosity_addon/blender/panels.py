@@ -5,12 +5,18 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 
 from . import runtime
 from .method_properties import AUTOMATIC, shown_settings
-from .object_roles import BAKE, BAKEABLE_TYPES
+from .object_panel import draw_overrides, has_role
 from .operators import output_folder
+from .preferences import folder_of, preferences
+from .preset_menu import RADIOSITY_PT_presets
+from .progress_text import progress_text
 from .properties import BY_ERROR
+from .relight_buttons import draw_relight_buttons
+from .wrapped_text import draw_text
 
 SHOWN_WARNINGS = 12
 
@@ -29,6 +35,10 @@ class RADIOSITY_PT_main(_Panel, bpy.types.Panel):
     bl_idname = "RADIOSITY_PT_main"
     bl_label = "Radiosity Lightmaps"
 
+    def draw_header_preset(self, _context: bpy.types.Context) -> None:
+        """Draw the button of the presets."""
+        RADIOSITY_PT_presets.draw_panel_header(self.layout)
+
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the buttons and settings."""
         layout = self.layout
@@ -40,6 +50,7 @@ class RADIOSITY_PT_main(_Panel, bpy.types.Panel):
         column.scale_y = 1.5
         column.operator("radiosity.bake", text="Bake Radiosity", icon="LIGHT_AREA")
         layout.operator("radiosity.restore", icon="LOOP_BACK")
+        draw_relight_buttons(layout, context)
         layout.prop(settings, "scope", expand=True)
         layout.prop(settings, "size_mode", expand=True)
 
@@ -56,10 +67,11 @@ class RADIOSITY_PT_main(_Panel, bpy.types.Panel):
             column.prop(settings, "pages")
         column = layout.column()
         column.prop(settings, "output_folder")
+        if not settings.is_property_set("output_folder"):
+            _draw_preferred(column, folder_of(context), settings.output_folder)
         if output_folder(context) is None:
-            _draw_text(
-                layout.box(), "The file is not saved: lightmaps will be packed into it", "INFO", context
-            )
+            text = iface_("The file is not saved: lightmaps will be packed into it")
+            draw_text(layout.box(), text, "INFO", context)
         if not any(obj.type == "MESH" for obj in context.scene.objects):
             layout.operator("radiosity.add_cornell_box", icon="CUBE")
 
@@ -92,9 +104,12 @@ class RADIOSITY_PT_advanced(_Panel, bpy.types.Panel):
         column = layout.column(align=True)
         column.prop(settings, "seed")
         column.prop(settings, "threads")
+        if not settings.is_property_set("threads"):
+            _draw_preferred(column, preferences(context).threads, settings.threads)
         column = layout.column(heading="Viewport")
         column.prop(settings, "show_while_solving")
         column.prop(settings, "show_result")
+        layout.operator("radiosity.clean", icon="BRUSH_DATA")
 
 
 class RADIOSITY_PT_object(_Panel, bpy.types.Panel):
@@ -108,20 +123,15 @@ class RADIOSITY_PT_object(_Panel, bpy.types.Panel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Show it for what can light, block or be baked."""
-        obj = context.object
-        surface = obj is not None and (obj.type in BAKEABLE_TYPES or obj.instance_type == "COLLECTION")
-        return surface and not runtime.running.active
+        return has_role(context.object) and not runtime.running.active
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw its settings."""
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        layout.label(text=context.object.name, icon="OBJECT_DATA")
-        layout.prop(context.object, "radiosity_mode", expand=True)
-        column = layout.column()
-        column.enabled = context.object.radiosity_mode == BAKE
-        column.prop(context.object, "radiosity_texel_scale")
+        layout.label(text=context.object.name, icon="OBJECT_DATA", translate=False)
+        draw_overrides(layout, context.object)
 
 
 class RADIOSITY_PT_solver(_Panel, bpy.types.Panel):
@@ -152,6 +162,7 @@ class RADIOSITY_PT_last_bake(_Panel, bpy.types.Panel):
     bl_idname = "RADIOSITY_PT_last_bake"
     bl_label = "Last Bake"
     bl_parent_id = "RADIOSITY_PT_main"
+    bl_order = 9  # below all settings
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -165,7 +176,7 @@ class RADIOSITY_PT_last_bake(_Panel, bpy.types.Panel):
         for name, value in last.figures:
             split = column.split(factor=0.45)
             split.label(text=name)
-            split.label(text=value)
+            split.label(text=value, translate=False)
         self.layout.prop(context.scene.radiosity, "lightmap_only")
         if last.folder:
             self.layout.operator("radiosity.open_folder", icon="FILE_FOLDER")
@@ -188,39 +199,24 @@ class RADIOSITY_PT_warnings(_Panel, bpy.types.Panel):
         """Draw the warnings, the first ones of many."""
         last = runtime.last_bake(context.scene) or runtime.LastBake()
         for name, message in last.warnings[:SHOWN_WARNINGS]:
-            _draw_text(self.layout.box(), f"{name}: {message}", "ERROR", context)
+            draw_text(self.layout.box(), f"{name}: {message}", "ERROR", context)
         hidden = last.warning_count - len(last.warnings[:SHOWN_WARNINGS])
         if hidden > 0:
-            self.layout.label(text=f"and {hidden} more, in report.json")
+            text = iface_("and {} more, in report.json").format(hidden)
+            self.layout.label(text=text, translate=False)
+
+
+def _draw_preferred(layout: Any, preferred: Any, shown: Any) -> None:
+    """Say that the preferences' value counts where the scene has none of its own."""
+    if preferred != shown:
+        layout.label(text=iface_("From the preferences: {}").format(preferred), icon="INFO", translate=False)
 
 
 def _draw_progress(layout: Any) -> None:
     """Show how far the running bake is."""
     running = runtime.running
-    layout.progress(factor=running.fraction, text=f"{running.stage}  {running.fraction:.0%}", type="BAR")
+    layout.progress(factor=running.fraction, text=progress_text(running), type="BAR")
     layout.label(text="Esc cancels", icon="CANCEL")
-
-
-def _draw_text(layout: Any, text: str, icon: str, context: bpy.types.Context) -> None:
-    """Draw a text over as many lines as the sidebar's width asks for."""
-    width = context.region.width if context.region is not None else 280
-    scale = context.preferences.system.ui_scale
-    per_line = max(16, int((width / scale - 60) / 6.2))
-    column = layout.column(align=True)
-    column.scale_y = 0.85
-    for number, line in enumerate(_wrapped(text, per_line)):
-        column.label(text=line, icon=icon if number == 0 else "BLANK1")
-
-
-def _wrapped(text: str, width: int) -> list[str]:
-    """Break a text at spaces into lines of at most `width` characters."""
-    lines = [""]
-    for word in text.split():
-        if lines[-1] and len(lines[-1]) + 1 + len(word) > width:
-            lines.append(word)
-        else:
-            lines[-1] = f"{lines[-1]} {word}".strip()
-    return lines
 
 
 CLASSES = (

@@ -17,13 +17,18 @@ from .bake_record import is_made
 from .png import render_png
 
 SAMPLES = 32
+QUICK_SAMPLES = 4
+"""Where a bake is only lit anew: edges are rougher, but the picture costs no more than the light."""
+
 MAX_SIDE = 960
 """Pixels."""
 
 _VIEW_FROM = Vector((1.0, -1.6, 0.9)).normalized()
 
 
-def render_preview(context: bpy.types.Context, path: Path, settings: BakeSettings) -> None:
+def render_preview(
+    context: bpy.types.Context, path: Path, settings: BakeSettings, samples: int = SAMPLES
+) -> None:
     """Render the scene's camera, or a framed view of the baked objects, to a PNG file.
 
     The scene and its render settings stay as they are.
@@ -35,6 +40,8 @@ def render_preview(context: bpy.types.Context, path: Path, settings: BakeSetting
         Lightmaps that are not where their images say yet are looked for beside it.
     settings : BakeSettings
         Its seed and threads.
+    samples : int
+        A pixel's.
 
     Raises
     ------
@@ -49,7 +56,7 @@ def render_preview(context: bpy.types.Context, path: Path, settings: BakeSetting
             camera = _framing_camera(context, scene)
         _fit(scene.render)
         with _lightmaps_at(path.parent):
-            render_png(scene, path, SAMPLES, settings.seed, settings.threads)
+            render_png(scene, path, samples, settings.seed, settings.threads)
     except (RuntimeError, TypeError) as error:
         raise BakeError(f"cannot render the preview '{path}': {' '.join(str(error).split())}") from error
     finally:

@@ -20,16 +20,15 @@ from ..settings import (
 )
 from .method_properties import MethodProperties, given_settings
 from .object_roles import BAKE, BAKEABLE_TYPES
+from .preferences import DEFAULT_FOLDER, memory_limit_of, threads_of
 
 DEFAULTS = BakeSettings()
 
 SHARED_FIELDS = (
     *("atlas", "quantity", "light", "format"),
-    *("max_resolution", "mip_levels", "sky", "keep_uvs", "seed", "threads"),
+    *("max_resolution", "mip_levels", "sky", "keep_uvs", "seed"),
 )
 """Settings of the panel that a bake takes as they are."""
-
-DEFAULT_FOLDER = "//lightmaps/"
 
 _LABELS = {
     "shared": ("Shared", "One image for all objects"),
@@ -82,6 +81,12 @@ class RadiositySettings(MethodProperties, bpy.types.PropertyGroup):
         items=[
             ("all", "All", "Every mesh that shows in renders"),
             ("selected", "Selected", "The selected meshes that show in renders"),
+            (
+                "changed",
+                "Changed",
+                "Those whose shape, place or reflectance differs from the last bake; others keep their "
+                "lightmaps, without new shadows. All, where the light has changed",
+            ),
         ],
         default="all",
     )
@@ -206,10 +211,16 @@ class RadiositySettings(MethodProperties, bpy.types.PropertyGroup):
         subtype="DIR_PATH",
         options=_RELATIVE_PATH,
     )
+    use_light_groups: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Light Groups",
+        description="Bake a lightmap for each light group as well, which the materials mix: colors and "
+        "strengths can then be changed without baking",
+        default=DEFAULTS.light_groups,
+    )
     show_while_solving: bpy.props.BoolProperty(  # type: ignore[valid-type]
         name="Show While Solving",
-        description="Draw the elements over the objects in the viewports while a bake is solving, as bright "
-        "as they are at that moment",
+        description="Draw the light over the objects in the viewports while a bake runs, as far as it is "
+        "known: the elements while it solves, then the texels",
         default=True,
     )
     show_result: bpy.props.BoolProperty(  # type: ignore[valid-type]
@@ -222,6 +233,11 @@ class RadiositySettings(MethodProperties, bpy.types.PropertyGroup):
         description="Show the lightmaps alone instead of base color × lightmap",
         default=False,
         update=_show_lightmap_only,
+    )
+    baked_light: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Baked Light",
+        description="What lamps and settings were at the last bake",
+        options={"HIDDEN"},
     )
     last_bake: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Last Bake",
@@ -250,8 +266,10 @@ def settings_of(context: bpy.types.Context) -> BakeSettings:
         relative_error=group.relative_error if by_error else None,
         pages=group.pages if group.atlas == "shared" and not by_density else 1,
         objects=chosen,
+        light_groups=group.use_light_groups,
         **{name: getattr(group, name) for name in SHARED_FIELDS},
-        **given_settings(group),
+        threads=threads_of(context),
+        **{"memory_limit": memory_limit_of(context), **given_settings(group)},
     )
 
 

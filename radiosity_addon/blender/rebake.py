@@ -30,6 +30,8 @@ _RECORD_FIELDS = (
     "is_hidden",
     "hide_viewport",
     "hide_render",
+    "fingerprint",
+    "texels_per_metre",
 )
 
 
@@ -86,9 +88,18 @@ class EarlierBake:
             _show_baked(baked)
         self._context.view_layer.update()
 
-    def discard(self) -> None:
-        """Remove the earlier bake for good."""
-        remove_datablocks([block for block, _ in self._made])
+    def discard(self, keep: frozenset[str] = frozenset()) -> None:
+        """Remove the earlier bake for good, but for the objects whose names are to keep theirs."""
+        shown = [baked for baked in self._objects if baked.obj.name in keep]
+        for baked in shown:
+            _show_baked(baked)
+        meshes = [baked.mesh for baked in shown if baked.mesh is not None]
+        used = _all_used(meshes, [block for block, _ in self._made])
+        for block, name in self._made:
+            if block in used:
+                mark_made(block)
+                block.name = name
+        remove_datablocks([block for block, _ in self._made if block not in used])
         self._context.view_layer.update()
 
 
@@ -133,8 +144,8 @@ def originals_shown(context: bpy.types.Context) -> Iterator[tuple[BakeWarning, .
 
 
 @contextmanager
-def replacing_earlier(context: bpy.types.Context) -> Iterator[None]:
-    """Set the earlier bake aside; remove it on success, put it back on any failure."""
+def replacing_earlier(context: bpy.types.Context, keep: frozenset[str] = frozenset()) -> Iterator[None]:
+    """Set the earlier bake aside; remove it on success, but for objects to `keep`; put it back on failure."""
     earlier = EarlierBake(context)
     try:
         yield
@@ -142,7 +153,18 @@ def replacing_earlier(context: bpy.types.Context) -> Iterator[None]:
         restore(context)  # what the new bake has shown so far
         earlier.put_back()
         raise
-    earlier.discard()
+    earlier.discard(keep)
+
+
+def _all_used(roots: list[bpy.types.ID], among: list[bpy.types.ID]) -> set[bpy.types.ID]:
+    """Return those of some datablocks that `roots` are or use, however indirectly."""
+    users = bpy.data.user_map(subset=among) if among else {}
+    used = set(roots)
+    while True:
+        more = {block for block, of in users.items() if block not in used and not used.isdisjoint(of)}
+        if not more:
+            return used
+        used |= more
 
 
 def _remember(obj: bpy.types.Object) -> _Baked:

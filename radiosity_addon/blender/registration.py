@@ -8,9 +8,45 @@ from functools import partial
 
 import bpy
 
-from . import bake_record, cli_host, object_roles, operators, panels, properties, runtime
+from . import (
+    bake_record,
+    check_panel,
+    cleaning,
+    cli_host,
+    kept_bakes,
+    light_group_operators,
+    light_group_panels,
+    light_group_properties,
+    object_panel,
+    object_roles,
+    operators,
+    overlay_panel,
+    overlay_properties,
+    overlay_view,
+    panels,
+    preferences,
+    preset_menu,
+    properties,
+    relight_operators,
+    relight_panel,
+    relight_properties,
+    runtime,
+)
 
-CLASSES = (*operators.CLASSES, *panels.CLASSES)
+CLASSES = (
+    *preferences.CLASSES,
+    *operators.CLASSES,
+    *relight_operators.CLASSES,
+    *light_group_operators.CLASSES,
+    *preset_menu.CLASSES,
+    *panels.CLASSES,
+    *relight_panel.CLASSES,
+    *light_group_panels.CLASSES,
+    *overlay_panel.CLASSES,
+    *check_panel.CLASSES,
+    *object_panel.CLASSES,
+    *cleaning.CLASSES,
+)
 
 _undo: list[Callable[[], None]] = []
 
@@ -20,12 +56,19 @@ def register() -> None:
     if _undo:
         return
     try:
-        for module in (bake_record, object_roles, properties):
+        for module in (
+            *(bake_record, object_roles, light_group_properties, properties),
+            *(kept_bakes, relight_properties, overlay_properties, overlay_view),
+        ):
             module.register()
             _undo.append(module.unregister)
         for cls in CLASSES:
             bpy.utils.register_class(cls)
             _undo.append(partial(bpy.utils.unregister_class, cls))
+        for module in (preset_menu, cleaning):
+            module.register()
+            _undo.append(module.unregister)
+        _undo.append(check_panel.forget_checks)
         _undo.append(runtime.stop_running)
         cli_host.register()
         _undo.append(cli_host.unregister)

@@ -14,6 +14,7 @@ import bpy
 
 from ..alike import one_of_each
 from ..methods import METHODS
+from . import kept_details
 
 MAX_WARNINGS = 100
 """A scene keeps this many of the last bake's warnings; the report has them all."""
@@ -26,6 +27,8 @@ class Running:
     active: bool = False
     stage: str = ""
     fraction: float = 0.0
+    seconds_left: float | None = None
+    """About how long it still takes; None as long as nobody can know."""
     stop: Callable[[], None] | None = None
     """Ends it from outside its operator."""
 
@@ -84,8 +87,10 @@ def remember(scene: bpy.types.Scene, report: dict, folder: str) -> None:
 
 def forget(scene: bpy.types.Scene) -> None:
     """Drop the scene's memory of its last bake, and all trace of us where nothing else was set."""
+    kept_details.drop(scene)
     group = scene.radiosity
     group.property_unset("last_bake")
+    group.property_unset("baked_light")
     names = [prop.identifier for prop in group.bl_rna.properties if not prop.is_readonly]
     if not any(map(group.is_property_set, names)):
         scene.property_unset("radiosity")

@@ -26,13 +26,17 @@ _CLOSE = (96, 96)
 """Pixels of that look."""
 
 
-def read_world(world: bpy.types.World | None) -> tuple[list[Light], tuple[BakeWarning, ...]]:
+def read_world(
+    world: bpy.types.World | None, dark: bool = False
+) -> tuple[list[Light], tuple[BakeWarning, ...]]:
     """Return the lights that a world is; none where it is black or there is none.
 
     Parameters
     ----------
     world : World or None
         As the file has it, not evaluated: it may be rendered.
+    dark : bool
+        Whether a black one is a light as well: it may shine later.
 
     Raises
     ------
@@ -43,17 +47,17 @@ def read_world(world: bpy.types.World | None) -> tuple[list[Light], tuple[BakeWa
         return [], ()
     limited = _limited(world)
     if not uses_nodes(world):
-        return _constant(np.array(world.color[:3], dtype=np.float64), world.name), limited
+        return _constant(np.array(world.color[:3], dtype=np.float64), world.name, dark), limited
     radiance, warnings = read_radiance(world, "world")
     # The walk through the nodes warns of whatever is not constant: then Cycles knows better.
     beside = tuple(warning for warning in warnings if "volume" in warning.message)
     if len(beside) == len(warnings):
-        return _constant(radiance, world.name), beside + limited
+        return _constant(radiance, world.name, dark), beside + limited
     return _sampled(world), beside + limited
 
 
-def _constant(radiance: np.ndarray, name: str) -> list[Light]:
-    return [EnvironmentLight(radiance, name=name)] if radiance.any() else []
+def _constant(radiance: np.ndarray, name: str, dark: bool) -> list[Light]:
+    return [EnvironmentLight(radiance, name=name)] if radiance.any() or dark else []
 
 
 def _lights_surfaces(world: bpy.types.World) -> bool:

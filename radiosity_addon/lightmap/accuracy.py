@@ -7,6 +7,7 @@ from collections.abc import Callable, Generator
 from ..solver.local_pass import LocalPass
 from ..solver.scene import Scene
 from ..solver.steps import scaled
+from .light_so_far import LightSoFar
 from .reconstruct import GatherSettings, reconstruct
 from .sweeps import TexelLight
 from .texel_geometry import TexelGeometry
@@ -24,6 +25,7 @@ def light_within(
     geometry: TexelGeometry,
     settings_for: Callable[[float], GatherSettings],
     error: float,
+    so_far: LightSoFar | None = None,
 ) -> Generator[float, None, TexelLight]:
     """Light the texels so that their estimated relative RMS error is at most `error`, if that can be had.
 
@@ -40,7 +42,8 @@ def light_within(
     goal, left = error, 1.0
     settings = settings_for(goal)
     for _ in range(TRIES):
-        light = yield from scaled(reconstruct(scene, local, geometry, settings), 1.0 - left, 1.0 - 0.5 * left)
+        steps = reconstruct(scene, local, geometry, settings, so_far)
+        light = yield from scaled(steps, 1.0 - left, 1.0 - 0.5 * left)
         left *= 0.5
         goal *= MARGIN * error / max(light.error, 1e-9)
         before, settings = settings, settings_for(goal)

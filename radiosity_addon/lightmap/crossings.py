@@ -17,6 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..bake_scene import DIVIDED, HOODED, TOUCHED
 from ..solver.arrays import Array
 from ..solver.parallel import chunk_steps
 from ..solver.visibility import RayCaster
@@ -69,6 +70,14 @@ class Crossings:
         """Texels that are cut or at a rim: more than one light falls on them."""
         return self.cut | self.rim
 
+    @property
+    def state(self) -> Array:
+        """(n,) uint8: see `TEXEL_STATES`."""
+        state = np.where(
+            self.crossed, DIVIDED, np.where(self.hooded, HOODED, np.where(self.touched, TOUCHED, 0))
+        )
+        return np.asarray(state, dtype=np.uint8)
+
     @cached_property
     def alone(self) -> Array:
         """Texels whose light is like no neighbour's, though a line of sight may join them."""
@@ -81,12 +90,23 @@ class Crossings:
 
 
 def crossing_steps(
-    geometry: TexelGeometry, caster: RayCaster, threads: int = 0
+    geometry: TexelGeometry,
+    caster: RayCaster,
+    threads: int = 0,
+    before: Crossings | None = None,
+    anew: Array | None = None,
 ) -> Generator[float, None, Crossings]:
-    """Find the texels that geometry cuts, touches or hoods; yields the fraction done."""
-    result = Crossings(geometry, *np.zeros((4, len(geometry)), dtype=bool))
-    clear = clear_texels(geometry, OUTSET, HOOD, LIFT * caster.surface_offset, threads)
-    doubted = np.flatnonzero(~clear)
+    """Find the texels that geometry cuts, touches or hoods; yields the fraction done.
+
+    Given how it was `before`, only some texels, row numbers, are tried `anew`.
+    """
+    if before is None or anew is None:
+        result = Crossings(geometry, *np.zeros((4, len(geometry)), dtype=bool))
+        clear = clear_texels(geometry, OUTSET, HOOD, LIFT * caster.surface_offset, threads)
+        doubted = np.flatnonzero(~clear)
+    else:
+        were = (before.cut, before.touched, before.rim, before.hooded)
+        result, doubted = Crossings(geometry, *(flags.copy() for flags in were)), anew
 
     def find(part: slice) -> None:
         rows = doubted[part]

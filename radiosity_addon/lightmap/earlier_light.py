@@ -30,10 +30,19 @@ class EarlierLight:
     def __init__(self, strengths: Array, table: Array) -> None:
         self._known = [(strengths.copy(), table)]
 
+    @property
+    def baked(self) -> Array:
+        """(r, 3) float32: the first solution, of the strengths that were baked [W/m²]."""
+        return self._known[0][1]
+
     def add(self, strengths: Array, table: Array) -> None:
         """Remember another solution, for the oldest if there are many."""
         first, *others = self._known
         self._known = [first, *others[-(MOST - 2) :], (strengths.copy(), table)]
+
+    def first(self) -> EarlierLight:
+        """Return what remembers the first solution alone."""
+        return EarlierLight(*self._known[0])
 
     def mixed(self, strengths: Array) -> Array | None:
         """Return (r, 3) what surfaces reflect at (s, 3) strengths; None if they are no such mixture."""

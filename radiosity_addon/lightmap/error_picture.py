@@ -40,7 +40,7 @@ def texel_residual(
     found = crossing_steps(geometry, local.caster, local.threads)
     crossings = yield from scaled(found, DIRECT, CROSSED)
     stored = gather_texels(local, geometry, settings, crossings, local.leaves_of)
-    links = yield from scaled(stored, CROSSED, GATHERED)
+    links, _ = yield from scaled(stored, CROSSED, GATHERED)
     arriving = links.irradiance_steps(residual.gathered(local), local.threads)
     irradiance = direct + (yield from scaled(arriving, GATHERED, 1.0))
     values = _residual_at(residual, geometry, irradiance)

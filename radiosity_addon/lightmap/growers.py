@@ -1,4 +1,4 @@
-"""Cutting meshes into charts: xatlas, which only this module imports, and what stands in for it."""
+"""Cutting meshes into charts: xatlas, and what stands in for it."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .box_charts import box_charts
+from .chart_process import beside_a_window, run_apart, run_xatlas
 from .resting import Resting
 
 Float = NDArray[np.float64]
@@ -33,22 +34,13 @@ def grow_charts(vertices: Float, faces: Int) -> tuple[Float, Int]:
     chart : (n,) int64
         −1 for faces that xatlas left out.
     """
-    import xatlas
-
-    atlas = xatlas.Atlas()
-    atlas.add_mesh(vertices.astype(np.float32), faces.astype(np.uint32))
-    # Its packing is not used: make it quick, and do not let it turn charts twice.
-    packing = xatlas.PackOptions()
-    packing.rotate_charts = False
-    packing.bilinear = False
-    atlas.generate(xatlas.ChartOptions(), packing)
-    _, indices, uv = atlas[0]
-    _, chart_of_vertex = atlas.get_mesh_vertex_assignment(0)
-    chart = chart_of_vertex[indices[:, 0]].astype(np.int64)
-    chart[chart == np.iinfo(np.uint32).max] = -1
-    scale = np.array((max(atlas.width, 1), max(atlas.height, 1)), dtype=np.float64)
+    if beside_a_window(faces):
+        grown = run_apart(vertices, faces)
+        if grown is not None:
+            return grown
+    atlas, uv, chart = run_xatlas(vertices, faces)
     _resting.keep(atlas)
-    return uv[indices].astype(np.float64) * scale, chart
+    return uv, chart
 
 
 class PatientGrower:

@@ -58,11 +58,13 @@ class GatherPoints:
         self._geometry, self._caster, self._alone = geometry, caster, alone
         self.texel = np.zeros(0, dtype=np.int32)
         self.closeness = np.zeros(0)
+        self.level = np.zeros(0, dtype=np.int8)
+        """(g,) int8: as which level each was added, from 0"""
         self._grids: list[PointGrid] = []
         self._weighed = _Weighed.nothing()
         self._number = np.full(len(geometry), -1, dtype=np.int32)
-        self._farthest = np.full(len(geometry), np.inf)
-        """[m]: what texels see is no farther off in the mean, by what points near them see."""
+        self.farthest = np.full(len(geometry), np.inf)
+        """(n,) float64 [m]: what texels see is no farther off in the mean, by what points near them see."""
 
     def __len__(self) -> int:
         return len(self.texel)
@@ -74,6 +76,8 @@ class GatherPoints:
         size = max(stride, 1.5) * geometry.texel_size
         self._grids.append(PointGrid(geometry.position[texel], geometry.normal[texel], numbers, size))
         self._number[texel] = numbers
+        level = np.full(len(texel), len(self._grids) - 1, dtype=np.int8)
+        self.level = np.concatenate([self.level, level])
         self.texel = np.concatenate([self.texel, texel])
         self.closeness = np.concatenate([self.closeness, closeness])
 
@@ -127,7 +131,7 @@ class GatherPoints:
         number = self._number.take(texels)
         if not len(self):
             return np.zeros(len(texels))
-        around = 1.0 / self._farthest.take(texels)
+        around = 1.0 / self.farthest.take(texels)
         return np.where(number >= 0, self.closeness.take(np.maximum(number, 0)), around)
 
     def _clamp(self, texels: Array, point: Array) -> None:
@@ -138,7 +142,7 @@ class GatherPoints:
         first = np.flatnonzero(np.diff(texels, prepend=-1))
         if len(first):
             some = texels[first]
-            self._farthest[some] = np.minimum(self._farthest[some], np.minimum.reduceat(farthest, first))
+            self.farthest[some] = np.minimum(self.farthest[some], np.minimum.reduceat(farthest, first))
 
     def support(self, texels: Array) -> Array:
         """Return (n,) the summed weights around texels: below 1 they need a point of their own.
@@ -179,13 +183,13 @@ class GatherPoints:
         kept = known.pairs_of(texels)
         still = old[kept[0] - texels.start]
         kept = (kept[0][still], kept[1][still], kept[2][still])
-        found = [self._fresh(run[~old], 0), self._fresh(run[old], known.levels), kept]
+        found = [self.weighed(run[~old], 0), self.weighed(run[old], known.levels), kept]
         texel, point, weight = (np.concatenate(parts) for parts in zip(*found, strict=True))
         row = texel - texels.start
         order = np.argsort(row.astype(np.int16 if len(run) < 1 << 15 else np.int64), kind="stable")
         return row[order], point[order], weight[order]
 
-    def _fresh(self, texels: Array, level: int) -> tuple[Array, Array, Array]:
+    def weighed(self, texels: Array, level: int = 0) -> tuple[Array, Array, Array]:
         """Weigh the points of all levels from `level` for texels: (p,) texels, points, weights above 0."""
         row, point = self.pairs(texels, level)
         weight = self.kernel(texels[row], point)
@@ -302,6 +306,37 @@ def fit_steps(points: GatherPoints, geometry: TexelGeometry) -> Generator[float,
     counts, numbers, weights = zip(*(parts[start] for start in sorted(parts)), strict=True)
     count = np.concatenate(counts)
     return Interpolation(np.cumsum(count) - count, np.concatenate(numbers), np.concatenate(weights))
+
+
+def refit(points: GatherPoints, geometry: TexelGeometry, texels: Array) -> tuple[Array, Array, Array]:
+    """Weigh the gather points around some texels, in ascending order, as `fit_steps` does.
+
+    Returns
+    -------
+    count : (k,) int
+        Entries of each texel.
+    point, weight : (m,) int32, float32
+        Texel by texel.
+
+    Raises
+    ------
+    ValueError
+        If nothing speaks for a texel.
+    """
+    counts, numbers, weights = [], [], []
+    for start in range(0, len(texels), CHUNK):
+        some = texels[start : start + CHUNK]
+        texel, point, kernel = points.weighed(some)
+        count = np.bincount(np.searchsorted(some, texel), minlength=len(some))
+        if not count.all():
+            raise ValueError("a texel has no gather point in reach: it should have become one")
+        along = geometry.position[points.texel[point]] - geometry.position[texel]
+        counts.append(count)
+        numbers.append(point.astype(np.int32))
+        weights.append(_linear_weights(along, kernel, count))
+    if not counts:
+        return np.zeros(0, np.int64), np.zeros(0, np.int32), np.zeros(0, np.float32)
+    return np.concatenate(counts), np.concatenate(numbers), np.concatenate(weights)
 
 
 def _linear_weights(along: Array, kernel: Array, count: Array) -> Array:

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..solver.arrays import Array
 from ..solver.light_gains import LightGains
-from ..solver.local_pass import NOTHING, LocalPass, Resolver, values_of
+from ..solver.local_pass import NOTHING, Footprints, LocalPass, Resolver, values_of
 from ..solver.steps import drain, scaled
 from .source_means import Means
 from .stored_links import StoredLinks
@@ -72,11 +72,14 @@ class Parts:
     links : sequence of PartLinks
     element : (r,) int
         Whose light `start` is, or NOTHING.
+    small : (r − elements,) int64
+        Which parts the rows after the elements' are: their numbers less n (see `HitNumbers`), ascending.
     """
 
     start: Array
     links: Sequence[PartLinks]
     element: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    small: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
 
 class HitNumbers:
@@ -96,9 +99,50 @@ class HitNumbers:
         self.first_cell = texel_count + len(local.parts)
         self.end = self.first_cell + len(cells)
 
+    def cell(self, part: Array) -> Array:
+        """Return (p,) the cells' own numbers of those that are cells, numbered less n."""
+        return np.asarray(part - (self.first_cell - self.texel_count))
+
+
+@dataclass(frozen=True)
+class KnownParts:
+    """Parts of one kind that have looked already.
+
+    Attributes
+    ----------
+    is_leaf : bool
+        Parts of leaves, or cells.
+    part : (p,) int
+        Their numbers less n (see `HitNumbers`).
+    sources : (p, rays) int32
+        Numbered likewise.
+    gains : LightGains or None
+        What lights add, if that is known as well.
+    """
+
+    is_leaf: bool
+    part: Array
+    sources: Array
+    gains: LightGains | None = None
+
+    @property
+    def rays(self) -> int:
+        """That each gathers with."""
+        return int(self.sources.shape[1])
+
+    @property
+    def shadow_rays(self) -> int:
+        """Of each to every lamp."""
+        return SHADOW_RAYS * self.rays // RAYS
+
 
 def gather_parts(
-    numbers: HitNumbers, links: StoredLinks, resolve: Resolver, element: Array, reflectance: Array
+    numbers: HitNumbers,
+    links: StoredLinks,
+    resolve: Resolver,
+    element: Array,
+    reflectance: Array,
+    known: Sequence[KnownParts] = (),
 ) -> Generator[float, None, tuple[StoredLinks, Parts]]:
     """Look from the parts that links met, and from those that these met; yields the fraction done.
 
@@ -110,6 +154,8 @@ def gather_parts(
         Of the texels: the leaf elements below them, or NOTHING.
     reflectance : (n, 3)
         Theirs.
+    known : sequence of KnownParts
+        Those that need not be asked.
 
     Returns
     -------
@@ -117,7 +163,7 @@ def gather_parts(
         Their sources are rows of the table.
     parts : Parts
     """
-    gathering = _Gathering(numbers, resolve)
+    gathering = _Gathering(numbers, resolve, known)
     gathering.count(links.sources)
     gathering.count(links.aimed.sources)
     for turn in range(ROUNDS):
@@ -125,7 +171,14 @@ def gather_parts(
     made, of = yield from scaled(gathering.links(element, reflectance), 0.7, 1.0)
     start, rows = values_of(numbers.local.reflected(), of), gathering.rows
     aimed = replace(links.aimed, sources=rows(links.aimed.sources))
-    return replace(links, sources=rows(links.sources), aimed=aimed), Parts(start, made, of)
+    return replace(links, sources=rows(links.sources), aimed=aimed), Parts(start, made, of, gathering.small)
+
+
+def lit_footprints(numbers: HitNumbers, parts: KnownParts) -> Footprints:
+    """Return where parts ask for lamps' light."""
+    if parts.is_leaf:
+        return numbers.local.lit_parts(parts.part)
+    return numbers.cells.lit(numbers.cell(parts.part))
 
 
 class _Gathering:
@@ -135,14 +188,18 @@ class _Gathering:
     ----------
     numbers : HitNumbers
     resolve : callable
+    known : sequence of KnownParts
     """
 
-    def __init__(self, numbers: HitNumbers, resolve: Resolver) -> None:
+    def __init__(self, numbers: HitNumbers, resolve: Resolver, known: Sequence[KnownParts] = ()) -> None:
         self._numbers, self._resolve = numbers, resolve
         self._local, self._cells = numbers.local, numbers.cells
         self._met = np.zeros(numbers.end - numbers.texel_count, dtype=np.int32)
         self._asked = np.zeros(len(self._met), dtype=bool)
-        self._found: list[tuple[bool, int, Array, Array]] = []
+        self._found = list(known)
+        for some in known:
+            self._asked[some.part] = True
+            self.count(some.sources)
 
     def count(self, sources: Array) -> None:
         """Note which parts were met."""
@@ -165,18 +222,15 @@ class _Gathering:
             steps = self._gather(is_leaf, rays, part)
             sources = yield from scaled(steps, turn / len(groups), (turn + 1) / len(groups))
             self.count(sources)
-            self._found.append((is_leaf, rays, part, sources))
+            self._found.append(KnownParts(is_leaf, part, sources))
 
     def _gather(self, is_leaf: bool, rays: int, part: Array) -> Generator[float, None, Array]:
         if is_leaf:
             return self._local.gather_at_parts(part, rays, self._resolve)
-        return self._cells.gather(self._cell(part), rays, self._resolve)
-
-    def _cell(self, part: Array) -> Array:
-        return part - (self._numbers.first_cell - self._numbers.texel_count)
+        return self._cells.gather(self._numbers.cell(part), rays, self._resolve)
 
     @cached_property
-    def _small(self) -> Array:
+    def small(self) -> Array:
         """(s,) int64, ascending: the sixteenths of elements that were met, and the cells that were asked.
 
         Whole elements have rows whether met or not. Where nobody gathered, the hierarchy's values
@@ -189,27 +243,33 @@ class _Gathering:
     @cached_property
     def rows(self) -> _Rows:
         """What gives sources the rows of the table."""
-        return _Rows(self._numbers.elements, self._small + self._numbers.texel_count)
+        return _Rows(self._numbers.elements, self.small + self._numbers.texel_count)
 
     def links(
         self, element: Array, reflectance: Array
     ) -> Generator[float, None, tuple[list[PartLinks], Array]]:
         """Make the links of the parts asked, and tell whose light rows start with; yields how far it is."""
         local, cells, first = self._local, self._cells, self._numbers.texel_count
-        of_leaves = self._small[self._small < len(local.parts)]
-        of_cells = self._cell(self._small[len(of_leaves) :])
+        of_leaves = self.small[self.small < len(local.parts)]
+        of_cells = self._numbers.cell(self.small[len(of_leaves) :])
         whole = np.arange(self._numbers.elements - first)
         start = [whole, local.parts.leaf_of(of_leaves), element[cells.texel_of(of_cells)]]
         made, count = [], max(len(self._found), 1)
-        for done, (is_leaf, rays, part, sources) in enumerate(self._found):
-            asked = SHADOW_RAYS * rays // RAYS, local.new_gains(len(part))
-            if is_leaf:
-                direct, share = local.part_direct(part, *asked), local.part_reflectance(part)
+        for done, found in enumerate(self._found):
+            part = found.part
+            if found.is_leaf:
+                share = local.part_reflectance(part)
             else:
-                cell = self._cell(part)
-                direct, share = cells.direct(cell, *asked), reflectance[cells.texel_of(cell)]
-            lamps = yield from scaled(direct, done / count, (done + 1) / count)
-            made.append(PartLinks(self.rows(first + part), self.rows(sources), share, lamps, asked[1]))
+                share = reflectance[cells.texel_of(self._numbers.cell(part))]
+            if found.gains is None:
+                gains = local.new_gains(len(part))
+                at = lit_footprints(self._numbers, found)
+                direct = local.direct_steps(at, found.shadow_rays, gains)
+                lamps = yield from scaled(direct, done / count, (done + 1) / count)
+            else:
+                gains, lamps = found.gains, local.lit_by(found.gains)
+            rows = self.rows(first + part), self.rows(found.sources)
+            made.append(PartLinks(*rows, share, lamps, gains))
         return made, np.concatenate(start)
 
 
@@ -225,7 +285,7 @@ class _Rows:
     """
 
     def __init__(self, first: int, small: Array) -> None:
-        self._first, self._small = first, small
+        self._first, self.small = first, small
 
     def __call__(self, sources: Array) -> Array:
         """Return the rows of sources of any shape."""
@@ -233,8 +293,8 @@ class _Rows:
         if not doubtful.any():
             return sources
         result, wanted = sources.copy(), sources[doubtful]
-        place = np.searchsorted(self._small, wanted)
-        there = self._small.take(place, mode="clip") == wanted
+        place = np.searchsorted(self.small, wanted)
+        there = self.small.take(place, mode="clip") == wanted
         result[doubtful] = np.where(there, self._first + place, NOTHING)
         return result
 

@@ -8,7 +8,7 @@ trace nothing, remove what the coarse hierarchy got wrong.
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -24,6 +24,7 @@ from .continued import join_continued
 from .crossings import LIFT, Crossings, below_hood, crossing_steps
 from .earlier_light import EarlierLight
 from .interpolate import GatherPoints, fit_steps
+from .light_so_far import LightSoFar
 from .part_links import HitNumbers, gather_parts
 from .stored_links import StoredLinks
 from .sweeps import LitTexels, TexelLight, TexelTransport, sweep_steps
@@ -31,6 +32,7 @@ from .terminator import SmoothLift
 from .texel_cells import TexelCells
 from .texel_geometry import NO_TEXEL, TexelGeometry
 from .texel_materials import texel_materials
+from .traced_texels import KeptPoints, TracedTexels
 from .whole_neighbours import whole_neighbour
 
 DIRECT, CROSSED, GATHERED, PARTS = 0.25, 0.3, 0.8, 0.9
@@ -73,37 +75,52 @@ class GatherSettings:
 
 
 def reconstruct(
-    scene: Scene, local: LocalPass, geometry: TexelGeometry, settings: GatherSettings
+    scene: Scene,
+    local: LocalPass,
+    geometry: TexelGeometry,
+    settings: GatherSettings,
+    so_far: LightSoFar | None = None,
 ) -> Generator[float, None, TexelLight]:
     """Compute direct and indirect irradiance of all texels; yields the fraction done.
 
-    If `local` can ask for every light apart, what lights the texels anew is kept.
+    If `local` can ask for every light apart, what lights the texels anew is kept. `so_far` is told what is
+    known on the way.
     """
     join_continued(geometry, local.caster)
     gains = local.new_gains(len(geometry))
-    direct = local.direct_steps(footprints(geometry, local), gains=gains)
+    lamps = np.zeros((len(geometry), 3))
+    reflectance, emission = texel_materials(scene, geometry)
+    element = local.leaf_at_fronts(geometry.triangle, geometry.barycentric)
+    if so_far is not None:
+        so_far.begin(local, geometry, element, lamps, (reflectance, emission))
+    tell = None if so_far is None else so_far.asked
+    direct = local.direct_steps(footprints(geometry, local), gains=gains, total=lamps, tell=tell)
     lamps = yield from scaled(direct, 0.0, DIRECT)
     found = crossing_steps(geometry, local.caster, local.threads)
     crossings = yield from scaled(found, DIRECT, CROSSED)
     cells = TexelCells(local, geometry, crossings)
     numbers = HitNumbers(local, cells, len(geometry))
-    resolve = _resolver(geometry, crossings, numbers)
-    stored = gather_texels(local, geometry, settings, crossings, resolve)
-    links = yield from scaled(stored, CROSSED, GATHERED)
-    reflectance, _ = texel_materials(scene, geometry)
-    element = local.leaf_at_fronts(geometry.triangle, geometry.barycentric)
+    resolve = resolver(geometry, crossings, numbers)
+    met = None if so_far is None else partial(so_far.met, numbers)
+    stored = gather_texels(local, geometry, settings, crossings, resolve, met)
+    links, points = yield from scaled(stored, CROSSED, GATHERED)
     further = gather_parts(numbers, links, resolve, element, reflectance)
     links, parts = yield from scaled(further, GATHERED, PARTS)
     transport = TexelTransport(links, parts, reflectance)
     limits = settings.sweeps, settings.tolerance
     start = values_of(local.reflected(), element)
-    swept = sweep_steps(transport, start, lamps, local.beyond(), *limits, local.threads)
+    seen = None if so_far is None else so_far.swept
+    swept = sweep_steps(transport, start, lamps, local.beyond(), *limits, local.threads, seen=seen)
     light = yield from scaled(swept, PARTS, 1.0)
+    light = replace(light, state=crossings.state)
     yield 1.0
     if gains is None or local.sources is None or light.table is None:
         return light
     earlier = EarlierLight(local.sources.strengths, light.table)
-    return replace(light, kept=LitTexels(transport, gains, element, *limits, earlier))
+    lit = LitTexels(transport, gains, element, *limits, earlier)
+    chosen = KeptPoints.of(points)
+    traced = TracedTexels(settings, crossings, numbers, chosen, parts.small, local.bright, light.error)
+    return replace(light, kept=lit, traced=traced)
 
 
 def footprints(geometry: TexelGeometry, local: LocalPass) -> Footprints:
@@ -125,8 +142,12 @@ def gather_texels(
     settings: GatherSettings,
     crossings: Crossings,
     resolve: Resolver,
-) -> Generator[float, None, StoredLinks]:
-    """Gather at few texels, densely where others do not reach; yields the fraction done."""
+    met: Callable[[Array, Gathered, int], None] | None = None,
+) -> Generator[float, None, tuple[StoredLinks, GatherPoints]]:
+    """Gather at few texels, densely where others do not reach; yields the fraction done.
+
+    `met` is told of texels that have gathered, and how far they are apart.
+    """
     points = GatherPoints(geometry, local.caster, crossings.alone, local.threads)
     found: list[Gathered] = []
     first: list[int] = []
@@ -140,34 +161,42 @@ def gather_texels(
         at, closeness = begin + 0.2 * width, []
         for some, starts in ((chosen[~edge], STARTS), (chosen[edge], None)):
             end = at + 0.8 * width * len(some) / max(len(chosen), 1)
-            rays = _gather(local, geometry, some, starts, settings.rays, resolve)
+            rays = gather_at(local, geometry, some, starts, settings.rays, resolve)
             gathered = yield from scaled(rays, at, end)
             first.append(sum(len(before.sources) for before in found))
             found.append(gathered)
+            if met is not None:
+                met(some, gathered, stride)
             closeness.append(gathered.closeness)
             at = end
         points.add(stride, np.concatenate([chosen[~edge], chosen[edge]]), np.concatenate(closeness))
     spread = yield from scaled(fit_steps(points, geometry), 1.0 - FIT, 1.0)
     sources = np.concatenate([gathered.sources for gathered in found])
-    return StoredLinks(sources, spread, AimedRays.joined([gathered.aimed for gathered in found], first))
+    aimed = AimedRays.joined([gathered.aimed for gathered in found], first)
+    return StoredLinks(sources, spread, aimed), points
 
 
-def _gather(
+def gather_at(
     local: LocalPass, geometry: TexelGeometry, chosen: Array, starts: int | None, rays: int, resolve: Resolver
 ) -> Generator[float, None, Gathered]:
     """Gather at some texels; yields the fraction done."""
-    at = Footprints(
-        geometry.position[chosen],
-        geometry.normal[chosen],
-        chosen,
-        partial(_sample_of, geometry, chosen),
-        starts=starts,
-    )
+    at = gather_footprints(geometry, chosen, starts)
     expected = local.irradiance_at(geometry.triangle[chosen], geometry.barycentric[chosen])
     return (yield from local.gather_steps(at, geometry.surface_normal[chosen], rays, resolve, expected))
 
 
-def _sample_of(geometry: TexelGeometry, chosen: Array, rows: Array, u: Array) -> Array:
+def gather_footprints(geometry: TexelGeometry, chosen: Array, starts: int | None) -> Footprints:
+    """Return where some texels gather, each from so many points."""
+    return Footprints(
+        geometry.position[chosen],
+        geometry.normal[chosen],
+        chosen,
+        partial(sample_of, geometry, chosen),
+        starts=starts,
+    )
+
+
+def sample_of(geometry: TexelGeometry, chosen: Array, rows: Array, u: Array) -> Array:
     """Spread points over the footprints of some of the chosen texels."""
     return geometry.sample(chosen[rows], u)
 
@@ -189,7 +218,7 @@ def _choose(
     return candidates.astype(np.int32)
 
 
-def _resolver(geometry: TexelGeometry, crossings: Crossings, numbers: HitNumbers) -> Resolver:
+def resolver(geometry: TexelGeometry, crossings: Crossings, numbers: HitNumbers) -> Resolver:
     """Number hits: texels by their own number, then parts of leaf elements, then cells of divided texels."""
     wide = geometry.texel_area > (WIDE * geometry.texel_size) ** 2
     local, cells = numbers.local, numbers.cells

@@ -5,7 +5,7 @@ The unknowns are the texels and the parts that gather rays met where no texel an
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,7 @@ from .earlier_light import EarlierLight
 from .part_links import Parts, PartSweeps
 from .source_means import CHUNK_HITS, Means, mean_steps
 from .stored_links import StoredLinks
+from .traced_texels import TracedTexels
 
 TOLERANCE = 2e-4
 """Largest change of any texel, relative to the mean, at which the sweeps end by default. Most texels are
@@ -44,7 +45,13 @@ class TexelLight:
     table : (surfaces, 3) float32 or None [W/m²]
         What texels and parts reflected in the end.
     kept : LitTexels or None
-        What lights them anew, if it is kept.
+        What lights them anew, if it is kept, …
+    traced : TracedTexels or None
+        … and how they were lit.
+    noise : (n,) float32 or None [W/m²]
+        What `error` is the mean of: the estimated error of each texel.
+    state : (n,) uint8 or None
+        What geometry does to each, see `TEXEL_STATES`.
     """
 
     direct: Array
@@ -52,6 +59,9 @@ class TexelLight:
     error: float = 0.0
     table: Array | None = None
     kept: LitTexels | None = None
+    traced: TracedTexels | None = None
+    noise: Array | None = None
+    state: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -106,6 +116,7 @@ def sweep_steps(
     tolerance: float = TOLERANCE,
     threads: int = 0,
     estimate: bool = True,
+    seen: Callable[[Array], None] | None = None,
 ) -> Generator[float, None, TexelLight]:
     """Iterate H = direct + Σ ρ H over the stored hits, started from the hierarchy's solution.
 
@@ -124,6 +135,8 @@ def sweep_steps(
         … or until no texel changes by more than this part of the mean.
     estimate : bool
         Whether the error is estimated.
+    seen : callable or None
+        Is given the (n, 3) irradiance after every sweep [W/m²], to be looked at.
 
     Yields
     ------
@@ -156,19 +169,32 @@ def sweep_steps(
         left *= SWEPT
         indirect = np.maximum(links.spread_out(table, mean.copy(), threads), 0.0)
         table[surfaces:] = beyond
-        radiosity = (reflectance * (direct + indirect)).astype(np.float32)
+        irradiance = direct + indirect
+        if seen is not None:
+            seen(irradiance)
+        radiosity = (reflectance * irradiance).astype(np.float32)
         change = np.abs(radiosity - table[:texel_count]).max(axis=1)
         changed[:] = False
         changed[:texel_count] = change > still
         table[:texel_count][changed[:texel_count]] = radiosity[changed[:texel_count]]
         if change.max(initial=0.0) <= tolerance * radiosity.mean():
             break
-    error = estimated_error(links, table, direct + indirect, threads) if estimate else 0.0
-    return TexelLight(direct, indirect, error, table[:surfaces])
+    if not estimate:
+        return TexelLight(direct, indirect, 0.0, table[:surfaces])
+    noise = estimated_noise(links, table, threads)
+    error = relative_error(noise, direct + indirect)
+    each = np.sqrt((noise**2).mean(axis=1)).astype(np.float32)
+    return TexelLight(direct, indirect, error, table[:surfaces], noise=each)
 
 
-def estimated_error(links: StoredLinks, table: Array, irradiance: Array, threads: int = 0) -> float:
-    """Estimate the RMS error of texels' irradiance, relative to its mean: the noise of the gather rays.
+def relative_error(noise: Array, irradiance: Array) -> float:
+    """Return the RMS of (n, 3) noise, relative to the mean of the irradiance (n, 3)."""
+    mean = float(irradiance.mean()) if len(irradiance) else 0.0
+    return float(np.sqrt((noise**2).mean())) / mean if mean > 0.0 else 0.0
+
+
+def estimated_noise(links: StoredLinks, table: Array, threads: int = 0) -> Array:
+    """Estimate (n, 3) the error of texels' irradiance: the noise of the gather rays [W/m²].
 
     Half of a point's rays guess its irradiance with √2 times the noise of all of them, and share
     that half with the whole: so the two differ by about the noise of the whole. Spread over the
@@ -179,17 +205,11 @@ def estimated_error(links: StoredLinks, table: Array, irradiance: Array, threads
     links : StoredLinks
     table : (rows, 3) float32
         The radiosity that the links' sources had in the end, the sky's among it.
-    irradiance : (n, 3) float64
-        Of the texels, direct and indirect.
     """
-    mean = float(irradiance.mean()) if len(irradiance) else 0.0
-    if mean <= 0.0:
-        return 0.0
     half = links.sources.shape[1] // 2
     whole = drain(mean_steps(table, links.sources, threads))
     part = drain(mean_steps(table, np.ascontiguousarray(links.sources[:, :half]), threads))
-    noise = links.spread(part - whole)
-    return float(np.sqrt((noise**2).mean())) / mean
+    return np.asarray(links.spread(part - whole))
 
 
 def _reached(links: StoredLinks, parts: PartSweeps, direct: Array, beyond: int) -> Array:

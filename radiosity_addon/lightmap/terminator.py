@@ -7,6 +7,8 @@ the curved patch through its corners (a parabola over each edge).
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 
 from ..solver.arrays import Array
@@ -33,6 +35,18 @@ class SmoothLift:
         """(t, 3) [m]: four times the height of the parabola over the middle of each edge"""
         self._geometry = geometry
         self._smooth = (self._opening > 0).any(axis=1)
+        self._texels: Array | None = None
+
+    @property
+    def heights(self) -> Array:
+        """(t,) float64: rays from triangles are lifted no more than this [m]."""
+        return np.asarray(0.25 * np.maximum(self._opening, 0.0).sum(axis=1))
+
+    def of(self, chosen: Array) -> SmoothLift:
+        """Return what lifts the starts of some texels' rays, numbered among these."""
+        lift = copy(self)
+        lift._texels = chosen if self._texels is None else self._texels[chosen]
+        return lift
 
     def __call__(self, texels: Array, starts: Array, directions: Array) -> Array:
         """Return where rays start instead.
@@ -45,6 +59,7 @@ class SmoothLift:
         directions : (r, k, 3) float64
             Unit, toward the lamp.
         """
+        texels = texels if self._texels is None else self._texels[texels]
         rows = np.flatnonzero(self._smooth[self._geometry.triangle[texels]])
         if len(rows) == 0:
             return starts

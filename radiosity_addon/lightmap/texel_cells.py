@@ -17,7 +17,6 @@ import numpy as np
 
 from ..solver.arrays import Array
 from ..solver.footprints import Footprints
-from ..solver.light_gains import LightGains
 from ..solver.local_pass import NOTHING, LocalPass, Resolver
 from ..solver.parallel import chunk_steps
 from ..solver.visibility import Hits, sees
@@ -60,10 +59,11 @@ class TexelCells:
     """
 
     def __init__(self, local: LocalPass, geometry: TexelGeometry, crossings: Crossings) -> None:
-        self._local, self._geometry = local, geometry
+        self.local, self._geometry = local, geometry
         self._rim, divided = crossings.rim, crossings.crossed | crossings.touched
         self.texel = np.flatnonzero(divided).astype(np.int32)
         """(d,) The divided texels."""
+        self._divided = divided
         self._rank = np.cumsum(divided, dtype=np.int32) - 1
         self._anchors = np.empty((len(self.texel), CELLS, 3))
         self._below = np.zeros((len(self.texel), CELLS), dtype=bool)
@@ -86,9 +86,15 @@ class TexelCells:
         """Return (p,) the texel that each cell is of."""
         return np.asarray(self.texel[cell // CELLS])
 
+    def renumbered(self, other: TexelCells) -> Array:
+        """Return (cells,) int32 the numbers that these cells have among another's, or NOTHING."""
+        number = np.where(other._divided[self.texel], other._rank[self.texel], NOTHING)
+        cell = CELLS * number[:, None] + np.arange(CELLS)
+        return np.where(number[:, None] == NOTHING, NOTHING, cell).ravel().astype(np.int32)
+
     def at(self, texel: Array, hits: Hits) -> Array:
         """Return (h,) int32: the nearest cell of its `texel` whose anchor each hit sees, or NOTHING."""
-        geometry, caster = self._geometry, self._local.caster
+        geometry, caster = self._geometry, self.local.caster
         found = np.full(len(texel), NOTHING, dtype=np.int32)
         normal = geometry.surface_normal[texel]
         # On the page a texel may reach beyond its triangle onto one that looks elsewhere.
@@ -114,7 +120,7 @@ class TexelCells:
 
     def footprints(self, cell: Array) -> Footprints:
         """Return cells as footprints: their samples see the anchor."""
-        geometry, caster = self._geometry, self._local.caster
+        geometry, caster = self._geometry, self.local.caster
         texel, first = self.texel_of(cell), _FIRST[cell % CELLS]
         lift, below = self._lift(texel), self._below[cell // CELLS, cell % CELLS]
         anchor = self._anchors[cell // CELLS, cell % CELLS] - lift
@@ -131,32 +137,31 @@ class TexelCells:
 
         return Footprints(anchor, geometry.normal[texel], len(geometry) + cell, sample, starts=STARTS)
 
+    def upright(self, cell: Array) -> Array:
+        """Return (p, 3) the normals of the triangles that cells are on."""
+        return np.asarray(self._geometry.surface_normal[self.texel_of(cell)])
+
     def gather(self, cell: Array, rays: int, resolve: Resolver) -> Generator[float, None, Array]:
         """Gather over cells, (p, rays) sources; yields the fraction done."""
-        at, upright = self.footprints(cell), self._geometry.surface_normal[self.texel_of(cell)]
-        gathered = yield from self._local.gather_steps(at, upright, rays, resolve)
+        gathered = yield from self.local.gather_steps(
+            self.footprints(cell), self.upright(cell), rays, resolve
+        )
         return gathered.sources
 
-    def direct(
-        self, cell: Array, rays: int, gains: LightGains | None = None
-    ) -> Generator[float, None, Array]:
-        """Compute (p, 3) the irradiance of cells' anchors straight from lamps and emissive faces [W/m²].
-
-        `rays` is for each lamp; `gains` as in `LocalPass.direct_steps`.
-        """
+    def lit(self, cell: Array) -> Footprints:
+        """Return cells as footprints that ask for lamps: their anchors alone."""
         texel, geometry = self.texel_of(cell), self._geometry
-        expected = self._local.irradiance_at(geometry.triangle[texel], geometry.barycentric[texel])
+        expected = self.local.irradiance_at(geometry.triangle[texel], geometry.barycentric[texel])
         anchor = self._anchors[cell // CELLS, cell % CELLS] - self._lift(texel)
-        at = Footprints(anchor, geometry.normal[texel], len(geometry) + cell, expected=expected)
-        return self._local.direct_steps(at, rays, gains)
+        return Footprints(anchor, geometry.normal[texel], len(geometry) + cell, expected=expected)
 
     def _below_hood(self, texel: Array, points: Array) -> Array:
         """Return (n, k) whether (n, k, 3) points of texels at a rim are below the hood; False elsewhere."""
         below = np.zeros(points.shape[:2], dtype=bool)
         at_rim = np.flatnonzero(self._rim[texel])
-        below[at_rim] = below_hood(self._geometry, self._local.caster, texel[at_rim], points[at_rim])
+        below[at_rim] = below_hood(self._geometry, self.local.caster, texel[at_rim], points[at_rim])
         return below
 
     def _lift(self, texel: Array) -> Array:
-        offset = LIFT * self._local.caster.surface_offset
+        offset = LIFT * self.local.caster.surface_offset
         return np.asarray(offset * self._geometry.surface_normal[texel])

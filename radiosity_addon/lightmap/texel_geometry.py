@@ -40,6 +40,8 @@ class TexelGeometry:
     uv, page_of_triangle, triangles, face_normals, normals
         Of every scene triangle, as given.
     page, row, column, triangle : (n,) int32
+    share : (n,) float32
+        What part of the texel its triangle covers.
     centre_inside : (n,) bool
         Whether the texel's centre is on its triangle.
     whole : (n,) bool
@@ -67,6 +69,8 @@ class TexelGeometry:
         self.row = np.concatenate([page.row for page in texels])
         self.column = np.concatenate([page.column for page in texels])
         self.centre_inside = np.concatenate([page.centre_inside for page in texels])
+        self.share = np.concatenate([page.area for page in texels])
+        self.whole = self.share >= 1.0
         triangles = [of[page.triangle] for of, page in zip(rows, texels, strict=True)]
         self.triangle = np.concatenate(triangles).astype(np.int32)
         self.surface_normal = scene.face_normals[self.triangle]
@@ -77,7 +81,6 @@ class TexelGeometry:
             numbers[page.row, page.column] = self._first[number] + np.arange(len(page))
             self.index.append(numbers)
         self._inset = _edge_inset(scene)
-        self.whole = np.concatenate([page.area for page in texels]) >= 1.0
         centroid = np.concatenate([page.centroid for page in texels]).astype(np.float64)
         weights = self._drawn_in(centroid[:, None], self.triangle)[:, 0]
         self.barycentric = np.empty((len(weights), 2), dtype=np.float32)
@@ -120,6 +123,17 @@ class TexelGeometry:
         flat = 0.5 * np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
         flat *= np.array([len(numbers) ** 2 for numbers in self.index])[np.maximum(self.page_of_triangle, 0)]
         return np.asarray(self._scene.areas / np.maximum(flat, 1e-300))
+
+    @property
+    def reach(self) -> Array:
+        """(n,) float64: no point of a texel is farther from another one of it [m]."""
+        across, up = self._texel_edges
+        return np.asarray((np.linalg.norm(across, axis=1) + np.linalg.norm(up, axis=1))[self.triangle])
+
+    def on(self, scene: Scene) -> TexelGeometry:
+        """Return the same texels over a scene whose triangles have moved."""
+        rows = [np.flatnonzero(self.page_of_triangle == page) for page in range(len(self.texels))]
+        return TexelGeometry(scene, self.uv, self.page_of_triangle, self.texels, rows)
 
     def first(self, page: int) -> int:
         """Return the number of a page's first texel."""

@@ -9,7 +9,7 @@ elements those are depends on the point alone, so that the two together are unbi
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -49,11 +49,14 @@ class AimedRays:
         What was hit, numbered as the hits of all other rays; NOTHING where something is in the way.
     weights : (a, k) float32
         What each source's radiosity counts for.
+    element : (a, k) int32
+        What each was aimed at.
     """
 
     row: Array
     sources: Array
     weights: Array
+    element: Array = field(default_factory=lambda: np.zeros((0, 1), np.int32))
 
     @staticmethod
     def none() -> AimedRays:
@@ -70,7 +73,17 @@ class AimedRays:
             np.concatenate([part.row + start for part, start in kept]),
             np.concatenate([part.sources for part, _ in kept]),
             np.concatenate([part.weights for part, _ in kept]),
+            np.concatenate([part.element for part, _ in kept]),
         )
+
+    def entries(self, chosen: Array) -> AimedRays:
+        """Return some of the rays' rows, by a mask (a,)."""
+        return AimedRays(self.row[chosen], self.sources[chosen], self.weights[chosen], self.element[chosen])
+
+    def of_points(self, chosen: Array) -> AimedRays:
+        """Return those of the gather points that a mask (g,) has chosen, numbered among these."""
+        mine = self.entries(chosen[self.row])
+        return replace(mine, row=(np.cumsum(chosen) - 1)[mine.row])
 
 
 @dataclass(frozen=True)

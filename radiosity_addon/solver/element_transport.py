@@ -77,6 +77,11 @@ class ElementTransport:
         )
         self._light_links = join_light_links(state.light_links, further)
 
+    @property
+    def state(self) -> HierarchicalState:
+        """What was solved."""
+        return self._state
+
     def irradiance(self, strengths: Array) -> Array:
         """Solve for (s, 3) strengths of the sources: (e, 3) area means over every element [W/m²]."""
         state, hierarchy = self._state, self._state.hierarchy

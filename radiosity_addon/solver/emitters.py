@@ -63,6 +63,16 @@ class EmitterGroup:
         if len(corners) > MANY:
             self._tree = EmitterTree(corners, normals, self._areas * self._level)
 
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """(3,) float64 twice: the lower and upper corner of the box around all faces [m]."""
+        corners = self._corners.reshape(-1, 3)
+        return corners.min(axis=0), corners.max(axis=0)
+
+    def same_as(self, other: EmitterGroup) -> bool:
+        """Whether the other's faces are where these are."""
+        return self._corners.shape == other._corners.shape and bool((self._corners == other._corners).all())
+
     @staticmethod
     def of_faces(faces: Faces, caster: RayCaster, among: Array | None = None) -> list[EmitterGroup]:
         """Group the emissive faces, if given those of a (f,) mask, by colour: visibility cannot mix it up."""

@@ -119,6 +119,15 @@ class SkyPatch(Lamp):
         unit: Float64Array = mean / np.linalg.norm(mean)
         return unit
 
+    @property
+    def half_angle(self) -> float:
+        """How far its farthest corner is from `direction` [rad]."""
+        low, high, left, right = np.asarray(self.bounds).T
+        corners = np.concatenate(
+            [_directions(np.sin(up), azimuth) for up in (low, high) for azimuth in (left, right)]
+        )
+        return float(np.arccos(np.clip(corners @ -self.direction, -1.0, 1.0)).max())
+
     def unit_irradiance(self, points: Float64Array, normals: Float64Array) -> Float64Array:
         """Return the sum over the pixels of share × cosθ (see `Lamp.unit_irradiance`)."""
         toward, share = self._toward().T, np.asarray(self.share)

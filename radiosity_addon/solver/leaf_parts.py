@@ -80,6 +80,17 @@ class LeafParts:
 
         return Footprints(anchor, normal, part, sample, starts=STARTS)
 
+    def radius(self, part: Array) -> Array:
+        """Return (p,) how far parts reach from their anchors at most [m]."""
+        corners = self._corners(part)
+        apart = corners - (ANCHOR @ corners)[:, None]
+        return np.asarray(np.linalg.norm(apart, axis=2).max(axis=1))
+
+    def bounds(self, leaf: Array) -> tuple[Array, Array]:
+        """Return (l, 3) twice: the corners of the boxes around leaves."""
+        corners = self._hierarchy.corners[leaf]
+        return corners.min(axis=1), corners.max(axis=1)
+
     def _cells_at(self, leaf: Array, position: Array, normal: Array) -> Array:
         """Return (h,) the cells of leaves whose anchors lifted points see, or NOTHING."""
         cells = split_in_sixteen(self._hierarchy.corners[leaf])

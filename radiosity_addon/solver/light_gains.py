@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from .arrays import Array
@@ -39,6 +41,30 @@ class LightGains:
             self._of[light] = rows.astype(np.int32), gain[rows].astype(np.float32)
         else:
             self._of[light] = None, gain.astype(np.float32)
+
+    def of(self, light: int) -> Array:
+        """Return (n,) float32: the gain of a light; 0 of one that was not put in."""
+        rows, gain = self._of.get(light, (np.zeros(0, np.int32), np.zeros(0, np.float32)))
+        if rows is None:
+            return gain.copy()
+        everywhere = np.zeros(self._count, dtype=np.float32)
+        everywhere[rows] = gain
+        return everywhere
+
+    def take(self, points: Array) -> LightGains:
+        """Return those of some points, row numbers or a mask."""
+        result = LightGains(len(np.arange(self._count)[points]))
+        for light in self._of:
+            result.put(light, self.of(light)[points])
+        return result
+
+    @staticmethod
+    def joined(parts: Sequence[LightGains]) -> LightGains:
+        """Put the points of several one after the other."""
+        result = LightGains(sum(len(part) for part in parts))
+        for light in sorted({light for part in parts for light in part._of}):
+            result.put(light, np.concatenate([part.of(light) for part in parts]))
+        return result
 
     def irradiance(self, strengths: Array) -> Array:
         """Return (n, 3) float64 what arrives [W/m²] from lights of (k, 3) strengths, visibility included."""

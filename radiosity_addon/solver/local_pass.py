@@ -9,7 +9,7 @@ whose hits are looked up in the solution.
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -25,18 +25,29 @@ from .leaf_parts import LeafParts
 from .light_gains import LightGains
 from .light_sources import LightSources
 from .lights import Lamp
+from .retracing import Before, Retracing
 from .shadow_share import ShadowShare
 from .steps import drain, scaled
 from .textured_emitters import emitter_groups
 from .visibility import Hits
 
 if TYPE_CHECKING:
+    from .hierarchy import Hierarchy
     from .state import SolverState
 
 __all__ = ["NOTHING", "SKY", "Footprints", "Gathered", "LocalPass", "Resolver", "Sampler", "values_of"]
 
 NEAR = 0.05
 """Form factor beyond which emissive faces are so near that it may change over a texel."""
+
+
+@dataclass(frozen=True)
+class AskedLight:
+    """A lamp or emissive group, its number among `LightGains`, and what places its shadow rays."""
+
+    light: Lamp | EmitterGroup
+    number: int
+    seed: int
 
 
 class LocalPass:
@@ -63,6 +74,10 @@ class LocalPass:
             else sources.groups
         )
 
+    def with_irradiance(self, irradiance: Array) -> LocalPass:
+        """Return the same with other light at the elements, (e, 3) [W/m²]."""
+        return LocalPass(replace(self._state, irradiance=irradiance), self.sources)
+
     def direct(
         self,
         points: Array,
@@ -76,7 +91,12 @@ class LocalPass:
         return drain(self.direct_steps(Footprints(points, normals, keys, sampler, near), rays))
 
     def direct_steps(
-        self, at: Footprints, rays: int | None = None, gains: LightGains | None = None
+        self,
+        at: Footprints,
+        rays: int | None = None,
+        gains: LightGains | None = None,
+        total: Array | None = None,
+        tell: Callable[[], None] | None = None,
     ) -> Generator[float, None, Array]:
         """Compute the irradiance straight from lamps and emissive surfaces, the sky's apart.
 
@@ -89,6 +109,10 @@ class LocalPass:
             If given, takes what every light adds: lamps by their number among the scene's lights, those
             without strength too, then emissive groups. Each is asked as if it were the only one, which
             it may become.
+        total : (n, 3) float64 or None
+            If given, all 0, the result grows in it, one light after the other, …
+        tell : callable or None
+            … and this is called after each.
 
         Yields
         ------
@@ -98,35 +122,56 @@ class LocalPass:
         -------
         irradiance : (n, 3) float64 [W/m²]
         """
-        total = np.zeros((len(at), 3))
-        shadow_rays = rays or self._state.settings.shadow_rays
-        numbered = [
-            (number, lit)
-            for number, lit in enumerate(self._state.scene.lights)
-            if isinstance(lit, Lamp) and (gains is not None or lit.strength.any())
-        ]
-        seeds = [self._seed + 31 + 7 * number for number in range(len(numbered))]
-        seeds += [self._seed + 17 + 7 * number for number in range(len(self.emitters))]
-        count = len(seeds)
-        lights: list[Lamp | EmitterGroup] = [*(lamp for _, lamp in numbered), *self.emitters]
-        numbers = [number for number, _ in numbered]
-        numbers += [len(self._state.scene.lights) + number for number in range(len(self.emitters))]
+        total = np.zeros((len(at), 3)) if total is None else total
+        lights = self.lights(dark=gains is not None)
         if gains is not None:
             at = replace(at, expected=None)
         spread = SpreadPoints(at, self._seed + 2, self.threads)
-        for done, (light, seed) in enumerate(zip(lights, seeds, strict=True)):
-            begin, end = done / count, (done + 1) / count
-            glows = isinstance(light, EmitterGroup)
-            caster = self.caster if glows else self.caster.for_lamps
-            asked = spread.gain_steps(light, NEAR if glows else 0.0)
-            gain = yield from scaled(asked, begin, begin + 0.1 / count)
-            share = ShadowShare(caster, light, spread, seed, self.threads).steps(gain, shadow_rays)
-            unblocked = yield from scaled(share, begin + 0.1 / count, end)
-            arriving = gain * unblocked
-            total += arriving[:, None] * light.strength
+        for done, asked in enumerate(lights):
+            steps = self._arriving(asked, spread, rays)
+            arriving = yield from scaled(steps, done / len(lights), (done + 1) / len(lights))
+            total += arriving[:, None] * asked.light.strength
             if gains is not None:
-                gains.put(numbers[done], arriving)
+                gains.put(asked.number, arriving)
+            if tell is not None:
+                tell()
         return total
+
+    def lights(self, dark: bool = True) -> list[AskedLight]:
+        """Return the lamps, if they are `dark` as well, and the emissive groups that shine on points."""
+        lamps = [
+            (number, lit)
+            for number, lit in enumerate(self._state.scene.lights)
+            if isinstance(lit, Lamp) and (dark or lit.strength.any())
+        ]
+        first, seed = len(self._state.scene.lights), self._seed
+        asked = [AskedLight(lit, row, seed + 31 + 7 * place) for place, (row, lit) in enumerate(lamps)]
+        groups = enumerate(self.emitters)
+        return asked + [AskedLight(lit, first + place, seed + 17 + 7 * place) for place, lit in groups]
+
+    def gain_steps(
+        self, asked: AskedLight, at: Footprints, rays: int | None = None
+    ) -> Generator[float, None, Array]:
+        """Compute (n,) what one light adds per unit of its strength, as if it were the only one."""
+        spread = SpreadPoints(replace(at, expected=None), self._seed + 2, self.threads)
+        return (yield from self._arriving(asked, spread, rays))
+
+    def _arriving(
+        self, asked: AskedLight, spread: SpreadPoints, rays: int | None
+    ) -> Generator[float, None, Array]:
+        """Compute (n,) unoccluded irradiance per unit of a light's strength times visibility."""
+        light, shadow_rays = asked.light, rays or self._state.settings.shadow_rays
+        glows = isinstance(light, EmitterGroup)
+        caster = self.caster if glows else self.caster.for_lamps
+        gain = yield from scaled(spread.gain_steps(light, NEAR if glows else 0.0), 0.0, 0.1)
+        share = ShadowShare(caster, light, spread, asked.seed, self.threads).steps(gain, shadow_rays)
+        unblocked = yield from scaled(share, 0.1, 1.0)
+        return np.asarray(gain * unblocked)
+
+    def lit_by(self, gains: LightGains) -> Array:
+        """Return (n, 3) what arrives [W/m²] by gains, of the strengths that the sources have."""
+        assert self.sources is not None  # else there are no gains
+        return gains.irradiance(self.sources.of_lamps(self.sources.strengths))
 
     def new_gains(self, count: int) -> LightGains | None:
         """Return where `count` points keep each light apart; None if lights cannot be asked for apart."""
@@ -176,24 +221,43 @@ class LocalPass:
         irradiance : (n,) float64 or None [W/m²]
             What is about expected. None aims at nothing.
         """
-        gathering = Gathering(
-            self.caster,
-            at,
-            surface_normals,
-            rays,
-            resolve,
-            self.leaves_of,
-            self._seed,
-            self.threads,
-            self._sky,
-        )
+        gathering = self._gathering(at, surface_normals, rays, resolve)
         if irradiance is None:
             return (yield from gathering.steps(None, np.zeros(len(at))))
         return (yield from gathering.steps(self._bright, irradiance))
 
+    def regather_steps(
+        self,
+        at: Footprints,
+        surface_normals: Array,
+        resolve: Resolver,
+        before: Before,
+        irradiance: Array | None = None,
+    ) -> Generator[float, None, Gathered]:
+        """Trace those rays again that something which moved touches; the others stay as they were.
+
+        Parameters are those of `gather_steps`; `before` is what the same rays met.
+        """
+        rays = before.gathered.sources.shape[1]
+        retracing = Retracing(self._gathering(at, surface_normals, rays, resolve), before)
+        if irradiance is None:
+            return (yield from retracing.steps(None, np.zeros(len(at))))
+        return (yield from retracing.steps(self._bright, irradiance))
+
+    def _gathering(self, at: Footprints, surface_normals: Array, rays: int, resolve: Resolver) -> Gathering:
+        chance = self._seed, self.threads
+        return Gathering(self.caster, at, surface_normals, rays, resolve, self.leaves_of, *chance, self._sky)
+
     @cached_property
     def _bright(self) -> BrightElements:
         return BrightElements(self._state.hierarchy, self.reflected(), self._unshadowed)
+
+    @property
+    def bright(self) -> Array:
+        """(e,) bool: the elements that rays are aimed at."""
+        found = np.zeros(self.hierarchy.n_elements, dtype=bool)
+        found[self._bright.element] = True
+        return found
 
     def _unshadowed(self, points: Array, normals: Array) -> Array:
         """Return (n,) the irradiance straight from lamps were nothing in the way, a mean of the channels."""
@@ -227,12 +291,27 @@ class LocalPass:
         arriving = self._state.irradiance if irradiance is None else irradiance
         return np.asarray(self._reflectance_where_hit(every) * arriving)
 
+    @property
+    def irradiance(self) -> Array:
+        """(e, 3) float64: the elements' irradiance [W/m²]."""
+        return self._state.irradiance
+
     def irradiance_at(self, triangle: Array, barycentric: Array) -> Array:
         """Return (n,) the elements' irradiance at points of triangles' fronts, a mean of the channels [W/m²].
 
         `barycentric` (n, 2) are weights of corners 2 and 3.
         """
         return values_of(self._state.irradiance.mean(axis=1), self.leaf_at_fronts(triangle, barycentric))
+
+    @property
+    def state(self) -> SolverState:
+        """What was solved."""
+        return self._state
+
+    @property
+    def hierarchy(self) -> Hierarchy:
+        """The elements that hits are numbered by."""
+        return self._state.hierarchy
 
     def leaf_at_fronts(self, triangle: Array, barycentric: Array) -> Array:
         """Return (n,) int32 the leaf elements at such points, or NOTHING where there is none."""
@@ -266,12 +345,10 @@ class LocalPass:
         hierarchy = self._state.hierarchy
         return np.asarray(hierarchy.reflectance[elements] / hierarchy.opacity_where_hit[elements, None])
 
-    def part_direct(
-        self, parts: Array, rays: int, gains: LightGains | None = None
-    ) -> Generator[float, None, Array]:
-        """Compute (p, 3) the irradiance of parts straight from lamps and emissive faces, by `rays` each."""
+    def lit_parts(self, parts: Array) -> Footprints:
+        """Return parts as footprints that ask for lamps, and what elements lead them to expect."""
         expected = self._state.irradiance[self.parts.leaf_of(parts)].mean(axis=1)
-        return self.direct_steps(replace(self.parts.footprints(parts), expected=expected), rays, gains)
+        return replace(self.parts.footprints(parts), expected=expected)
 
     def beyond(self, sky: SkyTable | None = None) -> Array:
         """Return (cells + 2, 3) the last rows of a table of radiosity [W/m²]: the sky's cells, and two dark.

@@ -114,3 +114,16 @@ def reflected_radiance(brdf: Value | float, irradiance: Value) -> Value:
     """Return L_r = f H [W/m²/sr] that a matte surface reflects (handout (2.10))."""
     radiance: Value = brdf * irradiance
     return radiance
+
+
+LUMINANCE = (0.2126, 0.7152, 0.0722)
+"""How bright the channels of linear Rec. 709 look (ITU-R BT.709)."""
+
+
+def luminous(radiant: npt.NDArray[Any], efficacy: float) -> npt.NDArray[Any]:
+    """Return K (0.2126 R + 0.7152 G + 0.0722 B): lux of irradiance (…, 3) [W/m²], lumens of watts.
+
+    K is the lumens that a watt of white makes: 683 (`settings.EFFICACY`), as for glTF's lamps, or what the
+    lamps have (a filament some 15, LEDs some 100, daylight some 110) where powers are those of all light.
+    """
+    return efficacy * (radiant @ LUMINANCE)

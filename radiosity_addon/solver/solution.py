@@ -10,6 +10,7 @@ import numpy as np
 
 from .arrays import Array
 from .element_transport import Relightable
+from .link_record import LinkRecord, record_links
 from .local_pass import LocalPass
 from .power import power_balance
 from .residual import Residual
@@ -94,6 +95,10 @@ class Solution:
             If the method keeps no links.
         """
         return Relightable.of(self._state, emitter)
+
+    def link_record(self) -> LinkRecord:
+        """Return the elements and links, kept small."""
+        return record_links(self._state)
 
     @property
     def element_residual(self) -> Residual:

@@ -86,6 +86,13 @@ class SurfaceImages:
     def __len__(self) -> int:
         return len(self.textured)
 
+    def same_as(self, other: SurfaceImages) -> bool:
+        """Whether another image shows the same on the same triangles."""
+        return all(
+            np.array_equal(getattr(self, name), getattr(other, name))
+            for name in ("textured", "image_uv", "values")
+        )
+
     @cached_property
     def cut_out(self) -> Array:
         """(t,) bool: triangles that anything may be seen through."""

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
+import shutil
 import signal
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import bpy
 import pytest
 
-from .conftest import QUICK, add_lamp, add_quad, digest, read_report, save, start
+from .conftest import QUICK, ROOT, add_lamp, add_quad, build_room, digest, read_report, save, start
 
 Run = Callable[..., object]
 
@@ -159,7 +163,7 @@ def test_ctrl_c_leaves_the_previous_result_whole(stage: str, room: Path, tmp_pat
     before = digest(out)
     job = start("bake", room, "--output", out, "--resolution", "256", cwd=tmp_path)
     for line in job.stdout:
-        if line.rstrip().endswith(stage):
+        if f"] {stage}" in line:
             os.killpg(job.pid, signal.SIGINT)
             break
     _, err = job.communicate(timeout=300)
@@ -167,3 +171,75 @@ def test_ctrl_c_leaves_the_previous_result_whole(stage: str, room: Path, tmp_pat
     assert err.splitlines()[-1] == "error: interrupted; nothing was written"
     assert "Traceback" not in err
     assert digest(out) == before
+
+
+KILLED_WHILE_PUBLISHING = """
+import os, sys
+from pathlib import Path
+
+replace, count = Path.replace, 0
+
+def replacing(source, goal):
+    global count
+    if goal.parent == Path(sys.argv[1]) and not goal.name.startswith("."):
+        count += 1
+        if count == 3:
+            os.kill(os.getpid(), 9)
+    return replace(source, goal)
+
+Path.replace = replacing
+from radiosity_addon.cli import main
+main(sys.argv[2:])
+"""
+
+
+@pytest.fixture(scope="module")
+def baked_before(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A scene, and the folder of a good bake of it: to be copied."""
+    folder = tmp_path_factory.mktemp("before")
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    build_room()
+    room = save(folder / "room.blend")
+    job = start("bake", room, "--output", folder / "out", *QUICK, "--quiet", cwd=folder)
+    assert job.wait(timeout=300) == 0
+    return room, folder / "out"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals are sent the POSIX way")
+@pytest.mark.parametrize("moment", ["light", "preview", "publish"])
+def test_a_killed_bake_leaves_the_previous_result_whole(
+    moment: str, baked_before: tuple[Path, Path], run: Run, tmp_path: Path
+) -> None:
+    room, good = baked_before
+    out = tmp_path / "out"
+    shutil.copytree(good, out)
+    before = digest(out)
+    words = ("bake", room, "--output", out, "--resolution", "64", "--quality", "draft", "--seed", "5")
+    if moment == "publish":
+        script = [sys.executable, "-c", KILLED_WHILE_PUBLISHING, str(out), *map(str, words)]
+        job = subprocess.run(script, cwd=ROOT, capture_output=True, timeout=300, check=False)
+    else:
+        job = start(*words, cwd=tmp_path)
+        for line in job.stdout:
+            if f"] {moment}" in line:
+                os.killpg(job.pid, signal.SIGKILL)
+                break
+        job.communicate(timeout=300)
+    assert job.returncode == -signal.SIGKILL
+    assert [path.name[:11] for path in out.iterdir() if path.is_dir()] == [".radiosity-"]
+    if moment != "publish":
+        files = {name: found for name, found in digest_files(out).items() if not name.startswith(".")}
+        assert files == before
+    # A bake that comes to nothing cleans up all the same.
+    assert run("bake", tmp_path / "nowhere.blend", "--output", out).code == 1
+    assert run("bake", room, "--output", out, "--objects", "Nobody").code == 2
+    assert digest(out) == before
+
+
+def digest_files(folder: Path) -> dict[str, str]:
+    """What the files of a folder hold; folders are left out."""
+    return {
+        path.name: hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in folder.iterdir()
+        if path.is_file()
+    }

@@ -10,7 +10,7 @@ from radiosity_addon.lightmap import accuracy
 from radiosity_addon.lightmap.interpolate import Interpolation
 from radiosity_addon.lightmap.reconstruct import GatherSettings
 from radiosity_addon.lightmap.stored_links import StoredLinks
-from radiosity_addon.lightmap.sweeps import TexelLight, estimated_error
+from radiosity_addon.lightmap.sweeps import TexelLight, estimated_noise, relative_error
 from radiosity_addon.quality import LADDER, for_error
 from radiosity_addon.settings import BakeSettings
 
@@ -20,6 +20,10 @@ def links_of(sources: np.ndarray) -> StoredLinks:
     count = len(sources)
     own = np.arange(count)
     return StoredLinks(sources.astype(np.int32), Interpolation(own, own, np.ones(count)))
+
+
+def estimated_error(links: StoredLinks, table: np.ndarray, irradiance: np.ndarray) -> float:
+    return relative_error(estimated_noise(links, table), irradiance)
 
 
 @pytest.mark.parametrize("rays", [16, 64, 256])
@@ -68,7 +72,7 @@ def test_it_looks_harder_until_the_error_is_reached(monkeypatch: pytest.MonkeyPa
     """Errors that fall like rays^-1/2, but are three times those of the table."""
     asked = []
 
-    def light(_scene, _local, _geometry, settings):  # type: ignore[no-untyped-def]
+    def light(_scene, _local, _geometry, settings, _so_far):  # type: ignore[no-untyped-def]
         asked.append(settings.rays)
         yield 0.5
         return TexelLight(np.ones((1, 3)), np.ones((1, 3)), 0.48 / settings.rays**0.5)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 from collections.abc import Generator
 
 import pytest
 
-from radiosity_addon.background import in_thread
+from radiosity_addon.background import TURN, in_thread
 
 
 def finish(steps: Generator) -> tuple[list, object]:
@@ -89,3 +90,20 @@ def test_closing_in_a_step_returns_at_once_and_closes_the_work_after_it() -> Non
     go_on.set()
     assert closed.wait(60)
     assert goes_on == []
+
+
+def test_turns_are_short_while_it_runs_and_as_before_afterwards() -> None:
+    """A window that is drawn asks for Python's lock dozens of times; each takes a turn at most."""
+    before, during = sys.getswitchinterval(), []
+
+    def work() -> Generator[int, None, None]:
+        during.append(sys.getswitchinterval())
+        yield 1
+
+    finish(in_thread(work()))
+    assert during == [pytest.approx(TURN)]
+    assert sys.getswitchinterval() == before
+    steps = in_thread(work())
+    next(steps)
+    steps.close()
+    assert sys.getswitchinterval() == before

@@ -61,6 +61,23 @@ def test_defaults_are_those_of_the_settings(verbs: list[tuple]) -> None:
     )
 
 
+def test_light_groups_arrive_those_of_the_file_and_those_that_are_named(verbs: list[tuple]) -> None:
+    line = ["bake", "s.blend", "--output", "o", "--light-groups", "--light-group", "Day=Sun, World"]
+    assert cli.main([*line, "--light-group", "Küche=Lamp.001"]) == 0
+    settings = verbs[0][4]
+    assert settings.light_groups
+    assert settings.groups == (("Day", ("Sun", "World")), ("Küche", ("Lamp.001",)))
+
+
+@pytest.mark.parametrize("text", ["Day", "Day=", "=Sun", "Day= ,"])
+def test_a_light_group_needs_a_name_and_members(
+    text: str, verbs: list[tuple], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["bake", "s.blend", "--output", "o", "--light-group", text]) == 2
+    assert f"--light-group {text}: give a name and what is in it" in capsys.readouterr().err
+    assert not verbs
+
+
 def test_every_option_arrives(verbs: list[tuple]) -> None:
     line = (
         "bake s.glb --output o --texel-density 12.5 --atlas per-object --quality high --quantity radiosity "
@@ -69,9 +86,9 @@ def test_every_option_arrives(verbs: list[tuple]) -> None:
         "--memory-limit 0.5"
     )
     assert cli.main(line.split()) == 0
-    (_, scene, _, output, settings, report, plot, console, _) = verbs[0]
+    (_, scene, _, output, settings, report, plot, keep, console, _) = verbs[0]
     assert (scene, output, console.quiet) == (Path("s.glb"), Path("o"), True)
-    assert (report, plot) == (Path("r.json"), Path("p.PNG"))
+    assert (report, plot, keep) == (Path("r.json"), Path("p.PNG"), False)
     assert settings == BakeSettings(
         texel_density=12.5,
         atlas="per-object",
@@ -90,6 +107,20 @@ def test_every_option_arrives(verbs: list[tuple]) -> None:
         contrast=0.25,
         memory_limit=0.5,
     )
+
+
+def test_a_bake_is_kept_if_it_can_be(verbs: list[tuple], capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["bake", "--keep"]) == 0
+    assert verbs[0][-3] is True
+    for line, message in (
+        ("--keep --method shooting", "needs the hierarchical method"),
+        ("--keep --quantity residual", "a residual is of all light together"),
+        ("--keep --relight", "not allowed with"),
+        ("--relight --plot p.png", "solves nothing"),
+    ):
+        assert cli.main(["bake", *line.split()]) == 2
+        assert message in capsys.readouterr().err
+    assert len(verbs) == 1
 
 
 @pytest.mark.parametrize(

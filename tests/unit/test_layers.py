@@ -16,6 +16,16 @@ LAYER_OF = {
     "quality": "pipeline",
     "relighting": "pipeline",
     "light_groups": "pipeline",
+    "rebaking": "pipeline",
+    "remarks": "pipeline",
+    "relight_check": "pipeline",
+    "fingerprint": "pipeline",
+    "sidecar": "pipeline",
+    "keeping": "pipeline",
+    "responses": "pipeline",
+    "bake_details": "pipeline",
+    "texel_pictures": "pipeline",
+    "foresight": "pipeline",
 }
 FRONT_DOORS = ("", "__main__", "cli", "console", "interrupts")
 
@@ -30,7 +40,8 @@ HOMES = {
     "mathutils": "blender",
     "bpy_extras": "blender",
     "gpu": "blender",
-    "xatlas": "lightmap.growers",
+    "blf": "blender",
+    "xatlas": "lightmap.chart_process",
     "embreex": "solver.embree",
 }
 
@@ -148,7 +159,7 @@ def test_the_rule_sees_a_wrong_import(module: str, source: str) -> None:
     [
         ("blender.export", "import bpy\nfrom ..solver import scene\nfrom ..pipeline import bake"),
         (
-            "lightmap.growers",
+            "lightmap.chart_process",
             "import xatlas\nfrom ..solver.scene import Scene\nfrom ..errors import BakeError",
         ),
         ("solver.embree", "from embreex import rtcore_scene\nimport numpy as np"),

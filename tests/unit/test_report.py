@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from radiosity_addon.bake_scene import BakeResult, BakeWarning, LightmapPage
+from radiosity_addon.bake_scene import BakeResult, BakeWarning, LightGroup, LightmapPage
 from radiosity_addon.errors import BakeError
 from radiosity_addon.report import MAX_HISTORY, BakeReport, LightmapFile, solver_part, thinned
 from tests.unit.texel_scenes import bake_object
@@ -117,3 +117,15 @@ def test_the_solver_part_tells_method_settings_and_whose_the_blocks_are() -> Non
             {"objects": ["Left", "Right"], "elements": 3, "area_m2": 1.0},
         ],
     }
+
+
+def test_light_groups_are_told_with_their_sources_and_files() -> None:
+    pages = (LightmapPage(np.zeros((4, 8, 3), np.float32), np.ones((4, 8), bool)),)
+    groups = (LightGroup("Day", pages, ("Sun", "World")), LightGroup("Night", pages, ("Lamp",)))
+    result = BakeResult(pages, (), SOLVER, (), groups=groups)
+    files = [[LightmapFile("lightmap_Day.png", 2.5)], [LightmapFile("lightmap_Night.exr")]]
+    told = BakeReport.of(result, [LightmapFile("lightmap.exr")], {}, files).as_dict()
+    assert told["light_groups"] == [
+        {"group": "Day", "sources": ["Sun", "World"], "pages": [{"image": "lightmap_Day.png", "scale": 2.5}]},
+        {"group": "Night", "sources": ["Lamp"], "pages": [{"image": "lightmap_Night.exr"}]},
+    ]

@@ -95,7 +95,7 @@ def test_light_on_one_side_does_not_reach_the_other() -> None:
     """The lamp stands left of the wall: cells on the right get none of it, and their rays see no lit cell."""
     cells, _ = cells_of(wall(5.4), rectangle((0, -1, 2), (0, 3, 0), (1, 0, 0)))
     every = np.arange(len(cells))
-    direct = drain(cells.direct(every, 4))
+    direct = drain(cells.local.direct_steps(cells.lit(every), 4))
     right = cells.footprints(every).points[:, 0] * SIZE > 5.4
     assert not direct[right].any()
     assert (direct[~right] > 0).all()

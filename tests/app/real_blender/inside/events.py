@@ -84,9 +84,13 @@ def until(happened, seconds):
     return asked, longest
 
 
-def screenshot(path):
-    """Picture of the whole screen; Blender's own operator knows only what was drawn already."""
-    subprocess.run(["import", "-window", "root", str(path)], check=True)
+def screenshot(path, part=None):
+    """Picture of the whole screen, or a part of it: x, y from the top left, width and height.
+
+    Blender's own operator knows only what was drawn already.
+    """
+    crop = ["-crop", "{2}x{3}+{0}+{1}".format(*part), "+repage"] if part else []
+    subprocess.run(["import", "-window", "root", *crop, str(path)], check=True)
 
 
 def drive(script, finished):

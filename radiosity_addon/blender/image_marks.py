@@ -1,0 +1,15 @@
+"""Custom properties by which a lightmap's image tells what it is: light to import, for panels."""
+
+from __future__ import annotations
+
+SCALE_PROPERTY = "radiosity_lightmap_scale"
+"""Multiply a texel by it to get the quantity."""
+
+QUANTITY_PROPERTY = "radiosity_lightmap_quantity"
+"""The quantity that it holds."""
+
+PAGE, GROUP = "radiosity_page", "radiosity_group_shown"
+"""Its page's number, and the light group it shows, "" for all light."""
+
+MARK = "radiosity_mark"
+"""The mark of its bake, if that was kept."""

@@ -1,0 +1,122 @@
+"""Which light group each lamp, emissive surface and world of a scene is in.
+
+A name on what stands in the scene and can be selected wins, that is on the instance before what it shows;
+then one on the object, then one on the material that emits, then one on the innermost collection around the
+object, then one on the innermost collection around the instance. What is dark may be in a group too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import bpy
+
+NAME = "radiosity_light_group"
+"""The property of objects, materials, worlds and collections that names their light group."""
+
+
+def name_on(owner: bpy.types.ID | None) -> str:
+    """Return the group named on an object, a material, a world or a collection; "" where none is."""
+    return str(getattr(owner, NAME, "")).strip()
+
+
+@dataclass(frozen=True)
+class PlaceGroups:
+    """The names that hold for all that one object, or one instance of it, shows.
+
+    Parameters
+    ----------
+    own, around : str
+        On the object or instance itself, and on the collections around it; "" where none is.
+    """
+
+    own: str = ""
+    around: str = ""
+
+    @property
+    def of_lamp(self) -> str:
+        """The group of a lamp there."""
+        return self.own or self.around
+
+    def of_material(self, material: bpy.types.Material | None) -> str:
+        """Return the group of what emits there by a material."""
+        return self.own or name_on(material) or self.around
+
+
+class Membership:
+    """The names on a scene's collections, read once."""
+
+    def __init__(self, scene: bpy.types.Scene) -> None:
+        self._around: dict[bpy.types.Object, str] = {}
+        collections = _collections_of(scene)
+        if any(map(name_on, collections)):
+            self._around = _innermost(collections)
+
+    def at(self, shown: bpy.types.Object, owner: bpy.types.Object) -> PlaceGroups:
+        """Return the names at one place.
+
+        Parameters
+        ----------
+        shown, owner : bpy.types.Object
+            The originals: of an instance, the object it shows and the one that makes it; else twice the
+            same.
+        """
+        around = self._around.get(shown, "") or self._around.get(owner, "")
+        return PlaceGroups(name_on(owner) or name_on(shown), around)
+
+
+def _collections_of(scene: bpy.types.Scene) -> list[bpy.types.Collection]:
+    """Return the scene's collections, outermost first, and those of no scene, which may be instanced."""
+    inside = [scene.collection, *scene.collection.children_recursive]
+    elsewhere = {each for other in bpy.data.scenes for each in other.collection.children_recursive}
+    return [*inside, *(each for each in bpy.data.collections if each not in elsewhere)]
+
+
+def _innermost(collections: list[bpy.types.Collection]) -> dict[bpy.types.Object, str]:
+    """Return for each object the name on the nearest collection around it; of several the first one's."""
+    parents: dict[bpy.types.Collection, list[bpy.types.Collection]] = {each: [] for each in collections}
+    for each in collections:
+        for child in each.children:
+            parents.setdefault(child, []).append(each)
+    nearest = {each: _nearest(each, parents) for each in collections}
+    found: dict[bpy.types.Object, tuple[int, str]] = {}
+    for each in collections:
+        distance, name = nearest[each]
+        for obj in each.objects:
+            if name and (obj not in found or distance < found[obj][0]):
+                found[obj] = distance, name
+    return {obj: name for obj, (_, name) in found.items()}
+
+
+def _nearest(
+    collection: bpy.types.Collection, parents: dict[bpy.types.Collection, list[bpy.types.Collection]]
+) -> tuple[int, str]:
+    """Return how many collections further out the first name is, and the name; "" where none is."""
+    level, seen, distance = [collection], {collection}, 0
+    while level:
+        name = next(filter(None, map(name_on, level)), "")
+        if name:
+            return distance, name
+        level = [outer for each in level for outer in parents.get(each, ()) if outer not in seen]
+        seen.update(level)
+        distance += 1
+    return distance, ""
+
+
+def lamps_by_group(scene: bpy.types.Scene) -> dict[str, list[bpy.types.Object]]:
+    """Return the lamps of each group, by its name; lamps that only instances show are not among them."""
+    membership = Membership(scene)
+    found: dict[str, list[bpy.types.Object]] = {}
+    for obj in scene.objects:
+        if obj.type == "LIGHT":
+            found.setdefault(membership.at(obj, obj).of_lamp, []).append(obj)
+    return found
+
+
+def named(owners: Iterable[bpy.types.ID]) -> Iterator[tuple[str, bpy.types.ID]]:
+    """Yield those owners on which a group is named, each after its group."""
+    for owner in owners:
+        name = name_on(owner)
+        if name:
+            yield name, owner

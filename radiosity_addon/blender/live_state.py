@@ -1,0 +1,48 @@
+"""Whether Live is on, and what it has to say: light to import, for panels and operators."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+
+
+@dataclass
+class State:
+    """Of this session.
+
+    Attributes
+    ----------
+    live : LiveRelight or None
+        What follows the lights now.
+    message : str
+        Why it is off, if not because somebody switched it off.
+    """
+
+    live: Any = None
+    message: str = ""
+
+
+state = State()
+
+
+def start(scene: bpy.types.Scene) -> None:
+    """Follow the lights of a scene from now on."""
+    from .live_relight import LiveRelight
+
+    stop()
+    state.message = ""
+    state.live = LiveRelight(scene)
+
+
+def stop(message: str = "") -> None:
+    """Follow no lights any more; harmless where none are."""
+    live, state.live = state.live, None
+    if live is None:
+        return
+    state.message = message
+    live.close()
+    manager = bpy.context.window_manager
+    if manager is not None and getattr(manager, "radiosity_live", False):
+        manager.radiosity_live = False

@@ -1,0 +1,170 @@
+"""*Changed*: which objects differ from those of the last bake, and so get new lightmaps; others keep theirs.
+
+An object has changed if its triangles, their shading normals, its reflectance or opacity, its texel scale
+or its part in the light have. Where lamps, emission, the world or the settings have changed, everything is
+lit anew. What is kept is kept as it is: the shadows and bounces that changed objects throw on others are
+not renewed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ..bake_scene import BakeObject, BakeResult, BakeScene, BakeWarning
+from ..errors import NothingToDoError
+from ..settings import BakeSettings
+from .bake_record import is_made
+from .export_sources import Export
+
+STEP = 1.0 / 256.0
+"""How far a texture's reflectance has to change to be seen: it is stored in other places every time."""
+
+_POINTS = np.array([[1, 1], [4, 1], [1, 4], [2, 2]]) / 6.0
+"""Where a textured triangle is looked at, beside its mean."""
+
+_OF_NO_CONSEQUENCE = frozenset({"objects", "threads", "memory_limit", "unwrap_seconds"})
+"""Settings that change no texel of what is kept."""
+
+
+@dataclass(frozen=True)
+class Kept:
+    """What keeps its lightmap: names of objects, and the files of their images, in lower case."""
+
+    objects: frozenset[str] = frozenset()
+    files: frozenset[str] = frozenset()
+
+    def warnings(self) -> tuple[BakeWarning, ...]:
+        """Say what was not renewed."""
+        if not self.objects:
+            return ()
+        message = (
+            f"{len(self.objects)} unchanged objects kept their lightmaps: light and shadow that the changed "
+            "ones throw on them are as before; bake all to renew them"
+        )
+        return (BakeWarning("scene", message),)
+
+
+def narrow(
+    scene: bpy.types.Scene, export: Export, settings: BakeSettings
+) -> tuple[Export, BakeSettings, Kept]:
+    """Leave lightmaps to what has changed since the last bake; to all where the light has.
+
+    Raises
+    ------
+    NothingToDoError
+        If nothing has.
+    """
+    everything = export, settings, Kept()
+    bake_scene = export.bake_scene
+    pairs = [
+        (source, target)
+        for source, target in zip(export.sources, bake_scene.objects, strict=True)
+        if target.bake
+    ]
+    if any(source.is_instance or source.makes_instances for source, _ in pairs):
+        return everything
+    kept, densities = set(), []
+    for source, target in pairs:
+        obj = bpy.data.objects.get((source.object_name, None))
+        if obj is None or not obj.is_property_set("radiosity_bake"):
+            continue
+        record = obj.radiosity_bake
+        shows = record.is_baked and isinstance(obj.data, bpy.types.Mesh) and is_made(obj.data)
+        if shows and record.fingerprint == fingerprint(bake_scene, target):
+            kept.add(target.name)
+            densities.append(record.texels_per_metre)
+    if not kept or scene.radiosity.baked_light != light_fingerprint(bake_scene, settings):
+        return everything
+    files = {name: _files(name) for name in kept}
+    if any(len(of) > 1 for of in files.values()):
+        return everything  # light groups, whose lightmaps are made together
+    if len(kept) == len(pairs):
+        raise NothingToDoError("nothing has changed since the last bake: there is nothing to do")
+    narrowed = tuple(replace(item, bake=item.bake and item.name not in kept) for item in bake_scene.objects)
+    if settings.atlas == "shared" and settings.texel_density is None:
+        # As sharp as what is kept, on a page of their own.
+        settings = replace(settings, texel_density=float(np.median(densities)), pages=1)
+    narrow_scene = replace(bake_scene, objects=narrowed)
+    taken = frozenset().union(*files.values())
+    return replace(export, bake_scene=narrow_scene), settings, Kept(frozenset(kept), taken)
+
+
+def remember(scene: bpy.types.Scene, export: Export, result: BakeResult, settings: BakeSettings) -> None:
+    """Note on every object what it was baked as."""
+    sources = {
+        target.name: source for source, target in zip(export.sources, export.bake_scene.objects, strict=True)
+    }
+    for baked in result.objects:
+        source = sources[baked.object.name]
+        obj = bpy.data.objects.get((source.object_name, None))
+        if obj is None or source.is_instance or not obj.is_property_set("radiosity_bake"):
+            continue
+        obj.radiosity_bake.fingerprint = fingerprint(export.bake_scene, baked.object)
+        told = result.atlas[baked.page] if result.atlas else {}
+        obj.radiosity_bake.texels_per_metre = told.get("texels_per_metre", 0.0)
+    scene.radiosity.baked_light = light_fingerprint(export.bake_scene, settings)
+
+
+def fingerprint(bake_scene: BakeScene, item: BakeObject) -> str:
+    """Return a digest of an object's shape, of how it reflects, and of its texel scale."""
+    scene, rows = bake_scene.scene, item.rows
+    digest = hashlib.sha256(f"{item.texel_scale:.6g}".encode())
+    flags = (scene.in_bounces[rows], scene.in_shadows[rows])
+    shape = (scene.triangles[rows], scene.normals[rows])
+    for values in (*shape, scene.reflectance[rows] / STEP, scene.opacity[rows] / STEP):
+        # Rounded, so that what is computed anew may differ by a rounding.
+        digest.update(np.round(values, 4 if values.ndim == 3 else 0).astype(np.float32).tobytes())
+    for values in flags:
+        digest.update(np.ascontiguousarray(values).tobytes())
+    if scene.images is not None:
+        triangle = item.first + np.flatnonzero(scene.images.textured[rows])
+        for point in _POINTS:
+            seen = scene.images.at(triangle, np.broadcast_to(point, (len(triangle), 2)))
+            weighed = np.concatenate([seen[:, :3], seen[:, 6:]], axis=1)
+            digest.update(np.round(weighed / STEP).astype(np.int16).tobytes())
+    return digest.hexdigest()
+
+
+def light_fingerprint(bake_scene: BakeScene, settings: BakeSettings) -> str:
+    """Return a digest of all that shines, and of the settings: what every lightmap depends on."""
+    digest = hashlib.sha256()
+    for light in bake_scene.scene.lights:
+        if not light.strength.any():
+            continue  # a kept bake knows dark lamps too
+        digest.update(type(light).__name__.encode())
+        for entry in fields(light):
+            digest.update(_bytes(getattr(light, entry.name)))
+    emits = bake_scene.scene.emission.any(axis=1)
+    digest.update(_bytes(bake_scene.scene.triangles[emits]))
+    digest.update(_bytes(bake_scene.scene.emission[emits]))
+    for entry in fields(settings):
+        if entry.name not in _OF_NO_CONSEQUENCE:
+            digest.update(f"{entry.name}={getattr(settings, entry.name)!r};".encode())
+    return digest.hexdigest()
+
+
+def _bytes(value: Any) -> bytes:
+    if isinstance(value, str):
+        return value.encode()
+    return np.round(np.asarray(value, dtype=np.float64), 5).astype(np.float32).tobytes()
+
+
+def _files(name: str) -> frozenset[str]:
+    """Return the stems of the files, in lower case, of the lightmaps that an object shows."""
+    found = set()
+    materials = bpy.data.objects[name, None].data.materials
+    trees = [material.node_tree for material in materials if material is not None]
+    while trees:
+        tree = trees.pop()
+        for node in tree.nodes if tree is not None else ():
+            if node.type == "GROUP" and node.node_tree is not None and is_made(node.node_tree):
+                trees.append(node.node_tree)
+            elif node.type == "TEX_IMAGE" and node.image is not None and is_made(node.image):
+                found.add(Path(node.image.filepath_raw or node.image.name).stem.lower())
+    return frozenset(found)

@@ -1,0 +1,79 @@
+"""What is set for relighting, and remembered of it: with each scene, and of this session alone."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..settings import BakeSettings
+
+
+def _switch_live(manager: bpy.types.WindowManager, context: bpy.types.Context) -> None:
+    from . import live_state
+
+    if manager.radiosity_live:
+        live_state.start(context.scene)
+    else:
+        live_state.stop()
+
+
+class RelightSettings(bpy.types.PropertyGroup):
+    """`scene.radiosity_relight`"""
+
+    keep: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Keep for Relighting",
+        description="Keep in memory how light gets about, so that other strengths and colors of lamps, "
+        "emission and world need no new bake. Takes about 300 bytes for each pixel that shows "
+        "a surface, 60 MB at 512 × 512, 1 GB at 2048 × 2048. Bakes of many lamps take somewhat longer",
+        default=True,
+    )
+    sidecar: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Write Sidecar",
+        description="Also write it to a file beside the lightmaps, so that this bake can be lit anew after "
+        "the scene was closed. About half as large as in memory",
+        default=False,
+    )
+    only_moved: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Only What Moved",
+        description="When nothing but places of objects has changed since a bake that is still in memory, "
+        "bake anew only what they touch: the same light in less than half of the time. The layout of the "
+        "lightmaps stays",
+        default=False,
+    )
+    mark: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Mark", description="Which bake the scene shows", options={"HIDDEN"}
+    )
+    strengths: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Strengths", description="The strengths its lightmaps were lit by last", options={"HIDDEN"}
+    )
+
+
+def keeps(scene: bpy.types.Scene, settings: BakeSettings) -> bool:
+    """Tell whether a bake of the scene from the panel is to be kept, and can be."""
+    from ..keeping import can_keep
+
+    chosen = scene.radiosity_relight
+    return bool(chosen.keep or chosen.sidecar) and can_keep(settings)
+
+
+def register() -> None:
+    """Register the settings and hang them on every scene and on the session."""
+    bpy.utils.register_class(RelightSettings)
+    bpy.types.Scene.radiosity_relight = bpy.props.PointerProperty(type=RelightSettings)
+    bpy.types.WindowManager.radiosity_live = bpy.props.BoolProperty(
+        name="Live",
+        description="Light the scene anew while power and color of lamps, emission or world are being "
+        "changed. Anything else that changes switches it off",
+        default=False,
+        update=_switch_live,
+        options={"SKIP_SAVE"},
+    )
+
+
+def unregister() -> None:
+    """Take them away; what a file holds stays in the file."""
+    from . import live_state
+
+    live_state.stop()
+    del bpy.types.WindowManager.radiosity_live
+    del bpy.types.Scene.radiosity_relight
+    bpy.utils.unregister_class(RelightSettings)

@@ -1,0 +1,149 @@
+"""The lightmaps of a bake rewritten in place: the same images, the same files, other light."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ..bake_scene import LightGroup, LightmapPage
+from ..errors import BakeError
+from ..manifest import FILES
+from .group_images import rescale_materials, update_images
+from .image_marks import SCALE_PROPERTY
+from .images import image_scale
+from .kept_bakes import group_images_of, images_of
+from .output import REPORT_NAME, OutputFolder
+
+OF_LIGHT = ("irradiance_W_m2", "illuminance_lx")
+"""What the report says of the light on objects: of other light than this, it must not stay."""
+
+Images = Mapping[int, bpy.types.Image]
+
+
+def rewrite(mark: str, pages: Sequence[LightmapPage], groups: Sequence[LightGroup], seconds: float) -> None:
+    """Show a bake's new pages, and replace its files by them, all or none.
+
+    Parameters
+    ----------
+    mark : str
+        The bake's.
+    pages : sequence of LightmapPage
+    groups : sequence of LightGroup
+        Of its light groups, if it has any.
+    seconds : float
+        How long lighting anew took, for the report.
+
+    Raises
+    ------
+    BakeError
+        If an image is not there any more, or a file cannot be replaced.
+    """
+    images, group_images = images_of(mark), group_images_of(mark)
+    check_images(images, pages)
+    shown = [images[number] for number in range(len(pages))]
+    every = [*shown, *(image for of in group_images.values() for image in of)]
+    # Of a group in which nothing shines any more there are no pages.
+    told = {group.name for group in groups}
+    dark = tuple(LightmapPage(np.zeros_like(page.pixels), page.coverage) for page in pages)
+    groups = [*groups, *(LightGroup(name, dark) for name in group_images if name not in told)]
+    with _as_before_on_failure(every):
+        update_images(shown, pages, group_images, groups)
+        store(every, seconds)
+
+
+def check_images(images: Images, pages: Sequence[LightmapPage]) -> None:
+    """Refuse images that are not those of the pages.
+
+    Raises
+    ------
+    BakeError
+    """
+    for number, page in enumerate(pages):
+        image = images.get(number)
+        if image is None:
+            raise BakeError(f"lightmap {number + 1} of the bake is not in the file any more: bake again")
+        height, width = page.pixels.shape[:2]
+        if tuple(image.size) != (width, height):
+            raise BakeError(f"lightmap '{image.name}' has lost its file, or was scaled: bake again")
+
+
+def store(images: Sequence[bpy.types.Image], seconds: float) -> None:
+    """Write the images to their files, and to the report beside them; pack anew those that are packed.
+
+    Raises
+    ------
+    BakeError
+        If a file cannot be replaced.
+    """
+    for image in images:
+        if image.packed_file is not None:
+            image.pack()
+    folders: dict[Path, list[bpy.types.Image]] = {}
+    for image in images:
+        if image.packed_file is None:
+            folders.setdefault(Path(bpy.path.abspath(image.filepath_raw)).parent, []).append(image)
+    for folder, inside in folders.items():
+        with OutputFolder(folder) as output:
+            for image in inside:
+                _save_into(output.staging, image)
+            _report(output, inside, seconds)
+            output.publish()
+
+
+def _save_into(folder: Path, image: bpy.types.Image) -> None:
+    """Save an image under its name in another folder; it goes on belonging to its own file."""
+    stored = image.filepath_raw
+    path = folder / Path(bpy.path.abspath(stored)).name
+    image.filepath_raw = str(path)
+    try:
+        image.save()
+    except RuntimeError as error:
+        raise BakeError(f"cannot write '{path.name}': {' '.join(str(error).split())}") from error
+    finally:
+        image.filepath_raw = stored
+
+
+def _report(output: OutputFolder, images: Sequence[bpy.types.Image], seconds: float) -> None:
+    """Bring the report in the folder up to date, if it is there and readable."""
+    try:
+        told: dict[str, Any] = json.loads((output.path / REPORT_NAME).read_text(encoding="utf-8"))
+        scales = {Path(bpy.path.abspath(image.filepath_raw)).name: image_scale(image) for image in images}
+        of_groups = [page for group in told.get("light_groups", ()) for page in group["pages"]]
+        for entry in (*told["objects"], *of_groups):
+            if "scale" in entry:
+                entry["scale"] = scales.get(entry["image"], entry["scale"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return
+    for entry in told["objects"]:
+        for name in OF_LIGHT:
+            entry.pop(name, None)
+    told[FILES] = output.files()
+    told["relit"] = {"seconds": round(seconds, 4)}
+    text = json.dumps(told, indent=2, ensure_ascii=False) + "\n"
+    (output.staging / REPORT_NAME).write_text(text, encoding="utf-8")
+
+
+@contextmanager
+def _as_before_on_failure(images: Sequence[bpy.types.Image]) -> Iterator[None]:
+    """Put the images' pixels and scales back if the block fails."""
+    before = []
+    for image in images:
+        pixels = np.empty(len(image.pixels), dtype=np.float32)
+        image.pixels.foreach_get(pixels)
+        before.append((image, pixels, image_scale(image)))
+    try:
+        yield
+    except BaseException:
+        for image, pixels, scale in before:
+            image.pixels.foreach_set(pixels)
+            image.update()
+            if SCALE_PROPERTY in image.keys():  # noqa: SIM118 (an ID is no dict)
+                rescale_materials(image, scale)
+                image[SCALE_PROPERTY] = scale
+        raise

@@ -1,0 +1,57 @@
+"""What of the light on a surface a lighting designer reads first: least, mean, most, and how even it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..bake_scene import TOUCHED
+from ..solver.arrays import Array
+
+
+@dataclass(frozen=True)
+class LightStatistics:
+    """Of one surface.
+
+    Attributes
+    ----------
+    minimum, mean, maximum : float
+        In the unit of what was given; the mean is by area.
+    """
+
+    minimum: float
+    mean: float
+    maximum: float
+
+    @property
+    def uniformity(self) -> float | None:
+        """U₀, the least over the mean, as in EN 12464-1; None in the dark."""
+        return self.minimum / self.mean if self.mean > 0 else None
+
+    def as_dict(self) -> dict[str, float | None]:
+        """The numbers as the report names them."""
+        return {
+            "minimum": self.minimum,
+            "mean": self.mean,
+            "maximum": self.maximum,
+            "uniformity": self.uniformity,
+        }
+
+
+def light_statistics(values: Array, areas: Array) -> LightStatistics | None:
+    """Sum up (n,) values of texels that show (n,) float of the surface each; None without any area."""
+    total = float(areas.sum())
+    if total <= 0:
+        return None
+    counted = values[areas > 0]
+    return LightStatistics(float(counted.min()), float(values @ areas) / total, float(counted.max()))
+
+
+def told_texels(state: Array) -> Array:
+    """Tell which of (n,) texels are of the surface as one sees it: none that are divided, hidden or shut in.
+
+    Those show the mean of two lights, or a dark that nobody looks at. All of them, if there are no others.
+    """
+    whole = (state == 0) | (state == TOUCHED)
+    return whole if whole.any() else np.ones(len(state), dtype=bool)

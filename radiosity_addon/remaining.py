@@ -1,0 +1,88 @@
+"""How long a bake will still take, told by how far it is and how long that took."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import deque
+from collections.abc import Callable
+
+FIRST_SECONDS, FIRST_FRACTION = 1.0, 0.1
+"""Nothing is said before so much time and so much of the work: the first steps tell nothing of the others."""
+
+RECENT = 0.35
+"""The pace is that of this last part of the time so far, …"""
+
+SLOWEST = 0.5
+"""… but no less than this share of the mean pace: a step that stands still will not do so for ever."""
+
+SHORTEST_MEMORY, MEMORY = 0.7, 0.08
+"""What is shown follows a new estimate within so many seconds, or this share of it."""
+
+APART = 0.05
+"""Seconds between two readings that are remembered."""
+
+
+class RemainingTime:
+    """Estimates the time a job still takes, from the pace at which the fraction done grew lately.
+
+    That jumps where a stage is quicker or slower than the one before, so what is shown runs down like a
+    clock and follows the estimate smoothly.
+
+    Parameters
+    ----------
+    clock : callable
+        Seconds, from any start.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._start = self._last = clock()
+        self._readings = deque([(self._start, 0.0)])
+        self._shown: float | None = None
+
+    def update(self, fraction: float) -> float | None:
+        """Return the seconds left when a fraction of 0 to 1 is done; None as long as nobody can know."""
+        now = self._clock()
+        passed, self._last = now - self._last, now
+        self._remember(now, fraction)
+        if fraction >= 1.0:
+            self._shown = 0.0
+        elif now - self._start >= FIRST_SECONDS and fraction >= FIRST_FRACTION:
+            estimate = (1.0 - fraction) / self._pace(now, fraction)
+            if self._shown is None:
+                self._shown = estimate
+            else:
+                running_down = max(self._shown - passed, 0.0)
+                follow = 1.0 - math.exp(-passed / max(SHORTEST_MEMORY, MEMORY * estimate))
+                self._shown = running_down + follow * (estimate - running_down)
+        return self._shown
+
+    def _remember(self, now: float, fraction: float) -> None:
+        """Note a reading, and forget those before the recent past, but for the last of them."""
+        if now - self._readings[-1][0] >= APART:
+            self._readings.append((now, fraction))
+        since = now - RECENT * (now - self._start)
+        while len(self._readings) > 1 and self._readings[1][0] <= since:
+            self._readings.popleft()
+
+    def _pace(self, now: float, fraction: float) -> float:
+        """Return how much was done a second lately."""
+        then, done = self._readings[0]
+        mean = fraction / (now - self._start)
+        recent = (fraction - done) / (now - then) if now > then else mean
+        return max(recent, SLOWEST * mean)
+
+
+def duration(seconds: float) -> str:
+    """Return a time as people say it, rounded up: '4 s', '25 s', '3 min', '1 h 10 min'."""
+    whole = max(math.ceil(seconds - 1e-6), 0)
+    if whole > 10:
+        whole = 5 * math.ceil(whole / 5)
+    if whole < 60:
+        return f"{whole} s"
+    minutes = math.ceil(whole / 60)
+    if minutes < 60:
+        return f"{minutes} min"
+    minutes = 10 * math.ceil(minutes / 10)
+    return f"{minutes // 60} h {minutes % 60} min" if minutes % 60 else f"{minutes // 60} h"

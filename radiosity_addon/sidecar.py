@@ -1,0 +1,215 @@
+"""A kept bake in a file beside its lightmaps: what lights it anew when Blender was closed meanwhile.
+
+Only what relighting reads is stored. The geometry itself is not: the scene brings it again, and its
+fingerprint must be that of the bake.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from copy import copy
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from .array_file import ArrayFileError, read_arrays, write_arrays
+from .bake_scene import BakedObject, BakeResult, BakeScene, LightmapPage
+from .errors import BakeError, RadiosityError
+from .fingerprint import check_same, fingerprint
+from .lightmap.earlier_light import EarlierLight
+from .lightmap.interpolate import Interpolation
+from .lightmap.part_links import PartLinks, Parts
+from .lightmap.seams import Seams
+from .lightmap.stored_links import StoredLinks
+from .lightmap.sweeps import LitTexels, TexelTransport
+from .lightmap.texel_geometry import TexelGeometry
+from .plain_objects import flatten, restore
+from .relighting import KeptBake
+from .settings import BakeSettings
+from .solver.aiming import AimedRays
+from .solver.area_light import AreaLight
+from .solver.bulb_lights import PointLight, SpotLight
+from .solver.cluster_links import ClusterLinks
+from .solver.clusters import Clusters
+from .solver.conservation import Balance
+from .solver.element_transport import ElementTransport, Relightable
+from .solver.emitters import EmitterGroup
+from .solver.environment import EnvironmentImage, SkyPatch
+from .solver.hierarchy import Faces, Hierarchy
+from .solver.light_gains import LightGains
+from .solver.light_links import LightLinks
+from .solver.light_sources import LightSources
+from .solver.lights import EnvironmentLight, SunLight
+from .solver.links import Links
+from .solver.local_pass import LocalPass
+from .solver.methods.hierarchical import HierarchicalState
+from .solver.settings import SolverSettings
+from .solver.tree_top import TreeTop
+
+SIDECAR_NAME = "lightmap.relight"
+
+MAGIC, VERSION = b"RADIOSITYRELIGHT", 1
+
+
+OF_SOURCES = ("emitter", "emitter_names", "light_groups", "emitter_groups")
+"""What a scene says of its sources beside their strengths: it stays as it was baked."""
+
+
+def _all(kind: Any) -> tuple[str, ...]:
+    return tuple(entry.name for entry in fields(kind))
+
+
+_LIGHTS = (PointLight, SpotLight, SunLight, AreaLight, EnvironmentLight, EnvironmentImage, SkyPatch)
+
+KEPT: Mapping[type, Sequence[str]] = {
+    **{kind: _all(kind) for kind in _LIGHTS},
+    **{
+        kind: _all(kind)
+        for kind in (SolverSettings, LightLinks, Interpolation, AimedRays, Seams, Relightable)
+    },
+    **{kind: _all(kind) for kind in (StoredLinks, TexelTransport, LitTexels, Balance, Parts)},
+    PartLinks: ("rows", "sources", "reflectance", "gains"),
+    Links: ("receiver", "source", "factor", "visibility", "to_quarter", "of_quarter"),
+    ClusterLinks: ("receiver", "source", "vector", "gradient", "even"),
+    Clusters: ("order", "start", "children", "area", "centre", "levels"),
+    TreeTop: (
+        *("row", "n_inner", "n_rows", "tip", "_clusters", "_area"),
+        *("_start", "_children", "_levels"),
+    ),
+    Faces: ("triangle", "normal", "centre", "area"),
+    Hierarchy: (
+        *("faces", "clusters", "face", "first_child", "level"),
+        *("area", "reflectance", "emission", "opacity"),
+    ),
+    HierarchicalState: (
+        *("settings", "hierarchy", "power", "links", "cluster_links", "top", "balance", "residual"),
+        *("iterations", "over_budget", "faint", "started"),
+    ),
+    LightSources: ("lights", "emitter", "groups", "strengths", "_owner", "_single"),
+    EmitterGroup: ("strength",),
+    ElementTransport: ("_state", "_sources", "_light_links"),
+    LocalPass: ("sources", "threads", "_state", "_seed"),
+    LightGains: ("_count", "_of"),
+    EarlierLight: ("_known",),
+    TexelGeometry: ("page", "triangle", "centre_inside", "index", "_first", "uv", "page_of_triangle"),
+}
+"""What is stored of each class: all that relighting reads."""
+
+DROPPED: Mapping[type, Sequence[str]] = {
+    PartLinks: ("lamps",),
+    Links: ("doubt",),
+    ClusterLinks: ("factor", "visibility", "doubt"),
+    TreeTop: ("kept", "tips"),
+    HierarchicalState: (
+        *("scene", "caster", "light_links", "irradiance", "radiosity"),
+        *("history", "details", "conservation"),
+    ),
+    LocalPass: ("caster", "emitters"),
+}
+"""What only a bake needs, for which None stands."""
+
+
+@dataclass(frozen=True, eq=False)
+class StoredBake:
+    """A bake as its sidecar has it, not yet tied to a scene.
+
+    Attributes
+    ----------
+    mark : str
+        The bake's own, which whoever wrote it knows it by.
+    settings : BakeSettings
+    """
+
+    mark: str
+    settings: BakeSettings
+    _stored: Mapping[str, Any]
+
+    def kept(self, bake_scene: BakeScene) -> KeptBake:
+        """Return the kept bake of a scene that differs in light alone.
+
+        Raises
+        ------
+        SceneError
+            If anything else differs; the message names it.
+        """
+        stored = self._stored
+        check_same(stored["fingerprint"], bake_scene)
+        scene = copy(bake_scene.scene)
+        scene.emission, scene.lights = stored["emission"], stored["solved"].sources.lights
+        before = replace(bake_scene, scene=scene, **stored["of_sources"])
+        texels = stored["texel_reflectance"], stored["texel_emission"]
+        solved, laid = stored["solved"], (stored["geometry"], stored["seams"], stored["rings"])
+        return KeptBake(before, self.settings, solved, stored["lit"], *laid, *texels)
+
+    def result(self, bake_scene: BakeScene, pages: tuple[LightmapPage, ...]) -> BakeResult:
+        """Return other pages as the result of a bake, laid out as it was."""
+        geometry, report = self._stored["geometry"], self._stored["report"]
+        baked = [item for item in bake_scene.objects if item.bake and item.count]
+        objects = tuple(
+            BakedObject(item, geometry.uv[item.rows], page)
+            for item, page in zip(baked, self._stored["pages"], strict=True)
+        )
+        return BakeResult(pages, objects, report["solver"], bake_scene.warnings, {}, report["atlas"])
+
+
+def write_sidecar(path: Path, kept: KeptBake, result: BakeResult, mark: str) -> int:
+    """Write a kept bake to a file; return the bytes that it takes.
+
+    Parameters
+    ----------
+    result : BakeResult
+        The bake's.
+    mark : str
+        See `StoredBake`.
+
+    Raises
+    ------
+    BakeError
+        If the file cannot be written.
+    """
+    state = kept.solved.elements.state
+    # Balanced links stand for those that were measured.
+    skipped = [] if state.balance is None else [(state, "links")]
+    stored = {
+        "mark": mark,
+        "settings": asdict(kept.settings),
+        "fingerprint": fingerprint(kept.bake_scene),
+        "emission": kept.bake_scene.scene.emission,
+        "of_sources": {name: getattr(kept.bake_scene, name) for name in OF_SOURCES},
+        "pages": [item.page for item in result.objects],
+        "report": {"solver": {**result.solver, "history": []}, "atlas": result.atlas},
+        "solved": kept.solved,
+        "lit": replace(kept.lit, earlier=kept.lit.earlier.first()),
+        "geometry": kept.geometry,
+        "seams": kept.seams,
+        "rings": kept.rings,
+        "texel_reflectance": kept.reflectance,
+        "texel_emission": kept.emission,
+    }
+    told, arrays = flatten(stored, KEPT, skipped)
+    try:
+        return write_arrays(path, MAGIC, VERSION, told, arrays)
+    except OSError as error:
+        raise BakeError(f"cannot write '{path}': {error.strerror}") from error
+
+
+def read_sidecar(path: Path) -> StoredBake:
+    """Read a kept bake from a file.
+
+    Raises
+    ------
+    BakeError
+        If there is none, or it is damaged or of another version.
+    """
+    try:
+        told, arrays = read_arrays(path, MAGIC, VERSION)
+        stored = restore(told, arrays, KEPT, DROPPED)
+        return StoredBake(stored["mark"], BakeSettings(**stored["settings"]), stored)
+    except FileNotFoundError:
+        raise BakeError(f"there is no '{path}': bake with a sidecar to light that bake anew") from None
+    except OSError as error:
+        raise BakeError(f"cannot read '{path}': {error.strerror}") from error
+    except ArrayFileError as error:
+        raise BakeError(f"'{path}' is not used: {error}; bake again") from error
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError, RadiosityError) as error:
+        raise BakeError(f"'{path}' is not used: it is damaged; bake again") from error

@@ -1,0 +1,190 @@
+"""Kept bakes after something moved: what full bakes give, for a part of their rays."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from radiosity_addon.bake_scene import BakeResult, BakeScene
+from radiosity_addon.errors import SceneError
+from radiosity_addon.pipeline import bake, bake_and_keep
+from radiosity_addon.rebaking import bake_moved, can_move, moved_objects
+from radiosity_addon.relighting import KeptBake, relight
+from radiosity_addon.settings import BakeSettings
+from radiosity_addon.solver import PointLight, Scene
+from radiosity_addon.solver.steps import drain
+from tests.moved_rooms import ELSEWHERE, PLACE, laid_out_as, room
+from tests.rooms import box_room, grey, solid_box
+from tests.unit.texel_scenes import bake_scene
+
+SETTINGS = BakeSettings(resolution=64, quality="draft", threads=1)
+
+
+def pixels(result: BakeResult) -> np.ndarray:
+    """The (n, 3) covered texels of the first page."""
+    return np.asarray(result.pages[0].pixels[result.pages[0].coverage], dtype=np.float64)
+
+
+def full(scene: BakeScene, kept: KeptBake, **settings: int) -> np.ndarray:
+    """What a whole bake gives, by the same lightmap coordinates."""
+    return pixels(drain(bake(laid_out_as(scene, kept.geometry.uv), replace(SETTINGS, **settings))))
+
+
+def relative(found: np.ndarray, expected: np.ndarray, where: np.ndarray | slice = slice(None)) -> float:
+    """Root mean square of the difference, relative to the mean of the whole."""
+    return float(np.sqrt(((found - expected)[where] ** 2).mean()) / expected.mean())
+
+
+@pytest.fixture(scope="module")
+def kept() -> KeptBake:
+    _, kept = drain(bake_and_keep(room(), SETTINGS))
+    return kept
+
+
+@pytest.fixture(scope="module")
+def moved(kept: KeptBake) -> tuple[BakeResult, KeptBake]:
+    result, after = drain(bake_moved(kept, room(ELSEWHERE, 30.0)))
+    return result, after
+
+
+@pytest.fixture(scope="module")
+def fresh(kept: KeptBake) -> tuple[BakeResult, KeptBake]:
+    """A full bake of the box at its new place."""
+    result, after = drain(bake_and_keep(laid_out_as(room(ELSEWHERE, 30.0), kept.geometry.uv), SETTINGS))
+    return result, after
+
+
+@pytest.fixture(scope="module")
+def expected(fresh: tuple[BakeResult, KeptBake]) -> np.ndarray:
+    return pixels(fresh[0])
+
+
+def test_a_moved_box_gives_what_a_full_bake_gives(
+    kept: KeptBake, moved: tuple[BakeResult, KeptBake], expected: np.ndarray
+) -> None:
+    """Everywhere, and on the floor where it stood and stands: no shadow is left, and none is missing."""
+    found, position = pixels(moved[0]), moved[1].geometry.position
+    assert relative(found, expected) < 0.01
+    for place in (PLACE, ELSEWHERE):
+        around = (np.abs(position[:, :2] - place) < 0.35).all(axis=1) & (position[:, 2] < 0.01)
+        assert around.sum() > 20
+        assert relative(found, expected, around) < 0.01
+        assert found[around].mean() == pytest.approx(expected[around].mean(), rel=0.005)
+    # So much had to change.
+    before = full(room(), kept)
+    assert relative(before, expected) > 0.1
+
+
+def test_it_takes_a_part_of_the_rays(kept: KeptBake, moved: tuple[BakeResult, KeptBake]) -> None:
+    assert moved[1].solved.local.caster.rays < 0.4 * kept.solved.local.caster.rays
+    assert moved[0].solver["moved"] == ["Box"]
+
+
+def test_what_moved_can_move_back(
+    kept: KeptBake, moved: tuple[BakeResult, KeptBake], expected: np.ndarray
+) -> None:
+    """On from what was baked anew: errors do not pile up, nor do points."""
+    result, back = drain(bake_moved(moved[1], room()))
+    before = full(room(), kept)
+    assert result.solver["moved"] == ["Box"]
+    assert relative(pixels(result), before) < 0.01
+    again, after = drain(bake_moved(back, room(ELSEWHERE, 30.0)))
+    assert relative(pixels(again), expected) < 0.01
+    points = [len(some.lit.transport.links.sources) for some in (kept, after)]
+    assert points[1] < 1.2 * points[0]
+
+
+def test_it_can_be_lit_anew(moved: tuple[BakeResult, KeptBake], fresh: tuple[BakeResult, KeptBake]) -> None:
+    """As a full bake of the moved scene can."""
+    strengths = moved[1].strengths
+    same = pixels(replace(moved[0], pages=drain(relight(moved[1], strengths))))
+    assert relative(same, pixels(moved[0])) < moved[1].lit.tolerance
+    strengths = strengths * np.array([2.0, 0.5, 0.0, 1.0, 1.5])[:, None]
+    found, expected = (
+        pixels(replace(of[0], pages=drain(relight(of[1], strengths)))) for of in (moved, fresh)
+    )
+    assert relative(found, expected) < 0.01
+
+
+def test_what_glows_may_move(kept: KeptBake) -> None:
+    found, _ = drain(bake_moved(kept, room(panel=-0.6)))
+    assert found.solver["moved"] == ["Panel"]
+    assert relative(pixels(found), full(room(panel=-0.6), kept)) < 0.01
+
+
+def test_another_size_keeps_its_texels_and_is_told_of(kept: KeptBake) -> None:
+    found, _ = drain(bake_moved(kept, room(size=1.3)))
+    assert any("another size" in warning.message for warning in found.warnings)
+    assert relative(pixels(found), full(room(size=1.3), kept)) < 0.01
+
+
+def sealed(at: float) -> BakeScene:
+    """A lit room with a sealed box in it, and a block that may stand inside that one."""
+    walls, _ = box_room((3.0, 2.0, 1.6))
+    hollow = np.concatenate(
+        [walls * 0.3 + (0.2, 0.2, 0.2), solid_box((0.19, 0.19, 0.19), (1.11, 0.81, 0.69))]
+    )
+    block = solid_box((at, 0.4, 0.3), (at + 0.2, 0.6, 0.5))
+    triangles = np.concatenate([walls, hollow, block])
+    lamp = PointLight((2.0, 1.0, 1.2), 20.0, radius=0.05)
+    dark = grey(len(triangles), 0.0)
+    scene = Scene(triangles, grey(len(triangles), 0.6), dark, lights=(lamp,))
+    return bake_scene(scene, ("Room", 12), ("Inside", 12), ("Outside", 12), ("Block", 12))
+
+
+def test_no_light_comes_along_into_a_sealed_box() -> None:
+    """A lit block that is put into it is black then, as all in it is."""
+    _, kept = drain(bake_and_keep(sealed(1.9), SETTINGS))
+    result, after = drain(bake_moved(kept, sealed(0.5)))
+    triangle = after.geometry.triangle
+    inside = ((triangle >= 12) & (triangle < 24)) | (triangle >= 36)
+    found = pixels(result)
+    assert inside.sum() > 100
+    assert not found[inside].any()
+    assert found[~inside].mean() > 0.1
+
+
+def test_what_moved_is_told_by_name(kept: KeptBake) -> None:
+    assert moved_objects(kept, room()) == ()
+    assert moved_objects(kept, room(turn=1.0)) == ("Box",)
+    assert moved_objects(kept, room(turn=1.0, panel=0.1)) == ("Box", "Panel")
+    with pytest.raises(SceneError, match="nothing has moved"):
+        drain(bake_moved(kept, room()))
+
+
+def test_who_bakes_may_ask_whether_it_can_be(kept: KeptBake) -> None:
+    assert can_move(kept, room(ELSEWHERE), SETTINGS)
+    assert not can_move(kept, room(), SETTINGS)
+    assert not can_move(kept, room(ELSEWHERE), replace(SETTINGS, resolution=128))
+    assert not can_move(kept, altered(lights=()), SETTINGS)
+
+
+def altered(**changes: np.ndarray | tuple) -> BakeScene:
+    """The room with other materials or lamps."""
+    plain = room(ELSEWHERE)
+    scene = plain.scene
+    given = {"reflectance": scene.reflectance, "emission": scene.emission, "lights": scene.lights, **changes}
+    return replace(plain, scene=Scene(scene.triangles, **given))
+
+
+def test_other_changes_are_refused(kept: KeptBake) -> None:
+    plain = room(ELSEWHERE)
+    painted = plain.scene.reflectance.copy()
+    painted[12] = 0.1
+    with pytest.raises(SceneError, match="'Box' has another material; bake again"):
+        moved_objects(kept, altered(reflectance=painted))
+    with pytest.raises(SceneError, match="number of lamps"):
+        moved_objects(kept, altered(lights=plain.scene.lights[:-1]))
+    brighter = (replace(plain.scene.lights[0], power=1.0), *plain.scene.lights[1:])
+    with pytest.raises(SceneError, match="lamp 'Bulb' has changed"):
+        moved_objects(kept, altered(lights=brighter))
+    named = replace(plain, objects=(replace(plain.objects[0], name="Hall"), *plain.objects[1:]))
+    with pytest.raises(SceneError, match="added, removed or renamed"):
+        moved_objects(kept, named)
+    mesh = replace(plain.objects[1], polygon=plain.objects[1].polygon[::-1])
+    with pytest.raises(SceneError, match="'Box' has another mesh"):
+        moved_objects(kept, replace(plain, objects=(plain.objects[0], mesh, plain.objects[2])))
+    with pytest.raises(SceneError, match="nothing in it moved"):
+        moved_objects(replace(kept, moves=None), plain)

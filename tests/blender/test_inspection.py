@@ -1,0 +1,225 @@
+"""The look at a scene before it is baked: what will be baked, how large, and what is odd."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+import pytest
+
+import radiosity_addon
+from radiosity_addon.blender import check_panel, runtime
+from radiosity_addon.blender.cornell import build_cornell_box
+from radiosity_addon.blender.inspection import ERROR, INFO, WARNING, Inspection, inspect
+from radiosity_addon.settings import BakeSettings
+from tests.blender.scenes import QUAD, add_lamp, add_mesh, set_world
+
+ROOT = Path(__file__).resolve().parents[2]
+SETTINGS = BakeSettings(resolution=256)
+
+CUBE = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+CUBE_FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+
+
+@pytest.fixture(autouse=True)
+def registered() -> Iterator[None]:
+    radiosity_addon.register()
+    yield
+    radiosity_addon.unregister()
+
+
+def look(tmp_path: Path, settings: BakeSettings = SETTINGS) -> Inspection:
+    return inspect(bpy.context, settings, tmp_path)
+
+
+def odd(found: Inspection) -> dict[str, str]:
+    """Messages of what is more than worth knowing, by whose it is."""
+    return {finding.name: finding.message for finding in found.findings if finding.level != INFO}
+
+
+def room() -> None:
+    """A floor and a lamp: nothing odd."""
+    add_mesh("Floor")
+    add_lamp("POINT", energy=100.0, transform={"location": (0, 0, 2)})
+
+
+def test_the_cornell_box_is_as_it_should_be(tmp_path: Path) -> None:
+    build_cornell_box()
+    found = look(tmp_path)
+    assert (found.objects, found.triangles, found.scene_triangles) == (7, 34, 34)
+    assert found.foresight.pages == (256,)
+    assert not found.is_odd
+    # A bake of it has 56,642 texels (bench/results/cornell.json).
+    assert found.texels == pytest.approx(56_642, rel=0.25)
+
+
+def test_nothing_is_changed_by_looking(tmp_path: Path) -> None:
+    room()
+    floor = bpy.data.objects["Floor"]
+    floor.hide_set(True)
+    names = sorted(block.name for block in bpy.data.user_map())
+    look(tmp_path)
+    assert sorted(block.name for block in bpy.data.user_map()) == names
+    assert floor.hide_get()
+
+
+def test_an_unsaved_file_is_told_of() -> None:
+    room()
+    found = inspect(bpy.context, SETTINGS, None)
+    assert ["not saved" in finding.message for finding in found.findings if finding.name == "file"] == [True]
+
+
+def test_a_folder_that_cannot_be_written_is_told_of(tmp_path: Path) -> None:
+    room()
+    (tmp_path / "file").write_text("in the way")
+    found = inspect(bpy.context, SETTINGS, tmp_path / "file" / "lightmaps")
+    assert found.findings[0].level == ERROR
+    assert "choose another" in found.findings[0].message
+
+
+def test_darkness_is_told_of(tmp_path: Path) -> None:
+    add_mesh("Floor")
+    assert "has no light" in odd(look(tmp_path))[bpy.context.scene.name]
+    assert odd(look(tmp_path, BakeSettings(sky=True))) == {}
+    set_world(0.2, 0.2, 0.2)
+    assert odd(look(tmp_path)) == {}
+
+
+def test_hidden_objects_are_told_of(tmp_path: Path) -> None:
+    room()
+    add_mesh("Left out", location=(3, 0, 0)).hide_render = True
+    add_mesh("Unseen", location=(6, 0, 0)).hide_set(True)
+    found = odd(look(tmp_path))
+    assert "left out of the bake" in found["Left out"]
+    assert "part of the bake" in found["Unseen"]
+
+
+def test_tiny_objects_and_greedy_ones_are_told_of(tmp_path: Path) -> None:
+    room()
+    add_mesh("Pebble", [(0.01 * x, 0.01 * y, z) for x, y, z in QUAD], location=(0, 0, 0.5))
+    found = odd(look(tmp_path))
+    assert "8 × 8 texels" in found["Pebble"]
+    assert "of all texels" in found["Floor"]
+
+
+def test_uv_layers_are_told_of(tmp_path: Path) -> None:
+    room()
+    found = look(tmp_path, BakeSettings(keep_uvs=True))
+    assert "unwrapped anew" in odd(found)["Floor"]
+    assert any(
+        "without UVs of their own" in f.message or "becomes the first" in f.message for f in found.findings
+    )
+    mesh = bpy.data.objects["Floor"].data
+    for number in range(8):
+        mesh.uv_layers.new(name=f"UV {number}")
+    full = look(tmp_path)
+    assert [(f.level, f.name) for f in full.findings if "room" in f.message] == [(ERROR, "Floor")]
+
+
+def test_what_is_inside_out_is_told_of_unless_it_is_a_room(tmp_path: Path) -> None:
+    room()
+    inwards = [face[::-1] for face in CUBE_FACES]
+    add_mesh("Good", CUBE, CUBE_FACES, location=(5, 0, 1))
+    add_mesh("Turned", CUBE, inwards, location=(10, 0, 1))
+    add_mesh("Mirrored", CUBE, CUBE_FACES, location=(15, 0, 1), scale=(-1, 1, 1))
+    add_mesh("Hall", [(20 * x, 20 * y, 20 * z) for x, y, z in CUBE], inwards)
+    assert [name for name, text in odd(look(tmp_path)).items() if "inside out" in text] == ["Turned"]
+
+
+def test_forgotten_scales_and_units_are_told_of(tmp_path: Path) -> None:
+    room()
+    add_mesh("Map", [(0.01 * x, 0.01 * y, z) for x, y, z in QUAD], scale=(1000, 1000, 1000))
+    assert "scale of 1000 × 1000 × 1000" in odd(look(tmp_path))["Map"]
+    add_mesh("Far", location=(20_000, 0, 0))
+    assert "20 km" in odd(look(tmp_path))["scene"]
+
+
+def test_a_black_material_is_worth_knowing(tmp_path: Path) -> None:
+    room()
+    material = bpy.data.materials.new("Tar")
+    if bpy.app.version < (5, 0):
+        material.use_nodes = True
+    shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    shader.inputs["Base Color"].default_value = (0, 0, 0, 1)
+    for name in ("Specular IOR Level", "Specular"):
+        if name in shader.inputs:
+            shader.inputs[name].default_value = 0.0
+    bpy.data.objects["Floor"].data.materials.append(material)
+    found = [finding for finding in look(tmp_path).findings if finding.name == "Tar"]
+    assert [(finding.level, "black" in finding.message) for finding in found] == [(INFO, True)]
+
+
+def test_nothing_to_bake_is_an_error_not_an_exception(tmp_path: Path) -> None:
+    add_lamp("POINT", energy=10.0)
+    found = look(tmp_path)
+    assert found.findings[0].level == ERROR
+    assert "nothing to bake" in found.findings[0].message
+
+
+def test_the_worst_comes_first(tmp_path: Path) -> None:
+    room()
+    add_mesh("Pebble", [(0.01 * x, 0.01 * y, z) for x, y, z in QUAD], location=(0, 0, 0.5))
+    bpy.data.objects["Floor"].data.uv_layers.new(name="UV")
+    levels = [finding.level for finding in look(tmp_path, BakeSettings(keep_uvs=True)).findings]
+    assert levels == sorted(levels, key=(ERROR, WARNING, INFO).index)
+    assert len(levels) >= 3
+
+
+def test_many_triangles_take_a_moment_only(tmp_path: Path) -> None:
+    """As many as an office has, in as many objects: the aim is two seconds, processor time."""
+    room()
+    for number in range(100):
+        bpy.ops.mesh.primitive_uv_sphere_add(segments=20, ring_count=11, location=(3 * number, 5, 1))
+    start = time.process_time()
+    found = look(tmp_path)
+    assert found.scene_triangles > 39_000
+    assert time.process_time() - start < 2.0
+
+
+def test_the_operator_tells_and_the_panel_remembers() -> None:
+    build_cornell_box()
+    scene = bpy.context.scene
+    assert check_panel.last_check(scene) is None
+    assert bpy.ops.radiosity.check("EXEC_DEFAULT") == {"FINISHED"}
+    found = check_panel.last_check(scene)
+    assert found.objects == 7
+    assert dict(check_panel.figures(found))["Images"] == "1 × 512²"
+
+
+def test_only_an_odd_scene_that_was_never_seen_is_looked_at_first() -> None:
+    build_cornell_box()
+    assert not check_panel.look_first(bpy.context)
+    check_panel.forget_checks()
+    bpy.data.objects["Floor"].hide_set(True)
+    assert check_panel.look_first(bpy.context)
+    assert not check_panel.look_first(bpy.context)
+    check_panel.forget_checks()
+    bpy.context.scene.radiosity.last_bake = json.dumps(
+        {
+            "objects": 1,
+            "images": 1,
+            "solver": {"method": "hierarchical", "elements": 1, "links": 1, "rays": 1},
+            "seconds": 1.0,
+            "warnings": [],
+            "warning_count": 0,
+            "folder": "",
+        }
+    )
+    assert runtime.last_bake(bpy.context.scene) is not None
+    assert not check_panel.look_first(bpy.context)
+
+
+def test_the_command_line_checks_without_baking(tmp_path: Path) -> None:
+    add_mesh("Floor")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "dark.blend"))
+    command = [sys.executable, "-m", "radiosity_addon", "bake", str(tmp_path / "dark.blend"), "--check"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "Objects      1" in done.stdout
+    assert "has no light" in done.stdout
+    assert [path.name for path in tmp_path.iterdir()] == ["dark.blend"]

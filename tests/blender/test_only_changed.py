@@ -1,0 +1,202 @@
+"""*Changed*: new lightmaps for what differs from the last bake, and nothing else touched."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+import radiosity_addon
+from radiosity_addon.blender import runtime
+from radiosity_addon.blender.bake_record import mark_made, recorded_objects
+from tests.blender.scenes import add_lamp, add_mesh, shader_material
+
+
+@pytest.fixture(autouse=True)
+def room(tmp_path: Path) -> Iterator[Path]:
+    """A saved room of three objects, baked on one page; the folder of its lightmaps."""
+    radiosity_addon.register()
+    add_mesh("Floor", material=shader_material("Grey", "ShaderNodeBsdfDiffuse", Color=(0.5, 0.5, 0.5, 1)))
+    add_mesh("Shelf", location=(0, 0, 1), scale=(0.3, 0.3, 1))
+    add_mesh("Box", location=(1, 1, 0.5), scale=(0.2, 0.2, 1))
+    add_lamp("POINT", energy=100.0, transform={"location": (0, 0, 2)})
+    settings = bpy.context.scene.radiosity
+    settings.resolution, settings.quality, settings.scope = 32, "draft", "changed"
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
+    assert bake() == {"FINISHED"}
+    yield tmp_path / "lightmaps"
+    radiosity_addon.unregister()
+
+
+def bake() -> set[str]:
+    return bpy.ops.radiosity.bake("EXEC_DEFAULT", True)
+
+
+def shown() -> dict[str, str]:
+    """The lightmap file of every object that shows one."""
+    found = {}
+    for obj in recorded_objects():
+        images = set()
+        for material in obj.data.materials:
+            trees = [
+                material.node_tree,
+                *(n.node_tree for n in material.node_tree.nodes if n.type == "GROUP"),
+            ]
+            images |= {
+                node.image for tree in trees for node in tree.nodes if node.type == "TEX_IMAGE" and node.image
+            }
+        (image,) = images
+        found[obj.name] = Path(bpy.path.abspath(image.filepath)).name
+        assert (Path(bpy.path.abspath(image.filepath))).is_file()
+    return found
+
+
+def digests(folder: Path) -> dict[str, str]:
+    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in folder.glob("*.exr")}
+
+
+def uvs(name: str) -> np.ndarray:
+    layer = bpy.data.objects[name].data.uv_layers["Lightmap"]
+    values = np.empty(2 * len(layer.uv), dtype=np.float32)
+    layer.uv.foreach_get("vector", values)
+    return values
+
+
+ONE_PAGE = dict.fromkeys(("Floor", "Shelf", "Box"), "lightmap.exr")
+
+
+def test_the_first_bake_is_of_all(room: Path) -> None:
+    assert shown() == ONE_PAGE
+
+
+def test_without_a_change_nothing_is_done(room: Path) -> None:
+    before = digests(room), bpy.context.scene.radiosity.last_bake
+    assert bake() == {"CANCELLED"}
+    assert (digests(room), bpy.context.scene.radiosity.last_bake) == before
+    assert shown() == ONE_PAGE
+    # Nor after the file was saved and opened.
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
+    assert bake() == {"CANCELLED"}
+
+
+def test_a_moved_object_gets_a_new_lightmap_and_others_keep_theirs(room: Path) -> None:
+    page, floor = digests(room)["lightmap.exr"], uvs("Floor")
+    bpy.data.objects["Box"].location.x -= 0.5
+    assert bake() == {"FINISHED"}
+    assert shown() == {**ONE_PAGE, "Box": "lightmap_2.exr"}
+    assert digests(room)["lightmap.exr"] == page
+    np.testing.assert_array_equal(uvs("Floor"), floor)
+    report = json.loads((room / "report.json").read_text())
+    assert {entry["object"]: entry["image"] for entry in report["objects"]} == shown()
+    assert [entry["image"] for entry in report["pages"]] == ["lightmap_2.exr", "lightmap.exr"]
+    assert {entry["object"]: entry["atlas"] for entry in report["objects"]} == {
+        "Box": 0,
+        "Floor": 1,
+        "Shelf": 1,
+    }
+    last = runtime.last_bake(bpy.context.scene)
+    assert any("2 unchanged objects kept their lightmaps" in message for _, message in last.warnings)
+    # About as fine as before.
+    densities = [page["texels_per_metre"] for page in report["pages"]]
+    assert densities[0] == pytest.approx(densities[1], rel=0.3)
+    assert bake() == {"CANCELLED"}
+
+
+def test_again_and_again_and_restored(room: Path) -> None:
+    meshes = sorted(mesh.name for mesh in bpy.data.meshes if "(Lightmap)" not in mesh.name)
+    for step in (1, 2, 3):
+        bpy.data.objects["Box"].location.x -= 0.1 * step
+        assert bake() == {"FINISHED"}
+        assert set(shown().values()) <= {"lightmap.exr", "lightmap_2.exr", "lightmap_3.exr"}
+    assert len([image for image in bpy.data.images if image.name.startswith("lightmap")]) == 2
+    assert bpy.ops.radiosity.restore() == {"FINISHED"}
+    assert sorted(mesh.name for mesh in bpy.data.meshes) == meshes
+    assert [image.name for image in bpy.data.images if image.name.startswith("lightmap")] == []
+    assert not any(name.startswith(".earlier") for name in bpy.data.meshes.keys())  # noqa: SIM118
+
+
+def test_one_undo_brings_the_bake_before_back(room: Path) -> None:
+    bpy.data.objects["Box"].location.x -= 0.5
+    bpy.ops.ed.undo_push(message="Move")
+    assert bake() == {"FINISHED"}
+    bpy.ops.ed.undo()
+    assert shown() == ONE_PAGE
+
+
+def change_reflectance() -> None:
+    material = bpy.data.materials["Grey"]
+    node = next(node for node in material.node_tree.nodes if node.type == "BSDF_DIFFUSE")
+    node.inputs["Color"].default_value = (0.8, 0.1, 0.1, 1)
+
+
+def change_scale() -> None:
+    bpy.data.objects["Floor"].radiosity_texel_scale = 2.0
+
+
+def change_mesh() -> None:
+    record = bpy.data.objects["Floor"].radiosity_bake
+    record.original_mesh.vertices[0].co.z += 0.2
+
+
+@pytest.mark.parametrize("change", [change_reflectance, change_scale, change_mesh])
+def test_what_counts_as_a_change(change, room: Path) -> None:
+    change()
+    assert bake() == {"FINISHED"}
+    assert shown() == {**ONE_PAGE, "Floor": "lightmap_2.exr"}
+
+
+def change_lamp() -> None:
+    bpy.data.lights[0].energy = 50.0
+
+
+def change_quality() -> None:
+    bpy.context.scene.radiosity.seed = 3
+
+
+@pytest.mark.parametrize("change", [change_lamp, change_quality])
+def test_where_the_light_has_changed_all_are_lit_anew(change, room: Path) -> None:
+    page = digests(room)["lightmap.exr"]
+    change()
+    assert bake() == {"FINISHED"}
+    assert shown() == ONE_PAGE
+    assert digests(room)["lightmap.exr"] != page
+    assert bake() == {"CANCELLED"}
+
+
+def test_a_new_object_is_a_change(room: Path) -> None:
+    add_mesh("New", location=(-1, -1, 0.2), scale=(0.2, 0.2, 1))
+    assert bake() == {"FINISHED"}
+    assert shown() == {**ONE_PAGE, "New": "lightmap_2.exr"}
+
+
+def test_a_cancelled_one_leaves_the_earlier_bake(room: Path) -> None:
+    from radiosity_addon.blender.job import run_bake
+    from radiosity_addon.blender.output import OutputFolder
+    from radiosity_addon.blender.properties import settings_of
+
+    before = digests(room)
+    bpy.data.objects["Box"].location.x -= 0.5
+    job = run_bake(bpy.context, settings_of(bpy.context), OutputFolder(room), only_changed=True)
+    stages = []
+    while "apply" not in stages:
+        stages.append(next(job).stage)
+    job.close()
+    assert shown() == ONE_PAGE
+    assert digests(room) == before
+
+
+def test_objects_with_several_lightmaps_are_all_lit_anew(room: Path) -> None:
+    """As light groups have them, which are made together."""
+    image = bpy.data.images.new("lightmap_Kitchen", 4, 4)
+    mark_made(image)
+    (material,) = bpy.data.objects["Floor"].data.materials
+    material.node_tree.nodes.new("ShaderNodeTexImage").image = image
+    bpy.data.objects["Box"].location.x -= 0.5
+    assert bake() == {"FINISHED"}
+    assert shown() == ONE_PAGE

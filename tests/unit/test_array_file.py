@@ -1,0 +1,106 @@
+"""Files of arrays: what comes back is what was written, and what was not written so is refused."""
+
+from __future__ import annotations
+
+import json
+import struct
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from radiosity_addon import array_file
+from radiosity_addon.array_file import ArrayFileError, read_arrays, write_arrays
+
+MAGIC = b"TESTS"
+ARRAYS = [
+    np.arange(2_500_000, dtype=np.int32).reshape(-1, 2),  # more than a block
+    np.array([[0.5, -0.0], [np.inf, 1e-300]]),
+    np.zeros((0, 3), dtype=np.float32),
+    np.array([True, False, True]),
+    np.asfortranarray(np.arange(6.0).reshape(2, 3)),
+]
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    file = tmp_path / "some.arrays"
+    size = write_arrays(file, MAGIC, 3, {"told": ["ä", 0.1]}, ARRAYS)
+    assert size == file.stat().st_size
+    return file
+
+
+def test_arrays_come_back_as_they_were(path: Path) -> None:
+    told, arrays = read_arrays(path, MAGIC, 3)
+    assert told == {"told": ["ä", 0.1]}
+    for found, expected in zip(arrays, ARRAYS, strict=True):
+        assert found.dtype == expected.dtype
+        np.testing.assert_array_equal(found, expected)
+        assert found.flags.writeable
+
+
+def test_numbers_of_about_one_size_take_less_than_they_are(path: Path) -> None:
+    assert path.stat().st_size < 0.5 * sum(array.nbytes for array in ARRAYS)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.00001, 0.3, 0.999999])
+def test_what_is_cut_off_is_refused(path: Path, share: float) -> None:
+    content = path.read_bytes()
+    path.write_bytes(content[: int(share * len(content))])
+    with pytest.raises(ArrayFileError, match=r"cut off|damaged"):
+        read_arrays(path, MAGIC, 3)
+
+
+@pytest.mark.parametrize("at", [22, 54, 70, 5000, -1], ids=["digest", "length", "head", "array", "end"])
+def test_a_flipped_bit_is_noticed(path: Path, at: int) -> None:
+    content = bytearray(path.read_bytes())
+    content[at] ^= 4
+    path.write_bytes(content)
+    with pytest.raises(ArrayFileError, match="damaged"):
+        read_arrays(path, MAGIC, 3)
+
+
+def test_other_kinds_and_versions_are_refused(path: Path) -> None:
+    with pytest.raises(ArrayFileError, match="no such file"):
+        read_arrays(path, b"OTHERS", 3)
+    with pytest.raises(ArrayFileError, match="has version 3, and this is for version 4"):
+        read_arrays(path, MAGIC, 4)
+
+
+def forged(path: Path, head: dict, body: bytes) -> None:
+    """Write a file whose digest is right, whatever is in it."""
+    packed = zlib.compress(json.dumps(head).encode())
+    digest = array_file.hashlib.blake2b(packed + body, digest_size=32).digest()
+    path.write_bytes(struct.pack("<16sI32sQ", MAGIC, 3, digest, len(packed)) + packed + body)
+
+
+@pytest.mark.parametrize(
+    "entry",
+    [
+        {"kind": "object", "shape": [1], "blocks": [0]},
+        {"kind": "float64", "shape": [1 << 60], "blocks": [0]},
+        {"kind": "float64", "shape": [-1], "blocks": [0]},
+        {"kind": "float64", "shape": [2], "blocks": [99]},
+        {"kind": "float64", "shape": [2]},
+        "nothing of the kind",
+    ],
+    ids=["objects", "too large", "negative", "not there", "no blocks", "no entry"],
+)
+def test_a_file_that_was_forged_is_refused(tmp_path: Path, entry: object) -> None:
+    path = tmp_path / "forged"
+    forged(path, {"told": None, "arrays": [entry]}, b"")
+    with pytest.raises(ArrayFileError, match="damaged"):
+        read_arrays(path, MAGIC, 3)
+
+
+def test_no_more_is_unpacked_than_there_is_room_for(tmp_path: Path) -> None:
+    path, bomb = tmp_path / "bomb", zlib.compress(bytes(10_000_000))
+    forged(path, {"told": None, "arrays": [{"kind": "uint8", "shape": [4], "blocks": [len(bomb)]}]}, bomb)
+    _, (array,) = read_arrays(path, MAGIC, 3)
+    np.testing.assert_array_equal(array, [0, 0, 0, 0])
+
+
+def test_objects_cannot_be_written(tmp_path: Path) -> None:
+    with pytest.raises(TypeError, match="cannot be stored"):
+        write_arrays(tmp_path / "some", MAGIC, 3, None, [np.array([object()])])

@@ -1,0 +1,211 @@
+"""Sidecars: a stored bake gives the same lightmaps, for the same scene and no other."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from radiosity_addon.array_file import read_arrays, write_arrays
+from radiosity_addon.bake_scene import BakeResult, BakeScene
+from radiosity_addon.errors import BakeError, SceneError
+from radiosity_addon.fingerprint import check_same, fingerprint
+from radiosity_addon.pipeline import bake_and_keep
+from radiosity_addon.plain_objects import flatten, restore
+from radiosity_addon.relight_check import aligned, dark, strengths_in
+from radiosity_addon.relighting import KeptBake, relight
+from radiosity_addon.responses import Responses
+from radiosity_addon.settings import BakeSettings
+from radiosity_addon.sidecar import MAGIC, VERSION, read_sidecar, write_sidecar
+from radiosity_addon.solver import PointLight, Scene
+from radiosity_addon.solver.environment import EnvironmentImage
+from radiosity_addon.solver.steps import drain
+from tests.relit_rooms import BAKED, CHANGED, NAMES, lit_bake
+from tests.textured_rooms import furnace
+from tests.unit.texel_scenes import bake_scene
+
+SETTINGS = BakeSettings(resolution=32, quality="draft")
+
+
+@pytest.fixture(scope="module")
+def room() -> tuple[BakeResult, KeptBake]:
+    return drain(bake_and_keep(lit_bake(), SETTINGS))
+
+
+@pytest.fixture
+def path(room: tuple[BakeResult, KeptBake], tmp_path: Path) -> Path:
+    result, kept = room
+    file = tmp_path / "lightmap.relight"
+    assert write_sidecar(file, kept, result, "mark") == file.stat().st_size
+    return file
+
+
+def all_pixels(kept: KeptBake, strengths: np.ndarray) -> bytes:
+    return b"".join(page.pixels.tobytes() for page in drain(relight(kept, strengths)))
+
+
+def fresh(kept: KeptBake) -> KeptBake:
+    """A kept bake that has not been lit anew yet."""
+    return replace(kept, lit=replace(kept.lit, earlier=kept.lit.earlier.first()))
+
+
+def test_a_stored_bake_gives_the_same_lightmaps_to_the_last_bit(
+    room: tuple[BakeResult, KeptBake], path: Path
+) -> None:
+    _, kept = room
+    stored = read_sidecar(path)
+    assert (stored.mark, stored.settings) == ("mark", SETTINGS)
+    # The scene that it is tied to is lit otherwise by now.
+    again = stored.kept(lit_bake(CHANGED))
+    assert again.names == NAMES
+    np.testing.assert_array_equal(again.strengths, BAKED)
+    np.testing.assert_array_equal(strengths_in(again, lit_bake(CHANGED)), CHANGED)
+    assert all_pixels(again, CHANGED) == all_pixels(fresh(kept), CHANGED)
+
+
+def test_the_layout_of_the_bake_is_stored_with_it(room: tuple[BakeResult, KeptBake], path: Path) -> None:
+    result, _ = room
+    stored = read_sidecar(path).result(lit_bake(CHANGED), result.pages)
+    for found, expected in zip(stored.objects, result.objects, strict=True):
+        assert (found.object.name, found.page) == (expected.object.name, expected.page)
+        np.testing.assert_array_equal(found.uv, expected.uv)
+    assert stored.solver["elements"] == result.solver["elements"]
+    assert json.dumps(stored.atlas) == json.dumps(result.atlas)
+
+
+def test_textures_and_darkness_are_stored_too(tmp_path: Path) -> None:
+    """A textured room, once lit and once baked without any light."""
+    path = tmp_path / "lightmap.relight"
+    triangles, grey = lit_bake().scene.triangles[:10], np.full((10, 3), 0.5)
+    lamp = PointLight((1.0, 1.0, 1.0), 0.0, radius=0.05, name="Lamp")
+    unlit = bake_scene(Scene(triangles, grey, 0.0 * grey, lights=[lamp]), ("Room", 10))
+    for scene, strength in ((bake_scene(furnace(3.0), ("Room", 12)), None), (unlit, np.full((1, 3), 9.0))):
+        wanted = BakeSettings(resolution=12, quality="draft", quantity="radiosity")
+        result, kept = drain(bake_and_keep(scene, wanted))
+        write_sidecar(path, kept, result, "mark")
+        strengths = 2.0 * kept.strengths if strength is None else strength
+        found = all_pixels(read_sidecar(path).kept(scene), strengths)
+        assert found == all_pixels(fresh(kept), strengths)
+        assert np.frombuffer(found, dtype=np.float32).any()
+
+
+def test_damaged_and_missing_sidecars_are_refused_in_one_line(path: Path) -> None:
+    content = path.read_bytes()
+    for wrong, why in (
+        (content[:-20], "it is damaged"),
+        (content[:30], "it is cut off"),
+        (content[:-1] + bytes([content[-1] ^ 1]), "it is damaged"),
+        (b"PK" + content[2:], "it is no such file"),
+        (content[:16] + bytes([VERSION + 1]) + content[17:], f"it has version {VERSION + 1}"),
+    ):
+        path.write_bytes(wrong)
+        with pytest.raises(BakeError, match=f"'{path}' is not used: {why}") as caught:
+            read_sidecar(path)
+        assert "\n" not in str(caught.value)
+    path.unlink()
+    with pytest.raises(BakeError, match="there is no"):
+        read_sidecar(path)
+
+
+def moved(scene: BakeScene, name: str, amount: float = 1e-6) -> BakeScene:
+    item = next(item for item in scene.objects if item.name == name)
+    scene.scene.triangles[item.rows] += amount
+    return scene
+
+
+def painted(scene: BakeScene, name: str) -> BakeScene:
+    item = next(item for item in scene.objects if item.name == name)
+    scene.scene.reflectance[item.rows] *= 0.999
+    return scene
+
+
+def renamed(scene: BakeScene, name: str) -> BakeScene:
+    objects = [replace(item, name="Other" if item.name == name else item.name) for item in scene.objects]
+    return replace(scene, objects=tuple(objects))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (moved, "object 'Box' has moved, or changed its shape"),
+        (painted, "object 'Box' reflects otherwise"),
+        (renamed, "object 'Box' is not there any more"),
+    ],
+)
+def test_another_scene_is_refused_by_name(path: Path, change: object, message: str) -> None:
+    stored = read_sidecar(path)
+    with pytest.raises(SceneError, match=message):
+        stored.kept(change(lit_bake(CHANGED), "Box"))  # type: ignore[operator]
+
+
+def test_an_object_that_was_not_there_is_named() -> None:
+    with pytest.raises(SceneError, match="object 'Other' was not there"):
+        check_same({**fingerprint(lit_bake())}, added())
+
+
+def added() -> BakeScene:
+    scene = lit_bake()
+    return replace(scene, objects=(*scene.objects, replace(scene.objects[-1], name="Other", count=0)))
+
+
+def test_signs_of_zero_do_not_count() -> None:
+    other = lit_bake()
+    other.scene.triangles[other.scene.triangles == 0.0] = -0.0
+    check_same(fingerprint(lit_bake()), other)
+
+
+def test_lamps_that_are_gone_are_dark_and_new_ones_refused() -> None:
+    before = lit_bake().scene.lights
+    found = aligned(before, before[2:])
+    assert [light.name for light in found] == [light.name for light in before]
+    np.testing.assert_array_equal([light.strength for light in found[:2]], np.zeros((2, 3)))
+    assert found[2:] == before[2:]
+    with pytest.raises(SceneError, match="'Moon' is new"):
+        aligned(before, (*before, PointLight((0, 0, 0), 1.0, name="Moon")))
+    with pytest.raises(SceneError, match="there are 1 lights 'World', and there were 2"):
+        aligned(before, before[:3])
+    assert not dark(EnvironmentImage(2.0, np.ones((4, 8)), name="Sky")).strength.any()
+
+
+def test_only_known_classes_come_back_and_nothing_of_theirs_is_called(tmp_path: Path) -> None:
+    class Loud:
+        kept = 1
+
+        def __init__(self) -> None:
+            raise AssertionError("was called")
+
+        __setattr__ = __reduce__ = __init__  # type: ignore[assignment]
+
+    told, arrays = flatten([1, (2.5, None)], {})
+    told["objects"] = [{"class": "Loud", "has": {"kept": 3}}]
+    told["tree"] = {"object": 0}
+    assert restore(told, arrays, {Loud: ("kept",)}, {}).kept == 3
+    told["objects"][0]["has"]["other"] = 4
+    with pytest.raises(ValueError, match="unknown attribute"):
+        restore(told, arrays, {Loud: ("kept",)}, {})
+    write_arrays(tmp_path / "forged", MAGIC, VERSION, told, arrays)
+    assert read_arrays(tmp_path / "forged", MAGIC, VERSION)[0] == told
+    with pytest.raises(BakeError, match="damaged"):
+        read_sidecar(tmp_path / "forged")
+
+
+def test_objects_that_are_shared_stay_shared(path: Path) -> None:
+    kept = read_sidecar(path).kept(lit_bake())
+    assert kept.solved.sources is kept.solved.local.sources
+
+
+def test_pages_are_sums_of_what_sources_add(room: tuple[BakeResult, KeptBake]) -> None:
+    result, kept = room
+    responses = Responses(kept, BAKED, result.pages)
+    assert responses.missing(BAKED) == []
+    np.testing.assert_array_equal(responses.pages(BAKED)[0], result.pages[0].pixels)
+    assert responses.missing(CHANGED) == [0, 1, 2, 3, 4, 5]
+    for source in responses.missing(CHANGED):
+        drain(responses.steps(source))
+    (exact,) = drain(relight(kept, CHANGED))
+    found = responses.pages(CHANGED)[0]
+    assert np.sqrt(((found - exact.pixels) ** 2).mean()) < 2e-3 * exact.pixels.mean()
+    assert (found >= 0).all()
