@@ -17,7 +17,7 @@ from . import runtime
 from .operators import output_folder
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Unused:
     """What nothing shows any more.
 

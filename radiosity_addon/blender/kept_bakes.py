@@ -15,13 +15,14 @@ from bpy.app.handlers import persistent
 
 from .bake_record import is_made
 from .image_marks import GROUP, MARK, PAGE
+from .relight_properties import relight_of
 
 if TYPE_CHECKING:
     from ..relighting import KeptBake
     from ..solver.arrays import Array
 
 
-@dataclass
+@dataclass(eq=False, repr=False)
 class InMemory:
     """A kept bake.
 
@@ -44,7 +45,7 @@ _kept: dict[str, InMemory] = {}
 
 def mark_of(scene: bpy.types.Scene) -> str:
     """Return the mark of the bake that a scene shows and that can be lit anew; "" if there is none."""
-    return str(scene.radiosity_relight.mark)
+    return str(relight_of(scene).mark)
 
 
 def set_mark(scene: bpy.types.Scene, mark: str) -> None:
@@ -69,6 +70,8 @@ def put(scene: bpy.types.Scene, mark: str, bake: KeptBake) -> InMemory:
 def drop(scene: bpy.types.Scene) -> None:
     """Forget the scene's bake, in memory and in the scene."""
     _kept.pop(mark_of(scene), None)
+    if not scene.is_property_set("radiosity_relight"):
+        return
     group = scene.radiosity_relight
     group.property_unset("mark")
     group.property_unset("strengths")

@@ -17,7 +17,7 @@ STAND_IN_SUFFIX = " (Lightmap)"
 """What the name of an object ends with that shows the lightmap of an instance."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class KeptDetails:
     """Of one bake.
 

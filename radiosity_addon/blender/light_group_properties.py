@@ -27,7 +27,7 @@ _DESCRIPTIONS = (
 )
 
 
-@dataclass
+@dataclass(eq=False, repr=False)
 class ListedGroup:
     """One light group of a scene, as the panel lists it."""
 
@@ -39,8 +39,10 @@ class ListedGroup:
     worlds: int = 0
 
 
-@dataclass
+@dataclass(eq=False, repr=False)
 class _Cache:
+    """What was found last: without this text the decorator would work one out, slowly."""
+
     scene: str = ""
     made: float = float("-inf")
     groups: list[ListedGroup] = field(default_factory=list)

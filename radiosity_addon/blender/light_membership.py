@@ -21,7 +21,7 @@ def name_on(owner: bpy.types.ID | None) -> str:
     return str(getattr(owner, NAME, "")).strip()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class PlaceGroups:
     """The names that hold for all that one object, or one instance of it, shows.
 

@@ -31,7 +31,7 @@ GROUP = "radiosity_group_shown"
 WHITE = (1.0, 1.0, 1.0, 1.0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Sliders:
     """What is set of one light group."""
 

@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 
 
-@dataclass
+@dataclass(eq=False, repr=False)
 class State:
     """Of this session.
 

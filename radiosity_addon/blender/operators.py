@@ -14,7 +14,7 @@ from . import kept_bakes, live_state, live_view, runtime
 from .check_panel import look_first
 from .preferences import folder_of
 from .properties import settings_of
-from .relight_properties import keeps
+from .relight_properties import keeps, relight_of
 from .window_job import WindowJob, redraw_sidebars
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ class RADIOSITY_OT_bake(WindowJob, bpy.types.Operator):
 
         if not keeps(scene, settings):
             return None
-        chosen = scene.radiosity_relight
+        chosen = relight_of(scene)
         held = kept_bakes.find(scene) if chosen.only_moved else None
         return Keeping(chosen.sidecar, earlier=None if held is None else held.bake)
 

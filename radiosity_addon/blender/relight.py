@@ -24,6 +24,7 @@ from . import kept_bakes
 from .export import export_scene
 from .kept_bakes import InMemory
 from .rebake import originals_shown
+from .relight_properties import relight_of
 from .relit_images import rewrite
 from .relit_materials import refresh
 
@@ -149,7 +150,7 @@ def note_shown(scene: bpy.types.Scene, held: InMemory, strengths: Array) -> None
 def _noted(scene: bpy.types.Scene, held: InMemory) -> Array:
     """Return the strengths that the scene says its lightmaps show: those of the bake if it says none."""
     try:
-        noted = np.array(json.loads(scene.radiosity_relight.strengths), dtype=np.float64)
+        noted = np.array(json.loads(relight_of(scene).strengths), dtype=np.float64)
     except (ValueError, TypeError):
         return held.bake.strengths
     return noted if noted.shape == held.bake.strengths.shape else held.bake.strengths

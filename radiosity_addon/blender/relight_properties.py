@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import bpy
 
 from ..settings import BakeSettings
@@ -47,11 +50,20 @@ class RelightSettings(bpy.types.PropertyGroup):
     )
 
 
+def relight_of(scene: bpy.types.Scene) -> Any:
+    """Return the scene's settings to read: Blender would add a group to the file where there is none yet."""
+    if scene.is_property_set("radiosity_relight"):
+        return scene.radiosity_relight
+    properties = RelightSettings.bl_rna.properties
+    names = ("keep", "sidecar", "only_moved", "mark", "strengths")
+    return SimpleNamespace(**{name: properties[name].default for name in names})
+
+
 def keeps(scene: bpy.types.Scene, settings: BakeSettings) -> bool:
     """Tell whether a bake of the scene from the panel is to be kept, and can be."""
     from ..keeping import can_keep
 
-    chosen = scene.radiosity_relight
+    chosen = relight_of(scene)
     return bool(chosen.keep or chosen.sidecar) and can_keep(settings)
 
 

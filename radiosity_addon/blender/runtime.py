@@ -20,7 +20,7 @@ MAX_WARNINGS = 100
 """A scene keeps this many of the last bake's warnings; the report has them all."""
 
 
-@dataclass
+@dataclass(eq=False, repr=False)
 class Running:
     """The bake that is going on in this Blender, if any."""
 
@@ -44,8 +44,10 @@ class LastBake:
     folder: str = ""
 
 
-@dataclass
+@dataclass(eq=False, repr=False)
 class _Cache:
+    """What was found last: without this text the decorator would work one out, slowly."""
+
     text: str = ""
     parsed: LastBake | None = None
 
