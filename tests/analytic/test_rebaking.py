@@ -210,6 +210,13 @@ def test_other_changes_are_refused(kept: KeptBake) -> None:
     named = replace(plain, objects=(replace(plain.objects[0], name="Hall"), *plain.objects[1:]))
     with pytest.raises(SceneError, match="added, removed or renamed"):
         moved_objects(kept, named)
+    uv = kept.geometry.uv
+    laid_out = laid_out_as(plain, uv)
+    assert moved_objects(kept, laid_out) == ("Box",)
+    with pytest.raises(SceneError, match="'Room' has other lightmap coordinates"):
+        moved_objects(kept, laid_out_as(plain, 0.5 * uv))
+    with pytest.raises(SceneError, match="'Room' has other lightmap coordinates"):
+        moved_objects(replace(kept, bake_scene=laid_out), plain)
     mesh = replace(plain.objects[1], polygon=plain.objects[1].polygon[::-1])
     with pytest.raises(SceneError, match="'Box' has another mesh"):
         moved_objects(kept, replace(plain, objects=(plain.objects[0], mesh, plain.objects[2])))
