@@ -25,7 +25,7 @@ def main() -> int:
     cases = SMALL_CASES if options.small else CASES
     output = options.output or (ROOT / "out" / "bench" if options.small else ROOT / "bench" / "results")
     cache = options.cache or (ROOT / "out" / "bench" / "cache" if options.small else DEFAULT_CACHE)
-    bench = Bench(cache, output, options.small, options.threads or os.cpu_count() or 1)
+    bench = Bench(cache, output, options.small, options.threads or os.cpu_count() or 1, options.presets)
     names = options.case or [*cases, ROOMS]
     if options.table:
         return 0 if report.update_readme(output, ROOT / "README.md") else 1
@@ -67,6 +67,7 @@ def parser() -> argparse.ArgumentParser:
     add(
         "--small", action="store_true", help="small versions, in a minute, to out/bench: that everything runs"
     )
+    add("--presets", action="store_true", help="draft, medium and high alone, no errors that are asked for")
     add("--references", action="store_true", help="only make what is cached: scenes and references")
     add("--calibrate", action="store_true", help="vary each setting alone, for what the error setting needs")
     add("--table", action="store_true", help="only write the README's table from the results that are there")

@@ -36,12 +36,15 @@ class Bench:
         Results.
     small : bool
     threads : int
+    presets : bool
+        Draft, medium and high alone, no errors that are asked for.
     """
 
     cache: Path
     output: Path
     small: bool
     threads: int
+    presets: bool = False
     busy_elsewhere: list[float] = field(default_factory=list)
     """Cores that others kept busy during each measurement."""
 
@@ -143,7 +146,7 @@ def compare(bench: Bench, case: Case) -> dict[str, Any]:
 
 
 def _runs(bench: Bench, case: Case) -> tuple[dict[str, Any], ...]:
-    return case.runs if bench.small else with_asked_errors(case)
+    return case.runs if bench.small or bench.presets else with_asked_errors(case)
 
 
 def our_bake(bench: Bench, prepared: Prepared, run: dict[str, Any], pixels: Path) -> dict[str, Any]:
