@@ -113,6 +113,7 @@ def _moved(kept: KeptBake, bake_scene: BakeScene) -> list[BakeObject]:
     if kept.moves is None:
         raise SceneError("the kept bake can be lit anew, but nothing in it moved; bake again")
     _check_objects(kept.bake_scene, bake_scene)
+    _check_layout(kept, bake_scene)
     _check_surfaces(kept.bake_scene, bake_scene)
     before, now = kept.bake_scene.scene, bake_scene.scene
     if len(before.lights) != len(now.lights):
@@ -134,6 +135,16 @@ def _check_objects(before: BakeScene, now: BakeScene) -> None:
         same = same and np.array_equal(was.polygon, item.polygon) and np.array_equal(was.loops, item.loops)
         if not same:
             raise SceneError(f"object '{item.name}' has another mesh, or is baked otherwise; bake again")
+
+
+def _check_layout(kept: KeptBake, now: BakeScene) -> None:
+    """Refuse lightmap coordinates of objects' own that are others than when the bake was kept."""
+    for was, item in zip(kept.bake_scene.objects, now.objects, strict=True):
+        if item.uv is None and was.uv is None:
+            continue
+        laid_out = kept.geometry.uv[item.rows] if was.uv is None else was.uv
+        if item.uv is None or (item.bake and not np.array_equal(item.uv, laid_out)):
+            raise SceneError(f"object '{item.name}' has other lightmap coordinates; bake again")
 
 
 def _check_surfaces(before: BakeScene, now: BakeScene) -> None:

@@ -40,7 +40,7 @@ class RelightSettings(bpy.types.PropertyGroup):
         description="When nothing but places of objects has changed since a bake that is still in memory, "
         "bake anew only what they touch: the same light in less than half of the time. The layout of the "
         "lightmaps stays",
-        default=False,
+        default=True,
     )
     mark: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Mark", description="Which bake the scene shows", options={"HIDDEN"}

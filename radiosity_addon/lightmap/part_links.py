@@ -135,6 +135,11 @@ class KnownParts:
         """Of each to every lamp."""
         return SHADOW_RAYS * self.rays // RAYS
 
+    def take(self, chosen: Array) -> KnownParts:
+        """Return those of some parts, row numbers or a mask."""
+        gains = None if self.gains is None else self.gains.take(chosen)
+        return KnownParts(self.is_leaf, self.part[chosen], self.sources[chosen], gains)
+
 
 def gather_parts(
     numbers: HitNumbers,
@@ -155,7 +160,7 @@ def gather_parts(
     reflectance : (n, 3)
         Theirs.
     known : sequence of KnownParts
-        Those that need not be asked.
+        Those that need not be asked. Those that nothing meets are left out.
 
     Returns
     -------
@@ -166,8 +171,10 @@ def gather_parts(
     gathering = _Gathering(numbers, resolve, known)
     gathering.count(links.sources)
     gathering.count(links.aimed.sources)
+    gathering.take_up()
     for turn in range(ROUNDS):
         yield from scaled(gathering.ask_new(), 0.7 * turn / ROUNDS, 0.7 * (turn + 1) / ROUNDS)
+        gathering.take_up()
     made, of = yield from scaled(gathering.links(element, reflectance), 0.7, 1.0)
     start, rows = values_of(numbers.local.reflected(), of), gathering.rows
     aimed = replace(links.aimed, sources=rows(links.aimed.sources))
@@ -196,15 +203,27 @@ class _Gathering:
         self._local, self._cells = numbers.local, numbers.cells
         self._met = np.zeros(numbers.end - numbers.texel_count, dtype=np.int32)
         self._asked = np.zeros(len(self._met), dtype=bool)
-        self._found = list(known)
-        for some in known:
-            self._asked[some.part] = True
-            self.count(some.sources)
+        self._found: list[KnownParts] = []
+        self._known = [(some, np.zeros(len(some.part), dtype=bool)) for some in known]
 
     def count(self, sources: Array) -> None:
         """Note which parts were met."""
         parts = sources[sources >= self._numbers.texel_count] - self._numbers.texel_count
         self._met += np.bincount(parts, minlength=len(self._met)).astype(np.int32)
+
+    def take_up(self) -> None:
+        """Take the known parts that were met, and those that these met in turn.
+
+        What nobody meets any more has no row in the table.
+        """
+        more = True
+        while more:
+            more = False
+            for some, taken in self._known:
+                met = np.flatnonzero(~taken & (self._met[some.part] > 0))
+                if len(met):
+                    more = taken[met] = self._asked[some.part[met]] = True
+                    self.count(some.sources[met])
 
     def ask_new(self) -> Generator[float, None, None]:
         """Look from the parts that were met but not asked yet; yields the fraction done."""
@@ -254,8 +273,9 @@ class _Gathering:
         of_cells = self._numbers.cell(self.small[len(of_leaves) :])
         whole = np.arange(self._numbers.elements - first)
         start = [whole, local.parts.leaf_of(of_leaves), element[cells.texel_of(of_cells)]]
-        made, count = [], max(len(self._found), 1)
-        for done, found in enumerate(self._found):
+        asked = [*(some.take(taken) for some, taken in self._known if taken.any()), *self._found]
+        made = []
+        for done, found in enumerate(asked):
             part = found.part
             if found.is_leaf:
                 share = local.part_reflectance(part)
@@ -265,7 +285,7 @@ class _Gathering:
                 gains = local.new_gains(len(part))
                 at = lit_footprints(self._numbers, found)
                 direct = local.direct_steps(at, found.shadow_rays, gains)
-                lamps = yield from scaled(direct, done / count, (done + 1) / count)
+                lamps = yield from scaled(direct, done / len(asked), (done + 1) / len(asked))
             else:
                 gains, lamps = found.gains, local.lit_by(found.gains)
             rows = self.rows(first + part), self.rows(found.sources)
@@ -312,6 +332,7 @@ class PartSweeps:
         self._links, self._surfaces = parts.links, texel_count + len(parts.start)
         self._texel_count = texel_count
         self._means = [Means(links.sources, links.lamps.shape[1], threads) for links in parts.links]
+        self._unseen: Array | None = None
 
     def lit_or_unknown(self, direct: Array) -> Array:
         """Return (table rows − beyond,) bool: what direct light (n, 3) meets, and parts that gather none."""
@@ -341,7 +362,7 @@ class PartSweeps:
         still : float
             Rows that would change by less stay as they are.
         """
-        fresh = changed.copy()
+        fresh = changed.copy() if self._unseen is None else changed | self._unseen
         for _ in range(SWEEPS):
             news = []
             for links, means in zip(self._links, self._means, strict=True):
@@ -350,9 +371,11 @@ class PartSweeps:
                 moved = np.abs(reflected - table[links.rows]).max(axis=1) > still
                 if moved.any():
                     news.append((links.rows[moved], reflected[moved]))
-            if not news:
-                break
             fresh[:] = False
             for rows, values in news:
                 table[rows] = values
                 fresh[rows] = changed[rows] = True
+            if not news:
+                break
+        # What changed last no part has seen yet: the next call begins with it.
+        self._unseen = fresh

@@ -135,7 +135,7 @@ class TexelCells:
             own &= self._below_hood(texel[rows], points) == below[rows, None]
             return np.asarray(np.where(own[..., None], points, back))
 
-        return Footprints(anchor, geometry.normal[texel], len(geometry) + cell, sample, starts=STARTS)
+        return Footprints(anchor, geometry.normal[texel], self._keys(cell), sample, starts=STARTS)
 
     def upright(self, cell: Array) -> Array:
         """Return (p, 3) the normals of the triangles that cells are on."""
@@ -153,7 +153,12 @@ class TexelCells:
         texel, geometry = self.texel_of(cell), self._geometry
         expected = self.local.irradiance_at(geometry.triangle[texel], geometry.barycentric[texel])
         anchor = self._anchors[cell // CELLS, cell % CELLS] - self._lift(texel)
-        return Footprints(anchor, geometry.normal[texel], len(geometry) + cell, expected=expected)
+        return Footprints(anchor, geometry.normal[texel], self._keys(cell), expected=expected)
+
+    def _keys(self, cell: Array) -> Array:
+        """Return (p,) int64 what cells' rays are drawn by: the same whichever other texels are divided."""
+        texel = self.texel_of(cell).astype(np.int64)
+        return np.asarray(len(self._geometry) + CELLS * texel + cell % CELLS)
 
     def _below_hood(self, texel: Array, points: Array) -> Array:
         """Return (n, k) whether (n, k, 3) points of texels at a rim are below the hood; False elsewhere."""

@@ -146,6 +146,33 @@ def test_no_light_comes_along_into_a_sealed_box() -> None:
     assert found[~inside].mean() > 0.1
 
 
+def shelves(at: float) -> BakeScene:
+    """A room, red shelves without a lightmap that cut their back, and a block before them."""
+    walls, _ = box_room((3.0, 2.0, 1.6))
+    boards = [solid_box((0.0, 0.2, z), (0.25, 1.8, z + 0.02)) for z in (0.3, 0.6, 0.9, 1.2)]
+    case = np.concatenate([solid_box((0.02, 0.1, 0.1), (0.06, 1.9, 1.5)), *boards])
+    block = solid_box((at, 0.7, 0.4), (at + 0.3, 1.2, 1.0))
+    triangles = np.concatenate([walls, case, block])
+    reflectance = grey(len(triangles), 0.6)
+    reflectance[12 : 12 + len(case)] = (0.8, 0.2, 0.1)
+    lamp = PointLight((1.5, 1.0, 1.2), 20.0, radius=0.05)
+    scene = Scene(triangles, reflectance, grey(len(triangles), 0.0), lights=(lamp,))
+    return bake_scene(scene, ("Room", 12), ("Shelves", len(case), None, False), ("Block", 12))
+
+
+def test_parts_that_nothing_meets_any_more_are_left_out() -> None:
+    """Else they wrote what they reflect to the row that stands for nothing, and a second move failed."""
+    first, kept = drain(bake_and_keep(shelves(1.9), SETTINGS))
+    _, after = drain(bake_moved(kept, shelves(0.8)))
+    rows = np.concatenate([links.rows for links in after.lit.transport.parts.links])
+    assert rows.min() >= len(after.geometry)
+    before = np.concatenate([links.rows for links in kept.lit.transport.parts.links])
+    old, new = (some.moves.traced.numbered(of) for some, of in ((kept, before), (after, rows)))
+    assert np.setdiff1d(old, new).size > 0
+    back, _ = drain(bake_moved(after, shelves(1.9)))
+    assert relative(pixels(back), pixels(first)) < 0.01
+
+
 def test_what_moved_is_told_by_name(kept: KeptBake) -> None:
     assert moved_objects(kept, room()) == ()
     assert moved_objects(kept, room(turn=1.0)) == ("Box",)
@@ -183,6 +210,13 @@ def test_other_changes_are_refused(kept: KeptBake) -> None:
     named = replace(plain, objects=(replace(plain.objects[0], name="Hall"), *plain.objects[1:]))
     with pytest.raises(SceneError, match="added, removed or renamed"):
         moved_objects(kept, named)
+    uv = kept.geometry.uv
+    laid_out = laid_out_as(plain, uv)
+    assert moved_objects(kept, laid_out) == ("Box",)
+    with pytest.raises(SceneError, match="'Room' has other lightmap coordinates"):
+        moved_objects(kept, laid_out_as(plain, 0.5 * uv))
+    with pytest.raises(SceneError, match="'Room' has other lightmap coordinates"):
+        moved_objects(replace(kept, bake_scene=laid_out), plain)
     mesh = replace(plain.objects[1], polygon=plain.objects[1].polygon[::-1])
     with pytest.raises(SceneError, match="'Box' has another mesh"):
         moved_objects(kept, replace(plain, objects=(plain.objects[0], mesh, plain.objects[2])))

@@ -27,6 +27,7 @@ def room(tmp_path: Path) -> Iterator[Path]:
     add_lamp("POINT", energy=100.0, transform={"location": (0, 0, 2)})
     settings = bpy.context.scene.radiosity
     settings.resolution, settings.quality, settings.scope = 32, "draft", "changed"
+    bpy.context.scene.radiosity_relight.only_moved = False
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
     assert bake() == {"FINISHED"}
     yield tmp_path / "lightmaps"
@@ -105,6 +106,17 @@ def test_a_moved_object_gets_a_new_lightmap_and_others_keep_theirs(room: Path) -
     # About as fine as before.
     densities = [page["texels_per_metre"] for page in report["pages"]]
     assert densities[0] == pytest.approx(densities[1], rel=0.3)
+    assert bake() == {"CANCELLED"}
+
+
+def test_all_lightmaps_follow_what_moved_while_that_is_kept(room: Path) -> None:
+    bpy.context.scene.radiosity_relight.only_moved = True
+    page, floor = digests(room)["lightmap.exr"], uvs("Floor")
+    bpy.data.objects["Box"].location.x -= 0.5
+    assert bake() == {"FINISHED"}
+    assert shown() == ONE_PAGE
+    assert digests(room)["lightmap.exr"] != page
+    np.testing.assert_array_equal(uvs("Floor"), floor)
     assert bake() == {"CANCELLED"}
 
 

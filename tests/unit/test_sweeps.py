@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from radiosity_addon.lightmap.interpolate import Interpolation
-from radiosity_addon.lightmap.part_links import Parts
+from radiosity_addon.lightmap.part_links import SWEEPS, PartLinks, Parts, PartSweeps
 from radiosity_addon.lightmap.reconstruct import GatherSettings, reconstruct
 from radiosity_addon.lightmap.source_means import Means, mean_of_sources
 from radiosity_addon.lightmap.stored_links import StoredLinks
@@ -148,3 +148,18 @@ def test_only_what_sees_a_change_is_asked_again() -> None:
     assert 0 < sees.sum() < len(sees)
     np.testing.assert_array_equal(found[sees], mean_of_sources(table, sources[sees]))
     np.testing.assert_array_equal(found[~sees], mean_of_sources(stale, sources[~sees]))
+
+
+def test_light_goes_on_along_parts_where_the_last_sweep_ended() -> None:
+    """A chain of parts of which only the first is lit, longer than there are sweeps among parts at once."""
+    texels, length = 100, 3 * SWEEPS
+    rows = texels + np.arange(length)
+    sources = np.concatenate([[NOTHING], rows[:-1]]).astype(np.int32)[:, None]
+    lamps = np.zeros((length, 3))
+    lamps[0] = 1.0
+    links = PartLinks(rows, sources, np.full((length, 3), 0.9), lamps)
+    sweeps = PartSweeps(Parts(np.zeros((length, 3)), [links]), texels, 1)
+    table = np.zeros((texels + length + 2, 3), dtype=np.float32)
+    for _ in range(length // SWEEPS):
+        sweeps.sweep(table, np.zeros(len(table), dtype=bool), 1e-6)
+    np.testing.assert_allclose(table[rows, 0], 0.9 ** np.arange(1, length + 1), rtol=1e-5)

@@ -135,3 +135,13 @@ def test_below_a_hood_only_what_is_below_it_answers() -> None:
     points = at_cells.sampler(every, np.random.default_rng(3).uniform(size=(len(every), 8, 2)))[..., 0] * SIZE
     below = (at_cells.points[:, 0] * SIZE > low) & (at_cells.points[:, 0] * SIZE < high)
     np.testing.assert_array_equal((points > low) & (points < high), np.repeat(below[:, None], 8, axis=1))
+
+
+def test_a_cell_draws_the_same_rays_whichever_other_texels_are_divided() -> None:
+    """Or rays of a kept bake could not be made again after something else moved onto the floor."""
+    alone, _ = cells_of(wall(5.5))
+    both, _ = cells_of(wall(2.5), wall(5.5))
+    number = alone.renumbered(both)
+    assert (number != np.arange(len(alone))).any()
+    np.testing.assert_array_equal(both.footprints(number).keys, alone.footprints(np.arange(len(alone))).keys)
+    assert len(np.unique(both.footprints(np.arange(len(both))).keys)) == len(both)
