@@ -1,4 +1,4 @@
-"""Switch the extension off and on with nothing of it loaded: how much processor time it takes, what it imports."""
+"""Switch the extension off and on with nothing of it loaded: its processor time, and what it imports."""
 
 import json
 import sys
