@@ -14,7 +14,6 @@ import numpy as np
 from .bake_details import statistics
 from .bake_scene import BakeObject, BakeResult, BakeScene, BakeWarning, Progress
 from .errors import SceneError
-from .lightmap.continued import join_continued
 from .lightmap.disturbance import Disturbance
 from .lightmap.moved import LitBefore, moved_steps
 from .pipeline import Lit, baked_objects, finish, staged, timed
@@ -85,7 +84,6 @@ def bake_moved(
     with timed(seconds, "light"):
         solved = carried(kept.solved, bake_scene.scene, bake_scene.emitter)
         geometry = kept.geometry.on(bake_scene.scene)
-        join_continued(geometry, solved.local.caster)
         rows = [np.arange(item.first, item.first + item.count) for item in moved]
         offset = solved.local.caster.surface_offset
         disturbance = Disturbance.of(kept.geometry, geometry, rows, offset)

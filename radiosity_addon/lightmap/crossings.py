@@ -147,13 +147,6 @@ def below_hood(geometry: TexelGeometry, caster: RayCaster, texel: Array, spots: 
     return np.asarray(~free.reshape(spots.shape[:2]))
 
 
-def free_inside(caster: RayCaster, square: Array) -> Array:
-    """Return (n,) whether nothing crosses (n, 4, 3) squares, but for a margin along their sides."""
-    middle = square.mean(axis=1, keepdims=True)
-    corners = middle + INSET * (square - middle)
-    return _segments_free(caster, corners, np.concatenate([_EDGES, _DIAGONALS]))
-
-
 def _segments_free(caster: RayCaster, corners: Array, segments: Array) -> Array:
     """Return (n,) whether all segments, pairs of (n, 4, 3) corners, meet nothing."""
     return np.asarray(_free(caster, corners[:, segments[:, 0]], corners[:, segments[:, 1]]).all(axis=1))

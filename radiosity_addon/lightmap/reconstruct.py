@@ -20,7 +20,6 @@ from ..solver.local_pass import NOTHING, Footprints, Gathered, LocalPass, Resolv
 from ..solver.scene import Scene
 from ..solver.steps import scaled
 from ..solver.visibility import Hits, sees
-from .continued import join_continued
 from .crossings import LIFT, Crossings, below_hood, crossing_steps
 from .earlier_light import EarlierLight
 from .interpolate import GatherPoints, fit_steps
@@ -86,7 +85,6 @@ def reconstruct(
     If `local` can ask for every light apart, what lights the texels anew is kept. `so_far` is told what is
     known on the way.
     """
-    join_continued(geometry, local.caster)
     gains = local.new_gains(len(geometry))
     lamps = np.zeros((len(geometry), 3))
     reflectance, emission = texel_materials(scene, geometry)

@@ -10,7 +10,7 @@ import numpy as np
 from ..solver.arrays import Array
 from ..solver.scene import Scene
 from ..solver.visibility import Hits, surface_offset
-from .rasterise import FOOTPRINT, Texels, centre_weights, sample_footprints
+from .rasterise import FOOTPRINT, Texels, sample_footprints
 
 NO_TEXEL = -1
 
@@ -45,7 +45,7 @@ class TexelGeometry:
     centre_inside : (n,) bool
         Whether the texel's centre is on its triangle.
     whole : (n,) bool
-        Whether all of the texel is: on its triangle, or on others too that go on in its plane.
+        Whether all of the texel is.
     barycentric : (n, 2) float32
         Weights of the triangle's second and third corner at the centre of the footprint.
     position, normal, surface_normal : (n, 3) float64
@@ -97,16 +97,6 @@ class TexelGeometry:
         # A shading normal that vanished or turned behind the surface says nothing.
         sane = (length[:, 0] > 1e-6) & (np.einsum("nk,nk->n", shading, upright) > 0)
         self.normal[rows] = np.where(sane[:, None], shading / np.maximum(length, 1e-6), upright)
-
-    def make_whole(self, rows: Array) -> None:
-        """Count texels (r,), in ascending order, as whole: other triangles cover what theirs does not."""
-        self.whole[rows] = True
-        for number, page in enumerate(self.texels):
-            first, last = np.searchsorted(rows, self._first[number : number + 2])
-            own = rows[first:last] - self._first[number]
-            triangle = self.triangle[rows[first:last]]
-            at = self.uv, page.resolution, triangle, page.row[own], page.column[own]
-            self._put(rows[first:last], centre_weights(*at))
 
     def __len__(self) -> int:
         return len(self.page)
