@@ -46,7 +46,8 @@ def test_light_reaches_into_a_gap_as_far_as_the_gap_is_high(reflectance: float) 
     assert floor_below.sum() == 8 * (SIZE - 4)
     # One ray of a point's 256 may find the mouth; what comes in goes to and fro.
     bounces = 1.0 / (1.0 - reflectance**2)
-    limit = bounces * (most + 1.0 / 256)
+    # So may one of a cell's 64, of texels that the board's edge divides: others see what it reflects.
+    limit = bounces * (most + 1.0 / 256) + reflectance / 64
     assert irradiance[floor_below].max() < limit
     assert irradiance[floor_below].mean() < bounces * most
     underside = (geometry.page == 1) & inner & (depth > TEXEL)
