@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 import numpy as np
 
@@ -55,18 +57,18 @@ def check(seed: int) -> bool:
 
 def _bake(settings: BakeSettings, seen: list[tuple[BakeScene, BakeResult]]) -> None:
     """Bake the open scene, and keep what the pipeline was given and gave."""
-    pipeline_bake = job.pipeline.bake
+    bake_steps = job.bake_steps
 
-    def watched(scene: BakeScene, asked: BakeSettings):
-        result = yield from pipeline_bake(scene, asked)
+    def watched(scene: BakeScene, *given: Any):
+        result, kept = yield from bake_steps(scene, *given)
         seen.append((scene, result))
-        return result
+        return result, kept
 
-    job.pipeline.bake = watched
+    job.bake_steps = watched
     try:
         drain(job.run_bake(bpy.context, settings, None))
     finally:
-        job.pipeline.bake = pipeline_bake
+        job.bake_steps = bake_steps
 
 
 def _check_texels(scene: BakeScene, result: BakeResult, settings: BakeSettings) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import radiosity_addon
-from radiosity_addon import pipeline
+from radiosity_addon.lightmap import texel_pages
 
 from .checks import check
 from .scenes import SCENES
@@ -64,8 +64,8 @@ def test_random_scenes(start: int) -> None:
 
 def test_a_wrong_bake_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """The checks can fail: handed darkness below zero they say so."""
-    real = pipeline.dilate
-    monkeypatch.setattr(pipeline, "dilate", lambda *given: real(*given) - np.float32(1e6))
+    real = texel_pages.dilate
+    monkeypatch.setattr(texel_pages, "dilate", lambda *given: real(*given) - np.float32(1e6))
     radiosity_addon.register()
     try:
         with pytest.raises(AssertionError, match="page 0 holds -"):
