@@ -132,24 +132,21 @@ class TexelGeometry:
     def sample(self, rows: Array, u: Array, width: float = FOOTPRINT) -> Array:
         """Return (r, k, 3) points spread over the middle `width` of r texels by u (r, k, 2)."""
         points = np.empty((len(rows), u.shape[1], 3))
-        # What is inside a texel that is whole in its plane needs no clipping.
+        # What is inside a texel that is whole on its triangle needs no clipping.
         inner = self.whole[rows] & ((width < 1.0) | ((u > 0.0) & (u < 1.0)).all(axis=(1, 2)))
         plain, cut = np.flatnonzero(inner), np.flatnonzero(~inner)
-        points[plain] = self.in_plane(rows[plain], 0.5 + (u[plain].astype(np.float64) - 0.5) * width)
+        points[plain] = self._in_plane(rows[plain], 0.5 + (u[plain].astype(np.float64) - 0.5) * width)
         corners = self._scene.triangles[self.triangle[rows[cut]]]
         points[cut] = _at(corners, self.sample_weights(rows[cut], u[cut], width))
         return points
 
     def squares(self, rows: Array) -> Array:
         """Return (r, 4, 3) the corners of whole texels, in their triangles' planes but not cut by them."""
-        return self.in_plane(rows, np.broadcast_to(_SQUARE, (len(rows), 4, 2)))
+        return self._in_plane(rows, np.broadcast_to(_SQUARE, (len(rows), 4, 2)))
 
-    def in_plane(self, rows: Array, spots: Array, triangle: Array | None = None) -> Array:
-        """Return (r, k, 3) points at places (r, k, 2) of texels as unit squares.
-
-        In the planes of the texels' own triangles, or of others (r,) of the same pages.
-        """
-        triangle = self.triangle[rows] if triangle is None else triangle
+    def _in_plane(self, rows: Array, spots: Array) -> Array:
+        """Return (r, k, 3) points in the triangles' planes at places (r, k, 2) of texels as unit squares."""
+        triangle = self.triangle[rows]
         start = np.stack([self.column[rows], self.row[rows]], axis=1) - self._places[triangle, :2]
         across, up = self._texel_edges
         points = spots[..., :1] * across[triangle, None]
