@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import os
-import shutil
 import sys
 from typing import NoReturn
 
 from .cli import main
+from .temporary import TemporaryFolder
 
 
-def leave(code: int) -> NoReturn:
+def leave(code: int, temporary: TemporaryFolder) -> NoReturn:
     """End the process without Blender's own clean-up, which crashes or hangs in some versions."""
-    blender = sys.modules.get("bpy")
-    if blender is not None:
-        # Of that clean-up this alone would be missed: Blender's folder for temporary files.
-        shutil.rmtree(blender.app.tempdir, ignore_errors=True)
+    # Of that clean-up this alone would be missed: Blender's temporary files, which are in our folder.
+    temporary.remove()
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(code)
 
 
 if __name__ == "__main__":
-    leave(main())
+    temporary = TemporaryFolder()
+    leave(main(), temporary)

@@ -16,6 +16,7 @@ from .console import Console
 from .errors import RadiosityError, UsageError
 from .interrupts import Interrupts
 from .methods import METHODS, SETTINGS
+from .permissions import Permissions
 from .settings import ATLASES, FORMATS, LIGHTS, QUALITIES, QUANTITIES, BakeSettings, GroupSetting
 
 EXIT_DONE = 0
@@ -294,6 +295,14 @@ def _add_restore(parser: argparse.ArgumentParser) -> None:
 
 def _add_common(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quiet", action="store_true", help="print errors only")
+    parser.add_argument(
+        "--overwrite",
+        action="store_true",
+        help="replace files that no bake of this scene has written; never those the scene reads",
+    )
+    parser.add_argument(
+        "--allow-scripts", action="store_true", help="run the scripts and drivers of the .blend: only if trusted"
+    )
 
 
 def _run(
@@ -306,20 +315,21 @@ def _run(
         return _fail(
             f"{error.name} is not installed; run this through build.py or inside Blender", EXIT_FAILED
         )
+    allowed = Permissions(request.overwrite, request.allow_scripts)
     try:
         with Console(quiet=request.quiet) as console:
             if settings is not None and request.check:
-                return commands.check(request.scene, loaded, request.output, settings, console)
+                return commands.check(request.scene, loaded, request.output, settings, allowed, console)
             if settings is not None and request.relight:
                 from .blender.relight_command import relight
 
-                folder = request.output, settings, request.report
+                folder = request.output, settings, request.report, allowed
                 relight(request.scene, loaded, *folder, console, interrupts)
             elif settings is not None:
-                given = request.output, settings, request.report, request.plot, request.keep
+                given = request.output, settings, request.report, request.plot, request.keep, allowed
                 commands.bake(request.scene, loaded, *given, console, interrupts)
             else:
-                commands.restore(request.scene, loaded, request.output, console)
+                commands.restore(request.scene, loaded, request.output, allowed, console)
     except KeyboardInterrupt:
         return _fail(INTERRUPTED, EXIT_INTERRUPTED)
     except RadiosityError as error:

@@ -1,29 +1,130 @@
-"""Which files bakes have written into a folder, told by their reports: what may be cleaned away later.
+"""Which files are ours: those that a report lists, as they are to the byte, for the same .blend and scene.
 
-`report.json` lists every file that bakes left in its folder, also those of earlier bakes, with size and
-digest: a file that differs from what is listed is not what a bake wrote, and nobody's to delete.
+A report lists every file that bakes of its scene have left in its folder, with size and digest, and says
+which scene of which file that is. It proves itself by a seal, a digest of its other contents.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable
+import os
+import stat
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-FILES = "files"
-"""The report's key."""
+from .file_names import BLEND_NAME, REPORT_NAME, is_bake_name
 
-LIGHTMAPS = frozenset({".exr", ".png"})
-"""Endings of lightmap files, in lower case."""
+FILES, OWNER, SEAL = "files", "baked", "seal"
+"""Keys of a report."""
 
 _CHUNK = 1 << 20
+_MAX_REPORT = 256 * 2**20
+
+Report = Mapping[str, Any]
 
 
-def entry(path: Path, scene: str) -> dict[str, Any]:
-    """Describe a file that a bake of the .blend `scene` wrote; "" is one that was never saved."""
-    return {"bytes": path.stat().st_size, "sha256": digest(path), "scene": scene}
+@dataclass(frozen=True)
+class Owner:
+    """Whose files they are.
+
+    Attributes
+    ----------
+    source : str
+        The absolute path of the scene's file, or a word in angle brackets for a scene without one.
+    scene : str
+        The scene's name.
+    """
+
+    source: str
+    scene: str
+
+    def told(self, folder: Path) -> dict[str, str]:
+        """Return what a report in `folder` says: a path relative to it, so that both may be moved together."""
+        return {"file": _relative(self.source, folder), "scene": self.scene}
+
+    def owns(self, report: Report, folder: Path) -> bool:
+        """Return whether a report that lies in `folder` is of this file and scene.
+
+        The copy `baked.blend` that the command line has put next to it counts as the file itself.
+        """
+        return bool(report[OWNER]["scene"] == self.scene) and self.is_source_of(report, folder)
+
+    def is_source_of(self, report: Report, folder: Path) -> bool:
+        """Return whether a report that lies in `folder` is of any scene of this file."""
+        said = report[OWNER]
+        mine = self.told(folder)["file"]
+        if _is_same_path(folder, said["file"], mine):
+            return True
+        return BLEND_NAME in report[FILES] and _is_same_path(folder, BLEND_NAME, mine)
+
+
+class NoReportError(Exception):
+    """A file is no report that proves itself; says why, to be put after the file's name."""
+
+
+def read_report(path: Path) -> dict[str, Any]:
+    """Return a report that proves itself.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no file of this name.
+    NoReportError
+        If it is anything else.
+    """
+    found = path.lstat()
+    if not stat.S_ISREG(found.st_mode) or found.st_size > _MAX_REPORT:
+        raise NoReportError("was not written by a bake")
+    try:
+        report = json.loads(path.read_text(encoding="utf-8"))
+        if not isinstance(report, dict):
+            raise TypeError
+        if SEAL not in report and "version" in report and "solver" in report:
+            raise NoReportError("was written by an earlier version, which did not prove which files are its own")
+        if report[SEAL] != _seal_of(report):
+            raise NoReportError("was changed since it was written")
+        for key in ("file", "scene"):
+            if not isinstance(report[OWNER][key], str):
+                raise TypeError
+        report[FILES] = _checked(report[FILES])
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        raise NoReportError("was not written by a bake") from None
+    return report
+
+
+def sealed(report: Report) -> dict[str, Any]:
+    """Return a report with its seal."""
+    return {**{key: value for key, value in report.items() if key != SEAL}, SEAL: _seal_of(report)}
+
+
+def text_of(report: Report) -> str:
+    """Return what the file of a report holds."""
+    return json.dumps(report, indent=2, ensure_ascii=False) + "\n"
+
+
+def reports_in(folder: Path, belongs: Callable[[Report, Path], bool]) -> dict[str, dict[str, Any]]:
+    """Return the reports in a folder that belong to somebody, by name: `Owner.owns` of an owner says which."""
+    found = {}
+    try:
+        names = sorted(path.name for path in folder.iterdir() if path.name.endswith(REPORT_NAME))
+    except OSError:
+        return {}
+    for name in names:
+        try:
+            report = read_report(folder / name)
+        except (OSError, NoReportError):
+            continue
+        if belongs(report, folder):
+            found[name] = report
+    return found
+
+
+def entry(path: Path) -> dict[str, Any]:
+    """Describe a file as a report lists it."""
+    return {"bytes": path.stat().st_size, "sha256": digest(path)}
 
 
 def digest(path: Path) -> str:
@@ -35,48 +136,70 @@ def digest(path: Path) -> str:
     return found.hexdigest()
 
 
-def entries(new: Iterable[Path], report: Path, scene: str) -> dict[str, dict[str, Any]]:
-    """Return what a new report is to list: the new files, and those the earlier report lists that are there.
+def entries(new: Iterable[Path], folder: Path, earlier: Report | None) -> dict[str, dict[str, Any]]:
+    """Return what a new report is to list: the new files, and those the earlier one lists that are there.
 
     Parameters
     ----------
     new : iterable of Path
-    report : Path
-        The earlier report, if there is one.
-    scene : str
-        The .blend that was baked.
+    folder : Path
+        Where they will be.
+    earlier : mapping or None
+        The report to be replaced.
     """
-    kept = {name: told for name, told in listed(report).items() if (report.parent / name).is_file()}
-    return {**kept, **{path.name: entry(path, scene) for path in new}}
+    before = {} if earlier is None else earlier[FILES]
+    kept = {name: told for name, told in before.items() if (folder / name).is_file()}
+    return {**kept, **{path.name: entry(path) for path in new}}
 
 
-def listed(report: Path) -> dict[str, dict[str, Any]]:
-    """Return what a report lists of the files beside it; nothing if it is no report of ours."""
+def is_as_written(path: Path, told: Mapping[str, Any]) -> bool:
+    """Return whether a file is, to the byte, what a bake wrote."""
     try:
-        told = json.loads(report.read_text(encoding="utf-8"))
-        files = told[FILES]
-        return {
-            str(name): {"bytes": int(of["bytes"]), "sha256": str(of["sha256"]), "scene": str(of["scene"])}
-            for name, of in files.items()
-            if Path(name).name == name
-        }
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        return {}
-
-
-def is_as_written(path: Path, told: dict[str, Any]) -> bool:
-    """Tell whether a file is, to the byte, what a bake wrote."""
-    try:
-        return bool(path.stat().st_size == told["bytes"] and digest(path) == told["sha256"])
+        found = path.lstat()
+        same = stat.S_ISREG(found.st_mode) and found.st_size == told["bytes"]
+        return bool(same and digest(path) == told["sha256"])
     except OSError:
         return False
 
 
-def forget(report: Path, names: Iterable[str]) -> None:
-    """Take files off a report's list, over the old report only once the new one is whole."""
-    told = json.loads(report.read_text(encoding="utf-8"))
-    for name in names:
-        told.get(FILES, {}).pop(name, None)
-    aside = report.with_name(f".{report.name}.part")
-    aside.write_text(json.dumps(told, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-    aside.replace(report)
+def without(report: Report, names: Iterable[str]) -> dict[str, Any]:
+    """Return a report that does not list these files any more."""
+    gone = set(names)
+    return sealed({**report, FILES: {name: told for name, told in report[FILES].items() if name not in gone}})
+
+
+def _seal_of(report: Report) -> str:
+    """Return the digest of a report's other contents, in one canonical form."""
+    plain = json.loads(json.dumps({key: value for key, value in report.items() if key != SEAL}))
+    text = json.dumps(plain, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
+
+
+def _checked(files: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Return a report's list as it should be; names that no bake gives are left out."""
+    return {
+        name: {"bytes": int(of["bytes"]), "sha256": str(of["sha256"])}
+        for name, of in files.items()
+        if is_bake_name(name)
+    }
+
+
+def _relative(source: str, folder: Path) -> str:
+    if source.startswith("<"):
+        return source
+    try:
+        return Path(os.path.relpath(Path(source).resolve(), folder.resolve())).as_posix()
+    except ValueError:  # on another drive
+        return Path(source).resolve().as_posix()
+
+
+def _is_same_path(folder: Path, one: str, other: str) -> bool:
+    """Return whether two paths, relative to a folder, are of one file."""
+    if os.path.normcase(one) == os.path.normcase(other):
+        return True
+    if any(path.startswith(("<", "//", "\\\\")) for path in (one, other)):
+        return False  # words, and paths that would be looked for in the network
+    try:
+        return (folder / one).samefile(folder / other)
+    except OSError:
+        return False

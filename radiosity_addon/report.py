@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import math
-import os
 from bisect import bisect_right
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,11 +13,12 @@ import numpy as np
 
 from .bake_scene import LIGHTMAP_UV_LAYER, BakeObject, BakeResult
 from .errors import BakeError
-from .manifest import FILES
+from .manifest import FILES, OWNER, sealed, text_of
+from .staging import replacing
 
 T = TypeVar("T")
 
-VERSION = 1
+VERSION = 2
 MAX_HISTORY = 200
 """Entries of the solver's history that a report keeps; shooting makes one a shot."""
 
@@ -106,10 +105,10 @@ class BakeReport:
         """The report as report.json holds it."""
         return self.data
 
-    def joined(self, earlier: Path, objects: Collection[str]) -> BakeReport:
+    def joined(self, earlier: Mapping[str, Any] | None, objects: Collection[str]) -> BakeReport:
         """Return the report with what the one before says of objects that have kept their lightmaps."""
         try:
-            told = json.loads(earlier.read_text(encoding="utf-8")) if objects else {}
+            told = {} if earlier is None or not objects else earlier
             entries = [dict(entry) for entry in told.get("objects", ()) if entry["object"] in objects]
             numbers = sorted({entry["atlas"] for entry in entries})
             pages = [told["pages"][number] for number in numbers]
@@ -121,24 +120,44 @@ class BakeReport:
         joined = {"objects": [*self.data["objects"], *entries], "pages": [*self.data["pages"], *pages]}
         return BakeReport({**self.data, **joined})
 
-    def listing(self, files: Mapping[str, Mapping[str, Any]]) -> BakeReport:
-        """Return the report with a list of all that bakes have written beside it, see `manifest.py`."""
-        return BakeReport({**self.data, FILES: {name: dict(told) for name, told in files.items()}})
+    def proven(self, files: Mapping[str, Mapping[str, Any]], owner: Mapping[str, str]) -> BakeReport:
+        """Return the report with what proves which files are ours, see `manifest.py`.
+
+        Parameters
+        ----------
+        files : mapping of str to mapping
+            All that bakes have written next to it.
+        owner : mapping of str to str
+            The file and scene that were baked.
+        """
+        listed = {name: dict(told) for name, told in files.items()}
+        return BakeReport(sealed({**self.data, OWNER: dict(owner), FILES: listed}))
 
     def write(self, path: Path) -> None:
-        """Write the report as JSON, over an older one only once it is whole.
+        """Write the report as JSON.
 
         Raises
         ------
         BakeError
             If it cannot be written.
         """
-        aside = path.with_name(f".{path.name}.{os.getpid()}.part")
         try:
-            aside.write_text(json.dumps(self.data, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-            aside.replace(path)
+            path.write_text(text_of(self.data), encoding="utf-8")
         except OSError as error:
-            aside.unlink(missing_ok=True)
+            raise BakeError(f"cannot write the report '{path}': {error.strerror}") from error
+
+    def write_copy(self, path: Path) -> None:
+        """Write the report as JSON over an older copy, once it is whole.
+
+        Raises
+        ------
+        BakeError
+            If it cannot be written.
+        """
+        try:
+            with replacing(path) as aside:
+                aside.write_text(text_of(self.data), encoding="utf-8")
+        except OSError as error:
             raise BakeError(f"cannot write the report '{path}': {error.strerror}") from error
 
 

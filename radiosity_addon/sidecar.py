@@ -15,6 +15,7 @@ from typing import Any
 from .array_file import ArrayFileError, read_arrays, write_arrays
 from .bake_scene import BakedObject, BakeResult, BakeScene, LightmapPage
 from .errors import BakeError, RadiosityError
+from .file_names import SIDECAR_NAME as SIDECAR_NAME
 from .fingerprint import check_same, fingerprint
 from .lightmap.earlier_light import EarlierLight
 from .lightmap.interpolate import Interpolation
@@ -45,8 +46,6 @@ from .solver.local_pass import LocalPass
 from .solver.methods.hierarchical import HierarchicalState
 from .solver.settings import SolverSettings
 from .solver.tree_top import TreeTop
-
-SIDECAR_NAME = "lightmap.relight"
 
 MAGIC, VERSION = b"RADIOSITYRELIGHT", 1
 

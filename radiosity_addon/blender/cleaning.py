@@ -1,20 +1,23 @@
-"""*Clean*: delete lightmap files that bakes wrote and nothing shows any more; and recovery after a crash.
+"""*Clean* deletes lightmaps that bakes wrote and nothing shows any more; *Recover* ends an interrupted bake.
 
-A file goes only if a report lists it and it is, to the byte, what a bake wrote; if no image of the open
-file shows it; and if no other .blend that is known to have been baked with it is still there.
+A file goes only if a report of this .blend lists it and it is, to the byte, what a bake wrote; if no image
+of the open file shows it; and if no copy `baked.blend` next to it may show it.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import bpy
 from bpy.app.handlers import persistent
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ..errors import BakeError
 from . import runtime
 from .operators import output_folder
+from .window_job import redraw_sidebars
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -23,39 +26,49 @@ class Unused:
 
     Parameters
     ----------
-    files : tuple of Path
-        To be deleted.
+    files : mapping of Path to list of str
+        To be deleted: by report, the names of the files next to it.
     changed : tuple of Path
         Left alone: they are not what a bake wrote.
     """
 
-    files: tuple[Path, ...] = ()
+    files: Mapping[Path, list[str]] = field(default_factory=dict)
     changed: tuple[Path, ...] = ()
+
+    @property
+    def count(self) -> int:
+        """How many files are to be deleted."""
+        return sum(map(len, self.files.values()))
 
 
 def unused_lightmaps(context: bpy.types.Context) -> Unused:
     """Find the lightmaps that bakes of the open file wrote and that it does not show."""
-    from ..manifest import LIGHTMAPS, is_as_written, listed
-    from .output import BLEND_NAME, PREVIEW_NAME, REPORT_NAME
+    from ..file_names import BLEND_NAME, LIGHTMAPS, PREVIEW_NAME
+    from ..manifest import FILES, is_as_written, reports_in
+    from .ownership import owner_of
 
     images = [image for image in bpy.data.images if image.filepath_raw]
     shown = {Path(bpy.path.abspath(each.filepath_raw, library=each.library)).resolve() for each in images}
     here = Path(bpy.data.filepath).resolve() if bpy.data.filepath else None
-    files: list[Path] = []
+    files: dict[Path, list[str]] = {}
     changed: list[Path] = []
     for folder in _folders(context):
-        # A copy that the command line wrote shows all that is beside it.
-        copy = folder / BLEND_NAME
-        if copy.exists() and copy.resolve() != here:
-            continue
-        for name, told in listed(folder / REPORT_NAME).items():
-            path = folder / name
-            if path.suffix.lower() not in LIGHTMAPS or name == PREVIEW_NAME or not path.is_file():
+        for report, told in reports_in(folder, owner_of(context.scene).is_source_of).items():
+            # A copy that the command line wrote shows all that is listed with it.
+            copy = folder / BLEND_NAME
+            if BLEND_NAME in told[FILES] and copy.exists() and copy.resolve() != here:
                 continue
-            if path.resolve() in shown or _is_of_another(told["scene"], here):
-                continue
-            (files if is_as_written(path, told) else changed).append(path)
-    return Unused(tuple(files), tuple(changed))
+            for name, of in told[FILES].items():
+                path = folder / name
+                if path.suffix.lower() not in LIGHTMAPS or name == PREVIEW_NAME or not path.is_file():
+                    continue
+                if path.resolve() in shown:
+                    continue
+                if is_as_written(path, of):
+                    files.setdefault(folder / report, []).append(name)
+                else:
+                    changed.append(path)
+    return Unused(files, tuple(changed))
 
 
 def delete(unused: Unused) -> int:
@@ -66,24 +79,36 @@ def delete(unused: Unused) -> int:
     OSError
         If one cannot be deleted; those before it are gone.
     """
-    from ..manifest import forget
-    from .output import REPORT_NAME
+    from ..manifest import read_report, text_of, without
+    from ..staging import replacing
 
-    for path in unused.files:
-        path.unlink()
-        forget(path.parent / REPORT_NAME, [path.name])
-    return len(unused.files)
+    for report, names in unused.files.items():
+        told = read_report(report)
+        for name in names:
+            (report.parent / name).unlink()
+        with replacing(report) as aside:
+            aside.write_text(text_of(without(told, names)), encoding="utf-8")
+    return unused.count
+
+
+def interrupted_folders(context: bpy.types.Context) -> list[Path]:
+    """Return the folders of this file's bakes in which one was killed while it published; only looks."""
+    from ..staging import is_interrupted
+
+    return [folder for folder in _folders(context) if is_interrupted(folder)]
 
 
 def _folders(context: bpy.types.Context) -> list[Path]:
-    """Where bakes of the open file have written, and where the next one would."""
-    found = {output_folder(context), *map(_last_folder, bpy.data.scenes)}
-    return sorted(folder for folder in found if folder is not None and folder.is_dir())
+    """Return where bakes of the open file have written, and where the next one would; none in a network."""
+    last = [_last_folder(scene) for scene in bpy.data.scenes]
+    found = {folder for folder in (output_folder(context), *last) if folder is not None}
+    return sorted(folder for folder in found if not _is_remote(folder) and folder.is_dir())
 
 
-def _is_of_another(scene: str, here: Path | None) -> bool:
-    """Tell whether a lightmap belongs to another .blend that is still there, and may show it."""
-    return bool(scene) and Path(scene).exists() and Path(scene).resolve() != here
+def _is_remote(folder: Path) -> bool:
+    """Return whether merely looking at a folder would ask another machine, which a file could name."""
+    here = Path(bpy.data.filepath).drive if bpy.data.filepath else ""
+    return folder.drive.startswith("\\\\") and folder.drive != here
 
 
 class RADIOSITY_OT_clean(bpy.types.Operator):
@@ -104,11 +129,11 @@ class RADIOSITY_OT_clean(bpy.types.Operator):
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Ask first: files do not come back by undo."""
         found = unused_lightmaps(context)
-        if not found.files or bpy.app.background:
+        if not found.count or bpy.app.background:
             return self.execute(context)
         message = rpt_("Delete {} lightmap files that nothing shows any more? Undo does not bring them back")
         return context.window_manager.invoke_confirm(
-            self, event, title="Clean Up Lightmaps", message=message.format(len(found.files))
+            self, event, title="Clean Up Lightmaps", message=message.format(found.count)
         )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -129,35 +154,71 @@ class RADIOSITY_OT_clean(bpy.types.Operator):
         return {"FINISHED"}
 
 
-@persistent
-def _recover(*_: object) -> None:
-    """Put back what a bake that was killed while it wrote has left half done beside the file just opened."""
-    from ..staging import clean_up
+class RADIOSITY_OT_recover(bpy.types.Operator):
+    """Put the files of the last whole bake back: a bake was interrupted while it replaced them"""
 
-    for folder in {scene_folder for scene in bpy.data.scenes if (scene_folder := _last_folder(scene))}:
-        if clean_up(folder):
-            for image in bpy.data.images:
-                if image.filepath and Path(bpy.path.abspath(image.filepath_raw)).parent.resolve() == folder:
-                    image.reload()
+    bl_idname = "radiosity.recover"
+    bl_label = "Recover Lightmaps"
+    bl_options = {"REGISTER"}
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        """Offer it where a bake was interrupted, unless one is running."""
+        if runtime.running.active:
+            cls.poll_message_set("A bake is running; press Esc to cancel it")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Put them back, and have the open file show them."""
+        from ..staging import clean_up
+
+        done = []
+        try:
+            done = [folder for folder in interrupted_folders(context) if clean_up(folder)]
+        except BakeError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        finally:
+            look_for_interrupted(context)
+        if not done:
+            self.report({"INFO"}, "Nothing to recover: no bake was interrupted")
+            return {"CANCELLED"}
+        for image in bpy.data.images:
+            if image.filepath and Path(bpy.path.abspath(image.filepath_raw)).parent.resolve() in done:
+                image.reload()
+        self.report({"INFO"}, "The lightmaps are those of the last whole bake again")
+        return {"FINISHED"}
+
+
+def look_for_interrupted(context: bpy.types.Context) -> None:
+    """Have the panel say whether a bake of the open file was interrupted; files are only looked at."""
+    runtime.interrupted = bool(interrupted_folders(context))
+    redraw_sidebars(context)
+
+
+@persistent
+def _look(*_: object) -> None:
+    """Another file was opened."""
+    look_for_interrupted(bpy.context)
 
 
 def _last_folder(scene: bpy.types.Scene) -> Path | None:
     last = runtime.last_bake(scene) if scene.is_property_set("radiosity") else None
     if last is None or not last.folder:
         return None
-    folder = Path(bpy.path.abspath(last.folder)).resolve()
-    return folder if folder.is_dir() else None
+    return Path(bpy.path.abspath(last.folder))
 
 
 def register() -> None:
-    """Look after each file that is opened."""
-    bpy.app.handlers.load_post.append(_recover)
+    """Look at each file that is opened."""
+    bpy.app.handlers.load_post.append(_look)
 
 
 def unregister() -> None:
     """Stop that."""
-    if _recover in bpy.app.handlers.load_post:
-        bpy.app.handlers.load_post.remove(_recover)
+    if _look in bpy.app.handlers.load_post:
+        bpy.app.handlers.load_post.remove(_look)
 
 
-CLASSES = (RADIOSITY_OT_clean,)
+CLASSES = (RADIOSITY_OT_clean, RADIOSITY_OT_recover)

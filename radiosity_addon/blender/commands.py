@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import bpy
 
 from .. import register, unregister
+from ..bake_scene import BakeWarning
 from ..console import Console, summary
-from ..errors import BakeError, SceneError, UsageError
+from ..errors import SceneError, UsageError
 from ..interrupts import Interrupts
 from ..keeping import Keeping
+from ..permissions import Permissions
 from ..settings import BakeSettings
 from . import kept_bakes, runtime
+from .single_files import check_existing, check_places, owner_told
+
+if TYPE_CHECKING:
+    from .output import OutputFolder
 
 MAX_IMAGES = 8
 """The closing lines name so many lightmaps one by one."""
@@ -29,6 +35,7 @@ def bake(
     report_copy: Path | None,
     plot: Path | None,
     keep: bool,
+    allowed: Permissions,
     console: Console,
     interrupts: Interrupts,
 ) -> None:
@@ -49,23 +56,23 @@ def bake(
         Where the history is drawn to.
     keep : bool
         Whether a sidecar is written, by which the bake can be lit anew.
+    allowed : Permissions
     console : Console
     interrupts : Interrupts
     """
     with registered():
         from .job import WRITING_STAGES, run_bake
-        from .output import BLEND_NAME, OutputFolder
+        from .output import BLEND_NAME
 
         source = scene or loaded
         if source is not None and same_file(source, output / BLEND_NAME):
             raise UsageError(f"--output {output} would overwrite the scene '{source}'; choose another folder")
-        for path in filter(None, (report_copy, plot)):
-            # Now, not after all the work.
-            check_writable(path)
+        check_places(_places(report_copy, plot), source)
         console.progress("open", 0.0)
-        open_or_build(scene, loaded)
+        notes = open_or_build(scene, loaded, allowed)
+        folder = output_of(output, source, allowed, report_copy, plot)
         keeping = Keeping(sidecar=True) if keep else None
-        job = run_bake(bpy.context, settings, OutputFolder(output), with_copy=True, keeping=keeping)
+        job = run_bake(bpy.context, settings, folder, with_copy=True, keeping=keeping, notes=notes)
         try:
             while True:
                 try:
@@ -80,7 +87,7 @@ def bake(
             interrupts.deferred = True
             job.close()
         if report_copy is not None:
-            report.write(report_copy)
+            report.write_copy(report_copy)
         files = written_files(report.as_dict())
         if plot is not None:
             from .plot import render_plot
@@ -91,8 +98,45 @@ def bake(
         console.lines(summary(str(output), files, report.as_dict()))
 
 
+def _places(report_copy: Path | None, plot: Path | None) -> dict[str, Path]:
+    """Return the files to be written outside the bake's own, by option."""
+    given = {"--report": report_copy, "--plot": plot}
+    return {option: path for option, path in given.items() if path is not None}
+
+
+def output_of(
+    output: Path,
+    source: Path | None,
+    allowed: Permissions,
+    report_copy: Path | None = None,
+    plot: Path | None = None,
+) -> OutputFolder:
+    """Return the folder of a bake of the open scene, and see that the files next to it may be written.
+
+    Raises
+    ------
+    BakeError
+    """
+    from .output import OutputFolder
+    from .ownership import CORNELL_BOX, owner_of
+
+    came_from = CORNELL_BOX if source is None else str(source.expanduser().resolve())
+    owner = owner_of(bpy.context.scene, came_from)
+    if report_copy is not None:
+        check_existing("--report", report_copy, allowed.overwrite, owner_told(owner, output))
+    if plot is not None:
+        check_existing("--plot", plot, allowed.overwrite)
+    others = _places(report_copy, plot).values()
+    return OutputFolder(output, overwrite=allowed.overwrite, others=list(others), owner=owner)
+
+
 def check(
-    scene: Path | None, loaded: Path | None, output: Path | None, settings: BakeSettings, console: Console
+    scene: Path | None,
+    loaded: Path | None,
+    output: Path | None,
+    settings: BakeSettings,
+    allowed: Permissions,
+    console: Console,
 ) -> int:
     """Say what a bake would be and what is odd, without baking; 1 where it would stop, 0 otherwise.
 
@@ -108,7 +152,7 @@ def check(
         from .inspection import ERROR, inspect
 
         console.progress("open", 0.0)
-        open_or_build(scene, loaded)
+        open_or_build(scene, loaded, allowed)
         folder = output.expanduser().resolve() if output is not None else Path.cwd()
         found = inspect(bpy.context, settings, folder)
         lines = [f"  {name:<12} {value}" for name, value in figures(found)]
@@ -117,44 +161,50 @@ def check(
         return int(any(finding.level == ERROR for finding in found.findings))
 
 
-def restore(scene: Path | None, loaded: Path | None, output: Path, console: Console) -> None:
+def restore(
+    scene: Path | None, loaded: Path | None, output: Path, allowed: Permissions, console: Console
+) -> None:
     """Take the bake out of a file and write the result to another.
 
     Raises
     ------
-    SceneError
-        If the file shows no bake.
+    RadiosityError
+        If the file shows no bake, or the other may not be written.
     """
     with registered():
         from .files import open_scene
-        from .output import save_copy
+        from .output import save_restored
         from .restore import restore as restore_file
 
-        if scene is not None:
-            open_scene(scene)
-        elif loaded is None:
+        if scene is None and loaded is None:
             raise UsageError("restore needs SCENE, a baked .blend")
+        check_places({"--output": output}, scene or loaded)
+        if scene is not None:
+            open_scene(scene, allowed.scripts)
+        check_existing("--output", output, allowed.overwrite)
         count = restore_file(bpy.context)
         if not count:
             raise SceneError(f"'{scene or loaded}' shows no bake; there is nothing to restore")
         for each in bpy.data.scenes:
             runtime.forget(each)
             kept_bakes.drop(each)
-        _make_folder_of(output)
-        save_copy(output)
+        save_restored(output)
         console.lines([f"{count} object{'' if count == 1 else 's'} restored, written to {output}"])
 
 
-def open_or_build(scene: Path | None, loaded: Path | None) -> None:
-    """Have the scene to bake as the open file's scene."""
+def open_or_build(
+    scene: Path | None, loaded: Path | None, allowed: Permissions = Permissions()
+) -> tuple[BakeWarning, ...]:
+    """Have the scene to bake as the open file's scene; returns what to warn of."""
     from .cornell import build_cornell_box
     from .files import empty_scene, open_scene
 
     if scene is not None:
-        open_scene(scene)
-    elif loaded is None:
+        return open_scene(scene, allowed.scripts)
+    if loaded is None:
         empty_scene()
         build_cornell_box()
+    return ()
 
 
 def written_files(report: dict) -> list[tuple[str, str]]:
@@ -183,33 +233,6 @@ def _group_files(report: dict) -> list[tuple[str, str]]:
         shown = names[0] if len(names) == 1 else f"{names[0]} … {names[-1]}"
         files.append((shown, f"light of group '{group['group']}'"))
     return files
-
-
-def _make_folder_of(path: Path) -> None:
-    """Make the folder of a file to be written."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BakeError(f"cannot write '{path}': its folder cannot be made ({error.strerror})") from error
-
-
-def check_writable(path: Path) -> None:
-    """Make the folder of a file to be written later, and see that files can be written there.
-
-    Raises
-    ------
-    BakeError
-        If not.
-    """
-    _make_folder_of(path)
-    if path.is_dir():
-        raise BakeError(f"cannot write '{path}': it is a folder")
-    aside = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        aside.touch()
-        aside.unlink()
-    except OSError as error:
-        raise BakeError(f"cannot write '{path}': {error.strerror}") from error
 
 
 def same_file(one: Path, other: Path) -> bool:

@@ -8,10 +8,11 @@ from pathlib import Path
 import addon_utils  # type: ignore[import-not-found]
 import bpy
 
+from ..bake_scene import BakeWarning
 from ..errors import SceneError
 
 
-def open_scene(path: str | Path) -> None:
+def open_scene(path: str | Path, scripts: bool = False) -> tuple[BakeWarning, ...]:
     """Make the file at `path` the current one.
 
     A .blend is opened as it is. A .glb, .gltf or .obj is imported into an empty scene, as
@@ -21,6 +22,13 @@ def open_scene(path: str | Path) -> None:
     Parameters
     ----------
     path : str or Path
+    scripts : bool
+        Whether scripts and script expressions of a .blend are run: only of one that is trusted.
+
+    Returns
+    -------
+    warnings : tuple of BakeWarning
+        That scripts were not run, if there are any.
 
     Raises
     ------
@@ -41,7 +49,11 @@ def open_scene(path: str | Path) -> None:
                 raise SceneError(f"{path} is empty; save the scene again")
     except OSError as error:
         raise SceneError(f"{path} cannot be read: {error.strerror}") from None
+    if opener is _open_blend:
+        _open_blend(path, scripts)
+        return _blocked_scripts()
     opener(path)
+    return ()
 
 
 def empty_scene() -> None:
@@ -49,16 +61,24 @@ def empty_scene() -> None:
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
 
 
-def _open_blend(path: Path) -> None:
+def _open_blend(path: Path, scripts: bool = False) -> None:
     # load_ui: a saved window layout is of no use, and its areas cost time.
     try:
-        bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False)
+        bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=scripts)
     except RuntimeError:
         # What Blender says is no help: a newer file is "not a blend file" to it.
         raise SceneError(
             f"{path} cannot be read by Blender {bpy.app.version_string}: "
             "it is damaged, no .blend, or saved by a newer version"
         ) from None
+
+
+def _blocked_scripts() -> tuple[BakeWarning, ...]:
+    """Warn if the file just opened has scripts that were not run: it may look otherwise with them."""
+    if not bpy.app.autoexec_fail or bpy.app.autoexec_fail_quiet:
+        return ()
+    message = f"was not run ({bpy.app.autoexec_fail_message}): give --allow-scripts if you trust the file"
+    return (BakeWarning("script", message),)
 
 
 def _import_gltf(path: Path) -> None:

@@ -10,6 +10,7 @@ import bpy
 
 from ..bake_scene import BakeResult, LightGroup, LightmapPage
 from ..errors import BakeError
+from ..file_names import FileNames
 from ..lightmap.encode import png16_scale
 from ..settings import BakeSettings
 from . import overlay_view
@@ -23,15 +24,17 @@ GroupImages: TypeAlias = Mapping[str, Sequence[bpy.types.Image]]
 """By group, its images, parallel to the bake's pages."""
 
 
-def write_groups(result: BakeResult, settings: BakeSettings, folder: Path | None) -> GroupImages:
+def write_groups(
+    result: BakeResult, settings: BakeSettings, folder: Path | None, names: FileNames = FileNames()
+) -> GroupImages:
     """Make an image of each page of each light group, saved into `folder` or packed; see `write_pages`.
 
     A PNG's scale is its group's own, so that dim groups keep as many steps as bright ones.
     """
     made: dict[str, Sequence[bpy.types.Image]] = {}
     try:
-        for group, names in zip(result.groups, group_file_names(result, settings), strict=True):
-            made[group.name] = write_images(group.pages, names, settings, folder, group.name)
+        for group, files in zip(result.groups, group_file_names(result, settings, names), strict=True):
+            made[group.name] = write_images(group.pages, files, settings, folder, group.name)
     except BaseException:
         remove_datablocks(each_image(made))
         raise

@@ -7,76 +7,117 @@ saves or reads them.
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import bpy
 import numpy as np
 
-from ..bake_scene import BakeResult, LightmapPage
+from ..bake_scene import BakeResult, BakeScene, LightmapPage
 from ..errors import BakeError
+from ..file_names import FileNames, highest_page, unique_names
+from ..light_groups import are_wanted
 from ..lightmap.encode import encode_png16, png16_scale
 from ..report import LightmapFile
-from ..settings import BakeSettings
+from ..settings import OTHERS, BakeSettings
 from .bake_record import mark_made, remove_datablocks
 from .image_marks import GROUP, PAGE, QUANTITY_PROPERTY, SCALE_PROPERTY
 
 _FILE_FORMATS = {"exr": ("OPEN_EXR", ".exr"), "png16": ("PNG", ".png")}
-_RESERVED_NAMES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 
 
 def page_file_names(
-    result: BakeResult, settings: BakeSettings, others: frozenset[str] = frozenset()
+    result: BakeResult,
+    settings: BakeSettings,
+    others: frozenset[str] = frozenset(),
+    names: FileNames = FileNames(),
 ) -> list[str]:
-    """Name the file of every page: `lightmap.exr`, or one after each object.
-
-    The names differ from each other, and from stems of `others` in lower case, even where upper and lower
-    case do not count.
-    """
-    return _file_names(_stems(result, settings), settings, set(others))
+    """Name the file of every page: `lightmap.exr`, or one after each object; see `names_of_pages`."""
+    return names_of_pages(names, settings, len(result.pages), _objects(result), others=others)[0]
 
 
-def group_file_names(result: BakeResult, settings: BakeSettings) -> list[list[str]]:
+def group_file_names(
+    result: BakeResult, settings: BakeSettings, names: FileNames = FileNames()
+) -> list[list[str]]:
     """Name the files of every light group's pages after the pages and the group: `lightmap_Kitchen.exr`."""
-    stems = _stems(result, settings)
-    taken = {Path(name).stem.lower() for name in page_file_names(result, settings)}
-    return [
-        _file_names([sanitised_stem(f"{stem}_{group.name}") for stem in stems], settings, taken)
-        for group in result.groups
-    ]
+    groups = [group.name for group in result.groups]
+    return names_of_pages(names, settings, len(result.pages), _objects(result), groups)[1:]
 
 
-def _stems(result: BakeResult, settings: BakeSettings) -> list[str]:
-    """Return what the pages would be called, were there no two alike."""
-    stems = ["lightmap"] * len(result.pages)
+def names_of_pages(
+    names: FileNames,
+    settings: BakeSettings,
+    count: int,
+    objects: Sequence[str],
+    groups: Sequence[str] = (),
+    others: frozenset[str] = frozenset(),
+) -> list[list[str]]:
+    """Name the files of all pages.
+
+    They differ from each other, from the other files of the bake, and from stems of `others`, even
+    where upper and lower case do not count.
+
+    Parameters
+    ----------
+    names : FileNames
+    settings : BakeSettings
+        Its format and atlas.
+    count : int
+        How many pages there are.
+    objects : sequence of str
+        With an atlas per object, the name of each page's object.
+    groups : sequence of str
+        Names of light groups.
+    others : frozenset of str
+        Stems of file names, `folded`, that are taken.
+
+    Returns
+    -------
+    files : list of list of str
+        Those of all light, then those of each group.
+    """
+    ending = _FILE_FORMATS[settings.format][1]
+    taken = {*others, *names.reserved(ending)}
     if settings.atlas == "per-object":
-        for baked in result.objects:
-            stems[baked.page] = sanitised_stem(baked.object.name)
-    return stems
+        stems = [[names.object_page(name, group) for name in objects] for group in ("", *groups)]
+    else:
+        stems = [names.shared_pages(count, group) for group in ("", *groups)]
+    return [unique_names(of, ending, taken) for of in stems]
 
 
-def _file_names(stems: Sequence[str], settings: BakeSettings, taken: set[str]) -> list[str]:
-    """Return file names that differ from each other and from the stems taken, and take theirs."""
-    names: list[str] = []
-    for stem in stems:
-        unique, number = stem, 1
-        while unique.lower() in taken:
-            number += 1
-            unique = f"{stem}_{number}"
-        taken.add(unique.lower())
-        names.append(unique + _FILE_FORMATS[settings.format][1])
-    return names
+def possible_names(
+    names: FileNames, settings: BakeSettings, bake_scene: BakeScene, folder: Path, others: frozenset[str]
+) -> list[str]:
+    """Return the names of all lightmaps that a bake into a folder may write, before it is known which.
+
+    Where a density decides how many pages there are, as many as any file there could be the last of.
+    """
+    objects = [each.name for each in bake_scene.objects if each.bake]
+    count = settings.pages
+    if settings.atlas == "shared" and settings.texel_density is not None:
+        count = max(count, highest_page([path.name for path in folder.iterdir()]))
+    groups: Collection[str] = ()
+    if are_wanted(bake_scene, settings):
+        of_scene = (*bake_scene.light_groups, *bake_scene.emitter_groups)
+        groups = dict.fromkeys(filter(None, (*(name for name, _ in settings.groups), *of_scene, OTHERS)))
+    found = names_of_pages(names, settings, count, objects, list(groups), others)
+    return [name for of in found for name in of]
 
 
-def sanitised_stem(name: str) -> str:
-    """Turn an object's name into a file name's stem that every file system takes."""
-    stem = re.sub(r'[\x00-\x1f<>:"/\\|?*]', "_", name).strip(" .")[:100].strip(" .")
-    return f"_{stem}" if not stem or _RESERVED_NAMES.fullmatch(stem) else stem
+def _objects(result: BakeResult) -> list[str]:
+    """Return the name of each page's object."""
+    found = [""] * len(result.pages)
+    for baked in result.objects:
+        found[baked.page] = baked.object.name
+    return found
 
 
 def write_pages(
-    result: BakeResult, settings: BakeSettings, folder: Path | None, others: frozenset[str] = frozenset()
+    result: BakeResult,
+    settings: BakeSettings,
+    folder: Path | None,
+    others: frozenset[str] = frozenset(),
+    names: FileNames = FileNames(),
 ) -> list[bpy.types.Image]:
     """Make an image of each page, saved into `folder` or packed into the .blend.
 
@@ -88,7 +129,8 @@ def write_pages(
     folder : Path or None
         None packs the images.
     others : frozenset of str
-        Stems of file names, in lower case, that are taken.
+        Stems of file names, `folded`, that are taken.
+    names : FileNames
 
     Returns
     -------
@@ -100,7 +142,7 @@ def write_pages(
     BakeError
         If a file cannot be written.
     """
-    return write_images(result.pages, page_file_names(result, settings, others), settings, folder)
+    return write_images(result.pages, page_file_names(result, settings, others, names), settings, folder)
 
 
 def write_images(

@@ -10,12 +10,12 @@ from dataclasses import replace
 import bpy
 
 from ..background import in_thread
-from ..bake_scene import BakeResult, Progress
+from ..bake_scene import BakeResult, BakeWarning, Progress
+from ..file_names import FileNames
 from ..keeping import Keeping, bake_steps, moves_alone
 from ..relighting import KeptBake
 from ..report import BakeReport
 from ..settings import BakeSettings
-from ..sidecar import SIDECAR_NAME
 from ..solver.arrays import Array
 from . import kept_bakes, kept_details, runtime
 from .apply import apply_lightmaps, check_targets
@@ -23,12 +23,12 @@ from .bake_record import remove_datablocks
 from .export import export_scene
 from .export_sources import Export
 from .group_images import GroupImages, each_image, write_groups
-from .images import lightmap_files, relative_path, set_folder, write_pages
+from .images import lightmap_files, possible_names, relative_path, set_folder, write_pages
 from .light_shares import crowded_materials
 from .live_picture import Seen, seen_triangles
 from .only_changed import Kept as Others
 from .only_changed import narrow, remember
-from .output import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, OutputFolder, save_copy
+from .output import BLEND_NAME, PREVIEW_NAME, OutputFolder, save_copy
 from .preview import SAMPLES, render_preview
 from .rebake import originals_shown, replacing_earlier, seal
 from .restore import restore
@@ -53,6 +53,7 @@ def run_bake(
     patient: bool = False,
     keeping: Keeping | None = None,
     only_changed: bool = False,
+    notes: tuple[BakeWarning, ...] = (),
 ) -> BakeJob:
     """Bake the context's scene and show the lightmaps on its objects.
 
@@ -77,6 +78,8 @@ def run_bake(
     only_changed : bool
         Give new lightmaps to what has changed since the last bake, see `only_changed.py`, which cannot be
         kept then; if things have only moved since a bake that was kept, all lightmaps follow.
+    notes : tuple of BakeWarning
+        What is known before the bake and belongs into its report.
 
     Yields
     ------
@@ -96,8 +99,10 @@ def run_bake(
     wanted = settings
     with ExitStack() as stack:
         if output is not None:
-            # Opened first: a folder that cannot be written is no news for after the work.
+            # First: a folder that cannot be written, or holds files of others, is no news for after the work.
             stack.enter_context(output)
+            output.expect((BLEND_NAME, PREVIEW_NAME) if with_copy else ())
+            output.expect((output.names.sidecar,) if keeping and keeping.sidecar else ())
         yield Progress("export", 0.0)
         with timed(seconds, "export"), originals_shown(context) as edited:
             export = export_scene(context, settings, dark=keeping is not None)
@@ -107,11 +112,14 @@ def run_bake(
         if only_changed and not moves_alone(export.bake_scene, settings, keeping):
             export, settings, others = narrow(context.scene, export, settings)
             keeping = None if others.objects else keeping
+        if output is not None:
+            lightmaps = possible_names(output.names, settings, export.bake_scene, output.path, others.files)
+            output.expect(lightmaps)
         solved = APPLY if with_copy else APPLY_ALONE
-        sidecar = output.staging / SIDECAR_NAME if output and keeping and keeping.sidecar else None
+        sidecar = output.staging / output.names.sidecar if output and keeping and keeping.sidecar else None
         steps = bake_steps(export.bake_scene, settings, keeping, sidecar)
         result, kept = yield from _solve(steps, seen, patient, solved)
-        result = replace(result, warnings=(*edited, *others.warnings(), *result.warnings))
+        result = replace(result, warnings=(*notes, *edited, *others.warnings(), *result.warnings))
         seconds.update(result.seconds)
         yield Progress("apply", solved)
         if with_copy and output is not None:
@@ -120,8 +128,7 @@ def run_bake(
             images, groups = _show(context, settings, export, result, output, keeping, others.files)
             report = _report(result, images, groups, settings, seconds)
             if output is not None:
-                whole = report.joined(output.path / REPORT_NAME, others.objects)
-                whole.listing(output.files()).write(output.staging / REPORT_NAME)
+                output.write_report(report.joined(output.earlier, others.objects))
                 output.publish()
             remember(context.scene, export, result, wanted)
         folder = "" if output is None else relative_path(output.path)
@@ -185,12 +192,11 @@ def deliver(
         _remember_kept(context.scene, keeping, None)
         yield Progress("save", SAVE)
         with timed(seconds, "save"):
-            save_copy(output.staging / BLEND_NAME, output.path)
+            save_copy(output)
         yield Progress("preview", PREVIEW)
         with timed(seconds, "preview"):
             render_preview(context, output.staging / PREVIEW_NAME, settings, samples)
-        report = _report(result, images, groups, settings, seconds).listing(output.files())
-        report.write(output.staging / REPORT_NAME)
+        report = output.write_report(_report(result, images, groups, settings, seconds))
         yield Progress("write", 1.0)
         output.publish()
     except BaseException:
@@ -211,11 +217,11 @@ def _show(
     taken: frozenset[str] = frozenset(),
 ) -> tuple[list[bpy.types.Image], GroupImages]:
     """Make the images, also those of light groups, and put them on the objects; files `taken` stay."""
-    folder = None if output is None else output.staging
-    images = write_pages(result, settings, folder, taken)
+    folder, names = (None, FileNames()) if output is None else (output.staging, output.names)
+    images = write_pages(result, settings, folder, taken, names)
     groups: GroupImages = {}
     try:
-        groups = write_groups(result, settings, folder)
+        groups = write_groups(result, settings, folder, names)
         if output is not None:
             set_folder([*images, *each_image(groups)], output.path)
         if keeping is not None:

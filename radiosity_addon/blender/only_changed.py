@@ -18,6 +18,7 @@ import numpy as np
 
 from ..bake_scene import BakeObject, BakeResult, BakeScene, BakeWarning
 from ..errors import NothingToDoError
+from ..file_names import folded
 from ..settings import BakeSettings
 from .bake_record import is_made
 from .export_sources import Export
@@ -34,7 +35,7 @@ _OF_NO_CONSEQUENCE = frozenset({"objects", "threads", "memory_limit", "unwrap_se
 
 @dataclass(frozen=True)
 class Kept:
-    """What keeps its lightmap: names of objects, and the files of their images, in lower case."""
+    """What keeps its lightmap: names of objects, and the files of their images, `folded`."""
 
     objects: frozenset[str] = frozenset()
     files: frozenset[str] = frozenset()
@@ -156,7 +157,7 @@ def _bytes(value: Any) -> bytes:
 
 
 def _files(name: str) -> frozenset[str]:
-    """Return the stems of the files, in lower case, of the lightmaps that an object shows."""
+    """Return the stems of the files, `folded`, of the lightmaps that an object shows."""
     found = set()
     materials = bpy.data.objects[name, None].data.materials
     trees = [material.node_tree for material in materials if material is not None]
@@ -166,5 +167,5 @@ def _files(name: str) -> frozenset[str]:
             if node.type == "GROUP" and node.node_tree is not None and is_made(node.node_tree):
                 trees.append(node.node_tree)
             elif node.type == "TEX_IMAGE" and node.image is not None and is_made(node.image):
-                found.add(Path(node.image.filepath_raw or node.image.name).stem.lower())
+                found.add(folded(Path(node.image.filepath_raw or node.image.name).stem))
     return frozenset(found)

@@ -57,12 +57,13 @@ class RADIOSITY_OT_bake(WindowJob, bpy.types.Operator):
     def _start(self, context: bpy.types.Context, in_window: bool) -> Any:
         from .job import run_bake
         from .output import OutputFolder
+        from .ownership import panel_names
 
         live_state.stop()
         self._was_editing = context.mode == "EDIT_MESH"
         settings = settings_of(context)
         folder = output_folder(context)
-        output = None if folder is None else OutputFolder(folder)
+        output = None if folder is None else OutputFolder(folder, panel_names(context.scene))
         changed = context.scene.radiosity.scope == "changed"
         keeping = self._keeping(context.scene, settings)
         if in_window and context.scene.radiosity.show_while_solving:
@@ -181,11 +182,17 @@ class RADIOSITY_OT_open_folder(bpy.types.Operator):
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Open the folder."""
+        """Open the folder, if it really is that of a bake of this scene."""
+        from .ownership import own_reports
+
         last = runtime.last_bake(context.scene)
         folder = bpy.path.abspath(last.folder) if last is not None else ""
         if not Path(folder).is_dir():
             self.report({"ERROR"}, rpt_("The folder '{}' is not there any more").format(folder))
+            return {"CANCELLED"}
+        if not own_reports(Path(folder), context.scene):
+            message = rpt_("The folder '{}' holds no bake of this scene")
+            self.report({"ERROR"}, message.format(folder))
             return {"CANCELLED"}
         bpy.ops.wm.path_open(filepath=folder)
         return {"FINISHED"}

@@ -1,24 +1,31 @@
-"""The output folder: files are written aside and renamed, so that a result is always whole."""
+"""The output folder: files are written aside and renamed, so that a result is always whole.
+
+What stands in a place of one of a bake's files is only replaced if it proves to be ours, see `manifest.py`.
+"""
 
 from __future__ import annotations
 
-import uuid
-from collections.abc import Iterator
+import os
+import stat
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 import bpy
 
-from .. import manifest
-from ..errors import BakeError
-from ..staging import Staging, clean_up
+from ..errors import BakeError, RadiosityError
+from ..file_names import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, FileNames, folded
+from ..manifest import FILES as LISTED
+from ..manifest import OWNER, NoReportError, Owner, entries, is_as_written, read_report
+from ..report import BakeReport
+from ..staging import Staging, clean_up, replacing
 from .bake_record import is_made
+from .ownership import is_read, owner_of
 
-BLEND_NAME = "baked.blend"
-PREVIEW_NAME = "preview.png"
-REPORT_NAME = "report.json"
+__all__ = ["BLEND_NAME", "FILES", "PREVIEW_NAME", "REPORT_NAME", "OutputFolder", "save_copy", "save_restored"]
 
 FILES = (
     (BLEND_NAME, "the scene with its lightmaps"),
@@ -35,11 +42,39 @@ class OutputFolder:
     A context manager. Inside it, write into `staging`, a hidden folder on the same file
     system laid out as the result will be; `publish` then renames file by file over an
     earlier result, the report last. Leaving without it, or by an error, leaves the folder
-    as it was. Files that the bake did not write are never touched.
+    as it was. A file is replaced only if a report of the same file and scene lists it as it is.
+
+    Parameters
+    ----------
+    path : Path or str
+    names : FileNames
+        What the files are called: those of the command line, unless others are given.
+    source : str
+        The file the scene came from, where that is not the open one.
+    overwrite : bool
+        Replace files that are not ours, too, but none that the scene reads.
+    others : collection of Path
+        Files that something else will write: none of this bake's may be one of them.
+    owner : Owner or None
+        Whose files they are; None for the context's scene.
     """
 
-    def __init__(self, path: Path | str) -> None:
+    def __init__(
+        self,
+        path: Path | str,
+        names: FileNames = FileNames(),
+        source: str = "",
+        overwrite: bool = False,
+        others: Collection[Path] = (),
+        owner: Owner | None = None,
+    ) -> None:
         self.path = Path(path).expanduser().resolve()
+        self.names = names
+        self.earlier: dict[str, Any] | None = None
+        self._source = source
+        self._overwrite = overwrite
+        self._others = [_in_its_folder(other) for other in others]
+        self._owner = owner
         self._staging: Staging | None = None
         self._made: list[Path] = []
 
@@ -47,6 +82,11 @@ class OutputFolder:
     def staging(self) -> Path:
         """Where to write, while the folder is open."""
         return self._open.path
+
+    @property
+    def aside(self) -> Path:
+        """Where to save the copy of the scene, which has its relative paths from the folder it is in."""
+        return self._open.aside
 
     @property
     def _open(self) -> Staging:
@@ -57,7 +97,8 @@ class OutputFolder:
     def __enter__(self) -> OutputFolder:
         """Make the folder and its staging folder; a BakeError names one that cannot be written.
 
-        What a killed bake has left there is cleaned up first.
+        What a killed bake has left there is cleaned up first. A report in the place of this bake's
+        must be ours.
         """
         missing = [folder for folder in (self.path, *self.path.parents) if not folder.exists()]
         try:
@@ -70,28 +111,67 @@ class OutputFolder:
             raise BakeError(
                 f"cannot write to the output folder '{self.path}': {error.strerror}; choose another"
             ) from error
+        try:
+            self._owner = self._owner or owner_of(bpy.context.scene, self._source)
+            self.earlier = self._earlier()
+            for name in (BLEND_NAME, PREVIEW_NAME, self.names.report, self.names.sidecar):
+                self._refuse_others(name)
+        except BaseException:
+            self.__exit__(None, None, None)
+            raise
         return self
 
     def __exit__(
         self,
         _kind: type[BaseException] | None,
-        _error: BaseException | None,
+        error: BaseException | None,
         _trace: TracebackType | None,
     ) -> None:
-        """Remove what was not published, and folders that were made for nothing."""
+        """Remove what was not published, and folders that were made for nothing.
+
+        An error that names a file in the staging folder goes on naming its place in this folder.
+        """
+        staging, aside = str(self.staging), str(self.aside)
         self._open.close()
         self._staging = None
         self._remove_made()
+        names = f"{error.filename}" if isinstance(error, OSError) else f"{error}"
+        if isinstance(error, RadiosityError | OSError) and staging in names:
+            place = names.replace(aside, str(self.path / BLEND_NAME)).replace(staging, str(self.path))
+            if isinstance(error, OSError):
+                raise BakeError(f"cannot write '{place}': {error.strerror}") from error
+            raise type(error)(place) from error
+
+    def expect(self, names: Iterable[str]) -> None:
+        """Refuse names of files to come in whose places something stands that is not ours.
+
+        Raises
+        ------
+        BakeError
+            Naming the first of them, and what to do.
+        """
+        for name in names:
+            self._refuse_others(name)
+            if os.path.lexists(self.path / name):
+                self._check(name, partial(self._is_listed, name))
 
     def files(self) -> dict[str, dict[str, Any]]:
         """Return what the report is to list of the files here: those staged, and those of earlier bakes."""
-        staged = [self.staging / name for name in self._open.names() if name != REPORT_NAME]
-        return manifest.entries(staged, self.path / REPORT_NAME, bpy.data.filepath)
+        staged = [self.staging / name for name in self._open.names() if name != self.names.report]
+        return entries(staged, self.path, self.earlier)
+
+    def write_report(self, report: BakeReport) -> BakeReport:
+        """Stage the report, the last file, with what proves which files are ours; returns it so."""
+        assert self._owner is not None
+        owner = self._owner.told(self.path) if self.earlier is None else self.earlier[OWNER]
+        proven = report.proven(self.files(), owner)
+        proven.write(self.staging / self.names.report)
+        return proven
 
     def publish(self) -> list[Path]:
         """Rename all staged files to their places; undone as a whole if one fails.
 
-        Killed meanwhile, the next bake into the folder, or opening the file, puts the earlier ones back.
+        Killed meanwhile, the next bake into the folder puts the earlier ones back.
 
         Returns
         -------
@@ -101,14 +181,81 @@ class OutputFolder:
         Raises
         ------
         BakeError
-            If a file cannot be replaced.
+            If a file cannot be replaced, or is not ours to replace.
         """
-        names = sorted(self._open.names(), key=lambda name: (name == REPORT_NAME, name))
+        report = self.names.report
+        names = sorted(self._open.names(), key=lambda name: (name == report, name))
+        ours = {name: told["sha256"] for name, told in self._listed.items()}
+
+        def check(name: str, digest: str | None) -> None:
+            self._refuse_others(name)
+            if digest is None or (name == report and self.earlier is not None):
+                return
+            self._check(name, lambda: ours.get(name) == digest)
+
         try:
-            self._open.publish(names)
+            self._open.publish(names, check)
         except OSError as error:
             raise BakeError(f"cannot replace '{error.filename}': {error.strerror}") from error
         return [self.path / name for name in names]
+
+    def _earlier(self) -> dict[str, Any] | None:
+        """Return the report that this bake replaces, if it is ours.
+
+        Raises
+        ------
+        BakeError
+            If something else stands in its place.
+        """
+        assert self._owner is not None
+        path = self.path / self.names.report
+        try:
+            report = read_report(path)
+        except FileNotFoundError:
+            return None
+        except NoReportError as error:
+            self._refuse(path, str(error))
+            return None
+        if self._owner.owns(report, self.path):
+            return report
+        said = report[OWNER]
+        self._refuse(path, f"is of scene '{said['scene']}' of '{said['file']}'")
+        return None
+
+    @property
+    def _listed(self) -> Mapping[str, Mapping[str, Any]]:
+        """What our earlier report lists."""
+        return {} if self.earlier is None else self.earlier[LISTED]
+
+    def _is_listed(self, name: str) -> bool:
+        return name in self._listed and is_as_written(self.path / name, self._listed[name])
+
+    def _refuse_others(self, name: str) -> None:
+        """Refuse a name of ours that something else will write."""
+        path = self.path / name
+        if any(is_same_file(path, other) for other in self._others):
+            raise BakeError(f"'{path}' is a file of the bake itself: choose another name for the other file")
+
+    def _check(self, name: str, is_ours: Callable[[], bool]) -> None:
+        """Refuse what stands in the place of a file, unless it is ours or may be overwritten."""
+        path = self.path / name
+        if stat.S_ISREG(path.lstat().st_mode) and is_ours():
+            if name == BLEND_NAME and is_read(path):
+                raise BakeError(f"'{path}' is a file that the scene itself reads: choose another folder")
+            return
+        known = name in self._listed
+        self._refuse(
+            path, "was changed since it was baked" if known else "was not written by a bake of this scene"
+        )
+
+    def _refuse(self, path: Path, reason: str) -> None:
+        """Refuse what stands in a place; return if it may be overwritten."""
+        refuse_special(path)
+        if is_read(path):
+            raise BakeError(f"'{path}' is a file that the scene itself reads: choose another folder")
+        if not self._overwrite:
+            more = "" if self.names.prefix else ", or give --overwrite"
+            raise BakeError(f"'{path}' {reason}: move it away, choose another folder{more}")
 
     def _remove_made(self) -> None:
         """Remove the folders made on entering that are still empty, innermost first."""
@@ -119,41 +266,90 @@ class OutputFolder:
                 return
 
 
-def save_copy(path: Path, final_folder: Path | None = None) -> None:
-    """Save the open file as a compressed copy; the open file keeps its own path.
+def refuse_special(path: Path) -> None:
+    """Refuse to write where a folder, a link or a device is.
+
+    Raises
+    ------
+    BakeError
+    """
+    try:
+        found = path.lstat()
+    except FileNotFoundError:
+        return
+    except (OSError, ValueError) as error:
+        raise BakeError(f"cannot write '{path}': {error}") from error
+    kinds = ((stat.S_ISDIR, "a folder"), (stat.S_ISLNK, "a link"))
+    kind = next((text for test, text in kinds if test(found.st_mode)), "no regular file")
+    if not stat.S_ISREG(found.st_mode):
+        raise BakeError(f"cannot write '{path}': it is {kind}; choose another place")
+
+
+def _in_its_folder(path: Path) -> Path:
+    """Return a path whose folder is resolved, but not the file itself."""
+    path = path.expanduser().absolute()
+    return path.parent.resolve() / path.name
+
+
+def is_same_file(one: Path, other: Path) -> bool:
+    """Return whether two paths are of one file, also of one that is not there yet."""
+    try:
+        return one.samefile(other)
+    except OSError:
+        return one.parent == other.parent and folded(one.name) == folded(other.name)
+
+
+def save_copy(output: OutputFolder) -> None:
+    """Stage the open file as a compressed copy; the open file keeps its own path.
 
     Paths to images and other files are stored relative to where the copy will be, where
     they were relative to the open file; those of lightmaps always are.
-
-    Parameters
-    ----------
-    path : Path
-        The copy; replaced only once it is written.
-    final_folder : Path or None
-        The folder the copy will be moved to, on the same file system; None if it stays.
 
     Raises
     ------
     BakeError
         If it cannot be written, or is the open file itself.
     """
-    path = path.resolve()
-    folder = path.parent if final_folder is None else final_folder.resolve()
-    if bpy.data.filepath and Path(bpy.data.filepath).resolve() in (path, folder / path.name):
-        raise BakeError(f"'{folder / path.name}' is the scene itself: choose another folder for the copy")
+    place = output.path / BLEND_NAME
+    if bpy.data.filepath and Path(bpy.data.filepath).resolve() == place:
+        raise BakeError(f"'{place}' is the scene itself: choose another folder for the copy")
     # Blender makes paths relative to the folder it saves into, so this must be the final one.
-    aside = folder / f".{path.stem}-{uuid.uuid4().hex[:8]}.blend"
     try:
-        with _lightmaps_relative_to(folder):
-            bpy.ops.wm.save_as_mainfile(
-                filepath=str(aside), copy=True, compress=True, relative_remap=True, check_existing=False
-            )
-        aside.replace(path)
-    except (OSError, RuntimeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else " ".join(str(error).split())
-        raise BakeError(f"cannot write '{folder / path.name}': {reason}") from error
-    finally:
-        aside.unlink(missing_ok=True)
+        with _lightmaps_relative_to(output.path):
+            _save(output.aside, place)
+        output.aside.replace(output.staging / BLEND_NAME)
+    except OSError as error:
+        raise BakeError(f"cannot write '{place}': {error.strerror}") from error
+
+
+def save_restored(path: Path) -> None:
+    """Save the open file as a compressed copy that replaces `path` once it is whole.
+
+    Raises
+    ------
+    BakeError
+        If it cannot be written.
+    """
+    try:
+        with replacing(path) as aside:
+            beside = aside.parent.with_name(f"{aside.parent.name}.blend")
+            _save(beside, path)
+            beside.replace(aside)
+    except OSError as error:
+        raise BakeError(f"cannot write '{path}': {error.strerror}") from error
+
+
+def _save(aside: Path, place: Path) -> None:
+    """Save a copy of the open file, to be moved to its place in the same folder."""
+    try:
+        bpy.ops.wm.save_as_mainfile(
+            filepath=str(aside), copy=True, compress=True, relative_remap=True, check_existing=False
+        )
+    except RuntimeError as error:
+        reason = " ".join(str(error).split()).replace(str(aside), str(place))
+        raise BakeError(f"cannot write '{place}': {reason}") from error
+    if not aside.is_file():
+        raise BakeError(f"cannot write '{place}'")
 
 
 @contextmanager
@@ -173,3 +369,4 @@ def _lightmaps_relative_to(folder: Path) -> Iterator[None]:
     finally:
         for image, stored in before:
             image.filepath_raw = stored
+

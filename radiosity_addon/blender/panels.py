@@ -50,6 +50,10 @@ class RADIOSITY_PT_main(_Panel, bpy.types.Panel):
         column.scale_y = 1.5
         column.operator("radiosity.bake", text="Bake Radiosity", icon="LIGHT_AREA")
         layout.operator("radiosity.restore", icon="LOOP_BACK")
+        if runtime.interrupted:
+            box = layout.box()
+            draw_text(box, iface_("A bake was interrupted while it replaced its files"), "ERROR", context)
+            box.operator("radiosity.recover", icon="RECOVER_LAST")
         draw_relight_buttons(layout, context)
         layout.prop(settings, "scope", expand=True)
         layout.prop(settings, "size_mode", expand=True)

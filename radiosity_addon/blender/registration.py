@@ -23,6 +23,7 @@ from . import (
     overlay_panel,
     overlay_properties,
     overlay_view,
+    ownership,
     panels,
     preferences,
     preset_menu,
@@ -65,7 +66,7 @@ def register() -> None:
         for cls in CLASSES:
             bpy.utils.register_class(cls)
             _undo.append(partial(bpy.utils.unregister_class, cls))
-        for module in (preset_menu, cleaning):
+        for module in (preset_menu, ownership, cleaning):
             module.register()
             _undo.append(module.unregister)
         _undo.append(check_panel.forget_checks)

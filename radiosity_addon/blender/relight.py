@@ -17,12 +17,13 @@ from ..errors import BakeError, RadiosityError
 from ..light_groups import are_wanted, group_pages
 from ..relight_check import strengths_in
 from ..relighting import KeptBake, relight
-from ..sidecar import SIDECAR_NAME, StoredBake, read_sidecar
+from ..sidecar import StoredBake, read_sidecar
 from ..solver.arrays import Array
 from ..solver.steps import drain
 from . import kept_bakes
 from .export import export_scene
 from .kept_bakes import InMemory
+from .ownership import report_listing
 from .rebake import originals_shown
 from .relight_properties import relight_of
 from .relit_images import rewrite
@@ -99,8 +100,11 @@ def stored_bake(scene: bpy.types.Scene) -> StoredBake:
     images = kept_bakes.images_of(mark) if mark else {}
     if not images:
         raise BakeError("the scene shows no bake that was kept: bake with Keep for Relighting")
-    path = Path(bpy.path.abspath(images[min(images)].filepath_raw)).parent / SIDECAR_NAME
-    if images[min(images)].packed_file is not None or not path.is_file():
+    page = Path(bpy.path.abspath(images[min(images)].filepath_raw))
+    if images[min(images)].packed_file is not None:
+        raise BakeError("the bake is not in memory any more, and has no sidecar: bake again")
+    path = page.with_name(report_listing(page, [scene]).names.sidecar)
+    if not path.is_file():
         raise BakeError("the bake is not in memory any more, and has no sidecar: bake again")
     stored = read_sidecar(path)
     if stored.mark != mark:

@@ -5,20 +5,27 @@ from __future__ import annotations
 from collections.abc import Generator
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import bpy
 
-from ..bake_scene import Progress
+from ..bake_scene import BakeWarning, Progress
 from ..console import Console, summary
 from ..errors import UsageError
+from ..file_names import BLEND_NAME, PREVIEW_NAME, SIDECAR_NAME
 from ..interrupts import Interrupts
 from ..keeping import Keeping
+from ..permissions import Permissions
 from ..relight_check import strengths_in
 from ..report import BakeReport
 from ..settings import BakeSettings
-from ..sidecar import SIDECAR_NAME, StoredBake, read_sidecar
+from ..sidecar import StoredBake, read_sidecar
 from ..solver.steps import drain
-from .commands import check_writable, open_or_build, registered, same_file, written_files
+from .commands import open_or_build, output_of, registered, same_file, written_files
+from .single_files import check_places
+
+if TYPE_CHECKING:
+    from .output import OutputFolder
 
 EXPORT, RELIGHT, APPLY = 0.1, 0.2, 0.5
 """How far the whole is when each part begins; rough."""
@@ -30,6 +37,7 @@ def relight(
     output: Path,
     settings: BakeSettings,
     report_copy: Path | None,
+    allowed: Permissions,
     console: Console,
     interrupts: Interrupts,
 ) -> None:
@@ -37,7 +45,7 @@ def relight(
 
     Parameters
     ----------
-    scene, loaded, report_copy, console, interrupts
+    scene, loaded, report_copy, allowed, console, interrupts
         As for `commands.bake`.
     output : Path
         The folder with the bake and its sidecar.
@@ -51,21 +59,20 @@ def relight(
     """
     with registered():
         from .job import WRITING_STAGES
-        from .output import BLEND_NAME
 
         source = scene or loaded
         if source is not None and same_file(source, output / BLEND_NAME):
             raise UsageError(
                 f"--relight takes the scene that was baked, not '{source}', which it would replace"
             )
-        if report_copy is not None:
-            check_writable(report_copy)
+        check_places({} if report_copy is None else {"--report": report_copy}, source)
         console.progress("read", 0.0)
         stored = read_sidecar(output / SIDECAR_NAME)
         if settings not in (BakeSettings(), stored.settings):
             raise UsageError(f"the bake in {output} has its own settings: give --relight no others")
-        open_or_build(scene, loaded)
-        job = relight_into(bpy.context, stored, output)
+        notes = open_or_build(scene, loaded, allowed)
+        folder = output_of(output, source, allowed, report_copy)
+        job = relight_into(bpy.context, stored, folder, notes)
         try:
             while True:
                 try:
@@ -80,12 +87,15 @@ def relight(
             interrupts.deferred = True
             job.close()
         if report_copy is not None:
-            report.write(report_copy)
+            report.write_copy(report_copy)
         console.lines(summary(str(output), written_files(report.as_dict()), report.as_dict()))
 
 
 def relight_into(
-    context: bpy.types.Context, stored: StoredBake, folder: Path
+    context: bpy.types.Context,
+    stored: StoredBake,
+    folder: OutputFolder,
+    notes: tuple[BakeWarning, ...] = (),
 ) -> Generator[Progress, None, BakeReport]:
     """Light a stored bake anew, and write its folder as a bake would; the scene shows the lightmaps then.
 
@@ -94,14 +104,15 @@ def relight_into(
     RadiosityError
     """
     from .export import export_scene
+    from .images import group_file_names, page_file_names
     from .job import deliver, timed
-    from .output import OutputFolder
     from .preview import QUICK_SAMPLES
     from .rebake import originals_shown
     from .relight import lit
 
     seconds: dict[str, float] = {}
-    with OutputFolder(folder) as output:
+    with folder as output:
+        output.expect((BLEND_NAME, PREVIEW_NAME, output.names.sidecar))
         yield Progress("export", EXPORT)
         with timed(seconds, "export"), originals_shown(context):
             export = export_scene(context, stored.settings, dark=True)
@@ -109,7 +120,10 @@ def relight_into(
             kept = stored.kept(export.bake_scene)
             yield Progress("relight", RELIGHT)
             pages, groups = drain(lit(kept, strengths_in(kept, export.bake_scene)))
-        result = replace(stored.result(export.bake_scene, pages), groups=groups)
+        result = stored.result(export.bake_scene, pages)
+        result = replace(result, groups=groups, warnings=(*notes, *result.warnings))
+        output.expect(page_file_names(result, stored.settings))
+        output.expect(name for of in group_file_names(result, stored.settings) for name in of)
         yield Progress("apply", APPLY)
         keeping = Keeping(mark=stored.mark)
         made = export, result, output, seconds, keeping

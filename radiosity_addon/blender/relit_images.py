@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,12 +12,14 @@ import numpy as np
 
 from ..bake_scene import LightGroup, LightmapPage
 from ..errors import BakeError
-from ..manifest import FILES
+from ..report import BakeReport
+from . import kept_bakes
 from .group_images import rescale_materials, update_images
-from .image_marks import SCALE_PROPERTY
+from .image_marks import MARK, SCALE_PROPERTY
 from .images import image_scale
 from .kept_bakes import group_images_of, images_of
-from .output import REPORT_NAME, OutputFolder
+from .output import OutputFolder
+from .ownership import OwnReport, report_listing
 
 OF_LIGHT = ("irradiance_W_m2", "illuminance_lx")
 """What the report says of the light on objects: of other light than this, it must not stay."""
@@ -76,24 +77,36 @@ def check_images(images: Images, pages: Sequence[LightmapPage]) -> None:
 def store(images: Sequence[bpy.types.Image], seconds: float) -> None:
     """Write the images to their files, and to the report beside them; pack anew those that are packed.
 
+    Only files that a report of their scene lists are replaced, wherever the images point.
+
     Raises
     ------
     BakeError
-        If a file cannot be replaced.
+        If a file cannot be replaced, or is not ours.
     """
+    folders: dict[Path, list[bpy.types.Image]] = {}
+    reports: dict[Path, OwnReport] = {}
+    for image in images:
+        if image.packed_file is None:
+            path = Path(bpy.path.abspath(image.filepath_raw))
+            folders.setdefault(path.parent, []).append(image)
+            reports[path.parent] = report_listing(path, _scenes_of(image))
     for image in images:
         if image.packed_file is not None:
             image.pack()
-    folders: dict[Path, list[bpy.types.Image]] = {}
-    for image in images:
-        if image.packed_file is None:
-            folders.setdefault(Path(bpy.path.abspath(image.filepath_raw)).parent, []).append(image)
     for folder, inside in folders.items():
-        with OutputFolder(folder) as output:
+        report = reports[folder]
+        with OutputFolder(folder, report.names, owner=report.owner) as output:
             for image in inside:
                 _save_into(output.staging, image)
             _report(output, inside, seconds)
             output.publish()
+
+
+def _scenes_of(image: bpy.types.Image) -> list[bpy.types.Scene]:
+    """Return the scenes whose bake an image shows; all where none says so."""
+    scenes = [scene for scene in bpy.data.scenes if kept_bakes.mark_of(scene) == image.get(MARK)]
+    return scenes or list(bpy.data.scenes)
 
 
 def _save_into(folder: Path, image: bpy.types.Image) -> None:
@@ -110,23 +123,21 @@ def _save_into(folder: Path, image: bpy.types.Image) -> None:
 
 
 def _report(output: OutputFolder, images: Sequence[bpy.types.Image], seconds: float) -> None:
-    """Bring the report in the folder up to date, if it is there and readable."""
+    """Bring the report in the folder up to date."""
+    told: dict[str, Any] = dict(output.earlier or {})
     try:
-        told: dict[str, Any] = json.loads((output.path / REPORT_NAME).read_text(encoding="utf-8"))
         scales = {Path(bpy.path.abspath(image.filepath_raw)).name: image_scale(image) for image in images}
         of_groups = [page for group in told.get("light_groups", ()) for page in group["pages"]]
         for entry in (*told["objects"], *of_groups):
             if "scale" in entry:
                 entry["scale"] = scales.get(entry["image"], entry["scale"])
-    except (OSError, ValueError, KeyError, TypeError):
-        return
-    for entry in told["objects"]:
-        for name in OF_LIGHT:
-            entry.pop(name, None)
-    told[FILES] = output.files()
+        for entry in told["objects"]:
+            for name in OF_LIGHT:
+                entry.pop(name, None)
+    except (KeyError, TypeError, AttributeError):
+        raise BakeError(f"'{output.path / output.names.report}' is damaged: bake again") from None
     told["relit"] = {"seconds": round(seconds, 4)}
-    text = json.dumps(told, indent=2, ensure_ascii=False) + "\n"
-    (output.staging / REPORT_NAME).write_text(text, encoding="utf-8")
+    output.write_report(BakeReport(told))
 
 
 @contextmanager

@@ -53,6 +53,8 @@ class _Cache:
 
 
 running = Running()
+interrupted = False
+"""Whether a bake of the open file was killed while it replaced its lightmaps."""
 _cache = _Cache()
 
 

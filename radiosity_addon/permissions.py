@@ -1,0 +1,21 @@
+"""What the command line may do beyond what is safe, because its user says so."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Permissions:
+    """What is allowed.
+
+    Attributes
+    ----------
+    overwrite : bool
+        Replace files that no earlier bake of this scene has written.
+    scripts : bool
+        Run the scripts and script expressions of a scene file that is opened.
+    """
+
+    overwrite: bool = False
+    scripts: bool = False
