@@ -301,7 +301,7 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
         help="replace files that no bake of this scene has written; never those the scene reads",
     )
     parser.add_argument(
-        "--allow-scripts", action="store_true", help="run the scripts and drivers of the .blend: only if trusted"
+        "--allow-scripts", action="store_true", help="run the scripts and drivers of the .blend"
     )
 
 

@@ -92,6 +92,10 @@ class FileNames:
         return frozenset(folded(PurePath(name).stem) for name in others if name.endswith(ending))
 
 
+PLAIN_NAMES = FileNames()
+"""Those of the command line."""
+
+
 def unique_names(stems: Sequence[str], ending: str, taken: set[str]) -> list[str]:
     """Return file names that differ from each other and from the stems taken, and take theirs.
 

@@ -42,7 +42,7 @@ class Owner:
     scene: str
 
     def told(self, folder: Path) -> dict[str, str]:
-        """Return what a report in `folder` says: a path relative to it, so that both may be moved together."""
+        """Return what a report in `folder` says: a path relative to it, so that both can be moved."""
         return {"file": _relative(self.source, folder), "scene": self.scene}
 
     def owns(self, report: Report, folder: Path) -> bool:
@@ -83,7 +83,7 @@ def read_report(path: Path) -> dict[str, Any]:
         if not isinstance(report, dict):
             raise TypeError
         if SEAL not in report and "version" in report and "solver" in report:
-            raise NoReportError("was written by an earlier version, which did not prove which files are its own")
+            raise NoReportError("was written by an earlier version, which does not prove its files")
         if report[SEAL] != _seal_of(report):
             raise NoReportError("was changed since it was written")
         for key in ("file", "scene"):
@@ -106,7 +106,7 @@ def text_of(report: Report) -> str:
 
 
 def reports_in(folder: Path, belongs: Callable[[Report, Path], bool]) -> dict[str, dict[str, Any]]:
-    """Return the reports in a folder that belong to somebody, by name: `Owner.owns` of an owner says which."""
+    """Return the reports in a folder that belong to somebody, by name; see `Owner.owns`."""
     found = {}
     try:
         names = sorted(path.name for path in folder.iterdir() if path.name.endswith(REPORT_NAME))

@@ -173,9 +173,9 @@ class RADIOSITY_OT_recover(bpy.types.Operator):
         """Put them back, and have the open file show them."""
         from ..staging import clean_up
 
-        done = []
+        done: list[Path] = []
         try:
-            done = [folder for folder in interrupted_folders(context) if clean_up(folder)]
+            done = [folder.resolve() for folder in interrupted_folders(context) if clean_up(folder)]
         except BakeError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

@@ -192,9 +192,7 @@ def restore(
         console.lines([f"{count} object{'' if count == 1 else 's'} restored, written to {output}"])
 
 
-def open_or_build(
-    scene: Path | None, loaded: Path | None, allowed: Permissions = Permissions()
-) -> tuple[BakeWarning, ...]:
+def open_or_build(scene: Path | None, loaded: Path | None, allowed: Permissions) -> tuple[BakeWarning, ...]:
     """Have the scene to bake as the open file's scene; returns what to warn of."""
     from .cornell import build_cornell_box
     from .files import empty_scene, open_scene

@@ -10,7 +10,7 @@ import bpy
 
 from ..bake_scene import BakeResult, LightGroup, LightmapPage
 from ..errors import BakeError
-from ..file_names import FileNames
+from ..file_names import PLAIN_NAMES, FileNames
 from ..lightmap.encode import png16_scale
 from ..settings import BakeSettings
 from . import overlay_view
@@ -25,7 +25,7 @@ GroupImages: TypeAlias = Mapping[str, Sequence[bpy.types.Image]]
 
 
 def write_groups(
-    result: BakeResult, settings: BakeSettings, folder: Path | None, names: FileNames = FileNames()
+    result: BakeResult, settings: BakeSettings, folder: Path | None, names: FileNames = PLAIN_NAMES
 ) -> GroupImages:
     """Make an image of each page of each light group, saved into `folder` or packed; see `write_pages`.
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..bake_scene import BakeResult, BakeScene, LightmapPage
 from ..errors import BakeError
-from ..file_names import FileNames, highest_page, unique_names
+from ..file_names import PLAIN_NAMES, FileNames, highest_page, unique_names
 from ..light_groups import are_wanted
 from ..lightmap.encode import encode_png16, png16_scale
 from ..report import LightmapFile
@@ -30,14 +30,14 @@ def page_file_names(
     result: BakeResult,
     settings: BakeSettings,
     others: frozenset[str] = frozenset(),
-    names: FileNames = FileNames(),
+    names: FileNames = PLAIN_NAMES,
 ) -> list[str]:
     """Name the file of every page: `lightmap.exr`, or one after each object; see `names_of_pages`."""
     return names_of_pages(names, settings, len(result.pages), _objects(result), others=others)[0]
 
 
 def group_file_names(
-    result: BakeResult, settings: BakeSettings, names: FileNames = FileNames()
+    result: BakeResult, settings: BakeSettings, names: FileNames = PLAIN_NAMES
 ) -> list[list[str]]:
     """Name the files of every light group's pages after the pages and the group: `lightmap_Kitchen.exr`."""
     groups = [group.name for group in result.groups]
@@ -117,7 +117,7 @@ def write_pages(
     settings: BakeSettings,
     folder: Path | None,
     others: frozenset[str] = frozenset(),
-    names: FileNames = FileNames(),
+    names: FileNames = PLAIN_NAMES,
 ) -> list[bpy.types.Image]:
     """Make an image of each page, saved into `folder` or packed into the .blend.
 

@@ -11,7 +11,7 @@ import bpy
 
 from ..background import in_thread
 from ..bake_scene import BakeResult, BakeWarning, Progress
-from ..file_names import FileNames
+from ..file_names import PLAIN_NAMES
 from ..keeping import Keeping, bake_steps, moves_alone
 from ..relighting import KeptBake
 from ..report import BakeReport
@@ -217,7 +217,7 @@ def _show(
     taken: frozenset[str] = frozenset(),
 ) -> tuple[list[bpy.types.Image], GroupImages]:
     """Make the images, also those of light groups, and put them on the objects; files `taken` stay."""
-    folder, names = (None, FileNames()) if output is None else (output.staging, output.names)
+    folder, names = (None, PLAIN_NAMES) if output is None else (output.staging, output.names)
     images = write_pages(result, settings, folder, taken, names)
     groups: GroupImages = {}
     try:

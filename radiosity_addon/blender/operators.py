@@ -93,7 +93,10 @@ class RADIOSITY_OT_bake(WindowJob, bpy.types.Operator):
             bpy.ops.object.mode_set(mode="EDIT")
 
     def _succeeded(self, context: bpy.types.Context, in_window: bool) -> None:
+        from .cleaning import look_for_interrupted
         from .lightmap_materials import set_lightmap_only
+
+        look_for_interrupted(context)
 
         if in_window:
             show_result(context)

@@ -17,7 +17,7 @@ from typing import Any
 import bpy
 
 from ..errors import BakeError, RadiosityError
-from ..file_names import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, FileNames, folded
+from ..file_names import BLEND_NAME, PLAIN_NAMES, PREVIEW_NAME, REPORT_NAME, FileNames, folded
 from ..manifest import FILES as LISTED
 from ..manifest import OWNER, NoReportError, Owner, entries, is_as_written, read_report
 from ..report import BakeReport
@@ -62,7 +62,7 @@ class OutputFolder:
     def __init__(
         self,
         path: Path | str,
-        names: FileNames = FileNames(),
+        names: FileNames = PLAIN_NAMES,
         source: str = "",
         overwrite: bool = False,
         others: Collection[Path] = (),
@@ -369,4 +369,3 @@ def _lightmaps_relative_to(folder: Path) -> Iterator[None]:
     finally:
         for image, stored in before:
             image.filepath_raw = stored
-

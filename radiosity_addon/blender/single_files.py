@@ -64,7 +64,7 @@ def check_existing(option: str, path: Path, overwrite: bool, ours: Mapping[str, 
     if is_read(_absolute(path)):
         raise BakeError(f"{option} {path} is a file that the scene reads: choose another file")
     if not overwrite and not (ours is not None and _is_report_of(path, ours)):
-        raise BakeError(f"{option} {path} is there already: move it away, choose another file, or give --overwrite")
+        raise BakeError(f"{option} {path} is there: move it away, choose another, or give --overwrite")
 
 
 def owner_told(owner: Owner, output: Path) -> dict[str, str]:
