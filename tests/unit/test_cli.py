@@ -13,6 +13,7 @@ import pytest
 
 from radiosity_addon import cli
 from radiosity_addon.errors import BakeError, SceneError, UsageError
+from radiosity_addon.permissions import Permissions
 from radiosity_addon.settings import BakeSettings
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -83,12 +84,13 @@ def test_every_option_arrives(verbs: list[tuple]) -> None:
         "bake s.glb --output o --texel-density 12.5 --atlas per-object --quality high --quantity radiosity "
         "--light indirect --format png16 --objects Floor Wall --sky --keep-uvs --seed 7 --threads 2 "
         "--quiet --report r.json --plot p.PNG --method two-level --elements 900 --patches 30 --contrast 0.25 "
-        "--memory-limit 0.5"
+        "--memory-limit 0.5 --overwrite --allow-scripts"
     )
     assert cli.main(line.split()) == 0
-    (_, scene, _, output, settings, report, plot, keep, console, _) = verbs[0]
+    (_, scene, _, output, settings, report, plot, keep, allowed, console, _) = verbs[0]
     assert (scene, output, console.quiet) == (Path("s.glb"), Path("o"), True)
     assert (report, plot, keep) == (Path("r.json"), Path("p.PNG"), False)
+    assert allowed == Permissions(overwrite=True, scripts=True)
     assert settings == BakeSettings(
         texel_density=12.5,
         atlas="per-object",
@@ -111,7 +113,8 @@ def test_every_option_arrives(verbs: list[tuple]) -> None:
 
 def test_a_bake_is_kept_if_it_can_be(verbs: list[tuple], capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["bake", "--keep"]) == 0
-    assert verbs[0][-3] is True
+    assert verbs[0][-4] is True
+    assert verbs[0][-3] == Permissions()
     for line, message in (
         ("--keep --method shooting", "needs the hierarchical method"),
         ("--keep --quantity residual", "a residual is of all light together"),

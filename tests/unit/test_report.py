@@ -47,7 +47,7 @@ def test_the_file_holds_what_the_format_promises(tmp_path: Path) -> None:
     read = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
     assert read == report.as_dict()
     assert read == {
-        "version": 1,
+        "version": 2,
         "objects": [
             {"object": "Wände", "uv_layer": "Lightmap", "image": "a.exr", "resolution": [8, 4], "atlas": 0},
             {"object": "B", "uv_layer": "Lightmap", "image": "b.exr", "resolution": [2, 2], "atlas": 1},

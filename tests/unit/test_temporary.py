@@ -1,0 +1,92 @@
+"""The command line's temporary files: its own folder, and nothing else, is removed at the end."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+posix = pytest.mark.skipif(os.name == "nt", reason="kills as POSIX does")
+
+# A Blender that took TMPDIR itself for its folder, as it does where it cannot make one of its own.
+RUN = """
+import os, runpy, sys, types
+app = types.SimpleNamespace(tempdir=os.environ["TMPDIR"])
+sys.modules["bpy"] = types.SimpleNamespace(app=app)
+if os.environ.get("NO_FOLDERS"):
+    def refused(*_a, **_k):
+        raise OSError(28, "No space left on device")
+    os.mkdir = refused
+sys.argv = ["radiosity_addon", "bake", "--help"]
+runpy.run_module("radiosity_addon", run_name="__main__")
+"""
+
+KILLED = """
+import os
+from pathlib import Path
+from radiosity_addon.temporary import TemporaryFolder
+folder = TemporaryFolder()
+assert os.environ["TMPDIR"] == os.environ["TEMP"] == str(folder.path)
+(folder.path / "blender_abc").mkdir()
+(folder.path / "blender_abc" / "quit.blend").write_text("x")
+os.kill(os.getpid(), 9)
+"""
+
+
+def run(code: str, tmpdir: Path, **more: str) -> subprocess.CompletedProcess[str]:
+    env = {**os.environ, "TMPDIR": str(tmpdir), "PYTHONPATH": str(ROOT), **more}
+    return subprocess.run(
+        [sys.executable, "-c", code], env=env, cwd=ROOT, capture_output=True, text=True, timeout=120, check=False
+    )
+
+
+@pytest.mark.parametrize("no_folders", ["", "1"])
+def test_the_folder_for_temporary_files_itself_is_never_removed(tmp_path: Path, no_folders: str) -> None:
+    tmp_path = tmp_path / "tmp"
+    (tmp_path / "radiosity-notes").mkdir(parents=True)
+    (tmp_path / "mine.txt").write_text("years of work")
+    done = run(RUN, tmp_path, NO_FOLDERS=no_folders)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "mine.txt").read_text() == "years of work"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.txt", "radiosity-notes"]
+
+
+@posix
+def test_what_a_kill_leaves_is_removed_at_the_next_start_alone(tmp_path: Path) -> None:
+    (tmp_path / "radiosity-12345678").mkdir()
+    (tmp_path / "radiosity-12345678" / "mine.txt").write_text("of somebody else")
+    assert run(KILLED, tmp_path).returncode == -signal.SIGKILL
+    (left,) = [path for path in tmp_path.iterdir() if path.name != "radiosity-12345678"]
+    assert (left / "blender_abc" / "quit.blend").exists()
+    assert run(RUN, tmp_path).returncode == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["radiosity-12345678"]
+    assert (tmp_path / "radiosity-12345678" / "mine.txt").exists()
+
+
+def test_the_folder_of_a_living_process_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import tempfile
+
+    from radiosity_addon.temporary import TemporaryFolder
+
+    for name in ("TMPDIR", "TEMP", "TMP"):
+        monkeypatch.setenv(name, str(tmp_path))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    living = TemporaryFolder()
+    assert living.path is not None
+    (living.path / "file").write_text("in use")
+    assert run(RUN, tmp_path).returncode == 0
+    assert (living.path / "file").exists()
+    # Replaced by something else meanwhile, it is not ours to remove.
+    path = living.path
+    path.rename(tmp_path / "moved")
+    path.mkdir()
+    (path / "mine.txt").write_text("mine")
+    living.remove()
+    assert (path / "mine.txt").exists()
+    assert (tmp_path / "moved" / "file").exists()
