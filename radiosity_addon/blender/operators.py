@@ -197,8 +197,13 @@ class RADIOSITY_OT_open_folder(bpy.types.Operator):
             message = rpt_("The folder '{}' holds no bake of this scene")
             self.report({"ERROR"}, message.format(folder))
             return {"CANCELLED"}
-        bpy.ops.wm.path_open(filepath=folder)
+        _open(folder)
         return {"FINISHED"}
+
+
+def _open(folder: str) -> None:
+    """Show a folder in the system's file browser."""
+    bpy.ops.wm.path_open(filepath=folder)
 
 
 def output_folder(context: bpy.types.Context) -> Path | None:

@@ -44,7 +44,7 @@ def test_the_report_keeps_its_contract(run: Run, room: Path, tmp_path: Path) -> 
     assert run("bake", room, "--output", out, *QUICK, "--report", tmp_path / "copies" / "r.json").code == 0
     report = read_report(out)
     assert json.loads((tmp_path / "copies" / "r.json").read_text(encoding="utf-8")) == report
-    assert report["version"] == 1
+    assert report["version"] == 2
     assert {entry["object"] for entry in report["objects"]} == {"Floor", "Wall", "Cube"}
     for entry in report["objects"]:
         assert entry["uv_layer"] == "Lightmap"

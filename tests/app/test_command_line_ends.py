@@ -154,25 +154,6 @@ def test_the_process_ends_with_the_code(room: Path, tmp_path: Path) -> None:
     assert err.count("\n") == 1
 
 
-@pytest.mark.skipif(os.name == "nt", reason="signals are sent the POSIX way")
-@pytest.mark.parametrize("stage", ["export", "solve", "light", "preview"])
-def test_ctrl_c_leaves_the_previous_result_whole(stage: str, room: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    out.mkdir()
-    (out / "baked.blend").write_text("the previous result")
-    before = digest(out)
-    job = start("bake", room, "--output", out, "--resolution", "256", cwd=tmp_path)
-    for line in job.stdout:
-        if f"] {stage}" in line:
-            os.killpg(job.pid, signal.SIGINT)
-            break
-    _, err = job.communicate(timeout=300)
-    assert job.returncode == 130
-    assert err.splitlines()[-1] == "error: interrupted; nothing was written"
-    assert "Traceback" not in err
-    assert digest(out) == before
-
-
 KILLED_WHILE_PUBLISHING = """
 import os, sys
 from pathlib import Path
@@ -205,14 +186,37 @@ def baked_before(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     return room, folder / "out"
 
 
+def copied(baked: tuple[Path, Path], to: Path) -> tuple[Path, Path]:
+    """A copy of the whole project."""
+    shutil.copytree(baked[0].parent, to / "project")
+    return to / "project" / baked[0].name, to / "project" / baked[1].name
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals are sent the POSIX way")
+@pytest.mark.parametrize("stage", ["export", "solve", "light", "preview"])
+def test_ctrl_c_leaves_the_previous_result_whole(
+    stage: str, baked_before: tuple[Path, Path], tmp_path: Path
+) -> None:
+    room, out = copied(baked_before, tmp_path)
+    before = digest(out)
+    job = start("bake", room, "--output", out, "--resolution", "256", cwd=tmp_path)
+    for line in job.stdout:
+        if f"] {stage}" in line:
+            os.killpg(job.pid, signal.SIGINT)
+            break
+    _, err = job.communicate(timeout=300)
+    assert job.returncode == 130
+    assert err.splitlines()[-1] == "error: interrupted; nothing was written"
+    assert "Traceback" not in err
+    assert digest(out) == before
+
+
 @pytest.mark.skipif(os.name == "nt", reason="signals are sent the POSIX way")
 @pytest.mark.parametrize("moment", ["light", "preview", "publish"])
 def test_a_killed_bake_leaves_the_previous_result_whole(
     moment: str, baked_before: tuple[Path, Path], run: Run, tmp_path: Path
 ) -> None:
-    room, good = baked_before
-    out = tmp_path / "out"
-    shutil.copytree(good, out)
+    room, out = copied(baked_before, tmp_path)
     before = digest(out)
     words = ("bake", room, "--output", out, "--resolution", "64", "--quality", "draft", "--seed", "5")
     if moment == "publish":

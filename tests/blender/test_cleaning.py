@@ -11,9 +11,10 @@ import bpy
 import pytest
 
 import radiosity_addon
+from radiosity_addon.blender import runtime
 from radiosity_addon.blender.bake_record import recorded_objects
 from radiosity_addon.blender.cleaning import unused_lightmaps
-from radiosity_addon.manifest import listed
+from radiosity_addon.manifest import digest, read_report, sealed, text_of
 from tests.blender.scenes import add_lamp, add_mesh
 
 
@@ -41,9 +42,6 @@ def room(baked: Path, tmp_path: Path) -> Iterator[Path]:
     folder = tmp_path / "room"
     shutil.copytree(baked, folder)
     radiosity_addon.register()
-    report = folder / "lightmaps" / "report.json"
-    # The bake was of the file beside it, wherever the folder was copied to.
-    report.write_text(report.read_text().replace(json.dumps(str(baked))[1:-1], json.dumps(str(folder))[1:-1]))
     bpy.ops.wm.open_mainfile(filepath=str(folder / "room.blend"))
     yield folder
     radiosity_addon.unregister()
@@ -51,6 +49,10 @@ def room(baked: Path, tmp_path: Path) -> Iterator[Path]:
 
 def files(folder: Path) -> list[str]:
     return sorted(path.name for path in (folder / "lightmaps").iterdir())
+
+
+def listed(folder: Path) -> list[str]:
+    return sorted(read_report(folder / "lightmaps" / "room_Scene_report.json")["files"])
 
 
 def clean() -> set[str]:
@@ -73,33 +75,34 @@ def shown() -> dict[str, str]:
     return found
 
 
-BOTH = {"Floor": "Floor.exr", "Shelf": "Shelf.exr"}
+ALL = ["room_Scene_Floor_lightmap.exr", "room_Scene_Shelf_lightmap.exr", "room_Scene_report.json"]
+BOTH = {"Floor": "room_Scene_Floor_lightmap.exr", "Shelf": "room_Scene_Shelf_lightmap.exr"}
 
 
 def test_what_is_shown_stays(room: Path) -> None:
     assert shown() == BOTH
     assert clean() == {"CANCELLED"}
-    assert files(room) == ["Floor.exr", "Shelf.exr", "report.json"]
+    assert files(room) == ALL
 
 
 def test_after_a_restore_the_lightmaps_go_and_nothing_else(room: Path) -> None:
     mine = room / "lightmaps" / "mine.exr"
     mine.write_text("not a bake's")
     bpy.ops.radiosity.restore()
-    assert files(room) == ["Floor.exr", "Shelf.exr", "mine.exr", "report.json"]
+    assert files(room) == ["mine.exr", *ALL]
     assert clean() == {"FINISHED"}
-    assert files(room) == ["mine.exr", "report.json"]
-    assert listed(room / "lightmaps" / "report.json") == {}
+    assert files(room) == ["mine.exr", "room_Scene_report.json"]
+    assert listed(room) == []
     assert clean() == {"CANCELLED"}
 
 
 def test_a_file_that_somebody_changed_is_refused(room: Path) -> None:
     bpy.ops.radiosity.restore()
-    painted = room / "lightmaps" / "Floor.exr"
+    painted = room / "lightmaps" / "room_Scene_Floor_lightmap.exr"
     painted.write_bytes(painted.read_bytes()[:-1] + b"!")
-    assert [path.name for path in unused_lightmaps(bpy.context).changed] == ["Floor.exr"]
+    assert [path.name for path in unused_lightmaps(bpy.context).changed] == ["room_Scene_Floor_lightmap.exr"]
     assert clean() == {"FINISHED"}
-    assert files(room) == ["Floor.exr", "report.json"]
+    assert files(room) == ["room_Scene_Floor_lightmap.exr", "room_Scene_report.json"]
 
 
 def test_lightmaps_of_another_file_stay(room: Path) -> None:
@@ -107,24 +110,36 @@ def test_lightmaps_of_another_file_stay(room: Path) -> None:
     bpy.ops.wm.open_mainfile(filepath=str(room / "other.blend"))
     bpy.ops.radiosity.restore()
     assert clean() == {"CANCELLED"}
+    # It may have been moved, with what it shows to be found again.
     (room / "room.blend").unlink()
-    assert clean() == {"FINISHED"}
+    assert clean() == {"CANCELLED"}
+    assert files(room) == ALL
 
 
-def test_what_a_copy_beside_them_shows_stays(room: Path) -> None:
-    shutil.copy(room / "room.blend", room / "lightmaps" / "baked.blend")
+def test_what_a_copy_listed_with_them_shows_stays(room: Path) -> None:
+    report = room / "lightmaps" / "room_Scene_report.json"
+    copy = room / "lightmaps" / "baked.blend"
+    shutil.copy(room / "room.blend", copy)
+    told = read_report(report)
+    told["files"]["baked.blend"] = {"bytes": copy.stat().st_size, "sha256": digest(copy)}
+    report.write_text(text_of(sealed(told)))
     bpy.ops.radiosity.restore()
     assert clean() == {"CANCELLED"}
+    copy.unlink()
+    assert clean() == {"FINISHED"}
 
 
 def test_a_list_that_leads_elsewhere_is_not_followed(room: Path) -> None:
     bpy.ops.radiosity.restore()
     (room / "thesis.png").write_text("years of work")
-    report = room / "lightmaps" / "report.json"
+    report = room / "lightmaps" / "room_Scene_report.json"
     told = json.loads(report.read_text())
-    told["files"]["../thesis.png"] = dict(told["files"]["Floor.exr"])
-    report.write_text(json.dumps(told))
+    told["files"]["../thesis.png"] = dict(told["files"]["room_Scene_Floor_lightmap.exr"])
+    told["files"]["thesis.png"] = dict(told["files"]["room_Scene_Floor_lightmap.exr"])
+    (room / "lightmaps" / "thesis.png").write_text("years of work")
+    report.write_text(text_of(sealed(told)))
     clean()
+    assert (room / "lightmaps" / "thesis.png").exists()
     assert (room / "thesis.png").exists()
 
 
@@ -132,10 +147,10 @@ def test_a_smaller_bake_leaves_earlier_lightmaps_to_clean(room: Path) -> None:
     """Files of the bake before stay listed until they are cleaned away."""
     bpy.data.objects["Shelf"].radiosity_mode = "LIGHT_ONLY"
     assert bpy.ops.radiosity.bake("EXEC_DEFAULT", True) == {"FINISHED"}
-    assert sorted(listed(room / "lightmaps" / "report.json")) == ["Floor.exr", "Shelf.exr"]
+    assert listed(room) == ALL[:2]
     assert clean() == {"FINISHED"}
-    assert files(room) == ["Floor.exr", "report.json"]
-    assert shown() == {"Floor": "Floor.exr"}
+    assert files(room) == ["room_Scene_Floor_lightmap.exr", "room_Scene_report.json"]
+    assert shown() == {"Floor": "room_Scene_Floor_lightmap.exr"}
 
 
 def test_a_bake_outlives_saving_and_opening(room: Path) -> None:
@@ -150,11 +165,11 @@ def test_an_appended_object_brings_its_bake_along(room: Path, tmp_path: Path) ->
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "new.blend"))
     bpy.ops.wm.append(directory=str(room / "room.blend" / "Object"), filename="Floor")
-    assert shown() == {"Floor": "Floor.exr"}
+    assert shown() == {"Floor": "room_Scene_Floor_lightmap.exr"}
     assert clean() == {"CANCELLED"}
     assert bpy.ops.radiosity.restore() == {"FINISHED"}
     assert "Lightmap" not in bpy.data.objects["Floor"].data.uv_layers
-    assert files(room) == ["Floor.exr", "Shelf.exr", "report.json"]
+    assert files(room) == ALL
 
 
 def test_a_linked_object_shows_its_bake_and_is_left_alone(room: Path, tmp_path: Path) -> None:
@@ -171,17 +186,78 @@ def test_a_linked_object_shows_its_bake_and_is_left_alone(room: Path, tmp_path: 
     assert clean() == {"CANCELLED"}
 
 
-def test_opening_a_file_takes_back_a_half_published_bake(room: Path) -> None:
+def test_opening_a_file_touches_nothing_and_recover_takes_a_half_published_bake_back(room: Path) -> None:
     """As a bake leaves it that is killed between two renamings."""
     from radiosity_addon.staging import EARLIER, JOURNAL, Staging
 
-    good = (room / "lightmaps" / "Floor.exr").read_bytes()
+    name = "room_Scene_Floor_lightmap.exr"
+    floor = room / "lightmaps" / name
+    good = floor.read_bytes()
     staging = Staging(room / "lightmaps")
     (staging.path / EARLIER).mkdir()
-    shutil.copy(room / "lightmaps" / "Floor.exr", staging.path / EARLIER)
-    (staging.path / JOURNAL).write_text(json.dumps({"names": ["Floor.exr"]}))
-    (room / "lightmaps" / "Floor.exr").write_bytes(b"new")
-    staging._mark.close()  # as the system does for a process that is no more
+    shutil.copy(floor, staging.path / EARLIER)
+    old = digest(floor)
+    floor.write_bytes(b"new")
+    told = {"version": 2, "files": {name: {"new": digest(floor), "old": old}}}
+    (staging.path / JOURNAL).write_text(json.dumps(told))
+    staging.release()  # as the system does for a process that is no more
+    before = {path: path.read_bytes() for path in room.rglob("*") if path.is_file()}
     bpy.ops.wm.open_mainfile(filepath=str(room / "room.blend"))
-    assert (room / "lightmaps" / "Floor.exr").read_bytes() == good
-    assert files(room) == ["Floor.exr", "Shelf.exr", "report.json"]
+    assert {path: path.read_bytes() for path in room.rglob("*") if path.is_file()} == before
+    assert runtime.interrupted
+    assert bpy.ops.radiosity.recover() == {"FINISHED"}
+    assert floor.read_bytes() == good
+    assert files(room) == ALL
+    assert not runtime.interrupted
+    assert bpy.ops.radiosity.recover() == {"CANCELLED"}
+
+
+def test_a_bake_into_the_folder_recovers_it_too(room: Path) -> None:
+    from radiosity_addon.staging import EARLIER, JOURNAL, Staging
+
+    name = "room_Scene_Floor_lightmap.exr"
+    staging = Staging(room / "lightmaps")
+    (staging.path / EARLIER).mkdir()
+    (room / "lightmaps" / name).rename(staging.path / EARLIER / name)
+    old = digest(staging.path / EARLIER / name)
+    (room / "lightmaps" / name).write_bytes(b"new")
+    told = {"version": 2, "files": {name: {"new": digest(room / "lightmaps" / name), "old": old}}}
+    (staging.path / JOURNAL).write_text(json.dumps(told))
+    staging.release()
+    assert bpy.ops.radiosity.bake("EXEC_DEFAULT", True) == {"FINISHED"}
+    assert files(room) == ALL
+    assert not runtime.interrupted
+
+
+@pytest.mark.parametrize("crafted", ["../../victim.exr", "/victim.exr", "victim.txt"])
+def test_a_crafted_folder_is_left_as_it_is(room: Path, crafted: str) -> None:
+    """Opening a received project, and baking in it, must not reach outside its folder of lightmaps."""
+    from radiosity_addon.staging import EARLIER, JOURNAL, Staging
+
+    victims = [room.parent / "victim.exr", room / "lightmaps" / "victim.txt"]
+    for victim in victims:
+        victim.write_text("years of work")
+    staging = Staging(room / "lightmaps")
+    (staging.path / EARLIER).mkdir()
+    name = crafted.replace("/victim.exr", str(victims[0])) if crafted.startswith("/") else crafted
+    told = {"version": 2, "names": [name], "files": {name: {"new": digest(victims[0]), "old": None}}}
+    (staging.path / JOURNAL).write_text(json.dumps(told))
+    staging.release()
+    bpy.ops.wm.open_mainfile(filepath=str(room / "room.blend"))
+    assert not runtime.interrupted
+    assert bpy.ops.radiosity.bake("EXEC_DEFAULT", True) == {"FINISHED"}
+    assert all(victim.read_text() == "years of work" for victim in victims)
+
+
+def test_only_the_folder_of_a_bake_of_this_scene_is_opened(
+    room: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from radiosity_addon.blender import operators
+
+    opened = []
+    monkeypatch.setattr(operators, "_open", lambda folder: opened.append(folder))
+    assert bpy.ops.radiosity.open_folder() == {"FINISHED"}
+    (room / "lightmaps" / "room_Scene_report.json").rename(room / "lightmaps" / "notes.json")
+    with pytest.raises(RuntimeError, match="no bake of this scene"):
+        bpy.ops.radiosity.open_folder()
+    assert len(opened) == 1

@@ -15,7 +15,6 @@ from radiosity_addon.blender.images import (
     lightmap_files,
     page_file_names,
     relative_path,
-    sanitised_stem,
     set_folder,
     write_pages,
 )
@@ -127,10 +126,6 @@ def test_per_object_files_are_unique_whatever_the_case() -> None:
 def test_shared_pages_are_numbered() -> None:
     files = page_file_names(_result(_page(), _page()), BakeSettings(format="png16"))
     assert files == ["lightmap.png", "lightmap_2.png"]
-
-
-def test_long_names_are_cut() -> None:
-    assert len(sanitised_stem("x" * 300)) == 100
 
 
 def test_an_unwritable_file_is_named_and_leaves_no_image(tmp_path: Path) -> None:

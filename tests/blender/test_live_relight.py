@@ -69,7 +69,7 @@ def test_the_lightmap_follows_and_becomes_exact_at_rest(live: bpy.types.WindowMa
     settle()
     exact = lightmap()
     assert relative(shown, exact) < 2e-3
-    assert not bpy.data.images["lightmap.exr"].is_dirty
+    assert not bpy.data.images["room_Scene_lightmap.exr"].is_dirty
     assert live.radiosity_live
     live.radiosity_live = False
     held = kept_bakes.find(bpy.context.scene)

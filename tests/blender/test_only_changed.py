@@ -68,7 +68,7 @@ def uvs(name: str) -> np.ndarray:
     return values
 
 
-ONE_PAGE = dict.fromkeys(("Floor", "Shelf", "Box"), "lightmap.exr")
+ONE_PAGE = dict.fromkeys(("Floor", "Shelf", "Box"), "room_Scene_lightmap.exr")
 
 
 def test_the_first_bake_is_of_all(room: Path) -> None:
@@ -87,15 +87,18 @@ def test_without_a_change_nothing_is_done(room: Path) -> None:
 
 
 def test_a_moved_object_gets_a_new_lightmap_and_others_keep_theirs(room: Path) -> None:
-    page, floor = digests(room)["lightmap.exr"], uvs("Floor")
+    page, floor = digests(room)["room_Scene_lightmap.exr"], uvs("Floor")
     bpy.data.objects["Box"].location.x -= 0.5
     assert bake() == {"FINISHED"}
-    assert shown() == {**ONE_PAGE, "Box": "lightmap_2.exr"}
-    assert digests(room)["lightmap.exr"] == page
+    assert shown() == {**ONE_PAGE, "Box": "room_Scene_lightmap_2.exr"}
+    assert digests(room)["room_Scene_lightmap.exr"] == page
     np.testing.assert_array_equal(uvs("Floor"), floor)
-    report = json.loads((room / "report.json").read_text())
+    report = json.loads((room / "room_Scene_report.json").read_text())
     assert {entry["object"]: entry["image"] for entry in report["objects"]} == shown()
-    assert [entry["image"] for entry in report["pages"]] == ["lightmap_2.exr", "lightmap.exr"]
+    assert [entry["image"] for entry in report["pages"]] == [
+        "room_Scene_lightmap_2.exr",
+        "room_Scene_lightmap.exr",
+    ]
     assert {entry["object"]: entry["atlas"] for entry in report["objects"]} == {
         "Box": 0,
         "Floor": 1,
@@ -111,11 +114,11 @@ def test_a_moved_object_gets_a_new_lightmap_and_others_keep_theirs(room: Path) -
 
 def test_all_lightmaps_follow_what_moved_while_that_is_kept(room: Path) -> None:
     bpy.context.scene.radiosity_relight.only_moved = True
-    page, floor = digests(room)["lightmap.exr"], uvs("Floor")
+    page, floor = digests(room)["room_Scene_lightmap.exr"], uvs("Floor")
     bpy.data.objects["Box"].location.x -= 0.5
     assert bake() == {"FINISHED"}
     assert shown() == ONE_PAGE
-    assert digests(room)["lightmap.exr"] != page
+    assert digests(room)["room_Scene_lightmap.exr"] != page
     np.testing.assert_array_equal(uvs("Floor"), floor)
     assert bake() == {"CANCELLED"}
 
@@ -125,8 +128,12 @@ def test_again_and_again_and_restored(room: Path) -> None:
     for step in (1, 2, 3):
         bpy.data.objects["Box"].location.x -= 0.1 * step
         assert bake() == {"FINISHED"}
-        assert set(shown().values()) <= {"lightmap.exr", "lightmap_2.exr", "lightmap_3.exr"}
-    assert len([image for image in bpy.data.images if image.name.startswith("lightmap")]) == 2
+        assert set(shown().values()) <= {
+            "room_Scene_lightmap.exr",
+            "room_Scene_lightmap_2.exr",
+            "room_Scene_lightmap_3.exr",
+        }
+    assert len([image for image in bpy.data.images if "_lightmap" in image.name]) == 2
     assert bpy.ops.radiosity.restore() == {"FINISHED"}
     assert sorted(mesh.name for mesh in bpy.data.meshes) == meshes
     assert [image.name for image in bpy.data.images if image.name.startswith("lightmap")] == []
@@ -160,7 +167,7 @@ def change_mesh() -> None:
 def test_what_counts_as_a_change(change, room: Path) -> None:
     change()
     assert bake() == {"FINISHED"}
-    assert shown() == {**ONE_PAGE, "Floor": "lightmap_2.exr"}
+    assert shown() == {**ONE_PAGE, "Floor": "room_Scene_lightmap_2.exr"}
 
 
 def change_lamp() -> None:
@@ -173,28 +180,30 @@ def change_quality() -> None:
 
 @pytest.mark.parametrize("change", [change_lamp, change_quality])
 def test_where_the_light_has_changed_all_are_lit_anew(change, room: Path) -> None:
-    page = digests(room)["lightmap.exr"]
+    page = digests(room)["room_Scene_lightmap.exr"]
     change()
     assert bake() == {"FINISHED"}
     assert shown() == ONE_PAGE
-    assert digests(room)["lightmap.exr"] != page
+    assert digests(room)["room_Scene_lightmap.exr"] != page
     assert bake() == {"CANCELLED"}
 
 
 def test_a_new_object_is_a_change(room: Path) -> None:
     add_mesh("New", location=(-1, -1, 0.2), scale=(0.2, 0.2, 1))
     assert bake() == {"FINISHED"}
-    assert shown() == {**ONE_PAGE, "New": "lightmap_2.exr"}
+    assert shown() == {**ONE_PAGE, "New": "room_Scene_lightmap_2.exr"}
 
 
 def test_a_cancelled_one_leaves_the_earlier_bake(room: Path) -> None:
     from radiosity_addon.blender.job import run_bake
     from radiosity_addon.blender.output import OutputFolder
+    from radiosity_addon.blender.ownership import panel_names
     from radiosity_addon.blender.properties import settings_of
 
     before = digests(room)
     bpy.data.objects["Box"].location.x -= 0.5
-    job = run_bake(bpy.context, settings_of(bpy.context), OutputFolder(room), only_changed=True)
+    output = OutputFolder(room, panel_names(bpy.context.scene))
+    job = run_bake(bpy.context, settings_of(bpy.context), output, only_changed=True)
     stages = []
     while "apply" not in stages:
         stages.append(next(job).stage)

@@ -63,11 +63,14 @@ def test_a_saved_file_gets_a_folder_beside_it(tmp_path: Path) -> None:
     assert bake() == {"FINISHED"}
     assert sorted(path.name for path in tmp_path.iterdir()) == ["lightmaps", "room.blend"]
     folder = tmp_path / "lightmaps"
-    assert sorted(path.name for path in folder.iterdir()) == ["lightmap.exr", "report.json"]
-    image = bpy.data.images["lightmap.exr"]
-    assert image.filepath == "//lightmaps/lightmap.exr"
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "room_Cornell Box_lightmap.exr",
+        "room_Cornell Box_report.json",
+    ]
+    image = bpy.data.images["room_Cornell Box_lightmap.exr"]
+    assert image.filepath == "//lightmaps/room_Cornell Box_lightmap.exr"
     assert Path(bpy.path.abspath(runtime.last_bake(bpy.context.scene).folder)) == folder.resolve()
-    report = json.loads((folder / "report.json").read_text())
+    report = json.loads((folder / "room_Cornell Box_report.json").read_text())
     assert {entry["object"] for entry in report["objects"]} == set(showing())
 
 

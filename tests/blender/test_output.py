@@ -2,62 +2,89 @@
 
 from __future__ import annotations
 
+import json
+import os
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 
+import radiosity_addon
 from radiosity_addon.bake_scene import BakeResult, LightmapPage
 from radiosity_addon.blender.images import set_folder, write_pages
-from radiosity_addon.blender.output import BLEND_NAME, REPORT_NAME, OutputFolder, save_copy
+from radiosity_addon.blender.output import BLEND_NAME, REPORT_NAME, OutputFolder, save_copy, save_restored
 from radiosity_addon.errors import BakeError
+from radiosity_addon.manifest import digest, read_report
+from radiosity_addon.report import BakeReport
 from radiosity_addon.settings import BakeSettings
+
+REPORT = BakeReport({"version": 2, "objects": [], "solver": {}})
 
 
 def _contents(folder: Path) -> dict[str, str]:
-    return {path.name: path.read_text() if path.is_file() else "<folder>" for path in folder.iterdir()}
+    """What the files of a folder hold; reports prove themselves in other tests."""
+    return {
+        path.name: path.read_text() if path.is_file() else "<folder>"
+        for path in folder.iterdir()
+        if path.name != REPORT_NAME
+    }
 
 
 def _write(folder: Path, **files: str) -> None:
     for stem, text in files.items():
-        (folder / f"{stem}.txt").write_text(text)
+        (folder / f"{stem}.exr").write_text(text)
+
+
+def _bake(folder: Path, *, overwrite: bool = False, **files: str) -> list[Path]:
+    """Publish files as a bake does."""
+    with OutputFolder(folder, overwrite=overwrite) as output:
+        _write(output.staging, **files)
+        output.write_report(REPORT)
+        return output.publish()
 
 
 def test_publishing_replaces_all_files_and_leaves_others(tmp_path: Path) -> None:
-    _write(tmp_path, one="old", mine="keep")
+    _bake(tmp_path, one="old")
+    _write(tmp_path, mine="keep")
     with OutputFolder(tmp_path) as output:
         _write(output.staging, one="new", two="new")
-        (output.staging / REPORT_NAME).write_text("{}")
-        assert (tmp_path / "one.txt").read_text() == "old"
+        output.write_report(REPORT)
+        assert (tmp_path / "one.exr").read_text() == "old"
         paths = output.publish()
-    assert [path.name for path in paths] == ["one.txt", "two.txt", REPORT_NAME]
-    assert _contents(tmp_path) == {"one.txt": "new", "two.txt": "new", "mine.txt": "keep", REPORT_NAME: "{}"}
+    assert [path.name for path in paths] == ["one.exr", "two.exr", REPORT_NAME]
+    assert _contents(tmp_path) == {"one.exr": "new", "two.exr": "new", "mine.exr": "keep"}
+    assert sorted(read_report(tmp_path / REPORT_NAME)["files"]) == ["one.exr", "two.exr"]
 
 
 def test_an_error_leaves_the_earlier_result(tmp_path: Path) -> None:
-    _write(tmp_path, one="old")
+    _bake(tmp_path, one="old")
+    before = digests(tmp_path)
     with pytest.raises(KeyboardInterrupt), OutputFolder(tmp_path) as output:  # noqa: PT012
         _write(output.staging, one="new", two="new")
         raise KeyboardInterrupt
-    assert _contents(tmp_path) == {"one.txt": "old"}
+    assert digests(tmp_path) == before
 
 
 def test_publishing_that_fails_midway_is_undone(tmp_path: Path) -> None:
-    _write(tmp_path, a="old")
-    (tmp_path / "c.txt").mkdir()
-    with pytest.raises(BakeError, match=r"c\.txt"), OutputFolder(tmp_path) as output:  # noqa: PT012
+    _bake(tmp_path, a="old")
+    before = digests(tmp_path)
+    with pytest.raises(BakeError, match=r"c\.exr"), OutputFolder(tmp_path) as output:  # noqa: PT012
         _write(output.staging, a="new", b="new", c="new", d="new")
+        output.write_report(REPORT)
+        (tmp_path / "c.exr").mkdir()
         output.publish()
-    assert _contents(tmp_path) == {"a.txt": "old", "c.txt": "<folder>"}
+    (tmp_path / "c.exr").rmdir()
+    assert digests(tmp_path) == before
 
 
 def test_an_interrupt_while_publishing_is_undone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    _write(tmp_path, a="old", b="old")
+    _bake(tmp_path, a="old", b="old")
+    before = digests(tmp_path)
     replace = Path.replace
 
     def interrupted(source: Path, target: Path) -> Path:
-        if source.read_text() == "new" and source.name == "b.txt":
+        if source.name == "b.exr" and source.read_text() == "new":
             raise KeyboardInterrupt
         return replace(source, target)
 
@@ -65,7 +92,137 @@ def test_an_interrupt_while_publishing_is_undone(tmp_path: Path, monkeypatch: py
     with pytest.raises(KeyboardInterrupt), OutputFolder(tmp_path) as output:  # noqa: PT012
         _write(output.staging, a="new", b="new")
         output.publish()
-    assert _contents(tmp_path) == {"a.txt": "old", "b.txt": "old"}
+    assert digests(tmp_path) == before
+
+
+def digests(folder: Path) -> dict[str, str]:
+    """The files of a folder, hidden ones too, by what they hold."""
+    return {path.name: digest(path) for path in folder.iterdir()}
+
+
+FOREIGN = ["one.exr", "report.json", "baked.blend", "preview.png", "lightmap.relight"]
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+def test_files_that_no_bake_has_written_are_never_replaced(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("years of work")
+    with pytest.raises(BakeError) as caught, OutputFolder(tmp_path) as output:
+        output.expect([name])
+    assert str(tmp_path / name) in str(caught.value)
+    assert "--overwrite" in str(caught.value)
+    # Nor if one appears while the bake goes on.
+    with pytest.raises(BakeError, match=name), OutputFolder(tmp_path / "new") as output:  # noqa: PT012
+        output.expect([name])
+        (output.staging / name).write_text("a bake's")
+        (tmp_path / "new" / name).write_text("years of work")
+        output.publish()
+    for folder in (tmp_path, tmp_path / "new"):
+        assert (folder / name).read_text() == "years of work"
+        assert [path.name for path in folder.iterdir() if path.name != "new"] == [name]
+    with OutputFolder(tmp_path, overwrite=True) as output:
+        output.expect([name])
+        (output.staging / name).write_text("a bake's")
+        output.publish()
+    assert (tmp_path / name).read_text() == "a bake's"
+
+
+def test_a_lightmap_that_somebody_changed_is_not_replaced(tmp_path: Path) -> None:
+    _bake(tmp_path, one="light")
+    (tmp_path / "one.exr").write_text("paint")
+    with pytest.raises(BakeError, match=r"one\.exr' was changed since"), OutputFolder(tmp_path) as output:
+        output.expect(["one.exr"])
+    with pytest.raises(BakeError, match=r"one\.exr"):
+        _bake(tmp_path, one="new")
+    assert (tmp_path / "one.exr").read_text() == "paint"
+    (tmp_path / "one.exr").rename(tmp_path / "mine.exr")
+    _bake(tmp_path, one="new")
+    assert _contents(tmp_path) == {"one.exr": "new", "mine.exr": "paint"}
+
+
+def test_another_scene_or_file_does_not_get_the_folder(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "one.blend"))
+    _bake(out, one="old")
+    before = digests(out)
+    bpy.context.scene.name = "Other"
+    with pytest.raises(BakeError, match=r"report\.json' is of scene 'Scene' of '\.\./one\.blend'"):
+        _bake(out, one="new")
+    bpy.context.scene.name = "Scene"
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "two.blend"))
+    with pytest.raises(BakeError, match=r"one\.blend"):
+        _bake(out, one="new")
+    assert digests(out) == before
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "one.blend"))
+    _bake(out, one="new")
+    assert _contents(out) == {"one.exr": "new"}
+
+
+def test_a_report_of_an_earlier_version_is_refused_by_name(tmp_path: Path) -> None:
+    old = {"version": 1, "objects": [], "solver": {}, "files": {}}
+    (tmp_path / REPORT_NAME).write_text(json.dumps(old))
+    with pytest.raises(BakeError, match=r"report\.json' was written by an earlier version"):
+        _bake(tmp_path, one="new")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links need rights there")
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_links_and_folders_are_never_replaced(tmp_path: Path, overwrite: bool) -> None:
+    (tmp_path / "victim").write_text("years of work")
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "one.exr").symlink_to(tmp_path / "victim")
+    (out / "two.exr").symlink_to(tmp_path / "nowhere")
+    (out / "three.exr").mkdir()
+    os.mkfifo(out / "four.exr")
+    for name in ("one", "two", "three", "four"):
+        with pytest.raises(BakeError, match=name), OutputFolder(out, overwrite=overwrite) as output:
+            output.expect([f"{name}.exr"])
+        with pytest.raises(BakeError, match=name):
+            _bake(out, overwrite=overwrite, **{name: "new"})
+    assert (tmp_path / "victim").read_text() == "years of work"
+    assert (out / "one.exr").is_symlink()
+    assert not (tmp_path / "nowhere").exists()
+    assert not (out / REPORT_NAME).exists()
+
+
+def test_what_the_scene_reads_is_not_even_overwritten(tmp_path: Path) -> None:
+    _scene_with_picture(tmp_path)
+    bpy.data.images["Picture"].filepath_raw = str(tmp_path / "one.exr")
+    _write(tmp_path, one="a texture", frame_001="of a sequence", frame_002="of a sequence")
+    sequence = bpy.data.images.new("Frames", 2, 2)
+    sequence.source, sequence.filepath_raw = "SEQUENCE", str(tmp_path / "frame_001.exr")
+    for name in ("one.exr", "frame_001.exr", "frame_002.exr"):
+        with (
+            pytest.raises(BakeError, match=f"{name}.*reads"),
+            OutputFolder(tmp_path, overwrite=True) as output,
+        ):
+            output.expect([name])
+
+
+def test_an_unsaved_file_is_not_the_next_unsaved_file(tmp_path: Path) -> None:
+    radiosity_addon.register()
+    try:
+        _bake(tmp_path, one="old")
+        _bake(tmp_path, one="new")
+        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+        with pytest.raises(BakeError, match=r"report\.json"):
+            _bake(tmp_path, one="other")
+        assert _contents(tmp_path) == {"one.exr": "new"}
+    finally:
+        radiosity_addon.unregister()
+
+
+def test_no_message_names_the_staging_folder(tmp_path: Path) -> None:
+    def failing(error: type[Exception], *given: object) -> str:
+        with pytest.raises(BakeError) as caught, OutputFolder(tmp_path) as output:
+            raise error(*(str(each).format(staging=output.staging, aside=output.aside) for each in given))
+        return str(caught.value)
+
+    assert failing(BakeError, "cannot write '{staging}/one.exr'") == f"cannot write '{tmp_path}/one.exr'"
+    assert failing(BakeError, "cannot write '{aside}'") == f"cannot write '{tmp_path}/baked.blend'"
+    with pytest.raises(BakeError) as caught, OutputFolder(tmp_path) as output:
+        raise OSError(28, "No space left on device", str(output.staging / "one.exr"))
+    assert str(caught.value) == f"cannot write '{tmp_path}/one.exr': No space left on device"
 
 
 def test_folders_made_for_nothing_are_removed(tmp_path: Path) -> None:
@@ -118,7 +275,7 @@ def test_the_copy_finds_its_lightmaps_and_the_scene_s_pictures(tmp_path: Path, s
     with OutputFolder(out) as output:
         image = _stage_lightmap(output)
         lightmap_before = image.filepath_raw
-        save_copy(output.staging / BLEND_NAME, output.path)
+        save_copy(output)
         assert (bpy.data.filepath, picture.filepath_raw) == (path_before, picture_before)
         assert image.filepath_raw == lightmap_before
         output.publish()
@@ -133,7 +290,7 @@ def test_the_copy_finds_its_lightmaps_and_the_scene_s_pictures(tmp_path: Path, s
 
 def test_the_copy_is_compressed_and_replaces_an_older_one(tmp_path: Path) -> None:
     (tmp_path / "copy.blend").write_text("old")
-    save_copy(tmp_path / "copy.blend")
+    save_restored(tmp_path / "copy.blend")
     assert (tmp_path / "copy.blend").read_bytes()[:4] == bytes.fromhex("28b52ffd")  # Zstandard
     assert [path.name for path in tmp_path.iterdir()] == ["copy.blend"]
 
@@ -143,10 +300,10 @@ def test_the_scene_itself_is_never_overwritten(tmp_path: Path) -> None:
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     before = path.read_bytes()
     with OutputFolder(tmp_path) as output, pytest.raises(BakeError, match="is the scene itself"):
-        save_copy(output.staging / BLEND_NAME, output.path)
+        save_copy(output)
     assert path.read_bytes() == before
 
 
 def test_a_copy_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     with pytest.raises(BakeError, match=r"gone/copy\.blend"):
-        save_copy(tmp_path / "gone" / "copy.blend")
+        save_restored(tmp_path / "gone" / "copy.blend")

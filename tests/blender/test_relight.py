@@ -21,7 +21,9 @@ from radiosity_addon.cli import main
 from radiosity_addon.manifest import is_as_written
 from tests.blender.scenes import add_lamp, add_mesh, add_object, set_world, shader_material
 
-LIGHTMAP = "lightmap.exr"
+LIGHTMAP = "baked_Scene_lightmap.exr"
+REPORT = "baked_Scene_report.json"
+SIDECAR = "baked_Scene_lightmap.relight"
 
 
 @pytest.fixture(scope="module")
@@ -33,8 +35,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     room()
     bpy.ops.wm.save_as_mainfile(filepath=str(path / "plain.blend"))
     bpy.context.scene.radiosity_relight.sidecar = True
-    assert bake() == {"FINISHED"}
     bpy.ops.wm.save_as_mainfile(filepath=str(path / "baked.blend"), relative_remap=True)
+    assert bake() == {"FINISHED"}
+    bpy.ops.wm.save_mainfile()
     yield path
     radiosity_addon.unregister()
 
@@ -72,9 +75,10 @@ def relight() -> set[str]:
     return bpy.ops.radiosity.relight("EXEC_DEFAULT")
 
 
-def lightmap(name: str = LIGHTMAP) -> np.ndarray:
-    """The (h, w, 3) pixels of an image."""
-    image = bpy.data.images[name]
+def lightmap(name: str = "") -> np.ndarray:
+    """The (h, w, 3) pixels of an image: of the lightmap, if no other is named."""
+    shown = [image for image in bpy.data.images if is_made(image)]
+    image = bpy.data.images[name] if name else shown[0]
     pixels = np.empty(len(image.pixels), dtype=np.float32)
     image.pixels.foreach_get(pixels)
     return pixels.reshape(*image.size, 4)[..., :3].astype(np.float64)
@@ -105,7 +109,7 @@ def glowing() -> list[float]:
 
 def files(path: Path) -> dict[str, bytes]:
     """What is in a folder, the report without its times."""
-    return {file.name: file.read_bytes() for file in sorted(path.iterdir()) if file.name != "report.json"}
+    return {file.name: file.read_bytes() for file in sorted(path.iterdir()) if file.name != REPORT}
 
 
 def test_other_light_gives_what_a_full_bake_gives_in_place(baked: Path) -> None:
@@ -120,7 +124,7 @@ def test_other_light_gives_what_a_full_bake_gives_in_place(baked: Path) -> None:
     assert {image.name for image in bpy.data.images} == images
     assert {obj.name: obj.data.name for obj in bpy.data.objects if obj.type == "MESH"} == shown
     assert not bpy.data.images[LIGHTMAP].is_dirty
-    report = json.loads((baked / "lightmaps" / "report.json").read_text())
+    report = json.loads((baked / "lightmaps" / REPORT).read_text())
     assert "relit" in report
     # What is told of the light is gone, and the files are still known as ours.
     assert not any("irradiance_W_m2" in entry for entry in report["objects"])
@@ -135,10 +139,10 @@ def test_other_light_gives_what_a_full_bake_gives_in_place(baked: Path) -> None:
 
 
 def test_a_bake_is_kept_in_memory_until_restore_or_another_file(baked: Path) -> None:
-    (baked / "lightmaps" / "lightmap.relight").unlink()
+    (baked / "lightmaps" / SIDECAR).unlink()
     bpy.context.scene.radiosity_relight.sidecar = False
     assert bake() == {"FINISHED"}
-    assert not (baked / "lightmaps" / "lightmap.relight").exists()
+    assert not (baked / "lightmaps" / SIDECAR).exists()
     held = kept_bakes.find(bpy.context.scene)
     assert held is not None
     assert held.bake.names == ("Bulb", "Dark", "World", "Glow")
@@ -224,7 +228,7 @@ def test_a_hidden_lamp_is_dark(baked: Path) -> None:
 
 @pytest.mark.parametrize("wrong", ["cut off", "damaged", "another bake", "missing", "image"])
 def test_sidecars_that_do_not_fit_are_refused(baked: Path, wrong: str) -> None:
-    path = baked / "lightmaps" / "lightmap.relight"
+    path = baked / "lightmaps" / SIDECAR
     content = path.read_bytes()
     message = f"is not used: it is {wrong}"
     if wrong == "cut off":
@@ -251,7 +255,7 @@ def test_packed_lightmaps_are_packed_anew() -> None:
     scene.radiosity.resolution, scene.radiosity_relight.sidecar = 16, True
     radiosity_addon.register()
     assert bake() == {"FINISHED"}
-    image = bpy.data.images[LIGHTMAP]
+    image = bpy.data.images["lightmap.exr"]
     before = bytes(image.packed_file.data)
     bpy.data.objects["Bulb"].data.energy *= 3.0
     assert relight() == {"FINISHED"}
@@ -266,8 +270,8 @@ def test_png_files_get_another_scale_everywhere(tmp_path: Path, folder: Path) ->
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
     bpy.context.scene.radiosity.format, bpy.context.scene.radiosity.resolution = "png16", 16
     assert bake() == {"FINISHED"}
-    image = bpy.data.images["lightmap.png"]
-    scale, before = image_scale(image), lightmap("lightmap.png")
+    image = bpy.data.images["room_Scene_lightmap.png"]
+    scale, before = image_scale(image), lightmap("room_Scene_lightmap.png")
     for name in ("Bulb", "Dark"):
         bpy.data.objects[name].data.energy *= 2.0
     (glow,) = (node for node in bpy.data.materials["Glow"].node_tree.nodes if node.type == "EMISSION")
@@ -275,7 +279,7 @@ def test_png_files_get_another_scale_everywhere(tmp_path: Path, folder: Path) ->
     bpy.context.scene.world.node_tree.nodes["Background"].inputs["Strength"].default_value *= 2.0
     assert relight() == {"FINISHED"}
     assert image_scale(image) == pytest.approx(2.0 * scale, rel=1e-3)
-    assert relative(lightmap("lightmap.png"), before) < 1e-3
+    assert relative(lightmap("room_Scene_lightmap.png"), before) < 1e-3
     inputs = [
         node.inputs[SCALE].default_value
         for material in bpy.data.materials
@@ -284,20 +288,21 @@ def test_png_files_get_another_scale_everywhere(tmp_path: Path, folder: Path) ->
         if node.type == "GROUP"
     ]
     np.testing.assert_allclose(inputs, image_scale(image), rtol=1e-5)
-    report = json.loads((tmp_path / "lightmaps" / "report.json").read_text())
+    report = json.loads((tmp_path / "lightmaps" / "room_Scene_report.json").read_text())
     assert {entry["scale"] for entry in report["objects"]} == {image_scale(image)}
 
 
 def test_the_command_line_keeps_and_relights(folder: Path, tmp_path: Path) -> None:
     output = tmp_path / "out"
-    plain, changed = folder / "plain.blend", tmp_path / "changed.blend"
+    plain = changed = tmp_path / "plain.blend"
+    shutil.copy(folder / "plain.blend", plain)
     settings = ["--resolution", "32", "--quality", "draft", "--quiet"]
     assert main(["bake", str(plain), "--output", str(output), "--keep", *settings]) == 0
     sidecar = output / "lightmap.relight"
     kept, picture = sidecar.read_bytes(), (output / "preview.png").read_bytes()
     bpy.ops.wm.open_mainfile(filepath=str(plain))
     change_lights()
-    bpy.ops.wm.save_as_mainfile(filepath=str(changed), copy=True)
+    bpy.ops.wm.save_mainfile()
     relit = ["bake", str(changed), "--output", str(output), "--relight", "--quiet"]
     assert main([*relit, "--quality", "high"]) == 2
     assert main(relit) == 0
@@ -307,7 +312,7 @@ def test_the_command_line_keeps_and_relights(folder: Path, tmp_path: Path) -> No
     assert {entry["object"] for entry in report["objects"]} == {"Floor", "Panel", "Instancer/Wall"}
     full = tmp_path / "full"
     assert main(["bake", str(changed), "--output", str(full), *settings]) == 0
-    pages = [bpy.data.images.load(str(where / LIGHTMAP)).name for where in (output, full)]
+    pages = [bpy.data.images.load(str(where / "lightmap.exr")).name for where in (output, full)]
     assert relative(*map(lightmap, pages)) < 0.01
     # What it wrote can be lit anew itself, from the panel: the sidecar lies beside it.
     bpy.ops.wm.open_mainfile(filepath=str(output / "baked.blend"))

@@ -35,7 +35,22 @@ def test_the_command_line_keeps_plain_names() -> None:
     assert PLAIN_NAMES.object_page("Floor") == "Floor"
 
 
-NASTY = ["a/b", "a\\b", "a:b", "..", ".", "", "CON", "com1.txt", "a\0b", "x\ny", "\udc80", " a ", "\u202e", "é" * 300]
+NASTY = [
+    "a/b",
+    "a\\b",
+    "a:b",
+    "..",
+    ".",
+    "",
+    "CON",
+    "com1.txt",
+    "a\0b",
+    "x\ny",
+    "\udc80",
+    " a ",
+    "\u202e",
+    "é" * 300,
+]
 
 
 @pytest.mark.parametrize("name", NASTY)
@@ -52,7 +67,9 @@ def test_names_never_exceed_what_file_systems_take() -> None:
         long = char * 300
         names = FileNames.of_scene(f"/{long}.blend", long)
         stem = names.object_page(long, long)
-        (last,) = unique_names([stem], ".exr", {f"{stem}_{n}".casefold() for n in range(2, 10_000)} | {stem.casefold()})
+        (last,) = unique_names(
+            [stem], ".exr", {f"{stem}_{n}".casefold() for n in range(2, 10_000)} | {stem.casefold()}
+        )
         assert len(last.encode()) <= 255
         assert len(names.sidecar.encode()) <= 255
         assert len(sanitized(long, MAX_OBJECT).encode()) <= MAX_OBJECT
@@ -81,7 +98,8 @@ def test_no_lightmap_has_the_name_of_another_file_of_the_bake(prefix: str, endin
 
 
 @pytest.mark.parametrize(
-    "name", ["", ".", "..", ".a.exr", "a/b.exr", "a\\b.exr", "a", "a.txt", "b.blend", "a\0.exr", "C:a.exr", 3, None]
+    "name",
+    ["", ".", "..", ".a.exr", "a/b.exr", "a\\b.exr", "a", "a.txt", "b.blend", "a\0.exr", "C:a.exr", 3, None],
 )
 def test_names_of_other_kinds_are_no_bakes(name: object) -> None:
     assert not is_bake_name(name)

@@ -102,8 +102,18 @@ def test_a_report_of_the_first_version_is_named_so(tmp_path: Path) -> None:
 
 def test_names_that_no_bake_gives_are_left_out(tmp_path: Path) -> None:
     of = {"bytes": 1, "sha256": "0"}
-    names = ("../a.exr", "sub/a.exr", "thesis.odt", ".a.exr", "", "a.exr", "baked.blend", "my.blend", "x.relight")
-    report = {"baked": {"file": "<x>", "scene": "S"}, "files": {name: of for name in names}}
+    names = (
+        "../a.exr",
+        "sub/a.exr",
+        "thesis.odt",
+        ".a.exr",
+        "",
+        "a.exr",
+        "baked.blend",
+        "my.blend",
+        "x.relight",
+    )
+    report = {"baked": {"file": "<x>", "scene": "S"}, "files": dict.fromkeys(names, of)}
     (tmp_path / "report.json").write_text(text_of(sealed(report)))
     assert sorted(read_report(tmp_path / "report.json")["files"]) == ["a.exr", "baked.blend", "x.relight"]
 
@@ -115,7 +125,11 @@ def test_files_belong_to_one_file_and_one_scene(tmp_path: Path) -> None:
     folder.mkdir()
     written(folder, owner)
     assert list(reports_in(folder, owner.owns)) == ["report.json"]
-    for other in (Owner(str(blend), "Scene.001"), Owner(str(tmp_path / "bath.blend"), "Scene"), Owner("<x>", "Scene")):
+    for other in (
+        Owner(str(blend), "Scene.001"),
+        Owner(str(tmp_path / "bath.blend"), "Scene"),
+        Owner("<x>", "Scene"),
+    ):
         assert reports_in(folder, other.owns) == {}
     assert list(reports_in(folder, Owner(str(blend), "Scene.001").is_source_of)) == ["report.json"]
 

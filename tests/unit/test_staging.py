@@ -58,7 +58,9 @@ def killed(target: Path, after: int) -> None:
 
 def contents(folder: Path) -> dict[str, str]:
     """The files of a folder that are not hidden."""
-    return {path.name: path.read_text() for path in folder.iterdir() if path.is_file() and path.name[0] != "."}
+    return {
+        path.name: path.read_text() for path in folder.iterdir() if path.is_file() and path.name[0] != "."
+    }
 
 
 def staging_folders(folder: Path) -> list[Path]:
@@ -138,14 +140,28 @@ def crafted(target: Path, files: dict[str, dict], kept: dict[str, str]) -> Path:
     return staging.path
 
 
-NAMES = ["../victim.exr", "victim", "/victim.exr", ".victim.exr", "..", "", "sub/victim.exr", "..\\victim.exr"]
+NAMES = [
+    "../victim.exr",
+    "victim",
+    "/victim.exr",
+    ".victim.exr",
+    "..",
+    "",
+    "sub/victim.exr",
+    "..\\victim.exr",
+]
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_journal_that_names_what_no_bake_writes_touches_nothing(tmp_path: Path, name: str) -> None:
     folder = tmp_path / "folder"
     (folder / "sub").mkdir(parents=True)
-    victims = [tmp_path / "victim.exr", folder / "victim", folder / "sub" / "victim.exr", folder / ".victim.exr"]
+    victims = [
+        tmp_path / "victim.exr",
+        folder / "victim",
+        folder / "sub" / "victim.exr",
+        folder / ".victim.exr",
+    ]
     for victim in victims:
         victim.write_text("years of work")
     known = digest(victims[0])

@@ -42,7 +42,13 @@ os.kill(os.getpid(), 9)
 def run(code: str, tmpdir: Path, **more: str) -> subprocess.CompletedProcess[str]:
     env = {**os.environ, "TMPDIR": str(tmpdir), "PYTHONPATH": str(ROOT), **more}
     return subprocess.run(
-        [sys.executable, "-c", code], env=env, cwd=ROOT, capture_output=True, text=True, timeout=120, check=False
+        [sys.executable, "-c", code],
+        env=env,
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
     )
 
 
@@ -69,7 +75,9 @@ def test_what_a_kill_leaves_is_removed_at_the_next_start_alone(tmp_path: Path) -
     assert (tmp_path / "radiosity-12345678" / "mine.txt").exists()
 
 
-def test_the_folder_of_a_living_process_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_folder_of_a_living_process_is_left_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     import tempfile
 
     from radiosity_addon.temporary import TemporaryFolder

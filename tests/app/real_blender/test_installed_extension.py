@@ -43,7 +43,7 @@ def test_bakes_from_blenders_command_line(installed: Installed, cornell_blend: P
     assert done.returncode == 0, done.stdout
     assert cornell_blend.read_bytes() == before
     report = json.loads((output / "report.json").read_text())
-    assert report["version"] == 1
+    assert report["version"] == 2
     assert report["objects"]
     for entry in report["objects"]:
         assert entry["resolution"] == [64, 64]

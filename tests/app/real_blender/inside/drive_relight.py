@@ -70,7 +70,7 @@ def lamp():
 
 def light():
     """Mean of the lightmap."""
-    image = bpy.data.images["lightmap.exr"]
+    (image,) = (image for image in bpy.data.images if image.name.endswith("lightmap.exr"))
     pixels = np.empty(len(image.pixels), dtype=np.float32)
     image.pixels.foreach_get(pixels)
     return float(pixels.reshape(-1, 4)[:, :3].mean())
