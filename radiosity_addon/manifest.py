@@ -10,15 +10,17 @@ import hashlib
 import json
 import os
 import stat
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from .file_names import BLEND_NAME, REPORT_NAME, is_bake_name
 
 FILES, OWNER, SEAL = "files", "baked", "seal"
 """Keys of a report."""
+
+T = TypeVar("T")
 
 _CHUNK = 1 << 20
 _MAX_REPORT = 256 * 2**20
@@ -129,10 +131,16 @@ def entry(path: Path) -> dict[str, Any]:
 
 def digest(path: Path) -> str:
     """Return a file's SHA-256."""
+    return _drained(digest_steps(path))
+
+
+def digest_steps(path: Path) -> Generator[None, None, str]:
+    """Return a file's SHA-256; yields every few milliseconds."""
     found = hashlib.sha256()
     with path.open("rb") as file:
         while chunk := file.read(_CHUNK):
             found.update(chunk)
+            yield
     return found.hexdigest()
 
 
@@ -154,10 +162,16 @@ def entries(new: Iterable[Path], folder: Path, earlier: Report | None) -> dict[s
 
 def is_as_written(path: Path, told: Mapping[str, Any]) -> bool:
     """Return whether a file is, to the byte, what a bake wrote."""
+    return _drained(is_as_written_steps(path, told))
+
+
+def is_as_written_steps(path: Path, told: Mapping[str, Any]) -> Generator[None, None, bool]:
+    """Return whether a file is, to the byte, what a bake wrote; yields every few milliseconds."""
     try:
         found = path.lstat()
-        same = stat.S_ISREG(found.st_mode) and found.st_size == told["bytes"]
-        return bool(same and digest(path) == told["sha256"])
+        if not stat.S_ISREG(found.st_mode) or found.st_size != told["bytes"]:
+            return False
+        return bool((yield from digest_steps(path)) == told["sha256"])
     except OSError:
         return False
 
@@ -166,6 +180,16 @@ def without(report: Report, names: Iterable[str]) -> dict[str, Any]:
     """Return a report that does not list these files any more."""
     gone = set(names)
     return sealed({**report, FILES: {name: told for name, told in report[FILES].items() if name not in gone}})
+
+
+def _drained(steps: Generator[None, None, T]) -> T:
+    """Run steps to their end and return their result."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as done:
+            result: T = done.value
+            return result
 
 
 def _seal_of(report: Report) -> str:

@@ -58,7 +58,12 @@ class Staging(MarkedFolder):
         """Return the names of the files to be published."""
         return sorted(path.name for path in self.path.iterdir() if path.is_file() and path.name[0] != ".")
 
-    def publish(self, names: Sequence[str], check: Check = lambda _name, _digest: None) -> None:
+    def publish(
+        self,
+        names: Sequence[str],
+        check: Check = lambda _name, _digest: None,
+        known: Mapping[str, str] | None = None,
+    ) -> None:
         """Rename files to their places, in order; all or, if one fails, none.
 
         Parameters
@@ -66,6 +71,8 @@ class Staging(MarkedFolder):
         names : sequence of str
         check : callable
             Sees what each file is about to replace; what it raises ends it all.
+        known : mapping of str to str or None
+            Digests of staged files, where they are known already.
 
         Raises
         ------
@@ -83,7 +90,7 @@ class Staging(MarkedFolder):
                 found[name] = _regular(self.target / name)
                 old = None if found[name] is None else _kept(self.target / name, earlier / name)
                 check(name, old)
-                files[name] = _Replaced(digest(self.path / name), old)
+                files[name] = _Replaced((known or {}).get(name) or digest(self.path / name), old)
             _sync_folder(earlier)
             _write_journal(self.path, files)
             for name in names:

@@ -101,9 +101,12 @@ def run_bake(
         if output is not None:
             # First: a folder that cannot be written, or holds files of others, is no news for after the work.
             stack.enter_context(output)
-            output.expect((BLEND_NAME, PREVIEW_NAME) if with_copy else ())
-            output.expect((output.names.sidecar,) if keeping and keeping.sidecar else ())
         yield Progress("export", 0.0)
+        if output is not None:
+            copies = (BLEND_NAME, PREVIEW_NAME) if with_copy else ()
+            sidecars = (output.names.sidecar,) if keeping and keeping.sidecar else ()
+            for _ in output.expecting((*copies, *sidecars)):
+                yield Progress("export", 0.0)
         with timed(seconds, "export"), originals_shown(context) as edited:
             export = export_scene(context, settings, dark=keeping is not None)
             check_targets(export)
@@ -114,7 +117,8 @@ def run_bake(
             keeping = None if others.objects else keeping
         if output is not None:
             lightmaps = possible_names(output.names, settings, export.bake_scene, output.path, others.files)
-            output.expect(lightmaps)
+            for _ in output.expecting(lightmaps):
+                yield Progress("export", SOLVE)
         solved = APPLY if with_copy else APPLY_ALONE
         sidecar = output.staging / output.names.sidecar if output and keeping and keeping.sidecar else None
         steps = bake_steps(export.bake_scene, settings, keeping, sidecar)

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -19,7 +18,7 @@ import bpy
 from ..errors import BakeError, RadiosityError
 from ..file_names import BLEND_NAME, PLAIN_NAMES, PREVIEW_NAME, REPORT_NAME, FileNames, folded
 from ..manifest import FILES as LISTED
-from ..manifest import OWNER, NoReportError, Owner, entries, is_as_written, read_report
+from ..manifest import OWNER, NoReportError, Owner, entries, is_as_written_steps, read_report
 from ..report import BakeReport
 from ..staging import Staging, clean_up, replacing
 from .bake_record import is_made
@@ -77,6 +76,7 @@ class OutputFolder:
         self._owner = owner
         self._staging: Staging | None = None
         self._made: list[Path] = []
+        self._digests: dict[str, str] = {}
 
     @property
     def staging(self) -> Path:
@@ -150,15 +150,25 @@ class OutputFolder:
         BakeError
             Naming the first of them, and what to do.
         """
+        for _ in self.expecting(names):
+            pass
+
+    def expecting(self, names: Iterable[str]) -> Generator[None, None, None]:
+        """As `expect`; yields every few milliseconds, for large files are read."""
         for name in names:
+            path = self.path / name
             self._refuse_others(name)
-            if os.path.lexists(self.path / name):
-                self._check(name, partial(self._is_listed, name))
+            if os.path.lexists(path):
+                told = self._listed.get(name)
+                ours = told is not None and (yield from is_as_written_steps(path, told))
+                self._judge(name, ours)
 
     def files(self) -> dict[str, dict[str, Any]]:
         """Return what the report is to list of the files here: those staged, and those of earlier bakes."""
         staged = [self.staging / name for name in self._open.names() if name != self.names.report]
-        return entries(staged, self.path, self.earlier)
+        found = entries(staged, self.path, self.earlier)
+        self._digests = {path.name: found[path.name]["sha256"] for path in staged}
+        return found
 
     def write_report(self, report: BakeReport) -> BakeReport:
         """Stage the report, the last file, with what proves which files are ours; returns it so."""
@@ -191,10 +201,10 @@ class OutputFolder:
             self._refuse_others(name)
             if digest is None or (name == report and self.earlier is not None):
                 return
-            self._check(name, lambda: ours.get(name) == digest)
+            self._judge(name, ours.get(name) == digest)
 
         try:
-            self._open.publish(names, check)
+            self._open.publish(names, check, self._digests)
         except OSError as error:
             raise BakeError(f"cannot replace '{error.filename}': {error.strerror}") from error
         return [self.path / name for name in names]
@@ -227,19 +237,16 @@ class OutputFolder:
         """What our earlier report lists."""
         return {} if self.earlier is None else self.earlier[LISTED]
 
-    def _is_listed(self, name: str) -> bool:
-        return name in self._listed and is_as_written(self.path / name, self._listed[name])
-
     def _refuse_others(self, name: str) -> None:
         """Refuse a name of ours that something else will write."""
         path = self.path / name
         if any(is_same_file(path, other) for other in self._others):
             raise BakeError(f"'{path}' is a file of the bake itself: choose another name for the other file")
 
-    def _check(self, name: str, is_ours: Callable[[], bool]) -> None:
+    def _judge(self, name: str, ours: bool) -> None:
         """Refuse what stands in the place of a file, unless it is ours or may be overwritten."""
         path = self.path / name
-        if stat.S_ISREG(path.lstat().st_mode) and is_ours():
+        if ours:
             if name == BLEND_NAME and is_read(path):
                 raise BakeError(f"'{path}' is a file that the scene itself reads: choose another folder")
             return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import uuid
 from collections.abc import Iterable, Iterator, Mapping
@@ -13,8 +14,8 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..errors import BakeError
-from ..file_names import FileNames
-from ..manifest import FILES, Owner, reports_in
+from ..file_names import REPORT_NAME, FileNames
+from ..manifest import FILES, NoReportError, Owner, read_report, reports_in
 from .bake_record import is_made
 
 CORNELL_BOX = "<Cornell box>"
@@ -75,6 +76,11 @@ def report_listing(path: Path, scenes: Iterable[bpy.types.Scene]) -> OwnReport:
         for report in own_reports(path.parent, scene):
             if path.name in report.told[FILES]:
                 return report
+    try:
+        read_report(path.with_name(REPORT_NAME))
+    except (OSError, NoReportError) as error:
+        if isinstance(error, NoReportError):
+            raise BakeError(f"'{path.with_name(REPORT_NAME)}' {error}: bake again") from None
     raise BakeError(f"'{path}' is no lightmap that a bake of this file and scene has written: bake again")
 
 
@@ -91,11 +97,12 @@ def _read_files() -> Iterator[Path]:
     others: set[str] = set()
     for image in bpy.data.images:
         if image.packed_file is None and image.filepath_raw:
-            path = bpy.path.abspath(image.filepath_raw, library=image.library)
+            path = os.path.normpath(bpy.path.abspath(image.filepath_raw, library=image.library))
             (made if is_made(image) else others).add(path)
     if bpy.data.filepath:
         yield Path(bpy.data.filepath)
     for path in bpy.utils.blend_paths(absolute=True, packed=False, local=False):
+        path = os.path.normpath(path)
         if path not in made or path in others:
             yield Path(path)
     yield from map(Path, others)
