@@ -9,6 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..solver.polygon_clip import clip_half_plane
+
 Float = NDArray[np.float64]
 
 
@@ -22,46 +24,9 @@ def clip_to_unit_square(triangles: Float) -> Float:
     clockwise = edge_1[:, 0] * edge_2[:, 1] < edge_1[:, 1] * edge_2[:, 0]
     polygon = np.where(clockwise[:, None, None], triangles[:, ::-1], triangles)
     for axis in (0, 1):
-        polygon = _clip_half_plane(polygon, polygon[..., axis])
-        polygon = _clip_half_plane(polygon, 1.0 - polygon[..., axis])
+        polygon = clip_half_plane(polygon, polygon[..., axis])
+        polygon = clip_half_plane(polygon, 1.0 - polygon[..., axis])
     return polygon
-
-
-def _clip_half_plane(polygon: Float, distance: Float) -> Float:
-    """Keep the part of (t, k, 2) convex polygons where `distance` (t, k) ≥ 0: (t, k + 1, 2)."""
-    count, size = distance.shape
-    inside = distance >= 0
-    result = np.empty((count, size + 1, 2))
-    result[:, :-1] = polygon
-    result[:, -1] = polygon[:, -1]
-    # Most polygons are on one side: only those that are cut take work.
-    result[~inside.any(axis=1)] = 0.0
-    cut = np.flatnonzero(inside.any(axis=1) & ~inside.all(axis=1))
-    if len(cut):
-        result[cut] = _cut_half_plane(polygon.take(cut, axis=0), distance.take(cut, axis=0))
-    return result
-
-
-def _cut_half_plane(polygon: Float, distance: Float) -> Float:
-    """Do the same for polygons that lie on both sides."""
-    count, size = distance.shape
-    inside = distance >= 0
-    following = np.concatenate([polygon[:, 1:], polygon[:, :1]], axis=1)
-    next_distance = np.concatenate([distance[:, 1:], distance[:, :1]], axis=1)
-    crosses = inside != (next_distance >= 0)
-    share = distance / np.where(crosses, distance - next_distance, 1.0)
-    # Each side gives its start, if kept, and then its crossing, if any; close the gaps.
-    corners = np.empty((count, size, 2, 2))
-    corners[:, :, 0] = polygon
-    corners[:, :, 1] = polygon + share[..., None] * (following - polygon)
-    given = np.stack((inside, crosses), axis=-1).reshape(count, 2 * size)
-    place = np.cumsum(given, axis=1) - 1
-    kept = np.flatnonzero(given)
-    result = np.zeros((count * (size + 1), 2))
-    to = place.ravel().take(kept) + (size + 1) * (kept // (2 * size))
-    result[to] = corners.reshape(-1, 2).take(kept, axis=0)
-    last = np.minimum(np.arange(size + 1), place[:, -1:]) + (size + 1) * np.arange(count)[:, None]
-    return np.asarray(result.take(last, axis=0))
 
 
 def area_in_unit_square(triangles: Float) -> Float:

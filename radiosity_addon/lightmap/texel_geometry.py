@@ -17,6 +17,9 @@ NO_TEXEL = -1
 EDGE_OFFSETS = 4.0
 """Points keep this many ray offsets from the edges of their triangles."""
 
+SINK = 2.0
+"""Points that lie against another surface are so many ray offsets behind their own."""
+
 _SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
 
@@ -91,7 +94,7 @@ class TexelGeometry:
         """Put texels where barycentric weights (r, 3) of their triangles say."""
         triangle, upright = self.triangle[rows], self.surface_normal[rows]
         self.barycentric[rows] = weights[:, 1:]
-        self.position[rows] = _at(self.triangles[triangle], weights[:, None])[:, 0]
+        self.position[rows] = self._sunk(rows, _at(self.triangles[triangle], weights[:, None]))[:, 0]
         shading = np.einsum("nc,nck->nk", weights, self.normals[triangle])
         length = np.linalg.norm(shading, axis=1, keepdims=True)
         # A shading normal that vanished or turned behind the surface says nothing.
@@ -138,6 +141,23 @@ class TexelGeometry:
         points[plain] = self._in_plane(rows[plain], 0.5 + (u[plain].astype(np.float64) - 0.5) * width)
         corners = self._scene.triangles[self.triangle[rows[cut]]]
         points[cut] = _at(corners, self.sample_weights(rows[cut], u[cut], width))
+        return self._sunk(rows, points)
+
+    def _sunk(self, rows: Array, points: Array) -> Array:
+        """Move points (r, k, 3) of texels that lie against another surface behind their own: it stops their rays.
+
+        Started above, rays would pass what the texel lies on.
+        """
+        layers = self._scene.layers
+        pressed = np.flatnonzero(layers.pressed_triangles[self.triangle[rows]])
+        if len(pressed) == 0:
+            return points
+        triangle = np.repeat(self.triangle[rows[pressed]], points.shape[1])
+        chosen = points[pressed].reshape(-1, 3)
+        sunk = layers.is_pressed(triangle, layers.weights(2 * triangle.astype(np.int64), chosen))
+        depth = SINK * surface_offset(self.triangles)
+        chosen[sunk] -= depth * self.face_normals[triangle[sunk]]
+        points[pressed] = chosen.reshape(-1, *points.shape[1:])
         return points
 
     def squares(self, rows: Array) -> Array:

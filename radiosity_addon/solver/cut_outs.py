@@ -16,6 +16,7 @@ import numpy as np
 
 from .arrays import Array
 from .embree import TARGET_SLACK, EmbreeCaster
+from .layers import Layers
 from .sampling import hash_keys
 from .scene import Scene
 from .surface_images import SurfaceImages
@@ -34,9 +35,45 @@ def ray_caster(scene: Scene, threads: int = 0) -> RayCaster:
 
 
 def _caster(scene: Scene, threads: int, only: Array, for_lamps: RayCaster | None) -> RayCaster:
+    caster = _plain_caster(scene, threads, only, for_lamps)
+    return LayeredCaster(caster, scene.layers) if scene.layers else caster
+
+
+def _plain_caster(scene: Scene, threads: int, only: Array, for_lamps: RayCaster | None) -> RayCaster:
     if scene.images is None or not scene.images.cut_out.any():
         return EmbreeCaster(scene.triangles, threads, only, for_lamps, scene.two_sided)
     return CutOutCaster(scene.triangles, scene.images, threads, only, for_lamps, scene.two_sided)
+
+
+class LayeredCaster:
+    """The same rays, but where several surfaces are in one place they meet the one that counts there."""
+
+    def __init__(self, caster: RayCaster, layers: Layers) -> None:
+        self._caster, self._layers = caster, layers
+        self.surface_offset = caster.surface_offset
+
+    @property
+    def for_lamps(self) -> RayCaster:
+        """The caster that knows what stops the light of lamps; most often this one."""
+        found = self._caster.for_lamps
+        return self if found is self._caster else found
+
+    @property
+    def rays(self) -> int:
+        """Rays traced so far, those to lamps among them."""
+        return self._caster.rays
+
+    def visible(self, origins: Array, directions: Array, distances: Array) -> Array:
+        """See `RayCaster.visible`."""
+        return self._caster.visible(origins, directions, distances)
+
+    def passing(self, origins: Array, directions: Array, distances: Array, least: float = 0.0) -> Array:
+        """See `RayCaster.passing`."""
+        return self._caster.passing(origins, directions, distances, least)
+
+    def first_hits(self, origins: Array, directions: Array) -> Hits:
+        """See `RayCaster.first_hits`."""
+        return self._layers.owners(self._caster.first_hits(origins, directions))
 
 
 class CutOutCaster:

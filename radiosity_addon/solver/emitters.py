@@ -80,14 +80,23 @@ class EmitterGroup:
         rows = np.flatnonzero(shines if among is None else shines & among)
         if len(rows) == 0:
             return []
-        colours, group = np.unique(faces.emission[rows], axis=0, return_inverse=True)
+        rows, corners, level = _uncovered(faces, rows)
+        colours, group = np.unique(faces.exitance[rows], axis=0, return_inverse=True)
         group = group.reshape(-1)
         offset = end_offset(caster)
         lamps = []
         for number, colour in enumerate(colours):
-            some = rows[group == number]
-            corners, first = merge_flat(faces.corners[some])
-            lamps.append(EmitterGroup(corners, faces.normal[some[first]], colour, offset))
+            mine = group == number
+            whole, dim = np.flatnonzero(mine & (level == 1.0)), np.flatnonzero(mine & (level < 1.0))
+            merged, first = merge_flat(corners[whole])
+            normals = faces.normal[rows[whole][first]]
+            if len(dim) == 0:
+                lamps.append(EmitterGroup(merged, normals, colour, offset))
+                continue
+            merged = np.concatenate([merged, corners[dim]])
+            normals = np.concatenate([normals, faces.normal[rows[dim]]])
+            levels = np.concatenate([np.ones(len(first)), level[dim]])
+            lamps.append(EmitterGroup(merged, normals, colour, offset, levels))
         return lamps
 
     def unit_irradiance(self, points: Array, normals: Array) -> Array:
@@ -220,6 +229,26 @@ class EmitterGroup:
         found = point_to_polygon(points[point], normals[point], self._corners[face], contact=False)
         factors[point, face] = found * self._level[face]
         return factors
+
+
+def _uncovered(faces: Faces, rows: Array) -> tuple[Array, Array, Array]:
+    """Return what other faces leave of some: whose it is, corners (m, 3, 3), and what shows of it (m,)."""
+    if faces.own is None:
+        return rows, faces.corners[rows], np.ones(len(rows))
+    row, weights, level = faces.own.parts_of(faces.side[rows])
+    face = rows[row]
+    return face, corners_of_parts(faces, face, upright(faces, face, weights)), level
+
+
+def upright(faces: Faces, face: Array, weights: Array) -> Array:
+    """Return parts (m, 3, 2) of triangles the way round that is counter-clockwise as seen from the face."""
+    return np.where(faces.front[face, None, None], weights, weights[:, [0, 2, 1]])
+
+
+def corners_of_parts(faces: Faces, face: Array, weights: Array) -> Array:
+    """Return the corners (m, 3, 3) of parts in weights of their triangle's second and third corner."""
+    corner = np.where(faces.front[face, None, None], faces.corners[face], faces.corners[face][:, [0, 2, 1]])
+    return np.asarray(corner[:, :1] + np.einsum("pcw,pwk->pck", weights, corner[:, 1:] - corner[:, :1]))
 
 
 def end_offset(caster: RayCaster) -> float:

@@ -19,7 +19,7 @@ from .clusters import Clusters, build_clusters
 from .scene import WHOLE_TRIANGLE, Scene
 
 if TYPE_CHECKING:
-    from .surface_images import SurfaceImages
+    from .own_parts import OwnParts
 
 LEAF = -1
 
@@ -50,10 +50,21 @@ class Faces:
         """(f,) float64 [m²]"""
         self.reflectance = scene.reflectance[self.triangle]
         """(f, 3) float64"""
-        self.emission = scene.emission[self.triangle]
+        self.exitance = scene.emission[self.triangle]
+        """(f, 3) float64 [W/m²]: what a face emits where nothing covers it"""
+        self.emission = self.exitance
         """(f, 3) float64 [W/m²]"""
         self.opacity = scene.opacity[self.triangle]
-        """(f,) float64: reflectance and emission are already multiplied by it"""
+        """(f,) float64: reflectance and emission are already multiplied by it. What other faces cover
+        counts as cut out (`layers.py`)"""
+        self.own: OwnParts | None = None
+        """What covers leave of the scene's sides; None without any."""
+        if scene.layers:
+            self.own = scene.layers.own
+            share = self.own.share_of(self.side)
+            self.reflectance = self.reflectance * share[:, None]
+            self.emission = self.exitance * share[:, None]
+            self.opacity = self.opacity * share
         self.of_triangle = np.full((2, len(scene)), LEAF, dtype=np.int32)
         """(2, t) int32: the face of each triangle's front (row 0) and back (row 1), or −1"""
         self.of_triangle[0, solid] = np.arange(len(solid))
@@ -61,6 +72,11 @@ class Faces:
 
     def __len__(self) -> int:
         return len(self.triangle)
+
+    @property
+    def side(self) -> Array:
+        """(f,) int: 2 t for the front of triangle t, 2 t + 1 for its back."""
+        return 2 * self.triangle.astype(np.int64) + ~self.front
 
 
 class Hierarchy:
@@ -93,7 +109,15 @@ class Hierarchy:
         self.emission: Array = self.faces.emission.copy()
         self.opacity: Array = self.faces.opacity.copy()
         self._images = scene.images
+        self._plain = scene.reflectance, scene.emission, scene.opacity
+        self._detailed = np.zeros(count, dtype=bool)
+        """(f,) bool: faces whose elements differ: textured, or covered in part"""
         if self._images is not None:
+            self._detailed |= self._images.textured[self.faces.triangle]
+        if self.faces.own is not None:
+            share = self.faces.own.share_of(self.faces.side)
+            self._detailed |= (share > 0.0) & (share < 1.0)
+        if self._detailed.any():
             self._weights = np.where(
                 self.faces.front[:, None, None], WHOLE_TRIANGLE, WHOLE_TRIANGLE[[0, 2, 1]]
             )
@@ -157,17 +181,16 @@ class Hierarchy:
         for name in ("reflectance", "emission", "opacity"):
             values = getattr(self, name)
             setattr(self, name, np.concatenate([values, np.repeat(values[elements], 4, axis=0)]))
-        if self._images is not None:
-            self._look_up(self._images, elements)
+        if self._detailed.any():
+            self._look_up(elements)
 
-    def _look_up(self, images: SurfaceImages, elements: Array) -> None:
-        """Take the means over the new children of `elements` from images, and average them upwards."""
+    def _look_up(self, elements: Array) -> None:
+        """Take the means over the new children of `elements`, and average them upwards."""
         weights = split_in_four(self._weights[elements]).reshape(-1, 3, 2)
         self._weights = np.concatenate([self._weights, weights])
-        triangle = self.faces.triangle[self.face[elements]]
-        above = elements[images.textured[triangle]]
+        above = elements[self._detailed[self.face[elements]]]
         rows = (self.first_child[above][:, None] + np.arange(4)).ravel()
-        means = images.area_means(self.faces.triangle[self.face[rows]], self._weights[rows])
+        means = self._means(rows)
         self.reflectance[rows], self.emission[rows] = means[:, :3], means[:, 3:6]
         self.opacity[rows] = means[:, 6]
         # Samples of large elements are coarser than those of their parts.
@@ -177,6 +200,25 @@ class Hierarchy:
                 values[above] = values[children].mean(axis=1)
             above = np.unique(self.parent[above])
             above = above[above != LEAF]
+
+    def _means(self, elements: Array) -> Array:
+        """Return (n, 7) reflectance, emission and opacity of elements, less what others cover."""
+        triangle, weights = self.faces.triangle[self.face[elements]], self._weights[elements]
+        if self._images is None:
+            textured = np.zeros(len(elements), dtype=bool)
+        else:
+            textured = self._images.textured[triangle]
+        means = np.empty((len(elements), 7))
+        reflectance, emission, opacity = self._plain
+        means[:, :3], means[:, 3:6], means[:, 6] = reflectance[triangle], emission[triangle], opacity[triangle]
+        if self._images is not None:
+            means[textured] = self._images.area_means(triangle[textured], weights[textured])
+        if self.faces.own is not None:
+            side = self.faces.side[self.face[elements]]
+            back = side % 2 == 1
+            upright = np.where(back[:, None, None], weights[:, [0, 2, 1]], weights)
+            means *= self.faces.own.share_of_elements(side, upright)[:, None]
+        return means
 
     def leaf_at(self, face: Array, barycentric: Array) -> Array:
         """Find the leaf element under points of faces.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +13,7 @@ from .arrays import Array
 from .lights import Light
 
 if TYPE_CHECKING:
+    from .layers import Layers
     from .surface_images import SurfaceImages
 
 MAX_REFLECTANCE = 0.99
@@ -99,6 +101,13 @@ class Scene:
         """(t,) float64: area means"""
         if images is not None:
             self._average(images)
+
+    @cached_property
+    def layers(self) -> Layers:
+        """Which sides are covered by others in the same place."""
+        from .layers import Layers
+
+        return Layers(self)
 
     def _average(self, images: SurfaceImages) -> None:
         """Take the images' area means for the textured triangles' constants."""

@@ -10,8 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from .arrays import Array
-from .emitters import EmitterGroup, end_offset
+from .emitters import EmitterGroup, corners_of_parts, end_offset, upright
 from .hierarchy import Faces, split_in_four
+from .polygon_clip import areas
 from .scene import WHOLE_TRIANGLE, Scene
 from .surface_images import SurfaceImages
 from .visibility import RayCaster
@@ -55,10 +56,16 @@ def emissive_pieces(faces: Faces, rows: Array, images: SurfaceImages) -> tuple[A
     emission : (m, 3) float64 [W/m²]
         Area means, multiplied by opacity.
     """
-    face = rows
-    weights = np.where(faces.front[rows, None, None], WHOLE_TRIANGLE, WHOLE_TRIANGLE[[0, 2, 1]])
-    area = faces.area[rows]
-    parts = _part_emissions(faces, face, weights, images)
+    if faces.own is None:
+        face, level = rows, np.ones(len(rows))
+        weights = np.broadcast_to(WHOLE_TRIANGLE, (len(rows), 3, 2))
+        area = faces.area[rows]
+    else:
+        row, weights, level = faces.own.parts_of(faces.side[rows])
+        face = rows[row]
+        area = 2.0 * areas(weights) * faces.area[face]
+    weights = upright(faces, face, weights)
+    parts = _part_emissions(faces, face, weights, images) * level[:, None, None]
     power = float(area @ parts.mean(axis=(1, 2)))
     while len(face) < MOST_PIECES:
         spread = area * np.abs(parts - parts.mean(axis=1, keepdims=True)).mean(axis=(1, 2))
@@ -69,11 +76,13 @@ def emissive_pieces(faces: Faces, rows: Array, images: SurfaceImages) -> tuple[A
         chosen = np.sort(chosen[np.argsort(-spread[chosen], kind="stable")[:room]])
         children = split_in_four(weights[chosen]).reshape(-1, 3, 2)
         of = np.repeat(face[chosen], 4)
+        new = _part_emissions(faces, of, children, images) * np.repeat(level[chosen], 4)[:, None, None]
         kept = np.delete(np.arange(len(face)), chosen)
         face = np.concatenate([face[kept], of])
+        level = np.concatenate([level[kept], np.repeat(level[chosen], 4)])
         weights = np.concatenate([weights[kept], children])
         area = np.concatenate([area[kept], np.repeat(area[chosen] / 4, 4)])
-        parts = np.concatenate([parts[kept], _part_emissions(faces, of, children, images)])
+        parts = np.concatenate([parts[kept], new])
     return face, weights, parts.mean(axis=1)
 
 
@@ -92,8 +101,7 @@ def _of_pieces(
     face, weights, emission = face[shines], weights[shines], emission[shines]
     if len(face) == 0:
         return []
-    corner = np.where(faces.front[face, None, None], faces.corners[face], faces.corners[face][:, [0, 2, 1]])
-    corners = corner[:, :1] + np.einsum("pcw,pwk->pck", weights, corner[:, 1:] - corner[:, :1])
+    corners = corners_of_parts(faces, face, weights)
     brightest = emission.max(axis=1)
     colour = emission.sum(axis=0) / emission.sum(axis=0).max()
     if (np.abs(emission - brightest[:, None] * colour) <= SAME_COLOUR * brightest[:, None]).all():
