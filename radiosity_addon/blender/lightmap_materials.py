@@ -1,11 +1,13 @@
 """Copies of materials that show a lightmap: base color × lightmap, plus their own light.
 
 One copy for each (material, image, whether UVs are pinned), shared between the objects for
-which these are the same. The originals are never edited.
+which these are the same. A copy holds the original's nodes, connected, so that it can be edited
+as the original can; `material_edits.py` carries such edits to the original.
 """
 
 from __future__ import annotations
 
+import uuid
 from typing import Any
 
 import bpy
@@ -13,6 +15,8 @@ import bpy
 from ..bake_scene import LIGHTMAP_UV_LAYER
 from ..solver.radiometry import brdf_of_reflectance, radiance_of_radiosity
 from .bake_record import is_made, mark_made
+from .copy_marks import COPY_NAME, FED, FED_BY, ORIGINAL, PLAIN, SAMPLING, TOKEN, copied_groups, mark_added, source_name
+from .copy_record import record
 from .false_colors import false_colors
 from .image_marks import GROUP
 from .images import image_scale
@@ -27,9 +31,10 @@ from .node_group import (
     LIGHTMAP_ONLY,
     SCALE,
     SHADER,
+    SURFACE,
     lightmap_group,
 )
-from .surface_nodes import BLACK, Surface, feed_color, feed_float, read_surface
+from .surface_nodes import Surface, feed_color, feed_float, read_surface
 from .uv_pin import pin_uvs
 
 RADIANCE_PER_TEXEL = {
@@ -41,10 +46,6 @@ RADIANCE_PER_TEXEL = {
 """What a texel of 1 makes a surface send out [W/m²/sr]: of a white one for the irradiances
 (L = H/π), of the surface itself for radiosity (L = B/π, reflection and emission included). A
 residual is shown ten times its size: an error of a tenth looks as bright as the light itself."""
-
-
-ORIGINAL = "radiosity_original"
-"""Custom property of a copy: the material that it is of."""
 
 
 class LightmapMaterials:
@@ -95,31 +96,35 @@ class LightmapMaterials:
             copy.name = f"{material.name} (Lightmap)"
             copy[ORIGINAL] = material
         mark_made(copy)
+        copy[COPY_NAME], copy[TOKEN] = copy.name, uuid.uuid4().hex
         constant = read_material(material)
         radiance = radiance_of_radiosity(constant.emission)
-        plain = Surface(tuple(constant.reflectance.tolist()), tuple(radiance.tolist()))
-
+        unknown = Surface(
+            tuple(constant.reflectance.tolist()), tuple(radiance.tolist()), glows=bool(radiance.any())
+        )
         if material is None or not uses_nodes(material):
-            _enable_nodes(copy)
-            copy.node_tree.nodes.clear()
-            outputs = [copy.node_tree.nodes.new("ShaderNodeOutputMaterial")]
-        else:
-            outputs = [node for node in copy.node_tree.nodes if node.type == "OUTPUT_MATERIAL"]
-            outputs = outputs or [copy.node_tree.nodes.new("ShaderNodeOutputMaterial")]
-            if pinned:
-                pin_uvs(copy.node_tree)
-
-        for index, output in enumerate(outputs):
+            copy[PLAIN] = True
+            _make_plain_nodes(copy, unknown.base)
+        tree = copy.node_tree
+        record_content = record(copy)
+        before, active = {node.name for node in tree.nodes}, tree.nodes.active
+        if pinned:
+            pin_uvs(tree)
+        outputs = [node for node in tree.nodes if node.type == "OUTPUT_MATERIAL"]
+        for index, output in enumerate(outputs or [tree.nodes.new("ShaderNodeOutputMaterial")]):
             if is_volume(output):
                 continue
-            surface = plain
-            if material is not None and uses_nodes(material):
-                surface = read_surface(copy.node_tree, output.inputs["Surface"], plain)
-            self._wire(copy.node_tree, output, surface, image, group)
-            if surface.emission != BLACK:
+            surface = read_surface(tree, output.inputs["Surface"], unknown)
+            self._wire(tree, output, surface, image, group)
+            if surface.glows:
                 self._glows[material], copy[GROUP] = True, group
             if index == 0:
                 _skip_light_sampling(copy, surface)
+        mark_added(tree, before)
+        tree.nodes.active = active
+        for inner in dict.fromkeys(copied_groups(tree)):
+            mark_added(inner, {node.name for node in inner[ORIGINAL].nodes})
+        record_content()
         return copy
 
     def _wire(
@@ -131,8 +136,7 @@ class LightmapMaterials:
         light_group: str,
     ) -> None:
         """Wire UV Map → Image → group → output; the transparent part stays so."""
-        x, y = output.location
-        output.location = (x + 700, y + 300)
+        x, y = output.location.x - 500, output.location.y + 400
         uv_map = tree.nodes.new("ShaderNodeUVMap")
         uv_map.uv_map = LIGHTMAP_UV_LAYER
         uv_map.location = (x - 200, y + 450)
@@ -155,12 +159,17 @@ class LightmapMaterials:
             if light_group:
                 tree.links.new(factor_of(mixer, light_group), group.inputs[EMISSION_FACTOR])
         tree.links.new(texel, group.inputs[LIGHTMAP])
+        for link in list(output.inputs["Surface"].links):
+            tree.links.new(link.from_socket, group.inputs[SURFACE]).is_muted = link.is_muted
         group.inputs[SCALE].default_value = RADIANCE_PER_TEXEL[self._quantity] * scale
 
         # Radiosity already holds what the surface reflects and emits, and so does its error.
         if self._quantity not in ("radiosity", "residual"):
             feed_color(tree, group.inputs[BASE_COLOR], surface.base)
             feed_color(tree, group.inputs[EMISSION], surface.emission)
+        fed = group.inputs[BASE_COLOR], group.inputs[EMISSION]
+        group[FED] = [component for socket in fed for component in socket.default_value]
+        group[FED_BY] = [source_name(socket) for socket in fed]
 
         shader = group.outputs[SHADER]
         if surface.alpha != 1.0:
@@ -190,13 +199,20 @@ def set_lightmap_only(lightmap_only: bool) -> int:
     return count
 
 
-def _enable_nodes(material: bpy.types.Material) -> None:
-    """Give the material a node tree; Blender 5.0 and later need no asking and warn of it."""
+def _make_plain_nodes(material: bpy.types.Material, color: Any) -> None:
+    """Have the material say by nodes what it is without: diffuse, of one color."""
     if bpy.app.version < (5, 0):
-        material.use_nodes = True
+        material.use_nodes = True  # Blender 5.0 and later need no asking and warn of it
+    nodes = material.node_tree.nodes
+    nodes.clear()
+    shader, output = nodes.new("ShaderNodeBsdfDiffuse"), nodes.new("ShaderNodeOutputMaterial")
+    shader.inputs["Color"].default_value = (*color, 1.0)
+    output.location.x = 300
+    material.node_tree.links.new(shader.outputs[0], output.inputs["Surface"])
 
 
 def _skip_light_sampling(material: bpy.types.Material, surface: Surface) -> None:
     """Keep Cycles from sampling baked walls as lamps: they are bright, but light nothing."""
-    if surface.emission == BLACK and hasattr(material, "cycles"):
+    if not surface.glows and hasattr(material, "cycles"):
+        material[SAMPLING] = material.cycles.emission_sampling
         material.cycles.emission_sampling = "NONE"

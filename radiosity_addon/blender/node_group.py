@@ -10,6 +10,7 @@ from .bake_record import is_made, mark_made
 
 GROUP_NAME = "Radiosity Lightmap"
 
+SURFACE = "Surface"
 BASE_COLOR = "Base Color"
 LIGHTMAP = "Lightmap"
 EMISSION = "Emission"
@@ -30,6 +31,8 @@ def lightmap_group() -> bpy.types.NodeTree:
     """
     for tree in bpy.data.node_groups:
         if is_made(tree) and tree.name.startswith(GROUP_NAME):
+            if not any(item.name == SURFACE for item in tree.interface.items_tree):
+                _declare_surface(tree)  # one of an earlier version
             return tree
     tree = bpy.data.node_groups.new(GROUP_NAME, "ShaderNodeTree")
     mark_made(tree)
@@ -46,6 +49,7 @@ def _declare_sockets(tree: bpy.types.NodeTree) -> None:
         socket.default_value = default
         return socket
 
+    _declare_surface(tree)
     declare(BASE_COLOR, "NodeSocketColor", "What the surface reflects", (1.0, 1.0, 1.0, 1.0))
     declare(LIGHTMAP, "NodeSocketColor", "The lightmap's texel", (0.0, 0.0, 0.0, 1.0))
     declare(EMISSION, "NodeSocketColor", "Light of its own, strength included", (0.0, 0.0, 0.0, 1.0))
@@ -57,6 +61,13 @@ def _declare_sockets(tree: bpy.types.NodeTree) -> None:
     switch.subtype = "FACTOR"
     switch.min_value, switch.max_value = 0.0, 1.0
     tree.interface.new_socket(SHADER, in_out="OUTPUT", socket_type="NodeSocketShader")
+
+
+def _declare_surface(tree: bpy.types.NodeTree) -> None:
+    """Give the group the input that holds the material's own shader."""
+    tip = "The material's own shader, which was baked"
+    socket = tree.interface.new_socket(SURFACE, description=tip, in_out="INPUT", socket_type="NodeSocketShader")
+    tree.interface.move(socket, 0)
 
 
 def _build(tree: bpy.types.NodeTree) -> None:

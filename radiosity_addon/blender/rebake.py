@@ -17,6 +17,7 @@ import numpy as np
 
 from ..bake_scene import BakeWarning
 from .bake_record import is_made, made_datablocks, mark_made, recorded_objects, remove_datablocks, unmark_made
+from .material_edits import carry_edits
 from .restore import leave_edit_modes, restore, show_original
 
 SHAPE = "radiosity_shape"
@@ -135,7 +136,7 @@ def _shape(mesh: bpy.types.Mesh) -> str:
 def originals_shown(context: bpy.types.Context) -> Iterator[tuple[BakeWarning, ...]]:
     """Show the originals for a moment, as if nothing had been baked; yields what to warn of."""
     leave_edit_modes(context, recorded_objects())
-    edited = edited_copies()
+    edited = (*carry_edits(), *edited_copies())
     earlier = EarlierBake(context)
     try:
         yield edited

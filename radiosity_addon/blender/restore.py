@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 from .bake_record import forget, is_made, recorded_objects, remove_made, unmark_made
+from .material_edits import carry_edits
 
 
 def restore(context: bpy.types.Context) -> int:
@@ -18,6 +19,7 @@ def restore(context: bpy.types.Context) -> int:
     count : int
         How many objects were brought back; 0 means nothing was baked.
     """
+    carry_edits()
     objects = recorded_objects()
     leave_edit_modes(context, objects)
     for obj in objects:

@@ -62,35 +62,48 @@ class Value:
 def feed_of(socket: bpy.types.NodeSocket, stack: Stack = (), enter_groups: bool = True) -> Feed:
     """Follow an input socket to the node that computes it, or to the constant it ends at.
 
-    Without `enter_groups` a group node, or the node of a group's inputs, is where it ends.
+    Without `enter_groups` a group node, or the node of a group's inputs, is where it ends. Where muted
+    nodes and reroutes lead to nothing, the value is that of the socket that reads them, as in Cycles.
     """
+    reader = socket
     for _ in range(_MAX_STEPS):
         links = [link for link in socket.links if link.is_valid and not link.is_muted]
         if not links:
-            return Feed(None, socket, stack)
+            break
         node, output = links[0].from_node, links[0].from_socket
         if node.type == "SHADERTORGB":  # Cycles does not know it, and drops its links
-            return Feed(None, socket, stack)
-        if node.mute:
-            inner = [link.from_socket for link in node.internal_links if link.to_socket == output]
-            if not inner:
-                return Feed(None, socket, stack)
-            socket = inner[0]
-        elif node.type == "REROUTE":
-            socket = node.inputs[0]
+            break
+        if node.mute or node.type == "REROUTE":
+            inner = passed_through(node, output)
+            if inner is None:
+                break
+            socket = inner
         elif enter_groups and node.type == "GROUP" and node.node_tree is not None:
             inside = group_output(node.node_tree, output.identifier)
             if inside is None:
-                return Feed(None, socket, stack)
+                break
             socket, stack = inside, (*stack, node)
+            reader = socket
         elif enter_groups and node.type == "GROUP_INPUT" and stack:
             outside = by_identifier(stack[-1].inputs, output.identifier)
             if outside is None:
-                return Feed(None, socket, stack)
+                break
             socket, stack = outside, stack[:-1]
+            reader = socket
         else:
             return Feed(node, output, stack)
-    return Feed(None, socket, stack)
+    return Feed(None, reader, stack)
+
+
+def passed_through(node: bpy.types.Node, output: bpy.types.NodeSocket) -> bpy.types.NodeSocket | None:
+    """Return the input that a muted node, or a reroute, passes on at an output; None where it is nothing.
+
+    Blender decides which: of a muted Mix Shader the first shader, or the second where that alone is linked; of
+    shaders that only emit or scatter none, so that they are black.
+    """
+    if node.type == "REROUTE":
+        return node.inputs[0]
+    return next((link.from_socket for link in node.internal_links if link.to_socket == output), None)
 
 
 def evaluate(socket: bpy.types.NodeSocket, stack: Stack = ()) -> Value:

@@ -1,8 +1,8 @@
 """Keep images where they are on an object that had no UV layer and gets its first one.
 
 Without any layer a node that reads "the active UVs" reads (0, 0, 0); with `Lightmap` as the
-only layer it would suddenly read that. In the material's copy such nodes are fed the
-constant they used to read.
+only layer it would suddenly read that. In the material's copy what such nodes read is
+multiplied by 0.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import bpy
 
 from .bake_record import mark_made
+from .copy_marks import ORIGINAL, THROUGH
 
 
 def pin_uvs(tree: bpy.types.NodeTree) -> None:
@@ -42,25 +43,34 @@ def _is_reader(node: bpy.types.Node) -> bool:
 
 def _pin(tree: bpy.types.NodeTree, copies: dict[bpy.types.NodeTree, bpy.types.NodeTree]) -> None:
     """Pin one tree; `copies` holds the pinned copies of groups made so far."""
-    origin = None
     for node in list(tree.nodes):
         if node.type == "GROUP" and node.node_tree is not None and reads_active_uvs(node.node_tree):
             group = node.node_tree
             if group not in copies:
                 copies[group] = group.copy()
                 mark_made(copies[group])
+                copies[group][ORIGINAL] = group
                 _pin(copies[group], copies)
             node.node_tree = copies[group]
+        elif node.type == "TEX_IMAGE" and _is_reader(node):
+            origin = tree.nodes.new("ShaderNodeCombineXYZ")
+            origin.location = (node.location.x - 220, node.location.y - 200)
+            tree.links.new(origin.outputs["Vector"], node.inputs["Vector"])
         elif _is_reader(node):
-            origin = origin or tree.nodes.new("ShaderNodeCombineXYZ")
-            _feed(tree, node, origin.outputs["Vector"])
+            _zero(tree, node.outputs["UV"])
 
 
-def _feed(tree: bpy.types.NodeTree, node: bpy.types.Node, origin: bpy.types.NodeSocket) -> None:
-    """Put the constant in the place of what the node reads."""
-    if node.type == "TEX_IMAGE":
-        tree.links.new(origin, node.inputs["Vector"])
+def _zero(tree: bpy.types.NodeTree, output: bpy.types.NodeSocket) -> None:
+    """Put a node between an output and all that it feeds which makes zeros of it."""
+    links = list(output.links)
+    if not links:
         return
-    output = node.outputs["UV"]
-    for link in list(output.links):
-        tree.links.new(origin, link.to_socket)
+    zero = tree.nodes.new("ShaderNodeVectorMath")
+    zero.operation = "MULTIPLY"
+    zero.inputs[1].default_value = (0.0, 0.0, 0.0)
+    zero.location = (output.node.location.x + 180, output.node.location.y)
+    zero[THROUGH] = True
+    for link in links:
+        target, is_muted = link.to_socket, link.is_muted
+        tree.links.new(zero.outputs["Vector"], target).is_muted = is_muted
+    tree.links.new(output, zero.inputs[0])

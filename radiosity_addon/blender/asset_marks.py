@@ -1,0 +1,23 @@
+"""Fake users and asset marks: what Blender does not copy with a datablock."""
+
+from __future__ import annotations
+
+import bpy
+
+_DETAILS = ("author", "description", "copyright", "license", "catalog_id")
+
+
+def take_marks(target: bpy.types.ID | None, source: bpy.types.ID) -> None:
+    """Give a datablock the fake user and the asset mark that another one has."""
+    if target is None or target.library is not None:
+        return
+    if source.use_fake_user:
+        target.use_fake_user = True
+    if source.asset_data is None or target.asset_data is not None:
+        return
+    target.asset_mark()
+    for name in _DETAILS:
+        if hasattr(source.asset_data, name):
+            setattr(target.asset_data, name, getattr(source.asset_data, name))
+    for tag in source.asset_data.tags:
+        target.asset_data.tags.new(tag.name)

@@ -1,0 +1,36 @@
+"""What a lightmap copy was when it was made, noted on it as digests: so edits are known later, also after reloading."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import bpy
+
+from .copy_marks import CONTENT, ORIGINAL, SOURCE, STATE, copied_groups
+from .material_digest import digest, tree_digest
+
+
+def record(copy: bpy.types.Material) -> Callable[[], None]:
+    """Note what a fresh copy holds; what is returned completes the record once the lightmap is wired in."""
+    original = copy.get(ORIGINAL)
+    copy[CONTENT] = digest(copy)
+    copy[SOURCE] = "" if original is None else digest(original)
+
+    def complete() -> None:
+        for group in dict.fromkeys(copied_groups(copy.node_tree)):
+            group[SOURCE] = group[CONTENT] = tree_digest(group[ORIGINAL])
+            group[STATE] = tree_digest(group, as_copy=True)
+        copy[STATE] = digest(copy, as_copy=True)
+
+    return complete
+
+
+def note_same(copy: bpy.types.Material) -> None:
+    """Note that a copy and its original now have the same content."""
+    copy[SOURCE] = copy[CONTENT] = digest(copy[ORIGINAL])
+    copy[STATE] = digest(copy, as_copy=True)
+
+
+def is_untouched(copy: bpy.types.Material) -> bool:
+    """Whether nothing of a copied material was edited since it was recorded; its groups are not looked into."""
+    return copy.get(STATE) == digest(copy, as_copy=True)

@@ -1,0 +1,48 @@
+"""Keyframes and drivers of a node tree, by the data paths of what they move."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import bpy
+
+
+def path_of(socket: bpy.types.NodeSocket) -> str:
+    """Return the data path of a socket's value in its tree."""
+    return f"{socket.path_from_id()}.default_value"
+
+
+def is_keyed(socket: bpy.types.NodeSocket) -> bool:
+    """Whether keyframes or a driver of its tree move a socket's value."""
+    tree = socket.id_data
+    if tree.animation_data is None:
+        return False
+    path = path_of(socket)
+    return any(curve.data_path == path for curve in curves(tree))
+
+
+def move_keys(tree: bpy.types.NodeTree, before: str, after: str) -> None:
+    """Have what moved one path of a tree move another."""
+    if tree.animation_data is not None and before != after:
+        for curve in list(curves(tree)):
+            if curve.data_path == before:
+                curve.data_path = after
+
+
+def curves(owner: bpy.types.ID) -> Iterator[bpy.types.FCurve]:
+    """Yield all drivers of a datablock, and all curves of its action."""
+    data = owner.animation_data
+    if data is None:
+        return
+    yield from data.drivers
+    action = data.action
+    if action is None:
+        return
+    if hasattr(action, "fcurves"):  # until Blender 5.0
+        yield from action.fcurves
+        return
+    for layer in action.layers:
+        for strip in layer.strips:
+            for bag in strip.channelbags:
+                if data.action_slot is None or bag.slot_handle == data.action_slot.handle:
+                    yield from bag.fcurves
