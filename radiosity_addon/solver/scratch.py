@@ -16,7 +16,7 @@ import os
 import tempfile
 import threading
 import weakref
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
@@ -153,6 +153,20 @@ def tiles(count: int, size: int = TILE) -> Iterator[slice]:
     for start in range(0, count, size):
         yield slice(start, min(start + size, count))
         trim()
+
+
+def marked(count: int, of: Callable[[slice], Array]) -> Array:
+    """Return (count,) bool from what a function says of rows, tile by tile."""
+    result = np.empty(count, dtype=bool)
+    for rows in tiles(count):
+        result[rows] = of(rows)
+    return result
+
+
+def row_numbers(mask: Array) -> Array:
+    """Return where a mask is true, as int32: half of what `np.flatnonzero` takes."""
+    parts = [(rows.start + np.flatnonzero(mask[rows])).astype(np.int32) for rows in tiles(len(mask))]
+    return np.concatenate(parts) if parts else np.zeros(0, np.int32)
 
 
 def is_in_file(array: Array) -> bool:
