@@ -18,6 +18,7 @@ import numpy as np
 
 from ..solver.arrays import Array
 from ..solver.parallel import chunk_steps, for_chunks
+from ..solver.scratch import Scratch, tiles
 from ..solver.steps import drain
 from ..solver.visibility import RayCaster
 from .point_grid import NONE, PointGrid
@@ -62,8 +63,11 @@ class GatherPoints:
         """(g,) int8: as which level each was added, from 0"""
         self._grids: list[PointGrid] = []
         self._weighed = _Weighed.nothing()
-        self._number = np.full(len(geometry), -1, dtype=np.int32)
-        self.farthest = np.full(len(geometry), np.inf)
+        scratch = geometry.scratch
+        self._number = scratch.empty(len(geometry), np.int32)
+        self.farthest = scratch.empty(len(geometry))
+        for rows in tiles(len(geometry)):
+            self._number[rows], self.farthest[rows] = -1, np.inf
         """(n,) float64 [m]: what texels see is no farther off in the mean, by what points near them see."""
 
     def __len__(self) -> int:
@@ -153,8 +157,11 @@ class GatherPoints:
 
     def support_steps(self, texels: Array) -> Generator[float, None, Array]:
         """Compute the same; yields the fraction done."""
-        total = np.empty(len(texels))
+        scratch = self._geometry.scratch
+        total = scratch.empty(len(texels))
         parts: dict[int, tuple[Array, Array, Array]] = {}
+        kept = scratch.rows(1, np.int32), scratch.rows(1, np.int32), scratch.rows(1, np.float32)
+        self._weighed = _Weighed.nothing()
 
         def weigh(rows: slice) -> None:
             row, point = self.pairs(texels[rows])
@@ -162,10 +169,18 @@ class GatherPoints:
             weight = self.kernel(texels[rows][row], point)
             total[rows] = np.bincount(row, weight, minlength=len(texels[rows]))
             reached = np.flatnonzero(weight)
-            parts[rows.start] = texels[rows][row[reached]], point[reached], weight[reached]
+            # In single precision: they are kept for all texels.
+            single = weight[reached].astype(np.float32)
+            parts[rows.start] = texels[rows][row[reached]], point[reached], single
 
-        yield from chunk_steps(weigh, len(texels), CHUNK, self.threads)
-        self._weighed = _Weighed.joined(len(self._grids), texels, [parts[start] for start in sorted(parts)])
+        steps = chunk_steps(weigh, len(texels), CHUNK, self.threads)
+        for start, fraction in zip(range(0, len(texels), CHUNK), steps, strict=True):
+            for table, values in zip(kept, parts.pop(start), strict=True):
+                table.extend(values)
+            yield fraction
+        in_order = all((np.diff(texels[rows]) > 0).all() for rows in tiles(len(texels)))
+        if in_order and len(texels):
+            self._weighed = _Weighed(len(self._grids), texels, *(table.all()[:, 0] for table in kept))
         return total
 
     def weights_of(self, texels: slice) -> tuple[Array, Array, Array]:
@@ -175,7 +190,7 @@ class GatherPoints:
         """
         known = self._weighed
         run = np.arange(texels.start, texels.stop)
-        mine = slice(*np.searchsorted(known.texels, [texels.start, texels.stop]))
+        mine = _run_of(known.texels, texels)
         old = np.zeros(len(run), dtype=bool)
         old[known.texels[mine] - texels.start] = True
         # What has become a point since has learnt how close things are to it.
@@ -221,18 +236,17 @@ class _Weighed:
         none = np.zeros(0, dtype=np.int32)
         return _Weighed(0, none, none, none, np.zeros(0, dtype=np.float32))
 
-    @staticmethod
-    def joined(levels: int, texels: Array, parts: list[tuple[Array, Array, Array]]) -> _Weighed:
-        """Put the chunks' pairs together; nothing if `texels` are not in order."""
-        if not parts or (np.diff(texels) <= 0).any():
-            return _Weighed.nothing()
-        texel, point, weight = (np.concatenate(chunks) for chunks in zip(*parts, strict=True))
-        return _Weighed(levels, texels, texel, point, weight.astype(np.float32))
-
     def pairs_of(self, texels: slice) -> tuple[Array, Array, Array]:
         """Return texels, points and weights of a run of texels."""
-        part = slice(*np.searchsorted(self.texel, [texels.start, texels.stop]))
+        part = _run_of(self.texel, texels)
         return self.texel[part], self.point[part], self.weight[part]
+
+
+def _run_of(ascending: Array, texels: slice) -> slice:
+    """Return where a run of texels is in an ascending array of them."""
+    # Bounds of another type would have the whole array converted.
+    bounds = np.array([texels.start, texels.stop], dtype=ascending.dtype)
+    return slice(*np.searchsorted(ascending, bounds))
 
 
 @dataclass(frozen=True)
@@ -252,14 +266,13 @@ class Interpolation:
     point: Array
     weight: Array
 
-    def __call__(self, values: Array, threads: int = 1) -> Array:
+    def __call__(self, values: Array, threads: int = 1, scratch: Scratch | None = None) -> Array:
         """Carry (g, k) values of the gather points to (n, k) of the texels."""
-        result = np.empty((len(self.first), values.shape[1]))
-        ends = np.append(self.first, len(self.point))
+        result = (scratch or Scratch()).empty((len(self.first), values.shape[1]))
         columns = [np.ascontiguousarray(values[:, channel]) for channel in range(values.shape[1])]
 
         def spread(rows: slice) -> None:
-            entries = slice(ends[rows.start], ends[rows.stop])
+            entries = self.entries_of(rows)
             point, weight = self.point[entries].astype(np.intp), self.weight[entries]
             first = self.first[rows] - entries.start
             for channel, column in enumerate(columns):
@@ -270,7 +283,17 @@ class Interpolation:
 
     def any_of(self, chosen: Array) -> Array:
         """Return (n,) bool: which texels take from any of the chosen points, (g,) bool."""
-        return np.asarray(np.logical_or.reduceat(chosen[self.point], self.first))
+        result = np.zeros(len(self.first), dtype=bool)
+        for rows in tiles(len(result)):
+            entries = self.entries_of(rows)
+            first = self.first[rows] - entries.start
+            result[rows] = np.logical_or.reduceat(chosen[self.point[entries]], first)
+        return result
+
+    def entries_of(self, rows: slice) -> slice:
+        """Return where the entries of a run of texels are."""
+        stop = self.first[rows.stop] if rows.stop < len(self.first) else len(self.point)
+        return slice(int(self.first[rows.start]), int(stop))
 
 
 def fit(points: GatherPoints, geometry: TexelGeometry) -> Interpolation:
@@ -302,10 +325,19 @@ def fit_steps(points: GatherPoints, geometry: TexelGeometry) -> Generator[float,
         along = geometry.position[points.texel[point]] - geometry.position[row + rows.start]
         parts[rows.start] = count, point.astype(np.int32), _linear_weights(along, kernel, count)
 
-    yield from chunk_steps(weigh, len(geometry), CHUNK, points.threads)
-    counts, numbers, weights = zip(*(parts[start] for start in sorted(parts)), strict=True)
-    count = np.concatenate(counts)
-    return Interpolation(np.cumsum(count) - count, np.concatenate(numbers), np.concatenate(weights))
+    scratch = geometry.scratch
+    first = scratch.empty(len(geometry), np.int64)
+    point, weight = scratch.rows(1, np.int32), scratch.rows(1, np.float32)
+    total = 0
+    steps = chunk_steps(weigh, len(geometry), CHUNK, points.threads)
+    for start, fraction in zip(range(0, len(geometry), CHUNK), steps, strict=True):
+        count, numbers, weights = parts.pop(start)
+        first[start : start + len(count)] = total + np.cumsum(count) - count
+        total += len(numbers)
+        point.extend(numbers)
+        weight.extend(weights)
+        yield fraction
+    return Interpolation(first, point.all()[:, 0], weight.all()[:, 0])
 
 
 def refit(points: GatherPoints, geometry: TexelGeometry, texels: Array) -> tuple[Array, Array, Array]:

@@ -17,11 +17,12 @@ from ..solver.arrays import Array
 from ..solver.gathering import Gathered, Resolver
 from ..solver.local_pass import LocalPass
 from ..solver.retracing import Before
+from ..solver.scratch import row_numbers
 from ..solver.steps import scaled
 from .crossings import Crossings
 from .disturbance import Disturbance
 from .interpolate import LIFT, SAGITTA, GatherPoints, Interpolation, refit
-from .reconstruct import STARTS, GatherSettings, gather_at, gather_footprints
+from .reconstruct import STARTS, GatherSettings, gather_at, gather_footprints, on_lattice
 from .stored_links import StoredLinks
 from .traced_texels import KeptPoints
 
@@ -195,13 +196,12 @@ class MovedPoints:
 
     def _lacking(self, points: GatherPoints, among: Array, stride: int) -> Generator[float, None, Array]:
         """Find the texels of some, (n,) bool, on a lattice, that no point so far reaches."""
-        on_lattice = (self._geometry.row % stride == 0) & (self._geometry.column % stride == 0)
-        candidates = np.flatnonzero(on_lattice & among)
+        candidates = row_numbers(on_lattice(self._geometry, stride) & among)
         if len(points):
             reached = yield from points.support_steps(candidates)
             lacks = (reached < self._settings.support) | self._crossings.beside[candidates]
             candidates = candidates[lacks]
-        return candidates.astype(np.int32)
+        return np.asarray(candidates)
 
 
 def _merged(before: Interpolation, number: Array, anew: Array, entries: Entries) -> Interpolation:

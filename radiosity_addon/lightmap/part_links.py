@@ -16,6 +16,7 @@ import numpy as np
 from ..solver.arrays import Array
 from ..solver.light_gains import LightGains
 from ..solver.local_pass import NOTHING, Footprints, LocalPass, Resolver, values_of
+from ..solver.scratch import marked, tiles
 from ..solver.steps import drain, scaled
 from .source_means import Means
 from .stored_links import StoredLinks
@@ -32,6 +33,9 @@ SHADOW_RAYS = 4
 
 ROUNDS = 3
 """Rounds of asking the parts that parts met; beyond, the hierarchy's values stand for leaves."""
+
+TILE_HITS = 1 << 22
+"""Stored hits that are counted or numbered at once; bounds the temporaries to about 60 MB."""
 
 SWEEPS = 4
 """Sweeps among the parts for each over the texels, at most: the next one goes on where they ended."""
@@ -154,7 +158,8 @@ def gather_parts(
     Parameters
     ----------
     links : StoredLinks
-        Their sources are as `resolve` numbers them.
+        Their sources are as `resolve` numbers them; they are numbered anew where they are, for they take
+        more memory than all else.
     element : (n,) int32
         Of the texels: the leaf elements below them, or NOTHING.
     reflectance : (n, 3)
@@ -177,8 +182,9 @@ def gather_parts(
         gathering.take_up()
     made, of = yield from scaled(gathering.links(element, reflectance), 0.7, 1.0)
     start, rows = values_of(numbers.local.reflected(), of), gathering.rows
+    rows.number(links.sources)
     aimed = replace(links.aimed, sources=rows(links.aimed.sources))
-    return replace(links, sources=rows(links.sources), aimed=aimed), Parts(start, made, of, gathering.small)
+    return replace(links, aimed=aimed), Parts(start, made, of, gathering.small)
 
 
 def lit_footprints(numbers: HitNumbers, parts: KnownParts) -> Footprints:
@@ -208,8 +214,10 @@ class _Gathering:
 
     def count(self, sources: Array) -> None:
         """Note which parts were met."""
-        parts = sources[sources >= self._numbers.texel_count] - self._numbers.texel_count
-        self._met += np.bincount(parts, minlength=len(self._met)).astype(np.int32)
+        for rows in tiles(len(sources), max(TILE_HITS // max(sources.shape[1], 1), 1)):
+            some = sources[rows]
+            parts = some[some >= self._numbers.texel_count] - self._numbers.texel_count
+            self._met += np.bincount(parts, minlength=len(self._met)).astype(np.int32)
 
     def take_up(self) -> None:
         """Take the known parts that were met, and those that these met in turn.
@@ -308,15 +316,21 @@ class _Rows:
         self._first, self.small = first, small
 
     def __call__(self, sources: Array) -> Array:
-        """Return the rows of sources of any shape."""
-        doubtful = sources >= self._first
-        if not doubtful.any():
-            return sources
-        result, wanted = sources.copy(), sources[doubtful]
-        place = np.searchsorted(self.small, wanted)
-        there = self.small.take(place, mode="clip") == wanted
-        result[doubtful] = np.where(there, self._first + place, NOTHING)
+        """Return the rows of (k, …) sources."""
+        result = sources.copy()
+        self.number(result)
         return result
+
+    def number(self, sources: Array) -> None:
+        """Turn (k, …) sources into rows where they are."""
+        for some in tiles(len(sources), max(TILE_HITS // max(sources[:1].size, 1), 1)):
+            doubtful = sources[some] >= self._first
+            if not doubtful.any():
+                continue
+            wanted = sources[some][doubtful]
+            place = np.searchsorted(self.small, wanted)
+            there = self.small.take(place, mode="clip") == wanted
+            sources[some][doubtful] = np.where(there, self._first + place, NOTHING)
 
 
 class PartSweeps:
@@ -337,7 +351,7 @@ class PartSweeps:
     def lit_or_unknown(self, direct: Array) -> Array:
         """Return (table rows − beyond,) bool: what direct light (n, 3) meets, and parts that gather none."""
         lit = np.ones(self._surfaces, dtype=bool)
-        lit[: self._texel_count] = direct.any(axis=1)
+        lit[: self._texel_count] = marked(self._texel_count, lambda rows: direct[rows].any(axis=1))
         for links in self._links:
             lit[links.rows] = links.lamps.any(axis=1)
         return lit

@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..solver.scratch import Scratch, tiles
 from .clip import area_in_unit_square, clip_to_unit_square, polygon_area_centroid, sample_polygons
 
 Float = NDArray[np.float64]
@@ -116,7 +117,7 @@ class _Pairs(NamedTuple):
     centre: Bool
 
 
-def rasterise(uv: Float32, resolution: int) -> Texels:
+def rasterise(uv: Float32, resolution: int, scratch: Scratch | None = None) -> Texels:
     """Find every texel that a triangle overlaps, and the one triangle it belongs to.
 
     Parameters
@@ -126,6 +127,8 @@ def rasterise(uv: Float32, resolution: int) -> Texels:
         triangles without area cover nothing.
     resolution : int
         Width and height of the page in texels.
+    scratch : Scratch or None
+        Makes the texels' arrays; None keeps them in memory.
 
     Returns
     -------
@@ -142,19 +145,25 @@ def rasterise(uv: Float32, resolution: int) -> Texels:
         wins = score == best[pairs.texel]
         owner[pairs.texel[wins & (score > before)]] = _NOBODY
         np.minimum.at(owner, pairs.texel[wins], pairs.triangle[wins])
+    scratch = scratch or Scratch()
     covered = np.flatnonzero(owner != _NOBODY)
-    row, column = (part.astype(np.int32) for part in np.divmod(covered, resolution))
-    triangle = owner[covered]
-    area = np.ones(len(covered), dtype=np.float32)
-    centroid = np.empty((len(covered), 3), dtype=np.float32)
-    whole = best[covered] >= _CENTRE + 1
-    for some in _runs(np.flatnonzero(whole)):
+    count = len(covered)
+    row, column, triangle = (scratch.empty(count, np.int32) for _ in range(3))
+    area, centroid = scratch.empty(count, np.float32), scratch.empty((count, 3), np.float32)
+    centre_inside = scratch.empty(count, np.bool_)
+    for tile in tiles(count, CHUNK):
+        at = covered[tile]
+        row[tile], column[tile] = np.divmod(at, resolution)
+        triangle[tile], score = owner[at], best[at]
+        area[tile], centre_inside[tile] = 1.0, score >= _CENTRE
+        whole = score >= _CENTRE + 1
+        some = tile.start + np.flatnonzero(whole)
         centroid[some] = centre_weights(uv, resolution, triangle[some], row[some], column[some])
-    for some in _runs(np.flatnonzero(~whole)):
+        some = tile.start + np.flatnonzero(~whole)
         polygon, origin, _ = _clip(uv, resolution, triangle[some], row[some], column[some])
         area[some], middle = polygon_area_centroid(polygon)
         centroid[some] = _barycentric(middle[:, None], origin)[:, 0]
-    return Texels(resolution, uv, row, column, triangle, area, centroid, best[covered] >= _CENTRE)
+    return Texels(resolution, uv, row, column, triangle, area, centroid, centre_inside)
 
 
 def centre_weights(uv: Float32, resolution: int, triangle: Int32, row: Int32, column: Int32) -> Float:
@@ -166,12 +175,6 @@ def centre_weights(uv: Float32, resolution: int, triangle: Int32, row: Int32, co
 def overlap_areas(uv: Float32, resolution: int, triangle: Int32, row: Int32, column: Int32) -> Float:
     """Return (p,) the part of each texel that its triangle covers, 0 to 1."""
     return area_in_unit_square(_around_texels(uv, resolution, triangle, row, column))
-
-
-def _runs(rows: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
-    """Cut row numbers into runs of at most `CHUNK`."""
-    for start in range(0, len(rows), CHUNK):
-        yield rows[start : start + CHUNK]
 
 
 def coverage_sum(uv: Float32, resolution: int) -> Float:

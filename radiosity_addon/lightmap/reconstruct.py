@@ -18,6 +18,7 @@ from ..solver.aiming import AimedRays
 from ..solver.arrays import Array
 from ..solver.local_pass import NOTHING, Footprints, Gathered, LocalPass, Resolver, values_of
 from ..solver.scene import Scene
+from ..solver.scratch import marked, row_numbers, tiles
 from ..solver.steps import scaled
 from ..solver.visibility import Hits, sees
 from .crossings import LIFT, Crossings, below_hood, crossing_steps
@@ -36,6 +37,9 @@ from .whole_neighbours import whole_neighbour
 
 DIRECT, CROSSED, GATHERED, PARTS = 0.25, 0.3, 0.8, 0.9
 """How much is done when a part ends; rough, from rooms at medium quality."""
+
+CHUNK = 1 << 16
+"""Texels whose elements are looked up at once; bounds the temporaries to about 20 MB."""
 
 STARTS = 16
 """Points of a texel's footprint that its gather rays start from."""
@@ -85,10 +89,11 @@ def reconstruct(
     If `local` can ask for every light apart, what lights the texels anew is kept. `so_far` is told what is
     known on the way.
     """
-    gains = local.new_gains(len(geometry))
-    lamps = np.zeros((len(geometry), 3))
+    scratch = geometry.scratch
+    gains = local.new_gains(len(geometry), scratch)
+    lamps = scratch.zeros((len(geometry), 3))
     reflectance, emission = texel_materials(scene, geometry)
-    element = local.leaf_at_fronts(geometry.triangle, geometry.barycentric)
+    element = elements_below(local, geometry)
     if so_far is not None:
         so_far.begin(local, geometry, element, lamps, (reflectance, emission))
     tell = None if so_far is None else so_far.asked
@@ -106,9 +111,13 @@ def reconstruct(
     links, parts = yield from scaled(further, GATHERED, PARTS)
     transport = TexelTransport(links, parts, reflectance)
     limits = settings.sweeps, settings.tolerance
-    start = values_of(local.reflected(), element)
+    start, reflected = scratch.empty((len(geometry), 3), np.float32), local.reflected()
+    for tile in tiles(len(geometry)):
+        start[tile] = values_of(reflected, element[tile])
     seen = None if so_far is None else so_far.swept
-    swept = sweep_steps(transport, start, lamps, local.beyond(), *limits, local.threads, seen=seen)
+    swept = sweep_steps(
+        transport, start, lamps, local.beyond(), *limits, local.threads, seen=seen, scratch=scratch
+    )
     light = yield from scaled(swept, PARTS, 1.0)
     light = replace(light, state=crossings.state)
     yield 1.0
@@ -123,15 +132,29 @@ def reconstruct(
 
 def footprints(geometry: TexelGeometry, local: LocalPass) -> Footprints:
     """Return where all texels ask for light, and how much the elements lead them to expect."""
+    scratch = geometry.scratch
+    keys, expected = scratch.empty(len(geometry), np.int32), scratch.empty(len(geometry))
+    for tile in tiles(len(geometry), CHUNK):
+        keys[tile] = np.arange(tile.start, tile.stop)
+        expected[tile] = local.irradiance_at(geometry.triangle[tile], geometry.barycentric[tile])
     return Footprints(
         geometry.position,
         geometry.normal,
-        np.arange(len(geometry)),
+        keys,
         geometry.sample,
         geometry.neighbourhood,
-        expected=local.irradiance_at(geometry.triangle, geometry.barycentric),
+        expected=expected,
         lift=SmoothLift(geometry),
+        scratch=scratch,
     )
+
+
+def elements_below(local: LocalPass, geometry: TexelGeometry) -> Array:
+    """Return (n,) int32 the leaf elements below the texels, or NOTHING."""
+    element = geometry.scratch.empty(len(geometry), np.int32)
+    for tile in tiles(len(geometry), CHUNK):
+        element[tile] = local.leaf_at_fronts(geometry.triangle[tile], geometry.barycentric[tile])
+    return element
 
 
 def gather_texels(
@@ -147,8 +170,10 @@ def gather_texels(
     `met` is told of texels that have gathered, and how far they are apart.
     """
     points = GatherPoints(geometry, local.caster, crossings.alone, local.threads)
-    found: list[Gathered] = []
+    found: list[AimedRays] = []
     first: list[int] = []
+    sources = geometry.scratch.rows(settings.rays, np.int32)
+    count = 0
     width = (1.0 - FIT) / len(settings.strides)
     for number, stride in enumerate(settings.strides):
         begin = number * width
@@ -159,39 +184,46 @@ def gather_texels(
         at, closeness = begin + 0.2 * width, []
         for some, starts in ((chosen[~edge], STARTS), (chosen[edge], None)):
             end = at + 0.8 * width * len(some) / max(len(chosen), 1)
-            rays = gather_at(local, geometry, some, starts, settings.rays, resolve)
+            rays = gather_at(local, geometry, some, starts, settings.rays, resolve, sources.more(len(some)))
             gathered = yield from scaled(rays, at, end)
-            first.append(sum(len(before.sources) for before in found))
-            found.append(gathered)
+            first.append(count)
+            found.append(gathered.aimed)
+            count += len(some)
             if met is not None:
                 met(some, gathered, stride)
             closeness.append(gathered.closeness)
             at = end
         points.add(stride, np.concatenate([chosen[~edge], chosen[edge]]), np.concatenate(closeness))
     spread = yield from scaled(fit_steps(points, geometry), 1.0 - FIT, 1.0)
-    sources = np.concatenate([gathered.sources for gathered in found])
-    aimed = AimedRays.joined([gathered.aimed for gathered in found], first)
-    return StoredLinks(sources, spread, aimed), points
+    return StoredLinks(sources.all(), spread, AimedRays.joined(found, first)), points
 
 
 def gather_at(
-    local: LocalPass, geometry: TexelGeometry, chosen: Array, starts: int | None, rays: int, resolve: Resolver
+    local: LocalPass,
+    geometry: TexelGeometry,
+    chosen: Array,
+    starts: int | None,
+    rays: int,
+    resolve: Resolver,
+    into: Array | None = None,
 ) -> Generator[float, None, Gathered]:
-    """Gather at some texels; yields the fraction done."""
+    """Gather at some texels; yields the fraction done. `into` (c, rays) int32 takes the sources, if given."""
     at = gather_footprints(geometry, chosen, starts)
-    expected = local.irradiance_at(geometry.triangle[chosen], geometry.barycentric[chosen])
-    return (yield from local.gather_steps(at, geometry.surface_normal[chosen], rays, resolve, expected))
+    expected, upright = np.empty(len(chosen)), geometry.scratch.empty((len(chosen), 3))
+    for tile in tiles(len(chosen), CHUNK):
+        some = chosen[tile]
+        expected[tile] = local.irradiance_at(geometry.triangle[some], geometry.barycentric[some])
+        upright[tile] = geometry.surface_normal[some]
+    return (yield from local.gather_steps(at, upright, rays, resolve, expected, into))
 
 
 def gather_footprints(geometry: TexelGeometry, chosen: Array, starts: int | None) -> Footprints:
     """Return where some texels gather, each from so many points."""
-    return Footprints(
-        geometry.position[chosen],
-        geometry.normal[chosen],
-        chosen,
-        partial(sample_of, geometry, chosen),
-        starts=starts,
-    )
+    position, normal = (geometry.scratch.empty((len(chosen), 3)) for _ in range(2))
+    for tile in tiles(len(chosen)):
+        position[tile], normal[tile] = geometry.position[chosen[tile]], geometry.normal[chosen[tile]]
+    sampler = partial(sample_of, geometry, chosen)
+    return Footprints(position, normal, chosen, sampler, starts=starts, scratch=geometry.scratch)
 
 
 def sample_of(geometry: TexelGeometry, chosen: Array, rows: Array, u: Array) -> Array:
@@ -207,13 +239,20 @@ def _choose(
     Those beside something, (n,) bool, are chosen as well: points in the open do not know how close
     it is to them.
     """
-    on_lattice = (geometry.row % stride == 0) & (geometry.column % stride == 0)
-    candidates = np.flatnonzero(on_lattice)
+    candidates = on_lattice(geometry, stride)
     if len(points):
-        candidates = np.setdiff1d(candidates, points.texel, assume_unique=True)
+        candidates[points.texel] = False
+    candidates = row_numbers(candidates)
+    if len(points):
         reached = yield from points.support_steps(candidates)
         candidates = candidates[(reached < support) | beside[candidates]]
-    return candidates.astype(np.int32)
+    return candidates
+
+
+def on_lattice(geometry: TexelGeometry, stride: int) -> Array:
+    """Return (n,) bool: the texels in every so many rows and columns of their page."""
+    row, column = geometry.row, geometry.column
+    return marked(len(geometry), lambda tile: (row[tile] % stride == 0) & (column[tile] % stride == 0))
 
 
 def resolver(geometry: TexelGeometry, crossings: Crossings, numbers: HitNumbers) -> Resolver:

@@ -64,15 +64,18 @@ def mean_of_sources(table: Array, sources: Array) -> Array:
     return drain(mean_steps(table, sources, 1))
 
 
-def mean_steps(table: Array, sources: Array, threads: int) -> Generator[float, None, Array]:
-    """Compute the same; yields the fraction done."""
+def mean_steps(
+    table: Array, sources: Array, threads: int, rays: int | None = None
+) -> Generator[float, None, Array]:
+    """Compute the same, of the first `rays` alone if they are given; yields the fraction done."""
     result = np.empty((len(sources), table.shape[1]))
     columns = _columns(table)
 
     def average(rows: slice) -> None:
-        result[rows] = _mean_of(columns, sources[rows])
+        result[rows] = _mean_of(columns, sources[rows, :rays])
 
-    yield from chunk_steps(average, len(sources), max(CHUNK_HITS // max(sources.shape[1], 1), 1), threads)
+    chunk = max(CHUNK_HITS // max(sources.shape[1] if rays is None else rays, 1), 1)
+    yield from chunk_steps(average, len(sources), chunk, threads)
     return result
 
 

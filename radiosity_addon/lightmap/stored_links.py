@@ -9,6 +9,7 @@ import numpy as np
 
 from ..solver.aiming import AimedRays
 from ..solver.arrays import Array
+from ..solver.scratch import Scratch
 from .interpolate import Interpolation
 from .source_means import mean_steps
 
@@ -31,16 +32,20 @@ class StoredLinks:
     spread: Interpolation
     aimed: AimedRays = field(default_factory=AimedRays.none)
 
-    def irradiance_steps(self, table: Array, threads: int = 0) -> Generator[float, None, Array]:
+    def irradiance_steps(
+        self, table: Array, threads: int = 0, scratch: Scratch | None = None
+    ) -> Generator[float, None, Array]:
         """Compute (n, 3) what a table of radiosity sends to the texels; yields the fraction done."""
         mean = yield from mean_steps(table, self.sources, threads)
-        return self.spread_out(table, mean, threads)
+        return self.spread_out(table, mean, threads, scratch)
 
-    def spread_out(self, table: Array, mean: Array, threads: int = 0) -> Array:
+    def spread_out(
+        self, table: Array, mean: Array, threads: int = 0, scratch: Scratch | None = None
+    ) -> Array:
         """Add what aimed rays brought to (g, 3) `mean`, and carry it from the gather points to the texels."""
         aimed = self.aimed
         for channel in range(table.shape[1] if len(aimed.row) else 0):
             values = table[:, channel][aimed.sources]
             values[aimed.sources < 0] = 0.0
             mean[aimed.row, channel] += np.einsum("ak,ak->a", values, aimed.weights)
-        return self.spread(mean, threads)
+        return self.spread(mean, threads, scratch)

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..solver.arrays import Array
 from ..solver.light_gains import LightGains
+from ..solver.scratch import Scratch, tiles, trim
 from ..solver.steps import drain, scaled
 from .earlier_light import EarlierLight
 from .part_links import Parts, PartSweeps
@@ -117,6 +118,7 @@ def sweep_steps(
     threads: int = 0,
     estimate: bool = True,
     seen: Callable[[Array], None] | None = None,
+    scratch: Scratch | None = None,
 ) -> Generator[float, None, TexelLight]:
     """Iterate H = direct + Σ ρ H over the stored hits, started from the hierarchy's solution.
 
@@ -137,6 +139,8 @@ def sweep_steps(
         Whether the error is estimated.
     seen : callable or None
         Is given the (n, 3) irradiance after every sweep [W/m²], to be looked at.
+    scratch : Scratch or None
+        Makes the texels' arrays; None keeps them in memory.
 
     Yields
     ------
@@ -149,16 +153,19 @@ def sweep_steps(
     surfaces = texel_count + len(transport.parts.start)
     table = np.zeros((surfaces + len(beyond), 3), dtype=np.float32, order="F")
     table[surfaces:] = beyond
-    direct = lamps
+    direct, scratch = lamps, scratch or Scratch()
     if beyond.any():
         # The sky's light is direct: its share of the same rays.
-        from_sky = yield from scaled(links.irradiance_steps(table, threads), 0.0, 0.1)
-        direct = lamps + np.maximum(from_sky, 0.0)
+        direct = yield from scaled(links.irradiance_steps(table, threads, scratch), 0.0, 0.1)
+        for rows in tiles(texel_count):
+            direct[rows] = lamps[rows] + np.maximum(direct[rows], 0.0)
 
-    table[:texel_count] = start
+    for rows in tiles(texel_count):
+        table[rows] = start[rows]
+    del start
     table[texel_count:surfaces] = transport.parts.start
     table[:surfaces][~_reached(links, parts, direct, len(beyond))] = 0.0
-    indirect, left = np.zeros_like(direct), 0.9
+    indirect, left = scratch.zeros(direct.shape), 0.9
     changed = np.ones(len(table), dtype=bool)
     means = Means(links.sources, table.shape[1], threads)
     still = STILL * tolerance * float(table[:texel_count].mean()) if texel_count else 0.0
@@ -167,33 +174,46 @@ def sweep_steps(
         table[surfaces:] = 0.0
         mean = yield from scaled(means.steps(table, changed), 1.0 - left, 1.0 - SWEPT * left)
         left *= SWEPT
-        indirect = np.maximum(links.spread_out(table, mean.copy(), threads), 0.0)
+        del indirect
+        indirect = links.spread_out(table, mean.copy(), threads, scratch)
         table[surfaces:] = beyond
-        irradiance = direct + indirect
-        if seen is not None:
-            seen(irradiance)
-        radiosity = (reflectance * irradiance).astype(np.float32)
-        change = np.abs(radiosity - table[:texel_count]).max(axis=1)
         changed[:] = False
-        changed[:texel_count] = change > still
-        table[:texel_count][changed[:texel_count]] = radiosity[changed[:texel_count]]
-        if change.max(initial=0.0) <= tolerance * radiosity.mean():
+        largest, total = 0.0, 0.0
+        for rows in tiles(texel_count):
+            indirect[rows] = np.maximum(indirect[rows], 0.0)
+            radiosity = (reflectance[rows] * (direct[rows] + indirect[rows])).astype(np.float32)
+            change = np.abs(radiosity - table[rows]).max(axis=1)
+            moved = change > still
+            changed[rows] = moved
+            table[rows][moved] = radiosity[moved]
+            largest = max(largest, float(change.max()))
+            total += float(radiosity.sum(dtype=np.float64))
+        if seen is not None:
+            seen(direct + indirect)
+        if largest <= tolerance * total / max(3 * texel_count, 1):
             break
     if not estimate:
         return TexelLight(direct, indirect, 0.0, table[:surfaces])
-    noise = estimated_noise(links, table, threads)
-    error = relative_error(noise, direct + indirect)
-    each = np.sqrt((noise**2).mean(axis=1)).astype(np.float32)
+    noise = estimated_noise(links, table, threads, scratch)
+    error = relative_error(noise, direct, indirect)
+    each = scratch.empty(texel_count, np.float32)
+    for rows in tiles(texel_count):
+        each[rows] = np.sqrt((noise[rows] ** 2).mean(axis=1))
     return TexelLight(direct, indirect, error, table[:surfaces], noise=each)
 
 
-def relative_error(noise: Array, irradiance: Array) -> float:
-    """Return the RMS of (n, 3) noise, relative to the mean of the irradiance (n, 3)."""
-    mean = float(irradiance.mean()) if len(irradiance) else 0.0
-    return float(np.sqrt((noise**2).mean())) / mean if mean > 0.0 else 0.0
+def relative_error(noise: Array, *irradiance: Array) -> float:
+    """Return the RMS of (n, 3) noise, relative to the mean of the sum of irradiances (n, 3)."""
+    squares = total = 0.0
+    for rows in tiles(len(noise)):
+        squares += float((noise[rows] ** 2).sum())
+        total += sum(float(part[rows].sum()) for part in irradiance)
+    return float(np.sqrt(squares / noise.size)) / (total / noise.size) if total > 0.0 else 0.0
 
 
-def estimated_noise(links: StoredLinks, table: Array, threads: int = 0) -> Array:
+def estimated_noise(
+    links: StoredLinks, table: Array, threads: int = 0, scratch: Scratch | None = None
+) -> Array:
     """Estimate (n, 3) the error of texels' irradiance: the noise of the gather rays [W/m²].
 
     Half of a point's rays guess its irradiance with √2 times the noise of all of them, and share
@@ -208,8 +228,8 @@ def estimated_noise(links: StoredLinks, table: Array, threads: int = 0) -> Array
     """
     half = links.sources.shape[1] // 2
     whole = drain(mean_steps(table, links.sources, threads))
-    part = drain(mean_steps(table, np.ascontiguousarray(links.sources[:, :half]), threads))
-    return np.asarray(links.spread(part - whole))
+    part = drain(mean_steps(table, links.sources, threads, half))
+    return links.spread(part - whole, scratch=scratch)
 
 
 def _reached(links: StoredLinks, parts: PartSweeps, direct: Array, beyond: int) -> Array:
@@ -226,6 +246,7 @@ def _reached(links: StoredLinks, parts: PartSweeps, direct: Array, beyond: int) 
         for first in range(0, len(dark), step):
             some = dark[first : first + step]
             aims[some] = padded[links.sources[some]].any(axis=1)
+            trim()
         aims[links.aimed.row[padded[links.aimed.sources].any(axis=1)]] = True
         more = ~padded[: len(direct)] & links.spread.any_of(aims)
         padded[: len(direct)] |= more

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from ..solver.arrays import Array
 from ..solver.scene import Scene
+from ..solver.scratch import Scratch, tiles
 from ..solver.visibility import Hits, surface_offset
 from .rasterise import FOOTPRINT, Texels, sample_footprints
 
@@ -19,6 +21,9 @@ EDGE_OFFSETS = 4.0
 
 SINK = 2.0
 """Points that lie against another surface are so many ray offsets behind their own."""
+
+CHUNK = 1 << 16
+"""Texels placed at once; bounds the temporaries to about 40 MB."""
 
 _SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
@@ -37,12 +42,17 @@ class TexelGeometry:
         One per page.
     rows : sequence of (p,) int
         Per page, the scene triangle of each of the page's triangles.
+    scratch : Scratch or None
+        Makes the texels' arrays; None keeps them in memory.
 
     Attributes
     ----------
+    scratch : Scratch
+        Makes arrays of what else there is of each texel.
     uv, page_of_triangle, triangles, face_normals, normals
         Of every scene triangle, as given.
-    page, row, column, triangle : (n,) int32
+    page : (n,) int16, or int32 where there are more pages
+    row, column, triangle : (n,) int32
     share : (n,) float32
         What part of the texel its triangle covers.
     centre_inside : (n,) bool
@@ -62,35 +72,60 @@ class TexelGeometry:
         page_of_triangle: Array,
         texels: Sequence[Texels],
         rows: Sequence[Array],
+        scratch: Scratch | None = None,
     ) -> None:
+        self.scratch = scratch = scratch or Scratch()
         self._scene = scene
         self.uv, self.page_of_triangle = uv, page_of_triangle
         self.triangles, self.face_normals, self.normals = scene.triangles, scene.face_normals, scene.normals
-        self.texels = list(texels)
         self._first = np.cumsum([0] + [len(page) for page in texels])
-        self.page = np.repeat(np.arange(len(texels), dtype=np.int32), np.diff(self._first))
-        self.row = np.concatenate([page.row for page in texels])
-        self.column = np.concatenate([page.column for page in texels])
-        self.centre_inside = np.concatenate([page.centre_inside for page in texels])
-        self.share = np.concatenate([page.area for page in texels])
-        self.whole = self.share >= 1.0
-        triangles = [of[page.triangle] for of, page in zip(rows, texels, strict=True)]
-        self.triangle = np.concatenate(triangles).astype(np.int32)
-        self.surface_normal = scene.face_normals[self.triangle]
+        count = int(self._first[-1])
         self.index = []
         """per page (height, width) int32: the texel's number, or NO_TEXEL"""
         for number, page in enumerate(texels):
             numbers = np.full((page.resolution,) * 2, NO_TEXEL, dtype=np.int32)
-            numbers[page.row, page.column] = self._first[number] + np.arange(len(page))
+            for tile in tiles(len(page)):
+                own = np.arange(tile.start, tile.stop)
+                numbers[page.row[tile], page.column[tile]] = self._first[number] + own
             self.index.append(numbers)
+        self.texels = self._joined(texels)
+        self.page = scratch.empty(count, np.int16 if len(texels) <= np.iinfo(np.int16).max else np.int32)
+        self.triangle, self.whole = scratch.empty(count, np.int32), scratch.empty(count, np.bool_)
         self._inset = _edge_inset(scene)
-        centroid = np.concatenate([page.centroid for page in texels]).astype(np.float64)
-        weights = self._drawn_in(centroid[:, None], self.triangle)[:, 0]
-        self.barycentric = np.empty((len(weights), 2), dtype=np.float32)
-        self.position, self.normal = np.empty((2, len(weights), 3))
-        self._put(np.arange(len(weights)), weights)
+        self.surface_normal = scratch.empty((count, 3))
+        self.barycentric = scratch.empty((count, 2), np.float32)
+        self.position, self.normal = scratch.empty((count, 3)), scratch.empty((count, 3))
+        for number, (of, page) in enumerate(zip(rows, self.texels, strict=True)):
+            for tile in tiles(len(page), CHUNK):
+                mine = slice(self._first[number] + tile.start, self._first[number] + tile.stop)
+                triangle = of[page.triangle[tile]]
+                self.page[mine], self.triangle[mine] = number, triangle
+                self.whole[mine] = page.area[tile] >= 1.0
+                self.surface_normal[mine] = scene.face_normals[triangle]
+                centroid = page.centroid[tile].astype(np.float64)
+                self._put(mine, self._drawn_in(centroid[:, None], triangle)[:, 0])
 
-    def _put(self, rows: Array, weights: Array) -> None:
+    def _joined(self, texels: Sequence[Texels]) -> list[Texels]:
+        """Put the pages' texels one after the other; return them as views of the whole."""
+        names = ("row", "column", "centre_inside", "area")
+        if len(texels) == 1:
+            (only,) = texels
+            self.row, self.column, self.centre_inside, self.share = (getattr(only, name) for name in names)
+            return [only]
+        whole = {}
+        for name in names:
+            parts = [getattr(page, name) for page in texels]
+            whole[name] = self.scratch.empty(int(self._first[-1]), parts[0].dtype if parts else np.int32)
+            for first, part in zip(self._first, parts, strict=False):
+                for tile in tiles(len(part)):
+                    whole[name][first + tile.start : first + tile.stop] = part[tile]
+        self.row, self.column, self.centre_inside, self.share = (whole[name] for name in names)
+        return [
+            replace(page, **{name: whole[name][first : first + len(page)] for name in names})
+            for first, page in zip(self._first, texels, strict=False)
+        ]
+
+    def _put(self, rows: slice, weights: Array) -> None:
         """Put texels where barycentric weights (r, 3) of their triangles say."""
         triangle, upright = self.triangle[rows], self.surface_normal[rows]
         self.barycentric[rows] = weights[:, 1:]
@@ -107,7 +142,22 @@ class TexelGeometry:
     @cached_property
     def texel_size(self) -> float:
         """Width of a texel in the world [m], the median."""
-        return float(np.sqrt(np.median(self.texel_area[self.triangle]))) if len(self) else 1.0
+        if not len(self):
+            return 1.0
+        # The median of every texel's area, by how many there are of each triangle.
+        order = np.argsort(self.texel_area, kind="stable")
+        ends = np.cumsum(self.counts[order])
+        middle = np.searchsorted(ends, [(len(self) - 1) // 2, len(self) // 2], side="right")
+        return float(np.sqrt(self.texel_area[order[middle]].mean()))
+
+    @cached_property
+    def counts(self) -> Array:
+        """(t,) int64: how many texels each triangle has."""
+        found = np.zeros(len(self.triangles), dtype=np.int64)
+        for tile in tiles(len(self)):
+            some, count = np.unique(self.triangle[tile], return_counts=True)
+            found[some] += count
+        return found
 
     @cached_property
     def texel_area(self) -> Array:
@@ -126,7 +176,7 @@ class TexelGeometry:
     def on(self, scene: Scene) -> TexelGeometry:
         """Return the same texels over a scene whose triangles have moved."""
         rows = [np.flatnonzero(self.page_of_triangle == page) for page in range(len(self.texels))]
-        return TexelGeometry(scene, self.uv, self.page_of_triangle, self.texels, rows)
+        return TexelGeometry(scene, self.uv, self.page_of_triangle, self.texels, rows, self.scratch)
 
     def first(self, page: int) -> int:
         """Return the number of a page's first texel."""
@@ -143,7 +193,7 @@ class TexelGeometry:
         points[cut] = _at(corners, self.sample_weights(rows[cut], u[cut], width))
         return self._sunk(rows, points)
 
-    def _sunk(self, rows: Array, points: Array) -> Array:
+    def _sunk(self, rows: Array | slice, points: Array) -> Array:
         """Move points (r, k, 3) of texels that lie against another surface behind their own: it stops their rays.
 
         Started above, rays would pass what the texel lies on.
@@ -152,7 +202,7 @@ class TexelGeometry:
         pressed = np.flatnonzero(layers.pressed_triangles[self.triangle[rows]])
         if len(pressed) == 0:
             return points
-        triangle = np.repeat(self.triangle[rows[pressed]], points.shape[1])
+        triangle = np.repeat(self.triangle[rows][pressed], points.shape[1])
         chosen = points[pressed].reshape(-1, 3)
         sunk = layers.is_pressed(triangle, layers.weights(2 * triangle.astype(np.int64), chosen))
         depth = SINK * surface_offset(self.triangles)
@@ -211,18 +261,23 @@ class TexelGeometry:
         for page, (numbers, inside) in enumerate(zip(self.index, self._framed, strict=True)):
             mine = slice(self._first[page], self._first[page + 1])
             image = np.zeros((len(numbers) + 2, numbers.shape[1] + 2), dtype=bool)
-            image.ravel()[inside] = chosen[mine]
+            flat, own, result = image.ravel(), chosen[mine], grown[mine]
+            for tile in tiles(len(inside)):
+                flat[inside[tile]] = own[tile]
             image[1:-1] = image[1:-1] | image[:-2] | image[2:]
             image[:, 1:-1] = image[:, 1:-1] | image[:, :-2] | image[:, 2:]
-            grown[mine] = image.ravel().take(inside)
+            for tile in tiles(len(inside)):
+                result[tile] = flat.take(inside[tile])
         return grown
 
     @cached_property
     def _framed(self) -> list[Array]:
         """Per page, where its texels lie in a page that is one texel larger all around, row by row."""
-        return [
-            (page.row.astype(np.int64) + 1) * (page.resolution + 2) + page.column + 1 for page in self.texels
-        ]
+        framed = [self.scratch.empty(len(page), np.int32) for page in self.texels]
+        for page, places in zip(self.texels, framed, strict=True):
+            for tile in tiles(len(page)):
+                places[tile] = (page.row[tile] + 1) * (page.resolution + 2) + page.column[tile] + 1
+        return framed
 
     def positions_of(self, hits: Hits) -> Array:
         """Return (h, 3) where rays hit; meaningless without a hit."""

@@ -7,6 +7,7 @@ import numpy as np
 from ..solver.arrays import Array
 from ..solver.sampling import stratified_square
 from ..solver.scene import Scene
+from ..solver.scratch import marked, row_numbers, tiles, trim
 from ..solver.surface_images import CHANNELS, where_there
 from .rasterise import FOOTPRINT
 from .texel_geometry import TexelGeometry
@@ -31,10 +32,14 @@ def texel_materials(scene: Scene, geometry: TexelGeometry, width: float = WHOLE)
     reflectance, emission : (n, 3) float64
         Of the surface where it is there; emission in W/m².
     """
-    reflectance, emission = scene.reflectance[geometry.triangle], scene.emission[geometry.triangle]
+    reflectance, emission = (geometry.scratch.empty((len(geometry), 3)) for _ in range(2))
+    for tile in tiles(len(geometry)):
+        triangle = geometry.triangle[tile]
+        reflectance[tile], emission[tile] = scene.reflectance[triangle], scene.emission[triangle]
     if scene.images is None:
         return reflectance, emission
-    textured = np.flatnonzero(scene.images.textured[geometry.triangle])
+    images = scene.images
+    textured = row_numbers(marked(len(geometry), lambda tile: images.textured[geometry.triangle[tile]]))
     for first in range(0, len(textured), CHUNK):
         rows = textured[first : first + CHUNK]
         weights = geometry.sample_weights(rows, stratified_square(rows, SAMPLES, 0), width)
@@ -42,4 +47,5 @@ def texel_materials(scene: Scene, geometry: TexelGeometry, width: float = WHOLE)
         found = scene.images.at(triangle, weights[:, :, 1:].reshape(-1, 2))
         mean = found.reshape(len(rows), SAMPLES, CHANNELS).mean(axis=1, dtype=np.float64)
         reflectance[rows], emission[rows] = where_there(mean)
+        trim()
     return reflectance, emission

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from .emitters import EmitterGroup
 from .light_base import Lamp
 from .parallel import chunk_steps
 from .sampling import stratified_square
+from .scratch import Scratch, marked, row_numbers, trim
 from .steps import scaled
 
 SPREAD = 4
@@ -65,6 +67,8 @@ class Footprints:
         asked with few shadow rays. None asks all lamps alike.
     lift : callable or None
         Moves the starts of shadow rays off a smooth surface's flat triangles.
+    scratch : Scratch
+        Makes arrays of what is found at the points.
     """
 
     points: Array
@@ -75,16 +79,25 @@ class Footprints:
     starts: int | None = None
     expected: Array | None = None
     lift: Lift | None = None
+    scratch: Scratch = field(default_factory=Scratch)
 
     def __len__(self) -> int:
         return len(self.points)
 
-    def weight_of(self, irradiance: Array) -> Array:
-        """Return (n,) in [0, 1]: how much an irradiance (n,) [W/m²] counts beside what is expected."""
-        if self.expected is None:
-            return np.ones(len(self))
-        scale = np.maximum(self.expected, DARKEST * self.expected.mean()) if len(self) else self.expected
+    def weight_of(self, irradiance: Array, rows: slice = slice(None)) -> Array:
+        """Return (r,) in [0, 1]: how much an irradiance (r,) [W/m²] of rows counts beside what is expected."""
+        if self.expected is None or not len(irradiance):
+            return np.ones(len(irradiance))
+        scale = np.maximum(self.expected[rows], DARKEST * self.mean_expected)
         return np.asarray(np.minimum(irradiance / np.maximum(scale, 1e-300), 1.0))
+
+    @cached_property
+    def mean_expected(self) -> float:
+        """The mean of what is expected [W/m²]."""
+        assert self.expected is not None
+        mean = float(self.expected.mean())
+        trim()
+        return mean
 
 
 class SpreadPoints:
@@ -101,7 +114,7 @@ class SpreadPoints:
         self.at, self._seed, self._threads = at, seed, threads
         self.count = SPREAD if at.sampler else 1
         # From the centre: single precision is too coarse for the place of small things far from the origin.
-        self._apart = np.zeros((len(at), self.count, 3), dtype=np.float32)
+        self._apart = at.scratch.zeros((len(at), self.count, 3), np.float32)
         self._farthest = np.zeros(len(at), dtype=np.int8)
 
         def spread(part: slice) -> None:
@@ -132,7 +145,7 @@ class SpreadPoints:
         fraction : float
         """
         at = self.at
-        gain = np.empty(len(at))
+        gain = at.scratch.empty(len(at))
         varies, jump = np.zeros((2, len(at)), dtype=bool)
 
         def ask(part: slice) -> None:
@@ -151,7 +164,7 @@ class SpreadPoints:
 
         yield from scaled(chunk_steps(ask, len(at), CHUNK_POINTS, self._threads), 0.0, 0.5)
         # Right under a lamp two points may happen to see it alike: their neighbours do not.
-        bent = np.flatnonzero(varies if at.near is None or least else at.near(varies))
+        bent = row_numbers(varies if at.near is None or least else at.near(varies))
 
         def average(part: slice) -> None:
             gain[bent[part]] = self._varying(light, bent[part])
@@ -159,7 +172,8 @@ class SpreadPoints:
         yield from scaled(chunk_steps(average, len(bent), CHUNK_POINTS, self._threads), 0.5, 1.0)
         if at.near is not None and jump.any():
             # An edge that only cuts a footprint's corner is found from its neighbours.
-            rows = np.flatnonzero(at.near(jump) | (at.near(gain > 0) & at.near(gain <= 0)))
+            lit = marked(len(gain), lambda rows: gain[rows] > 0)
+            rows = row_numbers(at.near(jump) | (at.near(lit) & at.near(~lit)))
             gain[rows] = self._many(light, rows)
         return gain
 

@@ -89,9 +89,20 @@ class Gathering:
         self._caster, self._at, self._surface_normals, self._rays = caster, at, surface_normals, rays
         self._resolve, self._leaves_of = resolve, leaves_of
         self._seed, self.threads, self._sky = seed, threads, sky
-        self._sources = np.empty((len(at), rays), dtype=np.int32)
+        self._into: Array | None = None
         self._closeness = np.empty(len(at))
         self._aimed: dict[int, AimedRays] = {}
+
+    @property
+    def sources(self) -> Array:
+        """(n, rays) int32: see `Gathered`; made when it is first asked for, unless it was given."""
+        if self._into is None:
+            self._into = np.empty((len(self._at), self._rays), dtype=np.int32)
+        return self._into
+
+    @sources.setter
+    def sources(self, into: Array) -> None:
+        self._into = into
 
     def steps(self, bright: BrightElements | None, irradiance: Array) -> Generator[float, None, Gathered]:
         """Trace all; yields the fraction done.
@@ -103,6 +114,8 @@ class Gathering:
         irradiance : (n,) float64 [W/m²]
             What is about expected: noise is measured by it.
         """
+
+        assert len(self.sources) == len(self._at)
 
         def trace(part: slice) -> None:
             rows = np.arange(part.start, part.stop)
@@ -117,11 +130,11 @@ class Gathering:
 
     def gathered(self, aimed: AimedRays) -> Gathered:
         """Return what was found, with these aimed rays."""
-        return Gathered(self._sources, self._closeness, aimed)
+        return Gathered(self.sources, self._closeness, aimed)
 
     def take_up(self, before: Gathered) -> None:
         """Start from what was found before, of which some is to be traced again (`retracing.py`)."""
-        self._sources, self._closeness = before.sources.copy(), before.closeness.copy()
+        self.sources, self._closeness = before.sources.copy(), before.closeness.copy()
 
     def shares(self, rows: Array, bright: BrightElements, irradiance: Array) -> Array:
         """Return (r, m) how some rows would share their aimed rays out."""
@@ -197,7 +210,7 @@ class Gathering:
         same &= (np.abs(hits.barycentric - old.barycentric) < SAME_PLACE).all(axis=1)
         other = np.flatnonzero(~same)
         changed, hits, old = asked[other], hits.take(other), old.take(other)
-        self._sources[rows[changed], ray[changed]] = self._found(hits, along[other])
+        self.sources[rows[changed], ray[changed]] = self._found(hits, along[other])
         least = self._caster.surface_offset
         nearer = 1.0 / np.maximum(hits.distance, least) - 1.0 / np.maximum(old.distance, least)
         nearer = nearer.astype(np.float64) / self._rays
@@ -214,7 +227,7 @@ class Gathering:
         found[~upward] = NOTHING
         if bright is not None and shares is not None:
             found[bright.left_out(shares, hits, self._leaves_of).reshape(found.shape)] = NOTHING
-        self._sources[rows] = found
+        self.sources[rows] = found
         inverse = 1.0 / np.maximum(hits.distance.reshape(len(rows), rays), self._caster.surface_offset)
         self._closeness[rows] = inverse.mean(axis=1)
 

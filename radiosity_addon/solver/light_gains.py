@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .arrays import Array
+from .scratch import Scratch, row_numbers, tiles
 
 SPARSE = 0.5
 """A light that reaches less than this part of the points is kept as the rows it reaches: 8 bytes each; else
@@ -20,10 +21,15 @@ class LightGains:
     ----------
     count : int
         n.
+    scratch : Scratch or None
+        Makes the arrays; None keeps them in memory.
     """
 
-    def __init__(self, count: int) -> None:
+    _scratch: Scratch | None = None
+
+    def __init__(self, count: int, scratch: Scratch | None = None) -> None:
         self._count = count
+        self._scratch = scratch
         self._of: dict[int, tuple[Array | None, Array]] = {}
 
     def __len__(self) -> int:
@@ -36,11 +42,17 @@ class LightGains:
 
     def put(self, light: int, gain: Array) -> None:
         """Keep (n,) the gain of a light, which has this number, at all points."""
-        rows = np.flatnonzero(gain)
-        if len(rows) < SPARSE * self._count:
-            self._of[light] = rows.astype(np.int32), gain[rows].astype(np.float32)
+        scratch = self._scratch or Scratch()
+        if np.count_nonzero(gain) < SPARSE * self._count:
+            rows, kept = row_numbers(gain), scratch.rows(1, np.float32)
+            for tile in tiles(len(rows)):
+                kept.extend(gain[rows[tile]].astype(np.float32))
+            self._of[light] = rows, kept.all()[:, 0]
         else:
-            self._of[light] = None, gain.astype(np.float32)
+            single = scratch.empty(self._count, np.float32)
+            for tile in tiles(self._count):
+                single[tile] = gain[tile]
+            self._of[light] = None, single
 
     def of(self, light: int) -> Array:
         """Return (n,) float32: the gain of a light; 0 of one that was not put in."""
@@ -68,13 +80,11 @@ class LightGains:
 
     def irradiance(self, strengths: Array) -> Array:
         """Return (n, 3) float64 what arrives [W/m²] from lights of (k, 3) strengths, visibility included."""
-        total = np.zeros((self._count, 3))
+        total = (self._scratch or Scratch()).zeros((self._count, 3))
         for light, (rows, gain) in self._of.items():
             if not strengths[light].any():
                 continue
-            arriving = gain.astype(np.float64)[:, None] * strengths[light]
-            if rows is None:
-                total += arriving
-            else:
-                total[rows] += arriving
+            for tile in tiles(len(gain)):
+                arriving = gain[tile].astype(np.float64)[:, None] * strengths[light]
+                total[tile if rows is None else rows[tile]] += arriving
         return total

@@ -26,6 +26,7 @@ from .light_gains import LightGains
 from .light_sources import LightSources
 from .lights import Lamp
 from .retracing import Before, Retracing
+from .scratch import Scratch, tiles
 from .shadow_share import ShadowShare
 from .steps import drain, scaled
 from .textured_emitters import emitter_groups
@@ -122,7 +123,7 @@ class LocalPass:
         -------
         irradiance : (n, 3) float64 [W/m²]
         """
-        total = np.zeros((len(at), 3)) if total is None else total
+        total = at.scratch.zeros((len(at), 3)) if total is None else total
         lights = self.lights(dark=gains is not None)
         if gains is not None:
             at = replace(at, expected=None)
@@ -130,7 +131,8 @@ class LocalPass:
         for done, asked in enumerate(lights):
             steps = self._arriving(asked, spread, rays)
             arriving = yield from scaled(steps, done / len(lights), (done + 1) / len(lights))
-            total += arriving[:, None] * asked.light.strength
+            for rows in tiles(len(total)):
+                total[rows] += arriving[rows, None] * asked.light.strength
             if gains is not None:
                 gains.put(asked.number, arriving)
             if tell is not None:
@@ -166,16 +168,18 @@ class LocalPass:
         gain = yield from scaled(spread.gain_steps(light, NEAR if glows else 0.0), 0.0, 0.1)
         share = ShadowShare(caster, light, spread, asked.seed, self.threads).steps(gain, shadow_rays)
         unblocked = yield from scaled(share, 0.1, 1.0)
-        return np.asarray(gain * unblocked)
+        for rows in tiles(len(gain)):
+            gain[rows] *= unblocked[rows]
+        return gain
 
     def lit_by(self, gains: LightGains) -> Array:
         """Return (n, 3) what arrives [W/m²] by gains, of the strengths that the sources have."""
         assert self.sources is not None  # else there are no gains
         return gains.irradiance(self.sources.of_lamps(self.sources.strengths))
 
-    def new_gains(self, count: int) -> LightGains | None:
+    def new_gains(self, count: int, scratch: Scratch | None = None) -> LightGains | None:
         """Return where `count` points keep each light apart; None if lights cannot be asked for apart."""
-        return None if self.sources is None else LightGains(count)
+        return None if self.sources is None else LightGains(count, scratch)
 
     def gather(
         self,
@@ -206,6 +210,7 @@ class LocalPass:
         rays: int,
         resolve: Resolver,
         irradiance: Array | None = None,
+        into: Array | None = None,
     ) -> Generator[float, None, Gathered]:
         """Trace rays over hemispheres, and rays aimed at bright elements; yields the fraction done.
 
@@ -220,8 +225,12 @@ class LocalPass:
             Numbers the hits.
         irradiance : (n,) float64 or None [W/m²]
             What is about expected. None aims at nothing.
+        into : (n, rays) int32 or None
+            Takes the sources, if given.
         """
         gathering = self._gathering(at, surface_normals, rays, resolve)
+        if into is not None:
+            gathering.sources = into
         if irradiance is None:
             return (yield from gathering.steps(None, np.zeros(len(at))))
         return (yield from gathering.steps(self._bright, irradiance))

@@ -11,6 +11,8 @@ import os
 from collections.abc import Callable, Generator
 from concurrent.futures import ThreadPoolExecutor
 
+from .scratch import trim
+
 
 def thread_count(threads: int) -> int:
     """Return `threads`, or the number of usable cores if it is 0."""
@@ -44,14 +46,19 @@ def chunk_steps(
     """
     slices = [slice(start, min(start + chunk, rows)) for start in range(0, rows, chunk)]
     workers = min(thread_count(threads), len(slices))
+
+    def one(piece: slice) -> None:
+        work(piece)
+        trim()
+
     if workers <= 1:
         for number, piece in enumerate(slices):
-            work(piece)
+            one(piece)
             yield (number + 1) / len(slices)
         return
     pool = ThreadPoolExecutor(workers)
     try:
-        for number, _ in enumerate(pool.map(work, slices)):
+        for number, _ in enumerate(pool.map(one, slices)):
             yield (number + 1) / len(slices)
     finally:
         pool.shutdown(cancel_futures=True)

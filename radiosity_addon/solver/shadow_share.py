@@ -17,6 +17,7 @@ from .footprints import Footprints, SpreadPoints
 from .lights import Lamp
 from .parallel import chunk_steps
 from .sampling import stratified_square
+from .scratch import marked, row_numbers, tiles
 from .visibility import RayCaster
 
 CHUNK_RAYS = 1 << 16
@@ -62,7 +63,8 @@ class ShadowShare:
         self._caster, self._light, self._spread = caster, light, spread
         self._at: Footprints = spread.at
         self._seed, self._threads = seed, threads
-        self._lit, self._total = np.zeros(len(self._at)), np.zeros(len(self._at))
+        scratch = self._at.scratch
+        self._lit, self._total = scratch.zeros(len(self._at)), scratch.zeros(len(self._at))
 
     def steps(self, gain: Array, rays: int) -> Generator[float, None, Array]:
         """Ask where the lamp shines.
@@ -84,20 +86,23 @@ class ShadowShare:
         """
         if isinstance(self._light, Lamp) and not self._light.casts_shadow:
             return np.ones(len(gain))
-        facing, near = gain > 0, self._at.near
-        part = self._at.weight_of(gain * self._light.strength.mean())
-        few = _power_of_two(rays * np.sqrt(part / MAIN_PART), rays)
-        yield from self._shadow(np.flatnonzero(facing), few, 0.0, 0.5)
+        count, near, strength = len(gain), self._at.near, self._light.strength.mean()
+        facing = marked(count, lambda some: gain[some] > 0)
+        few, many = np.empty((2, count), dtype=np.int32)
+        for some in tiles(count):
+            part = self._at.weight_of(gain[some] * strength, some)
+            few[some] = _power_of_two(rays * np.sqrt(part / MAIN_PART), rays)
+            many[some] = _power_of_two(MORE_RAYS * rays * (part / MAIN_PART) ** 0.8, MORE_RAYS * rays)
+        yield from self._shadow(row_numbers(facing), few, 0.0, 0.5)
         # Few rays miss the faint ends of a penumbra: where many rays found one, ask around it.
-        many = _power_of_two(MORE_RAYS * rays * (part / MAIN_PART) ** 0.8, MORE_RAYS * rays)
         open_rows = facing & (many > few)
-        share = self._share()
-        partial = facing & (share > 1e-6) & (share < 1 - 1e-6)
+        partial = marked(count, lambda some: facing[some] & _is_partial(self._share(some)))
         if near is not None:
-            partial = near(partial) | (near(facing & (share > 0.5)) & near(facing & (share <= 0.5)))
+            bright = marked(count, lambda some: facing[some] & (self._share(some) > 0.5))
+            partial = near(partial) | (near(bright) & near(facing & ~bright))
         left = 0.5
         for _ in range(PENUMBRA_STEPS):
-            rows = np.flatnonzero(partial & open_rows)
+            rows = row_numbers(partial & open_rows)
             if len(rows) == 0:
                 break
             open_rows[rows] = False
@@ -108,9 +113,11 @@ class ShadowShare:
                 break
             share = self._share(rows)
             partial = np.zeros(len(facing), dtype=bool)
-            partial[rows[(share > 1e-6) & (share < 1 - 1e-6)]] = True
+            partial[rows[_is_partial(share)]] = True
             partial = near(partial)
-        return self._share()
+        for some in tiles(count):
+            self._lit[some] = self._share(some)
+        return self._lit
 
     def _share(self, rows: Array | slice = slice(None)) -> Array:
         total = self._total[rows]
@@ -169,6 +176,11 @@ class ShadowShare:
         some = min(count, STARTS)
         starts = at.sampler(rows, stratified_square(at.keys[rows], some, self._seed + 2))
         return np.asarray(starts[:, np.arange(count) * some // count])
+
+
+def _is_partial(share: Array) -> Array:
+    """Return which shares are neither none nor all."""
+    return np.asarray((share > 1e-6) & (share < 1 - 1e-6))
 
 
 def _power_of_two(wanted: Array, most: int) -> Array:
