@@ -114,7 +114,10 @@ def check(
         lines = [f"  {name:<12} {value}" for name, value in figures(found)]
         odd = [f"  {finding.level.lower():<8} {finding.message}" for finding in found.findings]
         console.lines(["a bake would be:", *lines, *(["what is odd:", *odd] if odd else ["nothing is odd"])])
-        return int(any(finding.level == ERROR for finding in found.findings))
+        wrong = [finding.message for finding in found.findings if finding.level == ERROR]
+        if wrong and console.quiet:
+            raise SceneError(wrong[0])
+        return int(bool(wrong))
 
 
 def restore(scene: Path | None, loaded: Path | None, output: Path, console: Console) -> None:
@@ -214,7 +217,10 @@ def check_writable(path: Path) -> None:
 
 def same_file(one: Path, other: Path) -> bool:
     """Whether both name one existing file."""
-    return one.exists() and other.exists() and one.samefile(other)
+    try:
+        return one.samefile(other)
+    except OSError:
+        return False
 
 
 @contextmanager
