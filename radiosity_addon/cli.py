@@ -260,6 +260,7 @@ def _add_bake(parser: argparse.ArgumentParser) -> None:
         help="light the bake in DIR anew, by other strengths of its lights, with the settings that it has",
     )
     _add_common(parser)
+    add("--no-preview", action="store_true", help="write no preview.png")
     add("--report", type=path_of, metavar="FILE", help="second copy of report.json")
     add("--plot", type=path_of, metavar="FILE.png", help="draw the history of residual, elements and links")
     _add_method(parser)
@@ -324,10 +325,12 @@ def _run(
                 from .blender.relight_command import relight
 
                 folder = request.output, settings, request.report
-                relight(request.scene, loaded, *folder, console, interrupts)
+                preview = not request.no_preview
+                relight(request.scene, loaded, *folder, console, interrupts, preview=preview)
             elif settings is not None:
                 given = request.output, settings, request.report, request.plot, request.keep
-                commands.bake(request.scene, loaded, *given, console, interrupts)
+                preview = not request.no_preview
+                commands.bake(request.scene, loaded, *given, console, interrupts, preview=preview)
             else:
                 commands.restore(request.scene, loaded, request.output, console)
     except KeyboardInterrupt:

@@ -31,6 +31,8 @@ def bake(
     keep: bool,
     console: Console,
     interrupts: Interrupts,
+    *,
+    preview: bool = True,
 ) -> None:
     """Bake a scene file, the file that is open, or the bundled Cornell box.
 
@@ -51,6 +53,8 @@ def bake(
         Whether a sidecar is written, by which the bake can be lit anew.
     console : Console
     interrupts : Interrupts
+    preview : bool
+        Whether a picture of the result is rendered.
     """
     with registered():
         from .job import WRITING_STAGES, run_bake
@@ -65,7 +69,8 @@ def bake(
         console.progress("open", 0.0)
         open_or_build(scene, loaded)
         keeping = Keeping(sidecar=True) if keep else None
-        job = run_bake(bpy.context, settings, OutputFolder(output), with_copy=True, keeping=keeping)
+        folder = OutputFolder(output)
+        job = run_bake(bpy.context, settings, folder, with_copy=True, keeping=keeping, with_preview=preview)
         try:
             while True:
                 try:
@@ -81,7 +86,7 @@ def bake(
             job.close()
         if report_copy is not None:
             report.write(report_copy)
-        files = written_files(report.as_dict())
+        files = written_files(report.as_dict(), preview)
         if plot is not None:
             from .plot import render_plot
 
@@ -160,8 +165,8 @@ def open_or_build(scene: Path | None, loaded: Path | None) -> None:
         build_cornell_box()
 
 
-def written_files(report: dict) -> list[tuple[str, str]]:
-    """What a bake has left in its folder, for people to read."""
+def written_files(report: dict, preview: bool = True) -> list[tuple[str, str]]:
+    """What a bake, with a preview or without, has left in its folder, for people to read."""
     from .output import BLEND_NAME, PREVIEW_NAME, REPORT_NAME
 
     images = list(dict.fromkeys(entry["image"] for entry in report["objects"]))
@@ -173,7 +178,7 @@ def written_files(report: dict) -> list[tuple[str, str]]:
             (image, "lightmap" if len(shown) == len(images) else f"{len(images)} lightmaps")
             for image in shown
         ),
-        (PREVIEW_NAME, "what it looks like"),
+        *([(PREVIEW_NAME, "what it looks like")] if preview else []),
         (REPORT_NAME, "objects, figures and warnings"),
     ]
 

@@ -53,6 +53,7 @@ def run_bake(
     patient: bool = False,
     keeping: Keeping | None = None,
     only_changed: bool = False,
+    with_preview: bool = True,
 ) -> BakeJob:
     """Bake the context's scene and show the lightmaps on its objects.
 
@@ -77,6 +78,9 @@ def run_bake(
     only_changed : bool
         Give new lightmaps to what has changed since the last bake, see `only_changed.py`, which cannot be
         kept then; if things have only moved since a bake that was kept, all lightmaps follow.
+
+    with_preview : bool
+        False leaves `preview.png` out.
 
     Yields
     ------
@@ -115,7 +119,8 @@ def run_bake(
         seconds.update(result.seconds)
         yield Progress("apply", solved)
         if with_copy and output is not None:
-            return (yield from deliver(context, settings, export, result, output, seconds, keeping))
+            samples = SAMPLES if with_preview else None
+            return (yield from deliver(context, settings, export, result, output, seconds, keeping, samples))
         with replacing_earlier(context, others.objects), timed(seconds, "apply"):
             images, groups = _show(context, settings, export, result, output, keeping, others.files)
             report = _report(result, images, groups, settings, seconds)
@@ -173,9 +178,9 @@ def deliver(
     output: OutputFolder,
     seconds: dict[str, float],
     keeping: Keeping | None,
-    samples: int = SAMPLES,
+    samples: int | None = SAMPLES,
 ) -> BakeJob:
-    """Show the lightmaps, save the scene beside them, render it, and publish all at once."""
+    """Show the lightmaps, save the scene beside them, render it unless `samples` is None, and publish it."""
     with replacing_earlier(context), timed(seconds, "apply"):
         images, groups = _show(context, settings, export, result, output, keeping)
     try:
@@ -186,9 +191,10 @@ def deliver(
         yield Progress("save", SAVE)
         with timed(seconds, "save"):
             save_copy(output.staging / BLEND_NAME, output.path)
-        yield Progress("preview", PREVIEW)
-        with timed(seconds, "preview"):
-            render_preview(context, output.staging / PREVIEW_NAME, settings, samples)
+        if samples is not None:
+            yield Progress("preview", PREVIEW)
+            with timed(seconds, "preview"):
+                render_preview(context, output.staging / PREVIEW_NAME, settings, samples)
         report = _report(result, images, groups, settings, seconds).listing(output.files())
         report.write(output.staging / REPORT_NAME)
         yield Progress("write", 1.0)

@@ -32,12 +32,14 @@ def relight(
     report_copy: Path | None,
     console: Console,
     interrupts: Interrupts,
+    *,
+    preview: bool = True,
 ) -> None:
     """Light the bake in a folder anew, as the lights of the scene that was baked are now.
 
     Parameters
     ----------
-    scene, loaded, report_copy, console, interrupts
+    scene, loaded, report_copy, console, interrupts, preview
         As for `commands.bake`.
     output : Path
         The folder with the bake and its sidecar.
@@ -65,7 +67,7 @@ def relight(
         if settings not in (BakeSettings(), stored.settings):
             raise UsageError(f"the bake in {output} has its own settings: give --relight no others")
         open_or_build(scene, loaded)
-        job = relight_into(bpy.context, stored, output)
+        job = relight_into(bpy.context, stored, output, preview)
         try:
             while True:
                 try:
@@ -81,11 +83,12 @@ def relight(
             job.close()
         if report_copy is not None:
             report.write(report_copy)
-        console.lines(summary(str(output), written_files(report.as_dict()), report.as_dict()))
+        files = written_files(report.as_dict(), preview)
+        console.lines(summary(str(output), files, report.as_dict()))
 
 
 def relight_into(
-    context: bpy.types.Context, stored: StoredBake, folder: Path
+    context: bpy.types.Context, stored: StoredBake, folder: Path, preview: bool = True
 ) -> Generator[Progress, None, BakeReport]:
     """Light a stored bake anew, and write its folder as a bake would; the scene shows the lightmaps then.
 
@@ -113,4 +116,5 @@ def relight_into(
         yield Progress("apply", APPLY)
         keeping = Keeping(mark=stored.mark)
         made = export, result, output, seconds, keeping
-        return (yield from deliver(context, stored.settings, *made, QUICK_SAMPLES))
+        samples = QUICK_SAMPLES if preview else None
+        return (yield from deliver(context, stored.settings, *made, samples))
