@@ -9,9 +9,11 @@ import argparse
 import sys
 import traceback
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
+from .arguments import folder_of, name_of, path_of, printable
 from .console import Console
 from .errors import RadiosityError, UsageError
 from .interrupts import Interrupts
@@ -149,13 +151,13 @@ def _add_bake(parser: argparse.ArgumentParser) -> None:
     add(
         "scene",
         nargs="?",
-        type=Path,
+        type=path_of,
         metavar="SCENE",
         help=".blend, .glb, .gltf or .obj; without it the file Blender has open, or the bundled Cornell box",
     )
     add(
         "--output",
-        type=Path,
+        type=folder_of,
         metavar="DIR",
         help=f"where everything goes (default for the bundled scene: {BUNDLED_OUTPUT})",
     )
@@ -221,11 +223,18 @@ def _add_bake(parser: argparse.ArgumentParser) -> None:
     add(
         "--objects",
         nargs="+",
+        type=name_of,
         metavar="NAME",
         help="what gets a lightmap; the rest still lights and blocks (default: every rendered mesh)",
     )
-    add("--light-only", nargs="+", metavar="NAME", help="what lights and blocks but gets no lightmap")
-    add("--ignore", nargs="+", metavar="NAME", help="what is left out as if it were not there")
+    add(
+        "--light-only",
+        nargs="+",
+        type=name_of,
+        metavar="NAME",
+        help="what lights and blocks but gets no lightmap",
+    )
+    add("--ignore", nargs="+", type=name_of, metavar="NAME", help="what is left out as if it were not there")
     add(
         "--sky", action="store_true", help="add a white sky of strength 1 where the scene has no light at all"
     )
@@ -235,6 +244,7 @@ def _add_bake(parser: argparse.ArgumentParser) -> None:
         "--light-group",
         dest="groups",
         action="append",
+        type=name_of,
         metavar="NAME=MEMBER,…",
         help="a lightmap also for these lamps, emissive materials or the world (may be repeated)",
     )
@@ -251,8 +261,9 @@ def _add_bake(parser: argparse.ArgumentParser) -> None:
         help="light the bake in DIR anew, by other strengths of its lights, with the settings that it has",
     )
     _add_common(parser)
-    add("--report", type=Path, metavar="FILE", help="second copy of report.json")
-    add("--plot", type=Path, metavar="FILE.png", help="draw the history of residual, elements and links")
+    add("--no-preview", action="store_true", help="write no preview.png")
+    add("--report", type=path_of, metavar="FILE", help="second copy of report.json")
+    add("--plot", type=path_of, metavar="FILE.png", help="draw the history of residual, elements and links")
     _add_method(parser)
 
 
@@ -283,12 +294,12 @@ def _add_restore(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "scene",
         nargs="?",
-        type=Path,
+        type=path_of,
         metavar="SCENE",
         help="a baked .blend; without it the file Blender has open",
     )
     parser.add_argument(
-        "--output", type=Path, required=True, metavar="FILE", help="the restored .blend to write"
+        "--output", type=path_of, required=True, metavar="FILE", help="the restored .blend to write"
     )
     _add_common(parser)
 
@@ -324,10 +335,12 @@ def _run(
                 from .blender.relight_command import relight
 
                 folder = request.output, settings, request.report, allowed
-                relight(request.scene, loaded, *folder, console, interrupts)
+                preview = not request.no_preview
+                relight(request.scene, loaded, *folder, console, interrupts, preview=preview)
             elif settings is not None:
                 given = request.output, settings, request.report, request.plot, request.keep, allowed
-                commands.bake(request.scene, loaded, *given, console, interrupts)
+                preview = not request.no_preview
+                commands.bake(request.scene, loaded, *given, console, interrupts, preview=preview)
             else:
                 commands.restore(request.scene, loaded, request.output, allowed, console)
     except KeyboardInterrupt:
@@ -346,6 +359,6 @@ def _run(
 
 
 def _fail(message: str, code: int) -> int:
-    line = " ".join(message.split())
-    print(f"error: {line}", file=sys.stderr, flush=True)  # noqa: T201
+    with suppress(OSError, ValueError):  # nobody may read it: the exit code still says it
+        print(f"error: {printable(message)}", file=sys.stderr, flush=True)  # noqa: T201
     return code

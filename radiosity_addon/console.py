@@ -6,9 +6,11 @@ import ctypes
 import os
 import sys
 from collections.abc import Iterable
+from contextlib import suppress
 from typing import Any, TextIO
 
 from .alike import one_of_each
+from .arguments import escaped
 from .remaining import RemainingTime, duration
 
 STEP = 10
@@ -55,7 +57,6 @@ class Console:
 
     def __exit__(self, *_: object) -> None:
         self._end_line()
-        self._stream.flush()
         if self._saved is not None:
             _flush_everything()
             os.dup2(self._saved, 1)
@@ -64,7 +65,8 @@ class Console:
             sys.stdout.close()
             sys.stdout = self._theirs
         if self._stream is not sys.stdout:
-            self._stream.close()
+            with suppress(OSError):
+                self._stream.close()
             self._stream = sys.stdout
 
     def progress(self, stage: str, fraction: float) -> None:
@@ -76,13 +78,11 @@ class Console:
         percent = int(100 * min(max(fraction, 0.0), 1.0))
         if self._stream.isatty():
             if (stage, percent) != (self._stage, self._percent):
-                self._stream.write(f"\r\x1b[K[{percent:3d} %] {stage}{left}")
-                self._stream.flush()
+                self._write(f"\r\x1b[K[{percent:3d} %] {stage}{left}")
                 self._open_line = True
                 self._stage, self._percent = stage, percent
         elif stage != self._stage or percent >= self._percent + STEP:
-            self._stream.write(f"[{percent:3d} %] {stage}{left}\n")
-            self._stream.flush()
+            self._write(f"[{percent:3d} %] {stage}{left}\n")
             self._stage, self._percent = stage, percent
 
     def lines(self, lines: Iterable[str]) -> None:
@@ -91,12 +91,18 @@ class Console:
             return
         self._end_line()
         for line in lines:
-            self._stream.write(line + "\n")
-        self._stream.flush()
+            self._write(escaped(line) + "\n")
+
+    def _write(self, text: str) -> None:
+        try:
+            self._stream.write(text)
+            self._stream.flush()
+        except (OSError, ValueError):
+            self.quiet = True  # nobody reads it, such as `| head`; the bake goes on
 
     def _end_line(self) -> None:
         if self._open_line:
-            self._stream.write("\r\x1b[K")
+            self._write("\r\x1b[K")
             self._open_line = False
 
 

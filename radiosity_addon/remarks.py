@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from .bake_scene import BakeObject, BakeScene, BakeWarning
+from .lightmap.greedy import greedy_object, share_of
 from .lightmap.texel_geometry import TexelGeometry
 from .quality import used_settings
 from .solver import Solution, SolverSettings
@@ -19,15 +20,21 @@ FEW_TEXELS = 8
 def small_objects(
     bake_scene: BakeScene, baked: list[BakeObject], geometry: TexelGeometry
 ) -> Iterator[BakeWarning]:
-    """Warn of objects that get hardly any texels."""
+    """Warn of objects that get hardly any texels, and of the one that takes nearly all, if there is one."""
     counts = np.bincount(geometry.triangle, minlength=len(bake_scene.scene))
-    for item in baked:
-        texels, surface = int(counts[item.rows].sum()), bake_scene.scene.areas[item.rows].sum()
-        if surface > 0 and texels < FEW_TEXELS**2:
+    texels = [int(counts[item.rows].sum()) for item in baked]
+    greedy = greedy_object([item.name for item in baked], texels)
+    mend = "raise the resolution or its texel scale"
+    if greedy is not None:
+        taken = share_of(max(texels), sum(texels))
+        mend = f"object '{greedy}' takes {taken} of all texels; lower its texel scale"
+    for item, own in zip(baked, texels, strict=True):
+        surface = bake_scene.scene.areas[item.rows].sum()
+        if surface > 0 and own < FEW_TEXELS**2:
             yield BakeWarning(
                 item.name,
-                f"object '{item.name}' gets only {texels} texels, fewer than {FEW_TEXELS} × {FEW_TEXELS}: "
-                "raise the resolution or its texel scale",
+                f"object '{item.name}' gets only {own} texels, fewer than {FEW_TEXELS} × {FEW_TEXELS}: "
+                f"{mend}",
             )
 
 

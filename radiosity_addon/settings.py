@@ -22,6 +22,12 @@ EFFICACY = 683.0
 """Lumens a watt of green light of 555 nm; taken for all light where nothing else is said [lm/W]."""
 
 MIN_ERROR, MAX_ERROR = 0.002, 0.2
+MAX_SEED = 2**31 - 1
+"""Blender's renders take no larger one."""
+
+MAX_THREADS = 1024
+"""As in Blender."""
+
 MAX_GROUPS = 24
 """Light groups of a bake: each is an image that its materials read, and graphics cards take 32, some 16."""
 
@@ -80,8 +86,9 @@ class BakeSettings:
     light_groups : bool
         Also bake the light groups that the scene itself has; `groups` win where both say something.
     seed : int
+        0 to 2³¹ − 1.
     threads : int
-        0 means all cores. The result does not depend on it.
+        0 to 1024; 0 means all cores. The result does not depend on it.
     method : str
         How the radiosity equation is solved: a name of `methods.METHODS`.
     elements, assembly, patches, contrast, form_factor_error, error, min_area, max_links, \
@@ -140,13 +147,13 @@ class BakeSettings:
             raise UsageError(f"error {self.relative_error} is not between {MIN_ERROR} and {MAX_ERROR}")
         if self.relative_error is not None and self.quantity == "residual":
             raise UsageError("a residual is an error picture: leave --error out, or bake another quantity")
-        if self.threads < 0:
-            raise UsageError(f"threads {self.threads} is negative; 0 means all cores")
+        if not 0 <= self.threads <= MAX_THREADS:
+            raise UsageError(f"threads {self.threads} is not between 0 and {MAX_THREADS}; 0 means all cores")
         for name in (*self.light_only, *self.ignore):
             if name in (self.objects or ()):
                 raise UsageError(f"object '{name}' cannot both get a lightmap and be light only or ignored")
-        if self.seed < 0:
-            raise UsageError(f"seed {self.seed} is negative")
+        if not 0 <= self.seed <= MAX_SEED:
+            raise UsageError(f"seed {self.seed} is not between 0 and {MAX_SEED}")
         for name, value, allowed in (
             ("atlas", self.atlas, ATLASES),
             ("quality", self.quality, QUALITIES),

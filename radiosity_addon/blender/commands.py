@@ -38,6 +38,8 @@ def bake(
     allowed: Permissions,
     console: Console,
     interrupts: Interrupts,
+    *,
+    preview: bool = True,
 ) -> None:
     """Bake a scene file, the file that is open, or the bundled Cornell box.
 
@@ -59,6 +61,8 @@ def bake(
     allowed : Permissions
     console : Console
     interrupts : Interrupts
+    preview : bool
+        Whether a picture of the result is rendered.
     """
     with registered():
         from .job import WRITING_STAGES, run_bake
@@ -72,7 +76,15 @@ def bake(
         notes = open_or_build(scene, loaded, allowed)
         folder = output_of(output, source, allowed, report_copy, plot)
         keeping = Keeping(sidecar=True) if keep else None
-        job = run_bake(bpy.context, settings, folder, with_copy=True, keeping=keeping, notes=notes)
+        job = run_bake(
+            bpy.context,
+            settings,
+            folder,
+            with_copy=True,
+            keeping=keeping,
+            notes=notes,
+            with_preview=preview,
+        )
         try:
             while True:
                 try:
@@ -88,7 +100,7 @@ def bake(
             job.close()
         if report_copy is not None:
             report.write_copy(report_copy)
-        files = written_files(report.as_dict())
+        files = written_files(report.as_dict(), preview)
         if plot is not None:
             from .plot import render_plot
 
@@ -158,7 +170,10 @@ def check(
         lines = [f"  {name:<12} {value}" for name, value in figures(found)]
         odd = [f"  {finding.level.lower():<8} {finding.message}" for finding in found.findings]
         console.lines(["a bake would be:", *lines, *(["what is odd:", *odd] if odd else ["nothing is odd"])])
-        return int(any(finding.level == ERROR for finding in found.findings))
+        wrong = [finding.message for finding in found.findings if finding.level == ERROR]
+        if wrong and console.quiet:
+            raise SceneError(wrong[0])
+        return int(bool(wrong))
 
 
 def restore(
@@ -205,8 +220,8 @@ def open_or_build(scene: Path | None, loaded: Path | None, allowed: Permissions)
     return ()
 
 
-def written_files(report: dict) -> list[tuple[str, str]]:
-    """What a bake has left in its folder, for people to read."""
+def written_files(report: dict, preview: bool = True) -> list[tuple[str, str]]:
+    """What a bake, with a preview or without, has left in its folder, for people to read."""
     from .output import BLEND_NAME, PREVIEW_NAME, REPORT_NAME
 
     images = list(dict.fromkeys(entry["image"] for entry in report["objects"]))
@@ -218,7 +233,7 @@ def written_files(report: dict) -> list[tuple[str, str]]:
             (image, "lightmap" if len(shown) == len(images) else f"{len(images)} lightmaps")
             for image in shown
         ),
-        (PREVIEW_NAME, "what it looks like"),
+        *([(PREVIEW_NAME, "what it looks like")] if preview else []),
         (REPORT_NAME, "objects, figures and warnings"),
     ]
 
@@ -235,7 +250,10 @@ def _group_files(report: dict) -> list[tuple[str, str]]:
 
 def same_file(one: Path, other: Path) -> bool:
     """Whether both name one existing file."""
-    return one.exists() and other.exists() and one.samefile(other)
+    try:
+        return one.samefile(other)
+    except OSError:
+        return False
 
 
 @contextmanager

@@ -10,6 +10,8 @@ import bpy
 
 from ..bake_scene import BakeWarning
 from ..errors import SceneError
+from ..gltf_check import gltf_fault
+from ..silenced import silenced
 
 
 def open_scene(path: str | Path, scripts: bool = False) -> tuple[BakeWarning, ...]:
@@ -39,11 +41,11 @@ def open_scene(path: str | Path, scripts: bool = False) -> tuple[BakeWarning, ..
     opener = _OPENERS.get(path.suffix.lower())
     if opener is None:
         raise SceneError(f"{path} is not a scene we can open; give a {', '.join(_OPENERS)} file")
-    if not path.exists():
-        raise SceneError(f"{path} does not exist; check the path")
-    if not path.is_file():
-        raise SceneError(f"{path} is not a file; give a {', '.join(_OPENERS)} file")
     try:
+        if not path.exists():
+            raise SceneError(f"{path} does not exist; check the path")
+        if not path.is_file():
+            raise SceneError(f"{path} is not a file; give a {', '.join(_OPENERS)} file")
         with path.open("rb") as stream:
             if not stream.read(1):
                 raise SceneError(f"{path} is empty; save the scene again")
@@ -82,6 +84,9 @@ def _blocked_scripts() -> tuple[BakeWarning, ...]:
 
 
 def _import_gltf(path: Path) -> None:
+    fault = gltf_fault(path)
+    if fault is not None:
+        raise SceneError(f"{path} cannot be read: {fault}; export the scene again")
     # Users may have switched the add-on off, and the bpy module may start without it.
     if addon_utils.check("io_scene_gltf2")[1] is False:
         addon_utils.enable("io_scene_gltf2", default_set=False)
@@ -98,19 +103,28 @@ def _import_obj(path: Path) -> None:
 
 
 def _import(path: Path, operation: Callable[[], set[str]]) -> None:
-    """Run an importer, its failure told in one line that names the file."""
-    try:
-        operation()
-    except Exception as error:  # noqa: BLE001 - importers let any exception of a broken file through
-        raise SceneError(f"{path} cannot be read: {_last_line(str(error))}; is the file complete?") from None
+    """Run an importer, its failure reported in one line that names the file and the cause."""
+    cause = None
+    with silenced():
+        try:
+            operation()
+        except Exception as error:  # noqa: BLE001 - importers let any exception of a broken file through
+            cause = _cause(str(error))
+    if cause is not None:
+        raise SceneError(f"{path} cannot be read: {cause}; is the file complete?")
     if len(bpy.data.objects) == 0:
         raise SceneError(f"{path} cannot be read: no object was found in it; is the file complete?")
 
 
-def _last_line(message: str) -> str:
-    """Keep the last line of an operator's message, without Blender's prefix."""
-    lines = [line.strip() for line in message.splitlines() if line.strip()]
-    return lines[-1].removeprefix("Error: ") if lines else "unknown error"
+def _cause(message: str) -> str:
+    """Return the line of an importer's message that says what happened, without Blender's prefixes.
+
+    Of a traceback, that is the line below its last frame, which starts at the margin.
+    """
+    lines = [line for line in message.splitlines() if line.strip() and not line.startswith("Location: ")]
+    if any(line.endswith("Traceback (most recent call last):") for line in lines):
+        lines = [line for line in lines if not line.startswith(" ") and "Traceback (most" not in line]
+    return lines[-1].strip().removeprefix("Error: ").rstrip(".") if lines else "unknown error"
 
 
 _OPENERS: dict[str, Callable[[Path], None]] = {

@@ -19,6 +19,7 @@ from .. import foresight
 from ..bake_scene import LIGHTMAP_UV_LAYER
 from ..errors import RadiosityError
 from ..foresight import Foresight, Lit
+from ..lightmap.greedy import greedy_object, share_of
 from ..settings import BakeSettings
 from .collect import Collected, Piece, collect
 from .export import chosen_pieces
@@ -45,9 +46,6 @@ ODD_SCALE = 100.0
 
 HUGE, MINUTE = 5000.0, 0.02
 """Sizes of a scene [m] that look like a mistaken unit."""
-
-GREEDY = 0.9
-"""An object that takes more of the texels leaves little for the others."""
 
 CLOSED = 1e-4
 """A surface is taken for closed if the vectors of its areas sum to less than this share of them."""
@@ -264,19 +262,21 @@ def _of_texels(lit: Sequence[Lit], plan: Foresight) -> Iterator[Finding]:
         for item, texels in zip(lit, plan.texels, strict=True)
         if item.area > 0 and texels < FEW_TEXELS
     ]
+    greedy = greedy_object([item.name for item in lit], plan.texels)
     if tiny:
-        message = (
-            f"{_names(tiny)} about to get fewer than 8 × 8 texels: raise the resolution or the texel scale"
+        mend = (
+            "raise the resolution or the texel scale"
+            if greedy is None
+            else f"'{greedy}' takes nearly all of them"
         )
-        yield Finding(WARNING, tiny[0], message)
-    total = sum(plan.texels)
-    for item, texels in zip(lit, plan.texels, strict=True):
-        if len(lit) > 1 and texels > GREEDY * total:
-            message = (
-                f"object '{item.name}' takes {texels / total:.0%} of all texels: lower its texel scale, or "
-                "more pages, if the others are to have more"
-            )
-            yield Finding(WARNING, item.name, message)
+        yield Finding(WARNING, tiny[0], f"{_names(tiny)} about to get fewer than 8 × 8 texels: {mend}")
+    if greedy is not None:
+        taken = share_of(max(plan.texels), sum(plan.texels))
+        message = (
+            f"object '{greedy}' takes {taken} of all texels: lower its texel scale, or set it to Light Only, "
+            "to leave more to the others"
+        )
+        yield Finding(WARNING, greedy, message)
 
 
 def _of_shapes(

@@ -54,6 +54,7 @@ def run_bake(
     keeping: Keeping | None = None,
     only_changed: bool = False,
     notes: tuple[BakeWarning, ...] = (),
+    with_preview: bool = True,
 ) -> BakeJob:
     """Bake the context's scene and show the lightmaps on its objects.
 
@@ -80,6 +81,8 @@ def run_bake(
         kept then; if things have only moved since a bake that was kept, all lightmaps follow.
     notes : tuple of BakeWarning
         What is known before the bake and belongs into its report.
+    with_preview : bool
+        False leaves `preview.png` out.
 
     Yields
     ------
@@ -127,7 +130,8 @@ def run_bake(
         seconds.update(result.seconds)
         yield Progress("apply", solved)
         if with_copy and output is not None:
-            return (yield from deliver(context, settings, export, result, output, seconds, keeping))
+            samples = SAMPLES if with_preview else None
+            return (yield from deliver(context, settings, export, result, output, seconds, keeping, samples))
         with replacing_earlier(context, others.objects), timed(seconds, "apply"):
             images, groups = _show(context, settings, export, result, output, keeping, others.files)
             report = _report(result, images, groups, settings, seconds)
@@ -184,9 +188,9 @@ def deliver(
     output: OutputFolder,
     seconds: dict[str, float],
     keeping: Keeping | None,
-    samples: int = SAMPLES,
+    samples: int | None = SAMPLES,
 ) -> BakeJob:
-    """Show the lightmaps, save the scene beside them, render it, and publish all at once."""
+    """Show the lightmaps, save the scene beside them, render it unless `samples` is None, and publish it."""
     with replacing_earlier(context), timed(seconds, "apply"):
         images, groups = _show(context, settings, export, result, output, keeping)
     try:
@@ -197,9 +201,10 @@ def deliver(
         yield Progress("save", SAVE)
         with timed(seconds, "save"):
             save_copy(output)
-        yield Progress("preview", PREVIEW)
-        with timed(seconds, "preview"):
-            render_preview(context, output.staging / PREVIEW_NAME, settings, samples)
+        if samples is not None:
+            yield Progress("preview", PREVIEW)
+            with timed(seconds, "preview"):
+                render_preview(context, output.staging / PREVIEW_NAME, settings, samples)
         report = output.write_report(_report(result, images, groups, settings, seconds))
         yield Progress("write", 1.0)
         output.publish()

@@ -44,6 +44,7 @@ class RADIOSITY_AP_preferences(bpy.types.AddonPreferences):
         "The result does not depend on it",
         default=0,
         min=0,
+        max=1024,
         soft_max=64,
     )
     check_first: bpy.props.BoolProperty(  # type: ignore[valid-type]

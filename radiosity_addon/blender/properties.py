@@ -13,6 +13,8 @@ from ..settings import (
     MAX_MIP_LEVELS,
     MAX_PAGES,
     MAX_RESOLUTION,
+    MAX_SEED,
+    MAX_THREADS,
     MIN_ERROR,
     QUALITIES,
     QUANTITIES,
@@ -195,12 +197,14 @@ class RadiositySettings(MethodProperties, bpy.types.PropertyGroup):
         description="Same scene, same seed: the same lightmap to the last bit",
         default=DEFAULTS.seed,
         min=0,
+        max=MAX_SEED,
     )
     threads: bpy.props.IntProperty(  # type: ignore[valid-type]
         name="Threads",
         description="Processor threads to use; 0 uses all. The result does not depend on it",
         default=DEFAULTS.threads,
         min=0,
+        max=MAX_THREADS,
         soft_max=64,
     )
     output_folder: bpy.props.StringProperty(  # type: ignore[valid-type]

@@ -40,12 +40,14 @@ def relight(
     allowed: Permissions,
     console: Console,
     interrupts: Interrupts,
+    *,
+    preview: bool = True,
 ) -> None:
     """Light the bake in a folder anew, as the lights of the scene that was baked are now.
 
     Parameters
     ----------
-    scene, loaded, report_copy, allowed, console, interrupts
+    scene, loaded, report_copy, allowed, console, interrupts, preview
         As for `commands.bake`.
     output : Path
         The folder with the bake and its sidecar.
@@ -72,7 +74,7 @@ def relight(
             raise UsageError(f"the bake in {output} has its own settings: give --relight no others")
         notes = open_or_build(scene, loaded, allowed)
         folder = output_of(output, source, allowed, report_copy)
-        job = relight_into(bpy.context, stored, folder, notes)
+        job = relight_into(bpy.context, stored, folder, notes, preview)
         try:
             while True:
                 try:
@@ -88,7 +90,8 @@ def relight(
             job.close()
         if report_copy is not None:
             report.write_copy(report_copy)
-        console.lines(summary(str(output), written_files(report.as_dict()), report.as_dict()))
+        files = written_files(report.as_dict(), preview)
+        console.lines(summary(str(output), files, report.as_dict()))
 
 
 def relight_into(
@@ -96,6 +99,7 @@ def relight_into(
     stored: StoredBake,
     folder: OutputFolder,
     notes: tuple[BakeWarning, ...] = (),
+    preview: bool = True,
 ) -> Generator[Progress, None, BakeReport]:
     """Light a stored bake anew, and write its folder as a bake would; the scene shows the lightmaps then.
 
@@ -127,4 +131,5 @@ def relight_into(
         yield Progress("apply", APPLY)
         keeping = Keeping(mark=stored.mark)
         made = export, result, output, seconds, keeping
-        return (yield from deliver(context, stored.settings, *made, QUICK_SAMPLES))
+        samples = QUICK_SAMPLES if preview else None
+        return (yield from deliver(context, stored.settings, *made, samples))

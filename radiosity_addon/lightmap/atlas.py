@@ -18,6 +18,7 @@ from ..bake_scene import BakeWarning
 from ..errors import BakeError
 from .charts import Charts, unwrap
 from .flatten import rescale_to_area, signed_double_area
+from .greedy import greedy_object, share_of
 from .growers import PatientGrower
 from .packing import Limits, Packing, pack
 from .pages import least_pages, shared_out
@@ -375,8 +376,13 @@ def _surface(group: list[_Layout]) -> float:
 
 def _crowded(group: list[_Layout], resolution: int) -> BakeWarning:
     count = sum(layout.charts.count for layout in group)
+    surfaces = [_surface([layout]) * layout.source.scale**2 for layout in group]
+    greedy = greedy_object([layout.source.name for layout in group], surfaces)
+    fix = "raise the resolution or the number of pages"
+    if greedy is not None:
+        taken = share_of(max(surfaces), sum(surfaces))
+        fix = f"object '{greedy}' takes {taken} of the surface; lower its texel scale"
     return BakeWarning(
-        group[0].source.name if len(group) == 1 else "atlas",
-        f"{resolution} px is too small to keep {count} charts apart, so light bleeds between them; "
-        "raise the resolution or the number of pages",
+        group[0].source.name if len(group) == 1 else greedy or "atlas",
+        f"{resolution} px is too small to keep {count} charts apart, so light bleeds between them; {fix}",
     )

@@ -39,6 +39,18 @@ def test_the_bundled_box_with_one_command(run: Run, tmp_path: Path, monkeypatch:
         assert part in done.out
 
 
+def test_without_a_preview(run: Run, room: Path, tmp_path: Path) -> None:
+    done = run("bake", room, "--output", tmp_path / "out", *QUICK, "--keep", "--no-preview")
+    assert (done.code, done.err) == (0, "")
+    files = {"baked.blend", "lightmap.exr", "lightmap.relight", "report.json"}
+    assert set(digest(tmp_path / "out")) == files
+    assert "preview.png" not in done.out
+    assert "preview" not in read_report(tmp_path / "out")["seconds"]
+    done = run("bake", room, "--output", tmp_path / "out", "--relight", "--no-preview")
+    assert (done.code, done.err) == (0, "")
+    assert set(digest(tmp_path / "out")) == files
+
+
 def test_the_report_keeps_its_contract(run: Run, room: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     assert run("bake", room, "--output", out, *QUICK, "--report", tmp_path / "copies" / "r.json").code == 0

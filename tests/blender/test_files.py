@@ -91,6 +91,45 @@ def test_what_cannot_be_opened_is_an_error_of_one_line(
     assert "\n" not in message
 
 
+def _triangle(damage: dict) -> bytes:
+    """A glTF file of a triangle whose buffer holds one number."""
+    tree = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}],
+        "buffers": [{"byteLength": 36, "uri": "data:application/octet-stream;base64,AAAA"}],
+    }
+    return json.dumps(tree | damage).encode()
+
+
+@pytest.mark.parametrize(
+    ("damage", "words"),
+    [
+        ({}, "buffer is smaller than requested"),
+        ({"buffers": [{"byteLength": 36, "uri": "gone.bin"}]}, "gone.bin"),
+        ({"nodes": [{"mesh": 7}]}, "node 0"),
+        ({"nodes": [{"mesh": 0, "children": [0]}]}, "parent"),
+        ({"nodes": [{"name": "Empty", "extensions": []}]}, "parse glTF"),
+    ],
+)
+def test_the_cause_is_told_and_nothing_is_printed(
+    damage: dict, words: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "damaged.gltf"
+    path.write_bytes(_triangle(damage))
+    with pytest.raises(SceneError) as caught:
+        open_scene(path)
+    message = str(caught.value)
+    assert words in message
+    assert "Location:" not in message
+    assert "\n" not in message
+    assert capfd.readouterr() == ("", "")
+
+
 def test_a_missing_file_and_a_folder_are_errors(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match=r"missing\.blend does not exist"):
         open_scene(tmp_path / "missing.blend")

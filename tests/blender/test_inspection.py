@@ -105,6 +105,13 @@ def test_tiny_objects_and_greedy_ones_are_told_of(tmp_path: Path) -> None:
     found = odd(look(tmp_path))
     assert "8 × 8 texels" in found["Pebble"]
     assert "of all texels" in found["Floor"]
+    add_mesh("Land", [(1e4 * x, 1e4 * y, z) for x, y, z in QUAD], location=(0, 0, -1))
+    found = odd(look(tmp_path))
+    assert "100 %" not in found["Land"]
+    assert "more than 99.9 % of all texels" in found["Land"]
+    tiny = next(message for message in found.values() if "8 × 8 texels" in message)
+    assert "'Land'" in tiny
+    assert "raise the resolution" not in tiny
 
 
 def test_uv_layers_are_told_of(tmp_path: Path) -> None:

@@ -212,6 +212,16 @@ def test_tiny_pages_work_and_say_that_they_are_crowded(resolution):
     assert any("raise the resolution" in warning.message for warning in atlas.warnings)
 
 
+def test_a_crowded_page_names_the_object_that_takes_it_all():
+    """At d331b48 the resolution was blamed, which would have to be a thousand times as large."""
+    small = [box((0.01, 0.01, 0.01)) for _ in range(40)]
+    (warning,) = run_atlas(inputs(box((1000, 1000, 0.001)), *small), 16).warnings
+    assert warning.name == "object 0"
+    assert "99.9 %" in warning.message
+    assert "texel scale" in warning.message
+    assert "resolution" not in warning.message
+
+
 def test_a_tiny_object_beside_a_huge_one_gets_a_texel():
     atlas = run_atlas(inputs(box((100, 100, 100)), box((1e-3, 1e-3, 1e-3)), box((30, 1e-4, 1e-4))), 128)
     texels = rasterise(page_uv(atlas), 128)

@@ -19,12 +19,17 @@ from radiosity_addon.settings import BakeSettings
 ROOT = Path(__file__).resolve().parents[2]
 
 
+options: list[dict] = []
+"""What `bake` got by keyword, call by call."""
+
+
 @pytest.fixture
 def verbs(monkeypatch: pytest.MonkeyPatch) -> list[tuple]:
     """Calls that reach the Blender layer, recorded instead of carried out."""
     calls: list[tuple] = []
+    options.clear()
     stand_in = ModuleType("radiosity_addon.blender.commands")
-    stand_in.bake = lambda *args: calls.append(("bake", *args))
+    stand_in.bake = lambda *args, **more: calls.append(("bake", *args)) or options.append(more)
     stand_in.restore = lambda *args: calls.append(("restore", *args))
     package = ModuleType("radiosity_addon.blender")
     package.commands = stand_in
@@ -36,7 +41,7 @@ def verbs(monkeypatch: pytest.MonkeyPatch) -> list[tuple]:
 def failing(verbs: list[tuple], error: BaseException) -> None:
     """Make `bake` end with this error."""
 
-    def bake(*_: object) -> None:
+    def bake(*_: object, **_more: object) -> None:
         raise error
 
     sys.modules["radiosity_addon.blender.commands"].bake = bake
@@ -109,6 +114,12 @@ def test_every_option_arrives(verbs: list[tuple]) -> None:
         contrast=0.25,
         memory_limit=0.5,
     )
+
+
+def test_a_bake_has_a_preview_unless_it_is_declined(verbs: list[tuple]) -> None:
+    assert cli.main(["bake"]) == 0
+    assert cli.main(["bake", "--no-preview"]) == 0
+    assert [each["preview"] for each in options] == [True, False]
 
 
 def test_a_bake_is_kept_if_it_can_be(verbs: list[tuple], capsys: pytest.CaptureFixture[str]) -> None:
@@ -247,7 +258,7 @@ def test_a_defect_of_ours_shows_its_traceback(verbs: list[tuple], capsys: pytest
 def test_an_interrupt_that_a_callback_swallows_still_ends_in_130(
     swallow: type[Exception], verbs: list[tuple]
 ) -> None:
-    def bake(*args: object) -> None:
+    def bake(*args: object, **_more: object) -> None:
         try:
             os.kill(os.getpid(), signal.SIGINT)
         except KeyboardInterrupt as stop:
@@ -265,7 +276,7 @@ def test_an_interrupt_that_a_callback_swallows_still_ends_in_130(
 def test_a_deferred_stage_is_finished_before_the_interrupt(verbs: list[tuple]) -> None:
     finished = []
 
-    def bake(*args: object) -> None:
+    def bake(*args: object, **_more: object) -> None:
         interrupts = args[-1]
         interrupts.deferred = True
         os.kill(os.getpid(), signal.SIGINT)

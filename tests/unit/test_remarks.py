@@ -1,0 +1,53 @@
+"""Warnings about texels name the object that is to blame."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from radiosity_addon.bake_scene import BakeObject, BakeScene
+from radiosity_addon.lightmap.greedy import greedy_object, share_of
+from radiosity_addon.remarks import small_objects
+from radiosity_addon.solver.scene import Scene
+
+
+class Texels:
+    """As much of a `TexelGeometry` as counts: the triangle of each texel."""
+
+    def __init__(self, *counts: int) -> None:
+        self.triangle = np.repeat(np.arange(len(counts)), counts)
+
+
+def warnings(*counts: int) -> dict[str, str]:
+    """What is said of objects of one triangle each that got so many texels."""
+    count = len(counts)
+    triangles = np.tile(np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), (count, 1, 1))
+    numbers = np.zeros(1, dtype=np.int32)
+    objects = [
+        BakeObject(f"Object {row}", row, 1, True, numbers, numbers.reshape(1, 1).repeat(3, 1))
+        for row in range(count)
+    ]
+    scene = BakeScene(Scene(triangles, np.zeros((count, 3)), np.zeros((count, 3))), tuple(objects))
+    return {each.name: each.message for each in small_objects(scene, objects, Texels(*counts))}
+
+
+def test_one_huge_object_is_named_instead_of_the_resolution() -> None:
+    said = warnings(100_000, 12, 70)
+    assert list(said) == ["Object 1"]
+    assert "12 texels" in said["Object 1"]
+    assert "'Object 0' takes 99.9 % of all texels" in said["Object 1"]
+    assert "raise the resolution" not in said["Object 1"]
+
+
+def test_without_one_the_resolution_is_to_be_raised() -> None:
+    assert "raise the resolution" in warnings(300, 200, 50)["Object 2"]
+    assert "raise the resolution" in warnings(50)["Object 0"]
+
+
+def test_a_share_is_100_percent_only_if_it_is_all() -> None:
+    assert share_of(3, 3) == "100.0 %"
+    assert share_of(999_999, 1_000_000) == "more than 99.9 %"
+    assert share_of(91, 100) == "91.0 %"
+    assert greedy_object(["A", "B"], [91, 9]) == "A"
+    assert greedy_object(["A", "B"], [90, 10]) is None
+    assert greedy_object(["A"], [90]) is None
+    assert greedy_object([], []) is None
