@@ -302,7 +302,7 @@ def is_same_file(one: Path, other: Path) -> bool:
     """Return whether two paths are of one file, also of one that is not there yet."""
     try:
         return one.samefile(other)
-    except OSError:
+    except (OSError, ValueError):
         return one.parent == other.parent and folded(one.name) == folded(other.name)
 
 
