@@ -52,7 +52,7 @@ class Staging(MarkedFolder):
     @property
     def aside(self) -> Path:
         """Where to save a .blend whose relative paths are to be those of the target folder."""
-        return self.target / f"{self.path.name}.blend"
+        return _asides(self.target, self.path)[0]
 
     def names(self) -> list[str]:
         """Return the names of the files to be published."""
@@ -111,11 +111,17 @@ class Staging(MarkedFolder):
 
     def close(self) -> None:
         """Remove the folder and whatever is left in it; it stays if earlier files could not be put back."""
-        _remove_file(self.aside)
+        for aside in _asides(self.target, self.path):
+            _remove_file(aside)
         if (self.path / JOURNAL).exists():
             self.release()
         else:
             super().close()
+
+
+def _asides(target: Path, staging: Path) -> list[Path]:
+    """Return where the copy of the scene is saved aside, and where Blender writes that first."""
+    return [target / f"{staging.name}{ending}" for ending in (".blend", ".blend@")]
 
 
 @contextmanager
@@ -162,8 +168,8 @@ def clean_up(target: Path) -> bool:
             except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
                 return False
             taken_back = taken_back or bool(steps)
-        for ending in (".blend", ".blend@"):
-            _remove_file(target / f"{path.name}{ending}")
+        for aside in _asides(target, path):
+            _remove_file(aside)
         return True
 
     clean_up_folders(target, PREFIX, done_with)

@@ -5,6 +5,7 @@ What stands in a place of one of a bake's files is only replaced if it proves to
 
 from __future__ import annotations
 
+import errno
 import os
 import stat
 from collections.abc import Collection, Generator, Iterable, Iterator, Mapping
@@ -33,6 +34,10 @@ FILES = (
     (REPORT_NAME, "objects, figures and warnings"),
 )
 """What a finished bake leaves in the folder, for people to read."""
+
+
+_DISK_FAILURES = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.EIO)
+"""What the system says of a disk that is full, or fails, often without naming the file."""
 
 
 class OutputFolder:
@@ -135,11 +140,15 @@ class OutputFolder:
         self._open.close()
         self._staging = None
         self._remove_made()
-        names = f"{error.filename}" if isinstance(error, OSError) else f"{error}"
-        if isinstance(error, RadiosityError | OSError) and staging in names:
-            place = names.replace(aside, str(self.path / BLEND_NAME)).replace(staging, str(self.path))
+        if isinstance(error, OSError):
+            named = str(error.filename or (staging if error.errno in _DISK_FAILURES else ""))
+        else:
+            named = str(error) if isinstance(error, RadiosityError) else ""
+        if staging in named:
+            place = named.replace(aside, str(self.path / BLEND_NAME)).replace(staging, str(self.path))
             if isinstance(error, OSError):
                 raise BakeError(f"cannot write '{place}': {error.strerror}") from error
+            assert error is not None
             raise type(error)(place) from error
 
     def expect(self, names: Iterable[str]) -> None:
@@ -229,7 +238,8 @@ class OutputFolder:
         if self._owner.owns(report, self.path):
             return report
         said = report[OWNER]
-        self._refuse(path, f"is of scene '{said['scene']}' of '{said['file']}'")
+        file = "a file that was never saved" if said["file"].startswith("<unsaved") else f"'{said['file']}'"
+        self._refuse(path, f"is of scene '{said['scene']}' of {file}")
         return None
 
     @property
@@ -302,7 +312,7 @@ def is_same_file(one: Path, other: Path) -> bool:
     """Return whether two paths are of one file, also of one that is not there yet."""
     try:
         return one.samefile(other)
-    except OSError:
+    except (OSError, ValueError):
         return one.parent == other.parent and folded(one.name) == folded(other.name)
 
 

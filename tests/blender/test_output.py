@@ -223,6 +223,11 @@ def test_no_message_names_the_staging_folder(tmp_path: Path) -> None:
     with pytest.raises(BakeError) as caught, OutputFolder(tmp_path) as output:
         raise OSError(28, "No space left on device", str(output.staging / "one.exr"))
     assert str(caught.value) == f"cannot write '{tmp_path}/one.exr': No space left on device"
+    # As `write` fails, which knows no name.
+    with pytest.raises(BakeError, match=str(tmp_path)), OutputFolder(tmp_path):
+        raise OSError(28, "No space left on device")
+    with pytest.raises(FileNotFoundError), OutputFolder(tmp_path):
+        raise FileNotFoundError(2, "No such file", "elsewhere")
 
 
 def test_folders_made_for_nothing_are_removed(tmp_path: Path) -> None:

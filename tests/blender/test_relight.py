@@ -109,7 +109,8 @@ def glowing() -> list[float]:
 
 def files(path: Path) -> dict[str, bytes]:
     """What is in a folder, the report without its times."""
-    return {file.name: file.read_bytes() for file in sorted(path.iterdir()) if file.name != REPORT}
+    found = [file for file in sorted(path.rglob("*")) if file.is_file() and file.name != REPORT]
+    return {str(file.relative_to(path)): file.read_bytes() for file in found}
 
 
 def test_other_light_gives_what_a_full_bake_gives_in_place(baked: Path) -> None:
@@ -331,3 +332,49 @@ def test_sliders_are_found_for_every_light(baked: Path) -> None:
     }
     assert values == {"Bulb": [40.0], "World": [1.0], "Glow": [3.0]}
     assert inputs_of(scene, "Nothing", emits=False) is None
+
+
+@pytest.mark.parametrize("where", ["outside", "no report", "not listed", "changed", "another scene"])
+def test_relight_writes_no_file_that_its_report_does_not_list(baked: Path, where: str) -> None:
+    """Wherever the image of a received file points."""
+    assert bake() == {"FINISHED"}  # now it is in memory, too
+    image = bpy.data.images[LIGHTMAP]
+    listed = baked / "lightmaps" / LIGHTMAP
+    victim = {
+        "outside": baked / "texture.exr",
+        "no report": baked / "pictures" / LIGHTMAP,
+        "not listed": baked / "lightmaps" / "texture.exr",
+    }.get(where, listed)
+    if victim != listed:
+        victim.parent.mkdir(exist_ok=True)
+        shutil.copy(listed, victim)
+        image.filepath_raw = str(victim)
+    elif where == "changed":
+        listed.write_bytes(listed.read_bytes() + b"\0")
+    else:
+        bpy.context.scene.name = "Other"
+    bpy.data.objects["Bulb"].data.energy *= 2.0
+    before, pixels = files(baked), lightmap()
+    with pytest.raises(RuntimeError, match=victim.name):
+        relight()
+    assert files(baked) == before
+    np.testing.assert_array_equal(lightmap(), pixels)
+
+
+def test_another_file_that_shows_the_same_lightmaps_does_not_rewrite_them(baked: Path) -> None:
+    """As *Save As* makes one: the first file still shows them."""
+    bpy.ops.wm.save_as_mainfile(filepath=str(baked / "second.blend"))
+    before = files(baked)
+    with pytest.raises(RuntimeError, match="bake again"):
+        relight()
+    assert files(baked) == before
+    assert bake() == {"FINISHED"}
+    bpy.data.objects["Bulb"].data.energy *= 2.0
+    assert relight() == {"FINISHED"}
+    after = files(baked)
+    assert {"second_Scene_lightmap.exr", "second_Scene_lightmap.relight"} <= {
+        Path(name).name for name in after
+    }
+    assert {name: after[name] for name in before if not name.endswith(".blend")} == {
+        name: held for name, held in before.items() if not name.endswith(".blend")
+    }
