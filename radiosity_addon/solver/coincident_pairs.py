@@ -92,7 +92,8 @@ def coincident_pairs(triangles: Array, rows: Array, tolerance: Array, reach: Arr
     found = [planes.overlapping(*pair) for pair in _near_pairs(planes.low, planes.high)]
     if not found:
         none = np.zeros(0, dtype=np.int64)
-        return CoincidentPairs(none, none, none > 0, *np.zeros((2, 0, CORNERS, 2)), np.zeros(0))
+        nowhere = np.zeros((0, CORNERS, 2))
+        return CoincidentPairs(none, none, none > 0, nowhere, nowhere, np.zeros(0))
     fields = (np.concatenate([getattr(part, name) for part in found]) for name in _FIELDS)
     return CoincidentPairs(*fields)
 

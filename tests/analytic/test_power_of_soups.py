@@ -29,7 +29,7 @@ def joined(*parts: tuple[np.ndarray, float, float]) -> Soup:
 def sheets(apart: float, count: int = 5, room: bool = False) -> Soup:
     """Glowing sheets over a floor, in one another."""
     sheet = rectangle((0.5, 0.5, 1.0), X, Y)
-    layers = [(sheet + (0, 0, apart * number), 0.5, 1.0) for number in range(count)]
+    layers = [(sheet + apart * number * Z, 0.5, 1.0) for number in range(count)]
     around = box_room((2, 2, 2))[0] if room else rectangle((0, 0, 0), 2 * X, 2 * Y)
     return joined((around, 0.5, 0.0), *layers)
 

@@ -16,8 +16,7 @@ from tests.unit.texel_scenes import bake_scene
 
 GROUND = rectangle((-4, -4, 0), (8, 0, 0), (0, 8, 0))
 BOX = solid_box((-0.5, -0.5, 0), (0.5, 0.5, 1))
-LOW, HIGH = BOX[:2], BOX[2:]
-"""The box's bottom, and the rest of it."""
+UP = np.array([0.0, 0.0, 1.0])
 
 SKY = EnvironmentLight((1.0, 1.0, 1.0))
 SUN = SunLight((0.2, 0.1, 1.0), (1.0, 1.0, 1.0))
@@ -56,7 +55,7 @@ def values(page: LightmapPage) -> np.ndarray:
 @pytest.mark.parametrize("rise", [0.0, 1e-6, -1e-6])
 @pytest.mark.parametrize(("degrees", "away"), [(0.0, 0.0), (30.0, 0.0), (30.0, 1e3)])
 def test_the_underside_is_dark(rise: float, degrees: float, away: float) -> None:
-    found = pages(BOX + (0, 0, rise), degrees=degrees, away=away)
+    found = pages(BOX + rise * UP, degrees=degrees, away=away)
     assert values(found["Bottom"]).max() == 0.0
     assert values(found["Box"]).mean() > 1.0
     assert values(found["Ground"]).mean() > 1.0
@@ -82,12 +81,12 @@ def test_the_ground_is_dark_below_the_box() -> None:
     """All texels of a ground as small as the box, which covers them."""
     ground = rectangle((-0.4, -0.4, 0), (0.8, 0, 0), (0, 0.8, 0))
     for rise in (0.0, 1e-6, -1e-6):
-        assert values(pages(BOX + (0, 0, rise), ground)["Ground"]).max() == 0.0
+        assert values(pages(BOX + rise * UP, ground)["Ground"]).max() == 0.0
 
 
 def test_a_millimeter_is_a_gap() -> None:
     """Seen from 1 mm above the ground, the sky is in a rim of that height only."""
-    lit = values(pages(BOX + (0, 0, 1e-3))["Bottom"])
+    lit = values(pages(BOX + 1e-3 * UP)["Bottom"])
     assert 0.0 < lit.mean() < 0.1
 
 
