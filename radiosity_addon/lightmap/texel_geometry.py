@@ -194,9 +194,9 @@ class TexelGeometry:
         return self._sunk(rows, points)
 
     def _sunk(self, rows: Array | slice, points: Array) -> Array:
-        """Move points (r, k, 3) of texels that lie against another surface behind their own: it stops their rays.
+        """Move points (r, k, 3) that lie against another surface behind their own, which stops their rays.
 
-        Started above, rays would pass what the texel lies on.
+        Rays that start above would pass the surface that the texel lies on.
         """
         layers = self._scene.layers
         pressed = np.flatnonzero(layers.pressed_triangles[self.triangle[rows]])

@@ -61,7 +61,10 @@ class CoincidentPairs:
 
     def take(self, rows: Array) -> CoincidentPairs:
         """Return some of the pairs."""
-        return CoincidentPairs(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+        return CoincidentPairs(*(getattr(self, name)[rows] for name in _FIELDS))
+
+
+_FIELDS = ("first", "second", "same", "in_first", "in_second", "height")
 
 
 def tolerances(triangles: Array) -> Array:
@@ -89,9 +92,10 @@ def coincident_pairs(triangles: Array, rows: Array, tolerance: Array, reach: Arr
     found = [planes.overlapping(*pair) for pair in _near_pairs(planes.low, planes.high)]
     if not found:
         none = np.zeros(0, dtype=np.int64)
-        return CoincidentPairs(none, none, none > 0, *np.zeros((2, 0, CORNERS, 2)), np.zeros(0))
-    joined = [np.concatenate([getattr(part, name) for part in found]) for name in found[0].__dataclass_fields__]
-    return CoincidentPairs(*joined)
+        nowhere = np.zeros((0, CORNERS, 2))
+        return CoincidentPairs(none, none, none > 0, nowhere, nowhere, np.zeros(0))
+    fields = (np.concatenate([getattr(part, name) for part in found]) for name in _FIELDS)
+    return CoincidentPairs(*fields)
 
 
 class _Planes:
@@ -142,9 +146,9 @@ class _Planes:
         around = np.linalg.norm(sides, axis=2).sum(axis=1)
         width = np.maximum(self._tolerance[first], self._tolerance[second])
         keep = np.flatnonzero(area > width * around)
-        rows = self._rows[first[keep]], self._rows[second[keep]]
+        first, second = self._rows[first[keep]], self._rows[second[keep]]
         return CoincidentPairs(
-            *rows, same[keep], in_first[keep], polygon[keep, :, 3:], polygon[keep, :, 2].mean(axis=1)
+            first, second, same[keep], in_first[keep], polygon[keep, :, 3:], polygon[keep, :, 2].mean(axis=1)
         )
 
 

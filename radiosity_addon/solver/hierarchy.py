@@ -76,7 +76,7 @@ class Faces:
     @property
     def side(self) -> Array:
         """(f,) int: 2 t for the front of triangle t, 2 t + 1 for its back."""
-        return 2 * self.triangle.astype(np.int64) + ~self.front
+        return np.asarray(2 * self.triangle.astype(np.int64) + ~self.front)
 
 
 class Hierarchy:
@@ -210,7 +210,11 @@ class Hierarchy:
             textured = self._images.textured[triangle]
         means = np.empty((len(elements), 7))
         reflectance, emission, opacity = self._plain
-        means[:, :3], means[:, 3:6], means[:, 6] = reflectance[triangle], emission[triangle], opacity[triangle]
+        means[:, :3], means[:, 3:6], means[:, 6] = (
+            reflectance[triangle],
+            emission[triangle],
+            opacity[triangle],
+        )
         if self._images is not None:
             means[textured] = self._images.area_means(triangle[textured], weights[textured])
         if self.faces.own is not None:

@@ -49,7 +49,7 @@ INSIDE = -1e-9
 
 @dataclass(frozen=True)
 class Covers:
-    """c parts of sides that are covered, sorted by side; side 2 t is the front of triangle t, 2 t + 1 its back.
+    """c covered parts, sorted by side; side 2 t is the front of triangle t, 2 t + 1 its back.
 
     Attributes
     ----------
@@ -102,7 +102,9 @@ class Layers:
     @cached_property
     def own(self) -> OwnParts:
         """What is left of the covered sides."""
-        return own_parts(self.covers.side, self.covers.part, self.covers.by, self.covers.in_cover, self._scene)
+        return own_parts(
+            self.covers.side, self.covers.part, self.covers.by, self.covers.in_cover, self._scene
+        )
 
     def owners(self, hits: Hits) -> Hits:
         """Return hits with those on covered sides moved to what covers them."""
@@ -153,9 +155,7 @@ class Layers:
 
     def _points(self, side: Array, place: Array) -> Array:
         corners = self._scene.triangles[side // 2]
-        return np.asarray(
-            corners[:, 0] + np.einsum("nw,nwk->nk", place, corners[:, 1:] - corners[:, :1])
-        )
+        return np.asarray(corners[:, 0] + np.einsum("nw,nwk->nk", place, corners[:, 1:] - corners[:, :1]))
 
     def weights(self, side: Array, points: Array) -> Array:
         """Return (n, 2) the weights of points in sides' triangles, drawn into them."""

@@ -1,8 +1,8 @@
 """Surfaces that lie in one another: no element sends or sees more than there is.
 
-Where two surfaces lie in one plane and face the same way, no ray tells which of them is in
-front. Both are seen, ΣFV comes to 2, and light would grow without end. So an element sends only
-the share 1 / ΣFV of its radiosity: matrix methods, shooting and two-level alike, hence they still
+Of coplanar surfaces in one place one counts (`layers.py`). Where others are too close for rays to
+tell which is in front, both are seen, ΣFV comes to 2, and light would grow without end. So an element
+sends only the share 1 / ΣFV of its radiosity: matrix methods, shooting and two-level alike, hence they still
 agree. Assemblies that are not reciprocal scale what an element receives.
 """
 

@@ -82,7 +82,7 @@ class OwnParts:
         return rows, corners, level
 
     def share_of_elements(self, side: Array, corners: Array) -> Array:
-        """Return (n,) what is left of triangles (n, 3, 2) within sides (n,), in weights, counter-clockwise."""
+        """Return (n,) what is left of counter-clockwise triangles (n, 3, 2) within sides (n,)."""
         result = np.ones(len(side))
         covered = np.flatnonzero(np.isin(side, self.sides))
         begin, count = self._runs(side[covered])
@@ -138,7 +138,9 @@ def own_parts(side: Array, part: Array, by: Array, in_cover: Array, scene: Scene
         left = np.ones(len(own), dtype=bool)
         left[asked] = False
         pieces = [(own[left], corners[left], level[left])]
-        pieces += [(own[asked[row]], each, level[asked[row]]) for row, each in _outside(corners[asked], part[chosen])]
+        pieces += [
+            (own[asked[row]], each, level[asked[row]]) for row, each in _outside(corners[asked], part[chosen])
+        ]
         seen_through = np.flatnonzero(cut[by[chosen] // 2])
         if len(seen_through):
             row, each = _fans(inner[seen_through])
@@ -183,7 +185,14 @@ def _fans(polygons: Array) -> tuple[Array, Array]:
 
 
 def _shining_through(
-    own: Array, corners: Array, level: Array, cover: Array, part: Array, in_cover: Array, by: Array, scene: Scene
+    own: Array,
+    corners: Array,
+    level: Array,
+    cover: Array,
+    part: Array,
+    in_cover: Array,
+    by: Array,
+    scene: Scene,
 ) -> tuple[Array, Array, Array]:
     """Return parts that lie under cut-out covers, split where the opacity varies, and what shows of them."""
     assert scene.images is not None
@@ -206,7 +215,7 @@ def _shining_through(
 
 
 def _moved(points: Array, part: Array, in_cover: Array) -> Array:
-    """Return (n, p, 2) points given in the plane of polygons (n, k, 2) in that of the same polygons elsewhere."""
+    """Return points (n, p, 2), given along with polygons (n, k, 2), where the same polygons are elsewhere."""
     row = np.arange(len(part))
     # The map is affine: three corners that span the most say all.
     apart = part - part[:, :1]
@@ -221,7 +230,9 @@ def _moved(points: Array, part: Array, in_cover: Array) -> Array:
     other = (along[:, None, 0] * off[..., 1] - along[:, None, 1] * off[..., 0]) / whole
     there = in_cover - in_cover[:, :1]
     return np.asarray(
-        in_cover[:, :1] + one[..., None] * there[row, far][:, None] + other[..., None] * there[row, wide][:, None]
+        in_cover[:, :1]
+        + one[..., None] * there[row, far][:, None]
+        + other[..., None] * there[row, wide][:, None]
     )
 
 

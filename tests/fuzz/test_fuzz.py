@@ -27,6 +27,9 @@ TRIED = SCENES if bpy.app.version[:2] == (5, 0) else SCENES // 5
 BAKED_SEED = 17
 """Its scene can be baked."""
 
+LAYERED = (20017,)
+"""Seeds whose faces lie in one another and once made light."""
+
 BLOCK = 100
 """Seeds of one test."""
 
@@ -60,6 +63,14 @@ def test_random_scenes(start: int) -> None:
     baked = sum(int(re.findall(r"(\d+) baked", words)[-1]) for words in told)
     # The generator is of no use if many of its scenes are refused.
     assert baked > 0.7 * BLOCK
+
+
+@pytest.mark.parametrize("seed", LAYERED)
+def test_layers_make_no_light(seed: int) -> None:
+    """In one process each: Blender's own end may hang while our classes are registered."""
+    command = [sys.executable, "-m", "tests.fuzz", "--seeds", f"{seed}:{seed + 1}"]
+    done = subprocess.run(command, cwd=ROOT, text=True, capture_output=True, timeout=TIMEOUT, check=False)
+    assert done.returncode == 0, (done.stdout + done.stderr)[-3000:]
 
 
 def test_a_wrong_bake_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
