@@ -20,7 +20,7 @@ def small_objects(
     bake_scene: BakeScene, baked: list[BakeObject], geometry: TexelGeometry
 ) -> Iterator[BakeWarning]:
     """Warn of objects that get hardly any texels."""
-    counts = np.bincount(geometry.triangle, minlength=len(bake_scene.scene))
+    counts = geometry.counts
     for item in baked:
         texels, surface = int(counts[item.rows].sum()), bake_scene.scene.areas[item.rows].sum()
         if surface > 0 and texels < FEW_TEXELS**2:
