@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -63,11 +64,11 @@ def details(solution: Solution, links: LinkRecord, geometry: TexelGeometry, ligh
     state = texel_state(light)
     pages = []
     for index in geometry.index:
-        of = np.full(index.shape, NO_TEXEL_HERE, dtype=np.uint8)
-        errors = np.zeros((2, *index.shape), dtype=np.float16)
+        of, errors = scratch.empty(index.shape, np.uint8), scratch.empty((2, *index.shape), np.float16)
         for rows in tiles(len(index), max(TILE // len(index), 1)):
             here = index[rows] >= 0
             number = index[rows][here]
+            of[rows], errors[:, rows] = NO_TEXEL_HERE, 0.0
             of[rows][here] = state[number]
             errors[0, rows][here] = noise[number] / unit
             errors[1, rows][here] = misfit[number] / unit
@@ -119,7 +120,7 @@ def statistics(
                 texels[place[number] : place[number] + some] = rows.start + order[start : start + some]
                 place[number] += some
     found: list[dict[str, Any]] = []
-    for start, stop in zip(ends[:-1], ends[1:], strict=True):
+    for start, stop in pairwise(ends):
         told = light_told(texels[start:stop], parts, geometry, state)
         watts, lumens, areas = told
         of_watts, of_lumens = light_statistics(watts, areas), light_statistics(lumens, areas)

@@ -9,11 +9,12 @@ from __future__ import annotations
 import time
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
 
+from . import foresight
 from .bake_details import More, more_of
 from .bake_scene import (
     BakedObject,
@@ -50,7 +51,7 @@ from .solver.arrays import Array
 from .solver.element_transport import Relightable
 from .solver.scratch import Scratch, tiles
 from .solver.visibility import RayCaster
-from .texel_memory import share_out_memory, texel_scratch
+from .texel_memory import pages_of, refuse_too_large, share_out_memory, texel_scratch
 from .texel_pictures import TexelPictures
 
 T = TypeVar("T")
@@ -70,6 +71,9 @@ class Lit:
 UNWRAP, RASTERISE, SOLVE, LIGHT, ENCODE = 0.0, 0.02, 0.04, 0.29, 0.98
 """How far the whole is when each stage begins: shares of the time of the box and the office at medium quality
 (bench/results), of which the time left is reckoned."""
+
+UNSURE = 0.8
+"""Pages that follow from a density are refused before they are laid out if so much of their width would."""
 
 MOST_SHOWN = 1 << 22
 """More texels than these are not shown while they are lit: their pictures would take too much memory."""
@@ -140,18 +144,21 @@ def _bake(
     if not baked:
         raise SceneError("nothing to bake: give the scene a render-visible mesh with faces")
 
+    _refuse_too_large(bake_scene, baked, settings)
     yield Progress("unwrap", UNWRAP)
     with timed(seconds, "unwrap"):
         atlas = yield from _unwrap(bake_scene, baked, settings)
     yield Progress("rasterise", RASTERISE)
-    scratch = texel_scratch([page.resolution for page in atlas.pages], settings)
+    sizes = [page.resolution for page in atlas.pages]
+    refuse_too_large(sizes, settings)
+    scratch = texel_scratch(sizes, settings)
     with timed(seconds, "rasterise"):
         geometry = _texels(bake_scene, baked, atlas, scratch)
     yield Progress("solve", SOLVE)
     with timed(seconds, "solve"):
         solution = yield from solve(bake_scene, quality.solver)
     yield Progress("light", LIGHT)
-    share_out_memory(geometry, settings)
+    share_out_memory(geometry, settings, keep)
     with timed(seconds, "light"):
         so_far = LightSoFar() if len(geometry) <= MOST_SHOWN else None
         steps = _texel_values(bake_scene, solution, geometry, quality.gather, settings, keep, so_far)
@@ -213,6 +220,21 @@ def baked_objects(bake_scene: BakeScene) -> list[BakeObject]:
     return [item for item in bake_scene.objects if item.bake and item.count]
 
 
+def _refuse_too_large(bake_scene: BakeScene, baked: list[BakeObject], settings: BakeSettings) -> None:
+    """Refuse, before anything is unwrapped, pages that will not fit into the memory limit."""
+    sizes = pages_of(settings)
+    if sizes is None:
+        areas = bake_scene.scene.areas
+        lit = [
+            foresight.Lit(item.name, item.count, float(areas[item.rows].sum()), item.texel_scale)
+            for item in baked
+        ]
+        plan = foresight.foresee(lit, len(bake_scene.scene), settings)
+        # By area it is known roughly; what unwrapping finds decides.
+        sizes = tuple(int(UNSURE * size) for size in plan.pages) if settings.texel_density else plan.pages
+    refuse_too_large(sizes, settings)
+
+
 def _unwrap(
     bake_scene: BakeScene, baked: list[BakeObject], settings: BakeSettings
 ) -> Generator[Progress, None, Atlas]:
@@ -241,9 +263,7 @@ def _padding(settings: BakeSettings) -> int:
     return padding_for(settings.mip_levels) if settings.padding is None else settings.padding
 
 
-def _texels(
-    bake_scene: BakeScene, baked: list[BakeObject], atlas: Atlas, scratch: Scratch
-) -> TexelGeometry:
+def _texels(bake_scene: BakeScene, baked: list[BakeObject], atlas: Atlas, scratch: Scratch) -> TexelGeometry:
     """Find the texels that the objects cover, and where they lie in the world."""
     count = len(bake_scene.scene)
     uv = np.zeros((count, 3, 2), dtype=np.float32)
@@ -332,6 +352,9 @@ def _texel_values(
     else:
         within = settings.relative_error, so_far
         light = yield from light_within(*where, lambda e: for_error(e).gather, *within)
+    if not keep:
+        # Hits were looked up in it: it is large, and stays in memory.
+        light = replace(light, table=None)
     materials = texel_materials(bake_scene.scene, geometry, FOOTPRINT)
     values = shown(light, *materials, settings, geometry.scratch)
     return Lit(values, local.caster, light, relightable, materials)

@@ -178,7 +178,8 @@ def relight(kept: KeptBake, strengths: Array) -> Generator[Progress, None, tuple
         If the sources cannot have them.
     """
     wanted = kept.sources.checked(strengths)
-    steps = relight_steps(kept.lit, kept.solved, wanted)
+    scratch = kept.geometry.scratch
+    steps = relight_steps(kept.lit, kept.solved, wanted, scratch)
     while True:
         try:
             yield Progress("relight", 0.95 * next(steps))
@@ -186,7 +187,7 @@ def relight(kept: KeptBake, strengths: Array) -> Generator[Progress, None, tuple
             light: TexelLight = done.value
             break
     emission = kept.sources.emission(kept.emission, kept.geometry.triangle, wanted)
-    values = shown(light, kept.reflectance, emission, kept.settings, Scratch())
+    values = shown(light, kept.reflectance, emission, kept.settings, scratch)
     pages = texel_pages(kept.geometry, values, kept.seams, kept.rings)
     yield Progress("relight", 1.0)
     return pages
@@ -199,7 +200,7 @@ def shown(
     values = scratch.empty(light.direct.shape, np.float32)
     parts = {"all": (light.direct, light.indirect), "direct": (light.direct,), "indirect": (light.indirect,)}
     for rows in tiles(len(values)):
-        irradiance = sum(part[rows] for part in parts[settings.light])
+        irradiance = np.add.reduce([part[rows] for part in parts[settings.light]])
         emitted = np.zeros((len(irradiance), 3)) if settings.light == "indirect" else emission[rows]
         values[rows] = to_quantity(irradiance, reflectance[rows], emitted, settings.quantity)
     return values

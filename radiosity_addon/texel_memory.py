@@ -1,8 +1,8 @@
 """What texels may take of the memory limit, and the least that they need.
 
-What is looked up at random stays in memory: the page's texel numbers, the light that hits are looked up in,
-the images themselves. Everything else is worked on in tiles and lives in files where memory is short
-(`solver/scratch.py`).
+What is looked up at random stays in memory: the numbers of the pages' texels, the light that hits are
+looked up in, the images that Blender holds. Everything else is worked on in tiles and lives in files where
+memory is short (`solver/scratch.py`). So only very large pages are refused (docs/decisions/0046).
 """
 
 from __future__ import annotations
@@ -10,26 +10,30 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from .errors import UsageError
 from .lightmap.texel_geometry import TexelGeometry
 from .settings import BakeSettings
 from .solver.parallel import thread_count
 from .solver.scratch import Scratch
 from .solver.settings import SolverSettings
 
-PAGE_BYTES = 20.0
-"""Of every pixel of a page, while it is rasterised and while pages are put together, …"""
+LIT_BYTES = 32.0
+"""Of every texel while it is lit: its number, its light, what geometry does to it, which rays it needs."""
 
-TEXEL_BYTES = 28.0
-"""… and of every texel that a triangle covers, while it is lit, with its number (docs/decisions/0046)."""
-
-IMAGE_BYTES = 34.0
-"""Of every pixel when the pages have become images: the page, what overlays show, the image itself, …"""
-
-COPY_BYTES = 16.0
-"""… and the copy through which Blender takes an image, one at a time."""
+IMAGE_BYTES, COPY_BYTES = 16.0, 16.0
+"""Of every pixel of an image in Blender, and of the copy that it is made from, one image at a time."""
 
 WORKING_BYTES, THREAD_BYTES = 120e6, 60e6
-"""Temporaries of a tile, and of each thread."""
+"""Temporaries of a tile, and of each thread, of pages of at least …"""
+
+WORKING_PIXELS = 1 << 20
+"""… so many pixels; of smaller ones in proportion."""
+
+BEFORE_SOLVING = 0.25
+"""Share of the free memory that the places of texels may take before the scene is solved."""
+
+PROCESS_BYTES = 600e6
+"""What Blender and a scene take where the system does not tell."""
 
 
 def memory_limit(settings: BakeSettings) -> float:
@@ -38,11 +42,53 @@ def memory_limit(settings: BakeSettings) -> float:
     return (SolverSettings().memory_limit if given is None else given) * 2**30
 
 
-def least_bytes(pages: Sequence[int]) -> float:
-    """Return what the texels of pages of some sizes take at least, whatever lives in files [bytes]."""
-    pixels = sum(size**2 for size in pages)
-    lit = max(PAGE_BYTES, TEXEL_BYTES) * pixels
-    return max(lit, IMAGE_BYTES * pixels + COPY_BYTES * max(pages, default=0) ** 2)
+def room(settings: BakeSettings) -> float:
+    """Return what Blender and the scene leave of the memory limit, half of it at least [bytes]."""
+    limit = memory_limit(settings)
+    return max(limit - process_bytes(), 0.5 * limit)
+
+
+def least_bytes(pages: Sequence[int], settings: BakeSettings) -> float:
+    """Return what pages of some sizes take at least, whatever lives in files [bytes]."""
+    pixels = float(sum(size**2 for size in pages))
+    # Besides the image there are its copy for Cycles, and those of light groups.
+    images = IMAGE_BYTES * (2 + len(settings.groups)) * pixels
+    most = max(LIT_BYTES * pixels, images + COPY_BYTES * max(pages, default=0) ** 2)
+    return most + working_bytes(settings) * min(pixels / WORKING_PIXELS, 1.0)
+
+
+def refuse_too_large(pages: Sequence[int], settings: BakeSettings) -> None:
+    """Refuse pages that do not fit into the memory limit, even in tiles.
+
+    Parameters
+    ----------
+    pages : sequence of int
+        The width and height of each in texels.
+
+    Raises
+    ------
+    UsageError
+        Names the pages, what they need, and what helps.
+    """
+    needed, left = least_bytes(pages, settings), room(settings)
+    if needed <= left:
+        return
+    largest = max(pages)
+    what = f"a page of {largest}²" if len(pages) == 1 else f"{len(pages)} pages of up to {largest}²"
+    smaller = "texel density" if settings.texel_density is not None else "resolution"
+    limit = memory_limit(settings) / 2**30
+    raised = (needed + memory_limit(settings) - left) / 2**30
+    raise UsageError(
+        f"{what} pixels needs at least {needed / 2**30:.1f} GiB of memory, but the memory limit of {limit:g} "
+        f"GiB leaves {left / 2**30:.1f}: lower the {smaller}, or raise the limit to {raised:.1f}"
+    )
+
+
+def pages_of(settings: BakeSettings) -> tuple[int, ...] | None:
+    """Return the sizes of the pages where the settings alone determine them, else None."""
+    if settings.texel_density is not None or settings.atlas != "shared":
+        return None
+    return (settings.resolution,) * settings.pages
 
 
 def working_bytes(settings: BakeSettings) -> float:
@@ -51,24 +97,21 @@ def working_bytes(settings: BakeSettings) -> float:
 
 
 def texel_scratch(pages: Sequence[int], settings: BakeSettings) -> Scratch:
-    """Return what makes the arrays of texels before the scene is solved, of which nobody knows the memory."""
-    free = memory_limit(settings) - process_bytes() - working_bytes(settings)
-    return Scratch(max(BEFORE_SOLVING * (free - least_bytes(pages)), 0.0))
+    """Return what makes the arrays of texels before the scene is solved, which takes who knows how much."""
+    free = memory_limit(settings) - process_bytes() - least_bytes(pages, settings)
+    return Scratch(max(BEFORE_SOLVING * free, 0.0))
 
 
-def share_out_memory(geometry: TexelGeometry, settings: BakeSettings) -> None:
-    """Give the texels' arrays what the scene, the solution and the floor leave of the memory limit."""
-    scratch = geometry.scratch
-    floor = TEXEL_BYTES * len(geometry) + working_bytes(settings)
-    free = memory_limit(settings) - process_bytes() - floor
-    scratch.budget = max(scratch.in_memory + free, 0.0)
+def share_out_memory(geometry: TexelGeometry, settings: BakeSettings, keep: bool) -> None:
+    """Give the texels' arrays what the scene, the solution and the least leave of the memory limit.
 
-
-BEFORE_SOLVING = 0.25
-"""Share of the free memory that the places of texels may take."""
-
-PROCESS_BYTES = 600e6
-"""What Blender and a scene take where the system does not tell."""
+    If the bake is kept, its arrays are still there when the images are made.
+    """
+    scratch, pages = geometry.scratch, [len(numbers) for numbers in geometry.index]
+    floor = LIT_BYTES * len(geometry) + working_bytes(settings)
+    if keep:
+        floor = max(floor, least_bytes(pages, settings))
+    scratch.budget = max(scratch.in_memory + memory_limit(settings) - process_bytes() - floor, 0.0)
 
 
 def process_bytes() -> float:

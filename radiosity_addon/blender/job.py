@@ -17,6 +17,7 @@ from ..report import BakeReport
 from ..settings import BakeSettings
 from ..sidecar import SIDECAR_NAME
 from ..solver.arrays import Array
+from ..texel_memory import pages_of, refuse_too_large
 from . import kept_bakes, kept_details, runtime
 from .apply import apply_lightmaps, check_targets
 from .bake_record import remove_datablocks
@@ -94,6 +95,8 @@ def run_bake(
     """
     seconds: dict[str, float] = {}
     wanted = settings
+    # Now, not after the export: large pages need much memory whatever is on them.
+    refuse_too_large(pages_of(settings) or (), settings)
     with ExitStack() as stack:
         if output is not None:
             # Opened first: a folder that cannot be written is no news for after the work.

@@ -189,9 +189,7 @@ class _Cells:
         return flat
 
 
-def _pieces(
-    triangles: Array, cells: _Cells, most: int, scratch: Scratch
-) -> tuple[Array, Array] | None:
+def _pieces(triangles: Array, cells: _Cells, most: int, scratch: Scratch) -> tuple[Array, Array] | None:
     """Cut triangles (t, 3, 3) into pieces (p, 3, 3) no wider than a cell; None if it takes too many.
 
     Left out is what lies where there are no cells. Also returns each piece's triangle, (p,).

@@ -26,7 +26,8 @@ def texel_pages(
     """
     pages = []
     for index in geometry.index:
-        pixels, coverage = np.zeros((*index.shape, 3), dtype=np.float32), np.empty(index.shape, dtype=bool)
+        pixels = geometry.scratch.zeros((*index.shape, 3), np.float32)
+        coverage = geometry.scratch.empty(index.shape, bool)
         for rows in tiles(len(index), max(TILE // len(index), 1)):
             coverage[rows] = index[rows] >= 0
             pixels[rows][coverage[rows]] = values[index[rows][coverage[rows]]]
