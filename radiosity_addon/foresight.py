@@ -14,6 +14,7 @@ from .lightmap.packing import padding_for
 from .lightmap.pages import least_pages, shared_out
 from .settings import BakeSettings
 from .solver.parallel import thread_count
+from .texel_memory import least_bytes, room
 
 FILLED = 0.85
 """What charts and the padding around them take of a page, of what there is."""
@@ -39,9 +40,9 @@ UNWRAP_SECONDS = 60e-6
 CORES = 2
 """Of the machine all this was measured on; more help by the power 0.6."""
 
-BYTES_A_RAY, BYTES_A_TRIANGLE, BYTES_A_TEXEL, BYTES_AT_LEAST = 6.0, 1700.0, 64.0, 30e6
-"""Memory: what rays met is kept while light is swept, more of it in scenes of more triangles, by the power
-0.14; faces and links; the pages themselves."""
+BYTES_A_RAY, BYTES_A_TRIANGLE, BYTES_A_TEXEL, BYTES_A_PIXEL, BYTES_AT_LEAST = 5.0, 1700.0, 380.0, 40.0, 80e6
+"""Memory: what rays met is kept while light is swept; faces and links; where texels lie, their light and what
+it is interpolated from; the pages themselves; temporaries. Beyond the memory limit it is in files."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,9 @@ class Foresight:
     texels : tuple of float
         Parallel to the objects: about how many each gets.
     memory : float
-        What it takes beside what Blender has taken already [bytes].
+        What it takes beside what Blender has taken already [bytes], …
+    files : float
+        … and what does not fit into the memory limit: temporary files take it [bytes].
     seconds : float or None
         None where it depends on what is found: an error that is asked for, and methods for study.
     """
@@ -93,6 +96,7 @@ class Foresight:
     pages: tuple[int, ...]
     texels: tuple[float, ...]
     memory: float
+    files: float
     seconds: float | None
 
 
@@ -112,17 +116,20 @@ def foresee(objects: Sequence[Lit], triangles: int, settings: BakeSettings) -> F
     rays = total * RAYS_A_TEXEL[settings.quality] * max(triangles, 1) ** 0.25
     memory = (
         BYTES_AT_LEAST
-        + BYTES_A_RAY * max(triangles, 1) ** 0.14 * rays
+        + BYTES_A_RAY * rays
         + BYTES_A_TRIANGLE * triangles
-        + BYTES_A_TEXEL * sum(page**2 for page in pages)
+        + BYTES_A_TEXEL * total
+        + BYTES_A_PIXEL * sum(page**2 for page in pages)
     )
+    most = max(room(settings), least_bytes(pages, settings))
     seconds = None
     if settings.method == "hierarchical" and settings.relative_error is None:
         solving = SOLVE_SECONDS[settings.quality] * max(triangles, 1) ** 0.45
         gathering = SECONDS_A_RAY * rays
         cores = thread_count(settings.threads)
         seconds = UNWRAP_SECONDS * triangles + (solving + gathering) * (CORES / cores) ** 0.6
-    return Foresight(tuple(pages), tuple(texels), memory, seconds)
+    in_memory = min(memory, most)
+    return Foresight(tuple(pages), tuple(texels), in_memory, memory - in_memory, seconds)
 
 
 def _pages(objects: Sequence[Lit], settings: BakeSettings) -> tuple[list[int], list[float]]:

@@ -11,6 +11,10 @@ from .errors import UsageError
 from .relighting import KeptBake, relight
 from .settings import MAX_GROUPS, OTHERS, BakeSettings
 from .solver.arrays import Array
+from .solver.scratch import tiles
+
+BAND = 64
+"""Rows of a page that are shared out at once."""
 
 
 def are_wanted(bake_scene: BakeScene, settings: BakeSettings) -> bool:
@@ -94,14 +98,12 @@ def group_pages(
                 found.append(done.value)
                 break
             yield (number + fraction) / len(chosen)
-    pixels = [
-        shared_out(page.pixels, np.stack([of[number].pixels for of in found]))
-        for number, page in enumerate(pages)
-    ]
+    for number, page in enumerate(pages):
+        share_out(page.pixels, [of[number].pixels for of in found])
     return tuple(
         LightGroup(
             name,
-            tuple(LightmapPage(part[group], page.coverage) for part, page in zip(pixels, pages, strict=True)),
+            found[group],
             tuple(dict.fromkeys(np.array(kept.names, dtype=object)[rows])),
         )
         for group, (name, rows) in enumerate(chosen)
@@ -109,16 +111,28 @@ def group_pages(
 
 
 def shared_out(whole: Array, parts: Array) -> Array:
-    """Scale (g, …) parts so that they sum to the `whole` (…), none below 0; float32.
+    """Return (g, …) float32 what `share_out` makes of parts."""
+    result = parts.astype(np.float64)
+    share_out(whole, list(result))
+    return result.astype(np.float32)
+
+
+def share_out(whole: Array, parts: Sequence[Array]) -> None:
+    """Scale parts of an image where they are, so that they sum to the `whole` (height, …), none below 0.
 
     Where no part has anything, the largest of them over all takes what there is.
     """
-    parts = np.maximum(parts.astype(np.float64), 0.0)
-    total = parts.sum(axis=0)
-    result = np.asarray(parts * np.where(total > 0, whole / np.where(total > 0, total, 1.0), 0.0))
-    largest = int(parts.reshape(len(parts), -1).sum(axis=1).argmax())
-    result[largest] += np.where(total > 0, 0.0, whole)
-    return np.asarray(result, dtype=np.float32)
+    light = np.zeros(len(parts))
+    for rows in tiles(len(whole), BAND):
+        light += [np.maximum(part[rows], 0.0).sum(dtype=np.float64) for part in parts]
+    largest = int(light.argmax())
+    for rows in tiles(len(whole), BAND):
+        shares = np.maximum(np.stack([part[rows] for part in parts]).astype(np.float64), 0.0)
+        total = shares.sum(axis=0)
+        shares *= np.where(total > 0, whole[rows] / np.where(total > 0, total, 1.0), 0.0)
+        shares[largest] += np.where(total > 0, 0.0, whole[rows])
+        for part, share in zip(parts, shares, strict=True):
+            part[rows] = share
 
 
 def members(

@@ -9,11 +9,12 @@ from __future__ import annotations
 import time
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
 
+from . import foresight
 from .bake_details import More, more_of
 from .bake_scene import (
     BakedObject,
@@ -48,7 +49,9 @@ from .settings import BakeSettings
 from .solver import Solution, SolverSettings, SolverState, solve_progress
 from .solver.arrays import Array
 from .solver.element_transport import Relightable
+from .solver.scratch import Scratch, tiles
 from .solver.visibility import RayCaster
+from .texel_memory import pages_of, refuse_too_large, share_out_memory, texel_scratch
 from .texel_pictures import TexelPictures
 
 T = TypeVar("T")
@@ -68,6 +71,12 @@ class Lit:
 UNWRAP, RASTERISE, SOLVE, LIGHT, ENCODE = 0.0, 0.02, 0.04, 0.29, 0.98
 """How far the whole is when each stage begins: shares of the time of the box and the office at medium quality
 (bench/results), of which the time left is reckoned."""
+
+UNSURE = 0.8
+"""Pages that follow from a density are refused before they are laid out if so much of their width would."""
+
+MOST_SHOWN = 1 << 22
+"""More texels than these are not shown while they are lit: their pictures would take too much memory."""
 
 DILATED = 8
 """Texels past the charts that are filled ring by ring, if not more are free."""
@@ -135,20 +144,27 @@ def _bake(
     if not baked:
         raise SceneError("nothing to bake: give the scene a render-visible mesh with faces")
 
+    _refuse_too_large(bake_scene, baked, settings)
     yield Progress("unwrap", UNWRAP)
     with timed(seconds, "unwrap"):
         atlas = yield from _unwrap(bake_scene, baked, settings)
     yield Progress("rasterise", RASTERISE)
+    sizes = [page.resolution for page in atlas.pages]
+    refuse_too_large(sizes, settings)
+    scratch = texel_scratch(sizes, settings)
     with timed(seconds, "rasterise"):
-        geometry = _texels(bake_scene, baked, atlas)
+        geometry = _texels(bake_scene, baked, atlas, scratch)
     yield Progress("solve", SOLVE)
     with timed(seconds, "solve"):
         solution = yield from solve(bake_scene, quality.solver)
     yield Progress("light", LIGHT)
+    share_out_memory(geometry, settings, keep)
     with timed(seconds, "light"):
-        so_far = LightSoFar()
+        so_far = LightSoFar() if len(geometry) <= MOST_SHOWN else None
         steps = _texel_values(bake_scene, solution, geometry, quality.gather, settings, keep, so_far)
-        lit = yield from staged(steps, "light", LIGHT, ENCODE, TexelPictures(so_far))
+        pictures = None if so_far is None else TexelPictures(so_far)
+        lit = yield from staged(steps, "light", LIGHT, ENCODE, pictures)
+        del so_far, pictures
     report = solver_part(solution.final_report(), used_settings(quality.solver), bake_scene.objects)
     sides = solution.triangle_irradiance, solution.back_irradiance
     of_light = (*turned_away(baked, bake_scene.scene.areas, *sides), *of_solution(solution, quality.solver))
@@ -204,6 +220,21 @@ def baked_objects(bake_scene: BakeScene) -> list[BakeObject]:
     return [item for item in bake_scene.objects if item.bake and item.count]
 
 
+def _refuse_too_large(bake_scene: BakeScene, baked: list[BakeObject], settings: BakeSettings) -> None:
+    """Refuse, before anything is unwrapped, pages that will not fit into the memory limit."""
+    sizes = pages_of(settings)
+    if sizes is None:
+        areas = bake_scene.scene.areas
+        lit = [
+            foresight.Lit(item.name, item.count, float(areas[item.rows].sum()), item.texel_scale)
+            for item in baked
+        ]
+        plan = foresight.foresee(lit, len(bake_scene.scene), settings)
+        # By area it is known roughly; what unwrapping finds decides.
+        sizes = tuple(int(UNSURE * size) for size in plan.pages) if settings.texel_density else plan.pages
+    refuse_too_large(sizes, settings)
+
+
 def _unwrap(
     bake_scene: BakeScene, baked: list[BakeObject], settings: BakeSettings
 ) -> Generator[Progress, None, Atlas]:
@@ -232,7 +263,7 @@ def _padding(settings: BakeSettings) -> int:
     return padding_for(settings.mip_levels) if settings.padding is None else settings.padding
 
 
-def _texels(bake_scene: BakeScene, baked: list[BakeObject], atlas: Atlas) -> TexelGeometry:
+def _texels(bake_scene: BakeScene, baked: list[BakeObject], atlas: Atlas, scratch: Scratch) -> TexelGeometry:
     """Find the texels that the objects cover, and where they lie in the world."""
     count = len(bake_scene.scene)
     uv = np.zeros((count, 3, 2), dtype=np.float32)
@@ -243,8 +274,8 @@ def _texels(bake_scene: BakeScene, baked: list[BakeObject], atlas: Atlas) -> Tex
     # What has no area has no side to be lit from, whatever its UVs say.
     page_of_triangle[bake_scene.scene.areas == 0] = -1
     rows = [np.flatnonzero(page_of_triangle == page) for page in range(len(atlas.pages))]
-    texels = [rasterise(uv[of], page.resolution) for of, page in zip(rows, atlas.pages, strict=True)]
-    return TexelGeometry(bake_scene.scene, uv, page_of_triangle, texels, rows)
+    texels = [rasterise(uv[of], page.resolution, scratch) for of, page in zip(rows, atlas.pages, strict=True)]
+    return TexelGeometry(bake_scene.scene, uv, page_of_triangle, texels, rows, scratch)
 
 
 def solve(bake_scene: BakeScene, settings: SolverSettings) -> Generator[Progress, None, Solution]:
@@ -307,7 +338,7 @@ def _texel_values(
     gather: GatherSettings,
     settings: BakeSettings,
     keep: bool,
-    so_far: LightSoFar,
+    so_far: LightSoFar | None,
 ) -> Generator[float, None, Lit]:
     """Compute the quantity asked for at all texels, and estimate the light's relative error."""
     if settings.quantity == "residual":
@@ -321,8 +352,12 @@ def _texel_values(
     else:
         within = settings.relative_error, so_far
         light = yield from light_within(*where, lambda e: for_error(e).gather, *within)
+    if not keep:
+        # Hits were looked up in it: it is large, and stays in memory.
+        light = replace(light, table=None)
     materials = texel_materials(bake_scene.scene, geometry, FOOTPRINT)
-    return Lit(shown(light, *materials, settings), local.caster, light, relightable, materials)
+    values = shown(light, *materials, settings, geometry.scratch)
+    return Lit(values, local.caster, light, relightable, materials)
 
 
 def _seams(
@@ -337,7 +372,10 @@ def _seams(
 
 def _check(report: dict[str, Any], pages: tuple[LightmapPage, ...]) -> None:
     """Refuse to hand out a result that is not finite: a defect must not look like a dark room."""
-    if not np.isfinite(report["residual"]) or not all(np.isfinite(p.pixels).all() for p in pages):
+    finite = all(
+        np.isfinite(page.pixels[rows]).all() for page in pages for rows in tiles(len(page.pixels), 256)
+    )
+    if not np.isfinite(report["residual"]) or not finite:
         raise BakeError(
             "the solution is not finite: this is a defect of the solver; please report the scene, "
             "and try another quality meanwhile"

@@ -91,7 +91,7 @@ def bake_moved(
         steps = moved_steps(before, solved.local, disturbance)
         light, local = yield from staged(steps, "light", 0.0, LIT)
     materials = kept.reflectance, kept.emission
-    values = shown(light, *materials, settings)
+    values = shown(light, *materials, settings, geometry.scratch)
     lit = Lit(values, local.caster, light, replace(solved, local=local), materials)
     report = moves.solved.report
     names = dict.fromkeys([*report.get("moved", ()), *(item.name for item in moved)])

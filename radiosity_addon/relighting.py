@@ -29,6 +29,7 @@ from .solver.element_transport import Relightable
 from .solver.light_sources import LightSources
 from .solver.lights import Light
 from .solver.scene import Scene
+from .solver.scratch import Scratch, tiles
 
 STRENGTHS = ("power", "irradiance", "radiance")
 """The fields of lights that may change."""
@@ -177,7 +178,8 @@ def relight(kept: KeptBake, strengths: Array) -> Generator[Progress, None, tuple
         If the sources cannot have them.
     """
     wanted = kept.sources.checked(strengths)
-    steps = relight_steps(kept.lit, kept.solved, wanted)
+    scratch = kept.geometry.scratch
+    steps = relight_steps(kept.lit, kept.solved, wanted, scratch)
     while True:
         try:
             yield Progress("relight", 0.95 * next(steps))
@@ -185,22 +187,23 @@ def relight(kept: KeptBake, strengths: Array) -> Generator[Progress, None, tuple
             light: TexelLight = done.value
             break
     emission = kept.sources.emission(kept.emission, kept.geometry.triangle, wanted)
-    values = shown(light, kept.reflectance, emission, kept.settings)
+    values = shown(light, kept.reflectance, emission, kept.settings, scratch)
     pages = texel_pages(kept.geometry, values, kept.seams, kept.rings)
     yield Progress("relight", 1.0)
     return pages
 
 
-def shown(light: TexelLight, reflectance: Array, emission: Array, settings: BakeSettings) -> Array:
-    """Return (n, 3) what texels are to hold of their light; reflectance and emission as they show."""
-    irradiance = {
-        "all": light.direct + light.indirect,
-        "direct": light.direct,
-        "indirect": light.indirect,
-    }[settings.light]
-    if settings.light == "indirect":
-        emission = np.zeros_like(emission)
-    return to_quantity(irradiance, reflectance, emission, settings.quantity)
+def shown(
+    light: TexelLight, reflectance: Array, emission: Array, settings: BakeSettings, scratch: Scratch
+) -> Array:
+    """Return (n, 3) float32 what texels are to hold of their light; reflectance and emission as they show."""
+    values = scratch.empty(light.direct.shape, np.float32)
+    parts = {"all": (light.direct, light.indirect), "direct": (light.direct,), "indirect": (light.indirect,)}
+    for rows in tiles(len(values)):
+        irradiance = np.add.reduce([part[rows] for part in parts[settings.light]])
+        emitted = np.zeros((len(irradiance), 3)) if settings.light == "indirect" else emission[rows]
+        values[rows] = to_quantity(irradiance, reflectance[rows], emitted, settings.quantity)
+    return values
 
 
 def differs_in_strength_alone(one: Light, other: Light) -> bool:

@@ -21,7 +21,7 @@ def small_objects(
     bake_scene: BakeScene, baked: list[BakeObject], geometry: TexelGeometry
 ) -> Iterator[BakeWarning]:
     """Warn of objects that get hardly any texels, and of the one that takes nearly all, if there is one."""
-    counts = np.bincount(geometry.triangle, minlength=len(bake_scene.scene))
+    counts = geometry.counts
     texels = [int(counts[item.rows].sum()) for item in baked]
     greedy = greedy_object([item.name for item in baked], texels)
     mend = "raise the resolution or its texel scale"

@@ -20,8 +20,12 @@ from ..light_groups import are_wanted
 from ..lightmap.encode import encode_png16, png16_scale
 from ..report import LightmapFile
 from ..settings import OTHERS, BakeSettings
+from ..solver.scratch import tiles
 from .bake_record import mark_made, remove_datablocks
 from .image_marks import GROUP, PAGE, QUANTITY_PROPERTY, SCALE_PROPERTY
+
+BAND = 64
+"""Rows of a page that are encoded at once."""
 
 _FILE_FORMATS = {"exr": ("OPEN_EXR", ".exr"), "png16": ("PNG", ".png")}
 
@@ -216,7 +220,9 @@ def set_pixels(image: bpy.types.Image, page: LightmapPage, scale: float | None) 
     if scale is not None:
         image[SCALE_PROPERTY] = scale
     pixels = np.ones((*page.pixels.shape[:2], 4), dtype=np.float32)
-    pixels[..., :3] = page.pixels if scale is None else encode_png16(page.pixels, scale)
+    for rows in tiles(len(pixels), BAND):
+        values = page.pixels[rows]
+        pixels[rows, :, :3] = values if scale is None else encode_png16(values, scale)
     image.pixels.foreach_set(pixels.ravel())
     image.update()
     image.update_tag()

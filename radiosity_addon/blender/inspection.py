@@ -7,6 +7,7 @@ office takes a second or two.
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +22,8 @@ from ..errors import RadiosityError
 from ..foresight import Foresight, Lit
 from ..lightmap.greedy import greedy_object, share_of
 from ..settings import BakeSettings
+from ..solver import scratch
+from ..texel_memory import refuse_too_large
 from .collect import Collected, Piece, collect
 from .export import chosen_pieces
 from .materials import uses_nodes
@@ -49,6 +52,9 @@ HUGE, MINUTE = 5000.0, 0.02
 
 CLOSED = 1e-4
 """A surface is taken for closed if the vectors of its areas sum to less than this share of them."""
+
+NOTED_FILES = 1e9
+"""Temporary files are told of from this size on [bytes]."""
 
 NAMED = 3
 """So many objects are named in a finding."""
@@ -141,7 +147,7 @@ def inspect(context: bpy.types.Context, settings: BakeSettings, folder: Path | N
         *_of_texels(lit, plan),
         *_of_shapes(context, collected, shapes),
         *_of_size(shapes),
-        *_of_memory(plan),
+        *_of_memory(plan, settings),
         *(Finding(INFO, warning.name, warning.message) for warning in collected.warnings),
     ]
     findings.sort(key=lambda finding: (ERROR, WARNING, INFO).index(finding.level))
@@ -327,8 +333,21 @@ def _of_size(shapes: dict[int, _Shape]) -> Iterator[Finding]:
         )
 
 
-def _of_memory(plan: Foresight) -> Iterator[Finding]:
-    """Say whether the memory that is free may not do."""
+def _of_memory(plan: Foresight, settings: BakeSettings) -> Iterator[Finding]:
+    """Say whether pages are too large for the memory limit, and whether memory or disk may not do."""
+    try:
+        refuse_too_large(plan.pages, settings)
+    except RadiosityError as error:
+        yield Finding(ERROR, "memory", str(error))
+        return
+    if plan.files > NOTED_FILES:
+        disk = shutil.disk_usage(scratch.folder()).free
+        message = (
+            f"about {plan.files / 1e9:.1f} GB of temporary files will be written to '{scratch.folder()}'"
+        )
+        if plan.files > disk:
+            message += f", where {disk / 1e9:.1f} GB are free: free some, or raise the memory limit"
+        yield Finding(WARNING if plan.files > disk else INFO, "memory", message)
     free = free_memory()
     if free is not None and plan.memory > free:
         message = (

@@ -17,6 +17,7 @@ from ..relighting import KeptBake
 from ..report import BakeReport
 from ..settings import BakeSettings
 from ..solver.arrays import Array
+from ..texel_memory import pages_of, refuse_too_large
 from . import kept_bakes, kept_details, runtime
 from .apply import apply_lightmaps, check_targets
 from .bake_record import remove_datablocks
@@ -100,6 +101,8 @@ def run_bake(
     """
     seconds: dict[str, float] = {}
     wanted = settings
+    # Now, not after the export: large pages need much memory whatever is on them.
+    refuse_too_large(pages_of(settings) or (), settings)
     with ExitStack() as stack:
         if output is not None:
             # First: a folder that cannot be written, or holds files of others, is no news for after the work.

@@ -41,7 +41,7 @@ def light_within(
     """
     goal, left = error, 1.0
     settings = settings_for(goal)
-    for _ in range(TRIES):
+    for tries in range(TRIES, 0, -1):
         steps = reconstruct(scene, local, geometry, settings, so_far)
         light = yield from scaled(steps, 1.0 - left, 1.0 - 0.5 * left)
         left *= 0.5
@@ -49,4 +49,7 @@ def light_within(
         before, settings = settings, settings_for(goal)
         if light.error <= error or settings == before:
             break
+        if tries > 1:
+            # It takes as much memory as the next one.
+            del light
     return light

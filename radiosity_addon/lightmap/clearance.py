@@ -15,6 +15,7 @@ import numpy as np
 
 from ..solver.arrays import Array
 from ..solver.parallel import for_chunks
+from ..solver.scratch import Scratch, tiles
 from .texel_geometry import TexelGeometry
 
 CELL = 2.0
@@ -34,6 +35,9 @@ ROUNDED = 1e-7
 
 CHUNK = 1 << 13
 """Texels worked on at once; bounds the temporaries to about 5 MB a thread."""
+
+CHUNK_PIECES = 1 << 15
+"""Pieces worked on at once; bounds the temporaries to about 20 MB."""
 
 _CORNERS = list(product((0, 1), repeat=3))
 
@@ -63,12 +67,12 @@ def clear_texels(
     if len(geometry) == 0:
         return clear
     low, high = _surroundings(geometry, outset, height, clearance, threads)
-    cell = CELL * float(np.median(_largest(high - low)))
-    cells = _Cells(low.min(axis=0), high.max(axis=0), cell)
-    pieces = _pieces(geometry.triangles, cells, max(MOST_PIECES, 4 * len(geometry)))
+    cells = _Cells(*_extent(low, high))
+    pieces = _pieces(geometry.triangles, cells, max(MOST_PIECES, 4 * len(geometry)), geometry.scratch)
     if pieces is None:
         return clear
     cells.fill(geometry, *pieces, FLAT * clearance)
+    del pieces
 
     def judge(rows: slice) -> None:
         clear[rows] = cells.all_flat(geometry, rows, low[rows], high[rows], FLAT * clearance)
@@ -81,7 +85,7 @@ def _surroundings(
     geometry: TexelGeometry, outset: float, height: float, clearance: float, threads: int
 ) -> tuple[Array, Array]:
     """Return (n, 3) lower and upper bounds of what is around each texel."""
-    low, high = np.empty((2, len(geometry), 3))
+    low, high = (geometry.scratch.empty((len(geometry), 3)) for _ in range(2))
 
     def bound(part: slice) -> None:
         rows = np.arange(part.start, part.stop)
@@ -99,6 +103,17 @@ def _surroundings(
 
     for_chunks(bound, len(geometry), CHUNK, threads)
     return low, high
+
+
+def _extent(low: Array, high: Array) -> tuple[Array, Array, float]:
+    """Return the bounds of all boxes between (n, 3) `low` and `high`, and how wide cells are to be."""
+    widest = np.empty(len(low))
+    bottom, top = np.full(3, np.inf), np.full(3, -np.inf)
+    for rows in tiles(len(low)):
+        widest[rows] = _largest(high[rows] - low[rows])
+        bottom = np.minimum(bottom, low[rows].min(axis=0))
+        top = np.maximum(top, high[rows].max(axis=0))
+    return bottom, top, CELL * float(np.median(widest, overwrite_input=True))
 
 
 class _Cells:
@@ -128,19 +143,26 @@ class _Cells:
 
     def fill(self, geometry: TexelGeometry, corners: Array, triangle: Array, tolerance: float) -> None:
         """Note the planes of pieces (p, 3, 3) of triangles (p,), no wider than a cell."""
-        low, high = _bounds(corners)
-        low -= tolerance
-        high += tolerance
+        places = geometry.scratch.empty((len(_CORNERS), len(corners)), np.int32)
+        for rows in tiles(len(corners), CHUNK_PIECES):
+            low, high = _bounds(corners[rows])
+            low -= tolerance
+            high += tolerance
+            for corner, place in enumerate(self.corners_of(low, high)):
+                places[corner, rows] = place
         first = np.ascontiguousarray(geometry.triangles[:, 0])
-        for place in self.corners_of(low, high):
-            self._owner[place] = triangle
-        for place in self.corners_of(low, high):
-            owner = self._owner.take(place)
-            other = np.flatnonzero(owner != triangle)
-            of = owner[other]
-            apart = corners.take(other, axis=0) - first.take(of, axis=0)[:, None]
-            off = _largest(np.abs(np.einsum("pck,pk->pc", apart, geometry.face_normals.take(of, axis=0))))
-            self._several[place[other[off > tolerance]]] = True
+        for place in places:
+            for rows in tiles(len(corners)):
+                self._owner[place[rows]] = triangle[rows]
+        for place in places:
+            for rows in tiles(len(corners), CHUNK_PIECES):
+                owner = self._owner.take(place[rows])
+                other = np.flatnonzero(owner != triangle[rows])
+                of = owner[other]
+                apart = corners[rows].take(other, axis=0) - first.take(of, axis=0)[:, None]
+                plane = geometry.face_normals.take(of, axis=0)
+                off = _largest(np.abs(np.einsum("pck,pk->pc", apart, plane)))
+                self._several[place[rows][other[off > tolerance]]] = True
 
     def all_flat(
         self, geometry: TexelGeometry, rows: slice, low: Array, high: Array, tolerance: float
@@ -167,28 +189,34 @@ class _Cells:
         return flat
 
 
-def _pieces(triangles: Array, cells: _Cells, most: int) -> tuple[Array, Array] | None:
+def _pieces(triangles: Array, cells: _Cells, most: int, scratch: Scratch) -> tuple[Array, Array] | None:
     """Cut triangles (t, 3, 3) into pieces (p, 3, 3) no wider than a cell; None if it takes too many.
 
     Left out is what lies where there are no cells. Also returns each piece's triangle, (p,).
     """
-    corners, triangle = triangles, np.arange(len(triangles))
+    corners, triangle = triangles, np.arange(len(triangles), dtype=np.int32)
     # A hair narrower: a piece's bounds are widened by what rounding may take.
     widest = cells.size * 0.999
-    done: list[tuple[Array, Array]] = []
+    done = scratch.rows(9, np.float64), scratch.rows(1, np.int32)
     count = 0
     while len(corners):
-        low, high = _bounds(corners)
-        within = (high >= cells.low) & (low <= cells.high)
-        inside = within[:, 0] & within[:, 1] & within[:, 2]
-        small = _largest(high - low) <= widest
-        ready, split = np.flatnonzero(inside & small), np.flatnonzero(inside & ~small)
-        done.append((corners[ready], triangle[ready]))
-        count += len(ready)
-        if count + 2 * len(split) > most + len(triangles):
+        halves = scratch.rows(9, np.float64), scratch.rows(1, np.int32)
+        for rows in tiles(len(corners), CHUNK_PIECES):
+            some, of = corners[rows], triangle[rows]
+            low, high = _bounds(some)
+            within = (high >= cells.low) & (low <= cells.high)
+            inside = within[:, 0] & within[:, 1] & within[:, 2]
+            small = _largest(high - low) <= widest
+            ready, split = np.flatnonzero(inside & small), np.flatnonzero(inside & ~small)
+            done[0].extend(some[ready])
+            done[1].extend(of[ready])
+            halves[0].extend(_halved(some[split]))
+            halves[1].extend(np.repeat(of[split], 2))
+            count += len(ready)
+        corners, triangle = halves[0].all().reshape(-1, 3, 3), halves[1].all()[:, 0]
+        if count + len(corners) > most + len(triangles):
             return None
-        corners, triangle = _halved(corners[split]), np.repeat(triangle[split], 2)
-    return np.concatenate([part[0] for part in done]), np.concatenate([part[1] for part in done])
+    return done[0].all().reshape(-1, 3, 3), done[1].all()[:, 0]
 
 
 def _bounds(corners: Array) -> tuple[Array, Array]:

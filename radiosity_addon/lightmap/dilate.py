@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 Float32 = NDArray[np.float32]
 Bool = NDArray[np.bool_]
 
+BAND = 1 << 20
+"""Texels that are halved at once; bounds the temporaries to about 40 MB."""
+
 _NEIGHBOURS = tuple(
     (row, column, 1.0 if row == 0 or column == 0 else 0.5)
     for row in (-1, 0, 1)
@@ -39,16 +42,19 @@ def dilate(pixels: Float32, coverage: Bool, rings: int = 8) -> Float32:
         A new array; all zero if nothing is covered.
     """
     result = np.where(coverage[..., None], pixels, np.float32(0)).astype(np.float32)
+    fill(result, coverage, rings)
+    return result
+
+
+def fill(pixels: Float32, coverage: Bool, rings: int = 8) -> None:
+    """Fill every uncovered texel of a page where it is; they must be 0 so far."""
     if not coverage.any():
-        return result
+        return
     filled = coverage.copy()
     for _ in range(rings):
-        if not _grow(result, filled):
-            return result
-    if not filled.all():
-        coarse = _pyramid(result, filled)
-        result[~filled] = coarse[~filled]
-    return result
+        if not _grow(pixels, filled):
+            return
+    _fill_coarsely(pixels, filled)
 
 
 def _grow(pixels: Float32, filled: Bool) -> bool:
@@ -73,21 +79,37 @@ def _grow(pixels: Float32, filled: Bool) -> bool:
     return True
 
 
-def _pyramid(pixels: Float32, filled: Bool) -> Float32:
-    """Return the page with every texel filled.
+def _fill_coarsely(pixels: Float32, filled: Bool) -> None:
+    """Fill the texels of a page that are not filled yet.
 
     Each takes the mean of the filled texels in the smallest of the blocks of 2, 4, 8 … texels
     around it that holds any.
     """
     height, width = filled.shape
     if filled.all() or (height == 1 and width == 1):
-        return pixels
+        return
+    coarse = np.empty(((height + 1) // 2, (width + 1) // 2, pixels.shape[2]), dtype=np.float32)
+    known = np.empty(coarse.shape[:2], dtype=bool)
+    # In bands of an even number of rows.
+    band = max(BAND // width // 2, 1)
+    for first in range(0, len(coarse), band):
+        some = slice(first, first + band)
+        coarse[some], known[some] = _halved(pixels[2 * first :][: 2 * band], filled[2 * first :][: 2 * band])
+    _fill_coarsely(coarse, known)
+    for first in range(0, len(coarse), band):
+        rows = slice(2 * first, min(2 * (first + band), height))
+        wide = coarse[first : first + band].repeat(2, axis=0).repeat(2, axis=1)
+        empty = ~filled[rows]
+        pixels[rows][empty] = wide[: rows.stop - rows.start, :width][empty]
+
+
+def _halved(pixels: Float32, filled: Bool) -> tuple[Float32, Bool]:
+    """Return the means of blocks of 2 × 2 texels over those that are filled, and which blocks have any."""
+    height, width = filled.shape
     pad = ((0, height % 2), (0, width % 2))
     weight = np.pad(filled, pad).astype(np.float32)
     values = np.pad(pixels, (*pad, (0, 0))) * weight[..., None]
     half_height, half_width = weight.shape[0] // 2, weight.shape[1] // 2
     count = weight.reshape(half_height, 2, half_width, 2).sum(axis=(1, 3))
     total = values.reshape(half_height, 2, half_width, 2, -1).sum(axis=(1, 3))
-    coarse = _pyramid(total / np.maximum(count, 1)[..., None], count > 0)
-    wide = coarse.repeat(2, axis=0).repeat(2, axis=1)[:height, :width]
-    return np.asarray(np.where(filled[..., None], pixels, wide), dtype=np.float32)
+    return np.asarray(total / np.maximum(count, 1)[..., None]), np.asarray(count > 0)

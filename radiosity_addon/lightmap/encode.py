@@ -7,6 +7,10 @@ from numpy.typing import NDArray
 
 from ..errors import BakeError, UsageError
 from ..solver.radiometry import brdf_of_reflectance, reflected_radiance
+from ..solver.scratch import tiles
+
+BAND = 256
+"""Rows of a page that are looked at at once."""
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -51,9 +55,10 @@ def png16_scale(*pages: Float32) -> float:
     """
     largest = 0.0
     for pixels in pages:
-        if not np.isfinite(pixels).all():
-            raise BakeError("the lightmap holds values that are not finite and cannot be written as PNG")
-        largest = max(largest, float(pixels.max(initial=0.0)))
+        for rows in tiles(len(pixels), BAND):
+            if not np.isfinite(pixels[rows]).all():
+                raise BakeError("the lightmap holds values that are not finite and cannot be written as PNG")
+            largest = max(largest, float(pixels[rows].max(initial=0.0)))
     return largest if largest > 0 else 1.0
 
 

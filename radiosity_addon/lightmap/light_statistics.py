@@ -8,6 +8,7 @@ import numpy as np
 
 from ..bake_scene import TOUCHED
 from ..solver.arrays import Array
+from ..solver.scratch import tiles
 
 
 @dataclass(frozen=True)
@@ -41,11 +42,15 @@ class LightStatistics:
 
 def light_statistics(values: Array, areas: Array) -> LightStatistics | None:
     """Sum up (n,) values of texels that show (n,) float of the surface each; None without any area."""
-    total = float(areas.sum())
-    if total <= 0:
-        return None
-    counted = values[areas > 0]
-    return LightStatistics(float(counted.min()), float(values @ areas) / total, float(counted.max()))
+    total = weighed = 0.0
+    least, largest = np.inf, -np.inf
+    for rows in tiles(len(values)):
+        counted = values[rows][areas[rows] > 0]
+        total += float(areas[rows].sum())
+        weighed += float(values[rows] @ areas[rows])
+        least = min(least, float(counted.min(initial=np.inf)))
+        largest = max(largest, float(counted.max(initial=-np.inf)))
+    return LightStatistics(least, weighed / total, largest) if total > 0 else None
 
 
 def told_texels(state: Array) -> Array:

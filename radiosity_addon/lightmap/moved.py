@@ -105,7 +105,7 @@ def moved_steps(
     of_texels = np.maximum(start[: len(geometry)] + reflectance * more, 0.0)
     transport = replace(transport, parts=replace(parts, start=start[len(geometry) :]))
     limits = lit.sweeps, lit.tolerance, local.threads, False
-    swept = sweep_steps(transport, of_texels, direct, local.beyond(), *limits)
+    swept = sweep_steps(transport, of_texels, direct, local.beyond(), *limits, scratch=geometry.scratch)
     light = yield from scaled(swept, PARTS, 1.0)
     assert local.sources is not None  # it asks for lights apart
     assert light.table is not None

@@ -15,6 +15,7 @@ import numpy as np
 from ..solver.arrays import Array
 from ..solver.element_transport import Relightable
 from ..solver.local_pass import values_of
+from ..solver.scratch import Scratch, tiles
 from ..solver.steps import scaled
 from .sweeps import LitTexels, TexelLight, sweep_steps
 
@@ -23,7 +24,7 @@ SOLVED = 0.3
 
 
 def relight_steps(
-    kept: LitTexels, solved: Relightable, strengths: Array
+    kept: LitTexels, solved: Relightable, strengths: Array, scratch: Scratch | None = None
 ) -> Generator[float, None, TexelLight]:
     """Light texels by other strengths of the sources.
 
@@ -33,6 +34,8 @@ def relight_steps(
     solved : Relightable
     strengths : (s, 3) float64
         See `LightSources.strengths` for units.
+    scratch : Scratch or None
+        Makes the texels' arrays; None keeps them in memory.
 
     Yields
     ------
@@ -50,16 +53,20 @@ def relight_steps(
     if known is None:
         table, left = kept.earlier.part_of(strengths)
         reflected = local.reflected(solved.elements.irradiance(left))
-        rows = np.concatenate([kept.element, parts.element])
-        first = table + values_of(reflected, rows)
+        first, count = table, len(kept.element)
+        for rows in tiles(len(table)):
+            after = slice(max(rows.start - count, 0), max(rows.stop - count, 0))
+            of = np.concatenate([kept.element[rows], parts.element[after]])
+            first[rows] = table[rows] + values_of(reflected, of)
     else:
         first = known
     start, of_parts = first[: len(kept.element)], first[len(kept.element) :]
     yield SOLVED
     transport = replace(kept.transport, parts=replace(parts, start=of_parts, links=links))
     lamps = kept.gains.irradiance(given)
+    beyond = local.beyond(sources.sky(strengths))
     limits = kept.sweeps, kept.tolerance, local.threads, False
-    swept = sweep_steps(transport, start, lamps, local.beyond(sources.sky(strengths)), *limits)
+    swept = sweep_steps(transport, start, lamps, beyond, *limits, scratch=scratch)
     light = yield from scaled(swept, SOLVED, 1.0)
     if known is None and light.table is not None:
         kept.earlier.add(strengths, light.table)

@@ -10,11 +10,13 @@ read beside it, so what is dark stays dark, and nothing turns negative.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..solver.arrays import Array
+from ..solver.scratch import trim
 from .seams import Seams
 from .texel_geometry import NO_TEXEL, TexelGeometry
 
@@ -35,14 +37,33 @@ def stitch_pages(pages: Sequence[Float32], geometry: TexelGeometry, seams: Seams
 
     What lies farther outside the charts than filtering reaches keeps what dilation gave it.
     """
-    hold = np.full(sum(numbers.size for numbers in geometry.index), HOLD_OUTSIDE)
-    numbers = np.concatenate([numbers.ravel() for numbers in geometry.index])
-    covered = numbers != NO_TEXEL
-    hold[covered] = np.where(geometry.centre_inside[numbers[covered]], HOLD_COVERED, HOLD_EDGE)
-    values = np.concatenate([page.reshape(-1, page.shape[-1]) for page in pages])
-    ends = np.cumsum([numbers.size for numbers in geometry.index])[:-1]
-    stitched = np.split(stitch(values, hold, seams), ends)
-    return [part.reshape(page.shape) for part, page in zip(stitched, pages, strict=True)]
+    stitched = [page.copy() for page in pages]
+    stitch_in_place(stitched, geometry, seams)
+    return stitched
+
+
+def stitch_in_place(pages: Sequence[Float32], geometry: TexelGeometry, seams: Seams) -> None:
+    """Stitch dilated pages where they are."""
+    if not len(seams):
+        return
+    texel, inverse = np.unique(seams.texel, return_inverse=True)
+    flat = [page.reshape(-1, page.shape[-1]) for page in pages]
+    ends = np.cumsum([0, *(len(page) for page in flat)])
+    on_pages = np.searchsorted(texel, ends)
+    hold = np.full(len(texel), HOLD_OUTSIDE)
+    values = np.empty((len(texel), pages[0].shape[-1]), dtype=pages[0].dtype)
+    own = [(slice(*on_pages[number : number + 2]), ends[number]) for number in range(len(flat))]
+    for page, index, (mine, first) in zip(flat, geometry.index, own, strict=True):
+        values[mine] = page[texel[mine] - first]
+        numbers = index.ravel()[texel[mine] - first]
+        covered = numbers != NO_TEXEL
+        inside = geometry.centre_inside[numbers[covered]]
+        hold[mine][covered] = np.where(inside, HOLD_COVERED, HOLD_EDGE)
+    rows = replace(seams, texel=inverse.reshape(seams.texel.shape))
+    values = stitch(values, hold, rows)
+    for page, (mine, first) in zip(flat, own, strict=True):
+        page[texel[mine] - first] = values[mine]
+    trim()
 
 
 def stitch(values: Array, hold: Array, seams: Seams) -> Array:

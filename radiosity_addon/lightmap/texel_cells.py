@@ -65,7 +65,7 @@ class TexelCells:
         """(d,) The divided texels."""
         self._divided = divided
         self._rank = np.cumsum(divided, dtype=np.int32) - 1
-        self._anchors = np.empty((len(self.texel), CELLS, 3))
+        self._anchors = geometry.scratch.empty((len(self.texel), CELLS, 3))
         self._below = np.zeros((len(self.texel), CELLS), dtype=bool)
         spots = _FIRST + ANCHOR / ALONG
 

@@ -65,6 +65,8 @@ class TexelGeometry:
         Centre of the footprint; interpolated shading normal; the triangle's own normal.
     """
 
+    scratch = Scratch()
+
     def __init__(
         self,
         scene: Scene,
@@ -120,9 +122,16 @@ class TexelGeometry:
                 for tile in tiles(len(part)):
                     whole[name][first + tile.start : first + tile.stop] = part[tile]
         self.row, self.column, self.centre_inside, self.share = (whole[name] for name in names)
+        rows = [slice(first, first + len(page)) for first, page in zip(self._first, texels, strict=False)]
         return [
-            replace(page, **{name: whole[name][first : first + len(page)] for name in names})
-            for first, page in zip(self._first, texels, strict=False)
+            replace(
+                page,
+                row=self.row[mine],
+                column=self.column[mine],
+                centre_inside=self.centre_inside[mine],
+                area=self.share[mine],
+            )
+            for mine, page in zip(rows, texels, strict=True)
         ]
 
     def _put(self, rows: slice, weights: Array) -> None:

@@ -6,9 +6,10 @@ import numpy as np
 
 from ..bake_scene import LightmapPage
 from ..solver.arrays import Array
-from .dilate import dilate
+from ..solver.scratch import TILE, tiles
+from .dilate import fill
 from .seams import Seams
-from .stitch import stitch_pages
+from .stitch import stitch_in_place
 from .texel_geometry import TexelGeometry
 
 
@@ -24,12 +25,14 @@ def texel_pages(
         None stitches nothing.
     """
     pages = []
-    for number, index in enumerate(geometry.index):
-        pixels = np.zeros((*index.shape, 3), dtype=np.float32)
-        coverage = index >= 0
-        pixels[coverage] = values[geometry.page == number][index[coverage] - geometry.first(number)]
-        pages.append(LightmapPage(dilate(pixels, coverage, rings), coverage))
-    if seams is None or not len(seams):
-        return tuple(pages)
-    stitched = stitch_pages([page.pixels for page in pages], geometry, seams)
-    return tuple(LightmapPage(pixels, page.coverage) for pixels, page in zip(stitched, pages, strict=True))
+    for index in geometry.index:
+        pixels = geometry.scratch.zeros((*index.shape, 3), np.float32)
+        coverage = geometry.scratch.empty(index.shape, bool)
+        for rows in tiles(len(index), max(TILE // len(index), 1)):
+            coverage[rows] = index[rows] >= 0
+            pixels[rows][coverage[rows]] = values[index[rows][coverage[rows]]]
+        fill(pixels, coverage, rings)
+        pages.append(LightmapPage(pixels, coverage))
+    if seams is not None and len(seams):
+        stitch_in_place([page.pixels for page in pages], geometry, seams)
+    return tuple(pages)

@@ -85,7 +85,7 @@ class Footprints:
         return len(self.points)
 
     def weight_of(self, irradiance: Array, rows: slice = slice(None)) -> Array:
-        """Return (r,) in [0, 1]: how much an irradiance (r,) [W/m²] of rows counts beside what is expected."""
+        """Return (r,) in [0, 1]: how much an irradiance (r,) [W/m²] of rows counts next to the expected."""
         if self.expected is None or not len(irradiance):
             return np.ones(len(irradiance))
         scale = np.maximum(self.expected[rows], DARKEST * self.mean_expected)

@@ -114,7 +114,6 @@ class Gathering:
         irradiance : (n,) float64 [W/m²]
             What is about expected: noise is measured by it.
         """
-
         assert len(self.sources) == len(self._at)
 
         def trace(part: slice) -> None:

@@ -310,7 +310,11 @@ class LocalPass:
 
         `barycentric` (n, 2) are weights of corners 2 and 3.
         """
-        return values_of(self._state.irradiance.mean(axis=1), self.leaf_at_fronts(triangle, barycentric))
+        return values_of(self._mean_irradiance, self.leaf_at_fronts(triangle, barycentric))
+
+    @cached_property
+    def _mean_irradiance(self) -> Array:
+        return np.asarray(self._state.irradiance.mean(axis=1))
 
     @property
     def state(self) -> SolverState:

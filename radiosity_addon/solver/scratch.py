@@ -18,7 +18,7 @@ import threading
 import weakref
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -171,7 +171,7 @@ def row_numbers(mask: Array) -> Array:
 
 def is_in_file(array: Array) -> bool:
     """Tell whether an array, or what it is a view of, lives in a file."""
-    base = array
+    base: Any = array
     while isinstance(base, np.ndarray):
         base = base.base
     base = base.obj if isinstance(base, memoryview) else base
@@ -191,14 +191,14 @@ def trim() -> None:
 
 def folder() -> Path:
     """Return where the files are made: TMPDIR, or where the system keeps large temporary files."""
-    if "TMPDIR" not in os.environ and os.access("/var/tmp", os.W_OK):  # noqa: S108 (/tmp is often in memory)
-        return Path("/var/tmp")  # noqa: S108
+    if "TMPDIR" not in os.environ and os.access("/var/tmp", os.W_OK):
+        return Path("/var/tmp")
     return Path(tempfile.gettempdir())
 
 
 def _temporary_file() -> BinaryIO:
     try:
-        return tempfile.TemporaryFile(dir=folder(), buffering=0)  # type: ignore[return-value]
+        return cast(BinaryIO, tempfile.TemporaryFile(dir=folder(), buffering=0))
     except OSError as error:
         raise BakeError(f"cannot make a temporary file in '{folder()}': {error.strerror}") from error
 

@@ -26,6 +26,7 @@ LAYER_OF = {
     "bake_details": "pipeline",
     "texel_pictures": "pipeline",
     "foresight": "pipeline",
+    "texel_memory": "pipeline",
 }
 FRONT_DOORS = ("", "__main__", "cli", "console", "interrupts")
 
