@@ -1,0 +1,99 @@
+"""A few of each kind of trial; `python -m tests.reliability` makes them all, see docs/reliability.md."""
+
+from __future__ import annotations
+
+import errno
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("bpy")
+
+from tests.reliability import damage, full_disk, kills, scenes  # noqa: E402
+from tests.reliability.command import ROOT  # noqa: E402
+from tests.reliability.tally import Tally  # noqa: E402
+
+LINUX = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs Linux")
+
+
+def check(tally: Tally, count: int) -> None:
+    assert len(tally.entries) == count, tally.summary()
+    assert [(entry["trial"], entry["problems"]) for entry in tally.failures] == []
+
+
+@LINUX
+def test_scenes() -> None:
+    """Random scenes, baked, edited and restored."""
+    tally = Tally("scenes", None)
+    scenes.run_all(tally, range(16), workers=os.cpu_count() or 1)
+    check(tally, 16)
+    assert any(entry["outcome"] != "refused" for entry in tally.entries.values())
+
+
+@LINUX
+def test_damage(tmp_path: Path) -> None:
+    """A damaged file of each kind."""
+    tally = Tally("damage", None)
+    damage.run_all(tally, tmp_path, range(6), workers=1)
+    check(tally, 6)
+
+
+@LINUX
+def test_kills(tmp_path: Path) -> None:
+    tally = Tally("kills", None)
+    kills.run_all(tally, tmp_path / "sandbox", 4)
+    check(tally, 4)
+
+
+@LINUX
+def test_full_disk(tmp_path: Path) -> None:
+    """Where file systems can be mounted, which takes root."""
+    if not full_disk.can_mount():
+        pytest.skip("file systems cannot be mounted here")
+    log = ROOT / "out" / "reliability" / "disk-few.jsonl"
+    log.unlink(missing_ok=True)
+    assert full_disk.enter(["disk", "--count", "3", "--name", log.stem]) == 0, log.read_text()
+
+
+@LINUX
+def test_failing_calls() -> None:
+    """Every eighth call of each job, in a process whose audit hooks do not outlive it."""
+    code = (
+        "import os, sys, tempfile, radiosity_addon\n"
+        "from pathlib import Path\n"
+        "from tests.reliability import failing_calls\n"
+        "from tests.reliability.tally import Tally\n"
+        "radiosity_addon.register()\n"
+        "tally = Tally('calls', None)\n"
+        "with tempfile.TemporaryDirectory() as folder:\n"
+        f"    failing_calls.run_all(tally, Path(folder) / 'sandbox', 8, ({errno.ENOSPC},))\n"
+        "code = tally.finish()\n"
+        "os._exit(code)\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
+    assert "calls:" in done.stdout, done.stderr[-2000:]
+    assert done.returncode == 0, done.stderr[-3000:]
+
+
+def test_a_wrong_program_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The checks can fail: a bake that deletes a file is told by the tree, one that is half done by its report."""
+    from tests.reliability import folders
+
+    (tmp_path / "a.txt").write_text("mine")
+    before = folders.tree(tmp_path)
+    (tmp_path / "a.txt").unlink()
+    assert folders.changes(before, folders.tree(tmp_path)) == ["gone: a.txt"]
+    entry = '{"objects": [{"image": "l.exr"}], "solver": {}, "files": {"l.exr": {"sha256": "0"}}}'
+    (tmp_path / "report.json").write_text(entry)
+    assert folders.broken_result(tmp_path) == ["missing: l.exr", "missing image: l.exr"]
