@@ -15,7 +15,18 @@ import bpy
 from ..bake_scene import LIGHTMAP_UV_LAYER
 from ..solver.radiometry import brdf_of_reflectance, radiance_of_radiosity
 from .bake_record import is_made, mark_made
-from .copy_marks import COPY_NAME, FED, FED_BY, ORIGINAL, PLAIN, SAMPLING, TOKEN, copied_groups, mark_added, source_name
+from .copy_marks import (
+    COPY_NAME,
+    FED,
+    FED_BY,
+    ORIGINAL,
+    PLAIN,
+    SAMPLING,
+    TOKEN,
+    copied_groups,
+    mark_added,
+    source_name,
+)
 from .copy_record import record
 from .false_colors import false_colors
 from .image_marks import GROUP

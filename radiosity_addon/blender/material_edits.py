@@ -1,4 +1,4 @@
-"""Carry what the user edited on lightmap copies of materials to the originals: what is seen is what is edited.
+"""Carry edits of the lightmap copies of materials to the originals: what is seen is what is edited.
 
 Restore, exports and comparisons call `carry_edits` first, and treat the originals as the truth then.
 """
@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import re
 import uuid
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from typing import Any
 
 import bpy
 
@@ -23,7 +24,6 @@ from .copy_marks import (
     STATE,
     TOKEN,
     copied_groups,
-    is_copied_group,
 )
 from .copy_values import take_values, write_material, write_tree
 from .legacy_copies import is_legacy, was_edited
@@ -37,10 +37,10 @@ _SUFFIX = " (Lightmap)"
 def carry_edits() -> tuple[BakeWarning, ...]:
     """Make every original equal to what the user made of its lightmap copy.
 
-    An edit goes to the original, which stays the datablock it is where its nodes are still the same ones, and is
-    replaced everywhere by one with the new nodes where not. Where the original was edited too, where another
-    copy of it was edited differently, and where it is linked from a library, the copy's content becomes a
-    material of its own. Afterwards the copies' `radiosity_original` names the materials that hold what they show.
+    An edit goes to the original. That stays the datablock it is if the nodes are still the same; else it is
+    replaced everywhere by a datablock with the new nodes. The copy's content becomes a material of its own
+    where the original was edited too, where another copy of it was edited differently, and where it is linked
+    from a library. Afterwards `radiosity_original` of each copy is the material that holds what it shows.
 
     Returns
     -------
@@ -66,7 +66,7 @@ def _carry(copy: bpy.types.Material, is_duplicate: bool) -> list[BakeWarning]:
     if is_legacy(copy):
         return _carry_legacy(copy)
     original = copy.get(ORIGINAL)
-    shown, edited = copy.name, not copy[STATE] == digest(copy, as_copy=True)
+    shown, edited = copy.name, copy[STATE] != digest(copy, as_copy=True)
     if not edited and not is_duplicate and copy.name == copy[COPY_NAME]:
         take_marks(original, copy)
         return []
@@ -76,7 +76,9 @@ def _carry(copy: bpy.types.Material, is_duplicate: bool) -> list[BakeWarning]:
         stripped, complete = stripped_copy(copy)
         content = digest(stripped)
         if not complete:
-            message = f"material '{shown}': what feeds the lightmap's node has no place in its shader: it was left out"
+            message = (
+                f"material '{shown}': its shader cannot take what feeds the lightmap's node: edit the shader"
+            )
             warnings.append(BakeWarning(shown, message))
         same = content == copy[CONTENT] or (original is not None and content == digest(original))
         if same and not (is_duplicate and copy.users) and not (renamed and original is None):
@@ -197,7 +199,7 @@ def _carry_legacy(copy: bpy.types.Material) -> list[BakeWarning]:
     return [] if original is None else [_conflict("material", original, own)]
 
 
-def _replace(blocks: object, original: bpy.types.ID, by: bpy.types.ID) -> bpy.types.ID:
+def _replace(blocks: Any, original: bpy.types.ID, by: bpy.types.ID) -> bpy.types.ID:
     """Put a datablock in the place of another, which is removed: its name, its users and what marks it."""
     name = original.name
     original.user_remap(by)
@@ -210,7 +212,8 @@ def _replace(blocks: object, original: bpy.types.ID, by: bpy.types.ID) -> bpy.ty
 def _conflict(kind: str, original: bpy.types.ID, own: bpy.types.ID) -> BakeWarning:
     reason = "is linked from a library" if original.library is not None else "was edited differently, too"
     message = (
-        f"{kind} '{original.name}' was edited where it shows a lightmap, and {reason}: the edit is in '{own.name}'"
+        f"{kind} '{original.name}' was edited on its lightmap copy, and {reason}: "
+        f"the copy's edits are in '{own.name}'"
     )
     return BakeWarning(own.name, message)
 
