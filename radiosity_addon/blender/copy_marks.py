@@ -37,6 +37,9 @@ SOURCE = "radiosity_source"
 STATE = "radiosity_state"
 """On a copy: the digest of all of it when it was made."""
 
+CARRIED = "radiosity_carried"
+"""On a copied material of an earlier version: the digest of all of it when its edits were carried."""
+
 SOCKETS = "radiosity_sockets"
 """On a copied node group: the identifiers of the sockets that we added."""
 
@@ -64,6 +67,7 @@ COPY_MARKS = (
     CONTENT,
     SOURCE,
     STATE,
+    CARRIED,
     SOCKETS,
     MADE_MARKER,
     GROUP,

@@ -16,6 +16,7 @@ from ..bake_scene import BakeWarning
 from .asset_marks import take_marks
 from .bake_record import is_made
 from .copy_marks import (
+    CARRIED,
     CONTENT,
     COPY_NAME,
     ORIGINAL,
@@ -187,14 +188,17 @@ def _carry_group(copy: bpy.types.NodeTree) -> list[BakeWarning]:
 
 def _carry_legacy(copy: bpy.types.Material) -> list[BakeWarning]:
     """Carry the edits of a copy that a version made which noted nothing on copies."""
-    original = copy.get(ORIGINAL)
-    stripped, edited = was_edited(copy)
-    if not edited:
-        bpy.data.materials.remove(stripped)
+    content = digest(copy)
+    if copy.get(CARRIED) == content:
         return []
-    name = "Material" if original is None else original.name
-    own = stripped
-    own.name, own.use_fake_user = name, True
+    copy[CARRIED] = content
+    original = copy.get(ORIGINAL)
+    own, edited = was_edited(copy)
+    if not edited:
+        bpy.data.materials.remove(own)
+        return []
+    own.name = "Material" if original is None else original.name
+    own.use_fake_user = True
     copy[ORIGINAL] = own
     return [] if original is None else [_conflict("material", original, own)]
 
