@@ -13,6 +13,11 @@ import bpy
 from .bake_record import MADE_MARKER, is_made
 from .image_marks import GROUP
 
+SUFFIX = " (Lightmap)"
+"""What a copy's name ends with."""
+
+NO_MATERIAL = f"No Material{SUFFIX}"
+
 ORIGINAL = "radiosity_original"
 """On a copy: the material or node group that it is of; missing for a copy of no material."""
 

@@ -19,9 +19,11 @@ from .copy_marks import (
     COPY_NAME,
     FED,
     FED_BY,
+    NO_MATERIAL,
     ORIGINAL,
     PLAIN,
     SAMPLING,
+    SUFFIX,
     TOKEN,
     copied_groups,
     mark_added,
@@ -101,10 +103,10 @@ class LightmapMaterials:
     ) -> bpy.types.Material:
         """Build one copy."""
         if material is None:
-            copy = bpy.data.materials.new("No Material (Lightmap)")
+            copy = bpy.data.materials.new(NO_MATERIAL)
         else:
             copy = material.copy()
-            copy.name = f"{material.name} (Lightmap)"
+            copy.name = f"{material.name}{SUFFIX}"
             copy[ORIGINAL] = material
         mark_made(copy)
         copy[COPY_NAME], copy[TOKEN] = copy.name, uuid.uuid4().hex

@@ -19,10 +19,12 @@ from .copy_marks import (
     CARRIED,
     CONTENT,
     COPY_NAME,
+    NO_MATERIAL,
     ORIGINAL,
     PLAIN,
     SOURCE,
     STATE,
+    SUFFIX,
     TOKEN,
     copied_groups,
 )
@@ -31,8 +33,6 @@ from .legacy_copies import is_legacy, was_edited
 from .material_digest import digest, tree_digest
 from .materials import uses_nodes
 from .stripping import stripped_copy, stripped_group
-
-_SUFFIX = " (Lightmap)"
 
 
 def carry_edits() -> tuple[BakeWarning, ...]:
@@ -87,7 +87,7 @@ def _carry(copy: bpy.types.Material, is_duplicate: bool) -> list[BakeWarning]:
             if content != copy[CONTENT]:
                 copy[CONTENT], copy[SOURCE] = content, digest(original)
         elif original is None or is_duplicate:
-            name = "Material" if original is None else original.name
+            name = _name_of_own(copy) if original is None else original.name
             original = _as_own(copy, stripped, name, content)
         elif original.library is None and digest(original) == copy[SOURCE]:
             original = _move(copy, original, stripped, content)
@@ -97,7 +97,9 @@ def _carry(copy: bpy.types.Material, is_duplicate: bool) -> list[BakeWarning]:
             original = own
         copy[STATE] = digest(copy, as_copy=True)
     if original is not None and original.library is None and renamed:
-        original.name = _base_name(copy.name)
+        name = _base_name(copy.name)
+        copy.name = f"{name}{SUFFIX}"  # or the original could not have it
+        original.name = name
     copy[COPY_NAME] = copy.name
     take_marks(original, copy)
     return warnings
@@ -159,6 +161,12 @@ def _as_own(
     copy.pop(PLAIN, None)
     copy[CONTENT], copy[SOURCE] = content, digest(stripped)
     return stripped
+
+
+def _name_of_own(copy: bpy.types.Material) -> str:
+    """Return what to call the material that a copy of none, or of one that was deleted, becomes."""
+    name = _base_name(copy.name)
+    return "Material" if name == _base_name(NO_MATERIAL) else name
 
 
 def _carry_group(copy: bpy.types.NodeTree) -> list[BakeWarning]:
@@ -238,5 +246,5 @@ def _duplicates(copies: Sequence[bpy.types.Material]) -> set[bpy.types.Material]
 
 def _base_name(name: str) -> str:
     """Return the name that a copy's name says of its original's, whatever number Blender gave the copy."""
-    head, suffix, rest = name.rpartition(_SUFFIX)
+    head, suffix, rest = name.rpartition(SUFFIX)
     return head if suffix and re.fullmatch(r"(\.\d+)?", rest) else name
