@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import bpy
 
 _DETAILS = ("author", "description", "copyright", "license", "catalog_id")
@@ -16,8 +18,9 @@ def take_marks(target: bpy.types.ID | None, source: bpy.types.ID) -> None:
     if source.asset_data is None or target.asset_data is not None:
         return
     target.asset_mark()
+    given, taken = source.asset_data, cast(bpy.types.AssetMetaData, target.asset_data)
     for name in _DETAILS:
-        if hasattr(source.asset_data, name):
-            setattr(target.asset_data, name, getattr(source.asset_data, name))
-    for tag in source.asset_data.tags:
-        target.asset_data.tags.new(tag.name)
+        if hasattr(given, name):
+            setattr(taken, name, getattr(given, name))
+    for tag in given.tags:
+        taken.tags.new(tag.name)

@@ -1,7 +1,7 @@
 """What a lightmap copy of a material, or of a node group in it, says of itself, in custom properties.
 
-Every node that we add to a copied tree is marked. So is what it stands for, so that `stripping.py` can take all of it
-out again.
+Every node that we add to a copied tree is marked, with what it stands for, so that `stripping.py` can
+take all of it out again.
 """
 
 from __future__ import annotations
@@ -12,6 +12,11 @@ import bpy
 
 from .bake_record import MADE_MARKER, is_made
 from .image_marks import GROUP
+
+SUFFIX = " (Lightmap)"
+"""What a copy's name ends with."""
+
+NO_MATERIAL = f"No Material{SUFFIX}"
 
 ORIGINAL = "radiosity_original"
 """On a copy: the material or node group that it is of; missing for a copy of no material."""
@@ -37,6 +42,9 @@ SOURCE = "radiosity_source"
 STATE = "radiosity_state"
 """On a copy: the digest of all of it when it was made."""
 
+CARRIED = "radiosity_carried"
+"""On a copied material of an earlier version: the digest of all of it when its edits were carried."""
+
 SOCKETS = "radiosity_sockets"
 """On a copied node group: the identifiers of the sockets that we added."""
 
@@ -50,12 +58,25 @@ THROUGH = "radiosity_through"
 """On a node that we added: what feeds its first input fed, before, what it feeds."""
 
 FOLLOWS = "radiosity_follows"
-"""On a node that we added: node and socket whose constant it repeats, where it cannot feed that socket."""
+"""On a node that we added: node and input whose constant it repeats, where it cannot feed that."""
 
 FED, FED_BY = "radiosity_fed", "radiosity_fed_by"
-"""On the node of the lightmap group: the constants, and the sources, of base color and emission when it was made."""
+"""On the lightmap group's node: constants and sources of base color and emission when it was made."""
 
-COPY_MARKS = (ORIGINAL, COPY_NAME, TOKEN, SAMPLING, PLAIN, CONTENT, SOURCE, STATE, SOCKETS, MADE_MARKER, GROUP)
+COPY_MARKS = (
+    ORIGINAL,
+    COPY_NAME,
+    TOKEN,
+    SAMPLING,
+    PLAIN,
+    CONTENT,
+    SOURCE,
+    STATE,
+    CARRIED,
+    SOCKETS,
+    MADE_MARKER,
+    GROUP,
+)
 NODE_MARKS = (ADDED, VALUE, THROUGH, FOLLOWS, FED, FED_BY)
 
 

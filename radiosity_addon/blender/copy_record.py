@@ -1,4 +1,4 @@
-"""What a lightmap copy was when it was made, noted on it as digests: so edits are known later, also after reloading."""
+"""Digests on a lightmap copy of what it was when it was made, by which edits are known later."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .material_digest import digest, tree_digest
 
 
 def record(copy: bpy.types.Material) -> Callable[[], None]:
-    """Note what a fresh copy holds; what is returned completes the record once the lightmap is wired in."""
+    """Note what a fresh copy holds; the result completes the record once the lightmap is wired in."""
     original = copy.get(ORIGINAL)
     copy[CONTENT] = digest(copy)
     copy[SOURCE] = "" if original is None else digest(original)
@@ -25,12 +25,6 @@ def record(copy: bpy.types.Material) -> Callable[[], None]:
     return complete
 
 
-def note_same(copy: bpy.types.Material) -> None:
-    """Note that a copy and its original now have the same content."""
-    copy[SOURCE] = copy[CONTENT] = digest(copy[ORIGINAL])
-    copy[STATE] = digest(copy, as_copy=True)
-
-
 def is_untouched(copy: bpy.types.Material) -> bool:
-    """Whether nothing of a copied material was edited since it was recorded; its groups are not looked into."""
+    """Whether a copied material is as it was recorded; its node groups are not looked into."""
     return copy.get(STATE) == digest(copy, as_copy=True)

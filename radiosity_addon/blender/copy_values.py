@@ -1,4 +1,4 @@
-"""Write what one node tree or material holds into another of the same structure, which stays the datablock it is."""
+"""Write the values of a node tree or material into another one that has the same nodes."""
 
 from __future__ import annotations
 
@@ -7,32 +7,35 @@ from typing import Any
 import bpy
 
 from .copy_marks import COPY_MARKS, FOLLOWS, NODE_MARKS, VALUE, is_copied_group
-from .material_digest import animation_of, links_of, properties_of_material, properties_of_node
-
-OUTPUTS_WITH_VALUES = {"RGB", "VALUE", "NORMAL"}
+from .material_digest import (
+    OUTPUTS_WITH_VALUES,
+    animation_of,
+    links_of,
+    properties_of_material,
+    properties_of_node,
+)
 
 
 def write_material(target: bpy.types.Material, source: bpy.types.Material) -> bool:
-    """Give a material all that another one holds; False, with some of it done, where that needs other nodes."""
+    """Give a material what another one holds; False, with some of it done, where that takes other nodes."""
     if not write_tree(target.node_tree, source.node_tree):
         return False
     return _attempt(lambda: _write_settings(target, source))
 
 
 def write_tree(target: bpy.types.NodeTree, source: bpy.types.NodeTree) -> bool:
-    """Give a tree the values of another one; False, with some of it done, where that needs other nodes."""
+    """Give a tree the values of another one; False, with some of it done, where that takes other nodes."""
     if {n.name: n.bl_idname for n in target.nodes} != {n.name: n.bl_idname for n in source.nodes}:
         return False
     if links_of(target) != links_of(source) or animation_of(target) != animation_of(source):
         return False
 
-    def write() -> bool:
-        return all([_write_node(node, source.nodes[node.name]) for node in target.nodes])
-
-    return _attempt(write)
+    return _attempt(lambda: all(_write_node(node, source.nodes[node.name]) for node in target.nodes))
 
 
-def take_values(copy: bpy.types.NodeTree, original: bpy.types.NodeTree, sockets: set[str] | None = None) -> None:
+def take_values(
+    copy: bpy.types.NodeTree, original: bpy.types.NodeTree, sockets: set[str] | None = None
+) -> None:
     """Give the constants of a lightmap copy's tree the values that those of its original have now.
 
     Parameters
@@ -114,21 +117,18 @@ def _write(target: Any, source: Any, names: tuple[str, ...]) -> bool:
         if kind == "COLLECTION":
             if len(old) != len(new) and not _resize(old, new):
                 return False
-            pairs = zip(old, new, strict=True)
-            if not all([_write(one, other, _writable(other)) for one, other in pairs]):
+            if not all(
+                _write(one, other, properties_of_node(other)) for one, other in zip(old, new, strict=True)
+            ):
                 return False
         elif kind == "POINTER" and not isinstance(new or old, bpy.types.ID):
-            if new is not None and (old is None or not _write(old, new, _writable(new))):
+            if new is not None and (old is None or not _write(old, new, properties_of_node(new))):
                 return False
         elif not _equal(old, new):
             setattr(target, name, new)
     if isinstance(target, bpy.types.CurveMapping):
         target.update()
     return True
-
-
-def _writable(struct: Any) -> tuple[str, ...]:
-    return properties_of_node(struct)
 
 
 def _resize(old: Any, new: Any) -> bool:
@@ -144,13 +144,12 @@ def _resize(old: Any, new: Any) -> bool:
 
 
 def _write_custom(target: Any, source: Any, marks: tuple[str, ...]) -> None:
-    known = source.bl_rna.properties
-    for key in [key for key in target.keys() if key not in marks and key not in known]:
-        if key not in source.keys():
-            del target[key]
-    for key in source.keys():
-        if key not in marks and key not in known:
-            target[key] = source[key]
+    without = {*marks, *source.bl_rna.properties.keys()}
+    wanted = set(source.keys())
+    for key in set(target.keys()) - wanted - without:
+        del target[key]
+    for key in wanted - without:
+        target[key] = source[key]
 
 
 def _equal(old: Any, new: Any) -> bool:

@@ -1,6 +1,6 @@
-"""Lightmap copies of earlier versions, which hold no record: what the lightmap added is recognized by its kind.
+"""Lightmap copies of earlier versions: without a record, what the lightmap added is recognized by its kind.
 
-In them the constants of base color and emission are written into the lightmap's node, and the shader is not linked.
+The lightmap's node holds the constants of base color and emission, and the shader is not linked.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ def is_legacy(copy: bpy.types.Material) -> bool:
 def was_edited(copy: bpy.types.Material) -> tuple[bpy.types.Material, bool]:
     """Return a new material with what a copy holds without the lightmap, and whether the user edited it.
 
-    Where copy and original differ, and the copy's shader still agrees with what the lightmap's node was given of
-    it, the original was edited and not the copy. In doubt the copy was.
+    Where they differ, and the copy's shader agrees with the constants in the lightmap's node, the original
+    was edited and not the copy. In doubt the copy was.
     """
     original = copy.get(ORIGINAL)
     stripped = copy.copy()
@@ -47,7 +47,7 @@ def was_edited(copy: bpy.types.Material) -> tuple[bpy.types.Material, bool]:
         stripped.cycles.emission_sampling = original.cycles.emission_sampling
     own, wanted = _constants(stripped.node_tree), _constants(tree)
     agrees = shown is None or own is None or _are_close(own, shown)
-    if not agrees and wanted is not None and _are_close(own, wanted):
+    if not agrees and own is not None and _are_close(own, wanted):
         _set_constants(stripped.node_tree, own, shown)  # the node was edited, which shows
     if digest(stripped) == digest(original):
         return stripped, False
@@ -82,7 +82,7 @@ def _shown(tree: bpy.types.NodeTree) -> Constants | None:
 
 
 def _main(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
-    """Return the shader at a tree's output, if it is one whose constants were written into the lightmap's node."""
+    """Return the shader at a tree's output, if its constants were written into the lightmap's node."""
     for output in tree.nodes:
         if output.type == "OUTPUT_MATERIAL":
             node = feed_of(output.inputs["Surface"], enter_groups=False).node

@@ -15,7 +15,20 @@ import bpy
 from ..bake_scene import LIGHTMAP_UV_LAYER
 from ..solver.radiometry import brdf_of_reflectance, radiance_of_radiosity
 from .bake_record import is_made, mark_made
-from .copy_marks import COPY_NAME, FED, FED_BY, ORIGINAL, PLAIN, SAMPLING, TOKEN, copied_groups, mark_added, source_name
+from .copy_marks import (
+    COPY_NAME,
+    FED,
+    FED_BY,
+    NO_MATERIAL,
+    ORIGINAL,
+    PLAIN,
+    SAMPLING,
+    SUFFIX,
+    TOKEN,
+    copied_groups,
+    mark_added,
+    source_name,
+)
 from .copy_record import record
 from .false_colors import false_colors
 from .image_marks import GROUP
@@ -90,10 +103,10 @@ class LightmapMaterials:
     ) -> bpy.types.Material:
         """Build one copy."""
         if material is None:
-            copy = bpy.data.materials.new("No Material (Lightmap)")
+            copy = bpy.data.materials.new(NO_MATERIAL)
         else:
             copy = material.copy()
-            copy.name = f"{material.name} (Lightmap)"
+            copy.name = f"{material.name}{SUFFIX}"
             copy[ORIGINAL] = material
         mark_made(copy)
         copy[COPY_NAME], copy[TOKEN] = copy.name, uuid.uuid4().hex

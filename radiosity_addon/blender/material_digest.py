@@ -1,13 +1,14 @@
-"""Digests of all that a user can edit in a material or a node group: equal ones look equal and work equally.
+"""Digests of all that a user can edit in a material or a node group.
 
-Names, places of nodes, selections and panels that are open do not count. Node groups and images count by name.
+The name, places of nodes, selections and open panels do not count. Node groups and images count by name.
 """
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cache
+from operator import attrgetter
 from typing import Any, TypeAlias
 
 import bpy
@@ -20,14 +21,21 @@ from .copy_marks import (
     is_added,
     is_copied_group,
 )
-from .keyed_paths import curves
+from .keyed_paths import curves, path_of
 from .materials import uses_nodes
 from .node_group import BASE_COLOR, EMISSION
 
 Reader: TypeAlias = Callable[[Any], Any]
+Readers: TypeAlias = tuple[Reader, tuple[tuple[str, Reader], ...]]
+
+_NAME, _IDENTIFIER = attrgetter("name"), attrgetter("identifier")
+_LINK = attrgetter(
+    "from_node.name", "from_socket.identifier", "to_node.name", "to_socket.identifier", "is_muted"
+)
+_UI = ("active_", "show_", "bl_")
 
 _SIMPLE = frozenset((bool, int, float, str, type(None)))
-_OUTPUTS_WITH_VALUES = {"RGB", "VALUE", "NORMAL"}
+OUTPUTS_WITH_VALUES = {"RGB", "VALUE", "NORMAL"}
 
 _NOT_CONTENT = frozenset(
     (
@@ -36,7 +44,7 @@ _NOT_CONTENT = frozenset(
         "library_weak_reference", "override_library", "original", "texture_paint_images",
         "texture_paint_slots", "paint_active_slot", "paint_clone_slot", "preview_render_type",
         "use_preview_world", "select", "parent", "index", "position", "frame_current", "inspection_index",
-        "paired_output", "internal_links", "inputs", "outputs",
+        "paired_output", "internal_links", "inputs", "outputs", "is_valid",
     )
 )  # fmt: skip
 
@@ -64,27 +72,18 @@ def tree_digest(tree: bpy.types.NodeTree, as_copy: bool = False) -> str:
 
 def links_of(tree: bpy.types.NodeTree) -> list[tuple[str, str, str, str, bool]]:
     """Return the links of a tree, by names of nodes and identifiers of sockets, sorted."""
-    return sorted(
-        (
-            link.from_node.name,
-            link.from_socket.identifier,
-            link.to_node.name,
-            link.to_socket.identifier,
-            link.is_muted,
-        )
-        for link in tree.links
-    )
+    return sorted(map(_LINK, tree.links))
 
 
 def properties_of_material(material: bpy.types.Material) -> tuple[str, ...]:
     """Return the names of a material's properties that count."""
-    return tuple(name for name, _ in _readers(type(material), _NOT_CONTENT))
+    return _names(type(material), _NOT_CONTENT)
 
 
 def properties_of_node(struct: bpy.types.bpy_struct) -> tuple[str, ...]:
     """Return the names of the properties of a node, or of a struct in it, that count."""
     without = _BASE_NODE if isinstance(struct, bpy.types.Node) else _NOT_CONTENT - {"name"}
-    return tuple(name for name, _ in _readers(type(struct), without))
+    return _names(type(struct), without)
 
 
 def animation_of(tree: bpy.types.NodeTree) -> Any:
@@ -97,39 +96,50 @@ def _hash(content: Any) -> str:
 
 
 def _tree(tree: bpy.types.NodeTree, as_copy: bool) -> list[Any]:
-    nodes = [_node(node, as_copy) for node in sorted(tree.nodes, key=lambda node: node.name)]
+    keyed = {curve.data_path for curve in curves(tree)}
+    nodes = [_node(node, as_copy, keyed) for node in sorted(tree.nodes, key=_NAME)]
     return [nodes, links_of(tree), _animation(tree)]
 
 
-def _node(node: bpy.types.Node, as_copy: bool) -> list[Any]:
+def _node(node: bpy.types.Node, as_copy: bool, keyed: set[str]) -> list[Any]:
     kind = node.type
     if as_copy and is_added(node):
-        value = list(_plain(node.outputs[0].default_value)) if kind == "RGB" else None
-        if kind == "VALUE":
-            value = [node.outputs[0].default_value]
-        if node.get(FED) is not None:
-            value = [list(node.inputs[name].default_value) for name in (BASE_COLOR, EMISSION)]
-        return [node.name, kind, value]
-    content = [node.name, node.bl_idname, node.label, node.mute]
-    for identifier, read in _readers(type(node), _BASE_NODE):
+        return [node.name, kind, _values(_settable(node), keyed)]
+    content: list[Any] = [node.name, node.bl_idname, node.label, node.mute]
+    simple, others = _readers(type(node), _BASE_NODE)
+    content.append(simple(node))
+    for identifier, read in others:
         value = getattr(node, identifier)
         if as_copy and kind == "GROUP" and identifier == "node_tree" and is_copied_group(value):
             value = value[ORIGINAL]
         content.append(read(value))
-    content.append([(socket.identifier, _value(socket)) for socket in node.inputs])
-    if kind in _OUTPUTS_WITH_VALUES:
-        content.append([_value(socket) for socket in node.outputs])
+    inputs = node.inputs
+    content += [list(map(_IDENTIFIER, inputs)), _values(inputs, keyed)]
+    if kind in OUTPUTS_WITH_VALUES:
+        content.append(_values(node.outputs, keyed))
     if node.keys():
         content.append(_custom(node, NODE_MARKS))
     return content
 
 
-_BASE_NODE = frozenset(prop.identifier for prop in bpy.types.Node.bl_rna.properties) | _NOT_CONTENT - {"node_tree"}
+def _settable(node: bpy.types.Node) -> list[bpy.types.NodeSocket]:
+    """Return those sockets of a node of ours whose values the user may want to set."""
+    if node.get(FED) is not None:
+        return [node.inputs[BASE_COLOR], node.inputs[EMISSION]]
+    return list(node.outputs) if node.type in OUTPUTS_WITH_VALUES else []
 
 
-def _value(socket: bpy.types.NodeSocket) -> Any:
-    value = getattr(socket, "default_value", None)
-    return value if type(value) in _SIMPLE else _plain(value)
+def _values(sockets: Any, keyed: set[str]) -> list[Any]:
+    """Return sockets' constants, but for those that keyframes and drivers move."""
+    if keyed:
+        sockets = [socket for socket in sockets if path_of(socket) not in keyed]
+    values = [getattr(socket, "default_value", None) for socket in sockets]
+    return [value if type(value) in _SIMPLE else _plain(value) for value in values]
+
+
+_BASE_NODE = frozenset(prop.identifier for prop in bpy.types.Node.bl_rna.properties) | _NOT_CONTENT - {
+    "node_tree"
+}
 
 
 def _interface(tree: bpy.types.NodeTree) -> list[Any]:
@@ -139,7 +149,8 @@ def _interface(tree: bpy.types.NodeTree) -> list[Any]:
 def _custom(owner: Any, marks: tuple[str, ...]) -> list[tuple[str, Any]]:
     """Return the custom properties, but for ours and those that are registered."""
     known = owner.bl_rna.properties
-    return [(key, _plain(owner[key])) for key in sorted(owner.keys()) if key not in marks and key not in known]
+    keys = [key for key in sorted(owner.keys()) if key not in marks and key not in known]
+    return [(key, _plain(owner[key])) for key in keys]
 
 
 def _animation(owner: bpy.types.ID) -> Any:
@@ -155,35 +166,50 @@ def _animation(owner: bpy.types.ID) -> Any:
     return [action, moved, drivers, [track.name for track in data.nla_tracks]]
 
 
-def _read(struct: Any, without: frozenset[str]) -> list[tuple[str, Any]]:
+def _read(struct: Any, without: frozenset[str]) -> list[Any]:
     """Return what a struct's properties hold."""
-    return [(name, read(getattr(struct, name))) for name, read in _readers(type(struct), without)]
+    simple, others = _readers(type(struct), without)
+    return [simple(struct), *(read(getattr(struct, name)) for name, read in others)]
 
 
-def _readers(kind: type, without: frozenset[str]) -> tuple[tuple[str, Reader], ...]:
+def _readers(kind: Any, without: frozenset[str]) -> Readers:
     # Properties can be registered at any time.
     return _readers_of(kind, without, len(kind.bl_rna.properties))
 
 
-@lru_cache(maxsize=None)
-def _readers_of(kind: type, without: frozenset[str], _: int) -> tuple[tuple[str, Reader], ...]:
-    """Return the properties of a kind of struct that count, and how each is read."""
-    found: list[tuple[str, Reader]] = []
+@cache
+def _readers_of(kind: Any, without: frozenset[str], _: int) -> Readers:
+    """Return how to get the plain properties of a kind of struct that count, and each of the others."""
+    plain: list[str] = []
+    others: list[tuple[str, Reader]] = []
     for prop in kind.bl_rna.properties:
         name = prop.identifier
-        if name in without or name.startswith(("active_", "show_", "bl_")):
+        if name in without or name.startswith(_UI):
             continue
         if prop.type == "COLLECTION":
-            found.append((name, _items))
+            others.append((name, _items))
         elif prop.type == "POINTER":
-            found.append((name, _pointer))
-        elif not prop.is_readonly:
-            found.append((name, _plain if getattr(prop, "is_array", False) or prop.type == "ENUM" else _same))
+            others.append((name, _pointer))
+        elif prop.is_readonly:
+            continue
+        elif getattr(prop, "is_array", False) or getattr(prop, "is_enum_flag", False):
+            others.append((name, _plain))
+        else:
+            plain.append(name)
+    return (attrgetter(*plain) if plain else _nothing), tuple(others)
+
+
+def _names(kind: Any, without: frozenset[str]) -> tuple[str, ...]:
+    found = []
+    for prop in kind.bl_rna.properties:
+        counts = prop.type in ("COLLECTION", "POINTER") or not prop.is_readonly
+        if counts and prop.identifier not in without and not prop.identifier.startswith(_UI):
+            found.append(prop.identifier)
     return tuple(found)
 
 
-def _same(value: Any) -> Any:
-    return value
+def _nothing(_: Any) -> None:
+    return None
 
 
 def _items(values: Any) -> list[Any]:

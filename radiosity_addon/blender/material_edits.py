@@ -1,4 +1,4 @@
-"""Carry what the user edited on lightmap copies of materials to the originals: what is seen is what is edited.
+"""Carry edits of the lightmap copies of materials to the originals: what is seen is what is edited.
 
 Restore, exports and comparisons call `carry_edits` first, and treat the originals as the truth then.
 """
@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import re
 import uuid
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from typing import Any
 
 import bpy
 
@@ -15,15 +16,17 @@ from ..bake_scene import BakeWarning
 from .asset_marks import take_marks
 from .bake_record import is_made
 from .copy_marks import (
+    CARRIED,
     CONTENT,
     COPY_NAME,
+    NO_MATERIAL,
     ORIGINAL,
     PLAIN,
     SOURCE,
     STATE,
+    SUFFIX,
     TOKEN,
     copied_groups,
-    is_copied_group,
 )
 from .copy_values import take_values, write_material, write_tree
 from .legacy_copies import is_legacy, was_edited
@@ -31,16 +34,14 @@ from .material_digest import digest, tree_digest
 from .materials import uses_nodes
 from .stripping import stripped_copy, stripped_group
 
-_SUFFIX = " (Lightmap)"
-
 
 def carry_edits() -> tuple[BakeWarning, ...]:
     """Make every original equal to what the user made of its lightmap copy.
 
-    An edit goes to the original, which stays the datablock it is where its nodes are still the same ones, and is
-    replaced everywhere by one with the new nodes where not. Where the original was edited too, where another
-    copy of it was edited differently, and where it is linked from a library, the copy's content becomes a
-    material of its own. Afterwards the copies' `radiosity_original` names the materials that hold what they show.
+    An edit goes to the original. That stays the datablock it is if the nodes are still the same; else it is
+    replaced everywhere by a datablock with the new nodes. The copy's content becomes a material of its own
+    where the original was edited too, where another copy of it was edited differently, and where it is linked
+    from a library. Afterwards `radiosity_original` of each copy is the material that holds what it shows.
 
     Returns
     -------
@@ -66,7 +67,7 @@ def _carry(copy: bpy.types.Material, is_duplicate: bool) -> list[BakeWarning]:
     if is_legacy(copy):
         return _carry_legacy(copy)
     original = copy.get(ORIGINAL)
-    shown, edited = copy.name, not copy[STATE] == digest(copy, as_copy=True)
+    shown, edited = copy.name, copy[STATE] != digest(copy, as_copy=True)
     if not edited and not is_duplicate and copy.name == copy[COPY_NAME]:
         take_marks(original, copy)
         return []
@@ -76,7 +77,9 @@ def _carry(copy: bpy.types.Material, is_duplicate: bool) -> list[BakeWarning]:
         stripped, complete = stripped_copy(copy)
         content = digest(stripped)
         if not complete:
-            message = f"material '{shown}': what feeds the lightmap's node has no place in its shader: it was left out"
+            message = (
+                f"material '{shown}': its shader cannot take what feeds the lightmap's node: edit the shader"
+            )
             warnings.append(BakeWarning(shown, message))
         same = content == copy[CONTENT] or (original is not None and content == digest(original))
         if same and not (is_duplicate and copy.users) and not (renamed and original is None):
@@ -84,7 +87,7 @@ def _carry(copy: bpy.types.Material, is_duplicate: bool) -> list[BakeWarning]:
             if content != copy[CONTENT]:
                 copy[CONTENT], copy[SOURCE] = content, digest(original)
         elif original is None or is_duplicate:
-            name = "Material" if original is None else original.name
+            name = _name_of_own(copy) if original is None else original.name
             original = _as_own(copy, stripped, name, content)
         elif original.library is None and digest(original) == copy[SOURCE]:
             original = _move(copy, original, stripped, content)
@@ -94,7 +97,9 @@ def _carry(copy: bpy.types.Material, is_duplicate: bool) -> list[BakeWarning]:
             original = own
         copy[STATE] = digest(copy, as_copy=True)
     if original is not None and original.library is None and renamed:
-        original.name = _base_name(copy.name)
+        name = _base_name(copy.name)
+        copy.name = f"{name}{SUFFIX}"  # or the original could not have it
+        original.name = name
     copy[COPY_NAME] = copy.name
     take_marks(original, copy)
     return warnings
@@ -158,6 +163,12 @@ def _as_own(
     return stripped
 
 
+def _name_of_own(copy: bpy.types.Material) -> str:
+    """Return what to call the material that a copy of none, or of one that was deleted, becomes."""
+    name = _base_name(copy.name)
+    return "Material" if name == _base_name(NO_MATERIAL) else name
+
+
 def _carry_group(copy: bpy.types.NodeTree) -> list[BakeWarning]:
     """Carry the edits of our copy of a node group."""
     if copy.get(STATE) is None or copy[STATE] == tree_digest(copy, as_copy=True):
@@ -185,19 +196,22 @@ def _carry_group(copy: bpy.types.NodeTree) -> list[BakeWarning]:
 
 def _carry_legacy(copy: bpy.types.Material) -> list[BakeWarning]:
     """Carry the edits of a copy that a version made which noted nothing on copies."""
-    original = copy.get(ORIGINAL)
-    stripped, edited = was_edited(copy)
-    if not edited:
-        bpy.data.materials.remove(stripped)
+    content = digest(copy)
+    if copy.get(CARRIED) == content:
         return []
-    name = "Material" if original is None else original.name
-    own = stripped
-    own.name, own.use_fake_user = name, True
+    copy[CARRIED] = content
+    original = copy.get(ORIGINAL)
+    own, edited = was_edited(copy)
+    if not edited:
+        bpy.data.materials.remove(own)
+        return []
+    own.name = "Material" if original is None else original.name
+    own.use_fake_user = True
     copy[ORIGINAL] = own
     return [] if original is None else [_conflict("material", original, own)]
 
 
-def _replace(blocks: object, original: bpy.types.ID, by: bpy.types.ID) -> bpy.types.ID:
+def _replace(blocks: Any, original: bpy.types.ID, by: bpy.types.ID) -> bpy.types.ID:
     """Put a datablock in the place of another, which is removed: its name, its users and what marks it."""
     name = original.name
     original.user_remap(by)
@@ -210,7 +224,8 @@ def _replace(blocks: object, original: bpy.types.ID, by: bpy.types.ID) -> bpy.ty
 def _conflict(kind: str, original: bpy.types.ID, own: bpy.types.ID) -> BakeWarning:
     reason = "is linked from a library" if original.library is not None else "was edited differently, too"
     message = (
-        f"{kind} '{original.name}' was edited where it shows a lightmap, and {reason}: the edit is in '{own.name}'"
+        f"{kind} '{original.name}' was edited on its lightmap copy, and {reason}: "
+        f"the copy's edits are in '{own.name}'"
     )
     return BakeWarning(own.name, message)
 
@@ -231,5 +246,5 @@ def _duplicates(copies: Sequence[bpy.types.Material]) -> set[bpy.types.Material]
 
 def _base_name(name: str) -> str:
     """Return the name that a copy's name says of its original's, whatever number Blender gave the copy."""
-    head, suffix, rest = name.rpartition(_SUFFIX)
+    head, suffix, rest = name.rpartition(SUFFIX)
     return head if suffix and re.fullmatch(r"(\.\d+)?", rest) else name

@@ -66,7 +66,8 @@ def _declare_sockets(tree: bpy.types.NodeTree) -> None:
 def _declare_surface(tree: bpy.types.NodeTree) -> None:
     """Give the group the input that holds the material's own shader."""
     tip = "The material's own shader, which was baked"
-    socket = tree.interface.new_socket(SURFACE, description=tip, in_out="INPUT", socket_type="NodeSocketShader")
+    kind = "NodeSocketShader"
+    socket = tree.interface.new_socket(SURFACE, description=tip, in_out="INPUT", socket_type=kind)
     tree.interface.move(socket, 0)
 
 

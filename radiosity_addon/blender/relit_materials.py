@@ -35,7 +35,7 @@ def refresh(names: Collection[str]) -> None:
 
 
 def show_emission(names: Collection[str]) -> None:
-    """Have the copies of some materials glow as their originals do, as far as constants of shaders say it: fast."""
+    """Have the copies of some materials glow as their originals do, as far as shaders' constants say it."""
     for copy, original in lightmap_copies(names):
         _take(copy, original, _EMISSION_SOCKETS)
 

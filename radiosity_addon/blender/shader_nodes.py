@@ -98,8 +98,8 @@ def feed_of(socket: bpy.types.NodeSocket, stack: Stack = (), enter_groups: bool 
 def passed_through(node: bpy.types.Node, output: bpy.types.NodeSocket) -> bpy.types.NodeSocket | None:
     """Return the input that a muted node, or a reroute, passes on at an output; None where it is nothing.
 
-    Blender decides which: of a muted Mix Shader the first shader, or the second where that alone is linked; of
-    shaders that only emit or scatter none, so that they are black.
+    Blender decides which: of a muted Mix Shader the first shader, or the second where that alone is linked;
+    of shaders that only emit or scatter none, so that they are black.
     """
     if node.type == "REROUTE":
         return node.inputs[0]

@@ -1,4 +1,4 @@
-"""Take what shows the lightmap out of a copied material again: what is left is the original, as the user edited it."""
+"""Take what shows the lightmap out of a copied material: the original is left, as the user edited it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import bpy
 
 from .bake_record import is_made
 from .copy_marks import (
-    ADDED,
     COPY_MARKS,
     FED,
     FED_BY,
@@ -54,10 +53,10 @@ def stripped_copy(copy: bpy.types.Material) -> tuple[bpy.types.Material, bool]:
 def stripped_group(copy: bpy.types.NodeTree) -> bpy.types.NodeTree:
     """Return a new node group with what our copy of one holds, without what we added."""
     group = copy.copy()
-    strip_tree(group)
     added = set(group.get(SOCKETS, ()))
     for item in [item for item in group.interface.items_tree if getattr(item, "identifier", None) in added]:
         group.interface.remove(item)
+    strip_tree(group)
     for name in COPY_MARKS:
         group.pop(name, None)
     return group
@@ -65,7 +64,9 @@ def stripped_group(copy: bpy.types.NodeTree) -> bpy.types.NodeTree:
 
 def strip_tree(tree: bpy.types.NodeTree) -> bool:
     """Remove our nodes from a tree and connect the user's as they were; see `stripped_copy`."""
-    complete = all([_keep_overrides(tree, node) for node in tree.nodes if is_lightmap_node(node)])
+    complete = True
+    for node in [node for node in tree.nodes if is_lightmap_node(node)]:
+        complete = _keep_overrides(tree, node) and complete
     for node in [node for node in tree.nodes if VALUE in node.keys() and is_added(node)]:  # noqa: SIM118
         _put_value_back(tree, node)
     added = {node.name for node in tree.nodes if is_added(node)}
@@ -120,7 +121,7 @@ def _behind_mix(node: bpy.types.Node) -> bpy.types.Node:
 
 
 def _put_value_back(tree: bpy.types.NodeTree, node: bpy.types.Node) -> None:
-    """Put the value of one of our nodes into the socket that it stands for; a node used otherwise is the user's."""
+    """Put the value of a node of ours into the socket it stands for; one used differently is the user's."""
     output = node.outputs[0]
     targets = [link.to_socket for link in output.links if not is_added(link.to_node)]
     if len(targets) > 1 or any(target.type != output.type for target in targets):
@@ -144,8 +145,8 @@ def _values(socket: bpy.types.NodeSocket) -> list[float]:
 
 def _keep_overrides(tree: bpy.types.NodeTree, node: bpy.types.Node) -> bool:
     """Give the shader what the user fed the lightmap's node instead; False where no shader can take it."""
-    feed = feed_of(node.inputs[SURFACE], enter_groups=False)
-    base, color, strength = COLORS.get(feed.node.type, (None,) * 3) if feed.node is not None else (None,) * 3
+    shader = feed_of(node.inputs[SURFACE], enter_groups=False).node
+    base, color, strength = (None,) * 3 if shader is None else COLORS.get(shader.type, (None,) * 3)
     constants, sources = list(node.get(FED, ())), list(node.get(FED_BY, ("", "")))
     complete = True
     for name, wanted, before, source_before in (
@@ -155,12 +156,12 @@ def _keep_overrides(tree: bpy.types.NodeTree, node: bpy.types.Node) -> bool:
         given = node.inputs[name]
         if given.is_linked and source_name(given) == source_before:
             continue
-        own = None if wanted is None else feed.node.inputs[wanted]
+        own = None if shader is None or wanted is None else shader.inputs[wanted]
         source = feed_of(given, enter_groups=False)
         if source.node is None:
             if given.is_linked or not before or _values(given) == before:
                 continue
-        elif is_added(source.node) or _is_extra(source) or _same_feed(own, source.socket):
+        elif is_added(source.node) or _is_extra(source.socket) or _same_feed(own, source.socket):
             continue
         if own is None:
             complete = False
@@ -171,17 +172,17 @@ def _keep_overrides(tree: bpy.types.NodeTree, node: bpy.types.Node) -> bool:
             tree.links.new(source.socket, own)
         else:
             own.default_value = given.default_value
-        if name == EMISSION and strength is not None:
-            for link in list(feed.node.inputs[strength].links):
+        if name == EMISSION and shader is not None and strength is not None:
+            for link in list(shader.inputs[strength].links):
                 tree.links.remove(link)
-            feed.node.inputs[strength].default_value = 1.0
+            shader.inputs[strength].default_value = 1.0
     return complete
 
 
-def _is_extra(feed: object) -> bool:
-    """Whether a node group puts something out for us only."""
-    tree = feed.node.node_tree if feed.node.type == "GROUP" else None
-    return tree is not None and feed.socket.identifier in tree.get(SOCKETS, ())
+def _is_extra(output: bpy.types.NodeSocket) -> bool:
+    """Whether an output of a node group is there for us only."""
+    tree = output.node.node_tree if output.node.type == "GROUP" else None
+    return tree is not None and output.identifier in tree.get(SOCKETS, ())
 
 
 def _same_feed(own: bpy.types.NodeSocket | None, source: bpy.types.NodeSocket) -> bool:

@@ -219,8 +219,8 @@ def _mix_colors(
     node = tree.nodes.new("ShaderNodeMix")
     node.data_type = "RGBA"
     feed_float(tree, socket_by_identifier(node.inputs, "Factor_Float"), factor)
-    feed_float(tree, socket_by_identifier(node.inputs, "A_Color"), first)
-    feed_float(tree, socket_by_identifier(node.inputs, "B_Color"), second)
+    feed_color(tree, socket_by_identifier(node.inputs, "A_Color"), first)
+    feed_color(tree, socket_by_identifier(node.inputs, "B_Color"), second)
     return socket_by_identifier(node.outputs, "Result_Color")
 
 
@@ -246,6 +246,6 @@ def _add_colors(tree: bpy.types.NodeTree, first: ColorSource, second: ColorSourc
         return first
     node = tree.nodes.new("ShaderNodeVectorMath")
     node.operation = "ADD"
-    feed_float(tree, node.inputs[0], first)
-    feed_float(tree, node.inputs[1], second)
+    feed_color(tree, node.inputs[0], first)
+    feed_color(tree, node.inputs[1], second)
     return node.outputs["Vector"]

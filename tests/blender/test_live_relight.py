@@ -200,4 +200,5 @@ def test_emission_that_varies_follows_its_slider(saved: Path, tmp_path: Path) ->
     (group,) = (node for node in slot.material.node_tree.nodes if node.type == "GROUP")
     (link,) = group.inputs[EMISSION].links
     assert link.from_node.type == "VECT_MATH"
-    assert link.from_node.inputs["Scale"].default_value == 9.0
+    (strength,) = link.from_node.inputs["Scale"].links
+    assert strength.from_socket.default_value == 9.0

@@ -221,7 +221,7 @@ CASES: dict[str, Callable[[Tree], Socket]] = {
 
 @pytest.mark.parametrize("case", CASES)
 def test_bake_and_picture_agree_with_cycles(case: str, tmp_path: Path) -> None:
-    """A square under a sky of radiance 1 shows reflectance + emission, and so does it with a lightmap of 1."""
+    """Under a sky of radiance 1 a square shows reflectance + emission; so it does with a lightmap of 1."""
     material = bpy.data.materials.new("Case")
     tree = with_nodes(material)
     tree.links.new(CASES[case](tree), tree.nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])

@@ -104,7 +104,9 @@ def glowing() -> list[float]:
     """What the panel's lightmap material adds of its own."""
     (material,) = (slot.material for slot in bpy.data.objects["Panel"].material_slots)
     (group,) = (node for node in material.node_tree.nodes if node.type == "GROUP")
-    return list(group.inputs[EMISSION].default_value)[:3]
+    (scaled,) = (link.from_node for link in group.inputs[EMISSION].links)
+    color, strength = (scaled.inputs[name].links[0].from_socket for name in ("Vector", "Scale"))
+    return [component * strength.default_value for component in color.default_value[:3]]
 
 
 def files(path: Path) -> dict[str, bytes]:
