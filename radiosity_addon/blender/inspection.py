@@ -22,7 +22,7 @@ from ..foresight import Foresight, Lit
 from ..lightmap.greedy import greedy_object, share_of
 from ..settings import BakeSettings
 from .collect import Collected, Piece, collect
-from .export import chosen_pieces
+from .export import check_names, chosen_pieces
 from .materials import uses_nodes
 from .mesh_arrays import world_from_object
 from .object_roles import BAKEABLE_TYPES
@@ -125,6 +125,7 @@ def inspect(context: bpy.types.Context, settings: BakeSettings, folder: Path | N
         collected = collect(depsgraph, factors, settings)
     findings = [Finding(WARNING, warning.name, warning.message) for warning in edited]
     try:
+        check_names(context, collected.pieces, settings)
         chosen = chosen_pieces(context, collected.pieces, settings.objects)
     except RadiosityError as error:
         chosen = []

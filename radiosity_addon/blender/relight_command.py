@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import bpy
@@ -96,7 +97,7 @@ def relight_into(
     ------
     RadiosityError
     """
-    from .export import export_scene
+    from .export import export_steps, exporting
     from .job import deliver, timed
     from .output import OutputFolder
     from .preview import QUICK_SAMPLES
@@ -106,8 +107,10 @@ def relight_into(
     seconds: dict[str, float] = {}
     with OutputFolder(folder) as output:
         yield Progress("export", EXPORT)
-        with timed(seconds, "export"), originals_shown(context):
-            export = export_scene(context, stored.settings, dark=True)
+        with timed(seconds, "export"):
+            shown = partial(originals_shown, context)
+            steps = export_steps(context, stored.settings, dark=True, shown=shown)
+            export = yield from exporting(steps)
         with timed(seconds, "relight"):
             kept = stored.kept(export.bake_scene)
             yield Progress("relight", RELIGHT)
