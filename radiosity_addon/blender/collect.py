@@ -11,31 +11,28 @@ import time
 from collections import Counter
 from collections.abc import Callable, Generator, Hashable, Iterator, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 
-from ..bake_scene import LIGHTMAP_UV_LAYER, BakeWarning
-from ..errors import SceneError
+from ..bake_scene import BakeWarning
 from ..settings import BakeSettings
 from ..solver.lights import Light
-from .export_sources import ExportSource, MaterialSource
+from .export_sources import MaterialSource
 from .image_values import Means, UnknownMeanError, Wanted, known_means_only, mean_of_named
 from .lamps import LampFactors, read_lamp
 from .light_linking import linking_warnings
 from .light_membership import Membership, PlaceGroups, name_on
-from .materials import DEFAULT_GREY, Surface, ray_doubts, read_material, uses_nodes
+from .materials import Surface, ray_doubts, read_material, uses_nodes
 from .mesh_arrays import (
     MeshArrays,
     RawMesh,
-    all_finite,
     copy_mesh_data,
     mesh_arrays,
     no_triangles,
-    not_finite_message,
 )
-from .object_roles import BAKE, BAKEABLE_TYPES, IGNORE, Role, role_of
+from .object_roles import BAKE, BAKEABLE_TYPES, IGNORE, role_of
+from .pieces import Collected, Found, names_of, piece_of
 from .render_state import background_scenes
 from .scene_objects import (
     identity_of,
@@ -57,57 +54,6 @@ from .shading_inputs import (
 )
 from .surface_bake import can_evaluate
 
-
-@dataclass(frozen=True)
-class Piece:
-    """One mesh at one place.
-
-    Parameters
-    ----------
-    source : ExportSource
-    mesh : MeshArrays
-    matrix : (4, 4) float64
-    surface : (t,) int32
-        Rows of `Collected.surfaces`.
-    role : Role
-        Of what is ignored, `mesh` is empty.
-    asked : frozenset of str
-        What its materials' nodes ask for, of those that vary; see `shading_inputs`.
-    inputs : dict of str to (t, 3, 4) or (4,) float32
-        What was found of it: not what follows from `mesh` and `matrix`, nor what is missing.
-    bakeable : bool
-        It is to have a lightmap, if it is asked for, and can: it may be edited.
-    linked : bool
-        It would be bakeable, were it not linked from a library.
-    uv_layers : int
-        The UV layers of the mesh that would get another.
-    has_lightmap_layer : bool
-    linking : tuple of BakeWarning
-        What is not followed, should it emit.
-    groups : PlaceGroups
-        The light group of what it emits.
-    """
-
-    source: ExportSource
-    mesh: MeshArrays
-    matrix: np.ndarray
-    surface: np.ndarray
-    role: Role
-    asked: frozenset[str]
-    inputs: dict[str, np.ndarray]
-    bakeable: bool
-    linked: bool
-    uv_layers: int
-    has_lightmap_layer: bool
-    linking: tuple[BakeWarning, ...]
-    groups: PlaceGroups
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The names by which a user may ask for it."""
-        return _names(self.source)
-
-
 MOMENT = 0.05
 """Seconds for which the scene is shown as a render would, if that is enough to read an object."""
 
@@ -115,53 +61,6 @@ View = Callable[[], AbstractContextManager[bpy.types.Depsgraph]]
 """Shows the scene as a render would, while it is entered."""
 
 _Key = Hashable
-
-
-@dataclass(frozen=True, eq=False)
-class _Found:
-    """One mesh at one place, as it was copied; see `Piece`.
-
-    Parameters
-    ----------
-    raw : RawMesh or None
-        None of what is ignored.
-    slots : (s,) int
-        Rows of surfaces, in the order in which they were found.
-    empty : tuple of bool
-        Which of the slots have no material; none where a material is put over all.
-    """
-
-    source: ExportSource
-    shown: str
-    raw: RawMesh | None
-    matrix: np.ndarray
-    slots: np.ndarray
-    empty: tuple[bool, ...]
-    role: Role
-    asked: frozenset[str]
-    mesh_inputs: MeshValues
-    inputs: dict[str, np.ndarray]
-    can_bake: bool
-    library: bool
-    owner: str
-    layers: frozenset[str]
-    linking: tuple[BakeWarning, ...]
-    groups: PlaceGroups
-
-
-@dataclass(frozen=True)
-class Collected:
-    """All that was found. `surfaces` and `materials` are indexed by `Piece.surface`.
-
-    `groups` are the lights' light groups, parallel to them, "" for those in none.
-    """
-
-    pieces: list[Piece]
-    surfaces: list[Surface]
-    materials: list[MaterialSource | None]
-    lights: list[Light]
-    warnings: list[BakeWarning]
-    groups: list[str]
 
 
 def collect(
@@ -222,7 +121,7 @@ class _Collector:
     def __init__(self, factors: LampFactors, settings: BakeSettings, dark: bool) -> None:
         self._factors, self._dark = factors, dark
         self._settings = settings
-        self._found: dict[_Key, _Found] = {}
+        self._found: dict[_Key, Found] = {}
         self._lights: dict[_Key, tuple[Light | None, str, tuple[BakeWarning, ...]]] = {}
         self._names: dict[_Key, str] = {}
         self._order: list[_Key] = []
@@ -287,7 +186,7 @@ class _Collector:
                     read[id(found.raw)] = mesh_arrays(found.raw)
                 mesh = no_triangles() if found.raw is None else read[id(found.raw)]
                 own = np.array([rows[row] for row in found.slots.tolist()], dtype=np.int32)
-                piece = _piece(found, mesh, own, collected)
+                piece = piece_of(found, mesh, own, collected)
                 if piece is not None:
                     collected.pieces.append(piece)
         collected.warnings.extend(self._unknown)
@@ -324,13 +223,13 @@ class _Collector:
         light, warnings = read_lamp(instance.object, matrix_of(instance), self._factors, self._dark)
         return light, self._groups(instance).of_lamp, warnings
 
-    def _mesh(self, instance: bpy.types.DepsgraphObjectInstance, name: str) -> _Found:
+    def _mesh(self, instance: bpy.types.DepsgraphObjectInstance, name: str) -> Found:
         shown = original_object(instance)
         owner = instance.parent.original if instance.is_instance else shown
         source = source_of(instance, name, not instance.is_instance and shown.name in self._instancers)
         held_out = owner.name_full in self._held_out
         background = self._background.get(owner.name_full)
-        role = role_of(shown, owner, _names(source), self._settings, held_out, background)
+        role = role_of(shown, owner, names_of(source), self._settings, held_out, background)
         can_bake = role.mode == BAKE and shown.type in BAKEABLE_TYPES
         raw, slots = None, np.zeros(0, dtype=np.int32)
         empty: tuple[bool, ...] = ()
@@ -342,7 +241,7 @@ class _Collector:
             asked = frozenset().union(*(self._surfaces[row][3] for row in slots.tolist()))
             raw, mesh_inputs = self._read(instance, asked)
         is_mesh = shown.type == "MESH" and not instance.is_instance
-        return _Found(
+        return Found(
             source=source,
             shown=shown.name,
             raw=raw,
@@ -433,48 +332,6 @@ def _with_keys(
         yield (identity, seen[identity]), instance
 
 
-def _piece(found: _Found, mesh: MeshArrays | None, rows: np.ndarray, collected: Collected) -> Piece | None:
-    """Make a piece of what was found, if it is one, and add its warnings."""
-    role, name = found.role, found.source.name
-    surface, asked = np.zeros(0, dtype=np.int32), found.asked
-    inputs = {**found.mesh_inputs, **found.inputs}
-    if mesh is not None and len(rows):
-        # A face whose slot does not exist shows the last one, as in Blender.
-        surface = rows[np.clip(mesh.material, 0, len(rows) - 1)]
-        shown = np.unique(surface)
-        if len(shown) and all(collected.surfaces[row].is_volume for row in shown):
-            # All there is of it is what fills it.
-            role, mesh, surface = replace(role, mode=IGNORE), no_triangles(), surface[:0]
-            asked, inputs = frozenset(), {}
-    if mesh is None or not all_finite(found.matrix):
-        raise SceneError(not_finite_message(found.shown))
-    if len(mesh) == 0 and role.mode != IGNORE:
-        return None
-    used = np.unique(np.clip(mesh.material, 0, max(len(found.empty) - 1, 0)))
-    if any(found.empty[slot] for slot in used if slot < len(found.empty)):
-        message = f"object '{name}' has an empty material slot; grey {DEFAULT_GREY} is used"
-        collected.warnings.append(BakeWarning(name, message))
-    can_bake = found.can_bake and role.mode == BAKE
-    if can_bake and found.library:
-        collected.warnings.append(_linked(found.owner))
-    collected.warnings.extend(role.warnings)
-    return Piece(
-        source=found.source,
-        mesh=mesh,
-        matrix=found.matrix,
-        surface=surface,
-        asked=asked,
-        inputs=inputs,
-        role=role,
-        bakeable=can_bake and not found.library,
-        linked=can_bake and found.library,
-        uv_layers=max(mesh.uv_layers, len(found.layers)),
-        has_lightmap_layer=mesh.lightmap_uv is not None or LIGHTMAP_UV_LAYER in found.layers,
-        linking=found.linking,
-        groups=found.groups,
-    )
-
-
 def _told_of(material: bpy.types.Material, messages: Sequence[str]) -> list[BakeWarning]:
     return [BakeWarning(material.name, f"material '{material.name}': {message}") for message in messages]
 
@@ -482,13 +339,3 @@ def _told_of(material: bpy.types.Material, messages: Sequence[str]) -> list[Bake
 def _copy_evaluated(mesh: bpy.types.Mesh, asked: frozenset[str]) -> tuple[RawMesh, MeshValues]:
     raw = copy_mesh_data(mesh)
     return raw, read_mesh_inputs(mesh, raw.loops, asked) if asked else {}
-
-
-def _names(source: ExportSource) -> tuple[str, ...]:
-    """Return the names by which a user may ask for what a source shows."""
-    return tuple(filter(None, (source.name, source.object_name, source.instancer)))
-
-
-def _linked(name: str) -> BakeWarning:
-    what = f"object '{name}' is linked from a library: it lights and blocks but gets no lightmap"
-    return BakeWarning(name, f"{what}; make it local or a library override to bake it")

@@ -19,12 +19,13 @@ from ..solver.lights import EnvironmentLight
 from ..solver.scene import Scene
 from ..solver.steps import drain
 from ..solver.surface_images import SurfaceImages
-from .collect import Collected, Piece, collect_steps
+from .collect import collect_steps
 from .export_sources import Export
 from .lamps import lamp_factors
 from .light_membership import name_on
 from .mesh_arrays import all_finite, degenerate, not_finite_message, world_from_object
 from .object_roles import BAKE, BAKEABLE_TYPES, half_visible
+from .pieces import Collected, Piece
 from .render_options import option_warnings, world_of
 from .render_state import leave_edit_mode, render_depsgraph
 from .surface_evaluation import evaluate_surfaces

@@ -21,11 +21,12 @@ from ..errors import RadiosityError
 from ..foresight import Foresight, Lit
 from ..lightmap.greedy import greedy_object, share_of
 from ..settings import BakeSettings
-from .collect import Collected, Piece, collect
+from .collect import collect
 from .export import check_names, chosen_pieces
 from .materials import uses_nodes
 from .mesh_arrays import world_from_object
 from .object_roles import BAKEABLE_TYPES
+from .pieces import Collected, Piece
 from .rebake import originals_shown
 from .render_state import render_depsgraph
 

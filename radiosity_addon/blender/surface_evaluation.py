@@ -18,10 +18,10 @@ from ..settings import BakeSettings
 from ..solver.radiometry import radiance_of_radiosity, radiosity_of_radiance
 from ..solver.scene import MAX_REFLECTANCE
 from ..solver.surface_images import SurfaceImages
-from .collect import Piece
 from .export_sources import MaterialSource
 from .materials import Surface
 from .mesh_arrays import normal_matrix, world_from_object
+from .pieces import Piece
 from .surface_bake import DrawnSurfaces, SurfaceBake, drawn_surfaces
 from .surface_rewiring import CHANNELS
 from .surface_terms import surface_of_terms

@@ -85,14 +85,6 @@ def photograph(name):
     events.screenshot(ANSWER.with_name(f"manners-{name}.png"))
 
 
-def images():
-    return sorted(
-        image.name
-        for image in bpy.data.images
-        if image.name.startswith("cornell") or "lightmap" in image.name
-    )
-
-
 def script():
     view = events.centre("WINDOW")
     settings = bpy.context.scene.radiosity
@@ -100,6 +92,11 @@ def script():
     yield from events.open_sidebar("Radiosity")
     bpy.context.view_layer.objects.active = bpy.data.objects["Floor"]
     yield from photograph("before")
+    # Its own settings, in the panel Active Object below the folder.
+    sidebar = events.region("UI")
+    yield from events.click(sidebar.x + 70, 800 - 372)
+    yield from photograph("object")
+    yield from events.click(sidebar.x + 70, 800 - 372)
 
     # The check's dialog: its button bakes, and it closes.
     bpy.data.objects["Short Block"].radiosity_texel_scale = 0.02
