@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import threading
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from concurrent.futures import ThreadPoolExecutor
 from queue import Empty, SimpleQueue
 from typing import TypeVar
@@ -62,6 +62,28 @@ def in_thread(steps: Generator[T, None, R]) -> Generator[T | None, None, R]:
         sys.setswitchinterval(turn)
         closed.set()
         thread.shutdown(wait=False)
+
+
+def elsewhere(work: Callable[[], R], patient: bool) -> Generator[float, None, R]:
+    """Do work on plain arrays: in a thread, with a step now and then, if somebody waits, else at once."""
+    if not patient:
+        return work()
+    steps = in_thread(_once(work))
+    try:
+        while True:
+            try:
+                next(steps)
+            except StopIteration as done:
+                result: R = done.value
+                return result
+            yield 0.0
+    finally:
+        steps.close()
+
+
+def _once(work: Callable[[], R]) -> Generator[None, None, R]:
+    yield from ()
+    return work()
 
 
 def _run(steps: Generator[T, None, R], yielded: SimpleQueue[T], closed: threading.Event) -> R:

@@ -31,6 +31,8 @@ class RADIOSITY_OT_check(bpy.types.Operator):
     bl_label = "Check"
     bl_options = {"REGISTER"}
 
+    _shown = False  # in a dialog, whose button bakes
+
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Offer it unless a bake is running."""
@@ -43,7 +45,11 @@ class RADIOSITY_OT_check(bpy.types.Operator):
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Look at the scene and tell."""
+        """Report what is found in the scene; from the dialog, bake it."""
+        if self._shown:
+            # The dialog is closed by now.
+            bpy.ops.radiosity.bake("INVOKE_DEFAULT")
+            return {"FINISHED"}
         try:
             found = look(context)
         except RadiosityError as error:
@@ -56,7 +62,7 @@ class RADIOSITY_OT_check(bpy.types.Operator):
         return {"FINISHED"}
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        """Look at the scene and show what was found in a pop-up."""
+        """Look at the scene and show what was found in a dialog."""
         if bpy.app.background or context.window is None:
             return self.execute(context)
         try:
@@ -64,20 +70,16 @@ class RADIOSITY_OT_check(bpy.types.Operator):
         except RadiosityError as error:
             self.report({"ERROR"}, " ".join(str(error).split()))
             return {"CANCELLED"}
-        return context.window_manager.invoke_popup(self, width=POPUP_WIDTH)
+        self._shown = True
+        return context.window_manager.invoke_props_dialog(
+            self, width=POPUP_WIDTH, title="Before Baking", confirm_text="Bake Radiosity"
+        )
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Draw the pop-up."""
+        """Draw the dialog."""
         found = last_check(context.scene)
-        if found is None:
-            return
-        layout = self.layout
-        layout.label(text="Before Baking", icon="VIEWZOOM")
-        draw_inspection(layout, found, context, POPUP_WIDTH)
-        row = layout.row()
-        row.scale_y = 1.3
-        row.operator_context = "INVOKE_DEFAULT"
-        row.operator("radiosity.bake", text="Bake Radiosity", icon="LIGHT_AREA")
+        if found is not None:
+            draw_inspection(self.layout, found, context, POPUP_WIDTH)
 
 
 class RADIOSITY_PT_check(bpy.types.Panel):

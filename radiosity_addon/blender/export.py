@@ -3,40 +3,73 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Callable, Generator, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass
+from typing import TypeVar
 
 import bpy
 import numpy as np
 
-from ..bake_scene import BakeObject, BakeScene, BakeWarning
+from ..background import elsewhere
+from ..bake_scene import BakeObject, BakeScene, BakeWarning, Progress
 from ..errors import SceneError, UsageError
 from ..settings import BakeSettings
 from ..solver.lights import EnvironmentLight
 from ..solver.scene import Scene
-from .collect import Collected, Piece, collect
+from ..solver.steps import drain
+from ..solver.surface_images import SurfaceImages
+from .collect import collect_steps
 from .export_sources import Export
 from .lamps import lamp_factors
 from .light_membership import name_on
 from .mesh_arrays import all_finite, degenerate, not_finite_message, world_from_object
 from .object_roles import BAKE, BAKEABLE_TYPES, half_visible
+from .pieces import Collected, Piece
 from .render_options import option_warnings, world_of
 from .render_state import leave_edit_mode, render_depsgraph
 from .surface_evaluation import evaluate_surfaces
 from .world import read_world
 
+T = TypeVar("T")
+
 MAX_UV_LAYERS = 8
 
 
 def export_scene(context: bpy.types.Context, settings: BakeSettings, dark: bool = False) -> Export:
-    """Read the context's view layer as a render would see it.
+    """Read the context's view layer as a render would see it, at once: for scripts; see `export_steps`."""
+    return drain(export_steps(context, settings, dark))
+
+
+def export_steps(
+    context: bpy.types.Context,
+    settings: BakeSettings,
+    dark: bool = False,
+    patient: bool = False,
+    shown: Callable[[], AbstractContextManager[object]] = nullcontext,
+) -> Generator[float, None, Export]:
+    """Read the context's view layer as a render would see it, in steps that a window can wait for.
+
+    Between two steps the file is as the user has it, and may be edited: what was read stays as it was read,
+    what is gone before it is read is not there.
 
     Parameters
     ----------
     context : bpy.types.Context
-        Of a scene without lightmaps: restore an earlier bake first.
+        Of a scene without lightmaps: restore an earlier bake first, or have `shown` hide it.
     settings : BakeSettings
         `objects`, `light_only`, `ignore`, `sky` and `keep_uvs` matter here.
     dark : bool
         Whether lamps without power and a black world are lights too, for a bake that is kept.
+    patient : bool
+        Whether a window waits: work on arrays is then done in a thread.
+    shown : callable
+        Shows the originals, within a step.
+
+    Yields
+    ------
+    fraction : float
+        Of no great truth.
 
     Returns
     -------
@@ -51,33 +84,70 @@ def export_scene(context: bpy.types.Context, settings: BakeSettings, dark: bool 
         baked has no room for another UV layer.
     """
     leave_edit_mode(context)
-    factors = lamp_factors()
-    with render_depsgraph(context) as depsgraph:
-        collected = collect(depsgraph, factors, settings, dark)
-        collected.warnings.extend(option_warnings(context))
-    shown = world_of(context)
-    # After that: Cycles may have to render it, which no evaluated object would survive.
-    world, warnings = read_world(shown, dark)
-    collected.lights.extend(world)
-    collected.groups.extend([name_on(shown)] * len(world))
-    collected.warnings.extend(warnings)
-    _check_names(context, collected.pieces, settings)
+    factors = yield from lamp_factors()
+    options: list[BakeWarning] = []
+
+    @contextmanager
+    def view() -> Iterator[bpy.types.Depsgraph]:
+        with shown(), render_depsgraph(context) as depsgraph:
+            yield depsgraph
+            options[:] = option_warnings(context)
+
+    sorted_out = yield from collect_steps(view, factors, settings, dark)
+    collected = yield from elsewhere(sorted_out, patient)
+    collected.warnings.extend(options)
+    # Before anything is rendered.
+    check_names(context, collected.pieces, settings)
     chosen = chosen_pieces(context, collected.pieces, settings.objects)
     for piece in chosen:
         _check_uv_layers(piece)
-    return _assemble(context, collected, {piece.source.name for piece in chosen}, settings)
+    yield 0.5
+    background = world_of(context)
+    group = name_on(background)
+    # After that: Cycles may have to render it, which no evaluated object would survive.
+    world, warnings = yield from read_world(background, dark)
+    collected.lights.extend(world)
+    collected.groups.extend([group] * len(world))
+    collected.warnings.extend(warnings)
+    names = {piece.source.name for piece in chosen}
+    return (yield from _assemble(context, collected, names, settings, patient))
 
 
-def _assemble(
-    context: bpy.types.Context, collected: Collected, chosen: set[str], settings: BakeSettings
-) -> Export:
-    warnings = list(collected.warnings)
-    reflectance = np.array([surface.reflectance for surface in collected.surfaces]).reshape(-1, 3)
-    emission = np.array([surface.emission for surface in collected.surfaces]).reshape(-1, 3)
+def exporting(steps: Generator[float, None, T]) -> Generator[Progress, None, T]:
+    """Take the steps of an export as progress."""
+    try:
+        while True:
+            try:
+                next(steps)
+            except StopIteration as done:
+                result: T = done.value
+                return result
+            yield Progress("export", 0.0)
+    finally:
+        steps.close()
+
+
+@dataclass(frozen=True, eq=False)
+class _Triangles:
+    """What all pieces are together, one row a triangle; see `Scene` and `BakeScene`."""
+
+    objects: list[BakeObject]
+    corners: np.ndarray
+    normals: np.ndarray
+    surface: np.ndarray
+    in_bounces: np.ndarray
+    in_shadows: np.ndarray
+    warnings: list[BakeWarning]
+    area_to_bake: bool
+
+
+def _triangles(pieces: list[Piece], chosen: set[str], settings: BakeSettings) -> _Triangles:
+    """Carry all pieces into the world; works on arrays alone."""
+    warnings: list[BakeWarning] = []
     objects, corners, normals, surfaces = [], [], [], []
     in_bounces, in_shadows = [], []
     first, area_to_bake = 0, False
-    for piece in collected.pieces:
+    for piece in pieces:
         mesh = piece.mesh
         world, world_normals, mirrored = world_from_object(mesh, piece.matrix)
         if not all_finite(world):
@@ -107,29 +177,61 @@ def _assemble(
         normals.append(world_normals)
         surfaces.append(piece.surface)
         first += len(mesh)
-    if not area_to_bake:
-        raise SceneError(_nothing_to_bake(context))
+    return _Triangles(
+        objects,
+        np.concatenate(corners),
+        np.concatenate(normals),
+        np.concatenate(surfaces),
+        np.concatenate(in_bounces),
+        np.concatenate(in_shadows),
+        warnings,
+        area_to_bake,
+    )
 
-    surface = np.concatenate(surfaces)
-    images = evaluate_surfaces(
+
+def _assemble(
+    context: bpy.types.Context, collected: Collected, chosen: set[str], settings: BakeSettings, patient: bool
+) -> Generator[float, None, Export]:
+    """Make one scene of all that was collected."""
+    triangles = yield from elsewhere(lambda: _triangles(collected.pieces, chosen, settings), patient)
+    if not triangles.area_to_bake:
+        raise SceneError(_nothing_to_bake(context))
+    images = yield from evaluate_surfaces(
         context,
         collected.pieces,
         collected.surfaces,
         collected.materials,
         settings,
+        patient,
     )
+    name = context.scene.name
+    return (yield from elsewhere(lambda: _export(name, collected, triangles, images, settings), patient))
+
+
+def _export(
+    scene_name: str,
+    collected: Collected,
+    triangles: _Triangles,
+    images: SurfaceImages | None,
+    settings: BakeSettings,
+) -> Export:
+    """Put the parts together; works on arrays alone."""
+    warnings = [*collected.warnings, *triangles.warnings]
+    surface = triangles.surface
+    reflectance = np.array([surface.reflectance for surface in collected.surfaces]).reshape(-1, 3)
+    emission = np.array([surface.emission for surface in collected.surfaces]).reshape(-1, 3)
     scene = Scene(
-        triangles=np.concatenate(corners),
+        triangles=triangles.corners,
         reflectance=reflectance[surface],
         emission=emission[surface],
         two_sided=True,  # Blender's surfaces reflect and emit on both sides
         lights=collected.lights,
-        normals=np.concatenate(normals),
+        normals=triangles.normals,
         images=images,
-        in_bounces=np.concatenate(in_bounces),
-        in_shadows=np.concatenate(in_shadows),
+        in_bounces=triangles.in_bounces,
+        in_shadows=triangles.in_shadows,
     )
-    for piece, obj in zip(collected.pieces, objects, strict=True):
+    for piece, obj in zip(collected.pieces, triangles.objects, strict=True):
         if piece.linking and scene.emission[obj.rows].any():
             warnings += piece.linking
     shining = [light for light in scene.lights if light.strength.any()]
@@ -137,7 +239,7 @@ def _assemble(
         if settings.sky:
             scene.lights = (*scene.lights, EnvironmentLight(1.0))
         else:
-            warnings.append(_no_light(context))
+            warnings.append(_no_light(scene_name))
     if scene.emission.any() or any(isinstance(light, EnvironmentLight) for light in shining):
         warnings += [
             half_visible(piece.source.object_name)
@@ -146,13 +248,13 @@ def _assemble(
         ]
     emitter, emitting, emitter_groups = _emitters(scene, surface, collected)
     if settings.light_groups and not any((*collected.groups, *emitter_groups)):
-        warnings.append(_no_groups(context))
+        warnings.append(_no_groups(scene_name))
     # A sky that was added belongs to nobody.
     of_lights = (*collected.groups, *("",) * (len(scene.lights) - len(collected.groups)))
     return Export(
         BakeScene(
             scene,
-            tuple(objects),
+            tuple(triangles.objects),
             tuple(dict.fromkeys(warnings)),
             emitter,
             emitting,
@@ -177,8 +279,9 @@ def _emitters(
     """
     names: list[str] = []
     place = []
+    on_material = [getattr(material, "group", "") for material in collected.materials]
     for piece in collected.pieces:
-        here = {row: piece.groups.of_material(collected.materials[row]) for row in np.unique(piece.surface)}
+        here = {row: piece.groups.of_group(on_material[row]) for row in np.unique(piece.surface)}
         names += [name for name in here.values() if name not in names]
         numbers = np.zeros(len(collected.surfaces), dtype=np.int32)
         numbers[list(here)] = [names.index(name) for name in here.values()]
@@ -222,7 +325,7 @@ def chosen_pieces(
     return chosen
 
 
-def _check_names(context: bpy.types.Context, pieces: list[Piece], settings: BakeSettings) -> None:
+def check_names(context: bpy.types.Context, pieces: list[Piece], settings: BakeSettings) -> None:
     """Refuse names of objects to leave out, or without lightmaps, that fit nothing."""
     known = {name for piece in pieces for name in piece.names}
     for option, names in (("--ignore", settings.ignore), ("--light-only", settings.light_only)):
@@ -267,15 +370,13 @@ def _degenerate_warning(name: str, count: int) -> BakeWarning:
     return BakeWarning(name, f"object '{name}': {which} without area; no light falls there")
 
 
-def _no_light(context: bpy.types.Context) -> BakeWarning:
-    name = context.scene.name
+def _no_light(name: str) -> BakeWarning:
     return BakeWarning(
         name, f"scene '{name}' has no light at all: the lightmaps are black; add a lamp or the sky"
     )
 
 
-def _no_groups(context: bpy.types.Context) -> BakeWarning:
-    name = context.scene.name
+def _no_groups(name: str) -> BakeWarning:
     message = f"scene '{name}': no lamp, emissive material or world is in a light group; none is baked"
     return BakeWarning(name, message)
 

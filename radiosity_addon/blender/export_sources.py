@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import bpy
+
 from ..bake_scene import BakeScene
+from ..errors import SceneError
 
 Matrix4 = tuple[tuple[float, ...], ...]
 
@@ -48,6 +51,42 @@ class ExportSource:
     matrix_world: Matrix4
     needs_evaluated_mesh: bool
     makes_instances: bool = False
+
+
+@dataclass(frozen=True)
+class MaterialSource:
+    """A material of the file, to be found again: it may be edited or removed meanwhile.
+
+    Parameters
+    ----------
+    name : str
+    library : str or None
+        File it is linked from; None for a local one.
+    group : str
+        The light group that is named on it, or "".
+    """
+
+    name: str
+    library: str | None
+    group: str
+
+    @staticmethod
+    def of(material: bpy.types.Material, group: str) -> MaterialSource:
+        """Return the source that finds a material."""
+        return MaterialSource(material.name, material.library.filepath if material.library else None, group)
+
+    def find(self) -> bpy.types.Material:
+        """Return the material.
+
+        Raises
+        ------
+        SceneError
+            If it is gone.
+        """
+        material = bpy.data.materials.get((self.name, self.library))
+        if material is None:
+            raise SceneError(f"material '{self.name}' was removed while the scene was read: bake again")
+        return material
 
 
 @dataclass(frozen=True)

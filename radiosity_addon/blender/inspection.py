@@ -24,11 +24,12 @@ from ..lightmap.greedy import greedy_object, share_of
 from ..settings import BakeSettings
 from ..solver import scratch
 from ..texel_memory import refuse_too_large
-from .collect import Collected, Piece, collect
-from .export import chosen_pieces
+from .collect import collect
+from .export import check_names, chosen_pieces
 from .materials import uses_nodes
 from .mesh_arrays import world_from_object
 from .object_roles import BAKEABLE_TYPES
+from .pieces import Collected, Piece
 from .rebake import originals_shown
 from .render_state import render_depsgraph
 
@@ -131,6 +132,7 @@ def inspect(context: bpy.types.Context, settings: BakeSettings, folder: Path | N
         collected = collect(depsgraph, factors, settings)
     findings = [Finding(WARNING, warning.name, warning.message) for warning in edited]
     try:
+        check_names(context, collected.pieces, settings)
         chosen = chosen_pieces(context, collected.pieces, settings.objects)
     except RadiosityError as error:
         chosen = []

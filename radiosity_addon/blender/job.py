@@ -21,7 +21,7 @@ from ..texel_memory import pages_of, refuse_too_large
 from . import kept_bakes, kept_details, runtime
 from .apply import apply_lightmaps, check_targets
 from .bake_record import remove_datablocks
-from .export import export_scene
+from .export import export_steps, exporting
 from .export_sources import Export
 from .group_images import GroupImages, each_image, write_groups
 from .images import lightmap_files, possible_names, relative_path, set_folder, write_pages
@@ -113,10 +113,21 @@ def run_bake(
             sidecars = (output.names.sidecar,) if keeping and keeping.sidecar else ()
             for _ in output.expecting((*copies, *sidecars)):
                 yield Progress("export", 0.0)
-        with timed(seconds, "export"), originals_shown(context) as edited:
-            export = export_scene(context, settings, dark=keeping is not None)
-            check_targets(export)
-            seen = seen_triangles(context, export)
+        edited: list[BakeWarning] = []
+
+        @contextmanager
+        def originals() -> Iterator[None]:
+            with originals_shown(context) as found:
+                edited[:] = found
+                yield
+
+        with timed(seconds, "export"):
+            steps = export_steps(context, settings, keeping is not None, patient, originals)
+            export = yield from exporting(steps)
+            yield Progress("export", 0.0)
+            with originals():
+                check_targets(export)
+                seen = seen_triangles(context, export)
         others = Others()
         if only_changed and not moves_alone(export.bake_scene, settings, keeping):
             export, settings, others = narrow(context.scene, export, settings)
@@ -127,8 +138,8 @@ def run_bake(
                 yield Progress("export", SOLVE)
         solved = APPLY if with_copy else APPLY_ALONE
         sidecar = output.staging / output.names.sidecar if output and keeping and keeping.sidecar else None
-        steps = bake_steps(export.bake_scene, settings, keeping, sidecar)
-        result, kept = yield from _solve(steps, seen, patient, solved)
+        baking = bake_steps(export.bake_scene, settings, keeping, sidecar)
+        result, kept = yield from _solve(baking, seen, patient, solved)
         result = replace(result, warnings=(*notes, *edited, *others.warnings(), *result.warnings))
         seconds.update(result.seconds)
         yield Progress("apply", solved)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Generator
 
 import bpy
 import numpy as np
@@ -11,6 +12,7 @@ from ..bake_scene import BakeWarning
 from ..errors import SceneError
 from ..solver.lights import AreaLight, Light, PointLight, SpotLight, SunLight
 from ..solver.radiometry import cone_projected_solid_angle, sphere_area
+from .image_values import known_means_only
 from .lamp_pixels import lamp_factor
 from .light_linking import linking_warnings
 from .materials import read_radiance, uses_nodes
@@ -27,16 +29,26 @@ LampFactors = dict[str, tuple[np.ndarray, float]]
 """By a lamp's full name, what its nodes make of its light (see `lamp_factor`)."""
 
 
-def lamp_factors() -> LampFactors:
-    """Have Cycles evaluate the nodes of all lamps whose light is not a plain constant.
+def lamp_factors() -> Generator[float, None, LampFactors]:
+    """Have Cycles evaluate the nodes of all lamps whose light is not a plain constant, one a step.
 
     Before the scene is evaluated: rendering would not leave its objects alive.
     """
-    factors = {}
-    for lamp in bpy.data.lights:
-        if lamp.users and uses_nodes(lamp) and read_radiance(lamp, "lamp")[1]:
-            factors[lamp.name_full] = lamp_factor(lamp)
+    factors: LampFactors = {}
+    wanted = [
+        lamp.name_full for lamp in bpy.data.lights if lamp.users and uses_nodes(lamp) and _needs_cycles(lamp)
+    ]
+    for number, name in enumerate(wanted):
+        yield number / len(wanted)
+        lamp = next((each for each in bpy.data.lights if each.name_full == name), None)
+        if lamp is not None:
+            factors[name] = lamp_factor(lamp)
     return factors
+
+
+def _needs_cycles(lamp: bpy.types.Light) -> bool:
+    with known_means_only(None):
+        return bool(read_radiance(lamp, "lamp")[1])
 
 
 def read_lamp(

@@ -41,7 +41,11 @@ class PlaceGroups:
 
     def of_material(self, material: bpy.types.Material | None) -> str:
         """Return the group of what emits there by a material."""
-        return self.own or name_on(material) or self.around
+        return self.of_group(name_on(material))
+
+    def of_group(self, on_material: str) -> str:
+        """Return the group of what emits there by a material on which a group is named, or "" is."""
+        return self.own or on_material or self.around
 
 
 class Membership:

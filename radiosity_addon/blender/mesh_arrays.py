@@ -47,50 +47,86 @@ class MeshArrays:
         return len(self.corners)
 
 
+@dataclass(frozen=True, eq=False)
+class RawMesh:
+    """What a mesh stores, copied as it is: to be worked on when the mesh may be gone.
+
+    Parameters
+    ----------
+    positions : (v, 3) float32
+    vertex : (l,) int32
+        Of each loop.
+    loops : (t, 3) int32
+    polygon : (t,) int32
+    material : (p,) int32
+    normals : (l, 3) float32
+    smooth : (p,) bool
+    by_corner : bool
+        Normals of corners count for flat polygons too; see `_flat`.
+    lightmap_uv : (l, 2) float32 or None
+    uv_layers : int
+    """
+
+    positions: np.ndarray
+    vertex: np.ndarray
+    loops: np.ndarray
+    polygon: np.ndarray
+    material: np.ndarray
+    normals: np.ndarray
+    smooth: np.ndarray
+    by_corner: bool
+    lightmap_uv: np.ndarray | None
+    uv_layers: int
+
+
 def read_mesh(mesh: bpy.types.Mesh) -> MeshArrays | None:
     """Return a mesh's triangles; None if a vertex is NaN or infinite.
 
     Loose vertices and edges are left out: they neither reflect nor block.
     """
-    positions = _read(mesh.vertices, "co", (len(mesh.vertices), 3), np.float32)
-    if not all_finite(positions):
-        return None
+    return mesh_arrays(copy_mesh_data(mesh))
+
+
+def copy_mesh_data(mesh: bpy.types.Mesh) -> RawMesh:
+    """Copy what is needed of a mesh, as fast as can be."""
     mesh.calc_loop_triangles()
-    count = len(mesh.loop_triangles)
-    loops = _read(mesh.loop_triangles, "loops", (count, 3), np.int32)
-    polygon = _read(mesh.loop_triangles, "polygon_index", (count,), np.int32)
-    vertex = _read(mesh.loops, "vertex_index", (len(mesh.loops),), np.int32)
-    material = _read(mesh.polygons, "material_index", (len(mesh.polygons),), np.int32)
-    normals = _read(mesh.corner_normals, "vector", (len(mesh.loops), 3), np.float32)
-    corners = positions[vertex[loops]].astype(np.float64)
-    normals = normals[loops].astype(np.float64)
-    flat = _flat(mesh)[polygon]
-    normals[flat] = _unit_normals(np.zeros_like(normals[flat]), corners[flat])
+    triangles, corners, polygons = len(mesh.loop_triangles), len(mesh.loops), len(mesh.polygons)
     layer = mesh.uv_layers.get(LIGHTMAP_UV_LAYER)
-    uv = None
-    if layer is not None:
-        uv = _read(layer.uv, "vector", (len(mesh.loops), 2), np.float32)[loops]
-    return MeshArrays(
-        corners,
-        normals,
-        loops,
-        polygon,
-        material[polygon],
-        uv,
-        len(mesh.uv_layers),
+    return RawMesh(
+        positions=_read(mesh.vertices, "co", (len(mesh.vertices), 3), np.float32),
+        vertex=_read(mesh.loops, "vertex_index", (corners,), np.int32),
+        loops=_read(mesh.loop_triangles, "loops", (triangles, 3), np.int32),
+        polygon=_read(mesh.loop_triangles, "polygon_index", (triangles,), np.int32),
+        material=_read(mesh.polygons, "material_index", (polygons,), np.int32),
+        normals=_read(mesh.corner_normals, "vector", (corners, 3), np.float32),
+        smooth=_read(mesh.polygons, "use_smooth", (polygons,), np.bool_),
+        by_corner=mesh.normals_domain == "CORNER" and (bpy.app.version >= (5, 2) or mesh.has_custom_normals),
+        lightmap_uv=None if layer is None else _read(layer.uv, "vector", (corners, 2), np.float32),
+        uv_layers=len(mesh.uv_layers),
     )
 
 
-def _flat(mesh: bpy.types.Mesh) -> np.ndarray:
+def mesh_arrays(raw: RawMesh) -> MeshArrays | None:
+    """Return the triangles of a mesh that was copied; None if a vertex is NaN or infinite."""
+    if not all_finite(raw.positions):
+        return None
+    loops, polygon = raw.loops, raw.polygon
+    corners = raw.positions[raw.vertex[loops]].astype(np.float64)
+    normals = raw.normals[loops].astype(np.float64)
+    flat = _flat(raw)[polygon]
+    normals[flat] = _unit_normals(np.zeros_like(normals[flat]), corners[flat])
+    uv = None if raw.lightmap_uv is None else raw.lightmap_uv[loops]
+    return MeshArrays(corners, normals, loops, polygon, raw.material[polygon], uv, raw.uv_layers)
+
+
+def _flat(raw: RawMesh) -> np.ndarray:
     """Return (polygons,) which ones Cycles shades by their triangles' own normals, not the polygon's.
 
     The two differ where a polygon is not planar. Measured in 4.2, 5.0 and 5.2: those shaded flat; sharp
     edges all around do not make one flat, and custom normals go before. 5.2 takes the normals of
     corners for all polygons of a mesh some of which are smooth.
     """
-    flat = ~_read(mesh.polygons, "use_smooth", (len(mesh.polygons),), np.bool_)
-    by_corner = mesh.normals_domain == "CORNER" and (bpy.app.version >= (5, 2) or mesh.has_custom_normals)
-    return flat & (not by_corner)
+    return ~raw.smooth & (not raw.by_corner)
 
 
 def no_triangles() -> MeshArrays:
@@ -180,6 +216,6 @@ def _unit_normals(normals: np.ndarray, corners: np.ndarray) -> np.ndarray:
 def _read(
     collection: bpy.types.bpy_prop_collection, attribute: str, shape: tuple[int, ...], kind: type
 ) -> np.ndarray:
-    values: np.ndarray = np.empty(int(np.prod(shape)), dtype=kind)
-    collection.foreach_get(attribute, values)
-    return values.reshape(shape)
+    values: np.ndarray = np.empty(shape, dtype=kind)
+    collection.foreach_get(attribute, values.reshape(-1))
+    return values

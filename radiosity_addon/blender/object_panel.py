@@ -86,7 +86,10 @@ def _others(context: bpy.types.Context) -> list[bpy.types.Object]:
 
 def draw_overrides(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     """Draw what an object has of its own."""
-    layout.prop(obj, "radiosity_mode", expand=True)
+    # Over the whole width: beside a label its three choices would not fit.
+    row = layout.row(align=True)
+    row.use_property_split = False
+    row.prop(obj, "radiosity_mode", expand=True)
     column = layout.column()
     column.enabled = obj.radiosity_mode == BAKE
     column.prop(obj, "radiosity_texel_scale")

@@ -55,6 +55,9 @@ class RADIOSITY_PT_main(_Panel, bpy.types.Panel):
             draw_text(box, iface_("A bake was interrupted while it replaced its files"), "ERROR", context)
             box.operator("radiosity.recover", icon="RECOVER_LAST")
         draw_relight_buttons(layout, context)
+        hint = unseen_hint(context)
+        if hint is not None:
+            draw_text(layout.box(), iface_(hint), "INFO", context)
         layout.prop(settings, "scope", expand=True)
         layout.prop(settings, "size_mode", expand=True)
 
@@ -78,6 +81,20 @@ class RADIOSITY_PT_main(_Panel, bpy.types.Panel):
             draw_text(layout.box(), text, "INFO", context)
         if not any(obj.type == "MESH" for obj in context.scene.objects):
             layout.operator("radiosity.add_cornell_box", icon="CUBE")
+
+
+WORKBENCH = "The Workbench render engine shows no lightmaps: choose EEVEE or Cycles"
+SOLID = "Solid and wireframe views show no lightmaps: switch to Material Preview"
+
+
+def unseen_hint(context: bpy.types.Context) -> str | None:
+    """Say why the lightmaps of a baked scene are not seen; None where they are, or there are none."""
+    if runtime.last_bake(context.scene) is None:
+        return None
+    shading = getattr(getattr(context.space_data, "shading", None), "type", "MATERIAL")
+    if context.scene.render.engine == "BLENDER_WORKBENCH" and shading != "MATERIAL":
+        return WORKBENCH
+    return SOLID if shading in {"SOLID", "WIREFRAME"} else None
 
 
 class RADIOSITY_PT_advanced(_Panel, bpy.types.Panel):

@@ -17,8 +17,8 @@ from .bake_record import is_made
 from .png import render_png
 
 SAMPLES = 8
-"""A pixel's. Lightmapped surfaces have no noise, so these only smooth edges: 99 % of the pixels are within 4 of
-255 levels of a picture with 256 samples."""
+"""A pixel's. Lightmapped surfaces have no noise, so these only smooth edges: 99 % of all pixels are
+within 4 of 255 levels of a picture with 256 samples."""
 
 QUICK_SAMPLES = 4
 """Where a bake is only lit anew: edges are rougher, but the picture costs no more than the light."""

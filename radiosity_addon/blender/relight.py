@@ -6,6 +6,7 @@ import json
 import time
 from collections.abc import Generator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import bpy
@@ -21,7 +22,7 @@ from ..sidecar import StoredBake, read_sidecar
 from ..solver.arrays import Array
 from ..solver.steps import drain
 from . import kept_bakes
-from .export import export_scene
+from .export import export_steps, exporting
 from .kept_bakes import InMemory
 from .ownership import report_listing
 from .rebake import originals_shown
@@ -57,7 +58,7 @@ def run_relight(
     """
     started = time.perf_counter()
     yield Progress("export", 0.0)
-    held, strengths = read_strengths(context)
+    held, strengths = yield from exporting(strengths_steps(context, patient))
     same = np.array_equal(strengths, held.shown)
     steps = lit(held.bake, strengths)
     pages, groups = yield from _shown(in_thread(steps) if patient else steps)
@@ -76,11 +77,18 @@ def read_strengths(context: bpy.types.Context) -> tuple[InMemory, Array]:
     ------
     RadiosityError
     """
+    return drain(strengths_steps(context))
+
+
+def strengths_steps(
+    context: bpy.types.Context, patient: bool = False
+) -> Generator[float, None, tuple[InMemory, Array]]:
+    """Read strengths as `read_strengths`, in steps as those of an export."""
     scene = context.scene
     held = kept_bakes.find(scene)
     stored: KeptBake | StoredBake = stored_bake(scene) if held is None else held.bake
-    with originals_shown(context):
-        export = export_scene(context, stored.settings, dark=True)
+    shown = partial(originals_shown, context)
+    export = yield from export_steps(context, stored.settings, True, patient, shown)
     if isinstance(stored, StoredBake):
         held = kept_bakes.put(scene, kept_bakes.mark_of(scene), stored.kept(export.bake_scene))
         held.shown = _noted(scene, held)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -107,7 +108,7 @@ def relight_into(
     ------
     RadiosityError
     """
-    from .export import export_scene
+    from .export import export_steps, exporting
     from .images import group_file_names, page_file_names
     from .job import deliver, timed
     from .preview import QUICK_SAMPLES
@@ -118,8 +119,10 @@ def relight_into(
     with folder as output:
         output.expect((BLEND_NAME, PREVIEW_NAME, output.names.sidecar))
         yield Progress("export", EXPORT)
-        with timed(seconds, "export"), originals_shown(context):
-            export = export_scene(context, stored.settings, dark=True)
+        with timed(seconds, "export"):
+            shown = partial(originals_shown, context)
+            steps = export_steps(context, stored.settings, dark=True, shown=shown)
+            export = yield from exporting(steps)
         with timed(seconds, "relight"):
             kept = stored.kept(export.bake_scene)
             yield Progress("relight", RELIGHT)

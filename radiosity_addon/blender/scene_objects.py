@@ -130,7 +130,7 @@ def materials_of(instance: bpy.types.DepsgraphObjectInstance) -> list[bpy.types.
 
 def source_of(instance: bpy.types.DepsgraphObjectInstance, name: str, makes_instances: bool) -> ExportSource:
     """Return the record by which what was exported is found again."""
-    object_name, library, instancer, persistent_id = _identity(instance)
+    object_name, library, instancer, persistent_id = identity_of(instance)
     return ExportSource(
         name=name,
         object_name=object_name,
@@ -172,13 +172,13 @@ def copy_evaluated_meshes(
         for instance in visible_objects(depsgraph):
             if instance.object.type != "MESH" or not wanted:
                 continue
-            name = wanted.pop(_identity(instance), None)
+            name = wanted.pop(identity_of(instance), None)
             if name is not None:
                 meshes[name] = _copy_mesh(instance, depsgraph)
     return meshes
 
 
-def _identity(instance: bpy.types.DepsgraphObjectInstance) -> tuple[str, str | None, str, tuple[int, ...]]:
+def identity_of(instance: bpy.types.DepsgraphObjectInstance) -> tuple[str, str | None, str, tuple[int, ...]]:
     """Return what tells an instance from all others: object, library, instancer, persistent id."""
     shown = original_object(instance)
     library = shown.library.filepath if shown.library else None

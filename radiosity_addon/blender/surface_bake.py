@@ -8,6 +8,7 @@ and all that is added to it is removed again.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -16,6 +17,7 @@ from ..errors import BakeError
 from ..lightmap.surface_tiles import SurfaceTiles
 from ..settings import BakeSettings
 from .bake_record import remove_datablocks
+from .export_sources import MaterialSource
 from .surface_rewiring import RewiredMaterial
 
 _PIXEL_OFFSET = np.array([0.001, 0.002])
@@ -29,62 +31,102 @@ def can_evaluate() -> bool:
     return hasattr(bpy.types.Scene, "cycles")
 
 
+@dataclass(frozen=True, eq=False)
+class DrawnSurfaces:
+    """The mesh of the triangles that vary, n of them.
+
+    Parameters
+    ----------
+    size : (int, int)
+        Width and height of the image.
+    corners : (n, 3, 3) float32
+    uv : (n, 3, 2) float32
+        In the image, their tiles.
+    inputs : dict of str to (n, 3, 4) float32
+        What nodes ask for.
+    surface : (n,) int
+    """
+
+    size: tuple[int, int]
+    corners: np.ndarray
+    uv: np.ndarray
+    inputs: dict[str, np.ndarray]
+    surface: np.ndarray
+
+
+def drawn_surfaces(
+    tiles: SurfaceTiles,
+    corners: np.ndarray,
+    inputs: Mapping[str, np.ndarray],
+    surface: np.ndarray,
+    varies: np.ndarray,
+) -> DrawnSurfaces:
+    """Return the mesh of those triangles that vary; works on arrays alone."""
+    coordinates, weights = (values[varies] for values in tiles.drawn_triangles())
+    size = np.array([tiles.width, tiles.height])
+    return DrawnSurfaces(
+        (tiles.width, tiles.height),
+        _at_weights(corners[varies], weights),
+        (coordinates + _PIXEL_OFFSET / size).astype(np.float32),
+        {name: _at_weights(values[varies], weights) for name, values in inputs.items()},
+        surface[varies],
+    )
+
+
 class SurfaceBake:
-    """A scene of one mesh and copies of materials, for the time of a few bakes."""
+    """A scene of one mesh and copies of materials, for the time of a bake.
+
+    Parameters
+    ----------
+    materials : mapping of int to MaterialSource or None
+        Those to evaluate, by their surface.
+    inputs : sequence of str
+        What their nodes ask for.
+    """
 
     def __init__(
         self,
         context: bpy.types.Context,
         settings: BakeSettings,
-        materials: Sequence[bpy.types.Material | None],
-        needed: set[int],
-        inputs: Mapping[str, np.ndarray],
+        materials: Mapping[int, MaterialSource | None],
+        inputs: Sequence[str],
     ) -> None:
         self._context = context
         self._made: list[bpy.types.ID] = []
         self._attributes = {name: f"radiosity_{number}" for number, name in enumerate(inputs)}
         self._rewired: dict[int, RewiredMaterial] = {}
         try:
-            for row in sorted(needed):
-                self._rewired[row] = RewiredMaterial(materials[row], self._attributes)
+            for row, source in materials.items():
+                if source is None:
+                    continue
+                self._rewired[row] = RewiredMaterial(source.find(), self._attributes)
                 self._made += self._rewired[row].made
             self._scene = _new_scene(context.scene, context.view_layer, settings)
             self._made.append(self._scene)
         except BaseException:
-            self.remove()
+            self.close()
             raise
 
-    def draw(
-        self,
-        tiles: SurfaceTiles,
-        corners: np.ndarray,
-        inputs: Mapping[str, np.ndarray],
-        surface: np.ndarray,
-        varies: np.ndarray,
-    ) -> None:
-        """Make the mesh of those triangles that vary; its image coordinates are their tiles."""
-        coordinates, weights = (values[varies] for values in tiles.drawn_triangles())
-        size = np.array([tiles.width, tiles.height])
+    def draw(self, drawn: DrawnSurfaces) -> None:
+        """Make the mesh and the image."""
         mesh = bpy.data.meshes.new("Radiosity Surfaces")
         self._made.append(mesh)
-        _fill_mesh(mesh, _at_weights(corners[varies], weights))
+        _fill_mesh(mesh, drawn.corners)
         layer = mesh.uv_layers.new(name=_UV_LAYER)
-        layer.uv.foreach_set("vector", (coordinates + _PIXEL_OFFSET / size).astype(np.float32).ravel())
-        for name, values in inputs.items():
+        layer.uv.foreach_set("vector", drawn.uv.ravel())
+        for name, values in drawn.inputs.items():
             attribute = mesh.attributes.new(self._attributes[name], "FLOAT_COLOR", "CORNER")
-            attribute.data.foreach_set("color", _at_weights(values[varies], weights).ravel())
-        slots = {row: slot for slot, row in enumerate(self._rewired)}
+            attribute.data.foreach_set("color", values.ravel())
+        slots = np.zeros(max(self._rewired) + 1, dtype=np.int32)
+        slots[list(self._rewired)] = np.arange(len(self._rewired))
         for rewired in self._rewired.values():
             mesh.materials.append(rewired.material)
-        slot = np.array([slots[row] for row in surface[varies].tolist()], dtype=np.int32)
-        mesh.polygons.foreach_set("material_index", slot)
+        mesh.polygons.foreach_set("material_index", slots[drawn.surface])
         mesh.update()
         self._object = bpy.data.objects.new("Radiosity Surfaces", mesh)
         self._made.append(self._object)
         self._scene.collection.objects.link(self._object)
-        self._image = bpy.data.images.new(
-            "Radiosity Surfaces", tiles.width, tiles.height, float_buffer=True, is_data=True
-        )
+        self._image = bpy.data.images.new("Radiosity Surfaces", *drawn.size, float_buffer=True, is_data=True)
         self._made.append(self._image)
 
     def may_be_cut_out(self, surface: int) -> bool:
@@ -111,7 +153,7 @@ class SurfaceBake:
         self._image.pixels.foreach_get(pixels)
         return pixels.reshape(height, width, 4)[..., :3]
 
-    def remove(self) -> None:
+    def close(self) -> None:
         """Leave the file as it was."""
         remove_datablocks(self._made)
         self._made.clear()
@@ -158,11 +200,11 @@ def _at_weights(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
 
 
 def _fill_mesh(mesh: bpy.types.Mesh, corners: np.ndarray) -> None:
-    """Give an empty mesh triangles (n, 3, 3) that share no vertex."""
+    """Give an empty mesh triangles (n, 3, 3) float32 that share no vertex."""
     count = len(corners)
     mesh.vertices.add(3 * count)
     mesh.loops.add(3 * count)
     mesh.polygons.add(count)
-    mesh.vertices.foreach_set("co", corners.astype(np.float32).ravel())
+    mesh.vertices.foreach_set("co", corners.ravel())
     mesh.loops.foreach_set("vertex_index", np.arange(3 * count, dtype=np.int32))
     mesh.polygons.foreach_set("loop_start", np.arange(0, 3 * count, 3, dtype=np.int32))

@@ -6,20 +6,23 @@ one bake for each of the three, however many objects there are.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import closing
 
 import bpy
 import numpy as np
 
+from ..background import elsewhere
 from ..lightmap.surface_tiles import SurfaceTiles, lay_out_surfaces
 from ..settings import BakeSettings
 from ..solver.radiometry import radiance_of_radiosity, radiosity_of_radiance
 from ..solver.scene import MAX_REFLECTANCE
 from ..solver.surface_images import SurfaceImages
-from .collect import Piece
+from .export_sources import MaterialSource
 from .materials import Surface
 from .mesh_arrays import normal_matrix, world_from_object
-from .surface_bake import SurfaceBake
+from .pieces import Piece
+from .surface_bake import DrawnSurfaces, SurfaceBake, drawn_surfaces
 from .surface_rewiring import CHANNELS
 from .surface_terms import surface_of_terms
 
@@ -31,10 +34,13 @@ def evaluate_surfaces(
     context: bpy.types.Context,
     pieces: Sequence[Piece],
     surfaces: Sequence[Surface],
-    materials: Sequence[bpy.types.Material | None],
+    materials: Sequence[MaterialSource | None],
     settings: BakeSettings,
-) -> SurfaceImages | None:
+    patient: bool = False,
+) -> Generator[float, None, SurfaceImages | None]:
     """Evaluate the materials that vary, on all pieces at once.
+
+    Each bake of Cycles is a step, which leaves nothing in the file: it may be edited before the next.
 
     Parameters
     ----------
@@ -42,10 +48,12 @@ def evaluate_surfaces(
     pieces : sequence of Piece
         All of the scene, in its order.
     surfaces : sequence of Surface
-    materials : sequence of bpy.types.Material or None
+    materials : sequence of MaterialSource or None
         Parallel to `surfaces`: the file's own, not evaluated ones.
     settings : BakeSettings
         `resolution` and `threads` matter here.
+    patient : bool
+        Whether a window waits.
 
     Returns
     -------
@@ -56,31 +64,42 @@ def evaluate_surfaces(
     ------
     BakeError
         If Cycles did not bake.
+    SceneError
+        If a material is gone.
     """
     surface = np.concatenate([piece.surface for piece in pieces])
     plain = np.array([one.is_plain for one in surfaces])
     rows = np.flatnonzero(~plain[surface])
     if not len(rows):
         return None
-    corners, inputs = _gather(pieces, rows)
+    corners, inputs = yield from elsewhere(lambda: _gather(pieces, rows), patient)
     own = surface[rows]
     varies = np.array([one.varies for one in surfaces])[own]
-    bake = SurfaceBake(context, settings, materials, set(own[varies].tolist()), inputs)
-    try:
+    needed = {row: materials[row] for row in sorted(set(own[varies].tolist()))}
+    yield 0.0
+    with closing(SurfaceBake(context, settings, needed, tuple(inputs))) as bake:
         cut_out = [one.opacity < 1.0 or bake.may_be_cut_out(row) for row, one in enumerate(surfaces)]
+        varying = [channel for channel in CHANNELS if not bake.is_constant(channel)] if varies.any() else []
+    yield 0.1
+
+    def laid_out() -> tuple[SurfaceTiles, dict[str, np.ndarray], DrawnSurfaces | None]:
         area = np.where(varies, _areas(corners), 0.0)
         tiles = lay_out_surfaces(area, np.array(cut_out)[own].astype(int), _side(settings, any(cut_out)))
-        terms = _terms_of_constants(tiles, surfaces, own)
-        if varies.any():
-            bake.draw(tiles, corners, inputs, own, varies)
-            triangle, row, column, *_ = tiles.texels()
-            row, column = row[varies[triangle]], column[varies[triangle]]
-            for channel in CHANNELS:
-                if not bake.is_constant(channel):
-                    terms[channel][row, column] = bake.channel(channel)[row, column]
-    finally:
-        bake.remove()
-    return _images(tiles, terms, rows, len(surface))
+        drawn = drawn_surfaces(tiles, corners, inputs, own, varies) if varying else None
+        return tiles, _terms_of_constants(tiles, surfaces, own), drawn
+
+    tiles, terms, drawn = yield from elsewhere(laid_out, patient)
+    triangle, row, column, *_ = tiles.texels()
+    row, column = row[varies[triangle]], column[varies[triangle]]
+    for channel in varying:
+        yield 0.2
+        assert drawn is not None
+        with closing(SurfaceBake(context, settings, needed, tuple(inputs))) as bake:
+            bake.draw(drawn)
+            seen = bake.channel(channel)
+        yield 0.5
+        terms[channel][row, column] = seen[row, column]
+    return (yield from elsewhere(lambda: _images(tiles, terms, rows, len(surface)), patient))
 
 
 def _side(settings: BakeSettings, cut_out: bool) -> int:

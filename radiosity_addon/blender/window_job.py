@@ -11,6 +11,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from ..errors import NothingToDoError, RadiosityError
 from ..remaining import RemainingTime
 from . import live_view, runtime
+from .file_watch import guarded
 from .progress_text import progress_text
 
 TICK = 0.005
@@ -45,6 +46,7 @@ class WindowJob:
     _job: Any = None  # the generator while it runs
     _report: Any = None  # what it returned
     _timer: bpy.types.Timer | None = None
+    _ticked: float = 0.0  # the timer's time when it last carried the work on
     _remaining: Any = None  # RemainingTime of the work that runs
     report: Any  # the operator's own
 
@@ -78,11 +80,15 @@ class WindowJob:
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Carry on for a tick, or cancel."""
+        if self._job is None:  # ended from outside
+            return {"CANCELLED"}
         if event.type == "ESC" and event.value == "PRESS":
             self._end(context)
             self._undone(context)
             self.report({"INFO"}, "Cancelled; everything is as it was")
             return {"CANCELLED"}
+        if event.type.startswith("TIMER") and not (event.type == "TIMER" and self._is_our_turn()):
+            return {"PASS_THROUGH"}  # another add-on's, or Blender's own
         if event.type != "TIMER":
             return {"PASS_THROUGH"} if event.type in _NAVIGATION else {"RUNNING_MODAL"}
         try:
@@ -95,6 +101,14 @@ class WindowJob:
             self._end(context)
             raise
         return self._finish(context)
+
+    def _is_our_turn(self) -> bool:
+        """Tell whether it is our timer that has come: events do not say whose they are, but it counts on."""
+        now = 0.0 if self._timer is None else self._timer.time_duration
+        if now == self._ticked:
+            return False
+        self._ticked = now
+        return True
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Blender ends the operator from outside: a window closes, or Blender quits."""
@@ -116,7 +130,8 @@ class WindowJob:
 
     def _begin(self, context: bpy.types.Context, in_window: bool) -> None:
         self._report = None
-        self._job = self._start(context, in_window)
+        self._job = guarded(self._start(context, in_window), context)
+        self._ticked = 0.0
         running = runtime.running
         running.active, running.stop = True, lambda: self._end(bpy.context)
         running.stage, running.fraction, running.seconds_left = "export", 0.0, None
@@ -167,13 +182,16 @@ class WindowJob:
             if self._timer is not None:
                 context.window_manager.event_timer_remove(self._timer)
                 context.window_manager.progress_end()
-                context.workspace.status_text_set(None)
+                if context.workspace is not None:  # the window may be closing
+                    context.workspace.status_text_set(None)
                 self._timer = None
             redraw_sidebars(context)
 
 
 def redraw_sidebars(context: bpy.types.Context) -> None:
     """Have the panel drawn again in every 3D viewport."""
+    if context.window_manager is None:
+        return
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":

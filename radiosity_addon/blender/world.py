@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
+
 import bpy
 import numpy as np
 
 from ..bake_scene import BakeWarning
+from ..errors import SceneError
 from ..solver.environment import (
     Bounds,
     SkyPatch,
@@ -15,6 +18,7 @@ from ..solver.environment import (
     solid_angles,
 )
 from ..solver.lights import EnvironmentLight, Light
+from .image_values import known_means_only
 from .lamps import ALL_BOUNCES
 from .materials import read_radiance, uses_nodes
 from .world_pixels import world_pixels
@@ -26,10 +30,13 @@ _CLOSE = (96, 96)
 """Pixels of that look."""
 
 
-def read_world(
-    world: bpy.types.World | None, dark: bool = False
-) -> tuple[list[Light], tuple[BakeWarning, ...]]:
+WorldLights = tuple[list[Light], tuple[BakeWarning, ...]]
+
+
+def read_world(world: bpy.types.World | None, dark: bool = False) -> Generator[float, None, WorldLights]:
     """Return the lights that a world is; none where it is black or there is none.
+
+    Each time that Cycles renders it is a step; the world is found by its name again after each.
 
     Parameters
     ----------
@@ -48,12 +55,13 @@ def read_world(
     limited = _limited(world)
     if not uses_nodes(world):
         return _constant(np.array(world.color[:3], dtype=np.float64), world.name, dark), limited
-    radiance, warnings = read_radiance(world, "world")
+    with known_means_only(None):  # an image is not constant, whatever its mean
+        radiance, warnings = read_radiance(world, "world")
     # The walk through the nodes warns of whatever is not constant: then Cycles knows better.
     beside = tuple(warning for warning in warnings if "volume" in warning.message)
     if len(beside) == len(warnings):
         return _constant(radiance, world.name, dark), beside + limited
-    return _sampled(world), beside + limited
+    return (yield from _sampled(world.name_full)), beside + limited
 
 
 def _constant(radiance: np.ndarray, name: str, dark: bool) -> list[Light]:
@@ -72,13 +80,32 @@ def _limited(world: bpy.types.World) -> tuple[BakeWarning, ...]:
     return (BakeWarning(world.name, message),)
 
 
-def _sampled(world: bpy.types.World) -> list[Light]:
+def _named(name: str) -> bpy.types.World:
+    """Return the world of a full name.
+
+    Raises
+    ------
+    SceneError
+        If it was removed between two steps.
+    """
+    world = next((each for each in bpy.data.worlds if each.name_full == name), None)
+    if world is None:
+        raise SceneError(f"world '{name}' was removed while the scene was read: bake again")
+    return world
+
+
+def _sampled(full_name: str) -> Generator[float, None, list[Light]]:
     """Render a world and split it into an even part and bright patches."""
-    pixels = world_pixels(world)
+    yield 0.0
+    name = _named(full_name).name
+    pixels = world_pixels(_named(full_name))
+    yield 0.5
     excess, patches = bright_patches(pixels)
     even = pixels - excess.reshape(pixels.shape)
-    lights: list[Light] = list(even_part(even, world.name))
-    lights.extend(_patch(world, pixels, excess, rows) for rows in patches)
+    lights: list[Light] = list(even_part(even, name))
+    for number, rows in enumerate(patches):
+        yield 0.5 + 0.5 * number / len(patches)
+        lights.append(_patch(_named(full_name), pixels, excess, rows))
     return [light for light in lights if light.strength.any()]
 
 

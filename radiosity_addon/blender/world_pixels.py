@@ -48,6 +48,9 @@ def world_pixels(
     """
     with only_for_now():
         copy = world.copy()
+        if hasattr(copy, "cycles"):
+            # Nothing is lit here: a map of where to aim rays would take longer than the picture.
+            copy.cycles.sampling_method = "NONE"
         _answer_light_paths(copy.node_tree, {})
         return look_around(panorama_scene(copy, window), size, f"world '{world.name}'")
 

@@ -1,0 +1,173 @@
+"""Bake from the check's dialog, with another add-on's timer and a second window that edits; take photos.
+
+Usage: blender cornell.blend --enable-event-simulate --python drive_manners.py -- ANSWER.json
+"""
+
+import importlib
+import json
+import sys
+from pathlib import Path
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).parent))
+import events
+from file_dump import differences, dump_file
+
+ANSWER = Path(sys.argv[sys.argv.index("--") + 1])
+MODULE = "bl_ext.user_default.radiosity_addon"
+
+runtime = importlib.import_module(f"{MODULE}.blender.runtime")
+window_job = importlib.import_module(f"{MODULE}.blender.window_job")
+
+seen = {"foreign_ticks": 0, "advanced": 0}
+
+
+class FOREIGN_OT_ticking(bpy.types.Operator):  # noqa: N801 (Blender's convention)
+    """A modal operator of somebody else, with a fast timer in the same window."""
+
+    bl_idname = "wm.foreign_ticking"
+    bl_label = "Ticking"
+
+    def invoke(self, context, _event):
+        self.timer = context.window_manager.event_timer_add(0.001, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        if event.type == "TIMER":
+            seen["foreign_ticks"] += 1
+            if seen.get("stop"):
+                context.window_manager.event_timer_remove(self.timer)
+                return {"CANCELLED"}
+        return {"PASS_THROUGH"}
+
+
+advance = window_job.WindowJob._advance
+
+
+def counted(self, seconds):
+    seen["advanced"] += 1
+    return advance(self, seconds)
+
+
+window_job.WindowJob._advance = counted
+
+
+def baking():
+    """A bake runs as a modal operator."""
+    return runtime.running.active
+
+
+def not_baking():
+    """The bake has ended."""
+    return not baking()
+
+
+def solving():
+    """The bake is past its export."""
+    return not baking() or runtime.running.stage in {"solve", "light"}
+
+
+def override(window):
+    area = next(area for area in window.screen.areas if area.type == "VIEW_3D")
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    return bpy.context.temp_override(window=window, area=area, region=region)
+
+
+def invoke(operator, window=None):
+    with override(window or events.window()):
+        operator("INVOKE_DEFAULT")
+
+
+def photograph(name):
+    yield 0.7
+    events.screenshot(ANSWER.with_name(f"manners-{name}.png"))
+
+
+def script():
+    view = events.centre("WINDOW")
+    settings = bpy.context.scene.radiosity
+    settings.show_result = False
+    yield from events.open_sidebar("Radiosity")
+    bpy.context.view_layer.objects.active = bpy.data.objects["Floor"]
+    yield from photograph("before")
+    # Its own settings, in the panel Active Object below the folder.
+    sidebar = events.region("UI")
+    yield from events.click(sidebar.x + 70, 800 - 372)
+    yield from photograph("object")
+    yield from events.click(sidebar.x + 70, 800 - 372)
+
+    # The check's dialog: its button bakes, and it closes.
+    bpy.data.objects["Short Block"].radiosity_texel_scale = 0.02
+    yield from events.hover(*view)
+    invoke(bpy.ops.radiosity.check)
+    yield from photograph("check")
+    yield from events.key("RET", *view)
+    seen["baking_from_dialog"] = baking() or runtime.last_bake(bpy.context.scene) is not None
+    yield from photograph("dialog-closed")
+    yield from events.until(not_baking, 120)
+    yield from photograph("after")
+    seen["lit"] = runtime.last_bake(bpy.context.scene) is not None
+    bpy.context.scene.render.engine = "BLENDER_WORKBENCH"
+    yield from photograph("workbench")
+
+    # Somebody else's timer does not carry it on, and is not kept from its owner.
+    bpy.utils.register_class(FOREIGN_OT_ticking)
+    settings.resolution = 256
+    invoke(bpy.ops.wm.foreign_ticking)
+    yield 0.3
+    seen["foreign_ticks"] = seen["advanced"] = 0
+    invoke(bpy.ops.radiosity.bake)
+    yield 1.0
+    seen["ticks"] = [seen["foreign_ticks"], seen["advanced"]]
+    yield from events.key("ESC", *view)
+    seen["stop"] = True
+    yield from events.until(not_baking, 30)
+    yield 0.3
+
+    # A second window: an object is deleted there, then an undo.
+    bpy.ops.ed.undo_push(message="Before")
+    with override(events.window()):
+        bpy.ops.wm.window_new()
+    yield 0.5
+    seen["windows"] = len(bpy.context.window_manager.windows)
+    for name, edit in (("deleted", delete), ("undone", undo), ("closed", close)):
+        before = dump_file()
+        invoke(bpy.ops.radiosity.bake)
+        yield from events.until(solving, 60)
+        seen[f"{name}_while_baking"] = baking()
+        edit(bpy.context.window_manager.windows[-1])
+        yield from events.until(not_baking, 120)
+        yield 0.3
+        after = dump_file()
+        seen[name] = [line for line in differences(before, after) if "/window_managers" not in line]
+        seen[f"{name}_shows"] = sorted(obj.name for obj in bpy.data.objects if obj.type == "MESH")
+
+
+def delete(window):
+    with override(window):
+        bpy.data.objects.remove(bpy.data.objects["Tall Block"])
+        bpy.ops.ed.undo_push(message="Delete")
+
+
+def undo(window):
+    with override(window):
+        bpy.ops.ed.undo()
+
+
+def close(window):
+    with override(window):
+        bpy.ops.wm.window_close()
+    runtime.running.active and runtime.running.stop()
+
+
+def finished(failure):
+    seen["failure"] = failure
+    if failure:
+        events.screenshot(ANSWER.with_name("manners-failure.png"))
+    ANSWER.write_text(json.dumps(seen, indent=1))
+
+
+bpy.context.preferences.view.show_splash = False
+events.drive(script(), finished)

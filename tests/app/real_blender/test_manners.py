@@ -1,0 +1,65 @@
+"""The check's dialog, other add-ons' timers and a second window, while a bake runs in a real window."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.app.real_blender.installed import Installed
+
+pytestmark = pytest.mark.real_blender
+
+PICTURES = Path(__file__).resolve().parents[3] / "out" / "ci"
+
+
+@pytest.fixture(scope="module")
+def seen(installed: Installed, cornell_blend: Path) -> dict[str, Any]:
+    """What one session saw; its photographs lie in `out/ci`."""
+    answer = cornell_blend.with_name("manners.json")
+    done = installed.run(
+        cornell_blend,
+        "--enable-event-simulate",
+        "--window-geometry",
+        *("0", "0", "1280", "800"),
+        "--python",
+        installed.folder / "drive_manners.py",
+        "--",
+        answer,
+        window=True,
+        timeout=500,
+    )
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    for picture in answer.parent.glob("manners-*.png"):
+        shutil.copy(picture, PICTURES)
+    assert answer.exists(), done.stdout
+    told = json.loads(answer.read_text())
+    (PICTURES / "manners.json").write_text(json.dumps(told, indent=1) + done.stdout)
+    assert told["failure"] is None, f"{told['failure']}\n{done.stdout}"
+    assert "Traceback" not in done.stdout, done.stdout
+    return told
+
+
+def test_the_dialogs_button_bakes(seen: dict[str, Any]) -> None:
+    assert seen["baking_from_dialog"]
+    assert seen["lit"]
+
+
+def test_only_its_own_timer_carries_a_bake_on(seen: dict[str, Any]) -> None:
+    foreign, advanced = seen["ticks"]
+    assert foreign > 0  # at d331b48 none: they were swallowed
+    assert 0 < advanced <= 110  # one every 10 ms
+
+
+def test_a_deletion_in_a_second_window_stops_the_bake_and_nothing_else(seen: dict[str, Any]) -> None:
+    assert seen["windows"] == 2
+    assert seen["deleted_while_baking"]
+    assert "Tall Block" not in seen["deleted_shows"]
+
+
+def test_an_undo_in_a_second_window_stops_the_bake(seen: dict[str, Any]) -> None:
+    assert seen["undone_while_baking"]
+    assert "Tall Block" in seen["undone_shows"]

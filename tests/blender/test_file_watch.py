@@ -1,0 +1,234 @@
+"""Edits, undo and deletion between the steps of a job: what a second window may do meanwhile."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from types import SimpleNamespace
+from typing import Any
+
+import bpy
+import pytest
+
+import radiosity_addon
+from radiosity_addon.blender import runtime, window_job
+from radiosity_addon.blender.bake_record import recorded_objects
+from radiosity_addon.blender.cornell import build_cornell_box
+from radiosity_addon.blender.file_watch import guarded
+from radiosity_addon.blender.job import run_bake
+from radiosity_addon.blender.relight import run_relight
+from radiosity_addon.errors import BakeError, RadiosityError
+from radiosity_addon.keeping import Keeping
+from radiosity_addon.settings import BakeSettings
+
+QUICK = BakeSettings(resolution=16, quality="draft")
+
+
+@pytest.fixture(autouse=True)
+def box() -> Iterator[bpy.types.Scene]:
+    radiosity_addon.register()
+    scene = build_cornell_box()
+    textured("Floor")
+    bpy.ops.ed.undo_push(message="Box")
+    yield scene
+    radiosity_addon.unregister()
+
+
+def textured(name: str) -> None:
+    """Have an object's material vary, so that its evaluation by Cycles is among the steps."""
+    tree = bpy.data.objects[name].data.materials[0].node_tree
+    checker = tree.nodes.new("ShaderNodeTexChecker")
+    shader = next(node for node in tree.nodes if node.type in {"BSDF_PRINCIPLED", "BSDF_DIFFUSE"})
+    tree.links.new(checker.outputs["Color"], shader.inputs[0])
+
+
+def blocks() -> list[str]:
+    kinds = (
+        "objects",
+        "meshes",
+        "materials",
+        "images",
+        "node_groups",
+        "scenes",
+        "cameras",
+        "worlds",
+        "lights",
+    )
+    return sorted(f"{kind}/{block.name}" for kind in kinds for block in getattr(bpy.data, kind))
+
+
+def job(patient: bool = False) -> Any:
+    return guarded(run_bake(bpy.context, QUICK, None, patient=patient), bpy.context)
+
+
+def count_steps() -> int:
+    steps = sum(1 for _ in job())
+    bpy.ops.radiosity.restore()
+    return steps
+
+
+def delete() -> None:
+    bpy.data.objects.remove(bpy.data.objects["Tall Block"])
+
+
+def delete_material() -> None:
+    bpy.data.materials.remove(bpy.data.objects["Floor"].data.materials[0])
+
+
+def rename() -> None:
+    bpy.data.objects["Tall Block"].name = "Renamed"
+
+
+def edit_mesh() -> None:
+    mesh = bpy.data.objects["Tall Block"].data
+    mesh.clear_geometry()
+    mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+
+
+def add() -> None:
+    mesh = bpy.data.objects["Tall Block"].data
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Added", mesh))
+
+
+def undo() -> None:
+    bpy.ops.ed.undo_push(message="Something")
+    bpy.ops.ed.undo()
+
+
+def remove_scene() -> None:
+    scene = bpy.context.scene
+    bpy.data.scenes.new("Other")
+    bpy.data.batch_remove([scene])
+
+
+EDITS: list[Callable[[], None]] = [delete, delete_material, rename, edit_mesh, add, undo]
+
+
+@pytest.mark.parametrize("edit", EDITS)
+@pytest.mark.parametrize("at", [0.0, 0.15, 0.3, 0.45, 0.6, 0.8, 1.0])
+def test_between_any_two_steps_a_bake_survives_or_stops_and_leaves_nothing(
+    edit: Callable[[], None], at: float
+) -> None:
+    steps = count_steps()
+    running = job()
+    for _ in range(1 + round(at * (steps - 1))):
+        next(running)
+    edit()
+    before = blocks()
+    try:
+        for _ in running:
+            pass
+    except RadiosityError as error:
+        message = str(error)
+        assert message
+        assert "\n" not in message
+        assert blocks() == before
+        assert not recorded_objects()
+    else:
+        assert recorded_objects()
+        assert bpy.ops.radiosity.restore() == {"FINISHED"}
+        assert set(blocks()) == set(before)
+
+
+def test_an_undo_stops_a_bake_at_its_next_step() -> None:
+    running = job()
+    next(running)
+    undo()
+    with pytest.raises(BakeError, match="Undo"):
+        next(running)
+    assert next(running, None) is None
+
+
+def test_another_file_stops_it() -> None:
+    running = job()
+    next(running)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    with pytest.raises(BakeError, match="another file"):
+        next(running)
+
+
+def test_another_scene_stops_it() -> None:
+    running = job()
+    next(running)
+    remove_scene()
+    with pytest.raises(BakeError, match="scene"):
+        next(running)
+
+
+def test_no_handler_stays() -> None:
+    handlers = bpy.app.handlers
+    lists = (handlers.undo_post, handlers.redo_post, handlers.load_pre)
+    before = [len(each) for each in lists]
+    running = job()
+    next(running)
+    assert [len(each) for each in lists] == [count + 1 for count in before]
+    running.close()
+    assert [len(each) for each in lists] == before
+
+
+@pytest.mark.parametrize("edit", [delete, rename, edit_mesh, undo])
+@pytest.mark.parametrize("at", [0.0, 0.5, 1.0])
+def test_between_the_steps_of_a_relight_too(edit: Callable[[], None], at: float) -> None:
+    for _ in run_bake(bpy.context, QUICK, None, keeping=Keeping()):
+        pass
+    lamp = next(obj for obj in bpy.data.objects if obj.type == "LIGHT")
+    lamp.data.energy *= 2
+    bpy.ops.ed.undo_push(message="Brighter")
+    count = sum(1 for _ in run_relight(bpy.context))
+    lamp = next(obj for obj in bpy.data.objects if obj.type == "LIGHT")
+    lamp.data.energy *= 2
+    running = guarded(run_relight(bpy.context), bpy.context)
+    for _ in range(1 + round(at * (count - 1))):
+        next(running)
+    edit()
+    before = blocks()
+    with suppress(RadiosityError):
+        for _ in running:
+            pass
+    assert blocks() == before
+
+
+class Job(window_job.WindowJob):
+    """A job of ten steps, with a timer that counts as Blender's does."""
+
+    def __init__(self) -> None:
+        self.steps = 0
+        self.messages: list[str] = []
+
+    def report(self, _kind: set[str], message: str) -> None:
+        self.messages.append(message)
+
+    def _start(self, _context: object, _in_window: bool) -> Any:
+        for number in range(10):
+            self.steps += 1
+            yield SimpleNamespace(stage="solve", fraction=number / 10)
+
+    def _succeeded(self, _context: object, _in_window: bool) -> None:
+        pass
+
+
+def test_only_its_own_timer_carries_a_job_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At d331b48 every TIMER event did, whoever's it was, and its owner never got it."""
+    monkeypatch.setattr(window_job.WindowJob, "_show_progress", lambda *_: None)
+    monkeypatch.setattr(window_job, "TICK", 0.0)
+    monkeypatch.setattr(
+        window_job.WindowJob, "_advance", lambda self, _: next(self._job, None) is None and False
+    )
+    running = Job()
+    running._begin(bpy.context, in_window=True)
+    running._timer = SimpleNamespace(time_duration=0.0)
+    foreign = SimpleNamespace(type="TIMER", value="NOTHING")
+    for _ in range(5):
+        assert running.modal(bpy.context, foreign) == {"PASS_THROUGH"}
+    assert running.steps == 0
+    running._timer.time_duration = 0.01
+    assert running.modal(bpy.context, foreign) == {"RUNNING_MODAL"}
+    assert running.modal(bpy.context, foreign) == {"PASS_THROUGH"}
+    assert running.steps == 1
+    assert running.modal(bpy.context, SimpleNamespace(type="TIMERREGION", value="NOTHING")) == {
+        "PASS_THROUGH"
+    }
+    running._timer = None
+    running._end(bpy.context)
+    assert running.modal(bpy.context, foreign) == {"CANCELLED"}
+    assert not runtime.running.active

@@ -1,0 +1,155 @@
+"""No step of an export holds the window up for long, but for what Blender does in one piece."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+
+import bpy
+import numpy as np
+import pytest
+
+from radiosity_addon.blender import collect as collecting
+from radiosity_addon.blender import surface_bake, world_pixels
+from radiosity_addon.blender.export import export_scene, export_steps
+from radiosity_addon.settings import BakeSettings
+from radiosity_addon.solver.steps import drain
+from tests.blender.scenes import add_lamp
+
+LONGEST = 0.1
+"""Seconds of processor time of a step."""
+
+
+def many_objects(count: int = 300, materials: int = 60, textured: int = 0) -> None:
+    made = []
+    for number in range(materials):
+        material = bpy.data.materials.new(f"Paint {number}")
+        if bpy.app.version < (5, 0):
+            material.use_nodes = True
+        shader = material.node_tree.nodes["Principled BSDF"]
+        shader.inputs["Base Color"].default_value = (0.1 + 0.8 * number / materials, 0.5, 0.3, 1.0)
+        if number < textured:
+            checker = material.node_tree.nodes.new("ShaderNodeTexChecker")
+            material.node_tree.links.new(checker.outputs[0], shader.inputs["Base Color"])
+        made.append(material)
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=16, ring_count=8)
+    first = bpy.context.object
+    for number in range(count):
+        mesh = first.data.copy()
+        mesh.materials.append(made[number % materials])
+        obj = bpy.data.objects.new(f"Ball {number}", mesh)
+        obj.location = (2.2 * (number % 20), 2.2 * (number // 20), 1.0)
+        bpy.context.scene.collection.objects.link(obj)
+    bpy.data.objects.remove(first)
+    add_lamp("SUN", "Sun", energy=3.0)
+    bpy.context.view_layer.update()
+
+
+class Timed:
+    """Processor time that a function of Blender's took, so that it can be told from ours."""
+
+    def __init__(self) -> None:
+        self.seconds = 0.0
+
+    def wrap(self, function):
+        def timed(*args, **more):
+            start = time.thread_time()
+            try:
+                return function(*args, **more)
+            finally:
+                self.seconds += time.thread_time() - start
+
+        return timed
+
+
+@pytest.fixture
+def of_blender(monkeypatch: pytest.MonkeyPatch) -> Iterator[Timed]:
+    """Takes the time of calls that cannot be divided: those that docs/main-thread.md lists."""
+    timed = Timed()
+    monkeypatch.setattr(surface_bake, "bake_emission", timed.wrap(surface_bake.bake_emission))
+    monkeypatch.setattr(world_pixels, "look_around", timed.wrap(world_pixels.look_around))
+    return timed
+
+
+@pytest.mark.parametrize("textured", [0, 20])
+def test_no_step_of_an_export_of_300_objects_takes_long(textured: int, of_blender: Timed) -> None:
+    """At d331b48 the export was one step, of 0.7 s without textures."""
+    many_objects(textured=textured)
+    steps = export_steps(bpy.context, BakeSettings(resolution=128), patient=True)
+    taken = []
+    while True:
+        start, of_blender.seconds = time.thread_time(), 0.0
+        try:
+            next(steps)
+        except StopIteration as done:
+            export = done.value
+            break
+        finally:
+            taken.append(time.thread_time() - start - of_blender.seconds)
+    assert len(export.sources) == 300
+    assert max(taken) < LONGEST, [round(each, 3) for each in sorted(taken)[-8:]]
+    assert sum(taken) > 0.1  # there is something to divide
+
+
+def test_moments_change_nothing_of_what_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However often the scene is looked at, the arrays are the same, in the same order."""
+    many_objects(40, 7, 3)
+    at_once = export_scene(bpy.context, BakeSettings(resolution=64))
+    monkeypatch.setattr(collecting, "MOMENT", 0.0)
+    looked = 0
+    steps = export_steps(bpy.context, BakeSettings(resolution=64), patient=True)
+    while True:
+        try:
+            next(steps)
+        except StopIteration as done:
+            in_steps = done.value
+            break
+        looked += 1
+    assert looked > 40
+    assert in_steps.sources == at_once.sources
+    one, other = at_once.bake_scene, in_steps.bake_scene
+    for name in ("triangles", "reflectance", "emission", "normals", "opacity"):
+        assert np.array_equal(getattr(one.scene, name), getattr(other.scene, name)), name
+    assert np.array_equal(one.scene.images.values, other.scene.images.values)
+    assert one.warnings == other.warnings
+    assert np.array_equal(one.emitter, other.emitter)
+
+
+def test_means_of_images_are_computed_outside_of_the_moment() -> None:
+    many_objects(4, 2)
+    image = bpy.data.images.new("Picture", 64, 64)
+    image.pixels.foreach_set(np.tile(np.array([0.5, 0.25, 1.0, 1.0], dtype=np.float32), 64 * 64))
+    tree = bpy.data.materials["Paint 0"].node_tree
+    texture = tree.nodes.new("ShaderNodeTexImage")
+    texture.image = image
+    tree.links.new(texture.outputs[0], tree.nodes["Principled BSDF"].inputs["Base Color"])
+    steps = export_steps(bpy.context, BakeSettings(resolution=64))
+    next(steps)
+    bpy.data.images.remove(image)  # between two steps
+    export = drain(steps)
+    assert len(export.sources) == 4
+
+
+def test_a_sky_is_rendered_without_an_importance_map(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = bpy.data.worlds.new("Sky")
+    if bpy.app.version < (5, 0):
+        world.use_nodes = True
+    tree = world.node_tree
+    tree.links.new(tree.nodes.new("ShaderNodeTexSky").outputs[0], tree.nodes["Background"].inputs["Color"])
+    bpy.context.scene.world = world
+    many_objects(2, 1)
+    methods = []
+    render = world_pixels.look_around
+
+    def noted(scene, *args):
+        methods.append(scene.world.cycles.sampling_method)
+        return render(scene, *args)
+
+    monkeypatch.setattr(world_pixels, "look_around", noted)
+    steps = export_steps(bpy.context, BakeSettings(resolution=16))
+    most, before = 0, 0
+    for _ in steps:
+        most, before = max(most, len(methods) - before), len(methods)
+    assert set(methods) == {"NONE"}
+    assert most == 1  # a render a step
+    assert world.cycles.sampling_method != "NONE"
