@@ -128,13 +128,14 @@ def restore(scene: Path | None, loaded: Path | None, output: Path, console: Cons
     with registered():
         from .files import open_scene
         from .output import save_copy
-        from .restore import restore as restore_file
+        from .restore import restore_scene
 
         if scene is not None:
             open_scene(scene)
         elif loaded is None:
             raise UsageError("restore needs SCENE, a baked .blend")
-        count = restore_file(bpy.context)
+        restored = restore_scene(bpy.context, None)
+        count = restored.count
         if not count:
             raise SceneError(f"'{scene or loaded}' shows no bake; there is nothing to restore")
         for each in bpy.data.scenes:
@@ -142,7 +143,8 @@ def restore(scene: Path | None, loaded: Path | None, output: Path, console: Cons
             kept_bakes.drop(each)
         _make_folder_of(output)
         save_copy(output)
-        console.lines([f"{count} object{'' if count == 1 else 's'} restored, written to {output}"])
+        lines = [f"{count} object{'' if count == 1 else 's'} restored, written to {output}"]
+        console.lines([*lines, *(f"warning: {warning.message}" for warning in restored.warnings)])
 
 
 def open_or_build(scene: Path | None, loaded: Path | None) -> None:

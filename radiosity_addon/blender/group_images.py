@@ -23,14 +23,16 @@ GroupImages: TypeAlias = Mapping[str, Sequence[bpy.types.Image]]
 """By group, its images, parallel to the bake's pages."""
 
 
-def write_groups(result: BakeResult, settings: BakeSettings, folder: Path | None) -> GroupImages:
+def write_groups(
+    result: BakeResult, settings: BakeSettings, folder: Path | None, others: frozenset[str] = frozenset()
+) -> GroupImages:
     """Make an image of each page of each light group, saved into `folder` or packed; see `write_pages`.
 
     A PNG's scale is its group's own, so that dim groups keep as many steps as bright ones.
     """
     made: dict[str, Sequence[bpy.types.Image]] = {}
     try:
-        for group, names in zip(result.groups, group_file_names(result, settings), strict=True):
+        for group, names in zip(result.groups, group_file_names(result, settings, others), strict=True):
             made[group.name] = write_images(group.pages, names, settings, folder, group.name)
     except BaseException:
         remove_datablocks(each_image(made))

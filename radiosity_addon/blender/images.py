@@ -37,10 +37,12 @@ def page_file_names(
     return _file_names(_stems(result, settings), settings, set(others))
 
 
-def group_file_names(result: BakeResult, settings: BakeSettings) -> list[list[str]]:
+def group_file_names(
+    result: BakeResult, settings: BakeSettings, others: frozenset[str] = frozenset()
+) -> list[list[str]]:
     """Name the files of every light group's pages after the pages and the group: `lightmap_Kitchen.exr`."""
     stems = _stems(result, settings)
-    taken = {Path(name).stem.lower() for name in page_file_names(result, settings)}
+    taken = {*others, *(Path(name).stem.lower() for name in page_file_names(result, settings, others))}
     return [
         _file_names([sanitised_stem(f"{stem}_{group.name}") for stem in stems], settings, taken)
         for group in result.groups

@@ -62,9 +62,9 @@ def bake(value: float, then: type[BaseException] | None = None) -> BakeScene:
     with originals_shown(context):
         export = export_scene(context, SETTINGS)
     result = result_of(export.bake_scene, value)
-    with replacing_earlier(context):
+    with replacing_earlier(context) as earlier:
         images = write_pages(result, SETTINGS, None)
-        apply_lightmaps(context, export, result, images, SETTINGS)
+        apply_lightmaps(context, export, result, images, SETTINGS, earlier=earlier)
         if then is not None:
             raise then
     return export.bake_scene
