@@ -25,7 +25,7 @@ from .light_mixer import mixers
 from .light_shares import LightShares
 from .lightmap_materials import LightmapMaterials
 from .rebake import EarlierBake, bare, replacing_earlier
-from .replacements import Replacement, dress, show, shown_by
+from .replacements import Replacement, changed_objects, dress, show, shown_by
 from .scene_objects import copy_evaluated_meshes
 from .stand_ins import StandIn, stand_in_of
 from .uv_layers import check_room
@@ -98,7 +98,7 @@ def apply_steps(
         for number, replacement in enumerate(replacements):
             dress(replacement, images, materials, shares)
             yield (number + 1) / len(replacements)
-        earlier.take_off([obj for each in replacements if not each.stand_in and (obj := each.obj)])
+        earlier.take_off(changed_objects(replacements))
         show(context, replacements)
     except BaseException:
         earlier.show_again()

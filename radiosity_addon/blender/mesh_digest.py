@@ -32,6 +32,14 @@ _VALUES = {  # attribute type → property of its elements, numbers in each, the
 _SELECTION = (".select_", ".uv_select", ".vs.", ".es.")
 """How attributes begin that say what is selected."""
 
+_DROPPED_WHERE_ZERO = frozenset(
+    {
+        "material_index", "sharp_face", "sharp_edge", "crease_edge", "crease_vert", "bevel_weight_edge",
+        "bevel_weight_vert", "freestyle_edge", "freestyle_face", ".hide_vert", ".hide_edge", ".hide_poly",
+    }
+)  # fmt: skip
+"""Attributes that Edit Mode leaves out where they are zero, which is their default."""
+
 _NOT_COUNTED = {
     *("name", "use_fake_user", "use_extra_user", "tag"),
     *("uv_layer_clone_index", "uv_layer_stencil_index"),
@@ -42,9 +50,12 @@ def digest(mesh: bpy.types.Mesh) -> str:
     """Return the digest of a mesh, the same for its original and an unedited copy with our layer."""
     found = hashlib.blake2b(digest_size=16)
     record = layer_record(mesh)
-    for name, attribute in sorted(_own_attributes(mesh, record)):
+    for name, attribute in sorted(_own_attributes(mesh, record), key=lambda found: found[0]):
+        values = _bytes_of(attribute)
+        if name in _DROPPED_WHERE_ZERO and not values.strip(b"\0"):
+            continue
         found.update(f"{name}:{attribute.domain}:{attribute.data_type};".encode())
-        found.update(_bytes_of(attribute))
+        found.update(values)
     starts = np.empty(len(mesh.polygons), dtype=np.int32)
     mesh.polygons.foreach_get("loop_start", starts)
     found.update(starts.tobytes())

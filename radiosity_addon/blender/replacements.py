@@ -112,6 +112,14 @@ def shown_by(source: ExportSource) -> str:
     return source.instancer if source.is_instance else source.object_name
 
 
+def changed_objects(replacements: Sequence[Replacement]) -> list[bpy.types.Object]:
+    """Return the objects of the user's that will show something else, or be hidden."""
+    names: dict[str, None] = {}
+    for replacement in replacements:
+        names.update(dict.fromkeys(sorted(_family(shown_by(replacement.source)))))
+    return [bpy.data.objects[name, None] for name in names if (name, None) in bpy.data.objects]
+
+
 def show(context: bpy.types.Context, replacements: Sequence[Replacement]) -> None:
     """Put the replacements into the scene, remembering what they replace."""
     collection = None
@@ -143,7 +151,8 @@ def show(context: bpy.types.Context, replacements: Sequence[Replacement]) -> Non
 
 def _family(name: str) -> set[str]:
     """Return an object's name, and those of the metaballs that melt into one surface with it."""
-    if bpy.data.objects[name, None].type != "META":
+    obj = bpy.data.objects.get((name, None))
+    if obj is None or obj.type != "META":
         return {name}
     base = name.split(".")[0]
     balls = (obj for obj in bpy.data.objects if obj.type == "META" and obj.library is None)

@@ -28,7 +28,11 @@ AFTER = pytest.mark.parametrize("then", [_again, _restored], ids=["baked again",
 
 
 def _plane() -> bpy.types.Object:
-    plane = add_plane(material=principled_material())
+    # Not from_pydata, which leaves some values of edges to chance.
+    bpy.ops.mesh.primitive_plane_add(calc_uvs=False)
+    plane = bpy.context.object
+    plane.data.name = "Plane"
+    plane.data.materials.append(principled_material())
     plane.data.uv_layers.new(name="Own")
     plane.data.attributes.new("Tint", "FLOAT_COLOR", "CORNER")
     plane.vertex_groups.new(name="Some").add([0], 0.5, "REPLACE")
