@@ -25,6 +25,9 @@ ORIGINAL = "radiosity_original"
 LAYER = "radiosity_layer"
 """Custom property of a mesh with a UV layer of ours; see `uv_layers.py`."""
 
+ASIDE = ".earlier "
+"""How names of what an earlier bake made begin while a new one is made."""
+
 _MADE_KINDS = ("objects", "collections", "meshes", "materials", "node_groups", "images")
 """The collections of `bpy.data` that a bake adds to."""
 
@@ -64,6 +67,9 @@ class BakeRecord(bpy.types.PropertyGroup):
     )
     texels_per_metre: bpy.props.FloatProperty(  # type: ignore[valid-type]
         description="How fine the lightmap is, for a texel scale of 1"
+    )
+    light: bpy.props.StringProperty(  # type: ignore[valid-type]
+        description="What the light and the settings were when the object was baked"
     )
     scene: bpy.props.StringProperty(  # type: ignore[valid-type]
         description="The scene whose bake the object shows"

@@ -6,12 +6,22 @@ from collections.abc import Iterable
 
 import bpy
 
+from ..errors import BakeError
+
 
 def leave_edit_modes(context: bpy.types.Context, objects: Iterable[bpy.types.Object]) -> None:
-    """Switch objects that are being edited to object mode; their data cannot be swapped in it."""
+    """Switch objects that are being edited to object mode; their data cannot be swapped in it.
+
+    Raises
+    ------
+    BakeError
+        If one cannot be switched.
+    """
     for obj in objects:
         if obj.mode != "OBJECT":
             leave_edit_mode_of(context, obj)
+        if obj.mode != "OBJECT":
+            raise BakeError(f"object '{obj.name}' is being edited: switch it to Object Mode first")
 
 
 def leave_edit_mode_of(context: bpy.types.Context, obj: bpy.types.Object) -> None:

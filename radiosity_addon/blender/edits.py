@@ -17,7 +17,7 @@ import numpy as np
 
 from ..bake_scene import LIGHTMAP_UV_LAYER, BakeWarning
 from . import material_edits
-from .bake_record import LAYER, ORIGINAL, is_made, is_recorded, made_datablocks, recorded_objects
+from .bake_record import ASIDE, LAYER, ORIGINAL, is_made, is_recorded, made_datablocks, recorded_objects
 from .edit_modes import leave_edit_modes
 from .material_slots import is_copy, original_of, show_originals
 from .mesh_digest import digest
@@ -31,6 +31,7 @@ from .stand_ins import (
     is_edited_object,
     released_copy,
     seal,
+    seal_object,
     set_stand_in,
     stand_in_of,
     stood_for,
@@ -69,6 +70,11 @@ def know_earlier_versions() -> None:
         made = isinstance(mesh, bpy.types.Mesh) and is_made(mesh)
         if made and STAND_IN not in mesh and is_recorded(obj) and obj.radiosity_bake.is_baked:
             _know(obj, mesh)
+    for stand_in in _stand_in_objects():
+        if STAND_IN not in stand_in:
+            source = stand_in.name.removeprefix(ASIDE).removesuffix(" (Lightmap)")
+            instancer = bpy.data.objects.get((source.split("/")[0], None))
+            seal_object(stand_in, instancer, source)
 
 
 def _know(obj: bpy.types.Object, mesh: bpy.types.Mesh) -> None:

@@ -63,16 +63,19 @@ def narrow(
     if any(source.is_instance or source.makes_instances for source, _ in pairs):
         return everything
     kept, densities = set(), []
+    light = light_fingerprint(bake_scene, settings)
     for source, target in pairs:
         obj = bpy.data.objects.get((source.object_name, None))
         if obj is None or not obj.is_property_set("radiosity_bake"):
             continue
         record = obj.radiosity_bake
+        if record.scene not in {"", scene.name} or (record.light or scene.radiosity.baked_light) != light:
+            continue
         shows = record.is_baked and shows_lightmap(obj) and files_of(obj)
         if shows and record.fingerprint == fingerprint(bake_scene, target):
             kept.add(target.name)
             densities.append(record.texels_per_metre)
-    if not kept or scene.radiosity.baked_light != light_fingerprint(bake_scene, settings):
+    if not kept:
         return everything
     if any(len(files_of(bpy.data.objects[name, None])) > 1 for name in kept):
         return everything  # light groups, whose lightmaps are made together
@@ -91,6 +94,7 @@ def remember(scene: bpy.types.Scene, export: Export, result: BakeResult, setting
     sources = {
         target.name: source for source, target in zip(export.sources, export.bake_scene.objects, strict=True)
     }
+    light = light_fingerprint(export.bake_scene, settings)
     for baked in result.objects:
         source = sources[baked.object.name]
         obj = bpy.data.objects.get((source.object_name, None))
@@ -99,7 +103,8 @@ def remember(scene: bpy.types.Scene, export: Export, result: BakeResult, setting
         obj.radiosity_bake.fingerprint = fingerprint(export.bake_scene, baked.object)
         told = result.atlas[baked.page] if result.atlas else {}
         obj.radiosity_bake.texels_per_metre = told.get("texels_per_metre", 0.0)
-    scene.radiosity.baked_light = light_fingerprint(export.bake_scene, settings)
+        obj.radiosity_bake.light = light
+    scene.radiosity.baked_light = light
 
 
 def fingerprint(bake_scene: BakeScene, item: BakeObject) -> str:

@@ -130,7 +130,11 @@ class RADIOSITY_OT_restore(bpy.types.Operator):
         from .restore import restore_scene
 
         live_state.stop()
-        restored = restore_scene(context, context.scene)
+        try:
+            restored = restore_scene(context, context.scene)
+        except RadiosityError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
         runtime.forget(context.scene)
         kept_bakes.drop(context.scene)
         redraw_sidebars(context)

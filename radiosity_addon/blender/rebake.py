@@ -11,14 +11,11 @@ from contextlib import contextmanager
 import bpy
 
 from ..bake_scene import BakeWarning
-from .bake_record import made_datablocks, remove_datablocks
+from .bake_record import ASIDE, made_datablocks, remove_datablocks
 from .edits import carry_edits
 from .shown_state import ShownState, showing, take_off
 from .stand_ins import INSTANCER, own_mesh
 from .sweep import sweep
-
-ASIDE = ".earlier "
-"""How names of what an earlier bake made begin while a new one is made."""
 
 
 @contextmanager

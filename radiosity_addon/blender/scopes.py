@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 
 from ..bake_scene import BakeWarning
-from .bake_record import is_made, is_recorded, made_datablocks, recorded_objects
+from .bake_record import ASIDE, is_made, is_recorded, made_datablocks, recorded_objects
 from .export_sources import Export
 from .replacements import shown_by
 from .stand_ins import INSTANCER
@@ -80,7 +80,8 @@ def files_of(obj: bpy.types.Object) -> frozenset[str]:
             if node.type == "GROUP" and node.node_tree is not None and is_made(node.node_tree):
                 trees.append(node.node_tree)
             elif node.type == "TEX_IMAGE" and node.image is not None and is_made(node.image):
-                found.add(Path(node.image.filepath_raw or node.image.name).stem.lower())
+                name = node.image.filepath_raw or node.image.name.removeprefix(ASIDE)
+                found.add(Path(name).stem.lower())
     return frozenset(found)
 
 

@@ -32,6 +32,7 @@ _RECORD_FIELDS = (
     "hide_render",
     "fingerprint",
     "texels_per_metre",
+    "light",
     "scene",
 )
 

@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, field, replace
 
 import bpy
 
-from .bake_record import LAYER, MADE_MARKER, ORIGINAL, is_made, is_recorded, unmark_made
+from .bake_record import ASIDE, LAYER, MADE_MARKER, ORIGINAL, is_made, is_recorded, unmark_made
 from .material_slots import is_copy, original_of, show_originals
 from .mesh_digest import digest
 from .uv_layers import take_layer_off
@@ -186,7 +186,7 @@ def _state(obj: bpy.types.Object) -> list:
     custom = sorted(key for key in obj.keys() if not key.startswith("radiosity"))  # noqa: SIM118
     action = obj.animation_data is not None
     return [
-        obj.name.removeprefix(".earlier "),
+        obj.name.removeprefix(ASIDE),
         "" if obj.parent is None else obj.parent.name,
         [constraint.type for constraint in obj.constraints],
         [modifier.type for modifier in obj.modifiers],

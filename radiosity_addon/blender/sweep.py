@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import bpy
 
 from .bake_record import (
+    ASIDE,
     LAYER,
     ORIGINAL,
     is_made,
@@ -19,7 +20,7 @@ from .edits import EDITED
 from .material_slots import is_copy
 from .stand_ins import is_edited_object, moved_place, release, release_object
 
-_SESSION = (bpy.types.Scene, bpy.types.Screen, bpy.types.WindowManager, bpy.types.WorkSpace)
+_SESSION = (bpy.types.Screen, bpy.types.WindowManager, bpy.types.WorkSpace)
 """What only looks at datablocks."""
 
 
@@ -53,7 +54,9 @@ def _remove_stand_ins(stand_ins: list[bpy.types.Object]) -> None:
     users = _users(list(stand_ins))
     unused = []
     for obj in stand_ins:
-        theirs = [user for user in users.get(obj, ()) if not is_made(user)]
+        # A scene has all of its objects.
+        others = [user for user in users.get(obj, ()) if not isinstance(user, bpy.types.Scene)]
+        theirs = [user for user in others if not is_made(user)]
         placed = any(not is_made(collection) for collection in obj.users_collection)
         if is_edited_object(obj) or theirs or placed or _is_wanted(obj):
             _give_object(obj)
@@ -66,7 +69,7 @@ def _give_object(obj: bpy.types.Object) -> None:
     """Make a stand-in the user's; where it still is in its instance's place it must not show as well."""
     in_place = moved_place(obj) is None
     release_object(obj)
-    obj.name = f"{obj.name.removeprefix('.earlier ').removesuffix(EDITED)}{EDITED}"
+    obj.name = f"{obj.name.removeprefix(ASIDE).removesuffix(EDITED)}{EDITED}"
     if in_place:
         obj.hide_viewport = obj.hide_render = True
     if isinstance(obj.data, bpy.types.Mesh) and is_made(obj.data):
@@ -109,6 +112,7 @@ def _remove_materials() -> None:
             continue
         if _is_wanted(material):
             unmark_made(material)
+            material.pop(ORIGINAL, None)
             continue
         original = material.get(ORIGINAL)
         if original is not None and material.users:
@@ -123,7 +127,8 @@ def _remove_collections() -> None:
     for collection in ours:
         if any(is_made(obj) for obj in collection.objects):
             continue
-        if any(not isinstance(user, bpy.types.Collection) for user in users.get(collection, ())):
+        holders = (bpy.types.Collection, bpy.types.Scene)
+        if any(not isinstance(user, holders) for user in users.get(collection, ())):
             unmark_made(collection)  # somebody makes instances of it, for one
             continue
         _hand_on(collection)
@@ -136,8 +141,9 @@ def _hand_on(collection: bpy.types.Collection) -> None:
         *(scene.collection for scene in bpy.data.scenes if collection in scene.collection.children[:]),
         *(other for other in bpy.data.collections if collection in other.children[:]),
     ]
+    lonely = [obj for obj in collection.objects if all(map(is_made, obj.users_collection))]
     for place in [parent for parent in above if parent.library is None]:
-        for obj in collection.objects:
+        for obj in lonely:
             if obj not in place.objects[:]:
                 place.objects.link(obj)
         for child in collection.children:
