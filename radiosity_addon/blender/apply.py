@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 
 import bpy
 
@@ -223,8 +224,10 @@ def _replacement(
         if obj is not None and not stand_in:
             flags = tuple((each.name, each.show_viewport, each.show_render) for each in obj.modifiers)
             known = StandIn(active_slot=obj.active_material_index, modifiers=flags)
-        stands_for = None if obj is None or stand_in else obj.data
-        return Replacement(source, baked, stand_in, mesh, False, stands_for, known, list(mesh.materials))
+        own_object = None if stand_in else obj
+        stands_for = None if own_object is None else own_object.data
+        made = Replacement(source, baked, stand_in, mesh, False, stands_for, known, list(mesh.materials))
+        return replace(made, object_slots=_object_slots(own_object))
     if source.needs_evaluated_mesh or obj is None or obj.type != "MESH":
         raise BakeError(f"object '{source.name}' went away while it was being baked: bake again")
     drawn = [slot.material for slot in obj.material_slots]
@@ -234,4 +237,11 @@ def _replacement(
     mesh = obj.data.copy()
     mark_made(mesh)
     known = StandIn(active_slot=obj.active_material_index)
-    return Replacement(source, baked, stand_in, mesh, False, None if stand_in else obj.data, known, drawn)
+    made = Replacement(source, baked, stand_in, mesh, False, None if stand_in else obj.data, known, drawn)
+    return replace(made, object_slots=_object_slots(None if stand_in else obj))
+
+
+def _object_slots(obj: bpy.types.Object | None) -> tuple[int, ...]:
+    """Return which material slots are linked to the object, not its data."""
+    slots = () if obj is None else enumerate(obj.material_slots)
+    return tuple(number for number, slot in slots if slot.link == "OBJECT")

@@ -19,7 +19,7 @@ from ..bake_scene import LIGHTMAP_UV_LAYER, BakeWarning
 from . import material_edits
 from .bake_record import ASIDE, LAYER, ORIGINAL, is_made, is_recorded, made_datablocks, recorded_objects
 from .edit_modes import leave_edit_modes
-from .material_slots import is_copy, original_of, show_originals
+from .material_slots import drop_added_slots, is_copy, original_of, show_originals
 from .mesh_digest import digest
 from .stand_ins import (
     EVALUATED,
@@ -186,6 +186,11 @@ def _replace_original(
     original.name = f"{name_of_both} (before)"
     edited = released_copy(mesh, name_of_both)
     edited.use_fake_user = fake_user
+    for slot in known.object_slots:
+        if slot < min(len(edited.materials), len(original.materials)):
+            edited.materials[slot] = original.materials[slot]
+    if not original.materials and known.slots == 1:
+        drop_added_slots(edited, 1, ())
     if original.shape_keys is not None and edited.shape_keys is not None:
         original.shape_keys.user_remap(edited.shape_keys)
         edited.shape_keys.name, original.shape_keys.name = original.shape_keys.name, edited.shape_keys.name

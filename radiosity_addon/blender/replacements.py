@@ -43,6 +43,8 @@ class Replacement:
         What a stand-in mesh stands for.
     known : StandIn
         How the object was.
+    object_slots : tuple of int
+        Slots that are linked to the object.
     drawn : list of Material
         What is in the slots without a bake.
     copies : list of Material
@@ -57,6 +59,7 @@ class Replacement:
     own: bpy.types.Mesh | None
     known: StandIn
     drawn: Materials
+    object_slots: tuple[int, ...] = ()
     copies: Materials = field(default_factory=list)
 
     @property
@@ -102,6 +105,11 @@ def _fill_stand_in(replacement: Replacement) -> None:
         mesh[ORIGINAL] = own
         # As many slots as the object has, or it would lose those that are linked to it.
         copies += copies[-1:] * (len(own.materials) - max(len(copies), len(mesh.materials)))
+        stands_for += [None] * (len(copies) - len(stands_for))
+        for slot in replacement.object_slots:
+            if slot < min(len(own.materials), len(copies)):
+                # Not to be seen: the object's slot has the copy.
+                copies[slot] = stands_for[slot] = own.materials[slot]
     set_materials(mesh, copies)
     stands_for += [None] * (len(mesh.materials) - len(stands_for))
     seal(mesh, kind, stands_for, replacement.known)

@@ -54,7 +54,30 @@ def test_an_edit_of_a_shared_mesh_is_in_all_that_share_it(then: Callable[[], lis
     assert first.data.vertices[0].co.z == 0.5
     assert [material.name for material in first.data.materials] == ["Paint"]
     assert [mesh.name for mesh in bpy.data.meshes] == ["First"]
-    assert first.data.keys() == [] if isinstance(first.data.keys(), list) else not list(first.data.keys())
+    assert list(first.data.keys()) == []
+
+
+@AFTER
+def test_an_edit_leaves_slots_that_are_linked_to_objects(then: Callable[[], list[str]]) -> None:
+    first, second = _pair()
+    first.material_slots[0].link = "OBJECT"
+    first.material_slots[0].material = principled_material(name="Of First")
+    bake_by_hand()
+    first.data.vertices[0].co.z = 0.5
+    assert then() == ["First"]
+    assert first.data == second.data
+    slots = [(obj.material_slots[0].link, obj.material_slots[0].material.name) for obj in (first, second)]
+    assert slots == [("OBJECT", "Of First"), ("DATA", "Paint")]
+
+
+@AFTER
+def test_an_edit_of_a_mesh_without_slots_adds_none(then: Callable[[], list[str]]) -> None:
+    first = add_plane("First")
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Second", first.data))
+    bake_by_hand()
+    first.data.vertices[0].co.z = 0.5
+    assert then() == ["First"]
+    assert len(first.data.materials) == len(first.material_slots) == 0
 
 
 @AFTER
