@@ -158,7 +158,7 @@ def run_bake(
             images, groups = yield from _told(showing, solved, 1.0)
             report = _report(result, images, groups, settings, seconds)
             if output is not None:
-                whole = report.joined(output.path / REPORT_NAME, scope.keep)
+                whole = report.joined(output.path / REPORT_NAME, earlier.kept_sources)
                 whole.listing(output.files()).write(output.staging / REPORT_NAME)
                 output.publish()
             remember(context.scene, export, result, wanted)
@@ -252,7 +252,8 @@ def _show(
 ) -> Generator[float, None, tuple[list[bpy.types.Image], GroupImages]]:
     """Make the images, also those of light groups, and put them on the objects; yields the fraction done."""
     folder = None if output is None else output.staging
-    taken = files_shown_by(earlier.keep)
+    # Which instances keep theirs is found out later.
+    taken = files_shown_by(earlier.keep, earlier.stand_ins.values() if earlier.is_partial else ())
     images = write_pages(result, settings, folder, taken)
     groups: GroupImages = {}
     try:

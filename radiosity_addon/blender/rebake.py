@@ -14,7 +14,7 @@ from ..bake_scene import BakeWarning
 from .bake_record import ASIDE, made_datablocks, remove_datablocks
 from .edits import carry_edits
 from .shown_state import ShownState, showing, take_off
-from .stand_ins import INSTANCER, own_mesh
+from .stand_ins import INSTANCER, own_mesh, source_name
 from .sweep import sweep
 
 
@@ -83,6 +83,12 @@ class EarlierBake:
     def stand_ins(self) -> dict[str, bpy.types.Object]:
         """The stand-in objects of earlier bakes, by name."""
         return {name: block for block, name in self._made if isinstance(block, bpy.types.Object)}
+
+    @property
+    def kept_sources(self) -> frozenset[str]:
+        """Names of what keeps its lightmap, as a report knows them."""
+        stay = [block for block in self.stand_ins.values() if not self._goes(block)]
+        return self.keep | {source_name(block) for block in stay}
 
     def let_stay(self, stand_in: bpy.types.Object) -> None:
         """Keep a stand-in though the object that makes its instance is shown anew."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from pathlib import Path
 
 import bpy
@@ -57,10 +57,11 @@ def shared_warnings(scene: bpy.types.Scene, export: Export) -> tuple[BakeWarning
     return tuple(found)
 
 
-def files_shown_by(names: Collection[str]) -> frozenset[str]:
+def files_shown_by(names: Collection[str], others: Iterable[bpy.types.Object] = ()) -> frozenset[str]:
     """Return the stems of the files, in lower case, of the lightmaps that objects or their instances show."""
-    objects = [bpy.data.objects[name, None] for name in names]
+    objects = [obj for name in names if (obj := bpy.data.objects.get((name, None))) is not None]
     inside = set(objects)
+    objects += others
     objects += [
         block
         for block in made_datablocks()
