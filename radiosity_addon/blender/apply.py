@@ -1,54 +1,35 @@
-"""Give baked objects their lightmaps, without editing an original.
+"""Give baked objects their lightmaps: on their own meshes, or on stand-ins where that cannot be.
 
-Each baked object gets a copy of its mesh with the UV layer `Lightmap` and lightmap
-materials. What is shown but has no object with a mesh of its own to swap (an instance, or
-an object that makes instances) is hidden, and stand-in objects take its place. All copies
-are made before the first object is touched, so an error leaves the file as it was.
+An object with a mesh of its own shows the lightmap on this mesh: it gets a UV layer `Lightmap` and lightmap
+copies of the materials. An object that shares its mesh, or whose modifiers make other polygons, gets a copy
+of the mesh. What has no object with a mesh to swap (an instance, or an object that makes instances) is
+hidden, and stand-in objects take its place. Everything is prepared before the first object is touched, and
+nothing yields after that: an error leaves the file as it was.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 
 import bpy
-from mathutils import Matrix
 
 from ..bake_scene import BakedObject, BakeResult
 from ..errors import BakeError
 from ..settings import BakeSettings
-from .bake_record import (
-    made_datablocks,
-    mark_made,
-    record_hiding,
-    record_mesh_swap,
-    record_modifiers,
-    recorded_objects,
-    remove_datablocks,
-)
+from .bake_record import made_datablocks, mark_made, remove_datablocks, unmark_made
+from .edit_modes import leave_edit_modes
 from .export_sources import Export, ExportSource
 from .group_images import GroupImages
+from .light_mixer import mixers
 from .light_shares import LightShares
 from .lightmap_materials import LightmapMaterials
-from .mesh_copies import copy_meshes, set_materials
-from .restore import leave_edit_modes
-from .uv_layers import check_room, write_layer
-
-STAND_IN_COLLECTION = "Radiosity Lightmaps"
-
-
-@dataclass(frozen=True)
-class _Replacement:
-    """What will be shown in a source's place.
-
-    `stand_in`: a new object shows it; otherwise the source's own object does.
-    `baked` is None for what is only shown anew because its instancer will be hidden.
-    """
-
-    source: ExportSource
-    mesh: bpy.types.Mesh
-    stand_in: bool
-    baked: BakedObject | None
+from .rebake import EarlierBake, bare, replacing_earlier
+from .replacements import Replacement, changed_objects, dress, show, shown_by
+from .scene_objects import copy_evaluated_meshes
+from .stand_ins import StandIn, stand_in_of
+from .uv_layers import check_room
 
 
 def apply_lightmaps(
@@ -58,8 +39,30 @@ def apply_lightmaps(
     images: Sequence[bpy.types.Image],
     settings: BakeSettings,
     groups: GroupImages | None = None,
+    earlier: EarlierBake | None = None,
 ) -> None:
-    """Show the lightmaps on the baked objects; `restore` undoes it.
+    """Show the lightmaps on the baked objects, at once; see `apply_steps`.
+
+    Without `earlier` all that the file shows of other bakes is replaced.
+    """
+    if earlier is None:
+        with replacing_earlier(context) as replaced:
+            apply_lightmaps(context, export, result, images, settings, groups, replaced)
+        return
+    for _ in apply_steps(context, export, result, images, settings, groups, earlier):
+        pass
+
+
+def apply_steps(
+    context: bpy.types.Context,
+    export: Export,
+    result: BakeResult,
+    images: Sequence[bpy.types.Image],
+    settings: BakeSettings,
+    groups: GroupImages | None,
+    earlier: EarlierBake,
+) -> Generator[float, None, None]:
+    """Show the lightmaps on the baked objects; `restore` takes them off.
 
     Parameters
     ----------
@@ -74,25 +77,34 @@ def apply_lightmaps(
         The quantity decides what the materials do with a texel.
     groups : mapping of str to list of Image
         Those of each light group, parallel to `images`: then materials mix these.
+    earlier : EarlierBake
+        What is replaced. It puts back what was there if this fails.
+
+    Yields
+    ------
+    fraction : float
+        How much is prepared. After the last one everything is shown.
 
     Raises
     ------
     SceneError
         If an object has no room for another UV layer.
     BakeError
-        If the file is baked already, or an object changed since the export.
+        If an object changed since the export.
     """
-    if recorded_objects():
-        raise BakeError("the file shows an earlier bake: restore it before baking again")
     before = set(made_datablocks())
     try:
-        replacements = _make_replacements(context, export, result)
-        shares = LightShares(context.scene, images, groups, settings) if groups else None
-        _dress(replacements, images, settings.quantity, shares)
+        replacements, shares = _prepare(context, export, result, images, settings, groups, earlier)
+        materials = LightmapMaterials(settings.quantity, shares)
+        for number, replacement in enumerate(replacements):
+            dress(replacement, images, materials, shares)
+            yield (number + 1) / len(replacements)
+        earlier.take_off(changed_objects(replacements))
+        show(context, replacements)
     except BaseException:
-        remove_datablocks([datablock for datablock in made_datablocks() if datablock not in before])
+        earlier.show_again()
+        remove_datablocks([block for block in made_datablocks() if block not in before])
         raise
-    _show(context, replacements)
 
 
 def check_targets(export: Export) -> None:
@@ -109,25 +121,53 @@ def check_targets(export: Export) -> None:
             check_room(obj.data, source.object_name)
 
 
-def _make_replacements(context: bpy.types.Context, export: Export, result: BakeResult) -> list[_Replacement]:
-    """Copy the meshes of all that will be shown anew."""
+def _prepare(
+    context: bpy.types.Context,
+    export: Export,
+    result: BakeResult,
+    images: Sequence[bpy.types.Image],
+    settings: BakeSettings,
+    groups: GroupImages | None,
+    earlier: EarlierBake,
+) -> tuple[list[Replacement], LightShares | None]:
+    """Find or make the meshes of all that will be shown, while the file is without any lightmaps."""
     lightmaps = {id(baked.object): baked for baked in result.objects}
     pairs = [
         (source, lightmaps.get(id(target)))
         for source, target in zip(export.sources, export.bake_scene.objects, strict=True)
     ]
     hidden = _instancers_to_hide(pairs)
-    shown = [
-        (source, baked, _shown_by(source) in hidden)
-        for source, baked in pairs
-        if baked is not None or _shown_by(source) in hidden
-    ]
+    shown = []
+    for source, baked in pairs:
+        stand_in = earlier.stand_ins.get(f"{source.name} (Lightmap)")
+        if baked is None and stand_in is not None and shown_by(source) in hidden and earlier.is_partial:
+            earlier.let_stay(stand_in)
+        elif baked is not None or shown_by(source) in hidden:
+            shown.append((source, baked, shown_by(source) in hidden))
     leave_edit_modes(context, _real_objects([source for source, _, _ in shown]))
-    meshes = copy_meshes(context, [source for source, _, _ in shown])
-    return [
-        _Replacement(source, mesh, stand_in, baked)
-        for (source, baked, stand_in), mesh in zip(shown, meshes, strict=True)
-    ]
+    with bare(context):
+        sources = [source for source, _, _ in shown if source.needs_evaluated_mesh]
+        evaluated = copy_evaluated_meshes(context, sources)
+        for mesh in evaluated.values():
+            mark_made(mesh)
+        own = _meshes_of_one_object([source for source, _, stand_in in shown if not stand_in])
+        replacements = [_replacement(*each, evaluated, own) for each in shown]
+        with _mixers_aside():
+            shares = LightShares(context.scene, images, groups, settings) if groups else None
+    return replacements, shares
+
+
+@contextmanager
+def _mixers_aside() -> Iterator[None]:
+    """Have a new mixer take the sliders over from the one that is shown."""
+    earlier = mixers()
+    for mixer in earlier:
+        unmark_made(mixer)
+    try:
+        yield
+    finally:
+        for mixer in earlier:
+            mark_made(mixer)
 
 
 def _instancers_to_hide(pairs: Sequence[tuple[ExportSource, BakedObject | None]]) -> set[str]:
@@ -137,110 +177,71 @@ def _instancers_to_hide(pairs: Sequence[tuple[ExportSource, BakedObject | None]]
     such an object shows needs a stand-in too, baked or not.
     """
     return {
-        _shown_by(source)
+        shown_by(source)
         for source, baked in pairs
         if baked is not None and (source.is_instance or source.makes_instances)
     }
 
 
-def _shown_by(source: ExportSource) -> str:
-    """Name of the object that must be visible for the source to be."""
-    return source.instancer if source.is_instance else source.object_name
-
-
 def _real_objects(sources: Sequence[ExportSource]) -> list[bpy.types.Object]:
     """The objects that show the sources."""
-    names = dict.fromkeys(_shown_by(source) for source in sources)
+    names = dict.fromkeys(shown_by(source) for source in sources)
     return [bpy.data.objects[name, None] for name in names if (name, None) in bpy.data.objects]
 
 
-def _dress(
-    replacements: Sequence[_Replacement],
-    images: Sequence[bpy.types.Image],
-    quantity: str,
-    shares: LightShares | None,
-) -> None:
-    """Give the mesh copies their lightmap UVs and materials."""
-    materials = LightmapMaterials(quantity, shares)
-    for replacement in replacements:
-        mesh, baked, name = replacement.mesh, replacement.baked, replacement.source.name
-        mesh.name = f"{name} (Lightmap)"
-        if baked is not None:
-            pinned = len(mesh.uv_layers) == 0
-            check_room(mesh, name)
-            write_layer(mesh, baked.object.loops, baked.uv, name)
-            # A mesh without slots is drawn grey; its lightmap needs a slot to sit in.
-            drawn = list(mesh.materials) or [None]
-            image = images[baked.page]
-            groups = [shares.emission_group(replacement.source, each) if shares else "" for each in drawn]
-            copies = [
-                materials.copy_of(material, image, pinned, group)
-                for material, group in zip(drawn, groups, strict=True)
-            ]
-            set_materials(mesh, copies)
+def _meshes_of_one_object(sources: Sequence[ExportSource]) -> set[bpy.types.Mesh]:
+    """Return the meshes that can carry a lightmap themselves: the file's own, used by one object alone."""
+    objects = [bpy.data.objects.get((source.object_name, source.library)) for source in sources]
+    found = {obj.data: obj for obj in objects if obj is not None and isinstance(obj.data, bpy.types.Mesh)}
+    users = bpy.data.user_map(subset=list(found)) if found else {}
+    return {
+        mesh
+        for mesh, obj in found.items()
+        if mesh.library is None
+        and mesh.override_library is None
+        and obj.library is None
+        and obj.override_library is None
+        and {user for user in users[mesh] if not _stands_in(user)} == {obj}
+    }
 
 
-def _show(context: bpy.types.Context, replacements: Sequence[_Replacement]) -> None:
-    """Put the replacements into the scene, remembering what they replace."""
-    collection = None
-    hidden = set()
-    for replacement in replacements:
-        if not replacement.stand_in:
-            _swap_mesh(replacement)
-            continue
-        if collection is None:
-            collection = bpy.data.collections.new(STAND_IN_COLLECTION)
-            mark_made(collection)
-            context.scene.collection.children.link(collection)
-        collection.objects.link(_new_stand_in(replacement))
-        hidden |= _family(_shown_by(replacement.source))
-    for name in sorted(hidden):
-        obj = bpy.data.objects[name, None]
-        record_hiding(obj)
-        obj.hide_viewport = obj.hide_render = True
-    context.view_layer.update()
+def _stands_in(user: bpy.types.ID) -> bool:
+    return isinstance(user, bpy.types.Mesh) and stand_in_of(user) is not None
 
 
-def _family(name: str) -> set[str]:
-    """Return an object's name, and those of the metaballs that melt into one surface with it."""
-    if bpy.data.objects[name, None].type != "META":
-        return {name}
-    base = name.split(".")[0]
-    balls = (obj for obj in bpy.data.objects if obj.type == "META" and obj.library is None)
-    return {obj.name for obj in balls if obj.name.split(".")[0] == base}
+def _replacement(
+    source: ExportSource,
+    baked: BakedObject | None,
+    stand_in: bool,
+    evaluated: dict[str, bpy.types.Mesh],
+    own: set[bpy.types.Mesh],
+) -> Replacement:
+    """Find or make the mesh of one source."""
+    obj = bpy.data.objects.get((source.object_name, source.library))
+    mesh = evaluated.get(source.name)
+    if mesh is not None:
+        known = StandIn()
+        if obj is not None and not stand_in:
+            flags = tuple((each.name, each.show_viewport, each.show_render) for each in obj.modifiers)
+            known = StandIn(active_slot=obj.active_material_index, modifiers=flags)
+        own_object = None if stand_in else obj
+        stands_for = None if own_object is None else own_object.data
+        made = Replacement(source, baked, stand_in, mesh, False, stands_for, known, list(mesh.materials))
+        return replace(made, object_slots=_object_slots(own_object))
+    if source.needs_evaluated_mesh or obj is None or obj.type != "MESH":
+        raise BakeError(f"object '{source.name}' went away while it was being baked: bake again")
+    drawn = [slot.material for slot in obj.material_slots]
+    check_room(obj.data, source.name)
+    if obj.data in own and not stand_in:
+        return Replacement(source, baked, False, obj.data, True, None, StandIn(), drawn)
+    mesh = obj.data.copy()
+    mark_made(mesh)
+    known = StandIn(active_slot=obj.active_material_index)
+    made = Replacement(source, baked, stand_in, mesh, False, None if stand_in else obj.data, known, drawn)
+    return replace(made, object_slots=_object_slots(None if stand_in else obj))
 
 
-def _swap_mesh(replacement: _Replacement) -> None:
-    """Show a mesh copy on the source's own object."""
-    obj = bpy.data.objects[replacement.source.object_name, None]
-    record_mesh_swap(obj)
-    if replacement.source.needs_evaluated_mesh:
-        record_modifiers(obj)
-        for modifier in obj.modifiers:
-            modifier.show_viewport = modifier.show_render = False
-    obj.data = replacement.mesh
-    # The copy's slots hold the lightmap materials; a slot linked to the object keeps its own.
-    for slot in obj.material_slots:
-        slot.link = "DATA"
-
-
-def _new_stand_in(replacement: _Replacement) -> bpy.types.Object:
-    """Make an object that shows a mesh copy at the source's place."""
-    mesh = replacement.mesh
-    stand_in = bpy.data.objects.new(f"{replacement.source.name} (Lightmap)", mesh)
-    mark_made(stand_in)
-    world = Matrix(replacement.source.matrix_world)
-    stand_in.matrix_world = world
-    if not _nearly_equal(stand_in.matrix_basis, world):
-        # Nested scales can shear, which an object's location, rotation and scale cannot:
-        # the mesh takes it, and the object only keeps the mirroring that a mesh must not.
-        mirror = Matrix.Scale(-1.0, 4) if world.determinant() < 0.0 else Matrix.Identity(4)
-        mesh.transform(mirror @ world, shape_keys=True)
-        stand_in.matrix_world = mirror
-    return stand_in
-
-
-def _nearly_equal(first: Matrix, second: Matrix) -> bool:
-    """Whether two transforms agree to float32 rounding."""
-    size = max(max(abs(value) for value in row) for row in second)
-    return all(abs(first[i][j] - second[i][j]) <= 1e-5 * size for i in range(4) for j in range(4))
+def _object_slots(obj: bpy.types.Object | None) -> tuple[int, ...]:
+    """Return which material slots are linked to the object, not its data."""
+    slots = () if obj is None else enumerate(obj.material_slots)
+    return tuple(number for number, slot in slots if slot.link == "OBJECT")

@@ -1,11 +1,13 @@
-"""What a bake changed on each object, remembered in the file so that Restore can undo it.
+"""What a bake changed, remembered in the file so that Restore can take it off again.
 
-Two kinds of memory, both saved with the .blend:
+Everything a bake makes carries a marker. What is needed to bring an object back hangs on what the bake put on
+it, so that it is copied along with it and also holds for library overrides:
 
-* `Object.radiosity_bake`, a `BakeRecord` on every object the bake touched. Its mesh pointer
-  counts as a user, so the original mesh outlives saving while a copy stands in for it.
-* a marker on every datablock the bake made (images, materials, meshes, node trees,
-  stand-in objects, their collection), so that Restore removes these and nothing else.
+* a mesh with the UV layer `Lightmap` of ours has a record of the layer (`uv_layers.py`);
+* a stand-in mesh knows the mesh it stands for, and how its object was (`stand_ins.py`);
+* `Object.radiosity_bake`, a `BakeRecord` on every object that shows a lightmap or was hidden for one.
+
+Files of earlier versions keep all of it in the `BakeRecord`.
 """
 
 from __future__ import annotations
@@ -16,6 +18,15 @@ import bpy
 
 MADE_MARKER = "radiosity_lightmaps"
 """Custom property of the datablocks that a bake made."""
+
+ORIGINAL = "radiosity_original"
+"""Custom property of a material copy or a stand-in mesh: the datablock of the user's that it shows."""
+
+LAYER = "radiosity_layer"
+"""Custom property of a mesh with a UV layer of ours; see `uv_layers.py`."""
+
+ASIDE = ".earlier "
+"""How names of what an earlier bake made begin while a new one is made."""
 
 _MADE_KINDS = ("objects", "collections", "meshes", "materials", "node_groups", "images")
 """The collections of `bpy.data` that a bake adds to."""
@@ -57,6 +68,12 @@ class BakeRecord(bpy.types.PropertyGroup):
     texels_per_metre: bpy.props.FloatProperty(  # type: ignore[valid-type]
         description="How fine the lightmap is, for a texel scale of 1"
     )
+    light: bpy.props.StringProperty(  # type: ignore[valid-type]
+        description="What the light and the settings were when the object was baked"
+    )
+    scene: bpy.props.StringProperty(  # type: ignore[valid-type]
+        description="The scene whose bake the object shows"
+    )
     is_hidden: bpy.props.BoolProperty(  # type: ignore[valid-type]
         description="Stand-ins replace the object, which was hidden"
     )
@@ -82,12 +99,25 @@ def unregister() -> None:
     bpy.utils.unregister_class(ModifierRecord)
 
 
+def is_recorded(obj: bpy.types.Object) -> bool:
+    """Whether an object has a record of a bake."""
+    # Asking first: before Blender 5.0 merely reading the record would leave one in the file.
+    if not obj.is_property_set("radiosity_bake"):
+        return False
+    return bool(obj.radiosity_bake.is_baked or obj.radiosity_bake.is_hidden)
+
+
 def recorded_objects() -> list[bpy.types.Object]:
     """Every object of the file that a bake touched and Restore can bring back."""
-    # Asking first: before Blender 5.0 merely reading the record would leave one in the file.
-    local = [obj for obj in bpy.data.objects if obj.library is None]
-    touched = [obj for obj in local if obj.is_property_set("radiosity_bake")]
-    return [obj for obj in touched if obj.radiosity_bake.is_baked or obj.radiosity_bake.is_hidden]
+    local = [obj for obj in bpy.data.objects if obj.library is None and not is_made(obj)]
+    # The record of a library override is gone once the file was saved; its mesh stays.
+    return [obj for obj in local if is_recorded(obj) or shows_lightmap(obj)]
+
+
+def shows_lightmap(obj: bpy.types.Object) -> bool:
+    """Whether an object's mesh is one on which a bake shows."""
+    mesh = obj.data
+    return isinstance(mesh, bpy.types.Mesh) and mesh.library is None and (is_made(mesh) or LAYER in mesh)
 
 
 def is_baked() -> bool:
@@ -116,11 +146,6 @@ def made_datablocks() -> Iterator[bpy.types.ID]:
         yield from [block for block in getattr(bpy.data, kind) if is_made(block) and block.library is None]
 
 
-def remove_made() -> None:
-    """Remove every datablock that a bake made."""
-    remove_datablocks(made_datablocks())
-
-
 def remove_datablocks(datablocks: Iterable[bpy.types.ID]) -> None:
     """Remove datablocks from the file, all at once, and the keyframes that nothing else uses."""
     blocks = list(datablocks)
@@ -130,32 +155,19 @@ def remove_datablocks(datablocks: Iterable[bpy.types.ID]) -> None:
     bpy.data.batch_remove([action for action in actions if action.users == 0])
 
 
-def record_mesh_swap(obj: bpy.types.Object) -> None:
-    """Remember the object's mesh and how its material slots are linked."""
-    record = obj.radiosity_bake
-    record.is_baked = True
-    record.original_mesh = obj.data
-    record.active_material_index = obj.active_material_index
-    linked_to_object = [i for i, slot in enumerate(obj.material_slots) if slot.link == "OBJECT"]
-    record.object_slots = " ".join(map(str, linked_to_object))
+def record_baked(obj: bpy.types.Object, scene: bpy.types.Scene) -> None:
+    """Remember that the object shows a lightmap of this scene's bake."""
+    obj.radiosity_bake.is_baked = True
+    obj.radiosity_bake.scene = scene.name
 
 
-def record_modifiers(obj: bpy.types.Object) -> None:
-    """Remember which of the object's modifiers show."""
-    record = obj.radiosity_bake
-    for modifier in obj.modifiers:
-        entry = record.modifiers.add()
-        entry.name = modifier.name
-        entry.show_viewport = modifier.show_viewport
-        entry.show_render = modifier.show_render
-
-
-def record_hiding(obj: bpy.types.Object) -> None:
+def record_hiding(obj: bpy.types.Object, scene: bpy.types.Scene) -> None:
     """Remember whether the object shows in the viewport and in renders."""
     record = obj.radiosity_bake
     record.is_hidden = True
     record.hide_viewport = obj.hide_viewport
     record.hide_render = obj.hide_render
+    record.scene = scene.name
 
 
 def forget(obj: bpy.types.Object) -> None:

@@ -189,7 +189,7 @@ def restore(
     with registered():
         from .files import open_scene
         from .output import save_restored
-        from .restore import restore as restore_file
+        from .restore import restore_scene
 
         if scene is None and loaded is None:
             raise UsageError("restore needs SCENE, a baked .blend")
@@ -197,14 +197,16 @@ def restore(
         if scene is not None:
             open_scene(scene, allowed.scripts)
         check_existing("--output", output, allowed.overwrite)
-        count = restore_file(bpy.context)
+        restored = restore_scene(bpy.context, None)
+        count = restored.count
         if not count:
             raise SceneError(f"'{scene or loaded}' shows no bake; there is nothing to restore")
         for each in bpy.data.scenes:
             runtime.forget(each)
             kept_bakes.drop(each)
         save_restored(output)
-        console.lines([f"{count} object{'' if count == 1 else 's'} restored, written to {output}"])
+        lines = [f"{count} object{'' if count == 1 else 's'} restored, written to {output}"]
+        console.lines([*lines, *(f"warning: {warning.message}" for warning in restored.warnings)])
 
 
 def open_or_build(scene: Path | None, loaded: Path | None, allowed: Permissions) -> tuple[BakeWarning, ...]:

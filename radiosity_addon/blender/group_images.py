@@ -25,7 +25,11 @@ GroupImages: TypeAlias = Mapping[str, Sequence[bpy.types.Image]]
 
 
 def write_groups(
-    result: BakeResult, settings: BakeSettings, folder: Path | None, names: FileNames = PLAIN_NAMES
+    result: BakeResult,
+    settings: BakeSettings,
+    folder: Path | None,
+    others: frozenset[str] = frozenset(),
+    names: FileNames = PLAIN_NAMES,
 ) -> GroupImages:
     """Make an image of each page of each light group, saved into `folder` or packed; see `write_pages`.
 
@@ -33,7 +37,8 @@ def write_groups(
     """
     made: dict[str, Sequence[bpy.types.Image]] = {}
     try:
-        for group, files in zip(result.groups, group_file_names(result, settings, names), strict=True):
+        files_of = group_file_names(result, settings, names, others)
+        for group, files in zip(result.groups, files_of, strict=True):
             made[group.name] = write_images(group.pages, files, settings, folder, group.name)
     except BaseException:
         remove_datablocks(each_image(made))

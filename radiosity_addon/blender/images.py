@@ -41,11 +41,14 @@ def page_file_names(
 
 
 def group_file_names(
-    result: BakeResult, settings: BakeSettings, names: FileNames = PLAIN_NAMES
+    result: BakeResult,
+    settings: BakeSettings,
+    names: FileNames = PLAIN_NAMES,
+    others: frozenset[str] = frozenset(),
 ) -> list[list[str]]:
     """Name the files of every light group's pages after the pages and the group: `lightmap_Kitchen.exr`."""
     groups = [group.name for group in result.groups]
-    return names_of_pages(names, settings, len(result.pages), _objects(result), groups)[1:]
+    return names_of_pages(names, settings, len(result.pages), _objects(result), groups, others)[1:]
 
 
 def names_of_pages(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Generator, Iterator
-from contextlib import ExitStack, contextmanager
-from dataclasses import replace
+from contextlib import AbstractContextManager, ExitStack, contextmanager
+from dataclasses import dataclass, replace
 
 import bpy
 
@@ -19,7 +19,7 @@ from ..settings import BakeSettings
 from ..solver.arrays import Array
 from ..texel_memory import pages_of, refuse_too_large
 from . import kept_bakes, kept_details, runtime
-from .apply import apply_lightmaps, check_targets
+from .apply import apply_steps, check_targets
 from .bake_record import remove_datablocks
 from .export import export_steps, exporting
 from .export_sources import Export
@@ -27,12 +27,12 @@ from .group_images import GroupImages, each_image, write_groups
 from .images import lightmap_files, possible_names, relative_path, set_folder, write_pages
 from .light_shares import crowded_materials
 from .live_picture import Seen, seen_triangles
-from .only_changed import Kept as Others
-from .only_changed import narrow, remember
+from .only_changed import kept_warning, narrow, remember
 from .output import BLEND_NAME, PREVIEW_NAME, OutputFolder, save_copy
 from .preview import SAMPLES, render_preview
-from .rebake import originals_shown, replacing_earlier, seal
+from .rebake import EarlierBake, originals_shown, replacing_earlier
 from .restore import restore
+from .scopes import files_shown_by, keeping_theirs, of_scene, shared_warnings
 
 BakeJob = Generator[Progress, None, BakeReport]
 
@@ -44,6 +44,36 @@ APPLY_ALONE = 0.98
 
 WRITING_STAGES = frozenset({"apply", "save", "preview", "write"})
 """Stages in which an exception from outside, such as Ctrl-C, would be lost or do harm."""
+
+
+@dataclass(frozen=True)
+class Scope:
+    """Which objects keep the lightmaps of earlier bakes: all those, those of the scene that is baked.
+
+    `is_partial` says that only some of the scene's objects are baked.
+    """
+
+    keep: frozenset[str] = frozenset()
+    in_scene: tuple[str, ...] = ()
+    is_partial: bool = False
+
+    @classmethod
+    def of(cls, scene: bpy.types.Scene, export: Export, is_partial: bool) -> Scope:
+        """Return the scope of a bake."""
+        keep = keeping_theirs(scene, export, is_partial)
+        return cls(keep, tuple(of_scene(keep, scene)), is_partial)
+
+    def replacing_earlier(self, context: bpy.types.Context) -> AbstractContextManager[EarlierBake]:
+        """Replace the earlier bake of all other objects."""
+        return replacing_earlier(context, self.keep, self.is_partial)
+
+
+def _cannot_relight(count: int) -> BakeWarning:
+    message = (
+        f"{count} objects that were not baked keep their lightmaps; "
+        "to relight the scene, bake all of its objects"
+    )
+    return BakeWarning("scene", message)
 
 
 def run_bake(
@@ -118,7 +148,7 @@ def run_bake(
         @contextmanager
         def originals() -> Iterator[None]:
             with originals_shown(context) as found:
-                edited[:] = found
+                edited.extend(found)  # once an edit is carried, it is not found again
                 yield
 
         with timed(seconds, "export"):
@@ -128,29 +158,38 @@ def run_bake(
             with originals():
                 check_targets(export)
                 seen = seen_triangles(context, export)
-        others = Others()
+        unchanged = 0
         if only_changed and not moves_alone(export.bake_scene, settings, keeping):
-            export, settings, others = narrow(context.scene, export, settings)
-            keeping = None if others.objects else keeping
+            export, settings, unchanged = narrow(context.scene, export, settings)
+        scope = Scope.of(context.scene, export, is_partial=settings.objects is not None or unchanged > 0)
+        remarks = [*notes, *edited, *shared_warnings(context.scene, export)]
+        if unchanged:
+            remarks.append(kept_warning(unchanged))
+        elif scope.in_scene and keeping is not None:
+            remarks.append(_cannot_relight(len(scope.in_scene)))
+        keeping = None if scope.in_scene else keeping
         if output is not None:
-            lightmaps = possible_names(output.names, settings, export.bake_scene, output.path, others.files)
+            shown = files_shown_by(scope.keep)
+            lightmaps = possible_names(output.names, settings, export.bake_scene, output.path, shown)
             for _ in output.expecting(lightmaps):
                 yield Progress("export", SOLVE)
         solved = APPLY if with_copy else APPLY_ALONE
         sidecar = output.staging / output.names.sidecar if output and keeping and keeping.sidecar else None
         baking = bake_steps(export.bake_scene, settings, keeping, sidecar)
         result, kept = yield from _solve(baking, seen, patient, solved)
-        result = replace(result, warnings=(*notes, *edited, *others.warnings(), *result.warnings))
+        result = replace(result, warnings=(*remarks, *result.warnings))
         seconds.update(result.seconds)
         yield Progress("apply", solved)
         if with_copy and output is not None:
+            made = export, result, output, seconds, keeping
             samples = SAMPLES if with_preview else None
-            return (yield from deliver(context, settings, export, result, output, seconds, keeping, samples))
-        with replacing_earlier(context, others.objects), timed(seconds, "apply"):
-            images, groups = _show(context, settings, export, result, output, keeping, others.files)
+            return (yield from deliver(context, settings, *made, samples, scope=scope))
+        with scope.replacing_earlier(context) as earlier, timed(seconds, "apply"):
+            showing = _show(context, settings, export, result, output, keeping, earlier)
+            images, groups = yield from _told(showing, solved, 1.0)
             report = _report(result, images, groups, settings, seconds)
             if output is not None:
-                output.write_report(report.joined(output.earlier, others.objects))
+                output.write_report(report.joined(output.earlier, earlier.kept_sources))
                 output.publish()
             remember(context.scene, export, result, wanted)
         folder = "" if output is None else relative_path(output.path)
@@ -203,10 +242,12 @@ def deliver(
     seconds: dict[str, float],
     keeping: Keeping | None,
     samples: int | None = SAMPLES,
+    scope: Scope | None = None,
 ) -> BakeJob:
     """Show the lightmaps, save the scene beside them, render it unless `samples` is None, and publish it."""
-    with replacing_earlier(context), timed(seconds, "apply"):
-        images, groups = _show(context, settings, export, result, output, keeping)
+    with (scope or Scope()).replacing_earlier(context) as earlier, timed(seconds, "apply"):
+        showing = _show(context, settings, export, result, output, keeping, earlier)
+        images, groups = yield from _told(showing, APPLY, SAVE)
     try:
         # The copy tells of its bake too; what is left to do is not in its times.
         so_far = _report(result, images, groups, settings, seconds)
@@ -237,24 +278,40 @@ def _show(
     result: BakeResult,
     output: OutputFolder | None,
     keeping: Keeping | None,
-    taken: frozenset[str] = frozenset(),
-) -> tuple[list[bpy.types.Image], GroupImages]:
-    """Make the images, also those of light groups, and put them on the objects; files `taken` stay."""
+    earlier: EarlierBake,
+) -> Generator[float, None, tuple[list[bpy.types.Image], GroupImages]]:
+    """Make the images, also those of light groups, and put them on the objects; yields the fraction done."""
     folder, names = (None, PLAIN_NAMES) if output is None else (output.staging, output.names)
+    # Which instances keep theirs is found out later.
+    taken = files_shown_by(earlier.keep, earlier.stand_ins.values() if earlier.is_partial else ())
     images = write_pages(result, settings, folder, taken, names)
     groups: GroupImages = {}
     try:
-        groups = write_groups(result, settings, folder, names)
+        groups = write_groups(result, settings, folder, taken, names)
         if output is not None:
             set_folder([*images, *each_image(groups)], output.path)
         if keeping is not None:
             kept_bakes.mark_images([*images, *each_image(groups)], keeping.mark)
-        apply_lightmaps(context, export, result, images, settings, groups)
-        seal()
+        yield from apply_steps(context, export, result, images, settings, groups, earlier)
     except BaseException:
         remove_datablocks([*images, *each_image(groups)])
         raise
     return images, groups
+
+
+def _told(
+    steps: Generator[float, None, tuple[list[bpy.types.Image], GroupImages]], begin: float, end: float
+) -> Generator[Progress, None, tuple[list[bpy.types.Image], GroupImages]]:
+    """Report steps of showing the lightmaps as progress between two fractions of the whole."""
+    try:
+        while True:
+            try:
+                fraction = next(steps)
+            except StopIteration as done:
+                return done.value
+            yield Progress("apply", begin + (end - begin) * fraction)
+    finally:
+        steps.close()
 
 
 def _report(

@@ -9,8 +9,7 @@ not renewed.
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, fields, replace
-from pathlib import Path
+from dataclasses import fields, replace
 from typing import Any
 
 import bpy
@@ -18,10 +17,10 @@ import numpy as np
 
 from ..bake_scene import BakeObject, BakeResult, BakeScene, BakeWarning
 from ..errors import NothingToDoError
-from ..file_names import folded
 from ..settings import BakeSettings
-from .bake_record import is_made
+from .bake_record import shows_lightmap
 from .export_sources import Export
+from .scopes import files_of
 
 STEP = 1.0 / 256.0
 """How far a texture's reflectance has to change to be seen: it is stored in other places every time."""
@@ -33,35 +32,28 @@ _OF_NO_CONSEQUENCE = frozenset({"objects", "threads", "memory_limit", "unwrap_se
 """Settings that change no texel of what is kept."""
 
 
-@dataclass(frozen=True)
-class Kept:
-    """What keeps its lightmap: names of objects, and the files of their images, `folded`."""
-
-    objects: frozenset[str] = frozenset()
-    files: frozenset[str] = frozenset()
-
-    def warnings(self) -> tuple[BakeWarning, ...]:
-        """Say what was not renewed."""
-        if not self.objects:
-            return ()
-        message = (
-            f"{len(self.objects)} unchanged objects kept their lightmaps: light and shadow that the changed "
-            "ones throw on them are as before; bake all to renew them"
-        )
-        return (BakeWarning("scene", message),)
+def kept_warning(count: int) -> BakeWarning:
+    """Say what was not renewed."""
+    message = (
+        f"{count} unchanged objects kept their lightmaps: light and shadow that the changed "
+        "ones throw on them are as before; bake all to renew them"
+    )
+    return BakeWarning("scene", message)
 
 
 def narrow(
     scene: bpy.types.Scene, export: Export, settings: BakeSettings
-) -> tuple[Export, BakeSettings, Kept]:
+) -> tuple[Export, BakeSettings, int]:
     """Leave lightmaps to what has changed since the last bake; to all where the light has.
+
+    Returns the export, the settings, and how many objects have not changed.
 
     Raises
     ------
     NothingToDoError
         If nothing has.
     """
-    everything = export, settings, Kept()
+    everything = export, settings, 0
     bake_scene = export.bake_scene
     pairs = [
         (source, target)
@@ -71,19 +63,21 @@ def narrow(
     if any(source.is_instance or source.makes_instances for source, _ in pairs):
         return everything
     kept, densities = set(), []
+    light = light_fingerprint(bake_scene, settings)
     for source, target in pairs:
         obj = bpy.data.objects.get((source.object_name, None))
         if obj is None or not obj.is_property_set("radiosity_bake"):
             continue
         record = obj.radiosity_bake
-        shows = record.is_baked and isinstance(obj.data, bpy.types.Mesh) and is_made(obj.data)
+        if record.scene not in {"", scene.name} or (record.light or scene.radiosity.baked_light) != light:
+            continue
+        shows = record.is_baked and shows_lightmap(obj) and files_of(obj)
         if shows and record.fingerprint == fingerprint(bake_scene, target):
             kept.add(target.name)
             densities.append(record.texels_per_metre)
-    if not kept or scene.radiosity.baked_light != light_fingerprint(bake_scene, settings):
+    if not kept:
         return everything
-    files = {name: _files(name) for name in kept}
-    if any(len(of) > 1 for of in files.values()):
+    if any(len(files_of(bpy.data.objects[name, None])) > 1 for name in kept):
         return everything  # light groups, whose lightmaps are made together
     if len(kept) == len(pairs):
         raise NothingToDoError("nothing has changed since the last bake: there is nothing to do")
@@ -92,8 +86,7 @@ def narrow(
         # As sharp as what is kept, on a page of their own.
         settings = replace(settings, texel_density=float(np.median(densities)), pages=1)
     narrow_scene = replace(bake_scene, objects=narrowed)
-    taken = frozenset().union(*files.values())
-    return replace(export, bake_scene=narrow_scene), settings, Kept(frozenset(kept), taken)
+    return replace(export, bake_scene=narrow_scene), settings, len(kept)
 
 
 def remember(scene: bpy.types.Scene, export: Export, result: BakeResult, settings: BakeSettings) -> None:
@@ -101,6 +94,7 @@ def remember(scene: bpy.types.Scene, export: Export, result: BakeResult, setting
     sources = {
         target.name: source for source, target in zip(export.sources, export.bake_scene.objects, strict=True)
     }
+    light = light_fingerprint(export.bake_scene, settings)
     for baked in result.objects:
         source = sources[baked.object.name]
         obj = bpy.data.objects.get((source.object_name, None))
@@ -109,7 +103,8 @@ def remember(scene: bpy.types.Scene, export: Export, result: BakeResult, setting
         obj.radiosity_bake.fingerprint = fingerprint(export.bake_scene, baked.object)
         told = result.atlas[baked.page] if result.atlas else {}
         obj.radiosity_bake.texels_per_metre = told.get("texels_per_metre", 0.0)
-    scene.radiosity.baked_light = light_fingerprint(export.bake_scene, settings)
+        obj.radiosity_bake.light = light
+    scene.radiosity.baked_light = light
 
 
 def fingerprint(bake_scene: BakeScene, item: BakeObject) -> str:
@@ -154,18 +149,3 @@ def _bytes(value: Any) -> bytes:
     if isinstance(value, str):
         return value.encode()
     return np.round(np.asarray(value, dtype=np.float64), 5).astype(np.float32).tobytes()
-
-
-def _files(name: str) -> frozenset[str]:
-    """Return the stems of the files, `folded`, of the lightmaps that an object shows."""
-    found = set()
-    materials = bpy.data.objects[name, None].data.materials
-    trees = [material.node_tree for material in materials if material is not None]
-    while trees:
-        tree = trees.pop()
-        for node in tree.nodes if tree is not None else ():
-            if node.type == "GROUP" and node.node_tree is not None and is_made(node.node_tree):
-                trees.append(node.node_tree)
-            elif node.type == "TEX_IMAGE" and node.image is not None and is_made(node.image):
-                found.add(folded(Path(node.image.filepath_raw or node.image.name).stem))
-    return frozenset(found)

@@ -115,7 +115,7 @@ class RADIOSITY_OT_bake(WindowJob, bpy.types.Operator):
 
 
 class RADIOSITY_OT_restore(bpy.types.Operator):
-    """Take the lightmaps off again: objects, materials and UV layers are as before the bake"""
+    """Take the lightmaps off this scene: what you edited since the bake stays"""
 
     bl_idname = "radiosity.restore"
     bl_label = "Restore"
@@ -130,19 +130,24 @@ class RADIOSITY_OT_restore(bpy.types.Operator):
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Bring every baked object of the file back."""
-        from .restore import restore
+        """Bring every baked object of the scene back."""
+        from .restore import restore_scene
 
         live_state.stop()
-        count = restore(context)
-        for scene in bpy.data.scenes:
-            runtime.forget(scene)
-            kept_bakes.drop(scene)
-        redraw_sidebars(context)
-        if not count:
-            self.report({"INFO"}, "Nothing to restore: no object shows a lightmap")
+        try:
+            restored = restore_scene(context, context.scene)
+        except RadiosityError as error:
+            self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        self.report({"INFO"}, rpt_("Restored {} objects").format(count))
+        runtime.forget(context.scene)
+        kept_bakes.drop(context.scene)
+        redraw_sidebars(context)
+        if not restored.count:
+            self.report({"INFO"}, "Nothing to restore: no object of this scene shows a lightmap")
+            return {"CANCELLED"}
+        self.report({"INFO"}, rpt_("Restored {} objects").format(restored.count))
+        for warning in restored.warnings:
+            self.report({"WARNING"}, warning.message)
         return {"FINISHED"}
 
 

@@ -13,7 +13,7 @@ from mathutils import Vector
 
 from ..errors import BakeError
 from ..settings import BakeSettings
-from .bake_record import is_made
+from .bake_record import is_made, shows_lightmap
 from .png import render_png
 
 SAMPLES = 8
@@ -101,7 +101,7 @@ def _framing_camera(context: bpy.types.Context, scene: bpy.types.Scene) -> bpy.t
 
 def _bounds(context: bpy.types.Context) -> np.ndarray:
     """Corners of the boxes around what shows a lightmap, (n, 3) [m]."""
-    baked = _showing([obj for obj in context.scene.objects if obj.type == "MESH" and is_made(obj.data)])
+    baked = _showing([obj for obj in context.scene.objects if shows_lightmap(obj)])
     objects = baked or _showing([obj for obj in context.scene.objects if obj.type == "MESH"])
     corners = [obj.matrix_world @ Vector(corner) for obj in objects for corner in obj.bound_box]
     return np.array(corners or [(-1.0, -1.0, -1.0), (1.0, 1.0, 1.0)])

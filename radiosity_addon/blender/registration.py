@@ -13,6 +13,7 @@ from . import (
     check_panel,
     cleaning,
     cli_host,
+    edit_guard,
     kept_bakes,
     light_group_operators,
     light_group_panels,
@@ -59,7 +60,7 @@ def register() -> None:
     try:
         for module in (
             *(bake_record, object_roles, light_group_properties, properties),
-            *(kept_bakes, relight_properties, overlay_properties, overlay_view),
+            *(kept_bakes, relight_properties, overlay_properties, overlay_view, edit_guard),
         ):
             module.register()
             _undo.append(module.unregister)

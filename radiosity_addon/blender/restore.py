@@ -1,73 +1,77 @@
-"""Restore: the file as it was before the bake, from what `bake_record` remembers."""
+"""Restore: objects as they were before the bake, with all that was edited since."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import bpy
 
-from .bake_record import forget, is_made, recorded_objects, remove_made, unmark_made
-from .material_edits import carry_edits
+from ..bake_scene import BakeWarning
+from .bake_record import is_recorded, made_datablocks, recorded_objects
+from .edits import carry_edits
+from .shown_state import sharing, showing, take_off, take_off_unused
+from .stand_ins import INSTANCER
+from .sweep import sweep
+
+
+@dataclass(frozen=True)
+class Restored:
+    """What Restore did: how many objects it brought back, and what the user should know of edits."""
+
+    count: int
+    warnings: tuple[BakeWarning, ...]
 
 
 def restore(context: bpy.types.Context) -> int:
-    """Bring every baked object of the file back and remove all that the bake made.
+    """Bring every baked object of the file back; returns how many, 0 if nothing was baked."""
+    return restore_scene(context, None).count
 
-    Meshes, UV layers, materials, slots, modifiers and visibility are exactly as they were:
-    the originals were never edited, only put aside. Image files on disk are not touched.
 
-    Returns
-    -------
-    count : int
-        How many objects were brought back; 0 means nothing was baked.
+def restore_scene(context: bpy.types.Context, scene: bpy.types.Scene | None) -> Restored:
+    """Take the lightmaps off the objects of a scene, or of the whole file.
+
+    Meshes, UV layers, materials, slots, modifiers and visibility are as they were, with the user's edits
+    since. What the bake made is removed as far as nothing else shows or uses it. Image files on disk stay.
+
+    Parameters
+    ----------
+    context : Context
+    scene : Scene or None
+        None restores the whole file. Objects of no scene go with any of them.
     """
-    carry_edits()
-    objects = recorded_objects()
-    leave_edit_modes(context, objects)
-    for obj in objects:
-        if not show_original(obj):
-            unmark_made(obj.data)
-    remove_made()
+    if next(made_datablocks(), None) is None and not recorded_objects():
+        return Restored(0, ())
+    warnings = carry_edits(context)
+    shown = showing()
+    if scene is not None:
+        shown = sharing(obj for obj in shown if is_of_scene(obj, scene))
+    count = sum(obj in set(shown) for obj in recorded_objects())
+    stand_ins = stand_ins_of(shown, scene)
+    take_off(shown)
+    take_off_unused()
+    sweep(stand_ins)
     context.view_layer.update()
-    return len(objects)
+    return Restored(count, warnings)
 
 
-def leave_edit_modes(context: bpy.types.Context, objects: list[bpy.types.Object]) -> None:
-    """Switch objects that are being edited to object mode; their data cannot be swapped in it."""
-    for obj in objects:
-        if obj.mode != "OBJECT" and context.view_layer.objects.get(obj.name) == obj:
-            with context.temp_override(active_object=obj, object=obj, selected_objects=[obj]):
-                bpy.ops.object.mode_set(mode="OBJECT")
+def is_of_scene(obj: bpy.types.Object, scene: bpy.types.Scene) -> bool:
+    """Whether an object is in a scene, shows a lightmap of the scene's bake, or is in no scene at all."""
+    baked_by = obj.radiosity_bake.scene if is_recorded(obj) else ""
+    return baked_by == scene.name or scene in (scenes := obj.users_scene) or not scenes
 
 
-def show_original(obj: bpy.types.Object) -> bool:
-    """Bring one object back and forget that it was baked; what the bake made is left alone.
-
-    Returns False where somebody deleted the original mesh since: the object then keeps the
-    copy that the bake made.
-    """
-    record = obj.radiosity_bake
-    found = not record.is_baked or _restore_mesh(obj)
-    if record.is_hidden:
-        obj.hide_viewport = record.hide_viewport
-        obj.hide_render = record.hide_render
-    forget(obj)
+def stand_ins_of(
+    objects: Sequence[bpy.types.Object], scene: bpy.types.Scene | None
+) -> list[bpy.types.Object]:
+    """Return the stand-in objects of instances that some objects make, or of the whole file."""
+    stand_ins = [block for block in made_datablocks() if isinstance(block, bpy.types.Object)]
+    if scene is None:
+        return stand_ins
+    inside = set(objects)
+    found = []
+    for stand_in in stand_ins:
+        instancer = stand_in.get(INSTANCER)
+        if instancer in inside or (instancer is None and is_of_scene(stand_in, scene)):
+            found.append(stand_in)
     return found
-
-
-def _restore_mesh(obj: bpy.types.Object) -> bool:
-    """Give the object its own mesh, slots and modifiers back; False where the mesh is gone."""
-    record = obj.radiosity_bake
-    for entry in record.modifiers:
-        modifier = obj.modifiers.get(entry.name)
-        if modifier is not None:
-            modifier.show_viewport = entry.show_viewport
-            modifier.show_render = entry.show_render
-    if record.original_mesh is None:
-        return False
-    # Somebody may have given the object another mesh since, which is then theirs to keep.
-    if is_made(obj.data):
-        obj.data = record.original_mesh
-    for index in map(int, record.object_slots.split()):
-        if index < len(obj.material_slots):
-            obj.material_slots[index].link = "OBJECT"
-    obj.active_material_index = record.active_material_index
-    return True

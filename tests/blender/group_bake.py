@@ -15,6 +15,7 @@ from radiosity_addon.blender.export import export_scene
 from radiosity_addon.blender.group_images import write_groups
 from radiosity_addon.blender.images import write_pages
 from radiosity_addon.blender.light_mixer import mixers, sliders_of
+from radiosity_addon.blender.rebake import originals_shown, replacing_earlier
 from radiosity_addon.settings import BakeSettings
 from tests.blender.hand_bake import add_plane, hand_result, principled_material
 
@@ -45,15 +46,22 @@ def light_groups(colors: Mapping[str, tuple[float, ...]] = GROUPS) -> tuple[Ligh
 
 
 def bake_groups(
-    colors: Mapping[str, tuple[float, ...]] = GROUPS, folder: Path | None = None, **settings: object
+    colors: Mapping[str, tuple[float, ...]] = GROUPS,
+    folder: Path | None = None,
+    failing: Exception | None = None,
+    **settings: object,
 ) -> BakeResult:
-    """Export the open scene, pretend to bake these light groups, and show the result."""
+    """Export the open scene, pretend to bake these light groups, show the result, and raise `failing`."""
     wanted = BakeSettings(light_groups=True, **settings)
-    export = export_scene(bpy.context, wanted)
+    with originals_shown(bpy.context):
+        export = export_scene(bpy.context, wanted)
     whole = tuple(sum(channel) for channel in zip(*colors.values(), strict=True))
     result = replace(hand_result(export, (whole,)), groups=light_groups(colors))
-    images, groups = write_pages(result, wanted, folder), write_groups(result, wanted, folder)
-    apply_lightmaps(bpy.context, export, result, images, wanted, groups)
+    with replacing_earlier(bpy.context) as earlier:
+        images, groups = write_pages(result, wanted, folder), write_groups(result, wanted, folder)
+        apply_lightmaps(bpy.context, export, result, images, wanted, groups, earlier)
+        if failing is not None:
+            raise failing
     return result
 
 

@@ -13,6 +13,7 @@ from radiosity_addon.blender.apply import apply_lightmaps
 from radiosity_addon.blender.export import export_scene
 from radiosity_addon.blender.export_sources import Export
 from radiosity_addon.blender.images import write_pages
+from radiosity_addon.blender.rebake import originals_shown, replacing_earlier
 from radiosity_addon.settings import BakeSettings
 
 TEXEL = (0.25, 0.5, 3.0)
@@ -40,13 +41,24 @@ def hand_result(export: Export, colors: Sequence[Sequence[float]] = ((0.25, 0.5,
 
 
 def bake_by_hand(
-    colors: Sequence[Sequence[float]] = (TEXEL,), folder: Path | None = None, **settings: object
+    colors: Sequence[Sequence[float]] = (TEXEL,),
+    folder: Path | None = None,
+    failing: Exception | None = None,
+    **settings: object,
 ) -> BakeResult:
-    """Export the open scene, pretend to bake it, and show the result."""
+    """Export the open scene, pretend to bake it, and show the result, in place of any bake that is shown.
+
+    `failing` is raised once the lightmaps are shown.
+    """
     wanted = BakeSettings(**settings)
-    export = export_scene(bpy.context, wanted)
+    with originals_shown(bpy.context):
+        export = export_scene(bpy.context, wanted)
     result = hand_result(export, colors)
-    apply_lightmaps(bpy.context, export, result, write_pages(result, wanted, folder), wanted)
+    with replacing_earlier(bpy.context) as earlier:
+        images = write_pages(result, wanted, folder)
+        apply_lightmaps(bpy.context, export, result, images, wanted, earlier=earlier)
+        if failing is not None:
+            raise failing
     return result
 
 

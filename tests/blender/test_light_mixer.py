@@ -16,7 +16,6 @@ from radiosity_addon.blender.group_images import shown_images, update_images
 from radiosity_addon.blender.light_mixer import mixers, sliders_of
 from radiosity_addon.blender.light_shares import MANY_IMAGES, LightShares, crowded_materials
 from radiosity_addon.blender.lightmap_materials import LightmapMaterials
-from radiosity_addon.blender.rebake import replacing_earlier
 from radiosity_addon.blender.restore import restore
 from radiosity_addon.errors import BakeError
 from radiosity_addon.settings import BakeSettings
@@ -98,8 +97,7 @@ def test_baking_again_keeps_sliders_and_keyframes(tmp_path: Path) -> None:
         strength = sliders_of(mixer)[0].strength
         strength.default_value = value
         strength.keyframe_insert("default_value", frame=frame)
-    with replacing_earlier(bpy.context):
-        bake_groups({"Sky": (1.0, 1.0, 1.0), **GROUPS})
+    bake_groups({"Sky": (1.0, 1.0, 1.0), **GROUPS})
     (mixer,) = mixers()
     assert [(sliders.name, sliders.strength.default_value) for sliders in sliders_of(mixer)][::2] == [
         ("Sky", 1.0),
@@ -116,14 +114,8 @@ def test_a_failed_bake_leaves_the_earlier_sliders() -> None:
     bake_groups()
     slide("Glow", 0.5)
     before = sorted(block.name for block in made_datablocks())
-
-    def fail() -> None:
-        with replacing_earlier(bpy.context):
-            bake_groups({"Sky": (1.0, 1.0, 1.0)})
-            raise ZeroDivisionError
-
     with pytest.raises(ZeroDivisionError):
-        fail()
+        bake_groups({"Sky": (1.0, 1.0, 1.0)}, failing=ZeroDivisionError())
     assert sorted(block.name for block in made_datablocks()) == before
     (mixer,) = mixers()
     assert [sliders.strength.default_value for sliders in sliders_of(mixer)] == [1.0, 0.5]

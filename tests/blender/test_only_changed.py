@@ -159,8 +159,7 @@ def change_scale() -> None:
 
 
 def change_mesh() -> None:
-    record = bpy.data.objects["Floor"].radiosity_bake
-    record.original_mesh.vertices[0].co.z += 0.2
+    bpy.data.objects["Floor"].data.vertices[0].co.z += 0.2
 
 
 @pytest.mark.parametrize("change", [change_reflectance, change_scale, change_mesh])

@@ -12,7 +12,7 @@ import pytest
 import radiosity_addon
 from radiosity_addon.bake_scene import BakedObject, BakeResult, BakeScene, LightmapPage
 from radiosity_addon.blender.apply import apply_lightmaps
-from radiosity_addon.blender.bake_record import is_baked
+from radiosity_addon.blender.bake_record import recorded_objects
 from radiosity_addon.blender.export import export_scene
 from radiosity_addon.blender.images import write_pages
 from radiosity_addon.blender.rebake import originals_shown, replacing_earlier
@@ -62,9 +62,9 @@ def bake(value: float, then: type[BaseException] | None = None) -> BakeScene:
     with originals_shown(context):
         export = export_scene(context, SETTINGS)
     result = result_of(export.bake_scene, value)
-    with replacing_earlier(context):
+    with replacing_earlier(context) as earlier:
         images = write_pages(result, SETTINGS, None)
-        apply_lightmaps(context, export, result, images, SETTINGS)
+        apply_lightmaps(context, export, result, images, SETTINGS, earlier=earlier)
         if then is not None:
             raise then
     return export.bake_scene
@@ -117,7 +117,7 @@ def test_the_originals_show_for_a_moment_only() -> None:
     bake(0.25)
     before = snapshot()
     with originals_shown(bpy.context):
-        assert not is_baked()
+        assert recorded_objects() == []
         shown = snapshot()["objects"]
         assert {name: shown[name] for name in bare["objects"]} == bare["objects"]
     assert snapshot() == before

@@ -202,9 +202,8 @@ def test_what_else_has_changed_is_named_and_nothing_is_written(
     if change == "move":
         bpy.data.objects["Floor"].location.z -= 0.01
     elif change == "paint":
-        bpy.data.objects["Floor"].radiosity_bake.original_mesh.materials.append(
-            shader_material("Red", "ShaderNodeBsdfDiffuse", Color=(0.8, 0.1, 0.1, 1.0))
-        )
+        red = shader_material("Red", "ShaderNodeBsdfDiffuse", Color=(0.8, 0.1, 0.1, 1.0))
+        bpy.data.objects["Floor"].data.materials[0] = red
     elif change == "add":
         add_mesh("More", location=(0, 0, 3))
     elif change == "hide":

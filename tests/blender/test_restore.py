@@ -105,8 +105,10 @@ def test_copies_that_the_user_made_of_a_baked_object_are_restored_too() -> None:
     copy.data = cube.data.copy()
     bpy.context.scene.collection.objects.link(copy)
     assert restore(bpy.context) == 2
-    assert cube.data == copy.data == original
-    assert [mesh.name for mesh in bpy.data.meshes] == [original.name]
+    assert cube.data == original
+    assert [mesh.users for mesh in bpy.data.meshes] == [1, 1]
+    for mesh in (cube.data, copy.data):
+        assert ([layer.name for layer in mesh.uv_layers], list(mesh.materials)) == (["UVMap"], [])
 
 
 def test_a_mesh_the_user_gave_a_baked_object_since_is_kept() -> None:
@@ -120,10 +122,12 @@ def test_a_mesh_the_user_gave_a_baked_object_since_is_kept() -> None:
 def test_where_the_original_mesh_is_gone_the_copy_stays() -> None:
     cube = _cube()
     original = cube.data
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Other", original))
     _bake(None)
     bpy.data.meshes.remove(original)
     restore(bpy.context)
     assert len(cube.data.polygons) == 6
+    assert "Lightmap" not in cube.data.uv_layers
     assert not bake_record.is_baked()
     assert list(bpy.data.images) == []
 

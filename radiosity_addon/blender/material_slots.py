@@ -1,0 +1,75 @@
+"""Material slots: lightmap copies in them, and the user's materials back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import bpy
+
+from .bake_record import ORIGINAL, is_made
+
+_KINDS_WITH_MATERIALS = ("meshes", "curves", "metaballs", "hair_curves", "pointclouds", "volumes")
+
+
+def original_of(material: bpy.types.Material | None) -> bpy.types.Material | None:
+    """Return the user's material behind a lightmap copy; any other material is the user's itself."""
+    return material.get(ORIGINAL) if material is not None and is_made(material) else material
+
+
+def is_copy(material: bpy.types.Material | None) -> bool:
+    """Whether a slot's material is a lightmap copy."""
+    return material is not None and is_made(material)
+
+
+def data_with_copies() -> Iterator[Any]:
+    """Yield the file's own data, of any kind, that has a lightmap copy in a slot."""
+    for kind in _KINDS_WITH_MATERIALS:
+        for data in getattr(bpy.data, kind, ()):
+            if data.library is None and any(is_copy(material) for material in data.materials):
+                yield data
+
+
+def own_copies(obj: bpy.types.Object) -> bool:
+    """Whether a slot that is linked to the object holds a lightmap copy."""
+    return any(slot.link == "OBJECT" and is_copy(slot.material) for slot in obj.material_slots)
+
+
+def show_originals(data: Any) -> None:
+    """Put the user's materials into the slots of a mesh; those that are no copies stay."""
+    for index, material in enumerate(data.materials):
+        if is_copy(material):
+            data.materials[index] = original_of(material)
+
+
+def show_own_originals(obj: bpy.types.Object) -> None:
+    """The same for the slots that are linked to the object."""
+    for slot in obj.material_slots:
+        if slot.link == "OBJECT" and is_copy(slot.material):
+            slot.material = original_of(slot.material)
+
+
+def set_materials(mesh: bpy.types.Mesh, materials: Sequence[bpy.types.Material | None]) -> None:
+    """Fill the mesh's slots; which slot a polygon uses stays, as it would not if they were cleared."""
+    for index, material in enumerate(materials):
+        if index >= len(mesh.materials):
+            mesh.materials.append(material)
+        elif mesh.materials[index] != material:
+            mesh.materials[index] = material
+
+
+def drop_added_slots(mesh: bpy.types.Mesh, added: int, users: Sequence[bpy.types.Object]) -> None:
+    """Remove slots that a bake added to a mesh without any, unless somebody uses them by now."""
+    if added and len(mesh.materials) == added and not any(mesh.materials):
+        drop_slots(mesh, 0, users)
+
+
+def drop_slots(data: Any, number: int, users: Sequence[bpy.types.Object]) -> None:
+    """Remove the slots of a mesh after a number of them; `users` are the objects that show it."""
+    if len(data.materials) <= number:
+        return
+    while len(data.materials) > number:
+        data.materials.pop()
+    for obj in users:
+        if obj.data == data:
+            obj.data = data  # or the object would go on having a slot
