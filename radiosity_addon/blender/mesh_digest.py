@@ -51,10 +51,12 @@ def digest(mesh: bpy.types.Mesh) -> str:
     found = hashlib.blake2b(digest_size=16)
     record = layer_record(mesh)
     for name, attribute in sorted(_own_attributes(mesh, record), key=lambda found: found[0]):
-        values = _bytes_of(attribute)
+        kind, values = attribute.data_type, _bytes_of(attribute)
+        if attribute.name == KEPT_VALUES:  # it was a UV layer, and will be one again
+            kind, values = "FLOAT2", np.frombuffer(values, np.float32).reshape(-1, 3)[:, :2].tobytes()
         if name in _DROPPED_WHERE_ZERO and not values.strip(b"\0"):
             continue
-        found.update(f"{name}:{attribute.domain}:{attribute.data_type};".encode())
+        found.update(f"{name}:{attribute.domain}:{kind};".encode())
         found.update(values)
     starts = np.empty(len(mesh.polygons), dtype=np.int32)
     mesh.polygons.foreach_get("loop_start", starts)

@@ -69,7 +69,8 @@ def _give_object(obj: bpy.types.Object) -> None:
     """Make a stand-in the user's; where it still is in its instance's place it must not show as well."""
     in_place = moved_place(obj) is None
     release_object(obj)
-    obj.name = f"{obj.name.removeprefix(ASIDE).removesuffix(EDITED)}{EDITED}"
+    name = obj.name.removeprefix(ASIDE).removesuffix(EDITED).removesuffix(" (Lightmap)")
+    obj.name = f"{name}{EDITED}"
     if in_place:
         obj.hide_viewport = obj.hide_render = True
     if isinstance(obj.data, bpy.types.Mesh) and is_made(obj.data):

@@ -81,6 +81,20 @@ def test_an_edit_of_a_mesh_without_slots_adds_none(then: Callable[[], list[str]]
 
 
 @AFTER
+def test_an_edit_of_a_mesh_with_eight_layers_keeps_them(then: Callable[[], list[str]]) -> None:
+    first, second = _pair()
+    for name in (*"ABCDEFG", "Lightmap"):
+        first.data.uv_layers.new(name=name)
+    first.data.uv_layers["Lightmap"].uv[0].vector = (0.25, 0.75)
+    bake_by_hand()
+    first.data.vertices[0].co.z = 0.5
+    assert then() == ["First"]
+    assert first.data == second.data
+    assert [layer.name for layer in first.data.uv_layers] == [*"ABCDEFG", "Lightmap"]
+    assert tuple(first.data.uv_layers["Lightmap"].uv[0].vector) == (0.25, 0.75)
+
+
+@AFTER
 def test_two_different_edits_are_both_kept(then: Callable[[], list[str]]) -> None:
     first, second = _pair()
     bake_by_hand()
@@ -244,14 +258,15 @@ def test_lightmaps_in_the_user_s_own_materials_stay() -> None:
     assert sorted(material.name for material in bpy.data.materials) == ["Mine", "Paint"]
 
 
-def test_a_lightmap_material_that_is_an_asset_stays() -> None:
+def test_what_is_marked_as_an_asset_stays_one() -> None:
     plane = add_plane(material=principled_material())
     bake_by_hand()
-    copy = plane.data.materials[0]
-    copy.asset_mark()
+    plane.data.materials[0].asset_mark()
     _restore()
-    assert copy.name in bpy.data.materials
-    assert "lightmap.exr" in bpy.data.images
+    (asset,) = (material for material in bpy.data.materials if material.asset_data is not None)
+    assert asset.name.startswith("Paint")
+    assert not is_made(asset)
+    assert [material.name for material in plane.data.materials] == ["Paint"]
     assert not bake_record.is_baked()
 
 
