@@ -20,7 +20,13 @@ def write_material(target: bpy.types.Material, source: bpy.types.Material) -> bo
     """Give a material what another one holds; False, with some of it done, where that takes other nodes."""
     if not write_tree(target.node_tree, source.node_tree):
         return False
-    return _attempt(lambda: _write_settings(target, source))
+    return write_settings(target, source)
+
+
+def write_settings(target: bpy.types.Material, source: bpy.types.Material) -> bool:
+    """Give a material what another one holds besides nodes; False where Blender refuses some of it."""
+    _write_custom(target, source, COPY_MARKS)
+    return _attempt(lambda: _write(target, source, properties_of_material(source)))
 
 
 def write_tree(target: bpy.types.NodeTree, source: bpy.types.NodeTree) -> bool:
@@ -86,11 +92,6 @@ def _attempt(write: Any) -> bool:
         return bool(write())
     except (AttributeError, TypeError, ValueError, RuntimeError):
         return False  # something that Blender does not let us set
-
-
-def _write_settings(target: bpy.types.Material, source: bpy.types.Material) -> bool:
-    _write_custom(target, source, COPY_MARKS)
-    return _write(target, source, properties_of_material(source))
 
 
 def _write_node(target: bpy.types.Node, source: bpy.types.Node) -> bool:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import bpy
+import numpy as np
 
 from ..bake_scene import BakeWarning
 from .asset_marks import take_marks
@@ -28,7 +29,7 @@ from .copy_marks import (
     TOKEN,
     copied_groups,
 )
-from .copy_values import take_values, write_material, write_tree
+from .copy_values import take_values, write_material, write_settings, write_tree
 from .legacy_copies import is_legacy, was_edited
 from .material_digest import digest, tree_digest
 from .materials import uses_nodes
@@ -146,8 +147,11 @@ def _write_plain(original: bpy.types.Material, stripped: bpy.types.Material) -> 
     (shader,) = (node for node in nodes if node.type == "BSDF_DIFFUSE")
     if len(stripped.node_tree.links) != 1 or shader.inputs["Roughness"].default_value != 0.0:
         return False
-    original.diffuse_color[:3] = shader.inputs["Color"].default_value[:3]
-    return True
+    before, color = tuple(original.diffuse_color), tuple(shader.inputs["Color"].default_value)
+    written = write_settings(original, stripped)
+    if not np.allclose(before[:3], color[:3]):
+        original.diffuse_color = (*color[:3], original.diffuse_color[3])
+    return written
 
 
 def _as_own(
