@@ -1,9 +1,9 @@
 """Which of several surfaces in one place counts: what is covered neither sends, reflects nor absorbs.
 
 The sides of coincident triangles that face the same way share their place. A ray meets one of them: the
-outermost; in one plane one that emits before one that does not; then the one listed first. The others are
-covered there, as if cut out: they weigh what is left of them, and a ray that meets one is answered by its
-cover. A cover that is itself partly cut out covers by its opacity.
+outermost; in one plane one that emits before one that does not, a front before a back, and the one listed
+first. The others are covered there, as if cut out: they weigh what is left of them, and a ray that meets
+one is answered by its cover. A cover that is itself partly cut out covers by its opacity.
 
 Two-sided triangles that face each other have something solid behind one of them, such as a box that stands
 on a ground: their fronts touch, so both are covered, and their backs are what a ray meets.
@@ -264,7 +264,8 @@ def _covers(scene: Scene, pairs: CoincidentPairs, tolerance: Array, emits: Array
         # Heights are along a direction of the group: seen from the other side they count the other way.
         sign = np.where(one_is_back ^ turned[first], -1, 1)
         apart = sign * (level[first] - level[second])
-        wins = np.where(apart != 0, apart > 0, first < second)
+        listed = np.where(one_is_back == other_is_back, first < second, ~one_is_back)
+        wins = np.where(apart != 0, apart > 0, listed)
         wins = np.where(flat & (emits[first] != emits[second]), emits[first], wins)
         wins = np.where(contact, one_is_back, wins)
         rows = np.flatnonzero(exists)

@@ -106,7 +106,7 @@ KINDS: dict[str, Callable[[], Soup]] = {
 }
 
 
-def check(soup: Soup, layer: float = 4e-5, points: int = 4000) -> None:
+def check(soup: Soup, layer: float = 4e-5, error: float = 1e-3) -> None:
     count = len(soup.triangles)
     channels = np.ones((1, 3))
     scene = Scene(
@@ -116,12 +116,12 @@ def check(soup: Soup, layer: float = 4e-5, points: int = 4000) -> None:
         two_sided=True,
     )
     assert count == len(scene)
-    solution = solve(scene, SolverSettings(error=1e-3))
+    solution = solve(scene, SolverSettings(error=error))
 
     def irradiance(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         return np.asarray(solution.irradiance(points, normals)[:, 0])
 
-    found = measure(soup, irradiance, layer, points)
+    found = measure(soup, irradiance, layer)
     allowed = TOLERANCE * found.emitted + 3.0 * found.error
     assert abs(found.absorbed + found.escaped - found.emitted) <= allowed, f"{found} {found.excess}"
     power = solution.report["power_W"]
@@ -168,4 +168,5 @@ def test_lightmaps_absorb_what_glowing_panels_in_a_ceiling_send() -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_light_is_neither_made_nor_lost(kind: str) -> None:
-    check(KINDS[kind]())
+    # Elements that others run through lose light until they are small.
+    check(KINDS[kind](), error=2e-4 if kind == "crossing" else 1e-3)
