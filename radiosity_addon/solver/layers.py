@@ -1,9 +1,9 @@
 """Which of several surfaces in one place counts: what is covered neither sends, reflects nor absorbs.
 
 The sides of coincident triangles that face the same way share their place. A ray meets one of them: the
-outermost; in one plane one that emits before one that does not; then the one listed first. The others are
-covered there, as if cut out: they weigh what is left of them, and a ray that meets one is answered by its
-cover. A cover that is itself partly cut out covers by its opacity.
+outermost; in one plane one that emits before one that does not, a front before a back, and the one listed
+first. The others are covered there, as if cut out: they weigh what is left of them, and a ray that meets
+one is answered by its cover. A cover that is itself partly cut out covers by its opacity.
 
 Two-sided triangles that face each other have something solid behind one of them, such as a box that stands
 on a ground: their fronts touch, so both are covered, and their backs are what a ray meets.
@@ -11,6 +11,7 @@ on a ground: their fronts touch, so both are covered, and their backs are what a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -18,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .arrays import Array
-from .coincident_pairs import CoincidentPairs, coincident_pairs, tolerances
+from .coincident_pairs import CORNERS, CoincidentPairs, coincident_pairs, tolerances
 from .embree import EmbreeCaster
 from .own_parts import OwnParts, own_parts
 from .polygon_clip import edge_distances
@@ -39,6 +40,9 @@ FINE = 1.0 / 64.0
 
 PROBES = 32
 """Rays that tell whether what is behind a face is solid."""
+
+MANY_COPIES = 4
+"""More exact copies of one triangle than these are not compared pair by pair."""
 
 MOST_COVERS = 16
 """A hit is handed on from cover to cover this often at most."""
@@ -89,9 +93,11 @@ class Layers:
         emits = scene.emission.max(axis=1, initial=0.0) > 0
         offset = surface_offset(scene.triangles)
         reach = np.where(emits, np.maximum(tolerance, NEAR_EMITTERS * offset), tolerance)
-        pairs = coincident_pairs(scene.triangles, solid, tolerance, reach)
+        copy, original = _many_copies(scene, solid, emits)
+        pairs = coincident_pairs(scene.triangles, np.setdiff1d(solid, copy), tolerance, reach)
         contact, pressed = _contacts(scene, pairs, tolerance)
-        self.covers = _covers(scene, pairs, tolerance, emits, contact)
+        covers = _covers(scene, pairs, tolerance, emits, contact)
+        self.covers = _sorted([covers, _whole_covers(scene, copy, original)])
         self._first = np.searchsorted(self.covers.side, np.arange(2 * len(scene) + 1))
         self._pressed = pressed
         self._first_pressed = np.searchsorted(pressed.side, 2 * np.arange(len(scene) + 1))
@@ -220,7 +226,7 @@ def _contacts(scene: Scene, pairs: CoincidentPairs, tolerance: Array) -> tuple[A
         parts.append(part[behind])
         theirs.append(in_other[behind])
     joined = Covers(*(np.concatenate(each) for each in (sides, others, parts, theirs)))
-    return contact, joined.take(np.argsort(joined.side, kind="stable"))
+    return contact, _sorted([joined])
 
 
 def _solid_behind(
@@ -258,7 +264,8 @@ def _covers(scene: Scene, pairs: CoincidentPairs, tolerance: Array, emits: Array
         # Heights are along a direction of the group: seen from the other side they count the other way.
         sign = np.where(one_is_back ^ turned[first], -1, 1)
         apart = sign * (level[first] - level[second])
-        wins = np.where(apart != 0, apart > 0, first < second)
+        listed = np.where(one_is_back == other_is_back, first < second, ~one_is_back)
+        wins = np.where(apart != 0, apart > 0, listed)
         wins = np.where(flat & (emits[first] != emits[second]), emits[first], wins)
         wins = np.where(contact, one_is_back, wins)
         rows = np.flatnonzero(exists)
@@ -276,13 +283,65 @@ def _covers(scene: Scene, pairs: CoincidentPairs, tolerance: Array, emits: Array
                 np.where(which, np.where(turn, mine[:, ::-1], mine), np.where(turn, theirs[:, ::-1], theirs)),
             )
         )
-    joined = Covers(*(np.concatenate([getattr(part, name) for part in found]) for name in _NAMES))
+    return _sorted(found)
+
+
+def _sorted(covers: Sequence[Covers]) -> Covers:
+    """Return all of several, sorted by side."""
+    joined = Covers(*(np.concatenate([getattr(part, name) for part in covers]) for name in _NAMES))
     return joined.take(np.argsort(joined.side, kind="stable"))
 
 
 def _no_covers() -> Covers:
     none = np.zeros(0, dtype=np.int64)
-    return Covers(none, none, *np.zeros((2, 0, 8, 2)))
+    return Covers(none, none, *np.zeros((2, 0, CORNERS, 2)))
+
+
+def _many_copies(scene: Scene, solid: Array, emits: Array) -> tuple[Array, Array]:
+    """Find opaque triangles of which there are many exact copies that face the same way.
+
+    Pairs of a thousand copies would be a million: all are covered by the one that counts.
+
+    Returns
+    -------
+    copy, original : (c,) int
+    """
+    none = np.zeros(0, dtype=np.int64)
+    opaque = solid if scene.images is None else solid[~scene.images.cut_out[solid]]
+    bits = np.ascontiguousarray(scene.triangles[opaque] + 0.0).view(np.uint64)
+    # A number for each triangle, whichever corner comes first.
+    mixed = bits * _ODD
+    number = (mixed[..., 0] ^ (mixed[..., 1] >> np.uint64(7)) ^ (mixed[..., 2] >> np.uint64(13))).sum(axis=1)
+    _, group, count = np.unique(number, return_inverse=True, return_counts=True)
+    rows = opaque[count[group.reshape(-1)] > MANY_COPIES]
+    if len(rows) == 0:
+        return none, none
+    corners = scene.triangles[rows] + 0.0
+    first = np.lexsort(corners.transpose(2, 0, 1), axis=1)[:, 0]
+    turned = np.take_along_axis(corners, ((first[:, None] + np.arange(3)) % 3)[..., None], axis=1)
+    kind = np.concatenate([turned.reshape(-1, 9), scene.two_sided[rows, None]], axis=1)
+    order = np.lexsort((rows, ~emits[rows]))
+    rows = rows[order]
+    _, first_row, group, count = np.unique(
+        kind[order], axis=0, return_index=True, return_inverse=True, return_counts=True
+    )
+    group = group.reshape(-1)
+    original = rows[first_row][group]
+    chosen = (count[group] > MANY_COPIES) & (rows != original)
+    return rows[chosen], original[chosen]
+
+
+def _whole_covers(scene: Scene, copy: Array, original: Array) -> Covers:
+    """Return covers of whole triangles, both sides of those that have two."""
+    backs = np.flatnonzero(scene.two_sided[copy])
+    side = np.concatenate([2 * copy, 2 * copy[backs] + 1])
+    by = np.concatenate([2 * original, 2 * original[backs] + 1])
+    whole = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])[[0, 1, 2, 2, 2, 2, 2, 2]]
+    parts = np.broadcast_to(whole, (len(side), CORNERS, 2))
+    return Covers(side, by, parts, parts)
+
+
+_ODD = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)
 
 
 _NAMES = ("side", "by", "part", "in_cover")
