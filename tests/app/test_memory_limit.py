@@ -9,6 +9,7 @@ import bpy
 import pytest
 
 from radiosity_addon.blender import job
+from radiosity_addon.blender.commands import registered
 from radiosity_addon.blender.inspection import ERROR, inspect
 from radiosity_addon.settings import BakeSettings
 
@@ -38,9 +39,10 @@ def test_the_check_says_so_and_ends_with_an_error(run: Run, room: Path) -> None:
 
 def test_the_panel_refuses_with_the_figure(room: Path) -> None:
     bpy.ops.wm.open_mainfile(filepath=str(room))
-    group = bpy.context.scene.radiosity
-    group.size_mode, group.resolution = "resolution", 16384
-    found = inspect(bpy.context, BakeSettings(resolution=16384), None)
-    assert any(finding.level == ERROR and "memory limit" in finding.message for finding in found.findings)
-    with pytest.raises(RuntimeError, match=r"GiB.*memory limit of 4"):
-        bpy.ops.radiosity.bake()
+    with registered():
+        group = bpy.context.scene.radiosity
+        group.size_mode, group.resolution = "resolution", 16384
+        found = inspect(bpy.context, BakeSettings(resolution=16384), None)
+        assert any(each.level == ERROR and "memory limit" in each.message for each in found.findings)
+        with pytest.raises(RuntimeError, match=r"GiB.*memory limit of 4"):
+            bpy.ops.radiosity.bake()
