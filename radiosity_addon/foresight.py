@@ -10,11 +10,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from .bake_scene import BakeScene
 from .lightmap.packing import padding_for
 from .lightmap.pages import least_pages, shared_out
 from .settings import BakeSettings
 from .solver.parallel import thread_count
-from .texel_memory import least_bytes, room
+from .texel_memory import least_bytes, pages_of, refuse_too_large, room
 
 FILLED = 0.85
 """What charts and the padding around them take of a page, of what there is."""
@@ -40,9 +41,13 @@ UNWRAP_SECONDS = 60e-6
 CORES = 2
 """Of the machine all this was measured on; more help by the power 0.6."""
 
-BYTES_A_RAY, BYTES_A_TRIANGLE, BYTES_A_TEXEL, BYTES_A_PIXEL, BYTES_AT_LEAST = 5.0, 1700.0, 380.0, 40.0, 80e6
-"""Memory: what rays met is kept while light is swept; faces and links; where texels lie, their light and what
-it is interpolated from; the pages themselves; temporaries. Beyond the memory limit it is in files."""
+BYTES_A_RAY, BYTES_A_TRIANGLE, BYTES_A_TEXEL, BYTES_A_PIXEL, BYTES_AT_LEAST = 6.0, 1700.0, 380.0, 40.0, 30e6
+"""Memory: what rays met is kept while light is swept, more of it in scenes of more triangles, by the power
+0.14; faces and links; where texels lie, and their light; the pages themselves. Beyond the memory limit it
+is in files."""
+
+UNSURE = 0.8
+"""Pages that follow from a density are refused before they are laid out if so much of their width would."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +121,7 @@ def foresee(objects: Sequence[Lit], triangles: int, settings: BakeSettings) -> F
     rays = total * RAYS_A_TEXEL[settings.quality] * max(triangles, 1) ** 0.25
     memory = (
         BYTES_AT_LEAST
-        + BYTES_A_RAY * rays
+        + BYTES_A_RAY * max(triangles, 1) ** 0.14 * rays
         + BYTES_A_TRIANGLE * triangles
         + BYTES_A_TEXEL * total
         + BYTES_A_PIXEL * sum(page**2 for page in pages)
@@ -130,6 +135,29 @@ def foresee(objects: Sequence[Lit], triangles: int, settings: BakeSettings) -> F
         seconds = UNWRAP_SECONDS * triangles + (solving + gathering) * (CORES / cores) ** 0.6
     in_memory = min(memory, most)
     return Foresight(tuple(pages), tuple(texels), in_memory, memory - in_memory, seconds)
+
+
+def refuse_before_unwrapping(bake_scene: BakeScene, settings: BakeSettings) -> None:
+    """Refuse pages that will not fit into the memory limit, as far as areas tell how large they get.
+
+    Raises
+    ------
+    UsageError
+        See `refuse_too_large`.
+    """
+    sizes = pages_of(settings)
+    if sizes is None:
+        areas = bake_scene.scene.areas
+        lit = [
+            Lit(item.name, item.count, float(areas[item.rows].sum()), item.texel_scale)
+            for item in bake_scene.objects
+            if item.bake and item.count
+        ]
+        sizes = foresee(lit, len(bake_scene.scene), settings).pages
+    if settings.texel_density is not None:
+        # It is known roughly; what unwrapping finds decides.
+        sizes = tuple(int(UNSURE * size) for size in sizes)
+    refuse_too_large(sizes, settings)
 
 
 def _pages(objects: Sequence[Lit], settings: BakeSettings) -> tuple[list[int], list[float]]:

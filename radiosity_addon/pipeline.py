@@ -14,7 +14,6 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from . import foresight
 from .bake_details import More, more_of
 from .bake_scene import (
     BakedObject,
@@ -27,6 +26,7 @@ from .bake_scene import (
     Progress,
 )
 from .errors import BakeError, SceneError, UsageError
+from .foresight import refuse_before_unwrapping
 from .light_groups import are_wanted, check_groups, group_pages
 from .lightmap.accuracy import light_within
 from .lightmap.atlas import Atlas, AtlasInput, AtlasOptions, build_atlas
@@ -51,7 +51,7 @@ from .solver.arrays import Array
 from .solver.element_transport import Relightable
 from .solver.scratch import Scratch, tiles
 from .solver.visibility import RayCaster
-from .texel_memory import pages_of, refuse_too_large, share_out_memory, texel_scratch
+from .texel_memory import refuse_too_large, share_out_memory, texel_scratch
 from .texel_pictures import TexelPictures
 
 T = TypeVar("T")
@@ -71,9 +71,6 @@ class Lit:
 UNWRAP, RASTERISE, SOLVE, LIGHT, ENCODE = 0.0, 0.02, 0.04, 0.29, 0.98
 """How far the whole is when each stage begins: shares of the time of the box and the office at medium quality
 (bench/results), of which the time left is reckoned."""
-
-UNSURE = 0.8
-"""Pages that follow from a density are refused before they are laid out if so much of their width would."""
 
 MOST_SHOWN = 1 << 22
 """More texels than these are not shown while they are lit: their pictures would take too much memory."""
@@ -144,7 +141,7 @@ def _bake(
     if not baked:
         raise SceneError("nothing to bake: give the scene a render-visible mesh with faces")
 
-    _refuse_too_large(bake_scene, baked, settings)
+    refuse_before_unwrapping(bake_scene, settings)
     yield Progress("unwrap", UNWRAP)
     with timed(seconds, "unwrap"):
         atlas = yield from _unwrap(bake_scene, baked, settings)
@@ -218,21 +215,6 @@ def finish(
 def baked_objects(bake_scene: BakeScene) -> list[BakeObject]:
     """Return the objects that get lightmaps."""
     return [item for item in bake_scene.objects if item.bake and item.count]
-
-
-def _refuse_too_large(bake_scene: BakeScene, baked: list[BakeObject], settings: BakeSettings) -> None:
-    """Refuse, before anything is unwrapped, pages that will not fit into the memory limit."""
-    sizes = pages_of(settings)
-    if sizes is None:
-        areas = bake_scene.scene.areas
-        lit = [
-            foresight.Lit(item.name, item.count, float(areas[item.rows].sum()), item.texel_scale)
-            for item in baked
-        ]
-        plan = foresight.foresee(lit, len(bake_scene.scene), settings)
-        # By area it is known roughly; what unwrapping finds decides.
-        sizes = tuple(int(UNSURE * size) for size in plan.pages) if settings.texel_density else plan.pages
-    refuse_too_large(sizes, settings)
 
 
 def _unwrap(

@@ -17,7 +17,7 @@ from .solver.parallel import thread_count
 from .solver.scratch import Scratch
 from .solver.settings import SolverSettings
 
-LIT_BYTES = 32.0
+LIT_BYTES = 48.0
 """Of every texel while it is lit: its number, its light, what geometry does to it, which rays it needs."""
 
 IMAGE_BYTES, COPY_BYTES = 16.0, 16.0
@@ -111,7 +111,9 @@ def share_out_memory(geometry: TexelGeometry, settings: BakeSettings, keep: bool
     floor = LIT_BYTES * len(geometry) + working_bytes(settings)
     if keep:
         floor = max(floor, least_bytes(pages, settings))
-    scratch.budget = max(scratch.in_memory + memory_limit(settings) - process_bytes() - floor, 0.0)
+    most = memory_limit(settings) - floor
+    scratch.budget = max(scratch.in_memory + most - process_bytes(), 0.0)
+    scratch.free = lambda: most - process_bytes()
 
 
 def process_bytes() -> float:

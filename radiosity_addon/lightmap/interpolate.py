@@ -23,6 +23,7 @@ from ..solver.steps import drain
 from ..solver.visibility import RayCaster
 from .point_grid import NONE, PointGrid
 from .texel_geometry import TexelGeometry
+from .weighed_pairs import Weighed, run_of
 
 REACH = 0.35
 """Largest split-sphere change at which a gather point still counts."""
@@ -62,7 +63,7 @@ class GatherPoints:
         self.level = np.zeros(0, dtype=np.int8)
         """(g,) int8: as which level each was added, from 0"""
         self._grids: list[PointGrid] = []
-        self._weighed = _Weighed.nothing()
+        self._weighed = Weighed.nothing()
         scratch = geometry.scratch
         self._number = scratch.empty(len(geometry), np.int32)
         self.farthest = scratch.empty(len(geometry))
@@ -161,7 +162,7 @@ class GatherPoints:
         total = scratch.empty(len(texels))
         parts: dict[int, tuple[Array, Array, Array]] = {}
         kept = scratch.rows(1, np.int32), scratch.rows(1, np.int32), scratch.rows(1, np.float32)
-        self._weighed = _Weighed.nothing()
+        self._weighed = Weighed.nothing()
 
         def weigh(rows: slice) -> None:
             row, point = self.pairs(texels[rows])
@@ -180,7 +181,7 @@ class GatherPoints:
             yield fraction
         in_order = all((np.diff(texels[rows]) > 0).all() for rows in tiles(len(texels)))
         if in_order and len(texels):
-            self._weighed = _Weighed(len(self._grids), texels, *(table.all()[:, 0] for table in kept))
+            self._weighed = Weighed(len(self._grids), texels, *(table.all()[:, 0] for table in kept))
         return total
 
     def weights_of(self, texels: slice) -> tuple[Array, Array, Array]:
@@ -190,7 +191,7 @@ class GatherPoints:
         """
         known = self._weighed
         run = np.arange(texels.start, texels.stop)
-        mine = _run_of(known.texels, texels)
+        mine = run_of(known.texels, texels)
         old = np.zeros(len(run), dtype=bool)
         old[known.texels[mine] - texels.start] = True
         # What has become a point since has learnt how close things are to it.
@@ -210,43 +211,6 @@ class GatherPoints:
         weight = self.kernel(texels[row], point)
         reached = np.flatnonzero(weight)
         return texels[row[reached]], point[reached], weight[reached].astype(np.float32)
-
-
-@dataclass(frozen=True)
-class _Weighed:
-    """What was weighed when the first `levels` levels of points were there.
-
-    Attributes
-    ----------
-    levels : int
-    texels : (n,) int
-        Ascending; they were no points themselves.
-    texel, point, weight : (p,) int, int32, float32
-        Pairs with a weight above 0, sorted by texel.
-    """
-
-    levels: int
-    texels: Array
-    texel: Array
-    point: Array
-    weight: Array
-
-    @staticmethod
-    def nothing() -> _Weighed:
-        none = np.zeros(0, dtype=np.int32)
-        return _Weighed(0, none, none, none, np.zeros(0, dtype=np.float32))
-
-    def pairs_of(self, texels: slice) -> tuple[Array, Array, Array]:
-        """Return texels, points and weights of a run of texels."""
-        part = _run_of(self.texel, texels)
-        return self.texel[part], self.point[part], self.weight[part]
-
-
-def _run_of(ascending: Array, texels: slice) -> slice:
-    """Return where a run of texels is in an ascending array of them."""
-    # Bounds of another type would have the whole array converted.
-    bounds = np.array([texels.start, texels.stop], dtype=ascending.dtype)
-    return slice(*np.searchsorted(ascending, bounds))
 
 
 @dataclass(frozen=True)

@@ -50,6 +50,8 @@ class Scratch:
 
     def __init__(self, budget: float = math.inf) -> None:
         self.budget = budget
+        self.free: Callable[[], float] | None = None
+        """Tells what all that the process does leaves for them, if somebody knows [bytes]."""
         self.in_memory = 0
         """What the arrays take of memory now [bytes]."""
         self.in_files = 0
@@ -61,7 +63,7 @@ class Scratch:
         size *= np.dtype(dtype).itemsize
         if size < SMALLEST:
             return np.empty(shape, dtype)
-        if self.in_memory + size <= self.budget:
+        if size <= self.room():
             return self._counted(np.empty(shape, dtype))
         self.in_files += size
         with _temporary_file() as file:
@@ -73,6 +75,11 @@ class Scratch:
         for rows in tiles(len(result)):
             result[rows] = 0
         return result
+
+    def room(self) -> float:
+        """Return what further arrays may take of memory [bytes]."""
+        left = self.budget - self.in_memory
+        return left if self.free is None else min(left, self.free())
 
     def rows(self, width: int, dtype: npt.DTypeLike) -> Rows:
         """Return a table that grows by blocks of rows."""
@@ -97,7 +104,7 @@ class Rows:
         self._scratch, self._width, self._dtype = scratch, width, np.dtype(dtype)
         self._blocks: list[Array] = []
         self._pending: list[Array] = []
-        self._count = self._waiting = 0
+        self._count = self._waiting = self._in_memory = 0
         self._file: BinaryIO | None = None
 
     def more(self, count: int) -> Array:
@@ -105,19 +112,20 @@ class Rows:
         start, row = self._count, self._width * self._dtype.itemsize
         self._count += count
         # Blocks in memory are joined at last: for a moment they are there twice.
-        room = self._scratch.budget - self._scratch.in_memory
-        if self._file is None and self._count * row >= SMALLEST and 2 * self._count * row > room:
+        size = self._count * row
+        if self._file is None and size >= SMALLEST and 2 * size > self._scratch.room() + self._in_memory:
             self._file = _temporary_file()
         if self._file is None or count == 0:
             block = np.empty((count, self._width), self._dtype)
         else:
             self._scratch.in_files += count * row
             block = _mapped(self._file, start * row, (count, self._width), self._dtype)
+        self._in_memory += block.nbytes if self._file is None else 0
         self._blocks.append(block)
         return block
 
     def extend(self, values: Array) -> None:
-        """Add rows, or single values where the table is one wide."""
+        """Add rows of any shape with as many numbers as the table is wide."""
         self._pending.append(values)
         self._waiting += len(values)
         if self._waiting * self._width >= PENDING:

@@ -1,0 +1,118 @@
+"""Arrays in memory and in files: the same values, within the budget."""
+
+from __future__ import annotations
+
+import gc
+import tracemalloc
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from radiosity_addon import pipeline
+from radiosity_addon.bake_scene import BakeResult
+from radiosity_addon.errors import BakeError
+from radiosity_addon.pipeline import bake
+from radiosity_addon.settings import BakeSettings
+from radiosity_addon.solver import scratch as module
+from radiosity_addon.solver.scratch import SMALLEST, Scratch, is_in_file, row_numbers
+from tests.cornell import cornell_box
+from tests.unit.texel_scenes import bake_scene
+
+COUNT = SMALLEST // 4
+"""Numbers of four bytes that are just counted."""
+
+
+def test_arrays_go_to_files_when_the_budget_is_used_up() -> None:
+    scratch = Scratch(1.5 * SMALLEST)
+    first = scratch.empty(COUNT, np.int32)
+    second = scratch.zeros((COUNT, 1), np.int32)
+    assert (is_in_file(first), is_in_file(second)) == (False, True)
+    assert (scratch.in_memory, scratch.in_files) == (SMALLEST, SMALLEST)
+    assert not second.any()
+    second[:] = 7
+    module.trim()
+    assert (second == 7).all()
+    del first
+    gc.collect()
+    assert scratch.in_memory == 0
+    assert not is_in_file(scratch.empty(COUNT, np.int32))
+
+
+def test_small_arrays_stay_in_memory() -> None:
+    assert not is_in_file(Scratch(0.0).empty(COUNT - 1, np.int32))
+
+
+@pytest.mark.parametrize("budget", [0.0, 3.0 * SMALLEST, np.inf])
+def test_rows_are_the_same_wherever_they_are(budget: float) -> None:
+    """Blocks that begin in memory and go on in a file."""
+    table = Scratch(budget).rows(3, np.int32)
+    blocks = []
+    for number, count in enumerate([5, 0, COUNT // 3, COUNT, 17]):
+        block = table.more(count)
+        block[:] = number
+        blocks.append(np.full((count, 3), number, np.int32))
+    table.extend(np.full((9, 3), 8, np.int32))
+    table.extend(np.full((2, 3), 9, np.int32))
+    expected = np.concatenate([*blocks, np.full((9, 3), 8), np.full((2, 3), 9)])
+    found = table.all()
+    assert is_in_file(found) == (budget < np.inf)
+    np.testing.assert_array_equal(found, expected)
+
+
+def test_a_full_disk_is_said_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: Any) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(module.os, "posix_fallocate", full, raising=False)
+    with pytest.raises(BakeError, match=r"no room for 0\.0 GiB .*TMPDIR") as caught:
+        Scratch(0.0).empty(COUNT, np.int32)
+    assert "\n" not in str(caught.value)
+
+
+def test_files_leave_nothing_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr(module.tempfile, "tempdir", None)
+    found = Scratch(0.0).zeros(COUNT, np.int32)
+    assert is_in_file(found)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_row_numbers_are_those_of_flatnonzero(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "TILE", 7)
+    mask = np.random.default_rng(0).random(100) > 0.5
+    np.testing.assert_array_equal(row_numbers(mask), np.flatnonzero(mask))
+
+
+def test_tiles_give_the_same_bytes_in_a_fraction_of_the_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The Cornell box at 192² with all arrays in memory, and with every one of 1 KB or more in a file."""
+    whole, most = baked()
+    monkeypatch.setattr(module, "SMALLEST", 1 << 10)
+    monkeypatch.setattr(pipeline, "texel_scratch", lambda *_: Scratch(0.0))
+    monkeypatch.setattr(pipeline, "share_out_memory", lambda *_: None)
+    tiled, least = baked()
+    assert tiled.pages[0].pixels.tobytes() == whole.pages[0].pixels.tobytes()
+    assert tiled.pages[0].coverage.tobytes() == whole.pages[0].coverage.tobytes()
+    assert whole.details is not None
+    assert tiled.details is not None
+    for name in ("state", "noise", "misfit"):
+        one, other = (getattr(result.details.pages[0], name) for result in (whole, tiled))
+        assert one.tobytes() == other.tobytes()
+    assert tiled.light == whole.light
+    assert least < most
+
+
+def baked() -> tuple[BakeResult, int]:
+    """Return a bake, and the most memory that it took [bytes]."""
+    scene = cornell_box()
+    tracemalloc.start()
+    try:
+        steps = bake(bake_scene(scene, ("Box", len(scene))), BakeSettings(resolution=192, quality="draft"))
+        while True:
+            try:
+                next(steps)
+            except StopIteration as done:
+                return done.value, tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()

@@ -1,0 +1,119 @@
+"""What pages need of the memory limit: large ones are refused before any work, all others are baked."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from radiosity_addon import pipeline
+from radiosity_addon.errors import UsageError
+from radiosity_addon.foresight import Lit, foresee
+from radiosity_addon.pipeline import bake
+from radiosity_addon.settings import BakeSettings
+from radiosity_addon.texel_memory import least_bytes, pages_of, process_bytes, refuse_too_large
+from tests.rooms import box_room, grey
+from tests.unit.texel_scenes import bake_scene
+
+ROOT = Path(__file__).resolve().parents[2]
+
+ON_8_GB = 30_000_000
+"""Pixels of the largest pages that fitted into 8 GB when nothing was tiled: at least 250 bytes each."""
+
+PEAK = """
+import os, sys
+from radiosity_addon.pipeline import bake
+from radiosity_addon.settings import BakeSettings
+from tests.rooms import FLOOR, box_room, grey
+from tests.unit.texel_scenes import bake_scene
+from radiosity_addon.solver import PointLight, Scene
+
+def peak():
+    return int(open("/proc/self/status").read().split("VmHWM:")[1].split()[0]) * 1024
+
+triangles, _ = box_room()
+scene = Scene(triangles, grey(12, 0.1), grey(12, 0.0), lights=[PointLight((0.5, 0.4, 0.6), 10.0)])
+limit = float(sys.argv[1])
+settings = dict(quality="draft", threads=2, memory_limit=limit)
+for _ in bake(bake_scene(scene, ("Room", 12)), BakeSettings(resolution=int(sys.argv[2]), **settings)):
+    pass
+print(peak())
+sys.stdout.flush()
+os._exit(0)
+"""
+
+
+@pytest.mark.parametrize("limit", [None, 4.0])
+def test_no_bake_that_fitted_into_eight_gigabytes_is_refused(limit: float | None) -> None:
+    settings = BakeSettings(memory_limit=limit, threads=8)
+    for pages in ([5477], [4096], [1024] * 28, [8]):
+        assert sum(size**2 for size in pages) <= ON_8_GB
+        refuse_too_large(pages, settings)
+
+
+def test_what_cannot_be_done_is_refused_with_the_figure() -> None:
+    with pytest.raises(UsageError) as caught:
+        refuse_too_large([16384], BakeSettings(resolution=16384))
+    message = str(caught.value)
+    assert "\n" not in message
+    figure = least_bytes([16384], BakeSettings()) / 2**30
+    assert f"{figure:.1f} GiB" in message
+    assert "limit of 4 GiB" in message
+    assert caught.value.exit_code == 2
+    # What it says helps does.
+    raised = float(message.split("to ")[-1])
+    refuse_too_large([16384], BakeSettings(resolution=16384, memory_limit=raised + 0.2))
+
+
+@pytest.mark.parametrize("size", [{"resolution": 16384}, {"texel_density": 20_000.0}])
+def test_a_bake_is_refused_before_anything_is_unwrapped(
+    size: dict[str, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from radiosity_addon.solver import Scene
+
+    def unwrapped(*_: object) -> None:
+        raise AssertionError("it was unwrapped")
+
+    monkeypatch.setattr(pipeline, "_unwrap", unwrapped)
+    triangles, _ = box_room()
+    scene = bake_scene(Scene(triangles, grey(12, 0.5), grey(12, 0.0)), ("Room", 12))
+    with pytest.raises(UsageError, match="memory limit"):
+        next(bake(scene, BakeSettings(**size)))  # type: ignore[arg-type]
+
+
+def test_settings_alone_tell_the_pages_of_a_shared_atlas() -> None:
+    assert pages_of(BakeSettings(resolution=64, pages=3)) == (64,) * 3
+    assert pages_of(BakeSettings(texel_density=3.0)) is None
+    assert pages_of(BakeSettings(atlas="per-object")) is None
+
+
+def test_a_bake_stays_within_the_limit_by_what_is_foreseen() -> None:
+    """Beyond the limit it is files that grow."""
+    ground = [Lit("Ground", 2, 250_000.0)]
+    plans = [foresee(ground, 2, BakeSettings(texel_density=density)) for density in (1.0, 8.0)]
+    assert plans[0].files == 0
+    assert plans[1].files > 0
+    assert plans[0].memory < plans[1].memory <= 4 * 2**30 - min(process_bytes(), 2 * 2**30)
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="no peak of a process to read")
+def test_the_peak_of_a_process_stays_within_the_limit() -> None:
+    """1024² texels, for which 0.9 GB were needed once."""
+    limit = 0.45
+    run = subprocess.run(
+        [sys.executable, "-c", PEAK, str(limit), "1024"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=900,
+    )
+    assert run.returncode == 0, run.stderr
+    assert 0.1 < float(run.stdout) / 2**30 <= limit
+
+
+def test_working_memory_does_not_refuse_small_pages() -> None:
+    assert np.isfinite(least_bytes([32], BakeSettings(threads=64)))
+    refuse_too_large([32], BakeSettings(memory_limit=0.01, threads=64))
