@@ -83,12 +83,12 @@ def export_steps(
         If there is nothing to bake, a coordinate is NaN or infinite, or an object to be
         baked has no room for another UV layer.
     """
-    leave_edit_mode(context)
     factors = yield from lamp_factors()
     options: list[BakeWarning] = []
 
     @contextmanager
     def view() -> Iterator[bpy.types.Depsgraph]:
+        leave_edit_mode(context)  # a second window may have entered it
         with shown(), render_depsgraph(context) as depsgraph:
             yield depsgraph
             options[:] = option_warnings(context)
