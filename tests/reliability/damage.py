@@ -1,7 +1,7 @@
 """Damaged files of every kind, given to the command line in a process of its own.
 
-Whatever the file holds: exit code 0, 1 or 2, a few lines at most, no traceback, little memory, nothing touched
-outside the output folder, and the result that was there is whole, or a new one is.
+Whatever the file holds: exit code 0, 1 or 2, a few lines at most, no traceback, little memory, nothing
+touched outside the output folder, and the earlier result is whole, or a new one is.
 """
 
 from __future__ import annotations
@@ -63,7 +63,8 @@ image.filepath_raw = "//picture.png"
 bpy.ops.wm.save_as_mainfile(filepath=str(folder / "with_png.blend"), compress=True)
 bpy.ops.wm.obj_export(filepath=str(folder / "plain.obj"))
 bpy.ops.export_scene.gltf(filepath=str(folder / "plain.glb"), export_format="GLB", export_lights=True)
-bpy.ops.export_scene.gltf(filepath=str(folder / "apart.gltf"), export_format="GLTF_SEPARATE", export_lights=True)
+apart = str(folder / "apart.gltf")
+bpy.ops.export_scene.gltf(filepath=apart, export_format="GLTF_SEPARATE", export_lights=True)
 os._exit(0)
 """
 

@@ -12,9 +12,9 @@ import pytest
 
 pytest.importorskip("bpy")
 
-from tests.reliability import damage, full_disk, kills, scenes  # noqa: E402
-from tests.reliability.command import ROOT  # noqa: E402
-from tests.reliability.tally import Tally  # noqa: E402
+from tests.reliability import damage, full_disk, kills, scenes
+from tests.reliability.command import ROOT
+from tests.reliability.tally import Tally
 
 LINUX = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs Linux")
 
@@ -87,7 +87,7 @@ def test_failing_calls() -> None:
 
 
 def test_a_wrong_program_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The checks can fail: a bake that deletes a file is told by the tree, one that is half done by its report."""
+    """The checks can fail: on a deleted file, and on a result that is half done."""
     from tests.reliability import folders
 
     (tmp_path / "a.txt").write_text("mine")
