@@ -1,6 +1,6 @@
-"""What docs/promises.md promises of files, scenes and light, tried from outside: by operators and the command line.
+"""The promises of docs/promises.md, tested from outside: by operators and the command line.
 
-No name of a file is written down here that a report tells.
+Names of files in the panel's folder are read from its report.
 """
 
 from __future__ import annotations
@@ -350,7 +350,10 @@ def test_restore_keeps_library_overrides(room: Path, tmp_path: Path) -> None:
     try:
         bake()
     except RuntimeError as error:
-        assert "Floor" in str(error) or "Cube" in str(error)  # refused by name: nothing to restore
+        message = str(error)  # refused by name: nothing to restore
+        named = "Floor" in message or "Cube" in message
+        if not named or "Traceback" in message:
+            raise
     else:
         restore()
     for name in ("Floor", "Cube"):
@@ -376,7 +379,7 @@ def test_mesh_edits_survive(again: bool, room: Path) -> None:
 def test_mesh_edits_on_stand_ins_are_never_dropped_in_silence(
     name: str, room: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """A modifier or another object stands in the way: the edit is in the file, or a message names the object."""
+    """With a modifier or a shared mesh: the edit is in the file, or a message names the object."""
     bake()
     bpy.data.objects[name].data.vertices[0].co.z = 4.125
     capfd.readouterr()
@@ -497,7 +500,7 @@ def test_undo_of_a_relight_brings_the_picture_back(room: Path) -> None:
 
 
 def measured_floor(layers: int, gap: float) -> float:
-    """Bake a floor below so many glowing sheets, each `gap` metres above the last; returns the light on it."""
+    """Bake a floor below glowing sheets that are `gap` meters apart; returns the light on it."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     floor = bpy.data.meshes.new("Floor")
     floor.from_pydata(QUAD, [], [(0, 1, 2, 3)])

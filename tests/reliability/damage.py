@@ -1,7 +1,7 @@
 """Damaged files of every kind, given to the command line in a process of its own.
 
-Whatever the file holds: exit code 0, 1 or 2, a few lines at most, no traceback, little memory, nothing touched
-outside the output folder, and the result that was there is whole, or a new one is.
+Whatever the file holds: exit code 0, 1 or 2, a few lines at most, no traceback, little memory, nothing
+touched outside the output folder, and the earlier result is whole, or a new one is.
 """
 
 from __future__ import annotations
@@ -63,7 +63,8 @@ image.filepath_raw = "//picture.png"
 bpy.ops.wm.save_as_mainfile(filepath=str(folder / "with_png.blend"), compress=True)
 bpy.ops.wm.obj_export(filepath=str(folder / "plain.obj"))
 bpy.ops.export_scene.gltf(filepath=str(folder / "plain.glb"), export_format="GLB", export_lights=True)
-bpy.ops.export_scene.gltf(filepath=str(folder / "apart.gltf"), export_format="GLTF_SEPARATE", export_lights=True)
+apart = str(folder / "apart.gltf")
+bpy.ops.export_scene.gltf(filepath=apart, export_format="GLTF_SEPARATE", export_lights=True)
 os._exit(0)
 """
 
@@ -87,18 +88,18 @@ class Place:
         return self.work / "out"
 
     def make(self) -> None:
-        """Make the pristine files, and the results of baking each of them."""
+        """Make the pristine files."""
         self.pristine.mkdir(parents=True)
         done = run_python(MAKE, self.pristine, cwd=self.root)
         assert done.code == 0, done.err[-2000:]
-        for name in SCENES:
+
+    def refresh(self, name: str | None) -> None:
+        """Begin again: all files, the earlier result of a scene, and foreign files."""
+        if name is not None and not (self.root / "results" / name).exists():
             self.refresh(None)
             done = self.bake(name, "--keep")
             assert done.code == 0, done.err
             shutil.copytree(self.out, self.root / "results" / name)
-
-    def refresh(self, name: str | None) -> None:
-        """Begin again: all files, the earlier result of a scene, and foreign files."""
         shutil.rmtree(self.work, ignore_errors=True)
         shutil.copytree(self.pristine, self.work)
         if name is not None:
@@ -114,10 +115,6 @@ class Place:
     def relight(self, name: str) -> Outcome:
         given = ("bake", self.work / name, "--output", self.out, "--quiet", "--relight")
         return run(*given, cwd=self.work, temporary=self.work / "tmp")
-
-
-SCENES = ("plain.blend", "with_png.blend", "with_jpg.blend", "with_exr.blend", "with_hdr.blend", "plain.obj")
-SCENES += ("plain.glb", "apart.gltf")
 
 
 def run_all(tally: Tally, root: Path, seeds: Iterable[int], workers: int = 2) -> None:
@@ -386,7 +383,10 @@ def sidecar(place: Place, random: Random) -> tuple[str, str, bool]:
     if random.random() < 0.25:
         return "plain.blend", flip(path, random), True
     if random.random() < 0.1:
-        shutil.copyfile(next((place.root / "results" / "with_png.blend").glob("*.relight")), path)
+        place.refresh("with_png.blend")
+        content = next(place.out.glob("*.relight")).read_bytes()
+        place.refresh("plain.blend")
+        path.write_bytes(content)
         return "plain.blend", "of another scene", True
     return "plain.blend", damage_arrays(path, random), True
 

@@ -1,8 +1,8 @@
 """What users do to a baked scene, and whether it is still there in the end.
 
-An edit returns a check, which is run after Restore and returns what is wrong, or "". Objects with a mesh of their
-own and no modifier must keep an edit as it was made. Of all others it must be in the file, or a message must have
-named the object: `soft` says which.
+An edit returns a check, which is run after Restore and returns what is wrong, or "". Objects with a mesh of
+their own and no modifier must keep an edit as made. For all others it must be in the file, or a message
+must have named the object.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Every file system call of publishing, made to fail once: the old result is whole afterwards, or the new one.
+"""Each file system call of publishing fails once: afterwards the old result is whole, or the new one is.
 
 The jobs run in this process, and fail by Python's audit events: see `hooks.py`.
 """
@@ -26,7 +26,7 @@ CODES = (errno.ENOSPC, errno.EACCES, errno.EIO)
 MOST_CALLS = 400
 
 Job = Callable[[Sandbox, int], str]
-"""Does the work of a number, so that results differ; returns what it says of errors, "" if it has succeeded."""
+"""Does the work, different for each number; returns the error message, "" if it has succeeded."""
 
 
 @dataclass

@@ -1,7 +1,7 @@
-"""Disks that are full, read-only or without inodes, below the output folder or the folder for temporary files.
+"""Full disks, read-only disks, disks without inodes: for the output folder or for temporary files.
 
-Small file systems in memory are mounted in a mount namespace of its own, which takes root. There `/tmp` is one too:
-a program that deletes too much finds nothing there. Where no namespace can be made, nothing is tried.
+Small file systems in memory are mounted in a separate mount namespace, which takes root. There `/tmp` is one
+too: a program that deletes too much finds nothing there.
 """
 
 from __future__ import annotations
@@ -53,8 +53,9 @@ class Trial:
 def trials(needed: int, count: int = COUNT) -> list[Trial]:
     """Return the trials, for a result that takes so many bytes."""
     special = [
-        Trial("tmp", "read-only"), Trial("tmp", "inodes"), Trial("tmp", "full"), Trial("out", "inodes"),
-        Trial("out", "read-only"), Trial("both", "full"), Trial("out", "inodes", 3), Trial("tmp", "inodes", 1),
+        Trial("tmp", "inodes"), Trial("tmp", "read-only"), Trial("tmp", "full"), Trial("out", "inodes"),
+        Trial("out", "read-only"), Trial("both", "full"), Trial("out", "inodes", 3),
+        Trial("tmp", "inodes", 1),
     ]  # fmt: skip
     if count <= len(special):
         return special[:count]
@@ -72,7 +73,7 @@ def can_mount() -> bool:
 
 
 def enter(words: list[str]) -> int:
-    """Run `python -m tests.reliability` with these words in a namespace where /tmp is a file system in memory."""
+    """Run `python -m tests.reliability` in a namespace where /tmp is a file system in memory."""
     script = """
 set -e
 mount -t tmpfs tmpfs /mnt

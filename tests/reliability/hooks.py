@@ -1,4 +1,4 @@
-"""What a process does with files, seen by Python's audit events: to fail a call, or to end the process before it.
+"""Python's audit events of file system calls: to make a call fail, or to end the process before it.
 
 Whatever module makes the call, and however it is written, the event comes first. A hook cannot be taken out
 again; it is idle while `Watch.active` is False.

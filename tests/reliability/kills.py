@@ -1,7 +1,7 @@
 """Bakes killed at random moments: nothing foreign is touched, and the next bake goes as if nothing had been.
 
-Two thirds of the processes end before a random call that concerns the output folder or the folder for temporary
-files, most of them while they publish; the others after a random time.
+Two thirds of the processes end before a random call that concerns the output folder or the temporary folder,
+most of them while they publish; the others after a random time.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The light of a known scene, followed by particles: what a bake's may not exceed.
 
-Every particle starts on an emissive face and carries its share of what is emitted. Where emissive faces lie in one
-place, or within `TOGETHER` of each other, only the outermost one sends particles out, for only it is seen.
+Every particle starts on an emissive face and carries its share of the emitted power. Where emissive faces lie
+in one place, or within `TOGETHER` of each other, only the outermost one sends particles out: only it is seen.
 Rays are met by brute force, in double precision: there are few triangles.
 """
 
@@ -59,8 +59,8 @@ class Arrived:
         The standard deviation of `emitted`.
     hair : bool
         Whether parallel emissive faces are less than `HAIR` apart, and yet not together.
-    front : dict of str to (float, float)
-        Of each object, for the first channel to the third: power that arrives on front sides, and its deviation.
+    front : dict of str to two arrays (3,)
+        For each object: power that arrives on front sides, and its standard deviation.
     """
 
     emitted: float

@@ -1,4 +1,4 @@
-"""Random scenes as users have them: shared meshes, modifiers, instances, several scenes, roles, hidden things."""
+"""Random scenes: shared meshes, modifiers, instances, several scenes, roles, hidden objects."""
 
 from __future__ import annotations
 
@@ -203,7 +203,7 @@ def _set_options(random: Random, scene: bpy.types.Scene) -> None:
 
 
 def build_known(random: Random) -> Known:
-    """Fill the open file with a scene whose light can be computed in another way: diffuse things and emitters."""
+    """Fill the open file with diffuse objects and emitters, whose light `light.py` can compute."""
     known = Known()
     scene = bpy.context.scene
     scene.render.resolution_x = scene.render.resolution_y = 16

@@ -26,7 +26,7 @@ FOREIGN = ("notes.txt", "photo.png", "Floor.exr", "deep/er/thesis.doc", ".hidden
 
 @dataclass(frozen=True)
 class Sandbox:
-    """A scene, a folder with an earlier result, a folder for temporary files, and foreign files in all of them."""
+    """A scene, an output folder, a folder for temporary files, and foreign files in all of them."""
 
     root: Path
 
@@ -78,7 +78,7 @@ def add_foreign(folder: Path) -> None:
 
 
 def build_room() -> None:
-    """Fill the open file: a floor, a wall with a texture, a cube with a modifier, twins, a lamp, a glowing panel."""
+    """Fill the open file: a floor, a wall, a cube with a modifier, twins, a lamp, a glowing panel."""
     import bpy
 
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)

@@ -1,4 +1,4 @@
-"""`python -m tests.reliability.scenes --seeds A:B`: random scenes in worker processes, each seed with a time limit.
+"""`python -m tests.reliability.scenes --seeds A:B`: random scenes in worker processes, with a time limit.
 
 `--here` makes the trials in this process instead, to look for the cause of a failure.
 """

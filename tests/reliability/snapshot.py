@@ -1,4 +1,4 @@
-"""The open file as one flat table, to compare before and after: a line for each value RNA shows, arrays by digest."""
+"""The open file as one flat table, to compare before and after: each value of RNA, arrays by digest."""
 
 from __future__ import annotations
 
@@ -16,21 +16,24 @@ SKIPPED = {
     "rna_type", "session_uid", "depsgraph", "bindcode", "is_evaluated", "preview", "asset_data", "original",
     "execution_time", "bl_system_properties_get", "warnings", "uv_sculpt", "storage_type", "id_data", "tag",
     "bl_rna", "is_missing", "users", "all_objects", "children_recursive", "frame_float", "is_updated",
-    "is_updated_data", "tool_settings", "matrix_world", "matrix_local", "dimensions", "bound_box", "face_count", "override_library", "library_weak_reference", "animation_data",
+    "is_updated_data", "tool_settings", "matrix_world", "matrix_local", "dimensions", "bound_box",
+    "face_count", "override_library", "library_weak_reference", "animation_data",
 }  # fmt: skip
 
 MESH_ARRAYS = {
     "vertices", "edges", "loops", "polygons", "loop_triangles", "loop_triangle_polygons", "attributes",
     "color_attributes", "uv_layers", "vertex_normals", "polygon_normals", "corner_normals", "vertex_colors",
     "sculpt_vertex_colors", "skin_vertices", "vertex_layers_float", "edge_creases", "vertex_creases",
-    "vertex_paint_masks", "uv_layer_stencil", "uv_layer_clone", "uv_layer_clone_index", "uv_layer_stencil_index",
-    "total_vert_sel", "total_edge_sel", "total_face_sel", "has_custom_normals", "normals_domain", "texspace_location",
-    "texspace_size",
+    "vertex_paint_masks", "uv_layer_stencil", "uv_layer_clone", "uv_layer_clone_index",
+    "uv_layer_stencil_index",
+    "total_vert_sel", "total_edge_sel", "total_face_sel", "has_custom_normals", "normals_domain",
+    "texspace_location", "texspace_size",
 }  # fmt: skip
 
 VALUES = {
     "FLOAT": ("value", 1, np.float32), "INT": ("value", 1, np.int32), "INT8": ("value", 1, np.int32),
-    "BOOLEAN": ("value", 1, bool), "FLOAT_VECTOR": ("vector", 3, np.float32), "FLOAT2": ("vector", 2, np.float32),
+    "BOOLEAN": ("value", 1, bool), "FLOAT_VECTOR": ("vector", 3, np.float32),
+    "FLOAT2": ("vector", 2, np.float32),
     "FLOAT_COLOR": ("color", 4, np.float32), "BYTE_COLOR": ("color", 4, np.float32),
     "INT32_2D": ("value", 2, np.int32), "INT16_2D": ("value", 2, np.int32),
     "QUATERNION": ("value", 4, np.float32), "FLOAT4X4": ("value", 16, np.float32),

@@ -20,10 +20,10 @@ from .sandbox import add_foreign
 from .snapshot import differences, snapshot
 
 POWER = 1.02
-"""Of what is emitted, what may arrive and escape by a bake's own report, at the draft quality of these scenes."""
+"""The most that may arrive and escape by a bake's report, relative to the emitted power, at draft quality."""
 
 EXCESS, DEVIATIONS = 1.10, 4.0
-"""Of the light that particles bring, what a lightmap of 64 pixels may show of an object; and in standard deviations."""
+"""The most that a lightmap of 64 pixels may show of an object, relative to the particles' light, and in σ."""
 
 FEWEST_TEXELS = 100
 
@@ -166,8 +166,8 @@ def _own() -> set[str]:
     return {
         obj.name
         for obj in bpy.context.scene.objects
-        if obj.type == "MESH" and users[obj.data.name] == 1 and not obj.modifiers and len(obj.users_scene) == 1
-        and obj.name not in instanced and obj.instance_type == "NONE"
+        if obj.type == "MESH" and users[obj.data.name] == 1 and not obj.modifiers
+        and len(obj.users_scene) == 1 and obj.name not in instanced and obj.instance_type == "NONE"
     }  # fmt: skip
 
 
@@ -268,7 +268,7 @@ def _compare_light(trial: Trial, seed: int) -> None:
 
 
 def _mean_shown(obj: bpy.types.Object, seed: int, count: int = 4000) -> np.ndarray | None:
-    """Return the mean of an object's lightmap at random points of its surface; None if it has too few texels."""
+    """Return the mean of an object's lightmap at random surface points; None for too few texels."""
     image, mesh = _lightmap_of(obj), obj.data
     layer = mesh.uv_layers.get("Lightmap")
     if image is None or layer is None:
