@@ -16,7 +16,7 @@ import numpy as np
 
 from ..bake_scene import BakeResult, LightmapPage
 from ..errors import BakeError
-from ..lightmap.encode import encode_png16, png16_scale
+from ..lightmap.encode import encode_png16, png16_scale, presentable
 from ..report import LightmapFile
 from ..settings import BakeSettings
 from .bake_record import mark_made, remove_datablocks
@@ -111,6 +111,7 @@ def write_images(
     group: str = "",
 ) -> list[bpy.types.Image]:
     """Make an image of each page by these names; see `write_pages`. `group` is the light group they show."""
+    pages = presentable(pages, signed=settings.quantity == "residual")
     scale = png16_scale(*[page.pixels for page in pages]) if settings.format == "png16" else None
     images: list[bpy.types.Image] = []
     try:
