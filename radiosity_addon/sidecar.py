@@ -28,6 +28,7 @@ from .plain_objects import flatten, restore
 from .relighting import DAMAGED, KeptBake, damaged
 from .settings import BakeSettings
 from .sidecar_checks import check_stored, stored_layout
+from .sidecar_names import BAKE, DIGEST, FILE, KEPT
 from .solver.aiming import AimedRays
 from .solver.area_light import AreaLight
 from .solver.bulb_lights import PointLight, SpotLight
@@ -48,19 +49,8 @@ from .solver.methods.hierarchical import HierarchicalState
 from .solver.settings import SolverSettings
 from .solver.tree_top import TreeTop
 
-SIDECAR_NAME = "lightmap.relight"
-
 MAGIC, VERSION = b"RADIOSITYRELIGHT", 2
 """Version 1 did not know textures, and what solving stores may differ from it."""
-
-DIGEST = "digest"
-"""What a report tells of a sidecar beside it, see `sidecar_entry`: the digest in its head …"""
-
-BAKE = "bake"
-"""… and the mark of its bake, …"""
-
-KEPT = "kept"
-"""… under this key. A report without it is of a bake that was not kept."""
 
 OF_SOURCES = ("emitter", "emitter_names", "light_groups", "emitter_groups")
 """What a scene says of its sources beside their strengths: it stays as it was baked."""
@@ -252,7 +242,7 @@ def sidecar_entry(path: Path, mark: str) -> dict[str, str]:
         If the sidecar cannot be read.
     """
     try:
-        return {BAKE: mark, DIGEST: read_digest(path, MAGIC, VERSION), "file": path.name}
+        return {BAKE: mark, DIGEST: read_digest(path, MAGIC, VERSION), FILE: path.name}
     except OSError as error:
         raise BakeError(f"cannot read '{path}': {error.strerror}") from error
     except ArrayFileError as error:

@@ -13,3 +13,6 @@ PAGE, GROUP = "radiosity_page", "radiosity_group_shown"
 
 MARK = "radiosity_mark"
 """The mark of its bake, if that was kept."""
+
+VERSION = "radiosity_version"
+"""The digest of the bytes of its file, or of what is packed: what its pixels are."""

@@ -15,9 +15,10 @@ from ..keeping import Keeping, bake_steps, moves_alone
 from ..relighting import KeptBake
 from ..report import BakeReport
 from ..settings import BakeSettings
-from ..sidecar import SIDECAR_NAME
+from ..sidecar import sidecar_entry
+from ..sidecar_names import KEPT, SIDECAR_NAME
 from ..solver.arrays import Array
-from . import kept_bakes, kept_details, runtime
+from . import kept_bakes, kept_details, lightmap_versions, runtime
 from .apply import apply_lightmaps, check_targets
 from .bake_record import remove_datablocks
 from .export import export_scene
@@ -94,6 +95,7 @@ def run_bake(
     """
     seconds: dict[str, float] = {}
     wanted = settings
+    lightmap_versions.flush()
     with ExitStack() as stack:
         if output is not None:
             # Opened first: a folder that cannot be written is no news for after the work.
@@ -121,7 +123,9 @@ def run_bake(
             report = _report(result, images, groups, settings, seconds)
             if output is not None:
                 whole = report.joined(output.path / REPORT_NAME, others.objects)
+                whole = keeping_sidecar(whole, output, keeping)
                 whole.listing(output.files()).write(output.staging / REPORT_NAME)
+                lightmap_versions.hold(output)
                 output.publish()
             remember(context.scene, export, result, wanted)
         folder = "" if output is None else relative_path(output.path)
@@ -189,7 +193,8 @@ def deliver(
         yield Progress("preview", PREVIEW)
         with timed(seconds, "preview"):
             render_preview(context, output.staging / PREVIEW_NAME, settings, samples)
-        report = _report(result, images, groups, settings, seconds).listing(output.files())
+        report = keeping_sidecar(_report(result, images, groups, settings, seconds), output, keeping)
+        report = report.listing(output.files())
         report.write(output.staging / REPORT_NAME)
         yield Progress("write", 1.0)
         output.publish()
@@ -216,6 +221,7 @@ def _show(
     groups: GroupImages = {}
     try:
         groups = write_groups(result, settings, folder)
+        lightmap_versions.mark([*images, *each_image(groups)])
         if output is not None:
             set_folder([*images, *each_image(groups)], output.path)
         if keeping is not None:
@@ -240,6 +246,15 @@ def _report(
     if groups:
         result = replace(result, warnings=(*result.warnings, *crowded_materials()))
     return BakeReport.of(result, lightmap_files(images, settings), seconds, shares)
+
+
+def keeping_sidecar(report: BakeReport, output: OutputFolder, keeping: Keeping | None) -> BakeReport:
+    """Return the report with what proves that a sidecar, if the bake is kept in one, belongs to it."""
+    if keeping is None or not keeping.sidecar:
+        return report
+    staged = output.staging / SIDECAR_NAME
+    path = staged if staged.is_file() else output.path / SIDECAR_NAME
+    return BakeReport({**report.data, KEPT: sidecar_entry(path, keeping.mark)})
 
 
 @contextmanager

@@ -16,7 +16,8 @@ from ..keeping import Keeping
 from ..relight_check import strengths_in
 from ..report import BakeReport
 from ..settings import BakeSettings
-from ..sidecar import SIDECAR_NAME, StoredBake, read_sidecar
+from ..sidecar import StoredBake, check_belongs, read_sidecar
+from ..sidecar_names import SIDECAR_NAME
 from ..solver.steps import drain
 from .commands import check_writable, open_or_build, registered, same_file, written_files
 
@@ -51,7 +52,7 @@ def relight(
     """
     with registered():
         from .job import WRITING_STAGES
-        from .output import BLEND_NAME
+        from .output import BLEND_NAME, REPORT_NAME
 
         source = scene or loaded
         if source is not None and same_file(source, output / BLEND_NAME):
@@ -61,8 +62,10 @@ def relight(
         if report_copy is not None:
             check_writable(report_copy)
         console.progress("read", 0.0)
-        stored = read_sidecar(output / SIDECAR_NAME)
-        if settings not in (BakeSettings(), stored.settings):
+        stored = read_sidecar(output / SIDECAR_NAME, settings.memory_limit)
+        check_belongs(stored, output / REPORT_NAME)
+        given = replace(settings, memory_limit=None)
+        if given not in (BakeSettings(), replace(stored.settings, memory_limit=None)):
             raise UsageError(f"the bake in {output} has its own settings: give --relight no others")
         open_or_build(scene, loaded)
         job = relight_into(bpy.context, stored, output)
@@ -111,6 +114,6 @@ def relight_into(
             pages, groups = drain(lit(kept, strengths_in(kept, export.bake_scene)))
         result = replace(stored.result(export.bake_scene, pages), groups=groups)
         yield Progress("apply", APPLY)
-        keeping = Keeping(mark=stored.mark)
+        keeping = Keeping(sidecar=True, mark=stored.mark)
         made = export, result, output, seconds, keeping
         return (yield from deliver(context, stored.settings, *made, QUICK_SAMPLES))

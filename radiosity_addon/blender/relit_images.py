@@ -14,8 +14,9 @@ import numpy as np
 from ..bake_scene import LightGroup, LightmapPage
 from ..errors import BakeError
 from ..manifest import FILES
+from . import lightmap_versions
 from .group_images import rescale_materials, update_images
-from .image_marks import SCALE_PROPERTY
+from .image_marks import SCALE_PROPERTY, VERSION
 from .images import image_scale
 from .kept_bakes import group_images_of, images_of
 from .output import REPORT_NAME, OutputFolder
@@ -84,6 +85,7 @@ def store(images: Sequence[bpy.types.Image], seconds: float) -> None:
     for image in images:
         if image.packed_file is not None:
             image.pack()
+            lightmap_versions.mark([image])
     folders: dict[Path, list[bpy.types.Image]] = {}
     for image in images:
         if image.packed_file is None:
@@ -93,7 +95,9 @@ def store(images: Sequence[bpy.types.Image], seconds: float) -> None:
             for image in inside:
                 _save_into(output.staging, image)
             _report(output, inside, seconds)
+            lightmap_versions.hold(output)
             output.publish()
+            lightmap_versions.mark(inside)
 
 
 def _save_into(folder: Path, image: bpy.types.Image) -> None:
@@ -136,14 +140,16 @@ def _as_before_on_failure(images: Sequence[bpy.types.Image]) -> Iterator[None]:
     for image in images:
         pixels = np.empty(len(image.pixels), dtype=np.float32)
         image.pixels.foreach_get(pixels)
-        before.append((image, pixels, image_scale(image)))
+        before.append((image, pixels, image_scale(image), image.get(VERSION)))
     try:
         yield
     except BaseException:
-        for image, pixels, scale in before:
+        for image, pixels, scale, version in before:
             image.pixels.foreach_set(pixels)
             image.update()
             if SCALE_PROPERTY in image.keys():  # noqa: SIM118 (an ID is no dict)
                 rescale_materials(image, scale)
                 image[SCALE_PROPERTY] = scale
+            if version is not None:
+                image[VERSION] = version
         raise

@@ -152,6 +152,7 @@ def test_a_bake_is_kept_in_memory_until_restore_or_another_file(baked: Path) -> 
     assert bpy.ops.radiosity.restore("EXEC_DEFAULT") == {"FINISHED"}
     assert kept_bakes.find(bpy.context.scene) is None
     assert not bpy.ops.radiosity.relight.poll()
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     assert not kept_bakes._kept
 
 
@@ -234,7 +235,7 @@ def test_sidecars_that_do_not_fit_are_refused(baked: Path, wrong: str) -> None:
     elif wrong == "another bake":
         kept_bakes.set_mark(bpy.context.scene, "other")
         kept_bakes.mark_images([bpy.data.images[LIGHTMAP]], "other")
-        message = "belongs to another bake"
+        message = "has no sidecar of its own"
     elif wrong == "missing":
         path.unlink()
         message = "has no sidecar"

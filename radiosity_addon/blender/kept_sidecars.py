@@ -1,0 +1,28 @@
+"""Whether a scene's bake can be relit: in memory, or from the sidecar next to its lightmaps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+
+from ..sidecar_names import SIDECAR_NAME
+from . import kept_bakes, lightmap_versions
+
+
+def sidecar_of(mark: str) -> Path | None:
+    """Return the sidecar next to a bake's lightmaps, if there is one."""
+    images = kept_bakes.images_of(mark)
+    if not images or images[min(images)].packed_file is not None:
+        return None
+    path = Path(bpy.path.abspath(images[min(images)].filepath_raw)).parent / SIDECAR_NAME
+    return path if path.is_file() else None
+
+
+def can_relight(scene: bpy.types.Scene) -> bool:
+    """Return whether the scene's bake is in memory or in a sidecar of its own; fast, for panels."""
+    mark = kept_bakes.mark_of(scene)
+    if not mark or kept_bakes.find(scene) is not None:
+        return bool(mark)
+    path = sidecar_of(mark)
+    return path is not None and lightmap_versions.bake_kept_in(path.parent) in ("", mark)

@@ -1,0 +1,417 @@
+"""Which version of its file a lightmap image shows, and bringing versions back after undo and redo.
+
+Undo takes UV maps and image datablocks back, but no files and no pixels. So each image says which bytes its
+file has to have, by their digest, and that is saved and undone with it; the report next to the file says
+which bytes it has. Where the two differ after undo or redo, the file is put back as it was from those that
+are held (`held_files.py`), published as any other, and the image loaded again.
+
+The handlers only compare. Files are copied in a thread, and a timer does what must be done with Blender;
+without a window, where no timer fires, all is done at once.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import threading
+from collections import OrderedDict
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import bpy
+from bpy.app.handlers import persistent
+
+from .. import manifest
+from ..errors import BakeError, RadiosityError
+from ..held_files import MOST_FILES, HeldFiles
+from ..sidecar_names import BAKE, KEPT, SIDECAR_NAME
+from . import live_state, overlay_view
+from .bake_record import is_made
+from .image_marks import PAGE, VERSION
+from .output import REPORT_NAME, OutputFolder
+
+TICK = 0.02
+"""Seconds between two looks at whether files have been copied."""
+
+FOREIGN = "The lightmaps on disk are from another bake than this file: bake again"
+
+Listed = Mapping[str, Mapping[str, Any]]
+
+
+@dataclass(eq=False, repr=False)
+class State:
+    """Of this session.
+
+    Attributes
+    ----------
+    message : str
+        What panels say; nothing where images and files belong together.
+    """
+
+    message: str = ""
+    held: HeldFiles | None = None
+    reports: OrderedDict[str, dict[str, Any]] = field(default_factory=OrderedDict)
+    """By the digest of each image that they list, the reports of files that were replaced."""
+    shown: dict[str, str] = field(default_factory=dict)
+    """By image, the version that its pixels in memory are; nothing for pixels that are in no file."""
+    read: dict[Path, tuple[tuple[int, int], _Read]] = field(default_factory=dict)
+    """What reports say, and the time and size of those when they were read."""
+    swap: _Swap | None = None
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """An image whose file has other bytes than it should.
+
+    Attributes
+    ----------
+    image : str
+        Its name: references die at undo.
+    path : Path
+        Of the file.
+    version : str
+        The digest of the bytes that it should have.
+    """
+
+    image: str
+    path: Path
+    version: str
+
+
+@dataclass(frozen=True)
+class _Read:
+    """What is asked of a report: the files that it lists, and the mark of the bake in its sidecar."""
+
+    listed: Listed = field(default_factory=dict)
+    kept: str = ""
+
+
+state = State()
+
+
+def mark(images: Iterable[bpy.types.Image]) -> None:
+    """Note on images, just saved or packed, which version of their file they show."""
+    for image in images:
+        if image.packed_file is not None:
+            image[VERSION] = hashlib.sha256(image.packed_file.data).hexdigest()
+        else:
+            image[VERSION] = manifest.digest(Path(bpy.path.abspath(image.filepath_raw)))
+        state.shown[image.name] = image[VERSION]
+
+
+def unsettle(images: Iterable[bpy.types.Image]) -> None:
+    """Note that images show pixels that no file has."""
+    for image in images:
+        state.shown[image.name] = ""
+
+
+def hold(output: OutputFolder) -> None:
+    """Hold what is about to be replaced in a folder, with what its report says of it."""
+    report = output.path / REPORT_NAME
+    listed = listed_in(report)
+    names = {path.name for path in output.staging.iterdir() if path.is_file()}
+    if not listed:
+        return
+    if state.held is None:
+        state.held = HeldFiles(Path(bpy.app.tempdir))
+    for name in sorted(names & listed.keys()):
+        # What relighting needs is large, and in memory as well.
+        if name != SIDECAR_NAME:
+            state.held.hold(output.path / name, str(listed[name]["sha256"]))
+    try:
+        told = json.loads(report.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return
+    for name in _images_of(told) & listed.keys():
+        state.reports[str(listed[name]["sha256"])] = told
+        state.reports.move_to_end(str(listed[name]["sha256"]))
+    while len(state.reports) > MOST_FILES:
+        state.reports.popitem(last=False)
+
+
+def listed_in(report: Path) -> Listed:
+    """Return what a report lists of the files next to it."""
+    return _read(report).listed
+
+
+def bake_kept_in(folder: Path) -> str:
+    """Return the mark of the bake in a folder's sidecar, by its report; "" if that does not say."""
+    return _read(folder / REPORT_NAME).kept
+
+
+def _read(report: Path) -> _Read:
+    """Read a report, again only if it has changed."""
+    try:
+        found = report.stat()
+    except OSError:
+        return _Read()
+    stamp = found.st_mtime_ns, found.st_size
+    known = state.read.get(report)
+    if known is None or known[0] != stamp:
+        kept = ""
+        with suppress(OSError, ValueError, KeyError, TypeError):
+            kept = str(json.loads(report.read_text(encoding="utf-8"))[KEPT][BAKE])
+        known = state.read[report] = stamp, _Read(manifest.listed(report), kept)
+    return known[1]
+
+
+def lightmaps() -> list[bpy.types.Image]:
+    """Return the lightmap images of the open file that say which version they show."""
+    own = [image for image in bpy.data.images if image.library is None and is_made(image)]
+    return [image for image in own if PAGE in image.keys() and image.get(VERSION)]  # noqa: SIM118 (an ID)
+
+
+def differing() -> list[Wanted]:
+    """Return the images whose files have, by the reports next to them, other bytes than they should."""
+    found = []
+    for image in lightmaps():
+        if image.packed_file is not None:
+            continue
+        path = Path(bpy.path.abspath(image.filepath_raw))
+        listed = listed_in(path.parent / REPORT_NAME).get(path.name)
+        if listed is not None and listed["sha256"] != image[VERSION]:
+            found.append(Wanted(image.name, path, image[VERSION]))
+    return found
+
+
+def flush() -> None:
+    """Finish at once what is left to be brought back."""
+    if state.swap is not None:
+        state.swap.thread.join()
+        _finish()
+
+
+def follow() -> None:
+    """Begin to bring back what undo or redo wants to see: other files, other pixels."""
+    stale = any(_is_stale(image) for image in lightmaps())
+    wanted = differing()
+    if not (wanted or stale or state.swap is not None or state.message):
+        return
+    if bpy.app.background:
+        _cancel()
+        _reload_stale()
+        _begin(wanted)
+        flush()
+    elif not bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.register(_tick, first_interval=0.0, persistent=True)
+
+
+def check() -> None:
+    """Say so where the file that was opened shows other bakes than are on the disk; touches nothing."""
+    state.message = FOREIGN if differing() else ""
+
+
+class _Swap:
+    """Files on their way back."""
+
+    def __init__(self, wanted: Sequence[Wanted]) -> None:
+        self.wanted = tuple(wanted)
+        self.outputs: dict[Path, OutputFolder] = {}
+        self.error = ""
+        try:
+            for one in wanted:
+                if one.path.parent not in self.outputs:
+                    self.outputs[one.path.parent] = OutputFolder(one.path.parent).__enter__()
+        except BaseException:
+            self.close()
+            raise
+        self.thread = threading.Thread(target=self._copy, name="radiosity versions", daemon=True)
+        self.thread.start()
+
+    def _copy(self) -> None:
+        """Copy what is held next to its place; in the thread, which knows nothing of Blender."""
+        assert state.held is not None
+        try:
+            for one in self.wanted:
+                state.held.copy_to(one.version, self.outputs[one.path.parent].staging / one.path.name)
+        except RadiosityError as error:
+            self.error = str(error)
+
+    def publish(self) -> None:
+        """Put the files in their places, with the reports that they had."""
+        for folder, output in self.outputs.items():
+            inside = [one for one in self.wanted if one.path.parent == folder]
+            hold(output)
+            _stage_report(output, inside)
+            output.publish()
+            state.read.pop(folder / REPORT_NAME, None)
+
+    def close(self) -> None:
+        """Remove what was not published."""
+        for output in self.outputs.values():
+            output.__exit__(None, None, None)
+        self.outputs = {}
+
+
+def _begin(wanted: Sequence[Wanted]) -> None:
+    """Begin to bring files back, those that are held; say so of the others."""
+    held = state.held
+    there = [one for one in wanted if held is not None and one.version in held]
+    state.message = FOREIGN if len(there) < len(wanted) else ""
+    if not there:
+        return
+    try:
+        state.swap = _Swap(there)
+    except RadiosityError as error:
+        state.message = f"{FOREIGN} ({error})"
+
+
+def _finish() -> None:
+    """Publish what was copied, and show it."""
+    swap, state.swap = state.swap, None
+    assert swap is not None
+    try:
+        if swap.error:
+            raise BakeError(swap.error)
+        if set(swap.wanted) <= set(differing()):
+            swap.publish()
+            for one in swap.wanted:
+                _reload(bpy.data.images[one.image])
+    except RadiosityError as error:
+        state.message = f"{FOREIGN} ({error})"
+    finally:
+        swap.close()
+
+
+def _cancel() -> None:
+    """Give up what is on its way."""
+    swap, state.swap = state.swap, None
+    if swap is not None:
+        swap.thread.join()
+        swap.close()
+
+
+def _stage_report(output: OutputFolder, wanted: Sequence[Wanted]) -> None:
+    """Write the report that the files had, with all that lies in the folder now."""
+    report = output.path / REPORT_NAME
+    listed = dict(listed_in(report))
+    told = next((state.reports[one.version] for one in wanted if one.version in state.reports), None)
+    if told is None:
+        told = json.loads(report.read_text(encoding="utf-8"))
+    before = told.get(manifest.FILES, {})
+    for one in wanted:
+        staged = output.staging / one.path.name
+        entry = {"bytes": staged.stat().st_size, "sha256": one.version}
+        scene = before.get(one.path.name, listed.get(one.path.name, {})).get("scene", "")
+        listed[one.path.name] = {**entry, "scene": scene}
+    told = {**told, manifest.FILES: listed}
+    if before.get(SIDECAR_NAME) != listed.get(SIDECAR_NAME):
+        told.pop(KEPT, None)  # its sidecar is not there any more
+    text = json.dumps(told, indent=2, ensure_ascii=False) + "\n"
+    (output.staging / REPORT_NAME).write_text(text, encoding="utf-8")
+
+
+def _images_of(told: Mapping[str, Any]) -> set[str]:
+    """Return the names of the images that a report describes."""
+    try:
+        groups = [page["image"] for group in told.get("light_groups", ()) for page in group["pages"]]
+        return {*(entry["image"] for entry in told["objects"]), *groups}
+    except (KeyError, TypeError):
+        return set()
+
+
+def _is_stale(image: bpy.types.Image) -> bool:
+    return state.shown.get(image.name, image[VERSION]) != image[VERSION]
+
+
+def _reload_stale() -> None:
+    """Load the images again whose pixels in memory are of another version."""
+    for image in lightmaps():
+        if _is_stale(image):
+            _reload(image)
+
+
+def _reload(image: bpy.types.Image) -> None:
+    image.reload()
+    image.update_tag()
+    state.shown[image.name] = image[VERSION]
+    overlay_view.changed()
+    with suppress(RadiosityError):
+        if live_state.state.live is not None:
+            live_state.state.live.look_again()
+
+
+def _tick() -> float | None:
+    """Carry on with what undo began; nothing may be raised."""
+    try:
+        if state.swap is not None and state.swap.thread.is_alive():
+            return TICK
+        if state.swap is not None:
+            _finish()
+        _reload_stale()
+        wanted = differing()
+        if wanted and not state.message:
+            _begin(wanted)
+        elif not wanted:
+            state.message = ""
+        return TICK if state.swap is not None else None
+    except Exception as error:  # noqa: BLE001 (a timer that raises is gone)
+        state.message = f"{FOREIGN} ({type(error).__name__}: {error})"
+        return None
+
+
+@persistent
+def _follow(*_: Any) -> None:
+    """Undo and redo bring images back, but neither pixels nor files."""
+    state.message = ""
+    follow()
+
+
+@persistent
+def _before_saving(*_: Any) -> None:
+    """What is saved must agree with the files next to it."""
+    if state.swap is None and not bpy.app.background and differing():
+        _begin(differing())
+    flush()
+
+
+@persistent
+def _forget(*_: Any) -> None:
+    """Another file is being opened: what is held belongs to this one."""
+    forget()
+
+
+@persistent
+def _opened(*_: Any) -> None:
+    check()
+
+
+def forget() -> None:
+    """Hold nothing any more."""
+    _cancel()
+    if state.held is not None:
+        state.held.close()
+    state.held, state.message = None, ""
+    state.reports.clear()
+    state.shown.clear()
+    state.read.clear()
+
+
+def _handlers() -> tuple[tuple[list[Any], Any], ...]:
+    on = bpy.app.handlers
+    return (
+        (on.undo_post, _follow),
+        (on.redo_post, _follow),
+        (on.save_pre, _before_saving),
+        (on.load_pre, _forget),
+        (on.load_post, _opened),
+    )
+
+
+def register() -> None:
+    """Follow undo, redo, saving and opening."""
+    for handlers, ours in _handlers():
+        handlers.append(ours)
+
+
+def unregister() -> None:
+    """Follow nothing any more, and hold nothing."""
+    for handlers, ours in _handlers():
+        if ours in handlers:
+            handlers.remove(ours)
+    if bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.unregister(_tick)
+    forget()
