@@ -29,7 +29,7 @@ class RADIOSITY_OT_relight(WindowJob, bpy.types.Operator):
             cls.poll_message_set("The scene shows no bake that was kept: bake with Keep for Relighting")
             return False
         if not can_relight(context.scene):
-            cls.poll_message_set("The bake is not in memory any more, and has no sidecar of its own: bake again")
+            cls.poll_message_set("The bake is no longer in memory, and has no sidecar of its own: bake again")
             return False
         return True
 

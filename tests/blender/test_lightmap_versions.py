@@ -254,7 +254,7 @@ def test_a_failure_while_relighting_leaves_the_version(room: Path, monkeypatch: 
 
 
 def test_our_share_of_an_undo_step_is_small(room: Path) -> None:
-    """Comparing: far below 100 ms, whatever the pages' size. (What follows is not in the handler of a window.)"""
+    """Comparing takes far less than 100 ms, whatever the size of pages; a window does no more at once."""
     bake(resolution=1024)
     bake(resolution=1000)
     lightmap_versions.differing()
