@@ -24,5 +24,7 @@ def can_relight(scene: bpy.types.Scene) -> bool:
     mark = kept_bakes.mark_of(scene)
     if not mark or kept_bakes.find(scene) is not None:
         return bool(mark)
-    path = sidecar_of(mark)
-    return path is not None and lightmap_versions.bake_kept_in(path.parent) in ("", mark)
+    if sidecar_of(mark) is None:
+        return False
+    images = kept_bakes.images_of(mark)
+    return lightmap_versions.bake_kept_by(lightmap_versions.report_of(images[min(images)])) in ("", mark)

@@ -30,8 +30,10 @@ from ..held_files import MOST_FILES, HeldFiles
 from ..sidecar_names import BAKE, KEPT, SIDECAR_NAME
 from . import live_state, overlay_view
 from .bake_record import is_made
-from .image_marks import PAGE, VERSION
+from .drawing import redraw_viewports
+from .image_marks import PAGE, REPORT, VERSION
 from .output import REPORT_NAME, OutputFolder
+from .window_job import redraw_sidebars
 
 TICK = 0.02
 """Seconds between two looks at whether files have been copied."""
@@ -74,11 +76,14 @@ class Wanted:
         Of the file.
     version : str
         The digest of the bytes that it should have.
+    report : Path
+        That lists it.
     """
 
     image: str
     path: Path
     version: str
+    report: Path
 
 
 @dataclass(frozen=True)
@@ -92,9 +97,10 @@ class _Read:
 state = State()
 
 
-def mark(images: Iterable[bpy.types.Image]) -> None:
-    """Note on images, just saved or packed, which version of their file they show."""
+def mark(images: Iterable[bpy.types.Image], report: str = REPORT_NAME) -> None:
+    """Note on images, just saved or packed, which version of their file they show, and the report with it."""
     for image in images:
+        image[REPORT] = report
         if image.packed_file is not None:
             image[VERSION] = hashlib.sha256(image.packed_file.data).hexdigest()
         else:
@@ -108,9 +114,25 @@ def unsettle(images: Iterable[bpy.types.Image]) -> None:
         state.shown[image.name] = ""
 
 
+def report_of(image: bpy.types.Image) -> Path:
+    """Return the report next to an image's file."""
+    path = Path(bpy.path.abspath(image.filepath_raw))
+    return path.with_name(Path(str(image.get(REPORT, ""))).name or REPORT_NAME)
+
+
+def report_in(output: OutputFolder) -> Path:
+    """Return the report of the bake whose files an output folder takes."""
+    return output.path / REPORT_NAME
+
+
+def _open(report: Path) -> OutputFolder:
+    """Open the folder of a report for files that it lists."""
+    return OutputFolder(report.parent).__enter__()
+
+
 def hold(output: OutputFolder) -> None:
     """Hold what is about to be replaced in a folder, with what its report says of it."""
-    report = output.path / REPORT_NAME
+    report = report_in(output)
     listed = listed_in(report)
     names = {path.name for path in output.staging.iterdir() if path.is_file()}
     if not listed:
@@ -137,9 +159,9 @@ def listed_in(report: Path) -> Listed:
     return _read(report).listed
 
 
-def bake_kept_in(folder: Path) -> str:
-    """Return the mark of the bake in a folder's sidecar, by its report; "" if that does not say."""
-    return _read(folder / REPORT_NAME).kept
+def bake_kept_by(report: Path) -> str:
+    """Return the mark of the bake in the sidecar that a report names; "" if it names none."""
+    return _read(report).kept
 
 
 def _read(report: Path) -> _Read:
@@ -170,10 +192,10 @@ def differing() -> list[Wanted]:
     for image in lightmaps():
         if image.packed_file is not None:
             continue
-        path = Path(bpy.path.abspath(image.filepath_raw))
-        listed = listed_in(path.parent / REPORT_NAME).get(path.name)
+        path, report = Path(bpy.path.abspath(image.filepath_raw)), report_of(image)
+        listed = listed_in(report).get(path.name)
         if listed is not None and listed["sha256"] != image[VERSION]:
-            found.append(Wanted(image.name, path, image[VERSION]))
+            found.append(Wanted(image.name, path, image[VERSION], report))
     return found
 
 
@@ -213,8 +235,8 @@ class _Swap:
         self.error = ""
         try:
             for one in wanted:
-                if one.path.parent not in self.outputs:
-                    self.outputs[one.path.parent] = OutputFolder(one.path.parent).__enter__()
+                if one.report not in self.outputs:
+                    self.outputs[one.report] = _open(one.report)
         except BaseException:
             self.close()
             raise
@@ -226,18 +248,17 @@ class _Swap:
         assert state.held is not None
         try:
             for one in self.wanted:
-                state.held.copy_to(one.version, self.outputs[one.path.parent].staging / one.path.name)
+                state.held.copy_to(one.version, self.outputs[one.report].staging / one.path.name)
         except RadiosityError as error:
             self.error = str(error)
 
     def publish(self) -> None:
         """Put the files in their places, with the reports that they had."""
-        for folder, output in self.outputs.items():
-            inside = [one for one in self.wanted if one.path.parent == folder]
+        for report, output in self.outputs.items():
             hold(output)
-            _stage_report(output, inside)
+            _stage_report(output, report, [one for one in self.wanted if one.report == report])
             output.publish()
-            state.read.pop(folder / REPORT_NAME, None)
+            state.read.pop(report, None)
 
     def close(self) -> None:
         """Remove what was not published."""
@@ -284,9 +305,8 @@ def _cancel() -> None:
         swap.close()
 
 
-def _stage_report(output: OutputFolder, wanted: Sequence[Wanted]) -> None:
+def _stage_report(output: OutputFolder, report: Path, wanted: Sequence[Wanted]) -> None:
     """Write the report that the files had, with all that lies in the folder now."""
-    report = output.path / REPORT_NAME
     listed = dict(listed_in(report))
     told = next((state.reports[one.version] for one in wanted if one.version in state.reports), None)
     if told is None:
@@ -301,7 +321,7 @@ def _stage_report(output: OutputFolder, wanted: Sequence[Wanted]) -> None:
     if before.get(SIDECAR_NAME) != listed.get(SIDECAR_NAME):
         told.pop(KEPT, None)  # its sidecar is not there any more
     text = json.dumps(told, indent=2, ensure_ascii=False) + "\n"
-    (output.staging / REPORT_NAME).write_text(text, encoding="utf-8")
+    (output.staging / report.name).write_text(text, encoding="utf-8")
 
 
 def _images_of(told: Mapping[str, Any]) -> set[str]:
@@ -318,9 +338,10 @@ def _is_stale(image: bpy.types.Image) -> bool:
 
 
 def _reload_stale() -> None:
-    """Load the images again whose pixels in memory are of another version."""
+    """Load the images again whose pixels in memory are of another version than their files."""
+    waiting = {one.image for one in differing()}
     for image in lightmaps():
-        if _is_stale(image):
+        if _is_stale(image) and image.name not in waiting:
             _reload(image)
 
 
@@ -347,7 +368,11 @@ def _tick() -> float | None:
             _begin(wanted)
         elif not wanted:
             state.message = ""
-        return TICK if state.swap is not None else None
+        if state.swap is not None:
+            return TICK
+        redraw_viewports()
+        redraw_sidebars(bpy.context)
+        return None
     except Exception as error:  # noqa: BLE001 (a timer that raises is gone)
         state.message = f"{FOREIGN} ({type(error).__name__}: {error})"
         return None
