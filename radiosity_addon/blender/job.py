@@ -131,6 +131,7 @@ def run_bake(
         folder = "" if output is None else relative_path(output.path)
         runtime.remember(context.scene, report.as_dict(), folder)
         _remember_kept(context.scene, keeping, kept)
+        lightmap_versions.check()
         kept_details.keep(context.scene, result, [image.name for image in images])
     return report
 

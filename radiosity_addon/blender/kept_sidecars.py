@@ -7,7 +7,8 @@ from pathlib import Path
 import bpy
 
 from ..sidecar_names import SIDECAR_NAME
-from . import kept_bakes, lightmap_versions
+from . import kept_bakes
+from .lightmap_reports import bake_kept_by, report_of
 
 
 def sidecar_of(mark: str) -> Path | None:
@@ -27,4 +28,4 @@ def can_relight(scene: bpy.types.Scene) -> bool:
     if sidecar_of(mark) is None:
         return False
     images = kept_bakes.images_of(mark)
-    return lightmap_versions.bake_kept_by(lightmap_versions.report_of(images[min(images)])) in ("", mark)
+    return bake_kept_by(report_of(images[min(images)])) in ("", mark)

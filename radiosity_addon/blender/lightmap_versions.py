@@ -15,7 +15,7 @@ import hashlib
 import json
 import threading
 from collections import OrderedDict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -27,11 +27,12 @@ from bpy.app.handlers import persistent
 from .. import manifest
 from ..errors import BakeError, RadiosityError
 from ..held_files import MOST_FILES, HeldFiles
-from ..sidecar_names import BAKE, KEPT, SIDECAR_NAME
+from ..sidecar_names import KEPT, SIDECAR_NAME
 from . import live_state, overlay_view
 from .bake_record import is_made
 from .drawing import redraw_viewports
 from .image_marks import PAGE, REPORT, VERSION
+from .lightmap_reports import forget_reports, images_described, listed_in, report_of
 from .output import REPORT_NAME, OutputFolder
 from .window_job import redraw_sidebars
 
@@ -39,8 +40,6 @@ TICK = 0.02
 """Seconds between two looks at whether files have been copied."""
 
 FOREIGN = "The lightmaps on disk are from another bake than this file: bake again"
-
-Listed = Mapping[str, Mapping[str, Any]]
 
 
 @dataclass(eq=False, repr=False)
@@ -59,8 +58,6 @@ class State:
     """By the digest of each image that they list, the reports of files that were replaced."""
     shown: dict[str, str] = field(default_factory=dict)
     """By image, the version that its pixels in memory are; nothing for pixels that are in no file."""
-    read: dict[Path, tuple[tuple[int, int], _Read]] = field(default_factory=dict)
-    """What reports say, and the time and size of those when they were read."""
     swap: _Swap | None = None
 
 
@@ -86,14 +83,6 @@ class Wanted:
     report: Path
 
 
-@dataclass(frozen=True)
-class _Read:
-    """What is asked of a report: the files that it lists, and the mark of the bake in its sidecar."""
-
-    listed: Listed = field(default_factory=dict)
-    kept: str = ""
-
-
 state = State()
 
 
@@ -112,12 +101,6 @@ def unsettle(images: Iterable[bpy.types.Image]) -> None:
     """Note that images show pixels that no file has."""
     for image in images:
         state.shown[image.name] = ""
-
-
-def report_of(image: bpy.types.Image) -> Path:
-    """Return the report next to an image's file."""
-    path = Path(bpy.path.abspath(image.filepath_raw))
-    return path.with_name(Path(str(image.get(REPORT, ""))).name or REPORT_NAME)
 
 
 def report_in(output: OutputFolder) -> Path:
@@ -147,37 +130,11 @@ def hold(output: OutputFolder) -> None:
         told = json.loads(report.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return
-    for name in _images_of(told) & listed.keys():
+    for name in images_described(told) & listed.keys():
         state.reports[str(listed[name]["sha256"])] = told
         state.reports.move_to_end(str(listed[name]["sha256"]))
     while len(state.reports) > MOST_FILES:
         state.reports.popitem(last=False)
-
-
-def listed_in(report: Path) -> Listed:
-    """Return what a report lists of the files next to it."""
-    return _read(report).listed
-
-
-def bake_kept_by(report: Path) -> str:
-    """Return the mark of the bake in the sidecar that a report names; "" if it names none."""
-    return _read(report).kept
-
-
-def _read(report: Path) -> _Read:
-    """Read a report, again only if it has changed."""
-    try:
-        found = report.stat()
-    except OSError:
-        return _Read()
-    stamp = found.st_mtime_ns, found.st_size
-    known = state.read.get(report)
-    if known is None or known[0] != stamp:
-        kept = ""
-        with suppress(OSError, ValueError, KeyError, TypeError):
-            kept = str(json.loads(report.read_text(encoding="utf-8"))[KEPT][BAKE])
-        known = state.read[report] = stamp, _Read(manifest.listed(report), kept)
-    return known[1]
 
 
 def lightmaps() -> list[bpy.types.Image]:
@@ -222,7 +179,7 @@ def follow() -> None:
 
 
 def check() -> None:
-    """Say so where the file that was opened shows other bakes than are on the disk; touches nothing."""
+    """Say so where the open file shows other bakes than are on the disk; touches nothing."""
     state.message = FOREIGN if differing() else ""
 
 
@@ -258,7 +215,6 @@ class _Swap:
             hold(output)
             _stage_report(output, report, [one for one in self.wanted if one.report == report])
             output.publish()
-            state.read.pop(report, None)
 
     def close(self) -> None:
         """Remove what was not published."""
@@ -322,15 +278,6 @@ def _stage_report(output: OutputFolder, report: Path, wanted: Sequence[Wanted]) 
         told.pop(KEPT, None)  # its sidecar is not there any more
     text = json.dumps(told, indent=2, ensure_ascii=False) + "\n"
     (output.staging / report.name).write_text(text, encoding="utf-8")
-
-
-def _images_of(told: Mapping[str, Any]) -> set[str]:
-    """Return the names of the images that a report describes."""
-    try:
-        groups = [page["image"] for group in told.get("light_groups", ()) for page in group["pages"]]
-        return {*(entry["image"] for entry in told["objects"]), *groups}
-    except (KeyError, TypeError):
-        return set()
 
 
 def _is_stale(image: bpy.types.Image) -> bool:
@@ -412,7 +359,7 @@ def forget() -> None:
     state.held, state.message = None, ""
     state.reports.clear()
     state.shown.clear()
-    state.read.clear()
+    forget_reports()
 
 
 def _handlers() -> tuple[tuple[list[Any], Any], ...]:

@@ -98,6 +98,7 @@ def store(images: Sequence[bpy.types.Image], seconds: float) -> None:
             lightmap_versions.hold(output)
             output.publish()
             lightmap_versions.mark(inside)
+    lightmap_versions.check()
 
 
 def _save_into(folder: Path, image: bpy.types.Image) -> None:

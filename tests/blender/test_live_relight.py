@@ -170,7 +170,7 @@ def test_its_message_goes_with_what_it_is_about(live: bpy.types.WindowManager) -
         settle()
         bpy.data.objects["Bulb"].location.x += 0.1
         settle()
-        assert "has changed" in live_state.state.message
+        assert "Live is off" in live_state.state.message
         assert not live.radiosity_live
         bpy.data.objects["Bulb"].location.x -= 0.1
 

@@ -19,7 +19,12 @@ from radiosity_addon.settings import BakeSettings
 ROOT = Path(__file__).resolve().parents[2]
 
 
-OURS = str(["alike", "blender", "errors", "methods", "remaining", "settings"])
+OURS = str(
+    [
+        *("alike", "blender", "errors", "held_files", "manifest", "methods", "remaining", "settings"),
+        *("sidecar_names", "staging"),
+    ]
+)
 """What registering imports beside Blender's side; none of it is heavy."""
 
 
