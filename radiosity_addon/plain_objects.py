@@ -52,8 +52,8 @@ def restore(told: Any, arrays: list[Array], table: Table, dropped: Mapping[type,
     reader = _Reader(arrays, {kind.__name__: kind for kind in table}, told["objects"])
     for made, entry in zip(reader.made, told["objects"], strict=True):
         kept, left = table[type(made)], dropped.get(type(made), ())
-        if set(entry["has"]) - set(kept):
-            raise ValueError("unknown attribute")
+        if set(entry["has"]) != set(kept):
+            raise ValueError("other attributes than these")
         for name in left:
             object.__setattr__(made, name, None)
         for name, node in entry["has"].items():

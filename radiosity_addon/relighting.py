@@ -9,14 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from .bake_scene import BakeScene, BakeWarning, LightmapPage, Progress
-from .errors import SceneError
+from .errors import BakeError, SceneError
 from .lightmap.atlas import Atlas
-from .lightmap.encode import to_quantity
+from .lightmap.encode import presentable, to_quantity
 from .lightmap.relight import kept_bytes, relight_steps
 from .lightmap.seams import Seams
 from .lightmap.sweeps import LitTexels, TexelLight
@@ -33,6 +34,12 @@ from .solver.scratch import Scratch, tiles
 
 STRENGTHS = ("power", "irradiance", "radiance")
 """The fields of lights that may change."""
+
+DAMAGED = (
+    *(ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError),
+    *(FloatingPointError, ZeroDivisionError, RecursionError, MemoryError, np.linalg.LinAlgError),
+)
+"""What computing with a sidecar can raise that is not as it was written."""
 
 SAME = 1e-5
 """Emission that differs from what its material's strength says by no more than this part is as expected."""
@@ -81,6 +88,8 @@ class KeptBake:
         Of the texels as they show; emission [W/m²] as it was baked.
     moves : Moves or None
         Without it nothing can be moved.
+    origin : str
+        The sidecar that it was read from, if it was.
     """
 
     bake_scene: BakeScene
@@ -93,6 +102,7 @@ class KeptBake:
     reflectance: Array
     emission: Array
     moves: Moves | None = None
+    origin: str = ""
 
     @property
     def sources(self) -> LightSources:
@@ -176,8 +186,25 @@ def relight(kept: KeptBake, strengths: Array) -> Generator[Progress, None, tuple
     ------
     SceneError
         If the sources cannot have them.
+    BakeError
+        If no light comes of it: the sidecar that the bake was read from is damaged.
     """
     wanted = kept.sources.checked(strengths)
+    if not kept.origin:
+        return (yield from _relight(kept, wanted))
+    try:
+        return (yield from _relight(kept, wanted))
+    except (*DAMAGED, BakeError) as error:
+        raise damaged(kept.origin) from error
+
+
+def damaged(path: Path | str) -> BakeError:
+    """Return the error for a sidecar that no bake has written."""
+    return BakeError(f"'{path}' is not used: it is damaged; bake again")
+
+
+def _relight(kept: KeptBake, wanted: Array) -> Generator[Progress, None, tuple[LightmapPage, ...]]:
+    """Compute the lightmaps for strengths that are checked."""
     scratch = kept.geometry.scratch
     steps = relight_steps(kept.lit, kept.solved, wanted, scratch)
     while True:
@@ -188,7 +215,7 @@ def relight(kept: KeptBake, strengths: Array) -> Generator[Progress, None, tuple
             break
     emission = kept.sources.emission(kept.emission, kept.geometry.triangle, wanted)
     values = shown(light, kept.reflectance, emission, kept.settings, scratch)
-    pages = texel_pages(kept.geometry, values, kept.seams, kept.rings)
+    pages = presentable(texel_pages(kept.geometry, values, kept.seams, kept.rings))
     yield Progress("relight", 1.0)
     return pages
 

@@ -6,13 +6,14 @@ fingerprint must be that of the bake.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-from .array_file import ArrayFileError, read_arrays, write_arrays
+from .array_file import ArrayFileError, TooLargeError, read_arrays, read_digest, write_arrays
 from .bake_scene import BakedObject, BakeResult, BakeScene, LightmapPage
 from .errors import BakeError, RadiosityError
 from .file_names import SIDECAR_NAME as SIDECAR_NAME
@@ -25,8 +26,10 @@ from .lightmap.stored_links import StoredLinks
 from .lightmap.sweeps import LitTexels, TexelTransport
 from .lightmap.texel_geometry import TexelGeometry
 from .plain_objects import flatten, restore
-from .relighting import KeptBake
+from .relighting import DAMAGED, KeptBake, damaged
 from .settings import BakeSettings
+from .sidecar_checks import check_stored, stored_layout
+from .sidecar_names import BAKE, DIGEST, FILE, KEPT
 from .solver.aiming import AimedRays
 from .solver.area_light import AreaLight
 from .solver.bulb_lights import PointLight, SpotLight
@@ -47,8 +50,8 @@ from .solver.methods.hierarchical import HierarchicalState
 from .solver.settings import SolverSettings
 from .solver.tree_top import TreeTop
 
-MAGIC, VERSION = b"RADIOSITYRELIGHT", 1
-
+MAGIC, VERSION = b"RADIOSITYRELIGHT", 2
+"""Version 1 did not know textures, and what solving stores may differ from it."""
 
 OF_SOURCES = ("emitter", "emitter_names", "light_groups", "emitter_groups")
 """What a scene says of its sources beside their strengths: it stays as it was baked."""
@@ -60,7 +63,7 @@ def _all(kind: Any) -> tuple[str, ...]:
 
 _LIGHTS = (PointLight, SpotLight, SunLight, AreaLight, EnvironmentLight, EnvironmentImage, SkyPatch)
 
-KEPT: Mapping[type, Sequence[str]] = {
+STORED: Mapping[type, Sequence[str]] = {
     **{kind: _all(kind) for kind in _LIGHTS},
     **{
         kind: _all(kind)
@@ -117,10 +120,13 @@ class StoredBake:
     mark : str
         The bake's own, which whoever wrote it knows it by.
     settings : BakeSettings
+    path : Path
+        Its file, for messages.
     """
 
     mark: str
     settings: BakeSettings
+    path: Path
     _stored: Mapping[str, Any]
 
     def kept(self, bake_scene: BakeScene) -> KeptBake:
@@ -130,15 +136,20 @@ class StoredBake:
         ------
         SceneError
             If anything else differs; the message names it.
+        BakeError
+            If the file is not of the scene that it says it is of.
         """
         stored = self._stored
         check_same(stored["fingerprint"], bake_scene)
+        baked = sum(item.bake and item.count > 0 for item in bake_scene.objects)
+        if stored_layout(stored) != (len(bake_scene.scene), baked):
+            raise damaged(self.path)
         scene = copy(bake_scene.scene)
         scene.emission, scene.lights = stored["emission"], stored["solved"].sources.lights
         before = replace(bake_scene, scene=scene, **stored["of_sources"])
         texels = stored["texel_reflectance"], stored["texel_emission"]
         solved, laid = stored["solved"], (stored["geometry"], stored["seams"], stored["rings"])
-        return KeptBake(before, self.settings, solved, stored["lit"], *laid, *texels)
+        return KeptBake(before, self.settings, solved, stored["lit"], *laid, *texels, origin=str(self.path))
 
     def result(self, bake_scene: BakeScene, pages: tuple[LightmapPage, ...]) -> BakeResult:
         """Return other pages as the result of a bake, laid out as it was."""
@@ -185,30 +196,75 @@ def write_sidecar(path: Path, kept: KeptBake, result: BakeResult, mark: str) -> 
         "texel_reflectance": kept.reflectance,
         "texel_emission": kept.emission,
     }
-    told, arrays = flatten(stored, KEPT, skipped)
+    told, arrays = flatten(stored, STORED, skipped)
     try:
         return write_arrays(path, MAGIC, VERSION, told, arrays)
     except OSError as error:
         raise BakeError(f"cannot write '{path}': {error.strerror}") from error
 
 
-def read_sidecar(path: Path) -> StoredBake:
+def read_sidecar(path: Path, memory_limit: float | None = None) -> StoredBake:
     """Read a kept bake from a file.
+
+    Parameters
+    ----------
+    memory_limit : float or None
+        GiB that it may take; None takes the default of bakes.
 
     Raises
     ------
     BakeError
-        If there is none, or it is damaged or of another version.
+        If there is none, it is damaged or of another version, or would take too much memory.
     """
+    most = int((memory_limit or SolverSettings.memory_limit) * (1 << 30))
     try:
-        told, arrays = read_arrays(path, MAGIC, VERSION)
-        stored = restore(told, arrays, KEPT, DROPPED)
-        return StoredBake(stored["mark"], BakeSettings(**stored["settings"]), stored)
+        told, arrays = read_arrays(path, MAGIC, VERSION, most)
+        stored = restore(told, arrays, STORED, DROPPED)
+        check_stored(stored)
+        return StoredBake(stored["mark"], BakeSettings(**stored["settings"]), path, stored)
     except FileNotFoundError:
         raise BakeError(f"there is no '{path}': bake with a sidecar to light that bake anew") from None
     except OSError as error:
         raise BakeError(f"cannot read '{path}': {error.strerror}") from error
+    except TooLargeError as error:
+        raise BakeError(f"'{path}' is not used: {error}; raise the limit, or bake again") from error
     except ArrayFileError as error:
         raise BakeError(f"'{path}' is not used: {error}; bake again") from error
-    except (ValueError, KeyError, TypeError, IndexError, AttributeError, RadiosityError) as error:
-        raise BakeError(f"'{path}' is not used: it is damaged; bake again") from error
+    except (*DAMAGED, RadiosityError) as error:
+        raise damaged(path) from error
+
+
+def sidecar_entry(path: Path, mark: str) -> dict[str, str]:
+    """Return what a report tells of the bake that was kept in a sidecar beside it.
+
+    Raises
+    ------
+    BakeError
+        If the sidecar cannot be read.
+    """
+    try:
+        return {BAKE: mark, DIGEST: read_digest(path, MAGIC, VERSION), FILE: path.name}
+    except OSError as error:
+        raise BakeError(f"cannot read '{path}': {error.strerror}") from error
+    except ArrayFileError as error:
+        raise BakeError(f"'{path}' is not used: {error}; bake again") from error
+
+
+def check_belongs(stored: StoredBake, report: Path) -> None:
+    """Refuse a sidecar that the report beside it does not name as that of its bake.
+
+    Raises
+    ------
+    BakeError
+    """
+    try:
+        told = json.loads(report.read_text(encoding="utf-8"))
+        kept = told.get(KEPT) if isinstance(told, dict) else None
+    except (OSError, ValueError, RecursionError):
+        raise BakeError(f"'{report}' cannot be read, or is no report: bake again, with --keep") from None
+    if not isinstance(kept, dict):
+        raise BakeError(
+            f"'{stored.path}' is older than the bake of '{report}', which was not kept: bake again"
+        )
+    if kept.get(BAKE) != stored.mark or kept != sidecar_entry(stored.path, stored.mark):
+        raise BakeError(f"'{stored.path}' belongs to another bake than '{report}': bake again")

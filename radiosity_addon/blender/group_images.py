@@ -11,7 +11,7 @@ import bpy
 from ..bake_scene import BakeResult, LightGroup, LightmapPage
 from ..errors import BakeError
 from ..file_names import PLAIN_NAMES, FileNames
-from ..lightmap.encode import png16_scale
+from ..lightmap.encode import png16_scale, presentable
 from ..settings import BakeSettings
 from . import overlay_view
 from .bake_record import is_made, remove_datablocks
@@ -97,7 +97,8 @@ def update_images(
     BakeError
         If an image is missing, or has another size.
     """
-    new = {group.name: group.pages for group in groups}
+    pages = presentable(pages)
+    new = {group.name: presentable(group.pages) for group in groups}
     if set(new) != set(group_images):
         raise BakeError("the lightmaps show other light groups than these: bake again")
     sets = [(images, pages), *((group_images[name], new[name]) for name in group_images)]

@@ -13,3 +13,9 @@ PAGE, GROUP = "radiosity_page", "radiosity_group_shown"
 
 MARK = "radiosity_mark"
 """The mark of its bake, if that was kept."""
+
+REPORT = "radiosity_report"
+"""The name of the report next to its file, which lists it."""
+
+VERSION = "radiosity_version"
+"""The digest of the bytes of its file, or of what is packed: what its pixels are."""

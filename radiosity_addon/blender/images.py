@@ -17,7 +17,7 @@ from ..bake_scene import BakeResult, BakeScene, LightmapPage
 from ..errors import BakeError
 from ..file_names import PLAIN_NAMES, FileNames, highest_page, unique_names
 from ..light_groups import are_wanted
-from ..lightmap.encode import encode_png16, png16_scale
+from ..lightmap.encode import encode_png16, png16_scale, presentable
 from ..report import LightmapFile
 from ..settings import OTHERS, BakeSettings
 from ..solver.scratch import tiles
@@ -160,6 +160,7 @@ def write_images(
     group: str = "",
 ) -> list[bpy.types.Image]:
     """Make an image of each page by these names; see `write_pages`. `group` is the light group they show."""
+    pages = presentable(pages, signed=settings.quantity == "residual")
     scale = png16_scale(*[page.pixels for page in pages]) if settings.format == "png16" else None
     images: list[bpy.types.Image] = []
     try:

@@ -16,9 +16,11 @@ from ..keeping import Keeping, bake_steps, moves_alone
 from ..relighting import KeptBake
 from ..report import BakeReport
 from ..settings import BakeSettings
+from ..sidecar import sidecar_entry
+from ..sidecar_names import KEPT
 from ..solver.arrays import Array
 from ..texel_memory import pages_of, refuse_too_large
-from . import kept_bakes, kept_details, runtime
+from . import kept_bakes, kept_details, lightmap_versions, runtime
 from .apply import apply_steps, check_targets
 from .bake_record import remove_datablocks
 from .export import export_steps, exporting
@@ -133,6 +135,7 @@ def run_bake(
     wanted = settings
     # Now, not after the export: large pages need much memory whatever is on them.
     refuse_too_large(pages_of(settings) or (), settings)
+    lightmap_versions.flush()
     with ExitStack() as stack:
         if output is not None:
             # First: a folder that cannot be written, or holds files of others, is no news for after the work.
@@ -189,12 +192,15 @@ def run_bake(
             images, groups = yield from _told(showing, solved, 1.0)
             report = _report(result, images, groups, settings, seconds)
             if output is not None:
-                output.write_report(report.joined(output.earlier, earlier.kept_sources))
+                whole = report.joined(output.earlier, earlier.kept_sources)
+                output.write_report(keeping_sidecar(whole, output, keeping))
+                lightmap_versions.hold(output)
                 output.publish()
             remember(context.scene, export, result, wanted)
         folder = "" if output is None else relative_path(output.path)
         runtime.remember(context.scene, report.as_dict(), folder)
         _remember_kept(context.scene, keeping, kept)
+        lightmap_versions.check()
         kept_details.keep(context.scene, result, [image.name for image in images])
     return report
 
@@ -260,7 +266,8 @@ def deliver(
             yield Progress("preview", PREVIEW)
             with timed(seconds, "preview"):
                 render_preview(context, output.staging / PREVIEW_NAME, settings, samples)
-        report = output.write_report(_report(result, images, groups, settings, seconds))
+        report = _report(result, images, groups, settings, seconds)
+        report = output.write_report(keeping_sidecar(report, output, keeping))
         yield Progress("write", 1.0)
         output.publish()
     except BaseException:
@@ -288,6 +295,7 @@ def _show(
     groups: GroupImages = {}
     try:
         groups = write_groups(result, settings, folder, taken, names)
+        lightmap_versions.mark([*images, *each_image(groups)], names.report)
         if output is not None:
             set_folder([*images, *each_image(groups)], output.path)
         if keeping is not None:
@@ -326,6 +334,15 @@ def _report(
     if groups:
         result = replace(result, warnings=(*result.warnings, *crowded_materials()))
     return BakeReport.of(result, lightmap_files(images, settings), seconds, shares)
+
+
+def keeping_sidecar(report: BakeReport, output: OutputFolder, keeping: Keeping | None) -> BakeReport:
+    """Return the report with what proves that a sidecar, if the bake is kept in one, belongs to it."""
+    if keeping is None or not keeping.sidecar:
+        return report
+    staged = output.staging / output.names.sidecar
+    path = staged if staged.is_file() else output.path / output.names.sidecar
+    return BakeReport({**report.data, KEPT: sidecar_entry(path, keeping.mark)})
 
 
 @contextmanager

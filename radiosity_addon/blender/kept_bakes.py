@@ -6,7 +6,7 @@ together if they are of one bake.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -40,6 +40,9 @@ class InMemory:
     shown: Array
 
 
+MOST_EARLIER = 1 << 30
+"""Bytes of bakes in memory that no scene shows, but may show again after undo."""
+
 _kept: dict[str, InMemory] = {}
 
 
@@ -60,16 +63,23 @@ def find(scene: bpy.types.Scene | None) -> InMemory | None:
 
 
 def put(scene: bpy.types.Scene, mark: str, bake: KeptBake) -> InMemory:
-    """Keep a scene's bake, in place of any other of this scene."""
-    for other in [key for key, held in _kept.items() if held.scene == scene.name_full]:
-        del _kept[other]
+    """Keep a scene's bake; earlier ones stay for undo, as far as there is room."""
+    _kept.pop(mark, None)
     _kept[mark] = InMemory(bake, scene.name_full, bake.strengths)
+    _make_room(mark)
     return _kept[mark]
 
 
+def _make_room(newest: str = "") -> None:
+    """Forget the oldest of the bakes that no scene shows, but for what `MOST_EARLIER` has room for."""
+    shown = {newest, *map(mark_of, bpy.data.scenes)}
+    earlier = [mark for mark in _kept if mark not in shown]
+    while sum(_kept[mark].bake.nbytes for mark in earlier) > MOST_EARLIER:
+        del _kept[earlier.pop(0)]
+
+
 def drop(scene: bpy.types.Scene) -> None:
-    """Forget the scene's bake, in memory and in the scene."""
-    _kept.pop(mark_of(scene), None)
+    """Have the scene show no bake any more; in memory it stays for undo, if there is room."""
     if not scene.is_property_set("radiosity_relight"):
         return
     group = scene.radiosity_relight
@@ -78,6 +88,7 @@ def drop(scene: bpy.types.Scene) -> None:
     names = [prop.identifier for prop in group.bl_rna.properties if not prop.is_readonly]
     if not any(map(group.is_property_set, names)):
         scene.property_unset("radiosity_relight")
+    _make_room()
 
 
 def drop_all() -> None:
@@ -116,33 +127,13 @@ def _drop_with_the_file(*_: Any) -> None:
     drop_all()
 
 
-@persistent
-def _follow_undo(*_: Any) -> None:
-    """Undo and redo bring remembered strengths back, but no pixels."""
-    if _kept:
-        from .relight import follow_undo
-
-        follow_undo()
-
-
-def _handlers() -> tuple[tuple[list, Callable[..., None]], ...]:
-    on = bpy.app.handlers
-    return (
-        (on.load_pre, _drop_with_the_file),
-        (on.undo_post, _follow_undo),
-        (on.redo_post, _follow_undo),
-    )
-
-
 def register() -> None:
-    """Forget what is kept when another file is opened, and follow undo and redo."""
-    for handlers, ours in _handlers():
-        handlers.append(ours)
+    """Forget what is kept when another file is opened."""
+    bpy.app.handlers.load_pre.append(_drop_with_the_file)
 
 
 def unregister() -> None:
     """Forget everything."""
-    for handlers, ours in _handlers():
-        if ours in handlers:
-            handlers.remove(ours)
+    if _drop_with_the_file in bpy.app.handlers.load_pre:
+        bpy.app.handlers.load_pre.remove(_drop_with_the_file)
     drop_all()

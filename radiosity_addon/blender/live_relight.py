@@ -9,7 +9,6 @@ and nothing follows from it.
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Generator
 from typing import Any
@@ -24,11 +23,11 @@ from ..errors import BakeError, RadiosityError
 from ..light_groups import are_wanted
 from ..responses import Responses
 from ..solver.arrays import Array
-from . import kept_bakes, live_state
+from . import kept_bakes, lightmap_versions, live_state
 from .group_images import update_images
 from .live_scene import LiveScene
 from .live_strengths import StrengthReader
-from .relight import lit, note_shown, read_strengths
+from .relight import lit, note_shown, noted_strengths, read_strengths
 from .relit_images import check_images, rewrite
 from .relit_materials import show_emission
 
@@ -87,6 +86,15 @@ class LiveRelight:
         while live_state.state.live is self and self.step(patient=False):
             pass
 
+    def look_again(self) -> None:
+        """The images were loaded again, after undo or redo: with the light that the scene remembers."""
+        if self._reader is None:
+            return
+        held = self._held()
+        self._shown = held.shown = noted_strengths(self._of_scene(), held)
+        self._exact = False
+        _wake()
+
     def note(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
         """Take a note of what changed."""
         if scene.name_full != self._scene or self._fits is None:
@@ -117,7 +125,9 @@ class LiveRelight:
         context = bpy.context
         if context.scene.name_full != self._scene:
             raise BakeError("another scene is shown")
+        lightmap_versions.flush()
         held, self._strengths = read_strengths(context)
+        self._shown = held.shown
         if are_wanted(held.bake.bake_scene, held.bake.settings):
             raise BakeError("the bake has light groups, whose own sliders change the light at once")
         self._reader = StrengthReader(context.scene, held.bake, self._strengths)
@@ -153,12 +163,13 @@ class LiveRelight:
             LightmapPage(pixels, np.zeros(0, dtype=bool)) for pixels in self._responses.pages(self._strengths)
         )
         check_images(images, pages)
-        update_images([images[number] for number in range(len(pages))], pages, {})
+        shown = [images[number] for number in range(len(pages))]
+        update_images(shown, pages, {})
+        lightmap_versions.unsettle(shown)
         changed = (self._strengths != self._shown).any(axis=1)
         lights = len(held.bake.sources.lights)
         if held.bake.settings.quantity != "radiosity":
             show_emission({held.bake.names[row] for row in np.flatnonzero(changed) if row >= lights})
-        self._of_scene().radiosity_relight.strengths = json.dumps(self._strengths.tolist())
         self._shown = self._strengths
         self.changes += 1
         _redraw()

@@ -37,11 +37,11 @@ def start(scene: bpy.types.Scene) -> None:
 
 
 def stop(message: str = "") -> None:
-    """Follow no lights any more; harmless where none are."""
+    """Follow no lights any more, and say why, if there is a reason; harmless where none are followed."""
     live, state.live = state.live, None
+    state.message = message
     if live is None:
         return
-    state.message = message
     live.close()
     manager = bpy.context.window_manager
     if manager is not None and getattr(manager, "radiosity_live", False):

@@ -18,6 +18,7 @@ from . import (
     light_group_operators,
     light_group_panels,
     light_group_properties,
+    lightmap_versions,
     object_panel,
     object_roles,
     operators,
@@ -60,7 +61,8 @@ def register() -> None:
     try:
         for module in (
             *(bake_record, object_roles, light_group_properties, properties),
-            *(kept_bakes, relight_properties, overlay_properties, overlay_view, edit_guard),
+            *(kept_bakes, lightmap_versions, relight_properties),
+            *(overlay_properties, overlay_view, edit_guard),
         ):
             module.register()
             _undo.append(module.unregister)

@@ -7,24 +7,23 @@ import time
 from collections.abc import Generator
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 
 import bpy
 import numpy as np
 
 from ..background import in_thread
 from ..bake_scene import LightGroup, LightmapPage, Progress
-from ..errors import BakeError, RadiosityError
+from ..errors import BakeError
 from ..light_groups import are_wanted, group_pages
 from ..relight_check import strengths_in
 from ..relighting import KeptBake, relight
 from ..sidecar import StoredBake, read_sidecar
 from ..solver.arrays import Array
 from ..solver.steps import drain
-from . import kept_bakes
+from . import kept_bakes, lightmap_versions
 from .export import export_steps, exporting
 from .kept_bakes import InMemory
-from .ownership import report_listing
+from .kept_sidecars import sidecar_of
 from .rebake import originals_shown
 from .relight_properties import relight_of
 from .relit_images import rewrite
@@ -57,6 +56,7 @@ def run_relight(
         If nothing was kept, or the scene differs in more than strengths of light; the message says in what.
     """
     started = time.perf_counter()
+    lightmap_versions.flush()
     yield Progress("export", 0.0)
     held, strengths = yield from exporting(strengths_steps(context, patient))
     same = np.array_equal(strengths, held.shown)
@@ -91,8 +91,9 @@ def strengths_steps(
     export = yield from export_steps(context, stored.settings, True, patient, shown)
     if isinstance(stored, StoredBake):
         held = kept_bakes.put(scene, kept_bakes.mark_of(scene), stored.kept(export.bake_scene))
-        held.shown = _noted(scene, held)
     assert held is not None
+    # Undo and redo may have changed it.
+    held.shown = noted_strengths(scene, held)
     return held, strengths_in(held.bake, export.bake_scene)
 
 
@@ -108,11 +109,8 @@ def stored_bake(scene: bpy.types.Scene) -> StoredBake:
     images = kept_bakes.images_of(mark) if mark else {}
     if not images:
         raise BakeError("the scene shows no bake that was kept: bake with Keep for Relighting")
-    page = Path(bpy.path.abspath(images[min(images)].filepath_raw))
-    if images[min(images)].packed_file is not None:
-        raise BakeError("the bake is not in memory any more, and has no sidecar: bake again")
-    path = page.with_name(report_listing(page, [scene]).names.sidecar)
-    if not path.is_file():
+    path = sidecar_of(mark)
+    if path is None:
         raise BakeError("the bake is not in memory any more, and has no sidecar: bake again")
     stored = read_sidecar(path)
     if stored.mark != mark:
@@ -159,27 +157,10 @@ def note_shown(scene: bpy.types.Scene, held: InMemory, strengths: Array) -> None
     scene.radiosity_relight.strengths = json.dumps(strengths.tolist())
 
 
-def _noted(scene: bpy.types.Scene, held: InMemory) -> Array:
+def noted_strengths(scene: bpy.types.Scene, held: InMemory) -> Array:
     """Return the strengths that the scene says its lightmaps show: those of the bake if it says none."""
     try:
         noted = np.array(json.loads(relight_of(scene).strengths), dtype=np.float64)
     except (ValueError, TypeError):
         return held.bake.strengths
     return noted if noted.shape == held.bake.strengths.shape else held.bake.strengths
-
-
-def follow_undo() -> None:
-    """Light scenes anew whose remembered strengths went back without the pixels, which undo leaves alone."""
-    for scene in bpy.data.scenes:
-        held = kept_bakes.find(scene)
-        if held is None:
-            continue
-        noted = _noted(scene, held)
-        if np.array_equal(noted, held.shown):
-            continue
-        try:
-            pages, groups = drain(lit(held.bake, noted))
-            rewrite(kept_bakes.mark_of(scene), pages, groups, 0.0)
-        except RadiosityError:
-            continue  # undone to before the images were there
-        held.shown = noted

@@ -20,7 +20,7 @@ from ..permissions import Permissions
 from ..relight_check import strengths_in
 from ..report import BakeReport
 from ..settings import BakeSettings
-from ..sidecar import StoredBake, read_sidecar
+from ..sidecar import StoredBake, check_belongs, read_sidecar
 from ..solver.steps import drain
 from .commands import open_or_build, output_of, registered, same_file, written_files
 from .single_files import check_places
@@ -62,6 +62,7 @@ def relight(
     """
     with registered():
         from .job import WRITING_STAGES
+        from .output import BLEND_NAME, REPORT_NAME
 
         source = scene or loaded
         if source is not None and same_file(source, output / BLEND_NAME):
@@ -70,8 +71,10 @@ def relight(
             )
         check_places({} if report_copy is None else {"--report": report_copy}, source)
         console.progress("read", 0.0)
-        stored = read_sidecar(output / SIDECAR_NAME)
-        if settings not in (BakeSettings(), stored.settings):
+        stored = read_sidecar(output / SIDECAR_NAME, settings.memory_limit)
+        check_belongs(stored, output / REPORT_NAME)
+        given = replace(settings, memory_limit=None)
+        if given not in (BakeSettings(), replace(stored.settings, memory_limit=None)):
             raise UsageError(f"the bake in {output} has its own settings: give --relight no others")
         notes = open_or_build(scene, loaded, allowed)
         folder = output_of(output, source, allowed, report_copy)
@@ -132,7 +135,7 @@ def relight_into(
         output.expect(page_file_names(result, stored.settings))
         output.expect(name for of in group_file_names(result, stored.settings) for name in of)
         yield Progress("apply", APPLY)
-        keeping = Keeping(mark=stored.mark)
+        keeping = Keeping(sidecar=True, mark=stored.mark)
         made = export, result, output, seconds, keeping
         samples = QUICK_SAMPLES if preview else None
         return (yield from deliver(context, stored.settings, *made, samples))

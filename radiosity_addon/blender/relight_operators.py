@@ -8,6 +8,7 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from . import kept_bakes, live_state, runtime
+from .kept_sidecars import can_relight
 from .window_job import WindowJob
 
 
@@ -26,6 +27,9 @@ class RADIOSITY_OT_relight(WindowJob, bpy.types.Operator):
             return False
         if context.scene is None or not kept_bakes.mark_of(context.scene):
             cls.poll_message_set("The scene shows no bake that was kept: bake with Keep for Relighting")
+            return False
+        if not can_relight(context.scene):
+            cls.poll_message_set("The bake is no longer in memory, and has no sidecar of its own: bake again")
             return False
         return True
 

@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from . import kept_bakes, live_state, runtime
+from . import kept_bakes, lightmap_versions, live_state, runtime
 from .panels import _Panel
 from .wrapped_text import draw_text
 
@@ -33,6 +33,8 @@ class RADIOSITY_PT_relight(_Panel, bpy.types.Panel):
         chosen = context.scene.radiosity_relight
         if live_state.state.message:
             draw_text(layout.box(), live_state.state.message, "ERROR", context)
+        if lightmap_versions.state.message:
+            draw_text(layout.box(), lightmap_versions.state.message, "ERROR", context)
         layout.use_property_split = True
         layout.use_property_decorate = False
         column = layout.column(heading="Next Bake")

@@ -15,7 +15,7 @@ def _switch_live(manager: bpy.types.WindowManager, context: bpy.types.Context) -
 
     if manager.radiosity_live:
         live_state.start(context.scene)
-    else:
+    elif live_state.state.live is not None:
         live_state.stop()
 
 

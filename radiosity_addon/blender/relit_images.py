@@ -13,9 +13,9 @@ import numpy as np
 from ..bake_scene import LightGroup, LightmapPage
 from ..errors import BakeError
 from ..report import BakeReport
-from . import kept_bakes
+from . import kept_bakes, lightmap_versions
 from .group_images import rescale_materials, update_images
-from .image_marks import MARK, SCALE_PROPERTY
+from .image_marks import MARK, SCALE_PROPERTY, VERSION
 from .images import image_scale
 from .kept_bakes import group_images_of, images_of
 from .output import OutputFolder
@@ -94,13 +94,17 @@ def store(images: Sequence[bpy.types.Image], seconds: float) -> None:
     for image in images:
         if image.packed_file is not None:
             image.pack()
+            lightmap_versions.mark([image])
     for folder, inside in folders.items():
         report = reports[folder]
         with OutputFolder(folder, report.names, owner=report.owner) as output:
             for image in inside:
                 _save_into(output.staging, image)
             _report(output, inside, seconds)
+            lightmap_versions.hold(output)
             output.publish()
+            lightmap_versions.mark(inside, report.names.report)
+    lightmap_versions.check()
 
 
 def _scenes_of(image: bpy.types.Image) -> list[bpy.types.Scene]:
@@ -147,14 +151,16 @@ def _as_before_on_failure(images: Sequence[bpy.types.Image]) -> Iterator[None]:
     for image in images:
         pixels = np.empty(len(image.pixels), dtype=np.float32)
         image.pixels.foreach_get(pixels)
-        before.append((image, pixels, image_scale(image)))
+        before.append((image, pixels, image_scale(image), image.get(VERSION)))
     try:
         yield
     except BaseException:
-        for image, pixels, scale in before:
+        for image, pixels, scale, version in before:
             image.pixels.foreach_set(pixels)
             image.update()
             if SCALE_PROPERTY in image.keys():  # noqa: SIM118 (an ID is no dict)
                 rescale_materials(image, scale)
                 image[SCALE_PROPERTY] = scale
+            if version is not None:
+                image[VERSION] = version
         raise

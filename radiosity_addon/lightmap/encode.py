@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
+from ..bake_scene import LightmapPage
 from ..errors import BakeError, UsageError
 from ..solver.radiometry import brdf_of_reflectance, reflected_radiance
 from ..solver.scratch import tiles
@@ -43,6 +47,31 @@ def to_quantity(irradiance: Float, reflectance: Float, emission: Float, quantity
     if quantity == "radiosity":
         return np.asarray(emission + reflectance * irradiance)
     raise UsageError(f"quantity {quantity!r} is not irradiance_over_pi, irradiance or radiosity")
+
+
+def presentable(pages: Sequence[LightmapPage], signed: bool = False) -> tuple[LightmapPage, ...]:
+    """Return pages that may be published: what is below 0 by rounding is 0 in them.
+
+    Parameters
+    ----------
+    signed : bool
+        Whether they may be negative, as an error picture is.
+
+    Raises
+    ------
+    BakeError
+        If a value is NaN or infinite.
+    """
+    found = []
+    for page in pages:
+        low, high = page.pixels.min(initial=0.0), page.pixels.max(initial=0.0)
+        # Either is NaN where a value is.
+        if not (np.isfinite(low) and np.isfinite(high)):
+            raise BakeError("the light is not finite somewhere: no lightmap is written; bake again")
+        if low < 0.0 and not signed:
+            page = replace(page, pixels=np.maximum(page.pixels, 0.0))
+        found.append(page)
+    return tuple(found)
 
 
 def png16_scale(*pages: Float32) -> float:

@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 import radiosity_addon
-from radiosity_addon.blender import kept_bakes, live_state
+from radiosity_addon.blender import kept_bakes, lightmap_versions, live_state
+from radiosity_addon.blender.image_marks import VERSION
 from radiosity_addon.blender.live_relight import _notice
 from radiosity_addon.blender.node_group import EMISSION
+from radiosity_addon.manifest import digest
 from tests.blender.scenes import shader_material
 from tests.blender.test_relight import change_lights, glowing, lightmap, relative, relight, room
 
@@ -143,6 +145,67 @@ def test_undo_takes_the_light_back_with_the_lamp(live: bpy.types.WindowManager) 
     settle()
     assert relative(lightmap(), before) < 2e-3
     assert bpy.context.window_manager.radiosity_live
+
+
+def test_a_slider_may_move_before_the_first_exact_light_is_there(saved: Path) -> None:
+    """It died of arrays that did not fit each other."""
+    bpy.ops.wm.open_mainfile(filepath=str(saved))
+    bpy.context.window_manager.radiosity_live = True
+    live_state.state.live._begin()
+    change_lights()
+    bpy.context.view_layer.update()
+    assert live_state.state.live._dirty
+    while not live_state.state.live._exact:
+        assert live_state.state.live.step(patient=True), live_state.state.message
+    followed = lightmap()
+    bpy.context.window_manager.radiosity_live = False
+    assert relight() == {"FINISHED"}
+    np.testing.assert_allclose(followed, lightmap(), rtol=1e-3, atol=1e-4)
+    live_state.stop()
+
+
+def test_its_message_goes_with_what_it_is_about(live: bpy.types.WindowManager) -> None:
+    def fail() -> None:
+        live.radiosity_live = True
+        settle()
+        bpy.data.objects["Bulb"].location.x += 0.1
+        settle()
+        assert "Live is off" in live_state.state.message
+        assert not live.radiosity_live
+        bpy.data.objects["Bulb"].location.x -= 0.1
+
+    fail()
+    assert relight() == {"FINISHED"}
+    assert live_state.state.message == ""
+    fail()
+    assert bpy.ops.radiosity.restore("EXEC_DEFAULT") == {"FINISHED"}
+    assert live_state.state.message == ""
+
+
+def test_files_and_pictures_agree_after_undo_and_redo(live: bpy.types.WindowManager) -> None:
+    """Also where a step was remembered while only sums were shown."""
+    bpy.ops.ed.undo_push(message="on")
+    for energy in (150.0, 300.0):
+        bpy.data.objects["Bulb"].data.energy = energy
+        follow()
+        bpy.ops.ed.undo_push(message="dragged")
+        settle()
+    bpy.ops.ed.undo_push(message="at rest")
+    brightest = lightmap()
+    for step in (bpy.ops.ed.undo, bpy.ops.ed.undo, bpy.ops.ed.redo, bpy.ops.ed.redo):
+        step()
+        settle()
+        image = bpy.data.images["lightmap.exr"]
+        assert image[VERSION] == digest(Path(bpy.path.abspath(image.filepath_raw)))
+        shown = lightmap()
+        image.reload()
+        np.testing.assert_array_equal(lightmap(), shown)
+        assert not lightmap_versions.state.message
+    assert relative(lightmap(), brightest) < 2e-3
+    live.radiosity_live = False
+    bpy.ops.ed.undo()
+    image = bpy.data.images["lightmap.exr"]
+    assert image[VERSION] == digest(Path(bpy.path.abspath(image.filepath_raw)))
 
 
 def test_nothing_is_raised_from_the_handler(

@@ -19,7 +19,12 @@ from radiosity_addon.settings import BakeSettings
 ROOT = Path(__file__).resolve().parents[2]
 
 
-OURS = str(["alike", "blender", "errors", "file_names", "manifest", "methods", "remaining", "settings"])
+OURS = str(
+    [
+        *("alike", "blender", "errors", "file_names", "held_files", "manifest", "methods", "remaining"),
+        *("report", "settings", "sidecar_names", "staging"),
+    ]
+)
 """What registering imports beside Blender's side; none of it is heavy."""
 
 

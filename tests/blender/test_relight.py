@@ -159,6 +159,7 @@ def test_a_bake_is_kept_in_memory_until_restore_or_another_file(baked: Path) -> 
     assert bpy.ops.radiosity.restore("EXEC_DEFAULT") == {"FINISHED"}
     assert kept_bakes.find(bpy.context.scene) is None
     assert not bpy.ops.radiosity.relight.poll()
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     assert not kept_bakes._kept
 
 
@@ -240,7 +241,7 @@ def test_sidecars_that_do_not_fit_are_refused(baked: Path, wrong: str) -> None:
     elif wrong == "another bake":
         kept_bakes.set_mark(bpy.context.scene, "other")
         kept_bakes.mark_images([bpy.data.images[LIGHTMAP]], "other")
-        message = "belongs to another bake"
+        message = "has no sidecar of its own"
     elif wrong == "missing":
         path.unlink()
         message = "has no sidecar"
@@ -323,6 +324,56 @@ def test_the_command_line_keeps_and_relights(folder: Path, tmp_path: Path) -> No
     assert main(["bake", str(output / "baked.blend"), "--output", str(output), "--relight"]) == 2
     sidecar.unlink()
     assert main(relit) == 1
+
+
+def test_a_sidecar_that_a_later_bake_left_over_is_refused(folder: Path, tmp_path: Path) -> None:
+    """It put the earlier bake over the later one."""
+    output, plain = tmp_path / "out", str(folder / "plain.blend")
+    settings = ["--resolution", "16", "--quality", "draft", "--quiet"]
+    assert main(["bake", plain, "--output", str(output), "--keep", *settings]) == 0
+    assert main(["bake", plain, "--output", str(output), "--relight", "--quiet"]) == 0
+    assert main(["bake", plain, "--output", str(output), *settings]) == 0
+    before = {path.name: path.read_bytes() for path in output.iterdir()}
+    assert main(["bake", plain, "--output", str(output), "--relight", "--quiet"]) == 1
+    assert {path.name: path.read_bytes() for path in output.iterdir()} == before
+
+
+@pytest.mark.parametrize("change", ["flipped", "swapped"])
+def test_textures_and_uvs_that_changed_are_noticed(tmp_path: Path, change: str) -> None:
+    """With the same mean: the light was wrong by up to 72 %, and nobody said so."""
+    radiosity_addon.register()
+    # Of each triangle one half is dark, whichever way the picture is mirrored.
+    checker = bpy.data.images.new("Checker", 8, 8)
+    pixels = np.ones((8, 8, 4), dtype=np.float32)
+    pixels[:4, :4, :3] = pixels[4:, 4:, :3] = 0.05
+    checker.pixels.foreach_set(pixels.ravel())
+    floor = shader_material("Checkered", "ShaderNodeBsdfDiffuse")
+    tree = floor.node_tree
+    texture = tree.nodes.new("ShaderNodeTexImage")
+    texture.image, texture.interpolation = checker, "Closest"
+    (diffuse,) = (node for node in tree.nodes if node.type == "BSDF_DIFFUSE")
+    tree.links.new(texture.outputs["Color"], diffuse.inputs["Color"])
+    obj = add_mesh("Floor", material=floor)
+    add_mesh("Wall", rotation_euler=(1.57, 0, 0), location=(0, 1, 0.5), scale=(1, 0.5, 1))
+    add_lamp("POINT", "Bulb", {"location": (0, 0, 1)}, energy=40.0)
+    uv = obj.data.uv_layers.new(name="UVMap")
+    corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], dtype=np.float32)
+    uv.data.foreach_set("uv", corners[: len(uv.data)].ravel())
+    bpy.context.scene.radiosity.resolution, bpy.context.scene.radiosity.quality = 16, "draft"
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
+    assert bake() == {"FINISHED"}
+    bpy.data.objects["Bulb"].data.energy = 50.0
+    assert relight() == {"FINISHED"}
+    if change == "swapped":
+        checker.pixels.foreach_set(np.ascontiguousarray(pixels[:, ::-1]).ravel())
+        checker.update()
+    else:
+        record = bpy.data.objects["Floor"].radiosity_bake
+        for mesh in (record.original_mesh, bpy.data.objects["Floor"].data):
+            layer = (mesh or bpy.data.objects["Floor"].data).uv_layers["UVMap"]
+            layer.data.foreach_set("uv", (abs((1.0, 0.0) - corners)).astype(np.float32).ravel())
+    with pytest.raises(RuntimeError, match=r"object 'Floor'.*: bake again"):
+        relight()
 
 
 def test_sliders_are_found_for_every_light(baked: Path) -> None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import struct
+import tracemalloc
 import zlib
 from pathlib import Path
 
@@ -11,7 +13,7 @@ import numpy as np
 import pytest
 
 from radiosity_addon import array_file
-from radiosity_addon.array_file import ArrayFileError, read_arrays, write_arrays
+from radiosity_addon.array_file import ArrayFileError, TooLargeError, read_arrays, write_arrays
 
 MAGIC = b"TESTS"
 ARRAYS = [
@@ -94,11 +96,46 @@ def test_a_file_that_was_forged_is_refused(tmp_path: Path, entry: object) -> Non
         read_arrays(path, MAGIC, 3)
 
 
-def test_no_more_is_unpacked_than_there_is_room_for(tmp_path: Path) -> None:
-    path, bomb = tmp_path / "bomb", zlib.compress(bytes(10_000_000))
-    forged(path, {"told": None, "arrays": [{"kind": "uint8", "shape": [4], "blocks": [len(bomb)]}]}, bomb)
-    _, (array,) = read_arrays(path, MAGIC, 3)
-    np.testing.assert_array_equal(array, [0, 0, 0, 0])
+@pytest.mark.parametrize("claimed", [4, 5_000_000, 10_000_000, 1 << 35])
+def test_bombs_are_refused_before_anything_of_their_size_is_allocated(tmp_path: Path, claimed: int) -> None:
+    """10 MB of zeros in 10 kB, and claims that a file of this size cannot keep."""
+    path, packed = tmp_path / "bomb", zlib.compress(bytes(400_000_000))
+    blocks = [len(packed)] * -(-claimed // array_file.BLOCK)
+    forged(path, {"told": None, "arrays": [{"kind": "uint8", "shape": [claimed], "blocks": blocks}]}, packed)
+    tracemalloc.start()
+    with pytest.raises(ArrayFileError, match=r"damaged|cannot"):
+        read_arrays(path, MAGIC, 3)
+    assert tracemalloc.get_traced_memory()[1] < 50_000_000
+    tracemalloc.stop()
+
+
+def test_a_description_that_is_a_bomb_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "bomb"
+    forged(path, {"told": " " * 300_000_000, "arrays": []}, b"")
+    tracemalloc.start()
+    with pytest.raises(ArrayFileError, match="damaged"):
+        read_arrays(path, MAGIC, 3)
+    assert tracemalloc.get_traced_memory()[1] < 100_000_000
+    tracemalloc.stop()
+    forged(path, json.loads("[" * 900 + "]" * 900), b"")  # type: ignore[arg-type]
+    with pytest.raises(ArrayFileError, match="damaged"):
+        read_arrays(path, MAGIC, 3)
+
+
+def test_what_exceeds_the_memory_that_is_allowed_is_refused(path: Path) -> None:
+    total = sum(array.nbytes for array in ARRAYS)
+    read_arrays(path, MAGIC, 3, most=total)
+    for most in (total - 1, path.stat().st_size - 1):
+        with pytest.raises(TooLargeError, match="memory limit"):
+            read_arrays(path, MAGIC, 3, most=most)
+
+
+def test_what_is_no_file_is_refused_at_once(tmp_path: Path) -> None:
+    """A pipe that nobody writes to would be waited for without end."""
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path / "pipe", Path("/dev/zero"), tmp_path):
+        with pytest.raises(ArrayFileError, match="no such file"):
+            read_arrays(path, MAGIC, 3)
 
 
 def test_objects_cannot_be_written(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,10 +20,18 @@ from radiosity_addon.relight_check import aligned, dark, strengths_in
 from radiosity_addon.relighting import KeptBake, relight
 from radiosity_addon.responses import Responses
 from radiosity_addon.settings import BakeSettings
-from radiosity_addon.sidecar import MAGIC, VERSION, read_sidecar, write_sidecar
+from radiosity_addon.sidecar import (
+    MAGIC,
+    VERSION,
+    check_belongs,
+    read_sidecar,
+    sidecar_entry,
+    write_sidecar,
+)
 from radiosity_addon.solver import PointLight, Scene
 from radiosity_addon.solver.environment import EnvironmentImage
 from radiosity_addon.solver.steps import drain
+from radiosity_addon.solver.surface_images import SurfaceImages
 from tests.relit_rooms import BAKED, CHANGED, NAMES, lit_bake
 from tests.textured_rooms import furnace
 from tests.unit.texel_scenes import bake_scene
@@ -183,9 +192,10 @@ def test_only_known_classes_come_back_and_nothing_of_theirs_is_called(tmp_path: 
     told["objects"] = [{"class": "Loud", "has": {"kept": 3}}]
     told["tree"] = {"object": 0}
     assert restore(told, arrays, {Loud: ("kept",)}, {}).kept == 3
-    told["objects"][0]["has"]["other"] = 4
-    with pytest.raises(ValueError, match="unknown attribute"):
-        restore(told, arrays, {Loud: ("kept",)}, {})
+    for has in ({"kept": 3, "other": 4}, {}):
+        told["objects"][0]["has"] = has
+        with pytest.raises(ValueError, match="other attributes"):
+            restore(told, arrays, {Loud: ("kept",)}, {})
     write_arrays(tmp_path / "forged", MAGIC, VERSION, told, arrays)
     assert read_arrays(tmp_path / "forged", MAGIC, VERSION)[0] == told
     with pytest.raises(BakeError, match="damaged"):
@@ -209,3 +219,84 @@ def test_pages_are_sums_of_what_sources_add(room: tuple[BakeResult, KeptBake]) -
     found = responses.pages(CHANGED)[0]
     assert np.sqrt(((found - exact.pixels) ** 2).mean()) < 2e-3 * exact.pixels.mean()
     assert (found >= 0).all()
+
+
+def textured(change: str = "") -> BakeScene:
+    """A closed room of textured walls, its texture changed in a way that keeps every mean."""
+    scene = furnace(3.0)
+    images = scene.images
+    assert images is not None
+    values, uv = images.values.copy(), images.image_uv.copy()
+    if change == "texture":  # two texels of one triangle change places
+        values[4, 20], values[5, 22] = images.values[5, 22], images.values[4, 20]
+    elif change == "uv":
+        uv[:] = uv[:, [0, 2, 1]]
+    elif change == "brighter":
+        values[..., 3:6] *= np.float32(1.7)
+    elif change == "pattern":
+        values[4, 20, 3:6], values[5, 22, 3:6] = images.values[5, 22, 3:6], images.values[4, 20, 3:6]
+    elif change == "moved":  # the same texels, elsewhere in the image
+        values = np.concatenate([images.values, np.zeros_like(images.values)])
+        uv[..., 1] *= 0.5
+    changed = copy(scene)
+    changed.images = SurfaceImages(values, uv, images.textured)
+    if change == "brighter":
+        changed.emission = scene.emission * np.float32(1.7)
+    return bake_scene(changed, ("Room", 12))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ("texture", "a texture of object 'Room', or its UV map, has changed"),
+        ("uv", "a texture of object 'Room', or its UV map, has changed"),
+        ("pattern", "the pattern that object 'Room' emits has changed"),
+    ],
+)
+def test_textures_with_the_same_means_are_told_apart(tmp_path: Path, change: str, message: str) -> None:
+    """From the sidecar as well as from memory."""
+    wanted = BakeSettings(resolution=12, quality="draft", quantity="radiosity")
+    result, kept = drain(bake_and_keep(textured(), wanted))
+    write_sidecar(tmp_path / "lightmap.relight", kept, result, "mark")
+    stored = read_sidecar(tmp_path / "lightmap.relight")
+    for same in ("", "brighter", "moved"):
+        stored.kept(textured(same))
+    with pytest.raises(SceneError, match=message):
+        stored.kept(textured(change))
+    with pytest.raises(SceneError, match=message):
+        strengths_in(kept, textured(change))
+
+
+def test_only_the_sidecar_that_the_report_names_is_used(
+    room: tuple[BakeResult, KeptBake], path: Path, tmp_path: Path
+) -> None:
+    """A bake that is not kept leaves the file of an earlier one."""
+    result, kept = room
+    stored, report = read_sidecar(path), tmp_path / "report.json"
+    with pytest.raises(BakeError, match=r"report\.json' cannot be read"):
+        check_belongs(stored, report)
+    report.write_text(json.dumps({"kept": sidecar_entry(path, "mark")}))
+    check_belongs(stored, report)
+    for wrong in ("{}", "[]", '{"kept": 1}', json.dumps({"kept": sidecar_entry(path, "other")})):
+        report.write_text(wrong)
+        with pytest.raises(BakeError, match="bake again") as caught:
+            check_belongs(stored, report)
+        assert str(path) in str(caught.value) or str(report) in str(caught.value)
+    # The same bake written a second time is another file.
+    report.write_text(json.dumps({"kept": sidecar_entry(path, "mark")}))
+    write_sidecar(path, replace(kept, rings=kept.rings + 1), result, "mark")
+    with pytest.raises(BakeError, match="belongs to another bake"):
+        check_belongs(read_sidecar(path), report)
+
+
+def test_what_takes_more_memory_than_is_allowed_is_refused(path: Path) -> None:
+    with pytest.raises(BakeError, match="memory limit") as caught:
+        read_sidecar(path, memory_limit=1e-4)
+    assert str(path) in str(caught.value)
+
+
+def test_sidecars_of_the_first_version_are_refused_by_name(path: Path) -> None:
+    content = path.read_bytes()
+    path.write_bytes(content[:16] + (1).to_bytes(4, "little") + content[20:])
+    with pytest.raises(BakeError, match=f"'{path}' is not used: it has version 1.*; bake again"):
+        read_sidecar(path)

@@ -1,0 +1,176 @@
+"""Sidecars that were changed by hand, their digest made right again: refused in a line, or harmless."""
+
+from __future__ import annotations
+
+import copy
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from radiosity_addon.array_file import read_arrays, write_arrays
+from radiosity_addon.errors import RadiosityError, SceneError
+from radiosity_addon.pipeline import bake_and_keep
+from radiosity_addon.relighting import relight
+from radiosity_addon.settings import BakeSettings
+from radiosity_addon.sidecar import MAGIC, VERSION, read_sidecar, write_sidecar
+from radiosity_addon.solver.steps import drain
+from tests.relit_rooms import CHANGED, lit_bake
+
+Array = np.ndarray[Any, Any]
+
+SETTINGS = BakeSettings(resolution=8, quality="draft", threads=1)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, list[Array]]:
+    """What a sidecar holds."""
+    path = tmp_path_factory.mktemp("whole") / "lightmap.relight"
+    result, kept = drain(bake_and_keep(lit_bake(), SETTINGS))
+    write_sidecar(path, kept, result, "mark")
+    return read_arrays(path, MAGIC, VERSION)
+
+
+def outcome(path: Path, told: Any, arrays: list[Array]) -> str:
+    """Relight from a sidecar of these contents; return why it is refused, "" if it is not."""
+    write_arrays(path, MAGIC, VERSION, told, arrays)
+    scene = lit_bake(CHANGED)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of numbers that overflow
+            stored = read_sidecar(path)
+            pages = drain(relight(stored.kept(scene), CHANGED))
+            stored.result(scene, pages)
+    except SceneError as error:
+        return f"{path} is of another scene: {error}"
+    except RadiosityError as error:
+        return str(error)
+    for page in pages:
+        assert np.isfinite(page.pixels).all()
+        assert (page.pixels >= 0.0).all()
+    return ""
+
+
+def at_the_middle(value: float) -> Callable[[Array], Array]:
+    """Set one number of an array."""
+
+    def change(array: Array) -> Array:
+        changed = array.copy()
+        with np.errstate(all="ignore"):
+            changed.reshape(-1)[array.size // 2] = np.array(value).astype(array.dtype)
+        return changed
+
+    return change
+
+
+CHANGES: dict[str, Callable[[Array], Array]] = {
+    "nan": at_the_middle(np.nan),
+    "infinite": at_the_middle(np.inf),
+    "one below 0": at_the_middle(-1),
+    "far below 0": at_the_middle(-1e9),
+    "huge": at_the_middle(2**31 - 1),
+    "all huge": lambda array: np.full_like(array, 1e30 if array.dtype.kind == "f" else 2**31 - 1),
+    "all 0": np.zeros_like,
+    "other type": lambda array: array.astype("float64" if array.dtype.kind in "ib" else "int64"),
+    "unsigned": lambda array: array.astype("uint8"),
+    "cut off": lambda array: array[:-1],
+    "longer": lambda array: np.concatenate([array, array[-1:]]),
+    "flat": lambda array: array.reshape(-1, 1, 1),
+    "empty": lambda array: array[:0],
+    "backwards": lambda array: np.ascontiguousarray(array[::-1]),
+}
+
+
+NEVER_HARMLESS = {"nan", "infinite", "other type", "cut off", "longer", "flat", "all huge"}
+
+
+@pytest.mark.parametrize("name", list(CHANGES))
+def test_every_array_may_be_damaged(whole: tuple[Any, list[Array]], tmp_path: Path, name: str) -> None:
+    """Nothing but a named error, or light that is finite and not negative, comes of it."""
+    told, arrays = whole
+    path, refused, tried = tmp_path / "lightmap.relight", 0, 0
+    every = name in ("nan", "one below 0", "huge")
+    for number, array in enumerate(arrays):
+        # Of the other changes each array gets one in three.
+        if not array.size or not (every or (number + list(CHANGES).index(name)) % 3 == 0):
+            continue
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            damaged = CHANGES[name](array)
+        if damaged.dtype == array.dtype and np.array_equal(damaged, array):
+            continue
+        tried += 1
+        message = outcome(path, told, [*arrays[:number], damaged, *arrays[number + 1 :]])
+        assert "\n" not in message
+        if message:
+            refused += 1
+            assert str(path) in message, (number, array.dtype, array.shape, message)
+        elif array.dtype.kind == "f":
+            # No number that is not finite, negative where it may not be, or absurd passes unseen.
+            assert name not in {"nan", "infinite", "other type", "cut off", "longer", "flat", "all huge"}, (
+                number
+            )
+    assert refused > 0.1 * tried
+
+
+def leaves(node: Any, at: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """Yield where in a description plain values are."""
+    if isinstance(node, dict):
+        for key, item in node.items():
+            yield from leaves(item, (*at, key))
+    elif isinstance(node, list):
+        for number, item in enumerate(node):
+            yield from leaves(item, (*at, number))
+    else:
+        yield at
+
+
+def put(told: Any, at: tuple[Any, ...], value: Any) -> Any:
+    """Return a description with another value somewhere."""
+    changed = copy.deepcopy(told)
+    owner = changed
+    for key in at[:-1]:
+        owner = owner[key]
+    owner[at[-1]] = value
+    return changed
+
+
+@pytest.mark.parametrize(
+    "value",
+    [None, -1, 2**40, 0, 1, 1e30, float("nan"), "text", [], {}, {"object": 0}, {"array": 0}],
+    ids=repr,
+)
+def test_every_value_of_the_description_may_be_damaged(
+    whole: tuple[Any, list[Array]], tmp_path: Path, value: Any
+) -> None:
+    told, arrays = whole
+    path, refused = tmp_path / "lightmap.relight", 0
+    places = list(leaves(told))
+    # One in ten, others for each value.
+    for at in places[len(repr(value)) % 10 :: 10]:
+        message = outcome(path, put(told, at, value), arrays)
+        assert "\n" not in message
+        refused += bool(message)
+    assert refused
+
+
+def test_what_belongs_to_no_sidecar_is_refused(whole: tuple[Any, list[Array]], tmp_path: Path) -> None:
+    told, arrays = whole
+    path = tmp_path / "lightmap.relight"
+    assert outcome(path, told, arrays) == ""
+    for wrong in (
+        {},
+        [],
+        None,
+        {"tree": 1},
+        {"tree": {}, "objects": []},
+        {**told, "objects": told["objects"][:3]},
+    ):
+        assert str(path) in outcome(path, wrong, arrays)
+    deep: Any = None
+    for _ in range(400):
+        deep = {"list": [deep]}
+    assert str(path) in outcome(path, {**told, "tree": deep}, arrays)
