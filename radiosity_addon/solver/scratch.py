@@ -64,7 +64,7 @@ class Scratch:
         if size < SMALLEST:
             return np.empty(shape, dtype)
         if size <= self.room():
-            return self._counted(np.empty(shape, dtype))
+            return self.counted(np.empty(shape, dtype))
         self.in_files += size
         with _temporary_file() as file:
             return _mapped(file, 0, shape, dtype)
@@ -85,8 +85,10 @@ class Scratch:
         """Return a table that grows by blocks of rows."""
         return Rows(self, width, dtype)
 
-    def _counted(self, array: Array) -> Array:
-        """Count an array until it is gone."""
+    def counted(self, array: Array) -> Array:
+        """Count an array in memory until it is gone."""
+        if array.nbytes < SMALLEST:
+            return array
         with _lock:
             self.in_memory += array.nbytes
         weakref.finalize(array, self._uncount, array.nbytes)
@@ -104,7 +106,7 @@ class Rows:
         self._scratch, self._width, self._dtype = scratch, width, np.dtype(dtype)
         self._blocks: list[Array] = []
         self._pending: list[Array] = []
-        self._count = self._waiting = self._in_memory = 0
+        self._count = self._waiting = 0
         self._file: BinaryIO | None = None
 
     def more(self, count: int) -> Array:
@@ -113,14 +115,13 @@ class Rows:
         self._count += count
         # Blocks in memory are joined at last: for a moment they are there twice.
         size = self._count * row
-        if self._file is None and size >= SMALLEST and 2 * size > self._scratch.room() + self._in_memory:
+        if self._file is None and size >= SMALLEST and size + count * row > self._scratch.room():
             self._file = _temporary_file()
         if self._file is None or count == 0:
-            block = np.empty((count, self._width), self._dtype)
+            block = self._scratch.counted(np.empty((count, self._width), self._dtype))
         else:
             self._scratch.in_files += count * row
             block = _mapped(self._file, start * row, (count, self._width), self._dtype)
-        self._in_memory += block.nbytes if self._file is None else 0
         self._blocks.append(block)
         return block
 
@@ -144,7 +145,7 @@ class Rows:
         shape = (self._count, self._width)
         if self._file is None:
             joined = np.concatenate(blocks) if blocks else np.empty(shape, self._dtype)
-            return self._scratch._counted(joined) if joined.nbytes >= SMALLEST else joined
+            return self._scratch.counted(joined)
         with self._file:
             result = _mapped(self._file, 0, shape, self._dtype)
         start = 0
