@@ -36,10 +36,11 @@ def test_a_test_backs_it(promise: str) -> None:
         assert name in functions, f"{path} has no {name}"
 
 
-def test_every_promise_test_is_named() -> None:
-    path = "tests/blender/test_promises.py"
+@pytest.mark.parametrize(
+    "path", ["tests/blender/test_promises.py", "tests/blender/test_promises_of_scenes.py"]
+)
+def test_every_promise_test_is_named(path: str) -> None:
     tree = ast.parse((ROOT / path).read_text(encoding="utf-8"))
-    tests = {
-        node.name for node in tree.body if isinstance(node, ast.FunctionDef) and node.name.startswith("test_")
-    }
+    functions = [node.name for node in tree.body if isinstance(node, ast.FunctionDef)]
+    tests = {name for name in functions if name.startswith("test_")}
     assert tests == {name for promise in PROMISES for file, name in NAMED.findall(promise) if file == path}
