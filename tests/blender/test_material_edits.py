@@ -201,7 +201,7 @@ def test_every_kind_of_value_is_written_in_place() -> None:
     assert (material["note"], list(material["other"])) == (4, [1.0, 2.0])
 
 
-def test_emission_sampling_and_light_groups_of_the_users_choice_survive(paint: Material) -> None:
+def test_emission_sampling_that_the_user_chose_survives(paint: Material) -> None:
     copy = copy_of(paint)
     assert (copy.cycles.emission_sampling, paint.cycles.emission_sampling) == ("NONE", "AUTO")
     copy.cycles.emission_sampling = "FRONT"
