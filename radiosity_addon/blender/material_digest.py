@@ -114,7 +114,9 @@ def _node(node: bpy.types.Node, as_copy: bool, keyed: set[str]) -> list[Any]:
             value = value[ORIGINAL]
         content.append(read(value))
     inputs = node.inputs
-    content += [list(map(_IDENTIFIER, inputs)), _values(inputs, keyed)]
+    content.append(_values(inputs, keyed))
+    if kind == "GROUP":  # others have the inputs that their properties say
+        content.append(list(map(_IDENTIFIER, inputs)))
     if kind in OUTPUTS_WITH_VALUES:
         content.append(_values(node.outputs, keyed))
     if node.keys():
