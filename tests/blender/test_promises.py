@@ -260,12 +260,12 @@ def test_a_sidecar_of_an_earlier_bake_is_refused(room: Path, run: Run) -> None:
 
 @pytest.mark.parametrize("change", ["pixels", "UVs"])
 def test_a_changed_texture_is_noticed(change: str, room: Path, run: Run) -> None:
-    """One with the same mean, or another way round."""
-    picture = bpy.data.images.new("Halves", 8, 8)
-    halves = np.zeros((8, 8, 4), dtype=np.float32)
-    halves[:, :4] = 1
-    halves[..., 3] = 1
-    picture.pixels.foreach_set(halves.ravel())
+    """A checker is inverted, or its UVs are flipped: the mean of each triangle stays."""
+    picture = bpy.data.images.new("Checker", 8, 8)
+    rows, columns = np.indices((8, 8)) // 2
+    checker = np.ones((8, 8, 4), dtype=np.float32)
+    checker[..., :3] = ((rows + columns) % 2)[..., None]
+    picture.pixels.foreach_set(checker.ravel())
     picture.pack()
     nodes = bpy.data.materials["White"].node_tree
     texture = nodes.nodes.new("ShaderNodeTexImage")
@@ -278,8 +278,8 @@ def test_a_changed_texture_is_noticed(change: str, room: Path, run: Run) -> None
     before = tree(room / "out")
     bpy.ops.wm.open_mainfile(filepath=str(room / "room.blend"))
     if change == "pixels":
-        picture = bpy.data.images["Halves"]
-        picture.pixels.foreach_set(np.ascontiguousarray(halves[:, ::-1]).ravel())
+        picture = bpy.data.images["Checker"]
+        picture.pixels.foreach_set(np.ascontiguousarray(checker[:, ::-1]).ravel())
         picture.pack()
     else:
         layer = bpy.data.meshes["Floor"].uv_layers["UVMap"]
@@ -287,5 +287,5 @@ def test_a_changed_texture_is_noticed(change: str, room: Path, run: Run) -> None
     save(room / "room.blend")
     code, told = run(*relight)
     assert code == 1
-    assert "Floor" in told or "White" in told or "Halves" in told
+    assert "Floor" in told or "White" in told or "Checker" in told
     assert changes(before, tree(room / "out")) == []
