@@ -11,10 +11,10 @@ from radiosity_addon.solver.scene import Scene
 
 
 class Texels:
-    """As much of a `TexelGeometry` as counts: the triangle of each texel."""
+    """As much of a `TexelGeometry` as counts: how many texels each triangle has."""
 
     def __init__(self, *counts: int) -> None:
-        self.triangle = np.repeat(np.arange(len(counts)), counts)
+        self.counts = np.array(counts)
 
 
 def warnings(*counts: int) -> dict[str, str]:
