@@ -18,7 +18,7 @@ from ..keeping import Keeping
 from ..permissions import Permissions
 from ..settings import BakeSettings
 from . import kept_bakes, runtime
-from .single_files import check_existing, check_places, owner_told
+from .single_files import check_existing, check_places, make_folder_of, owner_told
 
 if TYPE_CHECKING:
     from .output import OutputFolder
@@ -99,12 +99,14 @@ def bake(
             interrupts.deferred = True
             job.close()
         if report_copy is not None:
+            make_folder_of(report_copy)
             report.write_copy(report_copy)
         files = written_files(report.as_dict(), preview)
         if plot is not None:
             from .plot import render_plot
 
             console.progress("plot", 1.0)
+            make_folder_of(plot)
             render_plot(report.as_dict(), plot.resolve())
             files.append((str(plot), "how it was solved"))
         console.lines(summary(str(output), files, report.as_dict()))
@@ -204,6 +206,7 @@ def restore(
         for each in bpy.data.scenes:
             runtime.forget(each)
             kept_bakes.drop(each)
+        make_folder_of(output)
         save_restored(output)
         lines = [f"{count} object{'' if count == 1 else 's'} restored, written to {output}"]
         console.lines([*lines, *(f"warning: {warning.message}" for warning in restored.warnings)])

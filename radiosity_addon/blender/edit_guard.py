@@ -16,7 +16,6 @@ from mathutils import Matrix
 from . import runtime
 from .bake_record import is_made
 from .edit_modes import leave_edit_mode_of
-from .stand_ins import EVALUATED, moved_place, placed, stand_in_of
 
 DELAY = 0.05
 """Seconds after a change until it is looked at."""
@@ -38,6 +37,8 @@ def _note(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 def _is_guarded(obj: bpy.types.Object) -> bool:
     if is_made(obj):
         return True
+    from .stand_ins import EVALUATED, stand_in_of
+
     known = stand_in_of(obj.data) if isinstance(obj.data, bpy.types.Mesh) else None
     return known is not None and known.kind == EVALUATED
 
@@ -54,6 +55,8 @@ def _look() -> None:
 
 def refuse(context: bpy.types.Context) -> list[str]:
     """Put stand-ins back that were noted as changed; returns what to say of each."""
+    from .stand_ins import moved_place, placed
+
     names, messages = sorted(_noted), []
     _noted.clear()
     for name in names:

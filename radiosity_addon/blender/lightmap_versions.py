@@ -18,24 +18,26 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import bpy
 from bpy.app.handlers import persistent
 
 from .. import manifest
 from ..errors import BakeError, RadiosityError
+from ..file_names import REPORT_NAME
 from ..held_files import MOST_FILES, HeldFiles
-from ..report import BakeReport
 from ..sidecar_names import KEPT
 from . import live_state, overlay_view
 from .bake_record import is_made
 from .drawing import redraw_viewports
 from .image_marks import PAGE, REPORT, VERSION
 from .lightmap_reports import forget_reports, images_described, listed_in, report_of
-from .output import REPORT_NAME, OutputFolder
 from .ownership import own_reports
 from .window_job import redraw_sidebars
+
+if TYPE_CHECKING:
+    from .output import OutputFolder
 
 TICK = 0.02
 """Seconds between two looks at whether files have been copied."""
@@ -106,6 +108,8 @@ def unsettle(images: Iterable[bpy.types.Image]) -> None:
 
 def _open(report: Path) -> OutputFolder:
     """Open the folder of a report of this file for files that it lists."""
+    from .output import OutputFolder
+
     for scene in bpy.data.scenes:
         for own in own_reports(report.parent, scene):
             if own.names.report == report.name:
@@ -259,6 +263,8 @@ def _cancel() -> None:
 
 def _stage_report(output: OutputFolder, wanted: Sequence[Wanted]) -> None:
     """Write the report that the files had, with all that lies in the folder now."""
+    from ..report import BakeReport
+
     now = output.earlier or {}
     told = next((state.reports[one.version] for one in wanted if one.version in state.reports), now)
     before, listed = (report.get(manifest.FILES, {}) for report in (told, now))

@@ -23,7 +23,6 @@ from ..settings import (
 from .method_properties import MethodProperties, given_settings
 from .object_roles import BAKE, BAKEABLE_TYPES
 from .preferences import DEFAULT_FOLDER, memory_limit_of, threads_of
-from .stand_ins import source_name
 
 DEFAULTS = BakeSettings()
 
@@ -280,6 +279,8 @@ def settings_of(context: bpy.types.Context) -> BakeSettings:
 
 def selected_meshes(context: bpy.types.Context) -> tuple[str, ...]:
     """Return the names of the selected objects that show a surface when rendered and are to be baked."""
+    from .stand_ins import source_name
+
     return tuple(
         source_name(obj)
         for obj in context.view_layer.objects.selected

@@ -23,7 +23,7 @@ from ..settings import BakeSettings
 from ..sidecar import StoredBake, check_belongs, read_sidecar
 from ..solver.steps import drain
 from .commands import open_or_build, output_of, registered, same_file, written_files
-from .single_files import check_places
+from .single_files import check_places, make_folder_of
 
 if TYPE_CHECKING:
     from .output import OutputFolder
@@ -93,6 +93,7 @@ def relight(
             interrupts.deferred = True
             job.close()
         if report_copy is not None:
+            make_folder_of(report_copy)
             report.write_copy(report_copy)
         files = written_files(report.as_dict(), preview)
         console.lines(summary(str(output), files, report.as_dict()))

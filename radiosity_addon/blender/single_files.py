@@ -73,15 +73,15 @@ def owner_told(owner: Owner, output: Path) -> dict[str, str]:
 
 
 def check_writable(path: Path) -> None:
-    """Make the folder of a file to be written later, and see that files can be written there.
+    """See that a file can be written later, in its folder or in the one in which that will be made.
 
     Raises
     ------
     BakeError
         If not.
     """
-    make_folder_of(path)
-    aside = path.with_name(f".{path.name}.{os.getpid()}.part")
+    folder = next((each for each in path.absolute().parents if os.path.lexists(each)), path.parent)
+    aside = folder / f".{path.name}.{os.getpid()}.part"
     try:
         aside.open("x").close()
         aside.unlink()

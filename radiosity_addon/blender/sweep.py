@@ -111,11 +111,12 @@ def _remove_materials() -> None:
     for material in [block for block in bpy.data.materials if is_made(block) and block.library is None]:
         if material in shown:
             continue
-        if _is_wanted(material):
+        original = material.get(ORIGINAL)
+        # Edits, and with them the user's marks, have been carried to an original of this file.
+        if _is_wanted(material) and (original is None or original.library is not None):
             unmark_made(material)
             material.pop(ORIGINAL, None)
             continue
-        original = material.get(ORIGINAL)
         if original is not None and material.users:
             material.user_remap(original)
         gone.append(material)

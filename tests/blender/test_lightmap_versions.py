@@ -16,8 +16,8 @@ import pytest
 
 import radiosity_addon
 from radiosity_addon.blender import kept_bakes, lightmap_versions
-from radiosity_addon.blender.image_marks import VERSION
-from radiosity_addon.manifest import listed
+from radiosity_addon.blender.image_marks import REPORT, VERSION
+from radiosity_addon.manifest import FILES, read_report
 from tests.blender.scenes import add_lamp, add_mesh
 
 Array = np.ndarray[Any, Any]
@@ -82,6 +82,12 @@ def seen() -> Seen:
     return Seen(pixels, uvs, kept_bakes.mark_of(bpy.context.scene))
 
 
+def lightmap_file(room: Path) -> Path:
+    """The only lightmap of a room that was baked from the panel."""
+    (path,) = (room / "lightmaps").glob("*.exr")
+    return path
+
+
 def assert_files_agree() -> None:
     """What is on the disk is what the images say, and the report lists it."""
     assert not lightmap_versions.state.message
@@ -91,7 +97,8 @@ def assert_files_agree() -> None:
         path = Path(bpy.path.abspath(image.filepath_raw))
         digest = hashlib.sha256(path.read_bytes()).hexdigest()
         assert digest == image[VERSION]
-        assert listed(path.parent / "report.json")[path.name]["sha256"] == digest
+        report = read_report(path.with_name(image[REPORT]))
+        assert report[FILES][path.name]["sha256"] == digest
         on_disk = bpy.data.images.load(str(path))
         on_disk.colorspace_settings.name = "Non-Color"
         assert np.array_equal(values_of(on_disk), values_of(image))
@@ -102,7 +109,7 @@ def test_undo_of_a_second_bake_brings_the_first_picture_back(room: Path) -> None
     """Also after saving and opening: the defect showed the old UVs with the new picture."""
     bake()
     first = seen()
-    report = json.loads((room / "lightmaps" / "report.json").read_text())
+    report = json.loads(next((room / "lightmaps").glob("*report.json")).read_text())
     bpy.data.objects["Bulb"].data.energy = 200.0
     bake(resolution=24)
     second = seen()
@@ -110,7 +117,7 @@ def test_undo_of_a_second_bake_brings_the_first_picture_back(room: Path) -> None
     bpy.ops.ed.undo()
     assert seen() == first
     assert_files_agree()
-    restored = json.loads((room / "lightmaps" / "report.json").read_text())
+    restored = json.loads(next((room / "lightmaps").glob("*report.json")).read_text())
     assert restored["objects"] == report["objects"]
     bpy.ops.ed.redo()
     assert seen() == second
@@ -210,12 +217,12 @@ def test_what_is_no_longer_held_is_said_and_not_shown_silently(room: Path) -> No
 def test_a_version_that_was_changed_meanwhile_is_not_brought_back(room: Path) -> None:
     bake()
     bake(resolution=24)
-    newest = (room / "lightmaps" / "lightmap.exr").read_bytes()
+    newest = lightmap_file(room).read_bytes()
     (version,) = Path(bpy.app.tempdir).glob("radiosity-versions-*/*")
     version.write_bytes(b"changed")
     bpy.ops.ed.undo()
     assert "another bake" in lightmap_versions.state.message
-    assert (room / "lightmaps" / "lightmap.exr").read_bytes() == newest
+    assert lightmap_file(room).read_bytes() == newest
 
 
 def test_opening_an_older_file_says_so_and_touches_nothing(room: Path) -> None:

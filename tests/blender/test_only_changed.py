@@ -14,6 +14,7 @@ import pytest
 import radiosity_addon
 from radiosity_addon.blender import runtime
 from radiosity_addon.blender.bake_record import mark_made, recorded_objects
+from radiosity_addon.blender.copy_marks import ADDED
 from tests.blender.scenes import add_lamp, add_mesh, shader_material
 
 
@@ -216,7 +217,8 @@ def test_objects_with_several_lightmaps_are_all_lit_anew(room: Path) -> None:
     image = bpy.data.images.new("lightmap_Kitchen", 4, 4)
     mark_made(image)
     (material,) = bpy.data.objects["Floor"].data.materials
-    material.node_tree.nodes.new("ShaderNodeTexImage").image = image
+    node = material.node_tree.nodes.new("ShaderNodeTexImage")
+    node.image, node[ADDED] = image, "Kitchen"  # no edit of the user's
     bpy.data.objects["Box"].location.x -= 0.5
     assert bake() == {"FINISHED"}
     assert shown() == ONE_PAGE

@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[2]
 OURS = str(
     [
         *("alike", "blender", "errors", "file_names", "held_files", "manifest", "methods", "remaining"),
-        *("report", "settings", "sidecar_names", "staging"),
+        *("settings", "sidecar_names"),
     ]
 )
 """What registering imports beside Blender's side; none of it is heavy."""

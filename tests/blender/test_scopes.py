@@ -13,6 +13,7 @@ from radiosity_addon.blender import kept_bakes, runtime
 from radiosity_addon.blender.bake_record import recorded_objects
 from radiosity_addon.blender.job import run_bake
 from radiosity_addon.blender.output import OutputFolder
+from radiosity_addon.blender.ownership import panel_names
 from radiosity_addon.blender.restore import restore
 from radiosity_addon.blender.scopes import files_of
 from radiosity_addon.errors import BakeError
@@ -48,7 +49,7 @@ def bake(scene: bpy.types.Scene, output: Path | None = None, **settings: object)
     """Bake a scene; returns the warnings that name an object."""
     bpy.context.window.scene = scene
     wanted = BakeSettings(**{"resolution": 32, "quality": "draft", **settings})
-    job = run_bake(bpy.context, wanted, None if output is None else OutputFolder(output))
+    job = run_bake(bpy.context, wanted, None if output is None else OutputFolder(output, panel_names(scene)))
     while True:
         try:
             next(job)
@@ -70,7 +71,7 @@ def test_a_bake_of_another_scene_leaves_the_first(scenes, tmp_path: Path) -> Non
     first, second = scenes
     bake(first, tmp_path)
     before = images()
-    file = next(tmp_path.glob("*.exr"))
+    (file,) = tmp_path.glob("*.exr")
     pixels = file.read_bytes()
     warnings = bake(second, tmp_path)
     after = images()
@@ -85,12 +86,14 @@ def test_a_bake_of_another_scene_leaves_the_first(scenes, tmp_path: Path) -> Non
     bake(first, tmp_path)
     assert images()["B1"] == after["B1"]
     assert images()["Both"] == images()["A1"]
-    assert len([image for image in bpy.data.images if image.name.startswith("lightmap")]) == 2
+    assert len([image for image in bpy.data.images if "lightmap" in image.name]) == 2
     assert not any(block.name.startswith(".earlier") for block in [*bpy.data.images, *bpy.data.materials])
 
 
 def test_restore_is_of_the_scene_and_the_command_line_s_of_the_file(scenes) -> None:
     first, second = scenes
+    for scene in scenes:  # or world matrices are not known yet
+        scene.view_layers[0].update()
     dump_file()
     before = dump_file()
     bake(first)
@@ -101,7 +104,8 @@ def test_restore_is_of_the_scene_and_the_command_line_s_of_the_file(scenes) -> N
     assert runtime.last_bake(first) is None
     assert runtime.last_bake(second) is not None
     assert restore(bpy.context) == 2
-    runtime.forget(second)
+    for scene in scenes:  # to ask leaves a trace, before Blender 5.0
+        runtime.forget(scene)
     assert differences_since(before, dump_file()) == []
 
 
@@ -115,11 +119,11 @@ def test_what_is_not_selected_keeps_its_lightmap(scenes) -> None:
     assert after["A1"] != before["A1"]
     bake(first, objects=("A2", "Both"))
     assert images()["A1"] == after["A1"]
-    assert len([image for image in bpy.data.images if image.name.startswith("lightmap")]) == 2
+    assert len([image for image in bpy.data.images if "lightmap" in image.name]) == 2
     bake(first)
     assert len(set(images().values())) == 1
     restore(bpy.context)
-    assert [image.name for image in bpy.data.images if image.name.startswith("lightmap")] == []
+    assert [image.name for image in bpy.data.images if "lightmap" in image.name] == []
 
 
 def test_an_instance_that_is_not_selected_keeps_its_lightmap(scenes) -> None:
