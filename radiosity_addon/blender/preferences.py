@@ -83,8 +83,10 @@ def preferences(context: bpy.types.Context) -> Any:
 
 def folder_of(context: bpy.types.Context) -> str:
     """Return where a scene's lightmaps go: its own folder, or the preferences'."""
-    group = context.scene.radiosity
-    chosen: str = group.output_folder if group.is_property_set("output_folder") else ""
+    scene, chosen = context.scene, ""
+    # Merely reading the settings would leave them in a file that has none.
+    if scene.is_property_set("radiosity") and scene.radiosity.is_property_set("output_folder"):
+        chosen = scene.radiosity.output_folder
     return chosen.strip() or preferences(context).output_folder.strip() or DEFAULT_FOLDER
 
 
