@@ -51,7 +51,7 @@ LIGHT_SHARE = 0.25
 
 
 STALLED = 200
-"""Iterations in which the residual must fall by a tenth; else links whose sums are off keep it from falling."""
+"""Iterations in which the residual must fall by a tenth; where it does not, sums of links are off."""
 
 
 @dataclass
