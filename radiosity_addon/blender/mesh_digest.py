@@ -127,5 +127,8 @@ def _settings(mesh: bpy.types.Mesh) -> list[tuple[str, object]]:
         and not getattr(prop, "is_array", False)
         and prop.identifier not in _NOT_COUNTED
     ]
-    custom = [(key, repr(mesh[key])) for key in sorted(mesh.keys()) if not key.startswith("radiosity")]
+    # Before Blender 5.0, properties of add-ons are among them, merely because somebody read them.
+    known = mesh.bl_rna.properties
+    names = [key for key in sorted(mesh.keys()) if key not in known and not key.startswith("radiosity")]
+    custom = [(key, repr(mesh[key])) for key in names]
     return [*plain, *custom]

@@ -183,7 +183,9 @@ def _place(obj: bpy.types.Object) -> list[float]:
 
 def _state(obj: bpy.types.Object) -> list:
     """Return what somebody may add to an object."""
-    custom = sorted(key for key in obj.keys() if not key.startswith("radiosity"))  # noqa: SIM118
+    # Before Blender 5.0, properties of add-ons are among them, merely because somebody read them.
+    known = obj.bl_rna.properties
+    custom = sorted(key for key in obj.keys() if key not in known and not key.startswith("radiosity"))  # noqa: SIM118
     action = obj.animation_data is not None
     return [
         obj.name.removeprefix(ASIDE),

@@ -54,6 +54,8 @@ def paint() -> Material:
 @pytest.mark.parametrize("kind", ["BSDF_PRINCIPLED", "BSDF_DIFFUSE"])
 def test_another_base_color_shows_at_once(kind: str, tmp_path: Path) -> None:
     material = bpy.data.materials.new("Paint")
+    if bpy.app.version < (5, 0):
+        material.use_nodes = True
     if kind == "BSDF_DIFFUSE":
         tree = with_nodes(material)
         node = add_node(tree, "ShaderNodeBsdfDiffuse", Color=(*BASE, 1.0))

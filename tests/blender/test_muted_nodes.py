@@ -188,6 +188,9 @@ def cut_before_mute(tree: Tree) -> Socket:
     return node.outputs[0]
 
 
+DIFFERENT_BEFORE_5 = {"empty reroute", "unlinked hue into color", "group into color"}
+"""Nodes that lead to nothing: versions before 5.0 do not take the value of the socket that reads them."""
+
 CASES: dict[str, Callable[[Tree], Socket]] = {
     "mix": mix,
     "mix, factor linked": lambda tree: mix(tree, factor=True),
@@ -222,6 +225,8 @@ CASES: dict[str, Callable[[Tree], Socket]] = {
 @pytest.mark.parametrize("case", CASES)
 def test_bake_and_picture_agree_with_cycles(case: str, tmp_path: Path) -> None:
     """Under a sky of radiance 1 a square shows reflectance + emission; so it does with a lightmap of 1."""
+    if bpy.app.version < (5, 0) and case in DIFFERENT_BEFORE_5:
+        pytest.skip("earlier versions of Cycles read the value of the last socket instead")
     material = bpy.data.materials.new("Case")
     tree = with_nodes(material)
     tree.links.new(CASES[case](tree), tree.nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])

@@ -157,6 +157,8 @@ def test_a_failed_bake_of_another_scene_changes_nothing(scenes, monkeypatch: pyt
     first, second = scenes
     bake(first)
     bpy.context.window.scene = second
+    for scene in scenes:  # or world matrices are not known yet
+        scene.view_layers[0].update()
     dump_file()
     before = dump_file()
 

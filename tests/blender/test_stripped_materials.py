@@ -61,7 +61,9 @@ def test_an_unedited_copy_comes_apart_into_the_original(kind: str, pinned: bool)
     bpy.data.materials.remove(stripped)
     assert carry_edits() == ()
     restore(bpy.context)
-    assert differences_since(before) == []
+    # Before Blender 5.0, a copy counts what it uses twice until the file is loaded again.
+    counts = "/users:" if bpy.app.version < (5, 0) else None
+    assert [each for each in differences_since(before) if counts is None or counts not in each] == []
 
 
 @pytest.mark.parametrize("kind", EVERY)
