@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import bpy
+import numpy as np
 
 from .bake_record import ORIGINAL, is_made
 
@@ -68,8 +69,13 @@ def drop_slots(data: Any, number: int, users: Sequence[bpy.types.Object]) -> Non
     """Remove the slots of a mesh after a number of them; `users` are the objects that show it."""
     if len(data.materials) <= number:
         return
+    # Blender lowers the polygons' indices to the slots that are left; theirs may be of slots that never were.
+    indices = np.empty(len(data.polygons), dtype=np.int32)
+    data.polygons.foreach_get("material_index", indices)
     while len(data.materials) > number:
         data.materials.pop()
+    if indices.any():
+        data.polygons.foreach_set("material_index", indices)
     for obj in users:
         if obj.data == data:
             obj.data = data  # or the object would go on having a slot

@@ -54,7 +54,8 @@ def digest(mesh: bpy.types.Mesh) -> str:
         kind, values = attribute.data_type, _bytes_of(attribute)
         if attribute.name == KEPT_VALUES:  # it was a UV layer, and will be one again
             kind, values = "FLOAT2", np.frombuffer(values, np.float32).reshape(-1, 3)[:, :2].tobytes()
-        if name in _DROPPED_WHERE_ZERO and not values.strip(b"\0"):
+        # Before Blender 5.0, merely reading a UV layer makes the attribute of its pins.
+        if (name in _DROPPED_WHERE_ZERO or name.startswith(".pn.")) and not values.strip(b"\0"):
             continue
         found.update(f"{name}:{attribute.domain}:{kind};".encode())
         found.update(values)

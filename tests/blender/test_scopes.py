@@ -157,8 +157,7 @@ def test_a_failed_bake_of_another_scene_changes_nothing(scenes, monkeypatch: pyt
     first, second = scenes
     bake(first)
     bpy.context.window.scene = second
-    for scene in scenes:  # or world matrices are not known yet
-        scene.view_layers[0].update()
+    bpy.context.view_layer.update()  # or world matrices are not known yet
     dump_file()
     before = dump_file()
 
