@@ -32,11 +32,12 @@ def path_of(word: str) -> Path:
     try:
         path = Path(word).expanduser()
         length = len(os.fsencode(path.absolute()))
-        path.resolve()
-    except RuntimeError as error:
-        message = "a symbolic link in it leads to itself" if "loop" in str(error) else "there is no such user"
-        raise ArgumentTypeError(f"{shown}: {message}; give another path") from None
-    except OSError as error:
+        os.path.realpath(path, strict=True)
+    except FileNotFoundError:
+        pass  # an output need not be there yet
+    except RuntimeError:
+        raise ArgumentTypeError(f"{shown}: there is no such user; give another path") from None
+    except OSError as error:  # a link that leads to itself, a file where a folder should be
         raise ArgumentTypeError(f"{shown}: {error.strerror}; give another path") from None
     if any(len(os.fsencode(part)) > MAX_NAME for part in path.parts):
         raise ArgumentTypeError(f"{shown}: a name in it is longer than {MAX_NAME} bytes; give a shorter one")

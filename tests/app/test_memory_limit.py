@@ -22,7 +22,7 @@ def test_the_command_line_refuses_with_the_figure(
     def exported(*_: object, **__: object) -> None:
         raise AssertionError("the scene was exported")
 
-    monkeypatch.setattr(job, "export_scene", exported)
+    monkeypatch.setattr(job, "export_steps", exported)
     done = run("bake", room, "--output", tmp_path / "out", "--resolution", 16384)
     assert done.code == 2
     assert len(done.err.splitlines()) == 1

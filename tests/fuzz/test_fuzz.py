@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -15,6 +16,7 @@ import pytest
 
 import radiosity_addon
 from radiosity_addon.lightmap import texel_pages
+from radiosity_addon.solver.arrays import Array
 
 from .checks import check
 from .scenes import SCENES
@@ -75,8 +77,13 @@ def test_layers_make_no_light(seed: int) -> None:
 
 def test_a_wrong_bake_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """The checks can fail: handed darkness below zero they say so."""
-    real = texel_pages.dilate
-    monkeypatch.setattr(texel_pages, "dilate", lambda *given: real(*given) - np.float32(1e6))
+    real = texel_pages.fill
+
+    def darker(pixels: Array, *given: Any) -> None:
+        real(pixels, *given)
+        pixels -= np.float32(1e6)
+
+    monkeypatch.setattr(texel_pages, "fill", darker)
     radiosity_addon.register()
     try:
         with pytest.raises(AssertionError, match="page 0 holds -"):

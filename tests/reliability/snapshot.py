@@ -8,8 +8,10 @@ from typing import Any
 import bpy
 import numpy as np
 
-LEFT_OUT = {"window_managers", "screens", "workspaces", "brushes", "palettes", "libraries", "linestyles"}
-"""Kinds of datablocks that are no part of a scene."""
+LEFT_OUT = {
+    "window_managers", "screens", "workspaces", "brushes", "palettes", "libraries", "linestyles", "all_ids",
+}  # fmt: skip
+"""Kinds of datablocks that are no part of a scene, and the list of all kinds."""
 
 # Of the session, computed, or dumped by `_mesh`; reading uv_sculpt crashes 4.2.
 SKIPPED = {
