@@ -33,11 +33,11 @@ def path_of(word: str) -> Path:
         path = Path(word).expanduser()
         length = len(os.fsencode(path.absolute()))
         os.path.realpath(path, strict=True)
-    except FileNotFoundError:
-        pass  # an output need not be there yet
+    except (FileNotFoundError, NotADirectoryError):
+        pass  # what need not be there yet, and where a folder can be made, is known later
     except RuntimeError:
         raise ArgumentTypeError(f"{shown}: there is no such user; give another path") from None
-    except OSError as error:  # a link that leads to itself, a file where a folder should be
+    except OSError as error:  # a link that leads to itself
         raise ArgumentTypeError(f"{shown}: {error.strerror}; give another path") from None
     if any(len(os.fsencode(part)) > MAX_NAME for part in path.parts):
         raise ArgumentTypeError(f"{shown}: a name in it is longer than {MAX_NAME} bytes; give a shorter one")
