@@ -21,6 +21,7 @@ from .bake_record import ASIDE, LAYER, ORIGINAL, is_made, is_recorded, made_data
 from .edit_modes import leave_edit_modes
 from .material_slots import drop_added_slots, is_copy, original_of, show_originals
 from .mesh_digest import digest
+from .stand_in_names import carry_names
 from .stand_ins import (
     EVALUATED,
     OWN,
@@ -111,6 +112,10 @@ def _carry(mesh: bpy.types.Mesh, known: StandIn, users: Sequence[bpy.types.Objec
     original = mesh.get(ORIGINAL)
     edited, slots = is_edited(mesh, known), has_edited_slots(mesh, known)
     removed = len(mesh.materials) < known.slots
+    shown_on = next((obj for obj in users if not is_made(obj)), None)
+    if original is not None and shown_on is not None and not carry_names(mesh, original, shown_on):
+        edited = True
+    known = stand_in_of(mesh) or known
     if slots and not (edited or removed):
         edited = not _move_slots(mesh, known, original, users)
         if not edited:
@@ -192,8 +197,10 @@ def _replace_original(
     if not original.materials and known.slots == 1:
         drop_added_slots(edited, 1, ())
     if original.shape_keys is not None and edited.shape_keys is not None:
-        original.shape_keys.user_remap(edited.shape_keys)
-        edited.shape_keys.name, original.shape_keys.name = original.shape_keys.name, edited.shape_keys.name
+        _aim_drivers(original.shape_keys, edited.shape_keys)
+        name_of_keys = original.shape_keys.name
+        original.shape_keys.name = f"{name_of_keys} (before)"
+        edited.shape_keys.name = name_of_keys
     original.use_fake_user = False
     original.user_remap(edited)
     if original.users == 0:
@@ -201,6 +208,18 @@ def _replace_original(
     _seal_again(mesh, known)
     message = f"its mesh '{edited.name}' was edited since the bake: the edit is in all objects that share it"
     return BakeWarning(name, message)
+
+
+def _aim_drivers(before: bpy.types.Key, now: bpy.types.Key) -> None:
+    """Have drivers that read shape keys read others; `user_remap` would give the mesh the other keys too."""
+    for user in bpy.data.user_map(subset={before})[before]:
+        for owner in (user, getattr(user, "node_tree", None)):
+            data = getattr(owner, "animation_data", None)
+            for curve in data.drivers if data is not None else ():
+                for variable in curve.driver.variables:
+                    for target in variable.targets:
+                        if target.id == before:
+                            target.id = now
 
 
 def _seal_again(mesh: bpy.types.Mesh, known: StandIn) -> None:

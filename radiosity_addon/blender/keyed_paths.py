@@ -1,4 +1,4 @@
-"""Keyframes and drivers of a node tree, by the data paths of what they move."""
+"""Keyframes and drivers, by the data paths of what they move."""
 
 from __future__ import annotations
 

@@ -12,6 +12,7 @@ import bpy
 import numpy as np
 
 from ..bake_scene import LIGHTMAP_UV_LAYER
+from .keyed_paths import curves
 from .uv_layers import KEPT_VALUES, LayerRecord, layer_record
 
 _VALUES = {  # attribute type → property of its elements, numbers in each, their type
@@ -110,12 +111,32 @@ def _bytes_of(attribute: Any) -> bytes:
 
 
 def _add_shape_keys(mesh: bpy.types.Mesh, found: Any) -> None:
-    for key in mesh.shape_keys.key_blocks if mesh.shape_keys is not None else ():
+    keys = mesh.shape_keys
+    if keys is None:
+        return
+    moving = {curve.data_path for curve in curves(keys)}
+    found.update(repr((keys.use_relative, _animation(keys))).encode())
+    if "eval_time" not in moving:
+        found.update(repr(keys.eval_time).encode())
+    for key in keys.key_blocks:
         corners = np.empty(3 * len(key.data), dtype=np.float32)
         key.data.foreach_get("co", corners)
         found.update(repr((key.name, key.relative_key.name, key.mute, key.vertex_group)).encode())
         found.update(repr((key.slider_min, key.slider_max)).encode())
+        if f"{key.path_from_id()}.value" not in moving:
+            found.update(repr(key.value).encode())
         found.update(corners.tobytes())
+
+
+def _animation(owner: bpy.types.ID) -> tuple[str, list[tuple[str, int, str]], list[str]] | None:
+    """Return what animates a datablock: its action, its drivers, the tracks of its strips."""
+    data = owner.animation_data
+    if data is None:
+        return None
+    drivers = [(curve.data_path, curve.array_index, curve.driver.expression) for curve in data.drivers]
+    action = "" if data.action is None else data.action.name
+    found = action, drivers, [track.name for track in data.nla_tracks]
+    return found if any(found) else None
 
 
 def _settings(mesh: bpy.types.Mesh) -> list[tuple[str, object]]:
@@ -132,4 +153,4 @@ def _settings(mesh: bpy.types.Mesh) -> list[tuple[str, object]]:
     known = mesh.bl_rna.properties
     names = [key for key in sorted(mesh.keys()) if key not in known and not key.startswith("radiosity")]
     custom = [(key, repr(mesh[key])) for key in names]
-    return [*plain, *custom]
+    return [*plain, *custom, ("animation", _animation(mesh))]

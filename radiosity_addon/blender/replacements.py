@@ -16,6 +16,7 @@ from .light_shares import LightShares
 from .lightmap_materials import LightmapMaterials
 from .material_slots import set_materials
 from .mesh_digest import digest
+from .stand_in_names import note_names
 from .stand_ins import EVALUATED, OWN, StandIn, seal, seal_object, set_stand_in, stand_in_of
 from .uv_layers import check_room, layer_record, put_layer_on, set_record
 
@@ -192,6 +193,7 @@ def _swap_mesh(obj: bpy.types.Object, replacement: Replacement) -> None:
     for slot, copy in zip(obj.material_slots, replacement.copies, strict=False):
         if slot.link == "OBJECT":
             slot.material = copy
+    note_names(replacement.mesh, obj)
 
 
 def _new_stand_in(replacement: Replacement) -> bpy.types.Object:

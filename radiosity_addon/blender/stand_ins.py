@@ -31,6 +31,26 @@ OWN, EVALUATED = "own", "evaluated"
 
 
 @dataclass(frozen=True)
+class Names:
+    """What a stand-in mesh was called and called things when it was shown.
+
+    Attributes
+    ----------
+    mesh, shape_keys : str
+        Names of the datablocks; "" for none.
+    groups : tuple of (str, bool)
+        Vertex groups and whether they were locked.
+    roles : (str, str)
+        The user's UV layers that were active and for renders.
+    """
+
+    mesh: str = ""
+    shape_keys: str = ""
+    groups: tuple[tuple[str, bool], ...] = ()
+    roles: tuple[str, str] = ("", "")
+
+
+@dataclass(frozen=True)
 class StandIn:
     """What a stand-in mesh knows.
 
@@ -48,6 +68,7 @@ class StandIn:
         Slots that were linked to the object before (in files of earlier versions).
     modifiers : tuple of (str, bool, bool)
         Those that were switched off: their names, and whether they showed in viewports and renders.
+    names : Names
     """
 
     kind: str = EVALUATED
@@ -56,6 +77,7 @@ class StandIn:
     active_slot: int = 0
     object_slots: tuple[int, ...] = ()
     modifiers: tuple[tuple[str, bool, bool], ...] = field(default_factory=tuple)
+    names: Names = Names()
 
 
 def stand_in_of(mesh: bpy.types.ID | None) -> StandIn | None:
@@ -66,6 +88,10 @@ def stand_in_of(mesh: bpy.types.ID | None) -> StandIn | None:
         told = json.loads(mesh[STAND_IN])
         told["modifiers"] = tuple((str(name), bool(v), bool(r)) for name, v, r in told["modifiers"])
         told["object_slots"] = tuple(told["object_slots"])
+        names = told.pop("names", {})
+        if names:
+            groups = tuple((str(name), bool(lock)) for name, lock in names.pop("groups"))
+            told["names"] = Names(**{**names, "groups": groups, "roles": tuple(names["roles"])})
         return StandIn(**told)
     except (ValueError, TypeError, KeyError):
         return StandIn()

@@ -180,6 +180,26 @@ def _put_on(mesh: bpy.types.Mesh, coordinates: np.ndarray) -> None:
     set_record(mesh, LayerRecord(kept=kept, active=before[0], rendered=before[1]))
 
 
+def roles(mesh: bpy.types.Mesh) -> tuple[str, str]:
+    """Return the names of the user's layers that are active and that renders use, as without ours."""
+    record = layer_record(mesh) or LayerRecord(ours=False)
+
+    def without_ours(name: str, before: str) -> str:
+        if record.ours and name == LIGHTMAP_UV_LAYER:
+            return before
+        return LIGHTMAP_UV_LAYER if record.kept and name == record.kept else name
+
+    active, rendered = _roles(mesh)
+    return without_ours(active, record.active), without_ours(rendered, record.rendered)
+
+
+def give_roles(mesh: bpy.types.Mesh, wanted: tuple[str, str]) -> None:
+    """Make the user's layers of these names active and used for renders."""
+    record = layer_record(mesh) or LayerRecord(ours=False)
+    active, rendered = (record.kept if record.kept and name == LIGHTMAP_UV_LAYER else name for name in wanted)
+    _set_roles(mesh, active, rendered)
+
+
 def _roles(mesh: bpy.types.Mesh) -> tuple[str, str]:
     """Return the names of the active layer and of the one that renders use; "" without any."""
     layers = mesh.uv_layers
