@@ -6,7 +6,7 @@ import os
 import sys
 from typing import NoReturn
 
-from .cli import main
+from .interrupts import Interrupts
 from .temporary import TemporaryFolder
 
 
@@ -20,5 +20,10 @@ def leave(code: int, temporary: TemporaryFolder) -> NoReturn:
 
 
 if __name__ == "__main__":
-    temporary = TemporaryFolder()
-    leave(main(), temporary)
+    with Interrupts() as interrupts:
+        from .cli import main  # Ctrl-C waits while modules are imported
+
+        temporary = TemporaryFolder()
+        code = main(interrupts=interrupts)
+        interrupts.deferred = True
+        leave(code, temporary)

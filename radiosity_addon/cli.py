@@ -9,7 +9,7 @@ import argparse
 import sys
 import traceback
 from collections.abc import Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -40,7 +40,10 @@ BUNDLED_OUTPUT = Path("out/cornell")
 
 
 def main(
-    argv: Sequence[str] | None = None, prog: str = "python -m radiosity_addon", loaded: Path | None = None
+    argv: Sequence[str] | None = None,
+    prog: str = "python -m radiosity_addon",
+    loaded: Path | None = None,
+    interrupts: Interrupts | None = None,
 ) -> int:
     """Run one command and return its exit code; nothing is raised, nothing exits.
 
@@ -53,6 +56,8 @@ def main(
     loaded : Path or None
         The scene file the host has open already (`blender -b FILE --command …`):
         it is what a command without SCENE works on.
+    interrupts : Interrupts or None
+        Those of the caller, if it has entered some.
 
     Returns
     -------
@@ -70,8 +75,8 @@ def main(
         return _fail(str(error), error.exit_code)
     except SystemExit as help_was_asked:
         return int(help_was_asked.code or 0)
-    with Interrupts() as interrupts:
-        return _run(request, settings, loaded, interrupts)
+    with Interrupts() if interrupts is None else nullcontext(interrupts) as those:
+        return _run(request, settings, loaded, those)
 
 
 def build_parser(prog: str) -> argparse.ArgumentParser:
@@ -328,6 +333,8 @@ def _run(
         )
     allowed = Permissions(request.overwrite, request.allow_scripts)
     try:
+        interrupts.check()
+        interrupts.deferred = request.verb == "bake" and not request.check  # its stages say when
         with Console(quiet=request.quiet) as console:
             if settings is not None and request.check:
                 return commands.check(request.scene, loaded, request.output, settings, allowed, console)

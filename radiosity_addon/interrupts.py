@@ -11,15 +11,15 @@ class Interrupts:
     """While entered, SIGINT raises KeyboardInterrupt and is remembered.
 
     Blender prints and drops an exception raised in its own Python callbacks (a Cycles
-    render, an importer), and a Blender in the background installs a handler of its own
-    that never reaches Python. So the request is also kept in `requested`: loops call
-    `check`, and while `deferred` is set nothing is raised, so that what must not be torn
-    apart is finished first.
+    render, an importer), crashes on one that is raised while it is imported, and in the
+    background installs a handler of its own that never reaches Python. So the request is
+    also kept in `requested`: loops call `check`, and while `deferred` is set, as it is at
+    first, nothing is raised, so that what must not be torn apart is finished first.
     """
 
     def __init__(self) -> None:
         self.requested = False
-        self.deferred = False
+        self.deferred = True
         self._previous: object = None
 
     def check(self) -> None:

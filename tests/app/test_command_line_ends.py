@@ -8,6 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -208,6 +209,20 @@ def test_ctrl_c_leaves_the_previous_result_whole(
     assert job.returncode == 130
     assert err.splitlines()[-1] == "error: interrupted; nothing was written"
     assert "Traceback" not in err
+    assert digest(out) == before
+
+
+@pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="tells by /proc how far a process is")
+def test_ctrl_c_waits_while_blender_is_imported(baked_before: tuple[Path, Path], tmp_path: Path) -> None:
+    room, out = copied(baked_before, tmp_path)
+    before = digest(out)
+    job = start("bake", room, "--output", out, "--quiet", cwd=tmp_path)
+    maps = Path(f"/proc/{job.pid}/maps")
+    while job.poll() is None and "/bpy/" not in maps.read_text():
+        time.sleep(0.001)
+    os.killpg(job.pid, signal.SIGINT)
+    _, err = job.communicate(timeout=300)
+    assert (job.returncode, err) == (130, "error: interrupted; nothing was written\n")
     assert digest(out) == before
 
 
