@@ -31,7 +31,7 @@ SAMPLING = "radiosity_emission_sampling"
 """On a copied material: how Cycles sampled the original's emission."""
 
 EMPTY_SLOT = "radiosity_empty_slot"
-"""On a copied material: the slots it fills are linked to an object and empty; it is of the mesh's material."""
+"""On a copied material: the slots that it fills are empty ones of objects: it is of the mesh's material."""
 
 PLAIN = "radiosity_plain"
 """On a copied material: the original has no nodes."""
