@@ -7,12 +7,18 @@ killed leaves it behind. Ours is marked, so the next start can remove what a kil
 from __future__ import annotations
 
 import os
+import re
+import sys
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 
 from .marked_folders import MarkedFolder, clean_up_folders
 
 PREFIX = "radiosity-"
+_OF_BLENDER = r"blender_\w{6}"
+"""Names of the folders that Blender makes for itself."""
+
 _VARIABLES = ("TMPDIR", "TEMP", "TMP")
 """Where Blender, Python and child processes look."""
 
@@ -20,7 +26,8 @@ _VARIABLES = ("TMPDIR", "TEMP", "TMP")
 class TemporaryFolder:
     """A temporary folder for this process and its children; call before Blender is imported.
 
-    Where none can be made, as on a full disk, everything stays as it is, and nothing is removed at the end.
+    Where none can be made, as on a full disk, everything stays as it is, and nothing is removed at the end
+    but the folder that Blender made for itself, if it is empty.
     """
 
     def __init__(self) -> None:
@@ -41,7 +48,15 @@ class TemporaryFolder:
         return None if self._folder is None else self._folder.path
 
     def remove(self) -> None:
-        """Remove the folder, and nothing else."""
+        """Remove the folder or, where none could be made, Blender's own empty one; nothing else."""
         if self._folder is not None:
             self._folder.close()
             self._folder = None
+            return
+        blender = getattr(sys.modules.get("bpy"), "app", None)
+        given = [Path(os.environ[name]) for name in _VARIABLES if os.environ.get(name)]
+        made = Path(blender.tempdir) if blender is not None and blender.tempdir else None
+        # Where Blender could make no folder either, it names the one that it was given.
+        if made is not None and re.fullmatch(_OF_BLENDER, made.name) and made not in given:
+            with suppress(OSError):
+                made.rmdir()  # as long as it is empty

@@ -25,6 +25,7 @@ from .group_images import GroupImages
 from .light_mixer import mixers
 from .light_shares import LightShares
 from .lightmap_materials import LightmapMaterials
+from .material_slots import drawn_materials, empty_slots
 from .rebake import EarlierBake, bare, replacing_earlier
 from .replacements import Replacement, changed_objects, dress, show, shown_by
 from .scene_objects import copy_evaluated_meshes
@@ -227,21 +228,24 @@ def _replacement(
         own_object = None if stand_in else obj
         stands_for = None if own_object is None else own_object.data
         made = Replacement(source, baked, stand_in, mesh, False, stands_for, known, list(mesh.materials))
-        return replace(made, object_slots=_object_slots(own_object))
+        return _with_object_slots(made, own_object)
     if source.needs_evaluated_mesh or obj is None or obj.type != "MESH":
         raise BakeError(f"object '{source.name}' went away while it was being baked: bake again")
-    drawn = [slot.material for slot in obj.material_slots]
+    drawn = drawn_materials(obj)
     check_room(obj.data, source.name)
     if obj.data in own and not stand_in:
-        return Replacement(source, baked, False, obj.data, True, None, StandIn(), drawn)
+        made = Replacement(source, baked, False, obj.data, True, None, StandIn(), drawn)
+        return _with_object_slots(made, obj)
     mesh = obj.data.copy()
     mark_made(mesh)
     known = StandIn(active_slot=obj.active_material_index)
     made = Replacement(source, baked, stand_in, mesh, False, None if stand_in else obj.data, known, drawn)
-    return replace(made, object_slots=_object_slots(None if stand_in else obj))
+    return _with_object_slots(made, None if stand_in else obj)
 
 
-def _object_slots(obj: bpy.types.Object | None) -> tuple[int, ...]:
-    """Return which material slots are linked to the object, not its data."""
-    slots = () if obj is None else enumerate(obj.material_slots)
-    return tuple(number for number, slot in slots if slot.link == "OBJECT")
+def _with_object_slots(made: Replacement, obj: bpy.types.Object | None) -> Replacement:
+    """Note which material slots are linked to the object, not its data, and which of them are empty."""
+    if obj is None:
+        return made
+    own = tuple(number for number, slot in enumerate(obj.material_slots) if slot.link == "OBJECT")
+    return replace(made, object_slots=own, empty_slots=frozenset(empty_slots(obj)))

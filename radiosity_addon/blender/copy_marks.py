@@ -30,6 +30,9 @@ TOKEN = "radiosity_token"
 SAMPLING = "radiosity_emission_sampling"
 """On a copied material: how Cycles sampled the original's emission."""
 
+EMPTY_SLOT = "radiosity_empty_slot"
+"""On a copied material: the slots that it fills are empty ones of objects: it is of the mesh's material."""
+
 PLAIN = "radiosity_plain"
 """On a copied material: the original has no nodes."""
 
@@ -68,6 +71,7 @@ COPY_MARKS = (
     COPY_NAME,
     TOKEN,
     SAMPLING,
+    EMPTY_SLOT,
     PLAIN,
     CONTENT,
     SOURCE,

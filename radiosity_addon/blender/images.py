@@ -20,9 +20,11 @@ from ..light_groups import are_wanted
 from ..lightmap.encode import encode_png16, png16_scale, presentable
 from ..report import LightmapFile
 from ..settings import OTHERS, BakeSettings
+from ..silenced import silenced
 from ..solver.scratch import tiles
 from .bake_record import mark_made, remove_datablocks
 from .image_marks import GROUP, PAGE, QUANTITY_PROPERTY, SCALE_PROPERTY
+from .png import check_whole
 
 BAND = 64
 """Rows of a page that are encoded at once."""
@@ -237,9 +239,22 @@ def _store(image: bpy.types.Image, folder: Path | None, file_name: str) -> None:
     if folder is None:
         image.pack()
         return
-    path = folder / file_name
+    save_image(image, folder / file_name)
+
+
+def save_image(image: bpy.types.Image, path: Path) -> None:
+    """Save an image, which then is of this file.
+
+    Raises
+    ------
+    BakeError
+        If it cannot be written.
+    """
     image.filepath_raw = str(path)
     try:
-        image.save()
+        with silenced():  # what cannot be written is named on the terminal, too, and that by its staging path
+            image.save()
+        if image.file_format == "PNG":
+            check_whole(path)
     except RuntimeError as error:
         raise BakeError(f"cannot write '{path}': {' '.join(str(error).split())}") from error

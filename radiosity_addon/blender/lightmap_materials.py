@@ -1,8 +1,8 @@
 """Copies of materials that show a lightmap: base color × lightmap, plus their own light.
 
-One copy for each (material, image, whether UVs are pinned), shared between the objects for
-which these are the same. A copy holds the original's nodes, connected, so that it can be edited
-as the original can; `material_edits.py` carries such edits to the original.
+One copy for each (material, image, whether UVs are pinned, whether its slot is empty), shared
+between the objects for which these are the same. A copy holds the original's nodes, connected,
+so that it can be edited as the original can; `material_edits.py` carries such edits to the original.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from ..solver.radiometry import brdf_of_reflectance, radiance_of_radiosity
 from .bake_record import is_made, mark_made
 from .copy_marks import (
     COPY_NAME,
+    EMPTY_SLOT,
     FED,
     FED_BY,
     NO_MATERIAL,
@@ -76,6 +77,7 @@ class LightmapMaterials:
         image: bpy.types.Image,
         pinned: bool,
         group: str = "",
+        empty_slot: bool = False,
     ) -> bpy.types.Material:
         """Return the copy of `material` that shows `image`.
 
@@ -89,13 +91,17 @@ class LightmapMaterials:
             The object had no UV layer of its own.
         group : str
             The light group whose sliders its own light follows, if it has any; "" for none.
+        empty_slot : bool
+            The material is the mesh's; the object's own slot, which the copy fills, is empty.
         """
         group = group if self._glows.get(material, True) else ""
-        key = (material, image, pinned, group)
+        key = (material, image, pinned, group, empty_slot)
         if key not in self._made:
             self._made[key] = self._make(material, image, pinned, group)
+            if empty_slot:
+                self._made[key][EMPTY_SLOT] = True
             if not self._glows.setdefault(material, False):
-                self._made[material, image, pinned, ""] = self._made[key]
+                self._made[material, image, pinned, "", empty_slot] = self._made[key]
         return self._made[key]
 
     def _make(

@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from .bake_record import ORIGINAL, is_made
+from .copy_marks import EMPTY_SLOT
 
 _KINDS_WITH_MATERIALS = ("meshes", "curves", "metaballs", "hair_curves", "pointclouds", "volumes")
 
@@ -43,11 +44,35 @@ def show_originals(data: Any) -> None:
             data.materials[index] = original_of(material)
 
 
+def empty_slots(obj: bpy.types.Object) -> set[int]:
+    """Return which slots are linked to the object and empty, so that the mesh's materials show in them."""
+    materials = getattr(obj.data, "materials", ())
+    pairs = enumerate(zip(obj.material_slots, materials, strict=False))
+    return {
+        number for number, (slot, of_mesh) in pairs
+        if slot.link == "OBJECT" and slot.material is None and of_mesh is not None
+    }  # fmt: skip
+
+
+def drawn_materials(obj: bpy.types.Object) -> list[bpy.types.Material | None]:
+    """Return the material that each slot of an object shows."""
+    empty = empty_slots(obj)
+    return [
+        obj.data.materials[number] if number in empty else slot.material
+        for number, slot in enumerate(obj.material_slots)
+    ]
+
+
 def show_own_originals(obj: bpy.types.Object) -> None:
     """The same for the slots that are linked to the object."""
-    for slot in obj.material_slots:
-        if slot.link == "OBJECT" and is_copy(slot.material):
-            slot.material = original_of(slot.material)
+    materials = list(getattr(obj.data, "materials", ()))
+    for number, slot in enumerate(obj.material_slots):
+        if slot.link != "OBJECT" or not is_copy(slot.material):
+            continue
+        original = original_of(slot.material)
+        of_mesh = original_of(materials[number]) if number < len(materials) else None
+        # A slot that was empty stays so, unless an edit there went to a material of its own.
+        slot.material = None if EMPTY_SLOT in slot.material and original == of_mesh else original
 
 
 def set_materials(mesh: bpy.types.Mesh, materials: Sequence[bpy.types.Material | None]) -> None:

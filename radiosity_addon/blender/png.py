@@ -1,10 +1,17 @@
-"""Render a scene of our own to a PNG file, with Cycles on the CPU, the same bytes every time."""
+"""PNG files that Blender writes: whole, and of a scene of our own the same bytes every time.
+
+Pictures are rendered with Cycles on the CPU.
+"""
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import bpy
+
+_END = b"\0\0\0\0IEND\xaeB`\x82"
+"""The last chunk of every PNG file: without content, its type, its checksum."""
 
 
 def render_png(scene: bpy.types.Scene, path: Path, samples: int, seed: int = 0, threads: int = 0) -> None:
@@ -37,7 +44,23 @@ def render_png(scene: bpy.types.Scene, path: Path, samples: int, seed: int = 0, 
     _still_image(scene.render, path)
     bpy.ops.render.render(write_still=True, scene=scene.name)
     if path.is_file():
+        check_whole(path)
         path.write_bytes(_without_notes(path.read_bytes()))
+
+
+def check_whole(path: Path) -> None:
+    """See that a PNG file that Blender has written goes to its end: Blender does not notice a full disk.
+
+    Raises
+    ------
+    RuntimeError
+        If it does not.
+    """
+    with path.open("rb") as file:
+        size = file.seek(0, os.SEEK_END)
+        file.seek(max(0, size - len(_END)))
+        if file.read() != _END:
+            raise RuntimeError("only a part of the file could be written: is the disk full?")
 
 
 def _still_image(render: bpy.types.RenderSettings, path: Path) -> None:

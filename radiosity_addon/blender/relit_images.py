@@ -16,7 +16,7 @@ from ..report import BakeReport
 from . import kept_bakes, lightmap_versions
 from .group_images import rescale_materials, update_images
 from .image_marks import MARK, SCALE_PROPERTY, VERSION
-from .images import image_scale
+from .images import image_scale, save_image
 from .kept_bakes import group_images_of, images_of
 from .output import OutputFolder
 from .ownership import OwnReport, report_listing
@@ -116,12 +116,8 @@ def _scenes_of(image: bpy.types.Image) -> list[bpy.types.Scene]:
 def _save_into(folder: Path, image: bpy.types.Image) -> None:
     """Save an image under its name in another folder; it goes on belonging to its own file."""
     stored = image.filepath_raw
-    path = folder / Path(bpy.path.abspath(stored)).name
-    image.filepath_raw = str(path)
     try:
-        image.save()
-    except RuntimeError as error:
-        raise BakeError(f"cannot write '{path.name}': {' '.join(str(error).split())}") from error
+        save_image(image, folder / Path(bpy.path.abspath(stored)).name)
     finally:
         image.filepath_raw = stored
 

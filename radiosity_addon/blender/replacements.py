@@ -46,6 +46,8 @@ class Replacement:
         How the object was.
     object_slots : tuple of int
         Slots that are linked to the object.
+    empty_slots : frozenset of int
+        Those of them that are empty and show the mesh's material.
     drawn : list of Material
         What is in the slots without a bake.
     copies : list of Material
@@ -61,6 +63,7 @@ class Replacement:
     known: StandIn
     drawn: Materials
     object_slots: tuple[int, ...] = ()
+    empty_slots: frozenset[int] = frozenset()
     copies: Materials = field(default_factory=list)
 
     @property
@@ -85,8 +88,8 @@ def dress(
         image = images[baked.page]
         groups = [shares.emission_group(source, each) if shares else "" for each in drawn]
         replacement.copies = [
-            materials.copy_of(material, image, pinned, group)
-            for material, group in zip(drawn, groups, strict=True)
+            materials.copy_of(material, image, pinned, group, slot in replacement.empty_slots)
+            for slot, (material, group) in enumerate(zip(drawn, groups, strict=True))
         ]
     if replacement.in_place:
         return

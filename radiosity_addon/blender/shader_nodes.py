@@ -1,6 +1,7 @@
 """Walk shader node trees: from a socket to the node or the constant that feeds it.
 
-Reroutes, muted nodes and links, and node groups at any depth are seen through. Values
+Reroutes, muted nodes and links, and node groups at any depth are seen through; of links in
+a circle, those are dropped that Blender marks. Values
 are constants only: what varies over the surface is replaced by its mean (images, checkers) or
 refused (`NotConstantError`), and the caller falls back on the socket's own default.
 """
@@ -67,7 +68,7 @@ def feed_of(socket: bpy.types.NodeSocket, stack: Stack = (), enter_groups: bool 
     """
     reader = socket
     for _ in range(_MAX_STEPS):
-        links = [link for link in socket.links if link.is_valid and not link.is_muted]
+        links = [link for link in socket.links if is_followed(link)]
         if not links:
             break
         node, output = links[0].from_node, links[0].from_socket
@@ -93,6 +94,12 @@ def feed_of(socket: bpy.types.NodeSocket, stack: Stack = (), enter_groups: bool 
         else:
             return Feed(node, output, stack)
     return Feed(None, reader, stack)
+
+
+def is_followed(link: bpy.types.NodeLink) -> bool:
+    """Whether a walk follows a link: no muted one, and none that closes a cycle."""
+    # Blender marks these as invalid, but not those of a node to itself.
+    return link.is_valid and not link.is_muted and link.from_node != link.to_node
 
 
 def passed_through(node: bpy.types.Node, output: bpy.types.NodeSocket) -> bpy.types.NodeSocket | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -32,3 +33,32 @@ def record() -> Iterator[None]:
     bake_record.register()
     yield
     bake_record.unregister()
+
+
+@pytest.fixture
+def registered() -> Iterator[None]:
+    """The whole add-on, registered."""
+    import radiosity_addon
+
+    radiosity_addon.register()
+    yield
+    radiosity_addon.unregister()
+
+
+@pytest.fixture
+def room(registered: None, tmp_path: Path) -> Path:
+    """The folder of a saved room that is open and set to bake quickly."""
+    from tests.blender.promised import saved_room
+
+    return saved_room(tmp_path)
+
+
+@pytest.fixture
+def paint(record: None) -> bpy.types.Material:
+    """The material of a plane that shows a lightmap."""
+    from tests.blender.hand_bake import add_plane, bake_by_hand, principled_material
+
+    material = principled_material()
+    add_plane(material=material)
+    bake_by_hand()
+    return material

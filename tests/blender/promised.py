@@ -36,15 +36,37 @@ def command_line(capfd: pytest.CaptureFixture[str]) -> Run:
 def saved_room(folder: Path) -> Path:
     """Save a room that is set to bake quickly, and leave it open; returns the folder it is in."""
     build_room()
-    settings = bpy.context.scene.radiosity
-    settings.resolution, settings.quality, settings.min_area = 16, "draft", 0.5
+    set_quick(bpy.context.scene)
     return save(folder / "room" / "room.blend").parent
+
+
+def set_quick(scene: bpy.types.Scene) -> None:
+    """Have a scene baked in a moment."""
+    settings = scene.radiosity
+    settings.resolution, settings.quality, settings.min_area = 16, "draft", 0.5
+
+
+def show_picture(material: str, picture: bpy.types.Image) -> None:
+    """Feed a material's base color with a picture."""
+    tree = bpy.data.materials[material].node_tree
+    texture = tree.nodes.new("ShaderNodeTexImage")
+    texture.image = picture
+    tree.links.new(texture.outputs[0], shader_of(bpy.data.materials[material]).inputs["Base Color"])
 
 
 def save(path: Path) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     return path
+
+
+def refuse_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have no bake begin its work from now on."""
+
+    def worked(*_arguments: object) -> None:
+        raise AssertionError("the bake was not stopped before the work")
+
+    monkeypatch.setattr("radiosity_addon.blender.job.bake_steps", worked)
 
 
 def bake() -> None:

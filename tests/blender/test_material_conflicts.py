@@ -35,15 +35,6 @@ from tests.blender.hand_bake import (
 pytestmark = pytest.mark.usefixtures("record")
 
 
-@pytest.fixture
-def paint() -> Material:
-    """The material of a plane that shows a lightmap."""
-    material = principled_material()
-    add_plane(material=material)
-    bake_by_hand()
-    return material
-
-
 def test_an_edit_of_the_original_alone_stays(paint: Material) -> None:
     shader(paint).inputs["Base Color"].default_value = GREEN
     assert carry_edits() == ()

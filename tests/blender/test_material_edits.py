@@ -42,15 +42,6 @@ from tests.blender.scenes import add_node, with_nodes
 pytestmark = pytest.mark.usefixtures("record")
 
 
-@pytest.fixture
-def paint() -> Material:
-    """The material of a plane that shows a lightmap."""
-    material = principled_material()
-    add_plane(material=material)
-    bake_by_hand()
-    return material
-
-
 @pytest.mark.parametrize("kind", ["BSDF_PRINCIPLED", "BSDF_DIFFUSE"])
 def test_another_base_color_shows_at_once(kind: str, tmp_path: Path) -> None:
     material = bpy.data.materials.new("Paint")

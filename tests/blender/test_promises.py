@@ -7,14 +7,12 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 
-import radiosity_addon
 from tests.blender.promised import (
     QUAD,
     QUICK,
@@ -23,22 +21,18 @@ from tests.blender.promised import (
     command_line,
     lightmap_of,
     pixels_of,
+    refuse_work,
     refused,
     report_in,
     restore,
     save,
-    saved_room,
-    shader_of,
+    set_quick,
+    show_picture,
 )
 from tests.reliability.folders import broken_result, changes, images_of, listed, tree
 from tests.reliability.sandbox import add
 
-
-@pytest.fixture(autouse=True)
-def registered() -> Iterator[None]:
-    radiosity_addon.register()
-    yield
-    radiosity_addon.unregister()
+pytestmark = pytest.mark.usefixtures("registered")
 
 
 @pytest.fixture
@@ -46,16 +40,14 @@ def run(capfd: pytest.CaptureFixture[str]) -> Run:
     return command_line(capfd)
 
 
-@pytest.fixture
-def room(tmp_path: Path) -> Path:
-    return saved_room(tmp_path)
-
-
 @pytest.mark.parametrize(
     "name", ["lightmap.exr", "preview.png", "report.json", "baked.blend", "lightmap.relight"]
 )
-def test_the_command_line_replaces_no_foreign_file(name: str, room: Path, run: Run) -> None:
+def test_the_command_line_replaces_no_foreign_file(
+    name: str, room: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
     out = room / "out"
+    refuse_work(monkeypatch)
     out.mkdir()
     (out / name).write_text("mine")
     code, told = run("bake", room / "room.blend", "--output", out, *QUICK, "--keep")
@@ -70,19 +62,23 @@ def test_the_command_line_replaces_a_foreign_file_when_told_to(room: Path, run: 
     out = room / "out"
     out.mkdir()
     (out / "lightmap.exr").write_text("mine")
-    code, _ = run("bake", room / "room.blend", "--output", out, *QUICK, "--overwrite")
+    words = ("bake", room / "room.blend", "--output", out, *QUICK)
+    assert run(*words)[0] == 1
+    assert (out / "lightmap.exr").read_text() == "mine"
+    code, _ = run(*words, "--overwrite")
     assert code == 0
     assert broken_result(out) == []
 
 
 @pytest.mark.parametrize("atlas", ["shared", "per-object"])
-def test_the_panel_replaces_no_foreign_file(atlas: str, room: Path) -> None:
+def test_the_panel_replaces_no_foreign_file(atlas: str, room: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever the names of its files are: they are those of a bake that is gone."""
     bpy.context.scene.radiosity.atlas = atlas
     bake()
     lightmaps = room / "lightmaps"
     names = [path.name for path in lightmaps.iterdir()]
     restore()
+    refuse_work(monkeypatch)
     for name in names:
         shutil.rmtree(lightmaps)
         lightmaps.mkdir()
@@ -92,8 +88,9 @@ def test_the_panel_replaces_no_foreign_file(atlas: str, room: Path) -> None:
         assert (lightmaps / name).read_text() == "mine"
 
 
-def test_a_lightmap_that_was_painted_on_is_not_replaced(room: Path) -> None:
+def test_a_lightmap_that_was_painted_on_is_not_replaced(room: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     bake()
+    refuse_work(monkeypatch)
     path, told = report_in(room / "lightmaps")
     lightmap = path.parent / images_of(told)[0]
     lightmap.write_bytes(lightmap.read_bytes() + b"painted")
@@ -102,8 +99,9 @@ def test_a_lightmap_that_was_painted_on_is_not_replaced(room: Path) -> None:
     assert changes(before, tree(room)) == []
 
 
-@pytest.mark.parametrize("place", ["out", "lightmaps"])
+@pytest.mark.parametrize("place", ["out", "out, --overwrite", "lightmaps"])
 def test_textures_of_the_scene_are_never_replaced(place: str, room: Path, run: Run) -> None:
+    place, *options = place.split(", ")
     folder = room / place
     bake()
     name = images_of(report_in(room / "lightmaps")[1])[0] if place == "lightmaps" else "lightmap.exr"
@@ -113,19 +111,33 @@ def test_textures_of_the_scene_are_never_replaced(place: str, room: Path, run: R
     picture = bpy.data.images.new("Texture", 4, 4, float_buffer=True)
     picture.filepath_raw, picture.file_format = str(folder / name), "OPEN_EXR"
     picture.save()
-    nodes = bpy.data.materials["White"].node_tree
-    texture = nodes.nodes.new("ShaderNodeTexImage")
-    texture.image = picture
-    nodes.links.new(texture.outputs[0], shader_of(bpy.data.materials["White"]).inputs["Base Color"])
+    show_picture("White", picture)
     save(room / "room.blend")
     before = tree(folder)
     if place == "out":
-        code, told = run("bake", room / "room.blend", "--output", folder, *QUICK)
+        code, told = run("bake", room / "room.blend", "--output", folder, *QUICK, *options)
         assert code in (1, 2)
     else:
         told = refused(bpy.ops.radiosity.bake)
     assert name in told
     assert changes(before, tree(folder)) == []
+
+
+@pytest.mark.parametrize("option", ["--keep", "--overwrite"])
+def test_libraries_of_the_scene_are_never_replaced(option: str, room: Path, run: Run) -> None:
+    library = save(room / "out" / "baked.blend")
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    with bpy.data.libraries.load(str(library), link=True) as (_found, linked):
+        linked.objects = ["Floor", "Lamp"]
+    for obj in linked.objects:
+        bpy.context.scene.collection.objects.link(obj)
+    save(room / "user.blend")
+    before = tree(room)
+    code, told = run("bake", room / "user.blend", "--output", room / "out", *QUICK, option)
+    assert code in (1, 2)
+    assert "baked.blend" in told
+    assert told.count("\n") == 1
+    assert changes(before, tree(room)) == []
 
 
 def test_two_files_in_one_folder_keep_their_lightmaps(room: Path) -> None:
@@ -155,8 +167,7 @@ def second_scene() -> bpy.types.Scene:
     lamp = bpy.data.lights.new("Second lamp", "POINT")
     lamp.energy = 50
     add("Second lamp", lamp, (0, 0, 1))
-    settings = scene.radiosity
-    settings.resolution, settings.quality, settings.min_area = 16, "draft", 0.5
+    set_quick(scene)
     bpy.context.window.scene = first
     return scene
 
@@ -181,13 +192,16 @@ def test_two_scenes_of_a_file_keep_their_lightmaps(room: Path) -> None:
         np.testing.assert_array_equal(pixels_of(now), light[name])
 
 
+@pytest.mark.parametrize("overwrite", [(), ("--overwrite",)])
 @pytest.mark.parametrize("option", ["--report", "--plot"])
-def test_a_second_output_never_replaces_an_input_or_another_output(option: str, room: Path, run: Run) -> None:
+def test_a_second_output_never_replaces_an_input_or_another_output(
+    option: str, overwrite: tuple[str, ...], room: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
     out, before = room / "out", tree(room)
+    refuse_work(monkeypatch)
     for target in (room / "room.blend", out / "baked.blend", out / "preview.png", Path("/dev/null")):
-        if option == "--plot" and target.suffix != ".png":
-            continue
-        code, told = run("bake", room / "room.blend", "--output", room / "out", *QUICK, option, target)
+        words = ("bake", room / "room.blend", "--output", out, *QUICK, option, target, *overwrite)
+        code, told = run(*words)
         assert code in (1, 2), f"{option} {target}"
         assert told.count("\n") == 1
         assert changes(before, tree(room)) == []
@@ -258,6 +272,22 @@ def test_a_sidecar_of_an_earlier_bake_is_refused(room: Path, run: Run) -> None:
     assert changes(before, tree(room / "out")) == []
 
 
+@pytest.mark.parametrize("change", ["a vertex", "a place"])
+def test_a_changed_geometry_is_noticed(change: str, room: Path, run: Run) -> None:
+    relight = kept(room, run)
+    before = tree(room / "out")
+    if change == "a vertex":
+        bpy.data.meshes["Wall"].vertices[0].co.z += 0.125
+    else:
+        bpy.data.objects["Wall"].location.y += 0.125
+    save(room / "room.blend")
+    code, told = run(*relight)
+    assert code == 1
+    assert told.count("\n") == 1
+    assert "Wall" in told
+    assert changes(before, tree(room / "out")) == []
+
+
 @pytest.mark.parametrize("change", ["pixels", "UVs"])
 def test_a_changed_texture_is_noticed(change: str, room: Path, run: Run) -> None:
     """A checker is inverted, or its UVs are flipped: the mean of each triangle stays."""
@@ -267,10 +297,7 @@ def test_a_changed_texture_is_noticed(change: str, room: Path, run: Run) -> None
     checker[..., :3] = ((rows + columns) % 2)[..., None]
     picture.pixels.foreach_set(checker.ravel())
     picture.pack()
-    nodes = bpy.data.materials["White"].node_tree
-    texture = nodes.nodes.new("ShaderNodeTexImage")
-    texture.image = picture
-    nodes.links.new(texture.outputs[0], shader_of(bpy.data.materials["White"]).inputs["Base Color"])
+    show_picture("White", picture)
     layer = bpy.data.meshes["Floor"].uv_layers.new(name="UVMap")
     layer.data.foreach_set("uv", (0, 0, 1, 0, 1, 1, 0, 1))
     save(room / "room.blend")

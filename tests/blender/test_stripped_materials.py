@@ -28,19 +28,9 @@ from tests.blender.hand_bake import (
     BASE,
     add_plane,
     bake_by_hand,
-    principled_material,
 )
 
 pytestmark = pytest.mark.usefixtures("record")
-
-
-@pytest.fixture
-def paint() -> Material:
-    """The material of a plane that shows a lightmap."""
-    material = principled_material()
-    add_plane(material=material)
-    bake_by_hand()
-    return material
 
 
 @pytest.mark.parametrize("kind", EVERY)

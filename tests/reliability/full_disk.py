@@ -53,8 +53,8 @@ class Trial:
 def trials(needed: int, count: int = COUNT) -> list[Trial]:
     """Return the trials, for a result that takes so many bytes."""
     special = [
-        Trial("tmp", "inodes"), Trial("tmp", "read-only"), Trial("tmp", "full"), Trial("out", "inodes"),
-        Trial("out", "read-only"), Trial("both", "full"), Trial("out", "inodes", 3),
+        Trial("tmp", "inodes"), Trial("both", "full"), Trial("tmp", "read-only"), Trial("tmp", "full"),
+        Trial("out", "inodes"), Trial("out", "read-only"), Trial("out", "inodes", 3),
         Trial("tmp", "inodes", 1),
     ]  # fmt: skip
     if count <= len(special):

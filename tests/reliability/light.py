@@ -22,6 +22,7 @@ TOGETHER = 1e-6
 
 SPACINGS = 8
 HAIR = 1e-3
+"""Metres within which light between emissive faces may be held in: rays start above surfaces."""
 
 
 @dataclass(frozen=True)
@@ -54,20 +55,25 @@ class Arrived:
     Attributes
     ----------
     emitted : float
-        Power [W].
+        Power [W] of all faces, but for those that lie together.
+    leaving : float
+        The part of it that leaves: of faces with no other one within `HAIR` above them.
     deviation : float
         The standard deviation of `emitted`.
-    hair : bool
-        Whether parallel emissive faces are less than `HAIR` apart, and yet not together.
     front : dict of str to two arrays (3,)
         For each object: power that arrives on front sides, and its standard deviation.
     """
 
     emitted: float
+    leaving: float
     deviation: float
-    hair: bool
     front: dict[str, tuple[np.ndarray, np.ndarray]]
     area: dict[str, float]
+
+    @property
+    def hair(self) -> bool:
+        """Whether parallel emissive faces are less than `HAIR` apart, and yet not together."""
+        return self.leaving < self.emitted
 
 
 def triangles_of(scene: bpy.types.Scene) -> Triangles:
@@ -101,9 +107,9 @@ def follow(triangles: Triangles, known: Known, seed: int) -> Arrived:
     chosen = random.choice(len(area), PARTICLES, p=exitance * area / (exitance @ area))
     side = np.where(random.random(PARTICLES) < 0.5, 1.0, -1.0)
     start = _points(triangles.corners[chosen], random)
-    share, hair = _share(triangles.corners, unit, strength > 0, chosen, side, start)
+    share, leaves = _share(triangles.corners, unit, strength > 0, chosen, side, start)
     weight = np.repeat((share * total / PARTICLES)[:, None], 3, axis=1)
-    emitted = float(weight[:, 0].sum())
+    emitted, leaving = float(weight[:, 0].sum()), float(weight[leaves, 0].sum())
     arrived = np.zeros((len(triangles.names), PARTICLES, 3))
     direction = _cosine(unit[chosen] * side[:, None], random)
     origin = start + 1e-7 * unit[chosen] * side[:, None]
@@ -126,7 +132,8 @@ def follow(triangles: Triangles, known: Known, seed: int) -> Arrived:
     }
     sums = np.bincount(triangles.owner, area, len(triangles.names))
     doubt = total * float(share.std()) / math.sqrt(PARTICLES)
-    return Arrived(emitted, doubt, hair, found, dict(zip(triangles.names, sums.tolist(), strict=True)))
+    areas = dict(zip(triangles.names, sums.tolist(), strict=True))
+    return Arrived(emitted, leaving, doubt, found, areas)
 
 
 def _points(corners: np.ndarray, random: np.random.Generator) -> np.ndarray:
@@ -143,8 +150,8 @@ def _share(
     chosen: np.ndarray,
     side: np.ndarray,
     start: np.ndarray,
-) -> tuple[np.ndarray, bool]:
-    """Return each point's share, and whether other faces are a hair above it.
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return each point's share, and whether no other face is a hair above it.
 
     It is 0 where a parallel emissive face lies just above it, else 1 / the number that lie in its place.
     """
@@ -162,8 +169,8 @@ def _share(
     exact = 1e-10
     above = (over & (height > exact) & (height <= together)).any(axis=1)
     same = (over & (np.abs(height) <= exact)).sum(axis=1)
-    hair = bool((over & (height > together) & (height < HAIR)).any())
-    return np.where(above, 0.0, 1.0 / (1 + same)), hair
+    hair = (over & (height > together) & (height < HAIR)).any(axis=1)
+    return np.where(above, 0.0, 1.0 / (1 + same)), ~hair
 
 
 def _meet(

@@ -249,8 +249,12 @@ def _compare_light(trial: Trial, seed: int) -> None:
         told = float(np.mean(power["emitted"]))
         trial.measures["emitted"] = told / arrived.emitted
         doubt = 0.005 * arrived.emitted + 3 * arrived.deviation
-        if abs(told - arrived.emitted) > doubt:
-            trial.problems.append(f"power: {told:.4g} W emitted where there are {arrived.emitted:.4g} W")
+        # Rays pass layers that are a hair apart, so decision 0045 may count these once, or not.
+        if not arrived.leaving - doubt <= told <= arrived.emitted + doubt:
+            least = f"{arrived.leaving:.4g} to " if arrived.hair else ""
+            trial.problems.append(
+                f"power: {told:.4g} W emitted where there are {least}{arrived.emitted:.4g} W"
+            )
     for name in arrived.front:
         mean = _mean_shown(bpy.data.objects[name], seed) if name not in known.emission else None
         if mean is None or (arrived.hair and mean.max() > 0):

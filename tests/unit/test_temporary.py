@@ -17,7 +17,7 @@ posix = pytest.mark.skipif(os.name == "nt", reason="kills as POSIX does")
 # A Blender that took TMPDIR itself for its folder, as it does where it cannot make one of its own.
 RUN = """
 import os, runpy, sys, types
-app = types.SimpleNamespace(tempdir=os.environ["TMPDIR"])
+app = types.SimpleNamespace(tempdir=os.environ.get("BLENDER_S") or os.environ["TMPDIR"])
 sys.modules["bpy"] = types.SimpleNamespace(app=app)
 if os.environ.get("NO_FOLDERS"):
     def refused(*_a, **_k):
@@ -61,6 +61,25 @@ def test_the_folder_for_temporary_files_itself_is_never_removed(tmp_path: Path, 
     assert (done.returncode, done.stderr) == (0, "")
     assert (tmp_path / "mine.txt").read_text() == "years of work"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.txt", "radiosity-notes"]
+
+
+@pytest.mark.parametrize("content", ["", "quit.blend"])
+@pytest.mark.parametrize("name", ["blender_a1b2c3", "blender_mine"])
+def test_blender_s_own_folder_is_removed_if_it_is_empty(tmp_path: Path, name: str, content: str) -> None:
+    folder = tmp_path / name
+    folder.mkdir()
+    if content:
+        (folder / content).write_text("x")
+    done = run(RUN, tmp_path, NO_FOLDERS="1", BLENDER_S=f"{folder}{os.sep}")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert folder.exists() == (name == "blender_mine" or content != "")
+
+
+def test_an_empty_folder_that_blender_was_given_stays(tmp_path: Path) -> None:
+    folder = tmp_path / "blender_abcdef"
+    folder.mkdir()
+    assert run(RUN, folder, NO_FOLDERS="1").returncode == 0
+    assert folder.exists()
 
 
 @posix
