@@ -142,7 +142,8 @@ def run_bake(
             stack.enter_context(output)
         yield Progress("export", 0.0)
         if output is not None:
-            copies = (BLEND_NAME, PREVIEW_NAME) if with_copy else ()
+            preview = (PREVIEW_NAME,) if with_preview else ()
+            copies = (BLEND_NAME, *preview) if with_copy else ()
             sidecars = (output.names.sidecar,) if keeping and keeping.sidecar else ()
             for _ in output.expecting((*copies, *sidecars)):
                 yield Progress("export", 0.0)
