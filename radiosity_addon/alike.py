@@ -45,7 +45,7 @@ def _first_of(alike: Sequence[dict[str, str]]) -> dict[str, str]:
     """Return the first of a kind, with how many others there are and whose some of them are."""
     first, *others = alike
     names = list(dict.fromkeys(warning["name"] for warning in others if warning["name"] != first["name"]))
-    told = f"{len(others)} more like this in report.json"
+    told = f"{len(others)} more like this in the report"
     if names:
         told += f", of {', '.join(names[:NAMED])}{' …' if len(names) > NAMED else ''}"
     return {"name": first["name"], "message": f"{first['message']} ({told})"}

@@ -266,7 +266,7 @@ def _add_bake(parser: argparse.ArgumentParser) -> None:
         help="light the bake in DIR anew, by other strengths of its lights, with the settings that it has",
     )
     _add_common(parser)
-    add("--no-preview", action="store_true", help="write no preview.png")
+    add("--no-preview", action="store_true", help="write no preview.png; an earlier one stays")
     add("--report", type=path_of, metavar="FILE", help="second copy of report.json")
     add("--plot", type=path_of, metavar="FILE.png", help="draw the history of residual, elements and links")
     _add_method(parser)

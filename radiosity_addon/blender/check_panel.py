@@ -12,6 +12,7 @@ from ..remaining import duration
 from . import runtime
 from .preferences import preferences
 from .properties import settings_of
+from .relight_properties import keeps, relight_of
 from .wrapped_text import draw_text
 
 SHOWN_FINDINGS = 10
@@ -110,10 +111,15 @@ def look(context: bpy.types.Context) -> Any:
     """Inspect the context's scene as the panel would bake it, and remember what was found."""
     from .inspection import inspect
     from .operators import output_folder
+    from .output import OutputFolder
+    from .ownership import panel_names
 
     editing = context.mode == "EDIT_MESH"
     try:
-        found = inspect(context, settings_of(context), output_folder(context))
+        settings, folder = settings_of(context), output_folder(context)
+        output = None if folder is None else OutputFolder(folder, panel_names(context.scene))
+        kept = output is not None and keeps(context.scene, settings) and relight_of(context.scene).sidecar
+        found = inspect(context, settings, folder, output, [output.names.sidecar] if output and kept else ())
     finally:
         if editing and context.mode == "OBJECT" and bpy.ops.object.mode_set.poll():
             bpy.ops.object.mode_set(mode="EDIT")

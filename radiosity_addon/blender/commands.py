@@ -164,11 +164,13 @@ def check(
     with registered():
         from .check_panel import figures
         from .inspection import ERROR, inspect
+        from .output import BLEND_NAME, PREVIEW_NAME
 
         console.progress("open", 0.0)
         open_or_build(scene, loaded, allowed)
         folder = output.expanduser().resolve() if output is not None else Path.cwd()
-        found = inspect(bpy.context, settings, folder)
+        into = None if output is None else output_of(output, scene or loaded, allowed)
+        found = inspect(bpy.context, settings, folder, into, (BLEND_NAME, PREVIEW_NAME))
         lines = [f"  {name:<12} {value}" for name, value in figures(found)]
         odd = [f"  {finding.level.lower():<8} {finding.message}" for finding in found.findings]
         console.lines(["a bake would be:", *lines, *(["what is odd:", *odd] if odd else ["nothing is odd"])])

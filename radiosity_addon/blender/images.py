@@ -7,7 +7,7 @@ saves or reads them.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 
 import bpy
@@ -97,17 +97,31 @@ def names_of_pages(
 def possible_names(
     names: FileNames, settings: BakeSettings, bake_scene: BakeScene, folder: Path, others: frozenset[str]
 ) -> list[str]:
-    """Return the names of all lightmaps that a bake into a folder may write, before it is known which.
+    """Return the names of all lightmaps that a bake into a folder may write, before it is known which."""
+    objects = [each.name for each in bake_scene.objects if each.bake]
+    wanted = are_wanted(bake_scene, settings)
+    groups = (*bake_scene.light_groups, *bake_scene.emitter_groups) if wanted else None
+    return names_of_any(names, settings, objects, groups, folder, others)
+
+
+def names_of_any(
+    names: FileNames,
+    settings: BakeSettings,
+    objects: Sequence[str],
+    of_scene: Iterable[str] | None,
+    folder: Path,
+    others: frozenset[str] = frozenset(),
+) -> list[str]:
+    """Return the names of all lightmaps of some objects that a bake into a folder may write.
 
     Where a density decides how many pages there are, as many as any file there could be the last of.
+    `of_scene` are the light groups that the scene's sources are in, "" for none; None if none are baked.
     """
-    objects = [each.name for each in bake_scene.objects if each.bake]
     count = settings.pages
-    if settings.atlas == "shared" and settings.texel_density is not None:
+    if settings.atlas == "shared" and settings.texel_density is not None and folder.is_dir():
         count = max(count, highest_page([path.name for path in folder.iterdir()]))
     groups: Collection[str] = ()
-    if are_wanted(bake_scene, settings):
-        of_scene = (*bake_scene.light_groups, *bake_scene.emitter_groups)
+    if of_scene is not None:
         groups = dict.fromkeys(filter(None, (*(name for name, _ in settings.groups), *of_scene, OTHERS)))
     found = names_of_pages(names, settings, count, objects, list(groups), others)
     return [name for of in found for name in of]

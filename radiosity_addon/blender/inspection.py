@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,6 +26,7 @@ from ..solver import scratch
 from ..texel_memory import refuse_too_large
 from .collect import collect
 from .export import check_names, chosen_pieces
+from .foreseen_files import refusal
 from .materials import uses_nodes
 from .mesh_arrays import world_from_object
 from .object_roles import BAKEABLE_TYPES
@@ -35,6 +36,7 @@ from .render_state import render_depsgraph
 
 if TYPE_CHECKING:
     from .lamps import LampFactors
+    from .output import OutputFolder
 
 ERROR, WARNING, INFO = "ERROR", "WARNING", "INFO"
 """The bake would stop; the result may disappoint; worth knowing."""
@@ -111,7 +113,13 @@ class _Shape:
     volume: float | None
 
 
-def inspect(context: bpy.types.Context, settings: BakeSettings, folder: Path | None) -> Inspection:
+def inspect(
+    context: bpy.types.Context,
+    settings: BakeSettings,
+    folder: Path | None,
+    output: OutputFolder | None = None,
+    files: Collection[str] = (),
+) -> Inspection:
     """Look at the context's scene.
 
     Parameters
@@ -121,6 +129,10 @@ def inspect(context: bpy.types.Context, settings: BakeSettings, folder: Path | N
         Of the bake to be.
     folder : Path or None
         Where it would write; None where it packs.
+    output : OutputFolder or None
+        The same as the bake would have it; None if it is not known which files there are.
+    files : collection of str
+        What it would write besides lightmaps and the report.
 
     Raises
     ------
@@ -141,6 +153,9 @@ def inspect(context: bpy.types.Context, settings: BakeSettings, folder: Path | N
     lit = [_lit(piece, shapes) for piece in chosen]
     triangles = sum(len(piece.mesh) for piece in collected.pieces)
     plan = foresight.foresee(lit, triangles, settings)
+    refused = None if output is None else refusal(output, settings, collected, chosen, files)
+    if refused is not None:
+        findings.append(Finding(ERROR, "file", refused))
     findings += [
         *_of_the_file(folder),
         *_of_light(context, collected, settings),

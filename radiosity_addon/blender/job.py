@@ -32,7 +32,7 @@ from .live_picture import Seen, seen_triangles
 from .only_changed import kept_warning, narrow, remember
 from .output import BLEND_NAME, PREVIEW_NAME, OutputFolder, save_copy
 from .preview import SAMPLES, render_preview
-from .rebake import EarlierBake, originals_shown, replacing_earlier
+from .rebake import EarlierBake, Originals, replacing_earlier
 from .restore import restore
 from .scopes import files_shown_by, keeping_theirs, of_scene, shared_warnings
 
@@ -142,30 +142,25 @@ def run_bake(
             stack.enter_context(output)
         yield Progress("export", 0.0)
         if output is not None:
-            copies = (BLEND_NAME, PREVIEW_NAME) if with_copy else ()
+            preview = (PREVIEW_NAME,) if with_preview else ()
+            copies = (BLEND_NAME, *preview) if with_copy else ()
             sidecars = (output.names.sidecar,) if keeping and keeping.sidecar else ()
             for _ in output.expecting((*copies, *sidecars)):
                 yield Progress("export", 0.0)
-        edited: list[BakeWarning] = []
-
-        @contextmanager
-        def originals() -> Iterator[None]:
-            with originals_shown(context) as found:
-                edited.extend(found)  # once an edit is carried, it is not found again
-                yield
-
+        originals = Originals(context)
         with timed(seconds, "export"):
             steps = export_steps(context, settings, keeping is not None, patient, originals)
             export = yield from exporting(steps)
             yield Progress("export", 0.0)
             with originals():
+                context.view_layer.update()
                 check_targets(export)
                 seen = seen_triangles(context, export)
         unchanged = 0
         if only_changed and not moves_alone(export.bake_scene, settings, keeping):
             export, settings, unchanged = narrow(context.scene, export, settings)
         scope = Scope.of(context.scene, export, is_partial=settings.objects is not None or unchanged > 0)
-        remarks = [*notes, *edited, *shared_warnings(context.scene, export)]
+        remarks = [*notes, *originals.warnings, *shared_warnings(context.scene, export)]
         if unchanged:
             remarks.append(kept_warning(unchanged))
         elif scope.in_scene and keeping is not None:
@@ -188,6 +183,7 @@ def run_bake(
             samples = SAMPLES if with_preview else None
             return (yield from deliver(context, settings, *made, samples, scope=scope))
         with scope.replacing_earlier(context) as earlier, timed(seconds, "apply"):
+            result = replace(result, warnings=(*earlier.warnings, *result.warnings))
             showing = _show(context, settings, export, result, output, keeping, earlier)
             images, groups = yield from _told(showing, solved, 1.0)
             report = _report(result, images, groups, settings, seconds)
@@ -252,6 +248,7 @@ def deliver(
 ) -> BakeJob:
     """Show the lightmaps, save the scene beside them, render it unless `samples` is None, and publish it."""
     with (scope or Scope()).replacing_earlier(context) as earlier, timed(seconds, "apply"):
+        result = replace(result, warnings=(*earlier.warnings, *result.warnings))
         showing = _show(context, settings, export, result, output, keeping, earlier)
         images, groups = yield from _told(showing, APPLY, SAVE)
     try:

@@ -117,10 +117,7 @@ class OutputFolder:
                 f"cannot write to the output folder '{self.path}': {error.strerror}; choose another"
             ) from error
         try:
-            self._owner = self._owner or owner_of(bpy.context.scene, self._source)
-            self.earlier = self._earlier()
-            for name in (BLEND_NAME, PREVIEW_NAME, self.names.report, self.names.sidecar):
-                self._refuse_others(name)
+            self._meet_earlier()
         except BaseException:
             self.__exit__(None, None, None)
             raise
@@ -150,6 +147,23 @@ class OutputFolder:
                 raise BakeError(f"cannot write '{place}': {error.strerror}") from error
             assert error is not None
             raise type(error)(place) from error
+
+    def refusal(self, names: Iterable[str]) -> str | None:
+        """Return why a bake that writes files of these names would stop, if it would; changes no file."""
+        try:
+            if self.path.is_dir():
+                self._meet_earlier()
+                self.expect(names)
+        except (BakeError, OSError) as error:
+            return str(error)
+        return None
+
+    def _meet_earlier(self) -> None:
+        """Read the report that this bake replaces; a BakeError names what stands in its place."""
+        self._owner = self._owner or owner_of(bpy.context.scene, self._source)
+        self.earlier = self._earlier()
+        for name in (BLEND_NAME, PREVIEW_NAME, self.names.report, self.names.sidecar):
+            self._refuse_others(name)
 
     def expect(self, names: Iterable[str]) -> None:
         """Refuse names of files to come in whose places something stands that is not ours.

@@ -223,7 +223,7 @@ class RADIOSITY_PT_warnings(_Panel, bpy.types.Panel):
             draw_text(self.layout.box(), f"{name}: {message}", "ERROR", context)
         hidden = last.warning_count - len(last.warnings[:SHOWN_WARNINGS])
         if hidden > 0:
-            text = iface_("and {} more, in report.json").format(hidden)
+            text = iface_("and {} more, in the report").format(hidden)
             self.layout.label(text=text, translate=False)
 
 

@@ -6,7 +6,7 @@ A bake must read the user's own meshes and materials, yet the old lightmaps stay
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 
 import bpy
 
@@ -29,9 +29,33 @@ def originals_shown(context: bpy.types.Context) -> Iterator[tuple[BakeWarning, .
         yield warnings
 
 
+class Originals:
+    """Shows what is the user's, moment by moment, as `originals_shown`.
+
+    Edits made before the first moment are part of all. Later ones stay where they were made until lightmaps
+    are applied, which carries them.
+
+    Attributes
+    ----------
+    warnings : tuple of BakeWarning
+        What to warn of, once the first moment came.
+    """
+
+    def __init__(self, context: bpy.types.Context) -> None:
+        self._context = context
+        self._carried = False
+        self.warnings: tuple[BakeWarning, ...] = ()
+
+    def __call__(self) -> AbstractContextManager[None]:
+        """Return what shows them while it is entered; within, the scene is not evaluated yet."""
+        if not self._carried:
+            self.warnings, self._carried = carry_edits(self._context), True
+        return bare(self._context, evaluated=False)
+
+
 @contextmanager
-def bare(context: bpy.types.Context) -> Iterator[None]:
-    """Take all lightmaps of the file off for a moment."""
+def bare(context: bpy.types.Context, evaluated: bool = True) -> Iterator[None]:
+    """Take all lightmaps of the file off for a moment, for which the scene may be evaluated as well."""
     objects = showing()
     state = ShownState(objects)
     stand_ins = [
@@ -43,7 +67,8 @@ def bare(context: bpy.types.Context) -> Iterator[None]:
         take_off(objects)
         for block, _, _ in stand_ins:
             block.hide_viewport = block.hide_render = True
-        context.view_layer.update()
+        if evaluated:
+            context.view_layer.update()
         yield
     finally:
         state.put_back()
@@ -64,12 +89,17 @@ class EarlierBake:
         Names of objects that keep what they show.
     is_partial : bool
         Instances that are not baked keep what they show too, where others of the same instancer are.
+
+    Attributes
+    ----------
+    warnings : tuple of BakeWarning
+        What to warn of: edits made while the new bake was computed.
     """
 
     def __init__(
         self, context: bpy.types.Context, keep: Collection[str] = (), is_partial: bool = False
     ) -> None:
-        carry_edits(context)
+        self.warnings = carry_edits(context)
         self._context = context
         self.keep = frozenset(keep)
         self.is_partial = is_partial

@@ -6,7 +6,6 @@ import json
 import time
 from collections.abc import Generator
 from dataclasses import dataclass
-from functools import partial
 
 import bpy
 import numpy as np
@@ -24,7 +23,7 @@ from . import kept_bakes, lightmap_versions
 from .export import export_steps, exporting
 from .kept_bakes import InMemory
 from .kept_sidecars import sidecar_of
-from .rebake import originals_shown
+from .rebake import Originals
 from .relight_properties import relight_of
 from .relit_images import rewrite
 from .relit_materials import refresh
@@ -87,7 +86,7 @@ def strengths_steps(
     scene = context.scene
     held = kept_bakes.find(scene)
     stored: KeptBake | StoredBake = stored_bake(scene) if held is None else held.bake
-    shown = partial(originals_shown, context)
+    shown = Originals(context)
     export = yield from export_steps(context, stored.settings, True, patient, shown)
     if isinstance(stored, StoredBake):
         held = kept_bakes.put(scene, kept_bakes.mark_of(scene), stored.kept(export.bake_scene))

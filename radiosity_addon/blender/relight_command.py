@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -116,7 +115,7 @@ def relight_into(
     from .images import group_file_names, page_file_names
     from .job import deliver, timed
     from .preview import QUICK_SAMPLES
-    from .rebake import originals_shown
+    from .rebake import Originals
     from .relight import lit
 
     seconds: dict[str, float] = {}
@@ -124,7 +123,7 @@ def relight_into(
         output.expect((BLEND_NAME, PREVIEW_NAME, output.names.sidecar))
         yield Progress("export", EXPORT)
         with timed(seconds, "export"):
-            shown = partial(originals_shown, context)
+            shown = Originals(context)
             steps = export_steps(context, stored.settings, dark=True, shown=shown)
             export = yield from exporting(steps)
         with timed(seconds, "relight"):

@@ -59,17 +59,16 @@ def drawn_surfaces(
     corners: np.ndarray,
     inputs: Mapping[str, np.ndarray],
     surface: np.ndarray,
-    varies: np.ndarray,
 ) -> DrawnSurfaces:
-    """Return the mesh of those triangles that vary; works on arrays alone."""
-    coordinates, weights = (values[varies] for values in tiles.drawn_triangles())
+    """Return the mesh of triangles that have tiles; works on arrays alone."""
+    coordinates, weights = tiles.drawn_triangles()
     size = np.array([tiles.width, tiles.height])
     return DrawnSurfaces(
         (tiles.width, tiles.height),
-        _at_weights(corners[varies], weights),
+        _at_weights(corners, weights),
         (coordinates + _PIXEL_OFFSET / size).astype(np.float32),
-        {name: _at_weights(values[varies], weights) for name, values in inputs.items()},
-        surface[varies],
+        {name: _at_weights(values, weights) for name, values in inputs.items()},
+        surface,
     )
 
 
@@ -93,7 +92,7 @@ class SurfaceBake:
     ) -> None:
         self._context = context
         self._made: list[bpy.types.ID] = []
-        self._attributes = {name: f"radiosity_{number}" for number, name in enumerate(inputs)}
+        self._attributes = attribute_names(inputs)
         self._rewired: dict[int, RewiredMaterial] = {}
         try:
             for row, source in materials.items():
@@ -129,14 +128,6 @@ class SurfaceBake:
         self._image = bpy.data.images.new("Radiosity Surfaces", *drawn.size, float_buffer=True, is_data=True)
         self._made.append(self._image)
 
-    def may_be_cut_out(self, surface: int) -> bool:
-        """Tell whether a surface's opacity varies."""
-        return surface in self._rewired and not self._rewired[surface].is_constant("passed")
-
-    def is_constant(self, channel: str) -> bool:
-        """Tell whether no material varies in a channel: what was read of them then holds."""
-        return all(rewired.is_constant(channel) for rewired in self._rewired.values())
-
     def channel(self, channel: str) -> np.ndarray:
         """Return one channel, (h, w, 3) float32; what is not drawn is 0."""
         width, height = self._image.size
@@ -157,6 +148,11 @@ class SurfaceBake:
         """Leave the file as it was."""
         remove_datablocks(self._made)
         self._made.clear()
+
+
+def attribute_names(inputs: Sequence[str]) -> dict[str, str]:
+    """Return the mesh attribute that holds each of what nodes ask for."""
+    return {name: f"radiosity_{number}" for number, name in enumerate(inputs)}
 
 
 def bake_emission() -> set[str]:

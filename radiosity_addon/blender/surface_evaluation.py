@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import closing
+from functools import partial
 
 import bpy
 import numpy as np
@@ -22,7 +23,8 @@ from .export_sources import MaterialSource
 from .materials import Surface
 from .mesh_arrays import normal_matrix, world_from_object
 from .pieces import Piece
-from .surface_bake import DrawnSurfaces, SurfaceBake, drawn_surfaces
+from .surface_bake import SurfaceBake
+from .surface_batches import Batch, batches, material_facts
 from .surface_rewiring import CHANNELS
 from .surface_terms import surface_of_terms
 
@@ -77,28 +79,30 @@ def evaluate_surfaces(
     varies = np.array([one.varies for one in surfaces])[own]
     needed = {row: materials[row] for row in sorted(set(own[varies].tolist()))}
     yield 0.0
-    with closing(SurfaceBake(context, settings, needed, tuple(inputs))) as bake:
-        cut_out = [one.opacity < 1.0 or bake.may_be_cut_out(row) for row, one in enumerate(surfaces)]
-        varying = [channel for channel in CHANNELS if not bake.is_constant(channel)] if varies.any() else []
+    facts = yield from material_facts(needed, tuple(inputs))
+    cut_out = [
+        one.opacity < 1.0 or (row in facts and "passed" in facts[row].varying)
+        for row, one in enumerate(surfaces)
+    ]
+    # Where no material varies in a channel, what was read of them holds.
+    varying = [channel for channel in CHANNELS if any(channel in each.varying for each in facts.values())]
     yield 0.1
 
-    def laid_out() -> tuple[SurfaceTiles, dict[str, np.ndarray], DrawnSurfaces | None]:
+    def laid_out() -> tuple[SurfaceTiles, dict[str, np.ndarray], list[Batch]]:
         area = np.where(varies, _areas(corners), 0.0)
         tiles = lay_out_surfaces(area, np.array(cut_out)[own].astype(int), _side(settings, any(cut_out)))
-        drawn = drawn_surfaces(tiles, corners, inputs, own, varies) if varying else None
-        return tiles, _terms_of_constants(tiles, surfaces, own), drawn
+        divided = batches(tiles, corners, inputs, own, facts) if varying else []
+        return tiles, _terms_of_constants(tiles, surfaces, own), divided
 
-    tiles, terms, drawn = yield from elsewhere(laid_out, patient)
-    triangle, row, column, *_ = tiles.texels()
-    row, column = row[varies[triangle]], column[varies[triangle]]
-    for channel in varying:
-        yield 0.2
-        assert drawn is not None
-        with closing(SurfaceBake(context, settings, needed, tuple(inputs))) as bake:
-            bake.draw(drawn)
-            seen = bake.channel(channel)
-        yield 0.5
-        terms[channel][row, column] = seen[row, column]
+    tiles, terms, divided = yield from elsewhere(laid_out, patient)
+    for number, batch in enumerate(divided):
+        materials_here = {row: needed[row] for row in np.unique(batch.drawn.surface).tolist()}
+        for channel in varying:
+            yield 0.2 + 0.7 * number / len(divided)
+            with closing(SurfaceBake(context, settings, materials_here, tuple(inputs))) as bake:
+                bake.draw(batch.drawn)
+                seen = bake.channel(channel)
+            yield from elsewhere(partial(batch.put, seen, terms[channel]), patient)
     return (yield from elsewhere(lambda: _images(tiles, terms, rows, len(surface)), patient))
 
 

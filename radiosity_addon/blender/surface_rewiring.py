@@ -60,6 +60,12 @@ class RewiredMaterial:
             self._terms = _Rewiring().shader(output.inputs["Surface"], _Place(self._tree))
         self._finish(output)
 
+    @property
+    def node_count(self) -> int:
+        """The number of nodes in all of its trees."""
+        trees = [block for block in self.made if isinstance(block, bpy.types.NodeTree)]
+        return sum(len(tree.nodes) for tree in [self._tree, *trees])
+
     def is_constant(self, channel: str) -> bool:
         """Tell whether a channel is the same all over."""
         return not is_socket(getattr(self._terms, channel))

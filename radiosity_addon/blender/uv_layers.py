@@ -8,7 +8,7 @@ values go into an attribute. Either way they follow the mesh through edits.
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -63,7 +63,7 @@ def layer_record(mesh: bpy.types.Mesh) -> LayerRecord | None:
 
 def set_record(mesh: bpy.types.Mesh, record: LayerRecord) -> None:
     """Have the mesh remember what was done to it."""
-    mesh[LAYER] = json.dumps(asdict(record))
+    mesh[LAYER] = json.dumps(vars(record))
 
 
 def check_room(mesh: bpy.types.Mesh, object_name: str) -> None:
@@ -118,7 +118,7 @@ def put_layer_on(mesh: bpy.types.Mesh, loops: np.ndarray, uv: np.ndarray, object
         if same:
             set_record(mesh, LayerRecord(ours=False))
             return
-    _put_on(mesh, coordinates)
+    set_record(mesh, _put_on(mesh, coordinates))
 
 
 def layer_values(mesh: bpy.types.Mesh) -> np.ndarray | None:
@@ -132,9 +132,7 @@ def layer_values(mesh: bpy.types.Mesh) -> np.ndarray | None:
 def put_back_layer(mesh: bpy.types.Mesh, record: LayerRecord, values: np.ndarray | None) -> None:
     """Put on again what `layer_values` and `layer_record` returned before it was taken off."""
     if values is not None and len(values) == len(mesh.loops):
-        _put_on(mesh, values)
-        put_on = layer_record(mesh) or record
-        record = LayerRecord(**{**asdict(record), "kept": put_on.kept})
+        record = replace(record, kept=_put_on(mesh, values).kept)
     set_record(mesh, record)
 
 
@@ -160,7 +158,8 @@ def take_layer_off(mesh: bpy.types.Mesh) -> None:
     _set_roles(mesh, active, rendered)
 
 
-def _put_on(mesh: bpy.types.Mesh, coordinates: np.ndarray) -> None:
+def _put_on(mesh: bpy.types.Mesh, coordinates: np.ndarray) -> LayerRecord:
+    """Put the layer on; returns what is to be remembered."""
     layers = mesh.uv_layers
     kept = ""
     active, rendered = _roles(mesh)
@@ -177,7 +176,7 @@ def _put_on(mesh: bpy.types.Mesh, coordinates: np.ndarray) -> None:
         layers.new(name=LIGHTMAP_UV_LAYER, do_init=False)
     _write(mesh, LIGHTMAP_UV_LAYER, coordinates)
     _set_roles(mesh, active, rendered)
-    set_record(mesh, LayerRecord(kept=kept, active=before[0], rendered=before[1]))
+    return LayerRecord(kept=kept, active=before[0], rendered=before[1])
 
 
 def roles(mesh: bpy.types.Mesh) -> tuple[str, str]:

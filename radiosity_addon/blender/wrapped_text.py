@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
+import blf
 import bpy
 
-LETTER = 6.2
-"""Mean width of a letter [px], at a scale of the interface of 1."""
+MARGIN = 60
+"""What a layout's frame and a label's icon take of its width [px], at a scale of the interface of 1."""
+
+TABS = 32
+"""What a sidebar's tabs and its own frame take besides."""
 
 
 def draw_text(
@@ -26,22 +31,31 @@ def draw_text(
     width : float or None
         Of the layout [px]; None takes the region's.
     """
-    if width is None:
-        width = context.region.width if context.region is not None else 280
     scale = context.preferences.system.ui_scale
-    per_line = max(16, int((width / scale - 60) / LETTER))
+    if width is None:
+        width = (context.region.width if context.region is not None else 280) - TABS * scale
+    blf.size(_FONT, context.preferences.ui_styles[0].widget.points * scale)
     column = layout.column(align=True)
     column.scale_y = 0.85
-    for number, line in enumerate(wrapped(text, per_line)):
+    for number, line in enumerate(wrapped(text, width - MARGIN * scale, _width)):
         column.label(text=line, icon=icon if number == 0 else "BLANK1", translate=False)
 
 
-def wrapped(text: str, width: int) -> list[str]:
-    """Break a text at spaces into lines of at most `width` characters."""
+_FONT = 0
+"""The interface's own."""
+
+
+def _width(text: str) -> float:
+    return float(blf.dimensions(_FONT, text)[0])
+
+
+def wrapped(text: str, width: float, measure: Callable[[str], float]) -> list[str]:
+    """Break a text at spaces into lines no wider than `width`, as `measure` has it."""
     lines = [""]
     for word in text.split():
-        if lines[-1] and len(lines[-1]) + 1 + len(word) > width:
+        longer = f"{lines[-1]} {word}".strip()
+        if lines[-1] and measure(longer) > width:
             lines.append(word)
         else:
-            lines[-1] = f"{lines[-1]} {word}".strip()
+            lines[-1] = longer
     return lines

@@ -121,9 +121,30 @@ def lay_out_surfaces(area: Array, group: Array, side: int) -> SurfaceTiles:
     -------
     SurfaceTiles
     """
-    leg = _legs(area, side)
-    corner = np.zeros((len(area), 2), dtype=np.int32)
-    turned = np.zeros(len(area), dtype=bool)
+    return _placed(_legs(area, side), group, side)
+
+
+def lay_out_again(tiles: SurfaceTiles, triangles: Array) -> SurfaceTiles:
+    """Give some triangles of a layout an image of their own, about square, in which they are as large.
+
+    `texels` lists the same texels of each triangle for both, in the same order.
+
+    Parameters
+    ----------
+    tiles : SurfaceTiles
+    triangles : (n,) int
+        Not empty.
+    """
+    leg = tiles.leg[triangles]
+    taken = np.where(leg > 1, 0.5 * (leg + 1.0) * (leg + 2.0), 1.0).sum()
+    side = max(int(np.ceil(np.sqrt(taken / _FILLED))), int(leg.max()) + 1)
+    return _placed(leg, np.zeros(len(leg), dtype=np.int32), side)
+
+
+def _placed(leg: Array, group: Array, side: int) -> SurfaceTiles:
+    """Put tiles onto shelves, the largest of each group first."""
+    corner = np.zeros((len(leg), 2), dtype=np.int32)
+    turned = np.zeros(len(leg), dtype=bool)
     order = np.lexsort((-leg, group))
     top, x, shelf, last = 0, 0, 0, None
     position = 0

@@ -134,6 +134,27 @@ def test_between_any_two_steps_a_bake_survives_or_stops_and_leaves_nothing(
         assert set(blocks()) == set(before)
 
 
+def test_an_edit_of_a_stand_in_during_a_second_bake_is_in_its_report() -> None:
+    first, second = bpy.data.objects["Tall Block"], bpy.data.objects["Short Block"]
+    second.data = first.data
+    assert [*job()][-1]
+    assert first.data != second.data
+    running = job()
+    advance(running, "worked")
+    first.data.vertices[0].co.x += 0.01
+    edited = first.data.vertices[0].co.x
+    while True:
+        try:
+            next(running)
+        except StopIteration as done:
+            report = done.value
+            break
+    assert any("edited since the bake" in warning["message"] for warning in report.data["warnings"])
+    assert bpy.ops.radiosity.restore() == {"FINISHED"}
+    assert first.data == second.data
+    assert first.data.vertices[0].co.x == edited
+
+
 def test_an_undo_stops_a_bake_at_its_next_step() -> None:
     running = job()
     next(running)

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -16,7 +17,11 @@ import radiosity_addon
 from radiosity_addon.blender import check_panel, runtime
 from radiosity_addon.blender.cornell import build_cornell_box
 from radiosity_addon.blender.inspection import ERROR, INFO, WARNING, Inspection, inspect
+from radiosity_addon.blender.job import run_bake
+from radiosity_addon.blender.output import BLEND_NAME, PREVIEW_NAME, OutputFolder
+from radiosity_addon.errors import BakeError
 from radiosity_addon.settings import BakeSettings
+from radiosity_addon.solver.steps import drain
 from tests.blender.scenes import QUAD, add_lamp, add_mesh, set_world
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -80,6 +85,43 @@ def test_a_folder_that_cannot_be_written_is_told_of(tmp_path: Path) -> None:
     found = inspect(bpy.context, SETTINGS, tmp_path / "file" / "lightmaps")
     assert found.findings[0].level == ERROR
     assert "choose another" in found.findings[0].message
+
+
+@pytest.mark.parametrize(
+    ("foreign", "settings"),
+    [
+        ("lightmap.exr", SETTINGS),
+        ("Floor.exr", replace(SETTINGS, atlas="per-object")),
+        ("lightmap_3.png", replace(SETTINGS, texel_density=20.0, format="png16")),
+        ("lightmap_lamps.exr", replace(SETTINGS, groups=(("lamps", ("Lamp",)),))),
+        ("report.json", SETTINGS),
+        ("preview.png", SETTINGS),
+    ],
+)
+def test_a_file_that_a_bake_would_not_replace_is_named_as_by_the_bake(
+    foreign: str, settings: BakeSettings, tmp_path: Path
+) -> None:
+    room()
+    (tmp_path / foreign).write_text("the user's")
+    found = inspect(bpy.context, settings, tmp_path, OutputFolder(tmp_path), [BLEND_NAME, PREVIEW_NAME])
+    assert found.findings[0].level == ERROR
+    assert str(tmp_path / foreign) in found.findings[0].message
+    assert [path.name for path in tmp_path.iterdir()] == [foreign]
+    with pytest.raises(BakeError) as stopped:
+        drain(run_bake(bpy.context, settings, OutputFolder(tmp_path), with_copy=True))
+    assert str(stopped.value) == found.findings[0].message
+
+
+def test_files_of_the_last_bake_are_replaced_and_not_odd(tmp_path: Path) -> None:
+    room()
+    settings = replace(SETTINGS, resolution=16, quality="draft")
+    drain(run_bake(bpy.context, settings, OutputFolder(tmp_path)))
+    assert (tmp_path / "lightmap.exr").is_file()
+    found = inspect(bpy.context, settings, tmp_path, OutputFolder(tmp_path))
+    assert ERROR not in {finding.level for finding in found.findings}
+    (tmp_path / "lightmap.exr").write_text("changed")
+    found = inspect(bpy.context, settings, tmp_path, OutputFolder(tmp_path))
+    assert "was changed since it was baked" in found.findings[0].message
 
 
 def test_darkness_is_told_of(tmp_path: Path) -> None:

@@ -31,13 +31,13 @@ def test_many_alike_become_one_that_tells_of_the_others() -> None:
     assert shown[1:] == [TOO_SMALL]
     assert shown[0]["name"] == "slot0"
     assert shown[0]["message"].startswith(missing(0)["message"])
-    assert shown[0]["message"].endswith("(83 more like this in report.json, of slot1, slot2, slot3 …)")
+    assert shown[0]["message"].endswith("(83 more like this in the report, of slot1, slot2, slot3 …)")
 
 
 def test_others_of_the_same_thing_are_not_named_again() -> None:
     shown = one_of_each([warning("box", f"object 'box': triangle {number} is odd") for number in range(4)])
     assert [entry["message"] for entry in shown] == [
-        "object 'box': triangle 0 is odd (3 more like this in report.json)"
+        "object 'box': triangle 0 is odd (3 more like this in the report)"
     ]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap.surface_tiles import SurfaceTiles, lay_out_surfaces
+from radiosity_addon.lightmap.surface_tiles import SurfaceTiles, lay_out_again, lay_out_surfaces
 from radiosity_addon.solver.surface_images import SurfaceImages
 
 SIDE = 128
@@ -28,6 +28,23 @@ def test_no_texel_belongs_to_two_triangles() -> None:
     assert column.max() < tiles.width == SIDE
     leg = tiles.leg.astype(int)
     np.testing.assert_array_equal(np.bincount(triangle), leg * (leg + 1) // 2)
+
+
+@pytest.mark.parametrize("chosen", [[0], [3, 17, 34], range(1, 200, 3)])
+def test_some_triangles_laid_out_again_have_the_same_texels(chosen: list[int]) -> None:
+    tiles, some = _tiles(), np.array(chosen)
+    again = lay_out_again(tiles, some)
+    np.testing.assert_array_equal(again.leg, tiles.leg[some])
+    triangle, row, column, second, third = again.texels()
+    assert len(np.unique(row * again.width + column)) == len(row)
+    assert column.max() < again.width
+    assert row.max() < again.height
+    assert again.width * again.height < 4 * (0.5 * (again.leg + 1.0) * (again.leg + 2)).sum() + 16
+    of_all, _, _, all_second, all_third = tiles.texels()
+    same = np.isin(of_all, some)
+    np.testing.assert_array_equal(some[triangle], of_all[same])
+    np.testing.assert_array_equal(second, all_second[same])
+    np.testing.assert_array_equal(third, all_third[same])
 
 
 def test_the_image_is_as_large_as_it_may_be_and_larger_triangles_have_more() -> None:

@@ -54,12 +54,37 @@ def test_only_its_own_timer_carries_a_bake_on(seen: dict[str, Any]) -> None:
     assert 0 < advanced <= 110  # one every 10 ms
 
 
+def test_an_edit_in_a_second_window_survives_the_bake_and_the_bake_the_edit(seen: dict[str, Any]) -> None:
+    edited = seen["edited"]
+    assert edited["while_baking"]
+    assert edited["corner"] == 0.0625
+    assert edited["lit"] == edited["shows"]
+
+
 def test_a_deletion_in_a_second_window_stops_the_bake_and_nothing_else(seen: dict[str, Any]) -> None:
-    assert seen["windows"] == 2
-    assert seen["deleted_while_baking"]
-    assert "Tall Block" not in seen["deleted_shows"]
+    deleted = seen["deleted"]
+    assert deleted["windows"] == 2
+    assert deleted["while_baking"]
+    assert "Tall Block" not in deleted["shows"]
+    assert deleted["lit"] == []
 
 
 def test_an_undo_in_a_second_window_stops_the_bake(seen: dict[str, Any]) -> None:
-    assert seen["undone_while_baking"]
-    assert "Tall Block" in seen["undone_shows"]
+    undone = seen["undone"]
+    assert undone["while_baking"]
+    assert undone["lit"] == []
+
+
+def test_a_bake_goes_on_when_a_second_window_is_closed(seen: dict[str, Any]) -> None:
+    closed = seen["closed"]
+    assert closed["while_baking"]
+    assert closed["windows"] == 1
+    assert closed["lit"] == closed["shows"] != []
+
+
+def test_a_bake_ends_with_its_window_and_leaves_everything_as_it_was(seen: dict[str, Any]) -> None:
+    closed = seen["closed_itself"]
+    assert closed["while_baking"]
+    assert closed["windows"] == 1
+    assert closed["lit"] == []
+    assert closed["changed"] == []

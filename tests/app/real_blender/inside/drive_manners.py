@@ -20,6 +20,8 @@ MODULE = "bl_ext.user_default.radiosity_addon"
 runtime = importlib.import_module(f"{MODULE}.blender.runtime")
 window_job = importlib.import_module(f"{MODULE}.blender.window_job")
 
+CORNER = 0.0625  # where an edit puts a corner
+
 seen = {"foreign_ticks": 0, "advanced": 0}
 
 
@@ -126,23 +128,55 @@ def script():
     yield from events.until(not_baking, 30)
     yield 0.3
 
-    # A second window: an object is deleted there, then an undo.
+    # A second window: what is done there while the first one bakes.
+    settings = bpy.context.scene.radiosity
+    settings.resolution, settings.quality = 64, "draft"
+    for name, edit in (("edited", move_corner), ("deleted", delete), ("undone", undo), ("closed", close)):
+        yield from second_window()
+        yield from bake_and(name, edit, events.window())
+    # The window that bakes is closed; the other one stays.
+    yield from second_window()
+    yield from bake_and("closed_itself", close, bpy.context.window_manager.windows[-1])
+
+
+def second_window():
+    """Open one unless there is one, and start from the originals."""
+    invoke(bpy.ops.radiosity.restore)
+    yield 0.3
     bpy.ops.ed.undo_push(message="Before")
-    with override(events.window()):
-        bpy.ops.wm.window_new()
-    yield 0.5
+    if len(bpy.context.window_manager.windows) < 2:
+        with override(events.window()):
+            bpy.ops.wm.window_new()
+        yield 0.7
     seen["windows"] = len(bpy.context.window_manager.windows)
-    for name, edit in (("deleted", delete), ("undone", undo), ("closed", close)):
-        before = dump_file()
-        invoke(bpy.ops.radiosity.bake)
-        yield from events.until(solving, 60)
-        seen[f"{name}_while_baking"] = baking()
-        edit(bpy.context.window_manager.windows[-1])
-        yield from events.until(not_baking, 120)
-        yield 0.3
-        after = dump_file()
-        seen[name] = [line for line in differences(before, after) if "/window_managers" not in line]
-        seen[f"{name}_shows"] = sorted(obj.name for obj in bpy.data.objects if obj.type == "MESH")
+
+
+def bake_and(name, edit, window):
+    """Bake in a window, and have the second one do something once the scene is read."""
+    before = dump_file()
+    invoke(bpy.ops.radiosity.bake, window)
+    yield from events.until(solving, 60)
+    told = seen[name] = {"while_baking": baking()}
+    edit(bpy.context.window_manager.windows[-1])
+    yield from events.until(not_baking, 120)
+    yield 0.5
+    after = dump_file()
+    told["changed"] = [line for line in differences(before, after) if "/window_managers" not in line]
+    told["shows"] = sorted(obj.name for obj in bpy.data.objects if obj.type == "MESH")
+    told["lit"] = sorted(
+        obj.name for obj in bpy.data.objects if obj.type == "MESH" and "Lightmap" in obj.data.uv_layers
+    )
+    told["windows"] = len(bpy.context.window_manager.windows)
+    if "Tall Block" in told["shows"]:
+        told["corner"] = bpy.data.objects["Tall Block"].data.vertices[0].co.z
+
+
+def move_corner(window):
+    with override(window):
+        mesh = bpy.data.objects["Tall Block"].data
+        mesh.vertices[0].co.z = CORNER
+        mesh.update()
+        bpy.ops.ed.undo_push(message="Move")
 
 
 def delete(window):
@@ -159,7 +193,6 @@ def undo(window):
 def close(window):
     with override(window):
         bpy.ops.wm.window_close()
-    runtime.running.active and runtime.running.stop()
 
 
 def finished(failure):
