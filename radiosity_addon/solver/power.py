@@ -14,7 +14,7 @@ import numpy as np
 from .arrays import Array
 from .cluster_links import ClusterLinks, gather_at_clusters
 from .environment import SkyPatch
-from .hierarchy import Faces, Hierarchy, node_opacity
+from .hierarchy import LEAF, Faces, Hierarchy, node_opacity
 from .light_base import Emitter
 from .lights import EnvironmentLight, Light, SunLight
 from .links import Links
@@ -143,7 +143,15 @@ def link_closure(hierarchy: Hierarchy, links: Links, cluster_links: ClusterLinks
     opacity, as light that finds no surface there goes on to the next.
     """
     opacity = node_opacity(hierarchy)
-    factor = links.factor * links.visibility * opacity[links.source]
+    there = opacity[links.source]
+    child = np.full(len(opacity), LEAF)
+    child[hierarchy.n_clusters :] = hierarchy.first_child
+    inner = np.flatnonzero(child[links.source] != LEAF)
+    there[inner] = 0.0
+    for quarter in range(4):
+        of_quarter = hierarchy.opacity[child[links.source[inner]] + quarter]
+        there[inner] += 0.25 * links.of_quarter[inner, quarter] * of_quarter
+    factor = links.factor * links.visibility * there
     own = np.bincount(links.receiver, factor, minlength=hierarchy.n_elements)
     # An element's own links count for its whole area: exactly the mean over its leaves.
     held = np.bincount(hierarchy.face, own * hierarchy.area, minlength=len(hierarchy.faces))
