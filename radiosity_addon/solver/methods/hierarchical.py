@@ -111,6 +111,7 @@ def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float,
         settings.threads,
         most_light_elements(hierarchy, settings),
     )
+    state.keep_lamps_within_power()
     yield 0.1, state
     shapes = NodeShapes(hierarchy)
     state.links, state.cluster_links, state.faint = first_links(
