@@ -97,7 +97,7 @@ class Arrivals:
         rays[large & shines] = np.maximum(rays[large & shines], LAMP_RAYS)
         held = large & ~shines & ~self.escapes[leaves]
         rays[held] = np.maximum(rays[held], HELD_RAYS)
-        return rays
+        return np.asarray(rays)
 
     def error(self, leaves: Array) -> Array:
         """Return (n,) the standard error of the share of some leaves."""

@@ -91,7 +91,7 @@ class _Bulb(Emitter):
         square = self.radius**2 - np.einsum("ij,ij->i", across, across)
         bulge = np.zeros(len(across)) if self.soft_falloff else np.sqrt(np.maximum(square, 0.0))
         local = np.concatenate([across, bulge[:, None]], axis=1)
-        return np.asarray(self.position + to_world(local[:, None], directions)[:, 0])
+        return np.asarray(np.asarray(self.position) + to_world(local[:, None], directions)[:, 0])
 
     def _disk_rays(
         self, toward: Float64Array, distance: Float64Array, normals: Float64Array, u: Samples
