@@ -26,6 +26,12 @@ LAMP_RAYS = 512
 HELD_RAYS = 128
 """Rays of other leaves of which none escapes, but some end on black backs."""
 
+SPREAD_RAYS = 1 << 17
+"""So many rays in all, by area, where not all arrive: of a few large leaves each carries much light …"""
+
+MOST_OF_ONE = 1 << 13
+"""… but no more of one leaf than these."""
+
 MOST_RAYS = 1 << 20
 """Neighbours that share rays which disagree ask their own, unless they would be more than these."""
 
@@ -72,11 +78,26 @@ class Arrivals:
             if len(apart) * RAYS <= MOST_RAYS:
                 self._ask(hierarchy, apart, RAYS)
         self._ask(hierarchy, new[len(faces) :], RAYS)
-        doubtful = (self.share[new] > 0.0) & (self.share[new] < 1.0)
-        doubtful &= hierarchy.area[new] >= self._min_area
-        shines = hierarchy.emission[new].any(axis=1)
-        self._ask(hierarchy, new[doubtful & shines], LAMP_RAYS)
-        self._ask(hierarchy, new[doubtful & ~shines & ~self.escapes[new]], HELD_RAYS)
+        doubtful = new[(self.share[new] > 0.0) & (self.share[new] < 1.0)]
+        rays = self._wanted(hierarchy, doubtful)
+        for count in np.unique(rays[rays > RAYS]):
+            self._ask(hierarchy, doubtful[rays == count], int(count))
+
+    def _wanted(self, hierarchy: Hierarchy, leaves: Array) -> Array:
+        """Return (n,) how many rays of leaves tell what arrives, where not all does.
+
+        It depends on nothing but the leaf: the same whenever it appears.
+        """
+        part = hierarchy.area[leaves] / float(hierarchy.faces.area.sum())
+        # By fours, so that many leaves are asked together.
+        power = np.rint(0.5 * np.log2(np.maximum(part * (SPREAD_RAYS / RAYS), 1.0)))
+        rays = np.minimum(RAYS * 4 ** power.astype(np.int64), MOST_OF_ONE)
+        large = hierarchy.area[leaves] >= self._min_area
+        shines = hierarchy.emission[leaves].any(axis=1)
+        rays[large & shines] = np.maximum(rays[large & shines], LAMP_RAYS)
+        held = large & ~shines & ~self.escapes[leaves]
+        rays[held] = np.maximum(rays[held], HELD_RAYS)
+        return np.asarray(rays)
 
     def error(self, leaves: Array) -> Array:
         """Return (n,) the standard error of the share of some leaves."""

@@ -85,6 +85,14 @@ class _Bulb(Emitter):
             return self._disk_rays(toward, distance, normals, u)
         return self._sphere_rays(toward, distance, normals, u)
 
+    def _starts(self, place: Samples, directions: Float64Array) -> Float64Array:
+        """Return (n, 3) where rays along unit directions leave: the disk across them, or the sphere."""
+        across = self.radius * concentric_disk(np.asarray(place, dtype=np.float64))
+        square = self.radius**2 - np.einsum("ij,ij->i", across, across)
+        bulge = np.zeros(len(across)) if self.soft_falloff else np.sqrt(np.maximum(square, 0.0))
+        local = np.concatenate([across, bulge[:, None]], axis=1)
+        return np.asarray(np.asarray(self.position) + to_world(local[:, None], directions)[:, 0])
+
     def _disk_rays(
         self, toward: Float64Array, distance: Float64Array, normals: Float64Array, u: Samples
     ) -> Rays:
@@ -150,11 +158,10 @@ class PointLight(_Bulb):
         """(3,) RGB power it sends out [W]."""
         return self.strength.copy()
 
-    def emit(self, place: Samples, way: Samples) -> Rays:  # noqa: ARG002 - all start at one place
-        """Return rays from the lamp's centre, uniform over the sphere (see `Emitter.emit`)."""
+    def emit(self, place: Samples, way: Samples) -> Rays:
+        """Return rays uniform over all directions (see `Emitter.emit`)."""
         directions = uniform_cone(np.asarray(way, dtype=np.float64), 2.0)
-        origins = np.broadcast_to(np.asarray(self.position), directions.shape)
-        return origins, directions, np.ones(len(directions))
+        return self._starts(place, directions), directions, np.ones(len(directions))
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,12 +254,11 @@ class SpotLight(_Bulb):
         """1 − cos(angle/2), exact for narrow cones too."""
         return float(2.0 * np.sin(0.25 * self.angle) ** 2)
 
-    def emit(self, place: Samples, way: Samples) -> Rays:  # noqa: ARG002 - all start at one place
-        """Return rays from the lamp's centre, uniform over the round cone (see `Emitter.emit`)."""
+    def emit(self, place: Samples, way: Samples) -> Rays:
+        """Return rays uniform over the round cone (see `Emitter.emit`)."""
         cone = uniform_cone(np.asarray(way, dtype=np.float64), self._opening)
         directions, growth = self._in_world(to_world(cone[None], self._round_axis[None])[0])
-        origins = np.broadcast_to(np.asarray(self.position), directions.shape)
-        return origins, directions, self._attenuation(directions) * growth
+        return self._starts(place, directions), directions, self._attenuation(directions) * growth
 
     def _attenuation(self, directions: Float64Array) -> Float64Array:
         edge = np.cos(0.5 * self.angle)

@@ -19,6 +19,7 @@ from .embree import TARGET_SLACK, EmbreeCaster
 from .layers import Layers
 from .sampling import hash_keys
 from .scene import Scene
+from .stacks import Stacks
 from .surface_images import SurfaceImages
 from .visibility import NO_HIT, Hits, RayCaster, surface_offset
 
@@ -42,7 +43,10 @@ def _caster(scene: Scene, threads: int, only: Array, for_lamps: RayCaster | None
 def _plain_caster(scene: Scene, threads: int, only: Array, for_lamps: RayCaster | None) -> RayCaster:
     if scene.images is None or not scene.images.cut_out.any():
         return EmbreeCaster(scene.triangles, threads, only, for_lamps, scene.two_sided)
-    return CutOutCaster(scene.triangles, scene.images, threads, only, for_lamps, scene.two_sided)
+    stacks = Stacks(scene, only)
+    return CutOutCaster(
+        scene.triangles, scene.images, threads, only, for_lamps, scene.two_sided, stacks if stacks else None
+    )
 
 
 class LayeredCaster:
@@ -93,6 +97,8 @@ class CutOutCaster:
         What stops the light of lamps, where that is something else.
     two_sided : (t,) bool or None
         The others' backs are black; None if that does not matter.
+    stacks : Stacks or None
+        The cut-outs that lie in one another, if there are any.
     """
 
     def __init__(
@@ -103,12 +109,13 @@ class CutOutCaster:
         only: Array | None = None,
         for_lamps: RayCaster | None = None,
         two_sided: Array | None = None,
+        stacks: Stacks | None = None,
     ) -> None:
         self._own_rays = 0
         self._for_lamps = for_lamps
         self._counting = Lock()
         self.surface_offset = surface_offset(triangles)
-        self._images = images
+        self._images, self._stacks = images, stacks
         met = np.ones(len(triangles), dtype=bool) if only is None else only
         whole, cut = met & ~images.cut_out, met & images.cut_out
         self._whole_rows = np.append(np.flatnonzero(whole), NO_HIT).astype(np.int32)
@@ -143,9 +150,9 @@ class CutOutCaster:
         free = np.flatnonzero(share)
         ways = self._ways(free, origins, directions, distances * (1.0 - TARGET_SLACK))
         while len(ways.ray):
-            hits = ways.meet()
+            at, hits = ways.meet()
             opacity = np.clip(self._images.opacity_at(hits.triangle, hits.barycentric), least, 1.0 - least)
-            share[ways.ray] *= np.where(ways.again, 1.0, 1.0 - opacity)
+            np.multiply.at(share, ways.ray[at], 1.0 - opacity)
             ways.keep(share[ways.ray] > 0.0)
         return share
 
@@ -171,18 +178,23 @@ class CutOutCaster:
         distance = np.full(count, np.inf, dtype=np.float32)
         ways = self._ways(np.arange(count), origins, directions, reach)
         while len(ways.ray):
-            hits = ways.meet()
-            ray = ways.ray
+            at, hits = ways.meet()
+            ray = ways.ray[at]
             opacity = self._images.opacity_at(hits.triangle, hits.barycentric)
-            stops = (opacity > _drawn(origins[ray], directions[ray], hits.triangle)) & ~ways.again
-            stopped = ray[stops]
+            stops = np.flatnonzero(opacity > _drawn(origins[ray], directions[ray], hits.triangle))
+            # Of several in one place the outermost.
+            ended, first = np.unique(at[stops], return_index=True)
+            stops, stopped = stops[first], ways.ray[ended]
             triangle[stopped], distance[stopped] = hits.triangle[stops], hits.distance[stops]
             barycentric[stopped], front[stopped] = hits.barycentric[stops], hits.front[stops]
-            ways.keep(~stops)
+            going = np.ones(len(ways.ray), dtype=bool)
+            going[ended] = False
+            ways.keep(going)
         return Hits(triangle, barycentric, front, distance)
 
     def _ways(self, ray: Array, origins: Array, directions: Array, reach: Array) -> _Ways:
-        return _Ways(self._cut, self._cut_rows, self.surface_offset, ray, origins, directions, reach)
+        offset, stacks = self.surface_offset, self._stacks
+        return _Ways(self._cut, self._cut_rows, offset, stacks, ray, origins, directions, reach)
 
     def _count(self, rays: int) -> None:
         with self._counting:
@@ -200,6 +212,7 @@ class _Ways:
         The scene's triangle for each of its, and NO_HIT.
     offset : float
         How far beyond a cut-out rays go on [m].
+    stacks : Stacks or None
     ray : (w,) int
         Which of the n rays are on their way.
     origins, directions : (n, 3) float
@@ -209,8 +222,6 @@ class _Ways:
     ----------
     ray : (w,) int
         Those still on their way.
-    again : (w,) bool
-        Whether a ray met the triangle it has just passed: rounding, to be passed once more.
     """
 
     def __init__(
@@ -218,20 +229,31 @@ class _Ways:
         cut: RayCaster,
         rows: Array,
         offset: float,
+        stacks: Stacks | None,
         ray: Array,
         origins: Array,
         directions: Array,
         reach: Array,
     ) -> None:
-        self._cut, self._rows, self._offset = cut, rows, offset
+        self._cut, self._rows, self._offset, self._stacks = cut, rows, offset, stacks
         self._origins, self._directions, self._reach = origins, directions, reach
-        self.ray, self.again = ray, np.zeros(len(ray), dtype=bool)
+        self.ray = ray
         self._gone = np.zeros(len(ray))
-        self._last = np.full(len(ray), NO_HIT, dtype=np.int32)
+        # What each ray met in the last place: rounding may have it met once more.
+        self._last = np.full((len(ray), 1), NO_HIT, dtype=np.int32)
         self._layers = 0
 
-    def meet(self) -> Hits:
-        """Return the next cut-outs in the rays' way; rays that meet none within reach end here."""
+    def meet(self) -> tuple[Array, Hits]:
+        """Take rays to the next cut-outs in their way; rays that meet none within reach end here.
+
+        Returns
+        -------
+        at : (h,) int
+            Which of the rays on their way meets it, sorted.
+        hits : Hits
+            h of them: none for a ray that met again what it has just passed, several where cut-outs lie in
+            one another, the outermost first.
+        """
         start = self._origins[self.ray] + self._gone[:, None] * self._directions[self.ray]
         hits = self._cut.first_hits(start, self._directions[self.ray])
         distance, triangle = self._gone + hits.distance, self._rows[hits.triangle]
@@ -239,14 +261,25 @@ class _Ways:
         met &= self._layers < MOST_LAYERS
         self._layers += 1
         self._gone = distance + self._offset
-        self.again, self._last = triangle == self._last, triangle
         self.keep(met)
-        return Hits(triangle[met], hits.barycentric[met], hits.front[met], distance[met])
+        triangle = triangle[met]
+        at = np.flatnonzero((self._last != triangle[:, None]).all(axis=1))
+        new = Hits(triangle, hits.barycentric[met], hits.front[met], distance[met]).take(at)
+        if self._stacks is None:
+            self._last = triangle[:, None]
+            return at, new
+        of, new = self._stacks.through(new)
+        number = np.arange(len(of)) - np.searchsorted(of, of)
+        last = np.full((len(triangle), max(self._last.shape[1], int(number.max(initial=0)) + 1)), NO_HIT)
+        last[:, : self._last.shape[1]] = self._last
+        last[at] = NO_HIT
+        last[at[of], number] = new.triangle
+        self._last = last
+        return at[of], new
 
     def keep(self, going: Array) -> None:
         """Go on with the rays of a mask."""
-        self.ray, self.again = self.ray[going], self.again[going]
-        self._gone, self._last = self._gone[going], self._last[going]
+        self.ray, self._gone, self._last = self.ray[going], self._gone[going], self._last[going]
 
 
 def _drawn(origins: Array, directions: Array, triangle: Array) -> Array:

@@ -121,7 +121,7 @@ class Layers:
         side, place = side[moved].astype(np.int64), hits.barycentric[moved].astype(np.float64)
         waiting = np.arange(len(moved))
         for _ in range(MOST_COVERS):
-            row, cover = _holding(self._first, self.covers.part, side[waiting], place[waiting])
+            row, cover = holding(self._first, self.covers.part, side[waiting], place[waiting])
             cut = None if self._scene.images is None else self._scene.images.cut_out
             if cut is not None:
                 solid = ~cut[self.covers.by[cover] // 2]
@@ -131,7 +131,7 @@ class Layers:
             # Any cover will do: it hands on to its own.
             row, only = np.unique(row, return_index=True)
             cover, waiting = cover[only], waiting[row]
-            points = self._points(side[waiting], place[waiting])
+            points = self.points(side[waiting], place[waiting])
             side[waiting] = self.covers.by[cover]
             place[waiting] = self.weights(side[waiting], points)
         triangle, front, barycentric = hits.triangle.copy(), hits.front.copy(), hits.barycentric.copy()
@@ -146,7 +146,7 @@ class Layers:
         """
         found = np.zeros(len(triangle), dtype=bool)
         if len(self._pressed):
-            row, _ = _holding(self._first_pressed, self._pressed.part, triangle, barycentric)
+            row, _ = holding(self._first_pressed, self._pressed.part, triangle, barycentric)
             found[row] = True
         return found
 
@@ -159,7 +159,8 @@ class Layers:
     def _is_covered(self) -> Array:
         return np.diff(self._first) > 0
 
-    def _points(self, side: Array, place: Array) -> Array:
+    def points(self, side: Array, place: Array) -> Array:
+        """Return (n, 3) the points of sides at weights (n, 2) of their triangles' corners [m]."""
         corners = self._scene.triangles[side // 2]
         return np.asarray(corners[:, 0] + np.einsum("nw,nwk->nk", place, corners[:, 1:] - corners[:, :1]))
 
@@ -177,7 +178,7 @@ class Layers:
         return np.stack([second / over, third / over], axis=1)
 
 
-def _holding(first: Array, parts: Array, row: Array, place: Array) -> tuple[Array, Array]:
+def holding(first: Array, parts: Array, row: Array, place: Array) -> tuple[Array, Array]:
     """Return the pairs of points (n,) and parts that they lie in.
 
     Parameters

@@ -10,7 +10,7 @@ import numpy as np
 
 from .arrays import Array
 from .cluster_links import ClusterLinks, gather_at_clusters
-from .hierarchy import LEAF, Hierarchy, node_opacity
+from .hierarchy import LEAF, Hierarchy
 from .links import Links
 from .transport import gather, node_radiosity, pull, push, quarters_mean
 from .tree_top import TreeTop
@@ -36,12 +36,11 @@ class Arriving:
         self, hierarchy: Hierarchy, top: TreeTop, links: ClusterLinks, received: Array | None
     ) -> None:
         clusters, faces = hierarchy.clusters, hierarchy.faces
-        if received is None:
-            self.area = (clusters.area * node_opacity(hierarchy)[: len(clusters)])[links.receiver]
+        if received is None and (hierarchy.opacity == 1.0).all():
+            self.area = clusters.area[links.receiver]
             self.power = self.area * links.factor * links.visibility
             return
-        of_faces = pull(hierarchy, received[:, 1:])[: len(faces), 0]
-        weight = (of_faces * faces.area * faces.opacity)[:, None]
+        weight = (_taken_below(hierarchy, received)[: len(faces)] * faces.area)[:, None]
         sums = top.sums(np.concatenate([weight, weight * faces.normal, weight * faces.centre], axis=1))
         at = sums[top.row[links.receiver]]
         self.area = at[:, 0]
@@ -155,18 +154,23 @@ def taken_at_links(hierarchy: Hierarchy, links: Links, received: Array | None = 
     received : (e, 2) float64 or None
         What the light that leaves gather is scaled with, as from `Conservation.balance`.
     """
-    there = hierarchy.area * hierarchy.opacity
-    taken = np.asarray(there[links.receiver] * links.factor * links.visibility)
-    if received is None:
-        return taken
+    there = hierarchy.opacity if received is None else hierarchy.opacity * received[:, 0]
+    below = _taken_below(hierarchy, received)
     child = hierarchy.first_child[links.receiver]
     inner = np.flatnonzero(child != LEAF)
-    scale = received[links.receiver, 0]
-    below = pull(hierarchy, received[:, 1:])[:, 0]
-    scale[inner] = 0.0
+    share = there[links.receiver]
+    # Quarters take unequal parts of what arrives, and may be covered: each counts with what it takes.
+    share[inner] = 0.0
     for quarter in range(4):
-        scale[inner] += 0.25 * links.to_quarter[inner, quarter] * below[child[inner] + quarter]
-    return np.asarray(taken * scale)
+        share[inner] += 0.25 * links.to_quarter[inner, quarter] * below[child[inner] + quarter]
+    return np.asarray(hierarchy.area[links.receiver] * share * links.factor * links.visibility)
+
+
+def _taken_below(hierarchy: Hierarchy, received: Array | None) -> Array:
+    """Return (e,) what part of their ancestors' light the leaves of elements take where they are there."""
+    if received is None:
+        return hierarchy.opacity
+    return np.asarray(pull(hierarchy, hierarchy.opacity[:, None] * received[:, 1:])[:, 0])
 
 
 def sent(hierarchy: Hierarchy, links: Links, at_links: Array | None = None) -> Array:

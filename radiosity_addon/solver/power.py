@@ -7,22 +7,22 @@ means over the three channels, in watts.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeGuard
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .arrays import Array
 from .cluster_links import ClusterLinks, gather_at_clusters
 from .environment import SkyPatch
-from .hierarchy import Faces, Hierarchy, node_opacity
+from .hierarchy import LEAF, Faces, Hierarchy, node_opacity
+from .lamp_power import fate, is_stopped, lost_by_lamp
 from .light_base import Emitter
-from .lights import EnvironmentLight, Light, SunLight
+from .lights import EnvironmentLight, SunLight
 from .links import Links
 from .radiometry import irradiance_under_sky
 from .sampling import cosine_hemisphere, points_on_triangles, stratified_square, to_world
 from .scene import Scene
 from .tree_top import TreeTop
-from .visibility import RayCaster
 
 if TYPE_CHECKING:
     from .state import SolverState
@@ -68,7 +68,7 @@ def power_balance(state: SolverState) -> dict[str, float]:
     stops = scene.in_shadows[hierarchy.faces.triangle[hierarchy.face[receiver]]]
     for number, light in enumerate(scene.lights):
         on_top = state.light_links.light == number
-        if _is_stopped(light):
+        if is_stopped(light):
             emitted += float(light.flux.mean())
             on_top &= ~stops
         emitted += float(gain[on_top].sum()) * float(light.strength.mean())
@@ -82,11 +82,6 @@ def power_balance(state: SolverState) -> dict[str, float]:
         "absorbed": absorbed + from_surfaces[0] + from_lamps[0],
         "escaped": from_surfaces[1] + from_lamps[1],
     }
-
-
-def _is_stopped(light: Light) -> TypeGuard[Emitter]:
-    """Tell whether each part of a light's power ends at one surface, or none."""
-    return isinstance(light, Emitter) and light.casts_shadow
 
 
 def _follow_surfaces(state: SolverState) -> tuple[float, float]:
@@ -106,34 +101,23 @@ def _follow_surfaces(state: SolverState) -> tuple[float, float]:
     normals = hierarchy.normal[leaf]
     unit = stratified_square(number, 1, seed + 12)
     directions = to_world(cosine_hemisphere(unit), normals)[:, 0]
-    black, escaped = _fate(state, state.caster, points + state.caster.surface_offset * normals, directions)
+    start = points + state.caster.surface_offset * normals
+    black, escaped = fate(hierarchy, state.caster, start, directions)
     return total * float(black.mean()), total * float(escaped.mean())
 
 
 def _follow_lamps(state: SolverState) -> tuple[float, float]:
     """Return the power [W] that leaves lamps with shadows onto black backs, and out of the scene."""
     black_total = escaped_total = 0.0
-    count = ESCAPE_RAYS // 8
     for number, light in enumerate(state.scene.lights):
-        if not _is_stopped(light) or not light.flux.any():
+        if not is_stopped(light) or not light.flux.any():
             continue
         seed = state.settings.seed + 21 + 2 * number
-        place = stratified_square(np.zeros(1, np.int64), count, seed)[0]
-        way = stratified_square(np.zeros(1, np.int64), count, seed + 1)[0]
-        origins, directions, share = light.emit(place, way)
-        black, escaped = _fate(state, state.caster.for_lamps, origins, directions)
+        black, escaped, _ = lost_by_lamp(light, state.scene, state.hierarchy, state.caster, seed)
         flux = float(light.flux.mean())
-        black_total += flux * float((black * share).sum() / share.sum())
-        escaped_total += flux * float((escaped * share).sum() / share.sum())
+        black_total += flux * black
+        escaped_total += flux * escaped
     return black_total, escaped_total
-
-
-def _fate(state: SolverState, caster: RayCaster, origins: Array, directions: Array) -> tuple[Array, Array]:
-    """Return (n,) whether rays end on a black back, and whether they leave the scene."""
-    hits = caster.first_hits(origins, directions)
-    escaped = hits.triangle < 0
-    face = state.hierarchy.faces.of_triangle[(~hits.front).astype(int), hits.triangle]
-    return ~escaped & (face < 0), escaped
 
 
 def link_closure(hierarchy: Hierarchy, links: Links, cluster_links: ClusterLinks | None = None) -> Array:
@@ -143,7 +127,15 @@ def link_closure(hierarchy: Hierarchy, links: Links, cluster_links: ClusterLinks
     opacity, as light that finds no surface there goes on to the next.
     """
     opacity = node_opacity(hierarchy)
-    factor = links.factor * links.visibility * opacity[links.source]
+    there = opacity[links.source]
+    child = np.full(len(opacity), LEAF)
+    child[hierarchy.n_clusters :] = hierarchy.first_child
+    inner = np.flatnonzero(child[links.source] != LEAF)
+    there[inner] = 0.0
+    for quarter in range(4):
+        of_quarter = hierarchy.opacity[child[links.source[inner]] + quarter]
+        there[inner] += 0.25 * links.of_quarter[inner, quarter] * of_quarter
+    factor = links.factor * links.visibility * there
     own = np.bincount(links.receiver, factor, minlength=hierarchy.n_elements)
     # An element's own links count for its whole area: exactly the mean over its leaves.
     held = np.bincount(hierarchy.face, own * hierarchy.area, minlength=len(hierarchy.faces))

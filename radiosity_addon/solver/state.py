@@ -12,6 +12,7 @@ from .arrays import Array
 from .basis import Basis, constant_basis
 from .cut_outs import ray_caster
 from .hierarchy import Hierarchy
+from .lamp_power import lamps_within_power
 from .light_links import LightLinks, light_strengths, link_lights, no_light_links
 from .power import light_power
 from .scene import Scene
@@ -102,6 +103,13 @@ class SolverState:
             nothing_too_small,
             self.settings.seed,
             self.settings.threads,
+        )
+        self.keep_lamps_within_power()
+
+    def keep_lamps_within_power(self) -> None:
+        """Scale down what links say arrives from lamps that do not send so much."""
+        self.light_links = lamps_within_power(
+            self.light_links, self.scene, self.hierarchy, self.caster, self.settings.seed
         )
 
     def direct(self) -> Array:

@@ -1,7 +1,8 @@
 """Form factors between triangles, exact also where they touch, share an edge or cross planes.
 
-Far pairs average the point-to-polygon factor over the smaller triangle by cubature. Near
-pairs are cut at each other's planes, so that all of one sees all of the other, and then
+Far pairs average the point-to-polygon factor over the smaller triangle by cubature, needles
+over points along them. Other near pairs are cut at each other's planes, so that all of one sees
+all of the other, and then
 
     A₁ F₁₂ = 1/(2π) ∮ ∮ ln r dx₁ · dx₂
 
@@ -31,6 +32,11 @@ BLIND_BISECTIONS = 6
 
 MAX_BISECTIONS = 24
 """Ends the bisection at singular points; intervals there are below 1e-7 of their edge."""
+
+NEEDLE = 1e-8
+"""Outlines around less than this part of their length squared cancel: points along the triangle are asked."""
+
+NEEDLE_POINTS = 32
 
 CHUNK_PAIRS = 1 << 14
 """Triangle pairs worked on at a time; temporaries stay below 64 MB."""
@@ -137,10 +143,14 @@ def _chunk_factors(receivers: Float64Array, sources: Float64Array) -> Float64Arr
     rows = np.flatnonzero(far)
     if len(rows):
         mutual[rows] = _cubature(outer[rows], outer_normal[rows], inner[rows])
-    rows = np.flatnonzero(whole & ~far)
+    needle = facing & ~far & (outer_area < NEEDLE * outer_radius * (outer_radius + inner_radius))
+    rows = np.flatnonzero(needle)
+    if len(rows):
+        mutual[rows] = _along_needles(outer[rows], outer_normal[rows], inner[rows])
+    rows = np.flatnonzero(whole & ~far & ~needle)
     if len(rows):
         mutual[rows] = _outline_factor(outer[rows], inner[rows], outer_area[rows])
-    rows = np.flatnonzero(facing & ~whole)
+    rows = np.flatnonzero(facing & ~whole & ~needle)
     if len(rows):
         outer_part = _clip(outer[rows], outer_height[rows])
         inner_part = _clip(inner[rows], inner_height[rows])
@@ -183,6 +193,32 @@ def _cubature(outer: Float64Array, outer_normal: Float64Array, inner: Float64Arr
     normals = np.broadcast_to(outer_normal[:, None], spread).reshape(-1, 3)
     factors = point_to_polygon(points, normals, np.repeat(inner, spread[1], axis=0))
     mean: Float64Array = weighted_sums(factors.reshape(count, -1), _CUBATURE_WEIGHTS)
+    return mean
+
+
+def _along_needles(outer: Float64Array, outer_normal: Float64Array, inner: Float64Array) -> Float64Array:
+    """Return the mean point-to-polygon factor over points along the middle of each outer triangle.
+
+    Evenly by area: the width grows from one end of the longest side to the foot of the third corner.
+    """
+    count, rows = len(outer), np.arange(len(outer))
+    sides = np.roll(outer, -1, axis=1) - outer
+    longest = np.einsum("ijk,ijk->ij", sides, sides).argmax(axis=1)
+    start, side = outer[rows, longest], sides[rows, longest]
+    top = outer[rows, (longest + 2) % 3] - start
+    foot = np.einsum("ij,ij->i", top, side) / np.einsum("ij,ij->i", side, side)
+    foot = np.clip(foot, 1e-9, 1.0 - 1e-9)[:, None]
+    share = (np.arange(NEEDLE_POINTS) + 0.5) / NEEDLE_POINTS
+    rising = share < foot
+    at = np.where(rising, np.sqrt(share * foot), 1.0 - np.sqrt((1.0 - share) * (1.0 - foot)))
+    height = np.where(rising, at / foot, (1.0 - at) / (1.0 - foot))
+    off = top - foot * side
+    points = start[:, None] + at[..., None] * side[:, None] + 0.5 * height[..., None] * off[:, None]
+    normals = np.repeat(outer_normal, NEEDLE_POINTS, axis=0)
+    factors = point_to_polygon(points.reshape(-1, 3), normals, np.repeat(inner, NEEDLE_POINTS, axis=0))
+    mean: Float64Array = weighted_sums(
+        factors.reshape(count, -1), np.full(NEEDLE_POINTS, 1.0 / NEEDLE_POINTS)
+    )
     return mean
 
 

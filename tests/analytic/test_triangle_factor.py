@@ -8,6 +8,7 @@ import pytest
 from radiosity_addon.solver import triangle_factor
 from radiosity_addon.solver.form_factor import point_to_polygon, triangle_to_triangle
 from radiosity_addon.solver.sampling import points_on_triangles, stratified_square
+from tests.rooms import FLOOR, box_room
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -253,3 +254,31 @@ def test_kronrod_rule_is_exact_to_degree_22_and_its_gauss_rule_to_13() -> None:
         assert powers @ triangle_factor.KRONROD_WEIGHTS == pytest.approx(exact, abs=1e-14)
         if degree <= 13:
             assert powers @ triangle_factor.GAUSS_WEIGHTS == pytest.approx(exact, abs=1e-14)
+
+
+@pytest.mark.parametrize("width", [1e-6, 1e-8, 1e-10, 1e-13])
+@pytest.mark.parametrize("scale", [1.0, 1e-3, 1e4])
+def test_needles_send_what_they_have_and_take_no_time(width: float, scale: float) -> None:
+    """However thin a needle on a room's floor is, its factors to the other walls add up to 1.
+
+    Outlines of needles cancel to rounding, which no bisection can get below a tolerance.
+    """
+    room, surface = box_room((1.0, 1.5, 2.0))
+    needle = np.array([[0.0, 0.0, 0.0], [0.9, 0.3, 0.0], [0.9, 0.3 + width, 0.0]])
+    walls = scale * room[surface != FLOOR]
+    needles = np.repeat(scale * needle[None], len(walls), axis=0)
+    to_walls, from_walls = triangle_to_triangle(needles, walls), triangle_to_triangle(walls, needles)
+    assert to_walls.sum() == pytest.approx(1.0, abs=2e-3)
+    area = 0.5 * np.linalg.norm(np.cross(needles[0, 1] - needles[0, 0], needles[0, 2] - needles[0, 0]))
+    cross = np.cross(walls[:, 1] - walls[:, 0], walls[:, 2] - walls[:, 0])
+    there = 0.5 * np.linalg.norm(cross, axis=1)
+    np.testing.assert_allclose(there * from_walls, area * to_walls, rtol=1e-9, atol=0.0)
+
+
+def test_needles_across_a_plane_see_with_their_part_above_it() -> None:
+    """A quarter of the area of a needle that stands point down, half of it below, is above the floor."""
+    floor = np.array([[-9e4, -9e4, 0.0], [9e4, -9e4, 0.0], [0.0, 9e4, 0.0]])
+    for width in (1e-3, 1e-10):
+        needle = np.array([[0.0, 0.0, 1.0], [-width, 0.0, -1.0], [width, 0.0, -1.0]])
+        factor = triangle_to_triangle(needle[None], floor[None])[0]
+        assert factor == pytest.approx(0.25 * 0.5, rel=0.02)

@@ -15,6 +15,12 @@ EVERYTHING = 1e9
 """Smallest area that makes all faces neighbours."""
 
 
+@pytest.fixture
+def alike(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Large leaves ask no more rays than small ones."""
+    monkeypatch.setattr(arrivals, "SPREAD_RAYS", 0)
+
+
 def measured(triangles: np.ndarray, min_area: float, shines: np.ndarray | bool = False) -> Arrivals:
     emission = grey(len(triangles), 1.0) * np.broadcast_to(shines, len(triangles))[:, None]
     scene = Scene(triangles, grey(len(triangles), 0.5), emission)
@@ -44,11 +50,13 @@ def test_neighbours_whose_rays_disagree_ask_their_own() -> None:
     assert len(np.unique(alone.share)) > 10
 
 
+@pytest.mark.usefixtures("alike")
 def test_too_many_share_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(arrivals, "MOST_RAYS", 0)
     assert len(np.unique(measured(open_box()[0], EVERYTHING).share)) == 1
 
 
+@pytest.mark.usefixtures("alike")
 def test_black_backs_take_what_does_not_escape() -> None:
     """A one-sided panel under the ceiling of a closed room: what is above sees its back."""
     room, surface = box_room((2, 2, 2), n=2)
@@ -65,6 +73,7 @@ def test_black_backs_take_what_does_not_escape() -> None:
     assert (found.rays[floor] == RAYS).all()
 
 
+@pytest.mark.usefixtures("alike")
 def test_what_shines_into_the_open_asks_more() -> None:
     triangles, surface = open_box()
     found = measured(triangles, 0.0, surface == FLOOR)
@@ -74,6 +83,7 @@ def test_what_shines_into_the_open_asks_more() -> None:
     assert (found.rays[others] == RAYS).all()
 
 
+@pytest.mark.usefixtures("alike")
 def test_faces_average_their_leaves() -> None:
     triangles, _ = open_box()
     scene = Scene(triangles, grey(len(triangles), 0.5), grey(len(triangles), 0.0))
@@ -87,3 +97,20 @@ def test_faces_average_their_leaves() -> None:
         assert share[face] == pytest.approx(found.share[children].mean())
         assert error[face] == pytest.approx(np.sqrt(share[face] * (1 - share[face]) / (4 * RAYS)))
         assert escapes[face] == found.escapes[children].any()
+
+
+def test_large_leaves_ask_more() -> None:
+    """The floor of an open box of ten triangles sends 1 − 0.19982 of its light to the walls."""
+    room, surface = box_room()
+    kept = surface != CEILING
+    found = measured(room[kept], 0.0)
+    assert found.rays[:10].tolist() == [8192] * 10
+    assert found.share[:2].mean() == pytest.approx(1 - 0.19982, abs=0.005)
+    scene = Scene(room[kept], grey(10, 0.5), grey(10, 0.0))
+    hierarchy = Hierarchy(scene)
+    for _ in range(5):
+        hierarchy.subdivide(hierarchy.leaves[:4])
+    late = Arrivals(ray_caster(scene), 0.0, seed=3)
+    late.measure(hierarchy)
+    small = np.argmin(hierarchy.area[hierarchy.leaves])
+    assert late.rays[hierarchy.leaves[small]] < 8192

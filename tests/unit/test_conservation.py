@@ -12,7 +12,7 @@ from radiosity_addon.solver.hierarchy import LEAF
 from radiosity_addon.solver.link_sums import sent, sent_by_leaves
 from radiosity_addon.solver.methods.hierarchical import HierarchicalState
 from radiosity_addon.solver.transport import gather, node_radiosity, pull, push
-from tests.rooms import CEILING, box_room, grey
+from tests.rooms import CEILING, box_room, grey, rectangle
 from tests.unit.solved_rooms import corridor, furnished, solved
 
 
@@ -208,3 +208,33 @@ def test_what_something_escapes_from_is_not_scaled() -> None:
     open_faces = ~state.conservation.closed(state.hierarchy)
     assert open_faces.mean() > 0.95
     assert (state.balance.received[open_faces[state.hierarchy.face]] == 1).all()
+
+
+def test_partly_covered_faces_are_sent_what_their_quarters_take() -> None:
+    """A link's light lands on few quarters of its receiver: each takes by what is left of it alone."""
+    x, y, _ = np.eye(3)
+    panels = [
+        rectangle((0.2, 0.2, 0.5), 0.6 * x, 0.6 * y),
+        rectangle((0.5, 0.2, 0.5), 0.45 * x, 0.6 * y),
+        rectangle((0.3, 0.1, 0.55), 0.6 * y, 0.6 * x),
+        rectangle((0.3, 0.4, 0.55), 0.45 * y, 0.6 * x),
+    ]
+    room, _ = box_room()
+    triangles = np.concatenate([room, *panels])
+    emission = grey(len(triangles), 0.0)
+    emission[:2] = 1.0
+    state = solved(
+        Scene(triangles, grey(len(triangles), 0.9), emission, two_sided=True), error=0.02, min_area=1e-3
+    )
+    hierarchy, leaves = state.hierarchy, state.hierarchy.leaves
+    radiosity = np.zeros((hierarchy.n_elements, len(leaves)))
+    radiosity[leaves, np.arange(len(leaves))] = 1.0
+    balance = state.balance
+    assert balance is not None
+    gathered = gather(hierarchy, balance.links, radiosity, balance.sent)
+    own = gathered.mean(axis=1)
+    taken = balance.received[:, 1:] * (push(hierarchy, gathered) - own) + balance.received[:, :1] * own
+    area = hierarchy.area[leaves]
+    shares = (area * hierarchy.opacity[leaves]) @ taken[leaves] / area
+    assert len(state.cluster_links) == 0
+    assert shares[hierarchy.opacity[leaves] > 0].max() < 1.001

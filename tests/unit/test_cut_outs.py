@@ -128,3 +128,29 @@ def test_grazing_rays_meet_each_veil_once() -> None:
     assert set(np.unique(share)) <= {0.5, 1.0}
     met = BruteForceCaster(triangles).visible(origins, directions, np.full(5000, 0.4))
     assert (share[~met] == 0.5).mean() > 0.95
+
+
+@pytest.mark.parametrize(("apart", "from_above", "from_below"), [(0.0, "021", "102"), (4e-7, "210", "012")])
+def test_veils_in_one_place_multiply_too(apart: float, from_above: str, from_below: str) -> None:
+    """Rays that go on behind a veil do not miss those in the same place; the outermost comes first."""
+    opacity = np.array([0.3, 0.6, 0.5])
+    veil = rectangle((0, 0, 1), (1, 0, 0), (0, 1, 0))
+    other = rectangle((1, 0, 1), (0, 1, 0), (-1, 0, 0))
+    lift = np.array((0.0, 0.0, apart))
+    triangles = np.concatenate([veil, other[:, ::-1] + lift, other + 2 * lift])
+    values = image(1, 0.5, 0.0, opacity[None], wide=3)
+    middles = np.repeat((np.arange(3) + 0.5) / 3, 2)
+    uv = np.stack([np.repeat(middles[:, None], 3, axis=1), np.full((6, 3), 0.5)], axis=2)
+    images = SurfaceImages(values, uv, np.ones(6, dtype=bool))
+    cast = ray_caster(Scene(triangles, grey(6, 0.5), grey(6, 0), two_sided=True, images=images))
+    origins, directions = downward(40_000)
+    far = np.full(len(origins), 9.0)
+    np.testing.assert_allclose(cast.passing(origins, directions, far), np.prod(1 - opacity), rtol=1e-5)
+    for order, sign in ((from_above, 1), (from_below, -1)):
+        hits = cast.first_hits(origins * (1, 1, sign) + (0, 0, 1 - sign), directions * (1, 1, sign))
+        left = 1.0
+        for number in map(int, order):
+            met = hits.triangle // 2 == number
+            assert met.mean() == pytest.approx(left * opacity[number], abs=0.01)
+            assert (hits.front[met] == ((number == 1) == (sign < 0))).all()
+            left *= 1 - opacity[number]

@@ -50,10 +50,6 @@ LIGHT_SHARE = 0.25
 """BF_ε of light links, in units of the links': they are few, and every bounce starts with them."""
 
 
-STALLED = 200
-"""Iterations in which the residual must fall by a tenth; where it does not, sums of links are off."""
-
-
 @dataclass
 class HierarchicalState(SolverState):
     """What the refined hierarchy works on."""
@@ -115,6 +111,7 @@ def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float,
         settings.threads,
         most_light_elements(hierarchy, settings),
     )
+    state.keep_lamps_within_power()
     yield 0.1, state
     shapes = NodeShapes(hierarchy)
     state.links, state.cluster_links, state.faint = first_links(
@@ -212,7 +209,7 @@ def _over(state: HierarchicalState, errors: Array, threshold: float) -> Array:
 
 
 def iterate(state: HierarchicalState, tolerance: float, last: bool = False) -> None:
-    """Gather and push-pull, accelerated, until the residual is below `tolerance`, or falls no more.
+    """Gather and push-pull, accelerated, until the residual is below `tolerance`.
 
     Each step tells the residual of the radiosity before it; that of the `last` one is measured
     for the radiosity that is left in the state.
@@ -229,14 +226,11 @@ def iterate(state: HierarchicalState, tolerance: float, last: bool = False) -> N
     leaves = hierarchy.leaves
     least = state.emission[leaves]
     mixer = Anderson(hierarchy.area[leaves])
-    best, best_at = np.inf, state.iterations
     while not exhausted(state):
         before = state.radiosity[leaves]
         bounce(state, links, lights, scale, cluster_links, top, received)
         state.note()
-        if state.residual < 0.9 * best:
-            best, best_at = state.residual, state.iterations
-        if state.residual < tolerance or exhausted(state) or state.iterations - best_at > STALLED:
+        if state.residual < tolerance or exhausted(state):
             break
         # What a mixture guesses below the emission is no radiosity.
         state.radiosity[leaves] = np.maximum(mixer.next(before, state.radiosity[leaves]), least)
