@@ -19,7 +19,7 @@ from ..bake_scene import LIGHTMAP_UV_LAYER, BakeWarning
 from . import material_edits
 from .bake_record import ASIDE, LAYER, ORIGINAL, is_made, is_recorded, made_datablocks, recorded_objects
 from .edit_modes import leave_edit_modes
-from .material_slots import drop_added_slots, is_copy, original_of, show_originals
+from .material_slots import drop_added_slots, is_copy, link_to_object, original_of, show_originals
 from .mesh_digest import digest
 from .stand_in_names import carry_names
 from .stand_ins import (
@@ -162,7 +162,7 @@ def _move_slots(
             original.materials[slot] = material
         elif there and all(not is_made(obj) and slot < len(obj.material_slots) for obj in users):
             for obj in users:
-                obj.material_slots[slot].link = "OBJECT"
+                link_to_object(obj, slot)
                 obj.material_slots[slot].material = material
         elif slot == len(original.materials) and known.kind == OWN and original.library is None:
             original.materials.append(material)

@@ -75,6 +75,18 @@ def show_own_originals(obj: bpy.types.Object) -> None:
         slot.material = None if EMPTY_SLOT in slot.material and original == of_mesh else original
 
 
+def link_to_object(obj: bpy.types.Object, slot: int) -> None:
+    """Have a slot show the object's material instead of its mesh's."""
+    obj.material_slots[slot].link = "OBJECT"
+    if obj.override_library is None:
+        return
+    # A file restores overrides in the order in which they were noted, and a material only after the link.
+    noted = obj.override_library.properties
+    paths = {f"material_slots[{slot}].material", "active_material"}
+    for entry in [entry for entry in noted if entry.rna_path in paths]:
+        noted.remove(entry)
+
+
 def set_materials(mesh: bpy.types.Mesh, materials: Sequence[bpy.types.Material | None]) -> None:
     """Fill the mesh's slots; which slot a polygon uses stays, as it would not if they were cleared."""
     for index, material in enumerate(materials):

@@ -14,6 +14,7 @@ from .material_slots import (
     data_with_copies,
     drop_added_slots,
     drop_slots,
+    link_to_object,
     own_copies,
     set_materials,
     show_originals,
@@ -174,7 +175,7 @@ def _take_off(obj: bpy.types.Object) -> None:
         if recorded or obj.override_library is not None:
             for slot in known.object_slots:
                 if slot < len(obj.material_slots):
-                    obj.material_slots[slot].link = "OBJECT"
+                    link_to_object(obj, slot)
             _switch_on(obj, known.modifiers)
             obj.active_material_index = known.active_slot
     elif recorded and obj.radiosity_bake.modifiers:
@@ -249,8 +250,10 @@ def _put_back(before: _Object) -> None:
         entry.name, entry.show_viewport, entry.show_render = name, show_viewport, show_render
     if obj.data != before.data:
         obj.data = before.data
-    for slot, (link, material) in zip(obj.material_slots, before.slots, strict=False):
-        if slot.link != link:
+    for number, (slot, (link, material)) in enumerate(zip(obj.material_slots, before.slots, strict=False)):
+        if slot.link != link == "OBJECT":
+            link_to_object(obj, number)
+        elif slot.link != link:
             slot.link = link
         if link == "OBJECT" and slot.material != material:
             slot.material = material

@@ -323,6 +323,36 @@ def test_an_edit_on_an_override_becomes_a_mesh_of_its_own(tmp_path: Path) -> Non
     assert chair.data.vertices[0].co.z == 0.5
 
 
+@pytest.mark.parametrize("again", [False, True], ids=["restored", "baked again"])
+def test_a_material_assigned_to_an_override_survives_reloads(tmp_path: Path, again: bool) -> None:
+    path = str(tmp_path / "scene.blend")
+    add_plane("Chair", principled_material())
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"))
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, wanted):
+        wanted.objects = ["Chair"]
+    chair = wanted.objects[0].override_create(remap_local_usages=True)
+    bpy.context.scene.collection.objects.link(chair)
+
+    def reload() -> bpy.types.Object:
+        bpy.ops.wm.save_mainfile()
+        bpy.ops.wm.open_mainfile(filepath=path)
+        return bpy.context.scene.objects["Chair"]
+
+    bake_by_hand()
+    chair.material_slots[0].material = principled_material(name="Mine")
+    reload()
+    if again:
+        bake_by_hand()
+        reload()
+    _restore()
+    (slot,) = reload().material_slots
+    assert slot.link == "OBJECT"
+    assert slot.material is not None
+    assert slot.material.name == "Mine"
+
+
 def test_edits_that_cannot_be_taken_over_are_refused_at_once() -> None:
     instancer = _instance()
     modified = _modified()
