@@ -20,6 +20,7 @@ SKIPPED = {
     "bl_rna", "is_missing", "users", "all_objects", "children_recursive", "frame_float", "is_updated",
     "is_updated_data", "tool_settings", "matrix_world", "matrix_local", "dimensions", "bound_box",
     "face_count", "override_library", "library_weak_reference", "animation_data",
+    "is_runtime_data",
 }  # fmt: skip
 
 MESH_ARRAYS = {
