@@ -14,13 +14,16 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 import bpy
+from mathutils import Matrix
 
-from ..bake_scene import BakedObject, BakeResult
+from ..bake_scene import BakedObject, BakeResult, BakeWarning
 from ..errors import BakeError
 from ..settings import BakeSettings
+from ..solver.steps import drain
 from .bake_record import made_datablocks, mark_made, remove_datablocks, unmark_made
 from .edit_modes import leave_edit_modes
 from .export_sources import Export, ExportSource
+from .followers import left_behind, places
 from .group_images import GroupImages
 from .light_mixer import mixers
 from .light_shares import LightShares
@@ -41,17 +44,15 @@ def apply_lightmaps(
     settings: BakeSettings,
     groups: GroupImages | None = None,
     earlier: EarlierBake | None = None,
-) -> None:
+) -> tuple[BakeWarning, ...]:
     """Show the lightmaps on the baked objects, at once; see `apply_steps`.
 
     Without `earlier` all that the file shows of other bakes is replaced.
     """
     if earlier is None:
         with replacing_earlier(context) as replaced:
-            apply_lightmaps(context, export, result, images, settings, groups, replaced)
-        return
-    for _ in apply_steps(context, export, result, images, settings, groups, earlier):
-        pass
+            return apply_lightmaps(context, export, result, images, settings, groups, replaced)
+    return drain(apply_steps(context, export, result, images, settings, groups, earlier))
 
 
 def apply_steps(
@@ -62,7 +63,7 @@ def apply_steps(
     settings: BakeSettings,
     groups: GroupImages | None,
     earlier: EarlierBake,
-) -> Generator[float, None, None]:
+) -> Generator[float, None, tuple[BakeWarning, ...]]:
     """Show the lightmaps on the baked objects; `restore` takes them off.
 
     Parameters
@@ -86,6 +87,11 @@ def apply_steps(
     fraction : float
         How much is prepared. After the last one everything is shown.
 
+    Returns
+    -------
+    warnings : tuple of BakeWarning
+        What does not look as it was baked.
+
     Raises
     ------
     SceneError
@@ -95,13 +101,14 @@ def apply_steps(
     """
     before = set(made_datablocks())
     try:
-        replacements, shares = _prepare(context, export, result, images, settings, groups, earlier)
+        replacements, shares, baked_at = _prepare(context, export, result, images, settings, groups, earlier)
         materials = LightmapMaterials(settings.quantity, shares)
         for number, replacement in enumerate(replacements):
             dress(replacement, images, materials, shares)
             yield (number + 1) / len(replacements)
         earlier.take_off(changed_objects(replacements))
         show(context, replacements)
+        return left_behind(context, baked_at)
     except BaseException:
         earlier.show_again()
         remove_datablocks([block for block in made_datablocks() if block not in before])
@@ -130,8 +137,11 @@ def _prepare(
     settings: BakeSettings,
     groups: GroupImages | None,
     earlier: EarlierBake,
-) -> tuple[list[Replacement], LightShares | None]:
-    """Find or make the meshes of all that will be shown, while the file is without any lightmaps."""
+) -> tuple[list[Replacement], LightShares | None, dict[str, Matrix]]:
+    """Find or make the meshes of all that will be shown, while the file is without any lightmaps.
+
+    Also returns where the objects are then, by name.
+    """
     lightmaps = {id(baked.object): baked for baked in result.objects}
     pairs = [
         (source, lightmaps.get(id(target)))
@@ -147,6 +157,7 @@ def _prepare(
             shown.append((source, baked, shown_by(source) in hidden))
     leave_edit_modes(context, _real_objects([source for source, _, _ in shown]))
     with bare(context):
+        baked_at = places(context)
         sources = [source for source, _, _ in shown if source.needs_evaluated_mesh]
         evaluated = copy_evaluated_meshes(context, sources)
         for mesh in evaluated.values():
@@ -155,7 +166,7 @@ def _prepare(
         replacements = [_replacement(*each, evaluated, own) for each in shown]
         with _mixers_aside():
             shares = LightShares(context.scene, images, groups, settings) if groups else None
-    return replacements, shares
+    return replacements, shares, baked_at
 
 
 @contextmanager

@@ -37,6 +37,7 @@ from .restore import restore
 from .scopes import files_shown_by, keeping_theirs, of_scene, shared_warnings
 
 BakeJob = Generator[Progress, None, BakeReport]
+Shown = tuple[list[bpy.types.Image], GroupImages, tuple[BakeWarning, ...]]
 
 # How far the whole is when each part begins; rough, from bakes at medium quality.
 SOLVE, APPLY, SAVE, PREVIEW = 0.03, 0.85, 0.89, 0.92
@@ -185,7 +186,8 @@ def run_bake(
         with scope.replacing_earlier(context) as earlier, timed(seconds, "apply"):
             result = replace(result, warnings=(*earlier.warnings, *result.warnings))
             showing = _show(context, settings, export, result, output, keeping, earlier)
-            images, groups = yield from _told(showing, solved, 1.0)
+            images, groups, behind = yield from _told(showing, solved, 1.0)
+            result = replace(result, warnings=(*behind, *result.warnings))
             report = _report(result, images, groups, settings, seconds)
             if output is not None:
                 whole = report.joined(output.earlier, earlier.kept_sources)
@@ -250,7 +252,8 @@ def deliver(
     with (scope or Scope()).replacing_earlier(context) as earlier, timed(seconds, "apply"):
         result = replace(result, warnings=(*earlier.warnings, *result.warnings))
         showing = _show(context, settings, export, result, output, keeping, earlier)
-        images, groups = yield from _told(showing, APPLY, SAVE)
+        images, groups, behind = yield from _told(showing, APPLY, SAVE)
+        result = replace(result, warnings=(*behind, *result.warnings))
     try:
         # The copy tells of its bake too; what is left to do is not in its times.
         so_far = _report(result, images, groups, settings, seconds)
@@ -283,7 +286,7 @@ def _show(
     output: OutputFolder | None,
     keeping: Keeping | None,
     earlier: EarlierBake,
-) -> Generator[float, None, tuple[list[bpy.types.Image], GroupImages]]:
+) -> Generator[float, None, Shown]:
     """Make the images, also those of light groups, and put them on the objects; yields the fraction done."""
     folder, names = (None, PLAIN_NAMES) if output is None else (output.staging, output.names)
     # Which instances keep theirs is found out later.
@@ -297,16 +300,14 @@ def _show(
             set_folder([*images, *each_image(groups)], output.path)
         if keeping is not None:
             kept_bakes.mark_images([*images, *each_image(groups)], keeping.mark)
-        yield from apply_steps(context, export, result, images, settings, groups, earlier)
+        behind = yield from apply_steps(context, export, result, images, settings, groups, earlier)
     except BaseException:
         remove_datablocks([*images, *each_image(groups)])
         raise
-    return images, groups
+    return images, groups, behind
 
 
-def _told(
-    steps: Generator[float, None, tuple[list[bpy.types.Image], GroupImages]], begin: float, end: float
-) -> Generator[Progress, None, tuple[list[bpy.types.Image], GroupImages]]:
+def _told(steps: Generator[float, None, Shown], begin: float, end: float) -> Generator[Progress, None, Shown]:
     """Report steps of showing the lightmaps as progress between two fractions of the whole."""
     try:
         while True:

@@ -12,6 +12,7 @@ from ..bake_scene import BakedObject
 from ..errors import BakeError
 from .bake_record import ORIGINAL, mark_made, record_baked, record_hiding
 from .export_sources import ExportSource
+from .followers import nearly_equal
 from .light_shares import LightShares
 from .lightmap_materials import LightmapMaterials
 from .material_slots import set_materials
@@ -206,7 +207,7 @@ def _new_stand_in(replacement: Replacement) -> bpy.types.Object:
     mark_made(stand_in)
     world = Matrix(replacement.source.matrix_world)
     stand_in.matrix_world = world
-    if not _nearly_equal(stand_in.matrix_basis, world):
+    if not nearly_equal(stand_in.matrix_basis, world):
         # Nested scales can shear, which an object's location, rotation and scale cannot:
         # the mesh takes it, and the object only keeps the mirroring that a mesh must not.
         mirror = Matrix.Scale(-1.0, 4) if world.determinant() < 0.0 else Matrix.Identity(4)
@@ -218,9 +219,3 @@ def _new_stand_in(replacement: Replacement) -> bpy.types.Object:
     instancer = bpy.data.objects.get((shown_by(replacement.source), None))
     seal_object(stand_in, instancer, replacement.source.name)
     return stand_in
-
-
-def _nearly_equal(first: Matrix, second: Matrix) -> bool:
-    """Whether two transforms agree to float32 rounding."""
-    size = max(max(abs(value) for value in row) for row in second)
-    return all(abs(first[i][j] - second[i][j]) <= 1e-5 * size for i in range(4) for j in range(4))

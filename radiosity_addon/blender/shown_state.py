@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 
 from .bake_record import LAYER, ORIGINAL, forget, is_made, is_recorded
+from .followers import switch_drivers_on
 from .material_slots import (
     data_with_copies,
     drop_added_slots,
@@ -109,6 +110,7 @@ class ShownState:
             _put_back_data(data)
         for baked in self._objects:
             _put_back(baked)
+        switch_drivers_on([baked.obj for baked in self._objects])
 
 
 def take_off(objects: Sequence[bpy.types.Object]) -> None:
@@ -123,6 +125,7 @@ def take_off(objects: Sequence[bpy.types.Object]) -> None:
     for data in _dressed():
         if data in users and inside.issuperset(users[data]):
             _take_off_data(data, users[data])
+    switch_drivers_on(objects)
 
 
 def take_off_unused() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -56,10 +57,10 @@ def bake_by_hand(
     result = hand_result(export, colors)
     with replacing_earlier(bpy.context) as earlier:
         images = write_pages(result, wanted, folder)
-        apply_lightmaps(bpy.context, export, result, images, wanted, earlier=earlier)
+        behind = apply_lightmaps(bpy.context, export, result, images, wanted, earlier=earlier)
         if failing is not None:
             raise failing
-    return result
+    return replace(result, warnings=behind)
 
 
 def add_plane(name: str = "Plane", material: bpy.types.Material | None = None) -> bpy.types.Object:
