@@ -82,6 +82,7 @@ def _give_object(obj: bpy.types.Object) -> None:
 
 def _remove_meshes() -> None:
     shown = {obj.data for obj in bpy.data.objects if obj.data is not None and _is_shown_baked(obj)}
+    gone = []
     for mesh in [mesh for mesh in bpy.data.meshes if is_made(mesh) and mesh.library is None]:
         if mesh in shown:
             continue
@@ -91,7 +92,9 @@ def _remove_meshes() -> None:
             continue
         if mesh.users:
             mesh.user_remap(original)
-        bpy.data.batch_remove([mesh])
+        gone.append(mesh)
+    # All at once: Blender looks through the whole file each time.
+    remove_datablocks(gone)
 
 
 def _is_shown_baked(obj: bpy.types.Object) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from radiosity_addon.blender import collect as collecting
-from radiosity_addon.blender import rebake, surface_bake, surface_batches, world_pixels
+from radiosity_addon.blender import rebake, surface_bake, surface_batches, sweep, world_pixels
 from radiosity_addon.blender.bake_record import is_made
 from radiosity_addon.blender.export import export_scene, export_steps
 from radiosity_addon.settings import BakeSettings
@@ -140,6 +140,27 @@ def test_edits_since_a_bake_are_carried_once_and_read_in_every_step(monkeypatch:
     assert len(carried) == 1
     green = export.bake_scene.scene.reflectance
     assert (green[:, 1] > 2 * green[:, 0]).all()
+
+
+@pytest.mark.usefixtures("record")
+def test_stand_ins_of_an_earlier_bake_are_removed_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One by one, the meshes of 300 objects that share one took 0.9 s."""
+    many_objects(12, 3)
+    shared = bpy.data.objects["Ball 0"].data
+    for number in range(1, 12):
+        bpy.data.objects[f"Ball {number}"].data = shared
+    bake_by_hand()
+    meshes: list[int] = []
+    remove = sweep.remove_datablocks
+
+    def counted(blocks: list[bpy.types.ID]) -> None:
+        meshes.append(sum(isinstance(block, bpy.types.Mesh) for block in blocks))
+        remove(blocks)
+
+    monkeypatch.setattr(sweep, "remove_datablocks", counted)
+    bake_by_hand()
+    assert sorted(meshes)[-2:] == [0, 12]
+    assert sum(is_made(mesh) for mesh in bpy.data.meshes) == 12
 
 
 def test_batches_of_materials_change_nothing_of_what_is_evaluated(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -48,6 +48,11 @@ def test_the_dialogs_button_bakes(seen: dict[str, Any]) -> None:
     assert seen["lit"]
 
 
+def test_an_interrupted_bake_is_recovered_from_the_panel(seen: dict[str, Any]) -> None:
+    assert seen["interrupted"]
+    assert seen["recovered"]
+
+
 def test_only_its_own_timer_carries_a_bake_on(seen: dict[str, Any]) -> None:
     foreign, advanced = seen["ticks"]
     assert foreign > 0  # at d331b48 none: they were swallowed

@@ -3,6 +3,7 @@
 Usage: blender cornell.blend --enable-event-simulate --python drive_manners.py -- ANSWER.json
 """
 
+import hashlib
 import importlib
 import json
 import sys
@@ -17,6 +18,8 @@ from file_dump import differences, dump_file
 ANSWER = Path(sys.argv[sys.argv.index("--") + 1])
 MODULE = "bl_ext.user_default.radiosity_addon"
 
+cleaning = importlib.import_module(f"{MODULE}.blender.cleaning")
+staging = importlib.import_module(f"{MODULE}.staging")
 runtime = importlib.import_module(f"{MODULE}.blender.runtime")
 window_job = importlib.import_module(f"{MODULE}.blender.window_job")
 
@@ -83,7 +86,7 @@ def invoke(operator, window=None):
 
 
 def photograph(name):
-    yield 0.7
+    yield 2.0  # Blender moves sub-panels where a panel above has grown, frame by frame
     events.screenshot(ANSWER.with_name(f"manners-{name}.png"))
 
 
@@ -111,8 +114,14 @@ def script():
     yield from events.until(not_baking, 120)
     yield from photograph("after")
     seen["lit"] = runtime.last_bake(bpy.context.scene) is not None
+    yield from scroll("down")
+    yield from photograph("below")
+    yield from scroll("up")
+    engine = bpy.context.scene.render.engine
     bpy.context.scene.render.engine = "BLENDER_WORKBENCH"
     yield from photograph("workbench")
+    bpy.context.scene.render.engine = engine
+    yield from recover()
 
     # Somebody else's timer does not carry it on, and is not kept from its owner.
     bpy.utils.register_class(FOREIGN_OT_ticking)
@@ -137,6 +146,34 @@ def script():
     # The window that bakes is closed; the other one stays.
     yield from second_window()
     yield from bake_and("closed_itself", close, bpy.context.window_manager.windows[-1])
+
+
+def scroll(way):
+    """Move the sidebar by pages, to its end."""
+    with bpy.context.temp_override(window=events.window(), area=events.area_3d(), region=events.region("UI")):
+        for _ in range(3):
+            getattr(bpy.ops.view2d, f"scroll_{way}")(page=True)
+    yield 0.3
+
+
+def recover():
+    """Leave the folder as a bake that is killed while it replaces its files, and recover."""
+    (lightmap,) = Path(bpy.data.filepath).with_name("lightmaps").glob("*lightmap.exr")
+    good = lightmap.read_bytes()
+    folder = staging.Staging(lightmap.parent)
+    (folder.path / staging.EARLIER).mkdir()
+    (folder.path / staging.EARLIER / lightmap.name).write_bytes(good)
+    lightmap.write_bytes(b"new")
+    digests = {"new": hashlib.sha256(b"new").hexdigest(), "old": hashlib.sha256(good).hexdigest()}
+    told = {"version": 2, "files": {lightmap.name: digests}}
+    (folder.path / staging.JOURNAL).write_text(json.dumps(told))
+    folder.release()
+    cleaning.look_for_interrupted(bpy.context)
+    yield from photograph("recover")
+    seen["interrupted"] = runtime.interrupted
+    invoke(bpy.ops.radiosity.recover)
+    yield from photograph("recovered")
+    seen["recovered"] = not runtime.interrupted and lightmap.read_bytes() == good
 
 
 def second_window():

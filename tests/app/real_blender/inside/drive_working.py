@@ -72,7 +72,7 @@ def script():
     bpy.ops.ed.undo_push(message="Odd")
     before = dump_file()
     bake_button = yield from events.click_down(HEADER, looked)
-    yield from photograph("check", (760, 80, 520, 390))
+    yield from photograph("check", (440, 40, 600, 420))
     seen["baked_unlooked"] = baking()
     seen["findings"] = [finding.message for finding in check_panel.last_check(bpy.context.scene).findings]
     yield from events.key("ESC", *view)
