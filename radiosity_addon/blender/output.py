@@ -35,7 +35,6 @@ FILES = (
 )
 """What a finished bake leaves in the folder, for people to read."""
 
-
 _DISK_FAILURES = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.EIO)
 """What the system says of a disk that is full, or fails, often without naming the file."""
 
@@ -298,12 +297,7 @@ class OutputFolder:
 
 
 def refuse_special(path: Path) -> None:
-    """Refuse to write where a folder, a link or a device is.
-
-    Raises
-    ------
-    BakeError
-    """
+    """Refuse, by a BakeError, to write where a folder, a link or a device is."""
     try:
         found = path.lstat()
     except FileNotFoundError:
