@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import bpy
 
 from ..bake_scene import BakeWarning
-from .bake_record import is_recorded, made_datablocks, recorded_objects
+from .bake_record import made_datablocks, recorded_objects
 from .edits import carry_edits
+from .scopes import scene_of
 from .shown_state import sharing, showing, take_off, take_off_unused
 from .stand_ins import INSTANCER
 from .sweep import sweep
@@ -57,8 +58,7 @@ def restore_scene(context: bpy.types.Context, scene: bpy.types.Scene | None) -> 
 
 def is_of_scene(obj: bpy.types.Object, scene: bpy.types.Scene) -> bool:
     """Whether an object is in a scene, shows a lightmap of the scene's bake, or is in no scene at all."""
-    baked_by = obj.radiosity_bake.scene if is_recorded(obj) else ""
-    return baked_by == scene.name or scene in (scenes := obj.users_scene) or not scenes
+    return scene_of(obj) == scene or scene in (scenes := obj.users_scene) or not scenes
 
 
 def stand_ins_of(

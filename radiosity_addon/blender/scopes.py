@@ -51,7 +51,7 @@ def shared_warnings(scene: bpy.types.Scene, export: Export) -> tuple[BakeWarning
     found = []
     for name in sorted(shown_anew(export)):
         obj = bpy.data.objects.get((name, None))
-        other = None if obj is None else _scene_of(obj)
+        other = None if obj is None else scene_of(obj)
         if other is not None and other != scene:
             message = f"object '{name}' is in scene '{other.name}' too, and shows this bake's lightmap there"
             found.append(BakeWarning(name, message))
@@ -89,12 +89,12 @@ def files_of(obj: bpy.types.Object) -> frozenset[str]:
 
 def _belongs_to(obj: bpy.types.Object, scene: bpy.types.Scene) -> bool:
     """Whether an object shows a lightmap of this scene's bake, or of none that is known."""
-    baked_in = _scene_of(obj)
+    baked_in = scene_of(obj)
     scenes = obj.users_scene
     return baked_in == scene if baked_in is not None else (scene in scenes or not scenes)
 
 
-def _scene_of(obj: bpy.types.Object) -> bpy.types.Scene | None:
+def scene_of(obj: bpy.types.Object) -> bpy.types.Scene | None:
     """Return the scene whose bake an object shows; None where that is gone or not known."""
     name = obj.radiosity_bake.scene if is_recorded(obj) else ""
     scene = bpy.data.scenes.get(name) if name else None

@@ -110,6 +110,22 @@ def test_restore_is_of_the_scene_and_the_command_line_s_of_the_file(scenes) -> N
     assert differences_since(before, dump_file()) == []
 
 
+def test_a_full_copy_of_a_baked_scene_keeps_its_lightmaps(scenes) -> None:
+    first, _ = scenes
+    bake(first)
+    assert bpy.ops.scene.new(type="FULL_COPY") == {"FINISHED"}
+    copied = bpy.context.window.scene
+    copies = {obj.name for obj in copied.objects if obj.type == "MESH"}
+    bpy.context.window.scene = first
+    assert bpy.ops.radiosity.restore() == {"FINISHED"}
+    assert len(copies) == 3
+    assert set(images()) == copies
+    bpy.context.window.scene = copied
+    assert bpy.ops.radiosity.restore() == {"FINISHED"}
+    assert images() == {}
+    assert not [mesh.name for mesh in bpy.data.meshes if "Lightmap" in mesh.uv_layers]
+
+
 def test_what_is_not_selected_keeps_its_lightmap(scenes) -> None:
     first, _ = scenes
     bake(first)
