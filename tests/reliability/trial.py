@@ -322,24 +322,21 @@ def _missing_images() -> list[str]:
 
 def _edit(trial: Trial, own: set[str]) -> None:
     """Edit, bake again or not, restore, and look for the edits."""
-    made = []
-    done: set[str] = set()
+    made: dict[str, tuple[str, edits.Check]] = {}
     for _ in range(trial.random.randint(1, 3)):
         found = edits.edit(trial.random, own)
-        # A second edit of one kind would undo the first.
-        if (
-            found is not None
-            and found[0] not in done
-            and not any(found[0].endswith(old.split(" on ")[1]) for old in done)
-        ):
-            made.append(found)
-            done.add(found[0])
+        if found is None:
+            continue
+        kind, name = found[0].split(" on ", 1)
+        # A second edit of an object may undo the first, and deleting it does.
+        if name not in made or kind == "delete":
+            made[name] = found
     again = trial.random.random() < 0.5
     if again:
         with contextlib.suppress(StopIteration):
             _operate(trial, bpy.ops.radiosity.bake)
     _restore(trial)
-    for what, check in made:
+    for what, check in made.values():
         try:
             wrong = check(trial.said)
         except (KeyError, ReferenceError) as error:
