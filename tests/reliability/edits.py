@@ -124,7 +124,9 @@ def _copy_object(random: Random, obj: bpy.types.Object, own: bool) -> Check:
         made.data = obj.data.copy()
     bpy.context.scene.collection.objects.link(made)
     name, count = made.name, len(made.data.polygons)
-    filled = [slot.material is not None for slot in made.material_slots]
+    # An empty slot shows a material of the bake meanwhile.
+    shown = [slot.material.name if slot.material is not None else "" for slot in made.material_slots]
+    filled = [bool(title) and not title.startswith("No Material (Lightmap)") for title in shown]
 
     def check(said: str) -> str:
         now = bpy.data.objects.get(name)
