@@ -34,6 +34,9 @@ _PROBE = 1024
 _OVERLAP = 1.01
 """A texel filled to more than this holds triangles that lie over each other."""
 
+_COLLAPSED = 1e-6
+"""Kept UVs whose area is less than this share of their extent, squared, are a line but for rounding."""
+
 
 @dataclass(frozen=True)
 class AtlasInput:
@@ -274,7 +277,7 @@ def _kept_charts(
     """
     assert source.uv is not None
     uv = source.uv.astype(np.float64)
-    if not np.isfinite(uv).all() or not (signed_double_area(uv) != 0).any():
+    if not np.isfinite(uv).all() or not _has_area(uv):
         warnings.append(
             BakeWarning(source.name, "its Lightmap UVs have no area or are not numbers; unwrapped anew")
         )
@@ -289,6 +292,12 @@ def _kept_charts(
         )
     chart = np.zeros(len(uv), dtype=np.int64)
     return Charts(rescale_to_area(uv, triangles, chart, 1), chart, 1)
+
+
+def _has_area(uv: Float) -> bool:
+    """Whether (n, 3, 2) UVs cover more than rounding leaves of a line or a point."""
+    area = np.abs(signed_double_area(uv)).sum()
+    return bool(area > _COLLAPSED * (np.ptp(uv.reshape(-1, 2), axis=0) ** 2).sum())
 
 
 def _kept_as_they_are(

@@ -33,6 +33,10 @@ def _cut_half_plane(polygon: Array, distance: Array) -> Array:
     """Do the same for polygons that lie on both sides."""
     count, size = distance.shape
     width = polygon.shape[2]
+    bent = np.count_nonzero(np.diff(distance >= 0, axis=1, append=distance[:, :1] >= 0), axis=1) > 2
+    if bent.any():
+        distance = distance.copy()
+        distance[bent] = _outside_once(distance[bent])
     inside = distance >= 0
     following = np.concatenate([polygon[:, 1:], polygon[:, :1]], axis=1)
     next_distance = np.concatenate([distance[:, 1:], distance[:, :1]], axis=1)
@@ -50,6 +54,22 @@ def _cut_half_plane(polygon: Array, distance: Array) -> Array:
     result[to] = corners.reshape(-1, width).take(kept, axis=0)
     last = np.minimum(np.arange(size + 1), place[:, -1:]) + (size + 1) * np.arange(count)[:, None]
     return np.asarray(result.take(last, axis=0))
+
+
+def _outside_once(distance: Array) -> Array:
+    """Return (t, k) distances that are negative along one run of corners, the one with the smallest.
+
+    A line meets the outline of a convex polygon twice; where corners lie on it but for rounding, it seems to
+    more often.
+    """
+    size = distance.shape[1]
+    turned = (np.argmin(distance, axis=1)[:, None] + np.arange(size)) % size
+    values = np.take_along_axis(distance, turned, axis=1)
+    outside = values < 0
+    run = np.cumprod(outside, axis=1) | np.cumprod(outside[:, ::-1], axis=1)[:, ::-1]
+    result = np.empty_like(distance)
+    np.put_along_axis(result, turned, np.where(run, values, np.maximum(values, 0.0)), axis=1)
+    return result
 
 
 def areas(polygon: Array) -> Array:
