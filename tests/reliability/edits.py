@@ -106,14 +106,19 @@ def _paint(random: Random, obj: bpy.types.Object, own: bool) -> Check | None:
             node.inputs[0].default_value = (value, value, value, 1)
 
             def check(said: str, number: int = number, title: str = title) -> str:
-                slots = bpy.data.objects[name].material_slots
-                now = slots[number].material if number < len(slots) else None
+                now = _seen_in(bpy.data.objects[name], number)
                 back = now.node_tree.nodes.get(title) if now is not None and now.node_tree else None
                 there = back is not None and _near(back.inputs[0].default_value[0], value)
                 return "" if there or name in said else "the base color is as it was"
 
             return check
     return None
+
+
+def _seen_in(obj: bpy.types.Object, slot: int) -> bpy.types.Material | None:
+    """Return the material of a slot; where the object's is empty, Blender shows the mesh's."""
+    shown = obj.material_slots[slot].material if slot < len(obj.material_slots) else None
+    return shown or (obj.data.materials[slot] if slot < len(obj.data.materials) else None)
 
 
 def _copy_object(random: Random, obj: bpy.types.Object, own: bool) -> Check:

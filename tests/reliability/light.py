@@ -58,8 +58,8 @@ class Arrived:
         Power [W] of all faces, but for those that lie together.
     leaving : float
         The part of it that leaves: of faces with no other one within `HAIR` above them.
-    deviation : float
-        The standard deviation of `emitted`.
+    deviation, leaving_deviation : float
+        The standard deviations of `emitted` and of `leaving`.
     front : dict of str to two arrays (3,)
         For each object: power that arrives on front sides, and its standard deviation.
     """
@@ -67,6 +67,7 @@ class Arrived:
     emitted: float
     leaving: float
     deviation: float
+    leaving_deviation: float
     front: dict[str, tuple[np.ndarray, np.ndarray]]
     area: dict[str, float]
 
@@ -131,9 +132,9 @@ def follow(triangles: Triangles, known: Known, seed: int) -> Arrived:
         name: (arrived[number].sum(axis=0), deviation[number]) for number, name in enumerate(triangles.names)
     }
     sums = np.bincount(triangles.owner, area, len(triangles.names))
-    doubt = total * float(share.std()) / math.sqrt(PARTICLES)
+    doubts = [total * float(each.std()) / math.sqrt(PARTICLES) for each in (share, share * leaves)]
     areas = dict(zip(triangles.names, sums.tolist(), strict=True))
-    return Arrived(emitted, leaving, doubt, found, areas)
+    return Arrived(emitted, leaving, doubts[0], doubts[1], found, areas)
 
 
 def _points(corners: np.ndarray, random: np.random.Generator) -> np.ndarray:

@@ -248,9 +248,12 @@ def _compare_light(trial: Trial, seed: int) -> None:
     if power and arrived.emitted > 0:
         told = float(np.mean(power["emitted"]))
         trial.measures["emitted"] = told / arrived.emitted
-        doubt = 0.005 * arrived.emitted + 3 * arrived.deviation
+        doubt, least_doubt = (
+            0.005 * arrived.emitted + 3 * deviation
+            for deviation in (arrived.deviation, arrived.leaving_deviation)
+        )
         # Rays pass layers that are a hair apart, so decision 0045 may count these once, or not.
-        if not arrived.leaving - doubt <= told <= arrived.emitted + doubt:
+        if not arrived.leaving - least_doubt <= told <= arrived.emitted + doubt:
             least = f"{arrived.leaving:.4g} to " if arrived.hair else ""
             trial.problems.append(
                 f"power: {told:.4g} W emitted where there are {least}{arrived.emitted:.4g} W"
