@@ -176,7 +176,12 @@ def _replace_original(
 ) -> BakeWarning:
     """Put an edited copy of a shared mesh in the place of its original, or have its object keep it."""
     fits = original is not None and original.library is None and original.override_library is None
-    if original is None or not fits or known.seal != digest(original):
+    if (
+        original is None
+        or not fits
+        or known.seal != digest(original)
+        or _has_other_slots(original, mesh, known)
+    ):
         kept = released_copy(mesh, f"{original.name if original else name}{EDITED}")
         mesh[ORIGINAL] = kept
         _seal_again(mesh, known)
@@ -208,6 +213,17 @@ def _replace_original(
     _seal_again(mesh, known)
     message = f"its mesh '{edited.name}' was edited since the bake: the edit is in all objects that share it"
     return BakeWarning(name, message)
+
+
+def _has_other_slots(original: bpy.types.Mesh, mesh: bpy.types.Mesh, known: StandIn) -> bool:
+    """Whether a mesh holds other materials than when its stand-in was made."""
+    now = [original_of(material) for material in original.materials]
+    before = [stood_for(mesh, slot) for slot in range(known.slots)]
+    if not now and len(before) == 1:
+        return False  # objects without slots show one
+    pairs = enumerate(zip(now, before, strict=False))
+    other = any(one != two for slot, (one, two) in pairs if slot not in known.object_slots)
+    return other or len(now) != len(before)
 
 
 def _aim_drivers(before: bpy.types.Key, now: bpy.types.Key) -> None:

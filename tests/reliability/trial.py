@@ -330,10 +330,8 @@ def _edit(trial: Trial, own: set[str]) -> None:
         found = edits.edit(trial.random, own)
         if found is None:
             continue
-        kind, name = found[0].split(" on ", 1)
-        # A second edit of an object may undo the first, and deleting it does.
-        if name not in made or kind == "delete":
-            made[name] = found
+        # An edit may undo an earlier one of the same object: the last one counts.
+        made[found[0].split(" on ", 1)[1]] = found
     again = trial.random.random() < 0.5
     if again:
         with contextlib.suppress(StopIteration):
