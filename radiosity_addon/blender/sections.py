@@ -39,12 +39,12 @@ class Section:
 
 
 def draw_sections(layout: Any, sections: tuple[type[Section], ...], context: bpy.types.Context) -> None:
-    """Draw sections below each other; `layout` has the panel's full width."""
+    """Draw sections below each other at the end of `layout`, which has the panel's full width."""
+    layout.use_property_split = layout.use_property_decorate = False  # as in a panel of their own
     for section in sections:
         if not section.poll(context):
             continue
         header, body = layout.panel(section.name, default_closed=section.folded)
         section.draw_header(header, context)
         if body is not None:
-            body.use_property_split = body.use_property_decorate = False
             section.draw(body, context)
