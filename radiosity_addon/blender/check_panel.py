@@ -91,11 +91,6 @@ class CheckSection(Section):
     label = "Before Baking"
 
     @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        """Hide it while a bake runs."""
-        return not runtime.running.active
-
-    @classmethod
     def draw(cls, layout: Any, context: bpy.types.Context) -> None:
         """Draw the button, and what was found last."""
         layout.operator("radiosity.check", icon="VIEWZOOM")

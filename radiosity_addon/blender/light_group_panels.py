@@ -6,7 +6,6 @@ from typing import Any
 
 import bpy
 
-from . import runtime
 from .light_group_properties import ListedGroup, listed_groups
 from .light_membership import NAME
 from .light_mixer import Sliders, mixers, sliders_of
@@ -27,11 +26,6 @@ class LightGroupSection(Section):
 
     name = "radiosity_light_groups"
     label = "Light Groups"
-
-    @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        """Hide it while a bake is running."""
-        return not runtime.running.active
 
     @classmethod
     def draw_header(cls, header: Any, context: bpy.types.Context) -> None:

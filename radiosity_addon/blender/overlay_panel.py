@@ -8,7 +8,6 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from . import overlay_properties as kinds
-from . import runtime
 from .kept_details import details_of
 from .overlay_properties import overlay_of
 from .sections import Section
@@ -27,11 +26,6 @@ class OverlaySection(Section):
 
     name = "radiosity_overlays"
     label = "Overlays"
-
-    @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        """Show it while no bake runs: then the light itself is drawn."""
-        return not runtime.running.active
 
     @classmethod
     def draw(cls, layout: Any, context: bpy.types.Context) -> None:

@@ -26,26 +26,54 @@ from .wrapped_text import draw_text
 SHOWN_WARNINGS = 12
 
 
-class RADIOSITY_PT_main(bpy.types.Panel):
-    """Bake, Restore, the settings that matter, and below them sections that fold."""
+class _Panel:
+    """Where our panels are."""
 
-    bl_idname = "RADIOSITY_PT_main"
     bl_label = "Radiosity Lightmaps"
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "Radiosity"
+
+
+class RADIOSITY_PT_progress(_Panel, bpy.types.Panel):
+    """How far the bake is that runs, in place of all buttons.
+
+    A panel of its own: within one, Blender takes a progress bar under the mouse for the first label of what
+    is drawn next, and shows that as a bar.
+    """
+
+    bl_idname = "RADIOSITY_PT_progress"
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        """Show it while a bake runs."""
+        return runtime.running.active
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        """Draw the progress bar."""
+        running = runtime.running
+        self.layout.progress(factor=running.fraction, text=progress_text(running), type="BAR")
+        self.layout.label(text="Esc cancels", icon="CANCEL")
+
+
+class RADIOSITY_PT_main(_Panel, bpy.types.Panel):
+    """Bake, Restore, the settings that matter, and below them sections that fold."""
+
+    bl_idname = "RADIOSITY_PT_main"
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        """Show it unless a bake runs."""
+        return not runtime.running.active
 
     def draw_header_preset(self, _context: bpy.types.Context) -> None:
         """Draw the button of the presets."""
         RADIOSITY_PT_presets.draw_panel_header(self.layout)
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Draw the progress of a bake that runs, or the buttons and settings of the next one."""
-        if runtime.running.active:
-            _draw_progress(self.layout)
-        else:
-            _draw_buttons(self.layout, context)
-            _draw_settings(self.layout, context)
+        """Draw the buttons and settings."""
+        _draw_buttons(self.layout, context)
+        _draw_settings(self.layout, context)
         draw_sections(self.layout, SECTIONS, context)
 
 
@@ -117,7 +145,6 @@ class AdvancedSection(Section):
     def draw(cls, layout: Any, context: bpy.types.Context) -> None:
         """Draw the settings."""
         layout.use_property_split = True
-        layout.enabled = not runtime.running.active
         settings = context.scene.radiosity
         column = layout.column()
         for name in ("quantity", "light", "format"):
@@ -149,7 +176,7 @@ class ObjectSection(Section):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Show it for what can light, block or be baked."""
-        return has_role(context.object) and not runtime.running.active
+        return has_role(context.object)
 
     @classmethod
     def draw(cls, layout: Any, context: bpy.types.Context) -> None:
@@ -169,7 +196,6 @@ class SolverSection(Section):
     def draw(cls, layout: Any, context: bpy.types.Context) -> None:
         """Draw the method, and of the settings those that apply to it."""
         layout.use_property_split = True
-        layout.enabled = not runtime.running.active
         settings = context.scene.radiosity
         layout.prop(settings, "method")
         column = layout.column()
@@ -188,7 +214,7 @@ class LastBakeSection(Section):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Show it once there was a bake."""
-        return not runtime.running.active and runtime.last_bake(context.scene) is not None
+        return runtime.last_bake(context.scene) is not None
 
     @classmethod
     def draw(cls, layout: Any, context: bpy.types.Context) -> None:
@@ -236,13 +262,6 @@ def _draw_preferred(layout: Any, preferred: Any, shown: Any) -> None:
         layout.label(text=iface_("From the preferences: {}").format(preferred), icon="INFO", translate=False)
 
 
-def _draw_progress(layout: Any) -> None:
-    """Show how far the running bake is."""
-    running = runtime.running
-    layout.progress(factor=running.fraction, text=progress_text(running), type="BAR")
-    layout.label(text="Esc cancels", icon="CANCEL")
-
-
 SECTIONS: tuple[type[Section], ...] = (
     ObjectSection,
     SolverSection,
@@ -255,4 +274,4 @@ SECTIONS: tuple[type[Section], ...] = (
 )
 """Below the main settings, in this order."""
 
-CLASSES = (RADIOSITY_PT_main,)
+CLASSES = (RADIOSITY_PT_progress, RADIOSITY_PT_main)

@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from . import kept_bakes, lightmap_versions, live_state, runtime
+from . import kept_bakes, lightmap_versions, live_state
 from .sections import Section, draw_sections
 from .wrapped_text import draw_text
 
@@ -20,11 +20,6 @@ class RelightSection(Section):
     name = "radiosity_relight"
     label = "Relight"
     folded = False
-
-    @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        """Show it unless a bake is running."""
-        return not runtime.running.active
 
     @classmethod
     def draw(cls, layout: Any, context: bpy.types.Context) -> None:

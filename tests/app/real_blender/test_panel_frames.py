@@ -21,13 +21,13 @@ CHANGES = ("opened", "baking", "canceled", "baked", "interrupted", "recovered", 
 
 
 def pixels(name: str) -> np.ndarray:
-    """A photograph's colors [sRGB], (height, width, 3)."""
+    """A photograph's colors [sRGB], (height, width, 3), without the tabs, and the frame around the mouse."""
     image = bpy.data.images.load(str(PICTURES / f"frames-{name}.png"))
     width, height = image.size
     values = np.empty(width * height * 4, np.float32)
     image.pixels.foreach_get(values)
     bpy.data.images.remove(image)
-    return values.reshape(height, width, 4)[..., :3]
+    return values.reshape(height, width, 4)[10:-10, 15:250, :3]
 
 
 def differing(one: str, other: str) -> float:
@@ -58,8 +58,10 @@ def test_nothing_is_drawn_over_each_other_after_a_change(installed: Installed, c
     assert "Traceback" not in done.stdout, done.stdout
     assert tuple(told["changes"]) == CHANGES
     # The panel does change: without these there would be nothing to draw wrongly.
-    for before, after in pairwise(CHANGES):
+    for before, after in pairwise(CHANGES[1:]):
         assert differing(f"{before}-last", f"{after}-last") > 0.05
     # A few pixels are the view's, which shines through, and is drawn more finely each time.
     unlike = {name: differing(f"{name}-first", f"{name}-last") for name in CHANGES}
+    # The mouse was over the progress bar, which Blender would show again as another part of the panel.
+    unlike["opened, canceled"] = differing("opened-last", "canceled-last")
     assert max(unlike.values()) < 0.003, unlike  # with parts that lie over others it is 0.008 to 0.2
