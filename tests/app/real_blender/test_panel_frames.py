@@ -64,4 +64,4 @@ def test_nothing_is_drawn_over_each_other_after_a_change(installed: Installed, c
     unlike = {name: differing(f"{name}-first", f"{name}-last") for name in CHANGES}
     # The mouse was over the progress bar, which Blender would show again as another part of the panel.
     unlike["opened, canceled"] = differing("opened-last", "canceled-last")
-    assert max(unlike.values()) < 0.003, unlike  # with parts that lie over others it is 0.008 to 0.2
+    assert max(unlike.values()) < 0.003, unlike  # with a part in the wrong place, 0.01 to 0.2
