@@ -37,6 +37,9 @@ mount --rbind /dev "$root/dev"
 chroot "$root" "$@"
 """
 
+# Without a graphics card the shaders of a Material Preview take a minute to compile: they are kept.
+SHADERS = "/var/cache/mesa"
+
 SCREEN = "-screen 0 1280x800x24 +extension GLX"
 
 
@@ -79,6 +82,7 @@ class RealBlender:
             "HOME": self.inside(resources),
             "LANG": "C.UTF-8",
             "LIBGL_ALWAYS_SOFTWARE": "1",
+            "MESA_SHADER_CACHE_DIR": SHADERS,
             "BLENDER_USER_RESOURCES": self.inside(resources),
             **(environment or {}),
         }

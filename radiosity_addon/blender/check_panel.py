@@ -13,6 +13,7 @@ from . import runtime
 from .preferences import preferences
 from .properties import settings_of
 from .relight_properties import keeps, relight_of
+from .sections import Section
 from .wrapped_text import draw_text
 
 SHOWN_FINDINGS = 10
@@ -83,28 +84,19 @@ class RADIOSITY_OT_check(bpy.types.Operator):
             draw_inspection(self.layout, found, context, POPUP_WIDTH)
 
 
-class RADIOSITY_PT_check(bpy.types.Panel):
+class CheckSection(Section):
     """What the next bake will be."""
 
-    bl_idname = "RADIOSITY_PT_check"
-    bl_label = "Before Baking"
-    bl_parent_id = "RADIOSITY_PT_main"
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Radiosity"
-    bl_options = {"DEFAULT_CLOSED"}
+    name = "radiosity_check"
+    label = "Before Baking"
 
     @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        """Hide it while a bake runs."""
-        return not runtime.running.active
-
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(cls, layout: Any, context: bpy.types.Context) -> None:
         """Draw the button, and what was found last."""
-        self.layout.operator("radiosity.check", icon="VIEWZOOM")
+        layout.operator("radiosity.check", icon="VIEWZOOM")
         found = last_check(context.scene)
         if found is not None:
-            draw_inspection(self.layout, found, context, None)
+            draw_inspection(layout, found, context, None)
 
 
 def look(context: bpy.types.Context) -> Any:
@@ -197,4 +189,4 @@ def _bytes(count: float) -> str:
     return f"{count / 1e9:.1f} GB" if count >= 1e9 else f"{round(count / 1e6, -1):.0f} MB"
 
 
-CLASSES = (RADIOSITY_OT_check, RADIOSITY_PT_check)
+CLASSES = (RADIOSITY_OT_check,)

@@ -6,11 +6,11 @@ from typing import Any
 
 import bpy
 
-from . import runtime
 from .light_group_properties import ListedGroup, listed_groups
 from .light_membership import NAME
 from .light_mixer import Sliders, mixers, sliders_of
 from .object_roles import BAKEABLE_TYPES
+from .sections import Section
 
 _COUNTS = (
     ("lamps", "LIGHT"),
@@ -21,30 +21,21 @@ _COUNTS = (
 )
 
 
-class RADIOSITY_PT_light_groups(bpy.types.Panel):
+class LightGroupSection(Section):
     """The scene's light groups, and the sliders of those that were baked."""
 
-    bl_idname = "RADIOSITY_PT_light_groups"
-    bl_label = "Light Groups"
-    bl_parent_id = "RADIOSITY_PT_main"
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Radiosity"
-    bl_order = 2
-    bl_options = {"DEFAULT_CLOSED"}
+    name = "radiosity_light_groups"
+    label = "Light Groups"
 
     @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        """Hide it while a bake is running."""
-        return not runtime.running.active
+    def draw_header(cls, header: Any, context: bpy.types.Context) -> None:
+        """Draw the switch, and the name next to it."""
+        header.prop(context.scene.radiosity, "use_light_groups", text="")
+        super().draw_header(header, context)
 
-    def draw_header(self, context: bpy.types.Context) -> None:
-        """Draw the switch."""
-        self.layout.prop(context.scene.radiosity, "use_light_groups", text="")
-
-    def draw(self, context: bpy.types.Context) -> None:
+    @classmethod
+    def draw(cls, layout: Any, context: bpy.types.Context) -> None:
         """Draw the list, and below it the sliders."""
-        layout = self.layout
         groups = listed_groups(context.scene)
         column = layout.column(align=True)
         for group in groups:
@@ -180,7 +171,6 @@ def _draw_sliders(layout: Any, sliders: Sliders) -> None:
 
 
 CLASSES = (
-    RADIOSITY_PT_light_groups,
     RADIOSITY_PT_light_group_object,
     RADIOSITY_PT_light_group_lamp,
     RADIOSITY_PT_light_group_material,

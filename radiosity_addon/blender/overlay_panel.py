@@ -1,4 +1,4 @@
-"""The panel *Overlays*: what to draw over the objects, and the light on the active object in numbers."""
+"""The section *Overlays*: what to draw over the objects, and the light on the active object in numbers."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from . import overlay_properties as kinds
-from . import runtime
 from .kept_details import details_of
 from .overlay_properties import overlay_of
-from .panels import _Panel
+from .sections import Section
 from .wrapped_text import draw_text
 
 _SETTINGS = {
@@ -22,27 +21,18 @@ _SETTINGS = {
 }
 
 
-class RADIOSITY_PT_overlays(_Panel, bpy.types.Panel):
+class OverlaySection(Section):
     """What is drawn over the objects."""
 
-    bl_idname = "RADIOSITY_PT_overlays"
-    bl_label = "Overlays"
-    bl_parent_id = "RADIOSITY_PT_main"
-    bl_options = {"DEFAULT_CLOSED"}
-    bl_order = 50
+    name = "radiosity_overlays"
+    label = "Overlays"
 
     @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        """Show it while no bake runs: then the light itself is drawn."""
-        return not runtime.running.active
-
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(cls, layout: Any, context: bpy.types.Context) -> None:
         """Draw the choice, what belongs to it, and numbers of the active object."""
         from .overlay_pictures import missing
 
-        layout = self.layout
         layout.use_property_split = True
-        layout.use_property_decorate = False
         settings = overlay_of(context)
         layout.prop(settings, "show")
         reason = missing(context)
@@ -92,6 +82,3 @@ def _draw_statistics(layout: Any, context: bpy.types.Context) -> None:
         split = column.split(factor=0.45)
         split.label(text=name)
         split.label(text=text)
-
-
-CLASSES = (RADIOSITY_PT_overlays,)

@@ -1,4 +1,4 @@
-"""The panel *Relight*, and in it the lights of a kept bake with what can be changed of them."""
+"""The section *Relight*, and in it the lights of a kept bake with what can be changed of them."""
 
 from __future__ import annotations
 
@@ -7,62 +7,56 @@ from typing import Any
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from . import kept_bakes, lightmap_versions, live_state, runtime
-from .panels import _Panel
+from . import kept_bakes, lightmap_versions, live_state
+from .sections import Section, draw_sections
 from .wrapped_text import draw_text
 
 SHOWN_LIGHTS = 16
 
 
-class RADIOSITY_PT_relight(_Panel, bpy.types.Panel):
+class RelightSection(Section):
     """Other light without another bake."""
 
-    bl_idname = "RADIOSITY_PT_relight"
-    bl_label = "Relight"
-    bl_parent_id = "RADIOSITY_PT_main"
-    bl_order = 10
+    name = "radiosity_relight"
+    label = "Relight"
+    folded = False
 
     @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        """Show it unless a bake is running."""
-        return not runtime.running.active
-
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(cls, layout: Any, context: bpy.types.Context) -> None:
         """Draw what Live has to say, and what is kept of the next bake."""
-        layout = self.layout
         chosen = context.scene.radiosity_relight
         if live_state.state.message:
             draw_text(layout.box(), live_state.state.message, "ERROR", context)
         if lightmap_versions.state.message:
             draw_text(layout.box(), lightmap_versions.state.message, "ERROR", context)
         layout.use_property_split = True
-        layout.use_property_decorate = False
         column = layout.column(heading="Next Bake")
         column.prop(chosen, "keep")
         column.prop(chosen, "sidecar")
         column.prop(chosen, "only_moved")
+        draw_sections(layout, (RelightLightsSection,), context)
 
 
-class RADIOSITY_PT_relight_lights(_Panel, bpy.types.Panel):
+class RelightLightsSection(Section):
     """What of the kept bake's lights can be changed."""
 
-    bl_idname = "RADIOSITY_PT_relight_lights"
-    bl_label = "Lights"
-    bl_parent_id = "RADIOSITY_PT_relight"
+    name = "radiosity_relight_lights"
+    label = "Lights"
+    folded = False
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Show them while a bake is kept."""
         return kept_bakes.find(context.scene) is not None
 
-    def draw(self, context: bpy.types.Context) -> None:
+    @classmethod
+    def draw(cls, layout: Any, context: bpy.types.Context) -> None:
         """Draw each light's strength and color."""
         from .light_inputs import inputs_of
 
         held = kept_bakes.find(context.scene)
         if held is None:
             return
-        layout = self.layout
         lights = len(held.bake.sources.lights)
         named = list(dict.fromkeys((name, row >= lights) for row, name in enumerate(held.bake.names)))
         for name, emits in named[:SHOWN_LIGHTS]:
@@ -81,6 +75,3 @@ def _draw_inputs(row: Any, inputs: Any) -> None:
     for owner, attribute in inputs.color, inputs.strength:
         if owner is not None:
             row.prop(owner, attribute, text="")
-
-
-CLASSES = (RADIOSITY_PT_relight, RADIOSITY_PT_relight_lights)

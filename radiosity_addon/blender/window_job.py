@@ -87,14 +87,15 @@ class WindowJob:
             self._undone(context)
             self.report({"INFO"}, "Cancelled; everything is as it was")
             return {"CANCELLED"}
-        if event.type.startswith("TIMER") and not (event.type == "TIMER" and self._is_our_turn()):
-            return {"PASS_THROUGH"}  # another add-on's, or Blender's own
-        if event.type != "TIMER":
+        if not event.type.startswith("TIMER"):
             return {"PASS_THROUGH"} if event.type in _NAVIGATION else {"RUNNING_MODAL"}
+        # All timers' events are passed on: where ours and another's come together, either may be the first.
+        if event.type != "TIMER" or not self._is_our_turn():
+            return {"PASS_THROUGH"}
         try:
             if not self._advance(TICK):
                 self._show_progress(context)
-                return {"RUNNING_MODAL"}
+                return {"PASS_THROUGH"}
         except RadiosityError as error:
             return self._fail(context, error)
         except BaseException:
@@ -103,7 +104,7 @@ class WindowJob:
         return self._finish(context)
 
     def _is_our_turn(self) -> bool:
-        """Tell whether it is our timer that has come: events do not say whose they are, but it counts on."""
+        """Tell whether our timer has come: events do not say whose they are, but it counts on."""
         now = 0.0 if self._timer is None else self._timer.time_duration
         if now == self._ticked:
             return False

@@ -11,8 +11,9 @@ import bpy
 import pytest
 
 import radiosity_addon
-from radiosity_addon.blender import registration, runtime
+from radiosity_addon.blender import panels, registration, runtime
 from radiosity_addon.blender.cornell import build_cornell_box
+from radiosity_addon.blender.sections import Section
 
 BLENDER = Path(radiosity_addon.__file__).parent / "blender"
 SOURCES = sorted(path for path in BLENDER.rglob("*.py") if "presets" not in path.parts)
@@ -123,6 +124,13 @@ def test_every_operator_says_what_it_does_and_every_panel_has_a_name() -> None:
         assert cls.bl_label[0].isupper(), cls.__name__
     for cls in PANELS:
         assert cls.bl_label, cls.__name__
+
+
+def test_every_section_has_a_name_of_its_own() -> None:
+    sections = Section.__subclasses__()
+    assert {section.__name__ for section in sections} > {section.__name__ for section in panels.SECTIONS}
+    assert len({section.name for section in sections}) == len(sections)
+    assert all(section.label and section.name.startswith("radiosity_") for section in sections)
 
 
 def situations() -> Iterator[str]:

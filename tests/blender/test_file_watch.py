@@ -245,7 +245,8 @@ def test_only_its_own_timer_carries_a_job_on(monkeypatch: pytest.MonkeyPatch) ->
         assert running.modal(bpy.context, foreign) == {"PASS_THROUGH"}
     assert running.steps == 0
     running._timer.time_duration = 0.01
-    assert running.modal(bpy.context, foreign) == {"RUNNING_MODAL"}
+    # The other one's event may be the first of two that came at once: it is passed on then too.
+    assert running.modal(bpy.context, foreign) == {"PASS_THROUGH"}
     assert running.modal(bpy.context, foreign) == {"PASS_THROUGH"}
     assert running.steps == 1
     assert running.modal(bpy.context, SimpleNamespace(type="TIMERREGION", value="NOTHING")) == {

@@ -137,8 +137,7 @@ def test_the_panel_draws_groups_and_sliders(lamps: dict) -> None:
     bake_groups()
     outdate()
     notes: list = []
-    panel = light_group_panels.RADIOSITY_PT_light_groups
-    panel.draw(type("Panel", (), {"layout": _Layout(notes)})(), bpy.context)
+    light_group_panels.LightGroupSection.draw(_Layout(notes), bpy.context)
     labels = [words.get("text") for name, _, words in notes if name == "label"]
     # Each group in the list with the numbers of what is in it (an object and a material, whose lightmap
     # copy does not count), and again with its sliders.

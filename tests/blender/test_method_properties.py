@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from types import SimpleNamespace
 
 import bpy
 import pytest
@@ -43,7 +42,7 @@ def group() -> Iterator[bpy.types.PropertyGroup]:
 def drawn() -> list[str]:
     """Names of what the Solver panel shows."""
     layout = Layout()
-    panels.RADIOSITY_PT_solver.draw(SimpleNamespace(layout=layout), bpy.context)
+    panels.SolverSection.draw(layout, bpy.context)
     return layout.drawn
 
 

@@ -38,5 +38,5 @@ def test_groups_are_drawn_wherever_they_are_named(installed: Installed, cornell_
     assert told["failure"] is None, f"{told['failure']}\n{done.stdout}"
     assert "Traceback" not in done.stdout, done.stdout
     assert told["baked"] == ["FINISHED"]
-    names = {f"RADIOSITY_PT_light_group_{place}" for place in PLACES} | {"RADIOSITY_PT_light_groups"}
+    names = {f"RADIOSITY_PT_light_group_{place}" for place in PLACES} | {"sidebar"}
     assert set(told["drawn"]) == names

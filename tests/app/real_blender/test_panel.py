@@ -50,6 +50,10 @@ def test_the_bake_button_runs_a_modal_operator_to_its_end(seen: dict[str, Any]) 
     assert seen["images"]
 
 
+def test_the_result_is_shown(seen: dict[str, Any]) -> None:
+    assert seen["shading"] == "MATERIAL"
+
+
 def test_one_undo_takes_the_whole_bake_back_and_redo_brings_it(seen: dict[str, Any]) -> None:
     assert seen["after_undo"] == []
     assert seen["lit_after_redo"] == seen["objects"]

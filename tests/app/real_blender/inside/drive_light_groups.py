@@ -3,6 +3,7 @@
 Usage: blender FILE --enable-event-simulate --python drive_light_groups.py -- ANSWER.json
 """
 
+import importlib
 import json
 import sys
 from pathlib import Path
@@ -13,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import events
 
 ANSWER = Path(sys.argv[sys.argv.index("--") + 1])
+MODULE = "bl_ext.user_default.radiosity_addon"
 # Not those of materials and worlds: their previews take minutes without a graphics card.
 PLACES = {
     "OBJECT": "RADIOSITY_PT_light_group_object",
@@ -36,6 +38,18 @@ def opened(name):
     bpy.utils.register_class(panel)
 
 
+def opened_section():
+    """The same of the section in the sidebar."""
+    section = importlib.import_module(f"{MODULE}.blender.light_group_panels").LightGroupSection
+    draw = section.draw
+
+    def draw_and_note(layout, context):
+        draw(layout, context)
+        seen["drawn"]["sidebar"] = seen["drawn"].get("sidebar", 0) + 1
+
+    section.folded, section.draw = False, draw_and_note
+
+
 def active(name):
     for obj in bpy.context.view_layer.objects:
         obj.select_set(obj.name == name)
@@ -43,7 +57,8 @@ def active(name):
 
 
 def script():
-    for name in ("RADIOSITY_PT_light_groups", *PLACES.values()):
+    opened_section()
+    for name in PLACES.values():
         opened(name)
     scene = bpy.context.scene
     group = scene.radiosity

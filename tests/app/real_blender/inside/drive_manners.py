@@ -86,7 +86,7 @@ def invoke(operator, window=None):
 
 
 def photograph(name):
-    yield 2.0  # Blender moves sub-panels where a panel above has grown, frame by frame
+    yield 0.7
     events.screenshot(ANSWER.with_name(f"manners-{name}.png"))
 
 

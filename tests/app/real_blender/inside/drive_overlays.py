@@ -90,7 +90,7 @@ class PanelAlone(bpy.types.Panel):
     bl_space_type, bl_region_type = "VIEW_3D", "UI"
 
     def draw(self, context):
-        overlay_panel.RADIOSITY_PT_overlays.draw(self, context)
+        overlay_panel.OverlaySection.draw(self.layout, context)
 
 
 def every_panel(overlay):

@@ -3,6 +3,7 @@
 Usage: blender FILE --enable-event-simulate --python drive_solver_panel.py -- ANSWER.json
 """
 
+import importlib
 import json
 import sys
 from pathlib import Path
@@ -13,33 +14,27 @@ sys.path.insert(0, str(Path(__file__).parent))
 import events
 
 ANSWER = Path(sys.argv[sys.argv.index("--") + 1])
+MODULE = "bl_ext.user_default.radiosity_addon"
 
 seen = {"drawn": {}}
 
 
-def opened(panel):
-    """Have a panel open that comes folded."""
-    bpy.utils.unregister_class(panel)
-    panel.bl_options = set()
-    bpy.utils.register_class(panel)
+def noting(section):
+    """Note for each method that its section was drawn to the end."""
+    draw = section.draw
 
-
-def noting(panel):
-    """Note for each method that its panel was drawn to the end."""
-    draw = panel.draw
-
-    def draw_and_note(self, context):
-        draw(self, context)
+    def draw_and_note(layout, context):
+        draw(layout, context)
         method = context.scene.radiosity.method
         seen["drawn"][method] = seen["drawn"].get(method, 0) + 1
 
-    panel.draw = draw_and_note
+    section.draw = draw_and_note
 
 
 def script():
-    panel = bpy.types.RADIOSITY_PT_solver
-    noting(panel)
-    opened(panel)
+    section = importlib.import_module(f"{MODULE}.blender.panels").SolverSection
+    section.folded = False
+    noting(section)
     yield from events.open_sidebar("Radiosity")
     group = bpy.context.scene.radiosity
     methods = [item.identifier for item in group.bl_rna.properties["method"].enum_items]

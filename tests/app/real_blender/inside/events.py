@@ -93,6 +93,12 @@ def screenshot(path, part=None):
     subprocess.run(["import", "-window", "root", *crop, str(path)], check=True)
 
 
+def first_frame(kind):
+    """Have the window drawn once, as it is after a change of what its region of this kind shows."""
+    with bpy.context.temp_override(window=window(), area=area_3d(), region=region(kind)):
+        bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
+
+
 def drive(script, finished):
     """Run the generator `script` on a timer, then call `finished(traceback or None)` and quit."""
 
