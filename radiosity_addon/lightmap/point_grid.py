@@ -6,7 +6,7 @@ import numpy as np
 
 from ..solver.arrays import Array
 from ..solver.sampling import orthonormal_basis
-from ..solver.scratch import tiles
+from ..solver.scratch import Scratch, tiles
 
 PER_CELL = 2
 """Points taken from a cell: on a lattice as wide as the cells there are hardly more."""
@@ -34,22 +34,27 @@ class PointGrid:
         What a look-up answers with for the first of them; the others follow.
     size : float
         Edge of the cells [m].
+    scratch : Scratch
+        Makes the arrays.
     """
 
-    def __init__(self, position: Array, normal: Array, rows: Array, first: int, size: float) -> None:
+    def __init__(
+        self, position: Array, normal: Array, rows: Array, first: int, size: float, scratch: Scratch
+    ) -> None:
         self._size = size
-        keys = np.empty(len(rows), dtype=np.int64)
+        keys = scratch.empty(len(rows), np.int64)
         for some in tiles(len(rows), CHUNK):
             of = rows[some]
             keys[some] = _hash((position[of] / size).T) + _facing(normal[of])
         order = np.argsort(keys, kind="stable")
         # Looked up past its end, the last cell answers that it has no more.
         end = PER_CELL if len(rows) else 0
-        self._sorted = np.empty(len(rows) + end, dtype=np.int64)
-        self._numbers = np.full(len(rows) + end, NONE, dtype=np.int32)
+        self._sorted = scratch.empty(len(rows) + end, np.int64)
+        self._numbers = scratch.empty(len(rows) + end, np.int32)
         for some in tiles(len(rows)):
             self._sorted[some], self._numbers[some] = keys[order[some]], first + order[some]
-        self._sorted[len(rows) :] = self._sorted[len(rows) - 1] if end else 0
+        if end:
+            self._sorted[-end:], self._numbers[-end:] = keys[order[-1]], NONE
 
     def near(self, position: Array, normal: Array) -> Array:
         """Return (n, 18) int32: points that face alike in the nine cells around, each once; NONE for none.

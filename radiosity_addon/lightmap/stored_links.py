@@ -55,11 +55,8 @@ class StoredLinks:
                 mean[row, channel] += np.einsum("ak,ak->a", values, weights)
         return self.spread(mean, threads, scratch)
 
-    def aimed_at_any(self, marked: Array) -> Array:
-        """Return the gather points whose aimed rays met a marked row of the table, (rows,) bool."""
+    def mark_aims(self, aims: Array, marked: Array) -> None:
+        """Mark in (g,) bool the points whose aimed rays met a marked row of the table, (rows,) bool."""
         aimed = self.aimed
-        parts = [
-            aimed.row[rows][marked[aimed.sources[rows]].any(axis=1)]
-            for rows in tiles(len(aimed.row), AIMED_ROWS)
-        ]
-        return np.concatenate([np.zeros(0, np.int64), *parts])
+        for rows in tiles(len(aimed.row), AIMED_ROWS):
+            aims[aimed.row[rows][marked[aimed.sources[rows]].any(axis=1)]] = True

@@ -258,7 +258,7 @@ def _reached(links: StoredLinks, parts: PartSweeps, direct: Array, beyond: int) 
             some = dark[first : first + step]
             aims[some] = padded[links.sources[some]].any(axis=1)
             trim()
-        aims[links.aimed_at_any(padded)] = True
+        links.mark_aims(aims, padded)
         more = ~padded[: len(direct)] & links.spread.any_of(aims)
         padded[: len(direct)] |= more
         if not (parts.reach(padded) or more.any()):
