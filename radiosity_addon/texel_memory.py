@@ -7,6 +7,7 @@ memory is short (`solver/scratch.py`). So only very large pages are refused (doc
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -81,7 +82,8 @@ def refuse_too_large(pages: Sequence[int], settings: BakeSettings) -> None:
     what = f"a page of {largest}²" if len(pages) == 1 else f"{len(pages)} pages of up to {largest}²"
     smaller = "texel density" if settings.texel_density is not None else "resolution"
     limit = memory_limit(settings) / 2**30
-    raised = (needed + memory_limit(settings) - left) / 2**30
+    # Rounded up: the limit that is named has to do.
+    raised = math.ceil(10 * (needed + memory_limit(settings) - left) / 2**30) / 10
     raise UsageError(
         f"{what} pixels needs at least {needed / 2**30:.1f} GiB of memory, but the memory limit of {limit:g} "
         f"GiB leaves {left / 2**30:.1f}: lower the {smaller}, or raise the limit to {raised:.1f}"
