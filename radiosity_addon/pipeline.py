@@ -155,9 +155,9 @@ def _bake(
     with timed(seconds, "solve"):
         solution = yield from solve(bake_scene, quality.solver)
     yield Progress("light", LIGHT)
-    share_out_memory(geometry, settings, keep)
+    is_shown = share_out_memory(geometry, settings, keep)
     with timed(seconds, "light"):
-        so_far = LightSoFar() if len(geometry) <= MOST_SHOWN else None
+        so_far = LightSoFar() if is_shown and len(geometry) <= MOST_SHOWN else None
         steps = _texel_values(bake_scene, solution, geometry, quality.gather, settings, keep, so_far)
         pictures = None if so_far is None else TexelPictures(so_far)
         lit = yield from staged(steps, "light", LIGHT, ENCODE, pictures)

@@ -7,6 +7,7 @@ memory is short (`solver/scratch.py`). So only very large pages are refused (doc
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -31,6 +32,10 @@ WORKING_PIXELS = 1 << 20
 
 BEFORE_SOLVING = 0.25
 """Share of the free memory that the places of texels may take before the scene is solved."""
+
+SHOWN_BYTES, SHOWN_SHARE = 200.0, 0.3
+"""Of every texel if they are shown while they are lit, which they are if that takes no more than this share
+of what is free then."""
 
 PROCESS_BYTES = 600e6
 """What Blender and a scene take where the system does not tell."""
@@ -77,7 +82,8 @@ def refuse_too_large(pages: Sequence[int], settings: BakeSettings) -> None:
     what = f"a page of {largest}²" if len(pages) == 1 else f"{len(pages)} pages of up to {largest}²"
     smaller = "texel density" if settings.texel_density is not None else "resolution"
     limit = memory_limit(settings) / 2**30
-    raised = (needed + memory_limit(settings) - left) / 2**30
+    # Rounded up: the limit that is named has to do.
+    raised = math.ceil(10 * (needed + memory_limit(settings) - left) / 2**30) / 10
     raise UsageError(
         f"{what} pixels needs at least {needed / 2**30:.1f} GiB of memory, but the memory limit of {limit:g} "
         f"GiB leaves {left / 2**30:.1f}: lower the {smaller}, or raise the limit to {raised:.1f}"
@@ -102,18 +108,26 @@ def texel_scratch(pages: Sequence[int], settings: BakeSettings) -> Scratch:
     return Scratch(max(BEFORE_SOLVING * free, 0.0))
 
 
-def share_out_memory(geometry: TexelGeometry, settings: BakeSettings, keep: bool) -> None:
+def share_out_memory(geometry: TexelGeometry, settings: BakeSettings, keep: bool) -> bool:
     """Give the texels' arrays what the scene, the solution and the least leave of the memory limit.
 
     If the bake is kept, its arrays are still there when the images are made.
+
+    Returns
+    -------
+    shown : bool
+        Whether what is left suffices to show the texels while they are lit.
     """
     scratch, pages = geometry.scratch, [len(numbers) for numbers in geometry.index]
     floor = LIT_BYTES * len(geometry) + working_bytes(settings)
     if keep:
         floor = max(floor, least_bytes(pages, settings))
-    most = memory_limit(settings) - floor
+    most, showing = memory_limit(settings) - floor, SHOWN_BYTES * len(geometry)
+    shown = showing <= SHOWN_SHARE * (most - process_bytes())
+    most -= showing if shown else 0.0
     scratch.budget = max(scratch.in_memory + most - process_bytes(), 0.0)
     scratch.free = lambda: most - process_bytes()
+    return shown
 
 
 def process_bytes() -> float:

@@ -20,6 +20,7 @@ import numpy as np
 from ..bake_scene import DIVIDED, HOODED, TOUCHED
 from ..solver.arrays import Array
 from ..solver.parallel import chunk_steps
+from ..solver.scratch import row_numbers
 from ..solver.visibility import RayCaster
 from .clearance import clear_texels
 from .texel_geometry import TexelGeometry
@@ -73,10 +74,11 @@ class Crossings:
     @property
     def state(self) -> Array:
         """(n,) uint8: see `TEXEL_STATES`."""
-        state = np.where(
-            self.crossed, DIVIDED, np.where(self.hooded, HOODED, np.where(self.touched, TOUCHED, 0))
-        )
-        return np.asarray(state, dtype=np.uint8)
+        state = np.zeros(len(self.cut), dtype=np.uint8)
+        # The last one that holds counts.
+        for of, value in ((self.touched, TOUCHED), (self.hooded, HOODED), (self.crossed, DIVIDED)):
+            state[of] = value
+        return state
 
     @cached_property
     def alone(self) -> Array:
@@ -103,7 +105,7 @@ def crossing_steps(
     if before is None or anew is None:
         result = Crossings(geometry, *np.zeros((4, len(geometry)), dtype=bool))
         clear = clear_texels(geometry, OUTSET, HOOD, LIFT * caster.surface_offset, threads)
-        doubted = np.flatnonzero(~clear)
+        doubted = row_numbers(~clear)
     else:
         were = (before.cut, before.touched, before.rim, before.hooded)
         result, doubted = Crossings(geometry, *(flags.copy() for flags in were)), anew

@@ -8,7 +8,7 @@ foot or into a closed box does not come back.
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -181,10 +181,10 @@ def gather_parts(
         yield from scaled(gathering.ask_new(), 0.7 * turn / ROUNDS, 0.7 * (turn + 1) / ROUNDS)
         gathering.take_up()
     made, of = yield from scaled(gathering.links(element, reflectance), 0.7, 1.0)
-    start, rows = values_of(numbers.local.reflected(), of), gathering.rows
-    rows.number(links.sources)
-    aimed = replace(links.aimed, sources=rows(links.aimed.sources))
-    return replace(links, aimed=aimed), Parts(start, made, of, gathering.small)
+    start = values_of(numbers.local.reflected(), of)
+    for sources in (links.sources, links.aimed.sources):
+        gathering.rows.number(sources)
+    return links, Parts(start, made, of, gathering.small)
 
 
 def lit_footprints(numbers: HitNumbers, parts: KnownParts) -> Footprints:

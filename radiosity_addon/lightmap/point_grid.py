@@ -6,9 +6,13 @@ import numpy as np
 
 from ..solver.arrays import Array
 from ..solver.sampling import orthonormal_basis
+from ..solver.scratch import Scratch, tiles
 
 PER_CELL = 2
 """Points taken from a cell: on a lattice as wide as the cells there are hardly more."""
+
+CHUNK = 1 << 16
+"""Points whose cells are found at once; bounds the temporaries to about 10 MB."""
 
 NONE = -1
 """Stands where a cell has no more points."""
@@ -22,20 +26,35 @@ class PointGrid:
 
     Parameters
     ----------
-    position, normal : (p, 3) float64
-    numbers : (p,) int32
-        What a look-up answers with.
+    position, normal : (n, 3) float64
+        Of surfaces on which the points lie.
+    rows : (p,) int
+        Which of these the points are.
+    first : int
+        What a look-up answers with for the first of them; the others follow.
     size : float
         Edge of the cells [m].
+    scratch : Scratch
+        Makes the arrays.
     """
 
-    def __init__(self, position: Array, normal: Array, numbers: Array, size: float) -> None:
+    def __init__(
+        self, position: Array, normal: Array, rows: Array, first: int, size: float, scratch: Scratch
+    ) -> None:
         self._size = size
-        keys = _hash((position / size).T) + _facing(normal)
+        keys = scratch.empty(len(rows), np.int64)
+        for some in tiles(len(rows), CHUNK):
+            of = rows[some]
+            keys[some] = _hash((position[of] / size).T) + _facing(normal[of])
         order = np.argsort(keys, kind="stable")
         # Looked up past its end, the last cell answers that it has no more.
-        self._sorted = np.append(keys[order], np.repeat(keys[order][-1:], PER_CELL))
-        self._numbers = np.append(numbers[order], np.full(len(self._sorted) - len(order), NONE, np.int32))
+        end = PER_CELL if len(rows) else 0
+        self._sorted = scratch.empty(len(rows) + end, np.int64)
+        self._numbers = scratch.empty(len(rows) + end, np.int32)
+        for some in tiles(len(rows)):
+            self._sorted[some], self._numbers[some] = keys[order[some]], first + order[some]
+        if end:
+            self._sorted[-end:], self._numbers[-end:] = keys[order[-1]], NONE
 
     def near(self, position: Array, normal: Array) -> Array:
         """Return (n, 18) int32: points that face alike in the nine cells around, each once; NONE for none.

@@ -107,6 +107,9 @@ def reconstruct(
     met = None if so_far is None else partial(so_far.met, numbers)
     stored = gather_texels(local, geometry, settings, crossings, resolve, met)
     links, points = yield from scaled(stored, CROSSED, GATHERED)
+    chosen = KeptPoints.of(points) if gains is not None else None
+    # How points are found takes more than what they met says.
+    del points, stored
     further = gather_parts(numbers, links, resolve, element, reflectance)
     links, parts = yield from scaled(further, GATHERED, PARTS)
     transport = TexelTransport(links, parts, reflectance)
@@ -121,11 +124,10 @@ def reconstruct(
     light = yield from scaled(swept, PARTS, 1.0)
     light = replace(light, state=crossings.state)
     yield 1.0
-    if gains is None or local.sources is None or light.table is None:
+    if gains is None or chosen is None or local.sources is None or light.table is None:
         return light
     earlier = EarlierLight(local.sources.strengths, light.table)
     lit = LitTexels(transport, gains, element, *limits, earlier)
-    chosen = KeptPoints.of(points)
     traced = TracedTexels(settings, crossings, numbers, chosen, parts.small, local.bright, light.error)
     return replace(light, kept=lit, traced=traced)
 
@@ -195,7 +197,8 @@ def gather_texels(
             at = end
         points.add(stride, np.concatenate([chosen[~edge], chosen[edge]]), np.concatenate(closeness))
     spread = yield from scaled(fit_steps(points, geometry), 1.0 - FIT, 1.0)
-    return StoredLinks(sources.all(), spread, AimedRays.joined(found, first)), points
+    aimed = AimedRays.joined(found, first, geometry.scratch)
+    return StoredLinks(sources.all(), spread, aimed), points
 
 
 def gather_at(
@@ -209,7 +212,7 @@ def gather_at(
 ) -> Generator[float, None, Gathered]:
     """Gather at some texels; yields the fraction done. `into` (c, rays) int32 takes the sources, if given."""
     at = gather_footprints(geometry, chosen, starts)
-    expected, upright = np.empty(len(chosen)), geometry.scratch.empty((len(chosen), 3))
+    expected, upright = (geometry.scratch.empty((len(chosen), *of)) for of in ((), (3,)))
     for tile in tiles(len(chosen), CHUNK):
         some = chosen[tile]
         expected[tile] = local.irradiance_at(geometry.triangle[some], geometry.barycentric[some])

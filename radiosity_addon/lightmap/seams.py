@@ -119,7 +119,7 @@ def _on_pages(geometry: TexelGeometry, triangle: Array, corner: Array) -> tuple[
 
 def _clean(geometry: TexelGeometry, seams: Seams, at: Array, size: Array, caster: RayCaster | None) -> Array:
     """Return (s,) which places read their own surface's texels only, with nothing between the sides."""
-    index = np.concatenate([numbers.ravel() for numbers in geometry.index])
+    index = geometry.index[0].ravel() if len(geometry.index) == 1 else _in_one(geometry)
     good = np.zeros(len(seams), dtype=bool)
     for first in range(0, len(seams), CHUNK):
         rows = np.arange(first, min(first + CHUNK, len(seams)))
@@ -128,6 +128,11 @@ def _clean(geometry: TexelGeometry, seams: Seams, at: Array, size: Array, caster
         rows, numbers, weight = rows[own], numbers[own], weight[own]
         good[rows] = True if caster is None else _open(geometry, caster, numbers, weight)
     return good
+
+
+def _in_one(geometry: TexelGeometry) -> Array:
+    """Return all pages' numbers of texels, one page after the other."""
+    return np.concatenate([numbers.ravel() for numbers in geometry.index])
 
 
 def _shared_edges(scene: Scene, geometry: TexelGeometry) -> tuple[Array, Array]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..solver.arrays import Array
 from ..solver.parallel import chunk_steps
+from ..solver.scratch import Scratch, tiles
 from ..solver.steps import drain
 
 CHUNK_HITS = 1 << 18
@@ -24,11 +25,15 @@ class Means:
     ----------
     sources : (g, rays) int32
     channels, threads : int
+    scratch : Scratch or None
+        Makes the array of means; None keeps it in memory.
     """
 
-    def __init__(self, sources: Array, channels: int, threads: int) -> None:
+    def __init__(self, sources: Array, channels: int, threads: int, scratch: Scratch | None = None) -> None:
         self._sources, self._threads = sources, threads
-        self._mean = np.zeros((len(sources), channels))
+        self._mean = by_channel(len(sources), channels, scratch)
+        for rows in tiles(len(sources)):
+            self._mean[rows] = 0.0
         self._known = False
 
     def steps(self, table: Array, changed: Array) -> Generator[float, None, Array]:
@@ -59,16 +64,21 @@ class Means:
         return self._mean
 
 
+def by_channel(count: int, channels: int, scratch: Scratch | None = None) -> Array:
+    """Return (count, channels) float64 of any content, in which each channel is in one piece."""
+    return (scratch or Scratch()).empty((channels, count)).T
+
+
 def mean_of_sources(table: Array, sources: Array) -> Array:
     """Return (g, 3): the mean of the table's rows each gather point saw."""
     return drain(mean_steps(table, sources, 1))
 
 
 def mean_steps(
-    table: Array, sources: Array, threads: int, rays: int | None = None
+    table: Array, sources: Array, threads: int, rays: int | None = None, scratch: Scratch | None = None
 ) -> Generator[float, None, Array]:
     """Compute the same, of the first `rays` alone if they are given; yields the fraction done."""
-    result = np.empty((len(sources), table.shape[1]))
+    result = by_channel(len(sources), table.shape[1], scratch)
     columns = _columns(table)
 
     def average(rows: slice) -> None:

@@ -9,9 +9,12 @@ import numpy as np
 
 from ..solver.aiming import AimedRays
 from ..solver.arrays import Array
-from ..solver.scratch import Scratch
+from ..solver.scratch import Scratch, tiles
 from .interpolate import Interpolation
 from .source_means import mean_steps
+
+AIMED_ROWS = 1 << 14
+"""Points whose aimed rays are looked up at once; bounds the temporaries to a few MB."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +39,7 @@ class StoredLinks:
         self, table: Array, threads: int = 0, scratch: Scratch | None = None
     ) -> Generator[float, None, Array]:
         """Compute (n, 3) what a table of radiosity sends to the texels; yields the fraction done."""
-        mean = yield from mean_steps(table, self.sources, threads)
+        mean = yield from mean_steps(table, self.sources, threads, scratch=scratch)
         return self.spread_out(table, mean, threads, scratch)
 
     def spread_out(
@@ -44,8 +47,16 @@ class StoredLinks:
     ) -> Array:
         """Add what aimed rays brought to (g, 3) `mean`, and carry it from the gather points to the texels."""
         aimed = self.aimed
-        for channel in range(table.shape[1] if len(aimed.row) else 0):
-            values = table[:, channel][aimed.sources]
-            values[aimed.sources < 0] = 0.0
-            mean[aimed.row, channel] += np.einsum("ak,ak->a", values, aimed.weights)
+        for rows in tiles(len(aimed.row), AIMED_ROWS):
+            row, sources, weights = aimed.row[rows], aimed.sources[rows], aimed.weights[rows]
+            for channel in range(table.shape[1]):
+                values = table[:, channel][sources]
+                values[sources < 0] = 0.0
+                mean[row, channel] += np.einsum("ak,ak->a", values, weights)
         return self.spread(mean, threads, scratch)
+
+    def mark_aims(self, aims: Array, marked: Array) -> None:
+        """Mark in (g,) bool the points whose aimed rays met a marked row of the table, (rows,) bool."""
+        aimed = self.aimed
+        for rows in tiles(len(aimed.row), AIMED_ROWS):
+            aims[aimed.row[rows][marked[aimed.sources[rows]].any(axis=1)]] = True

@@ -12,11 +12,11 @@ import numpy as np
 
 from ..solver.arrays import Array
 from ..solver.light_gains import LightGains
-from ..solver.scratch import Scratch, tiles, trim
+from ..solver.scratch import Scratch, row_numbers, tiles, trim
 from ..solver.steps import drain, scaled
 from .earlier_light import EarlierLight
 from .part_links import Parts, PartSweeps
-from .source_means import CHUNK_HITS, Means, mean_steps
+from .source_means import CHUNK_HITS, Means, by_channel, mean_steps
 from .stored_links import StoredLinks
 from .traced_texels import TracedTexels
 
@@ -164,10 +164,13 @@ def sweep_steps(
         table[rows] = start[rows]
     del start
     table[texel_count:surfaces] = transport.parts.start
-    table[:surfaces][~_reached(links, parts, direct, len(beyond))] = 0.0
+    reached = _reached(links, parts, direct, len(beyond))
+    for rows in tiles(surfaces):
+        table[rows][~reached[rows]] = 0.0
+    del reached
     indirect, left = scratch.zeros(direct.shape), 0.9
     changed = np.ones(len(table), dtype=bool)
-    means = Means(links.sources, table.shape[1], threads)
+    means = Means(links.sources, table.shape[1], threads, scratch)
     still = STILL * tolerance * float(table[:texel_count].mean()) if texel_count else 0.0
     for _ in range(sweeps):
         parts.sweep(table, changed, still)
@@ -175,7 +178,12 @@ def sweep_steps(
         mean = yield from scaled(means.steps(table, changed), 1.0 - left, 1.0 - SWEPT * left)
         left *= SWEPT
         del indirect
-        indirect = links.spread_out(table, mean.copy(), threads, scratch)
+        # What aimed rays bring is added to it.
+        whole = by_channel(len(mean), table.shape[1], scratch)
+        for rows in tiles(len(mean)):
+            whole[rows] = mean[rows]
+        indirect = links.spread_out(table, whole, threads, scratch)
+        del whole
         table[surfaces:] = beyond
         changed[:] = False
         largest, total = 0.0, 0.0
@@ -227,9 +235,12 @@ def estimated_noise(
         The radiosity that the links' sources had in the end, the sky's among it.
     """
     half = links.sources.shape[1] // 2
-    whole = drain(mean_steps(table, links.sources, threads))
-    part = drain(mean_steps(table, links.sources, threads, half))
-    return links.spread(part - whole, scratch=scratch)
+    whole = drain(mean_steps(table, links.sources, threads, scratch=scratch))
+    part = drain(mean_steps(table, links.sources, threads, half, scratch))
+    for rows in tiles(len(part)):
+        part[rows] -= whole[rows]
+    del whole
+    return links.spread(part, scratch=scratch)
 
 
 def _reached(links: StoredLinks, parts: PartSweeps, direct: Array, beyond: int) -> Array:
@@ -242,12 +253,12 @@ def _reached(links: StoredLinks, parts: PartSweeps, direct: Array, beyond: int) 
     padded = np.append(reached, np.zeros(beyond, dtype=bool))  # nothing, and the sky, whose light is direct
     aims = np.zeros(len(links.sources), dtype=bool)
     while True:
-        dark, step = np.flatnonzero(~aims), max(CHUNK_HITS // links.sources.shape[1], 1)
+        dark, step = row_numbers(~aims), max(CHUNK_HITS // links.sources.shape[1], 1)
         for first in range(0, len(dark), step):
             some = dark[first : first + step]
             aims[some] = padded[links.sources[some]].any(axis=1)
             trim()
-        aims[links.aimed.row[padded[links.aimed.sources].any(axis=1)]] = True
+        links.mark_aims(aims, padded)
         more = ~padded[: len(direct)] & links.spread.any_of(aims)
         padded[: len(direct)] |= more
         if not (parts.reach(padded) or more.any()):

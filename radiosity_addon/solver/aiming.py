@@ -18,6 +18,7 @@ from .geometry_term import ray_geometry_term, throughput
 from .hierarchy import Hierarchy, split_in_four, split_in_sixteen
 from .radiometry import radiance_of_radiosity
 from .sampling import points_on_triangles
+from .scratch import Rows, Scratch, tiles
 from .visibility import Hits
 
 EVEN = 0.2
@@ -35,6 +36,10 @@ FAR = 0.05
 
 NOISE = 0.002
 """Nothing is aimed at where chance hits on bright elements would disturb irradiance by less than this."""
+
+
+TABLE_ROWS = 1 << 14
+"""Points whose rays are added to a table at once; bounds the temporaries to a few MB."""
 
 
 @dataclass(frozen=True)
@@ -64,17 +69,12 @@ class AimedRays:
         return AimedRays(np.zeros(0, np.int64), np.zeros((0, 1), np.int32), np.zeros((0, 1), np.float32))
 
     @staticmethod
-    def joined(parts: list[AimedRays], first: list[int]) -> AimedRays:
+    def joined(parts: list[AimedRays], first: list[int], scratch: Scratch | None = None) -> AimedRays:
         """Put lists of rays together; `first` is added to the rows of each."""
-        kept = [(part, start) for part, start in zip(parts, first, strict=True) if len(part.row)]
-        if not kept:
-            return AimedRays.none()
-        return AimedRays(
-            np.concatenate([part.row + start for part, start in kept]),
-            np.concatenate([part.sources for part, _ in kept]),
-            np.concatenate([part.weights for part, _ in kept]),
-            np.concatenate([part.element for part, _ in kept]),
-        )
+        table = AimedTable(scratch)
+        for part, start in zip(parts, first, strict=True):
+            table.extend(part, start)
+        return table.all()
 
     def entries(self, chosen: Array) -> AimedRays:
         """Return some of the rays' rows, by a mask (a,)."""
@@ -84,6 +84,40 @@ class AimedRays:
         """Return those of the gather points that a mask (g,) has chosen, numbered among these."""
         mine = self.entries(chosen[self.row])
         return replace(mine, row=(np.cumsum(chosen) - 1)[mine.row])
+
+
+class AimedTable:
+    """Aimed rays that are put together list by list.
+
+    Parameters
+    ----------
+    scratch : Scratch or None
+        Makes the arrays; None keeps them in memory.
+    """
+
+    def __init__(self, scratch: Scratch | None = None) -> None:
+        self._scratch = scratch or Scratch()
+        self._columns: tuple[Rows, ...] = ()
+
+    def extend(self, rays: AimedRays, first: int) -> None:
+        """Add rays; `first` is added to their rows."""
+        if not len(rays.row):
+            return
+        if not self._columns:
+            width, make = rays.sources.shape[1], self._scratch.rows
+            self._columns = make(1, np.int64), *(make(width, of) for of in (np.int32, np.float32, np.int32))
+        for rows in tiles(len(rays.row), TABLE_ROWS):
+            values = rays.row[rows] + first, rays.sources[rows], rays.weights[rows], rays.element[rows]
+            for column, some in zip(self._columns, values, strict=True):
+                column.extend(some)
+
+    def all(self) -> AimedRays:
+        """Return all rays, and give the table up."""
+        if not self._columns:
+            return AimedRays.none()
+        row, sources, weights, element = (column.all() for column in self._columns)
+        self._columns = ()
+        return AimedRays(row[:, 0], sources, weights, element)
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .aiming import AimedRays, BrightElements
+from .aiming import AimedRays, AimedTable, BrightElements
 from .arrays import Array
 from .environment import SkyTable
 from .footprints import Footprints
@@ -90,7 +90,7 @@ class Gathering:
         self._resolve, self._leaves_of = resolve, leaves_of
         self._seed, self.threads, self._sky = seed, threads, sky
         self._into: Array | None = None
-        self._closeness = np.empty(len(at))
+        self._closeness = at.scratch.empty(len(at))
         self._aimed: dict[int, AimedRays] = {}
 
     @property
@@ -123,9 +123,14 @@ class Gathering:
             if aimed is not None:
                 self._aimed[part.start] = aimed
 
-        yield from chunk_steps(trace, len(self._at), max(CHUNK_RAYS // self._rays, 1), self.threads)
-        starts = sorted(self._aimed)
-        return self.gathered(AimedRays.joined([self._aimed[start] for start in starts], starts))
+        aimed, chunk = AimedTable(self._at.scratch), max(CHUNK_RAYS // self._rays, 1)
+        steps = chunk_steps(trace, len(self._at), chunk, self.threads)
+        for start, fraction in zip(range(0, len(self._at), chunk), steps, strict=True):
+            found = self._aimed.pop(start, None)
+            if found is not None:
+                aimed.extend(found, start)
+            yield fraction
+        return self.gathered(aimed.all())
 
     def gathered(self, aimed: AimedRays) -> Gathered:
         """Return what was found, with these aimed rays."""

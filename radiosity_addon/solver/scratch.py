@@ -157,8 +157,9 @@ class Rows:
         return result
 
 
-def tiles(count: int, size: int = TILE) -> Iterator[slice]:
-    """Yield slices that cover `count` rows; what was touched in files leaves memory after each."""
+def tiles(count: int, size: int = 0) -> Iterator[slice]:
+    """Yield slices of `size` rows (0: `TILE`) that cover `count`; after each, files leave memory."""
+    size = size or TILE
     for start in range(0, count, size):
         yield slice(start, min(start + size, count))
         trim()

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from radiosity_addon import pipeline
+from radiosity_addon import pipeline, texel_memory
 from radiosity_addon.errors import UsageError
 from radiosity_addon.foresight import Lit, foresee
 from radiosity_addon.pipeline import bake
@@ -63,9 +63,15 @@ def test_what_cannot_be_done_is_refused_with_the_figure() -> None:
     assert f"{figure:.1f} GiB" in message
     assert "limit of 4 GiB" in message
     assert caught.value.exit_code == 2
-    # What it says helps does.
-    raised = float(message.split("to ")[-1])
-    refuse_too_large([16384], BakeSettings(resolution=16384, memory_limit=raised + 0.2))
+
+
+@pytest.mark.parametrize("size", [12_000, 12_300, 12_600, 12_900, 16_384])
+def test_the_limit_that_is_named_suffices(size: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(texel_memory, "process_bytes", lambda: 0.3e9)
+    with pytest.raises(UsageError) as caught:
+        refuse_too_large([size], BakeSettings(resolution=size))
+    raised = float(str(caught.value).split("to ")[-1])
+    refuse_too_large([size], BakeSettings(resolution=size, memory_limit=raised))
 
 
 @pytest.mark.parametrize("size", [{"resolution": 16384}, {"texel_density": 20_000.0}])
