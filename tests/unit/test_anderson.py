@@ -8,7 +8,8 @@ import pytest
 from radiosity_addon.solver import PointLight, Scene, SolverSettings
 from radiosity_addon.solver.anderson import Anderson
 from radiosity_addon.solver.bounce import bounce
-from radiosity_addon.solver.methods.hierarchical import exhausted, iterate
+from radiosity_addon.solver.methods import hierarchical
+from radiosity_addon.solver.methods.hierarchical import STALLED, exhausted, iterate
 from tests.rooms import box_room, grey
 from tests.unit.solved_rooms import solved
 
@@ -106,3 +107,20 @@ def test_a_bright_closed_room_needs_a_quarter_of_jacobis_gathers() -> None:
     area = state.hierarchy.area[state.hierarchy.leaves]
     apart = area @ np.abs(solution - state.radiosity)[state.hierarchy.leaves]
     assert apart.max() / state.power < 2 * 1e-5 / (1 - 0.95)
+
+
+def test_an_iteration_whose_residual_falls_no_more_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    triangles, _ = box_room((1, 1, 1), n=1)
+    scene = Scene(triangles, grey(len(triangles), 0.5), grey(len(triangles), 1.0))
+    state = solved(scene)
+    state.reset()
+    state.iterations = 0
+    residuals = [0.9**step for step in range(20)]
+
+    def stuck(state: hierarchical.HierarchicalState, *rest: object) -> None:
+        state.residual = residuals[min(state.iterations, len(residuals) - 1)]
+        state.iterations += 1
+
+    monkeypatch.setattr(hierarchical, "bounce", stuck)
+    iterate(state, 1e-5)
+    assert len(residuals) + STALLED <= state.iterations <= len(residuals) + STALLED + 2

@@ -50,6 +50,13 @@ LIGHT_SHARE = 0.25
 """BF_ε of light links, in units of the links': they are few, and every bounce starts with them."""
 
 
+STALLED = 100
+"""Iterations in which the residual must fall by a tenth, or no more follow.
+
+What a cluster's gradients take from faces below 0 is not taken (`bounce`): where few small faces shine into
+each other, that keeps the residual from falling, or would let plain iteration grow."""
+
+
 @dataclass
 class HierarchicalState(SolverState):
     """What the refined hierarchy works on."""
@@ -209,7 +216,7 @@ def _over(state: HierarchicalState, errors: Array, threshold: float) -> Array:
 
 
 def iterate(state: HierarchicalState, tolerance: float, last: bool = False) -> None:
-    """Gather and push-pull, accelerated, until the residual is below `tolerance`.
+    """Gather and push-pull, accelerated, until the residual is below `tolerance`, or falls no more.
 
     Each step tells the residual of the radiosity before it; that of the `last` one is measured
     for the radiosity that is left in the state.
@@ -226,11 +233,14 @@ def iterate(state: HierarchicalState, tolerance: float, last: bool = False) -> N
     leaves = hierarchy.leaves
     least = state.emission[leaves]
     mixer = Anderson(hierarchy.area[leaves])
+    best, best_at = np.inf, state.iterations
     while not exhausted(state):
         before = state.radiosity[leaves]
         bounce(state, links, lights, scale, cluster_links, top, received)
         state.note()
-        if state.residual < tolerance or exhausted(state):
+        if state.residual < 0.9 * best:
+            best, best_at = state.residual, state.iterations
+        if state.residual < tolerance or exhausted(state) or state.iterations - best_at > STALLED:
             break
         # What a mixture guesses below the emission is no radiosity.
         state.radiosity[leaves] = np.maximum(mixer.next(before, state.radiosity[leaves]), least)
