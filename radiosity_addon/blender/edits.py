@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
 from ..bake_scene import LIGHTMAP_UV_LAYER, BakeWarning
 from . import material_edits
@@ -24,16 +25,21 @@ from .mesh_digest import digest
 from .stand_in_names import carry_names
 from .stand_ins import (
     EVALUATED,
+    INSTANCER,
     OWN,
     STAND_IN,
     StandIn,
     has_edited_slots,
     is_edited,
     is_edited_object,
+    moved_place,
+    place_again,
+    placed,
     released_copy,
     seal,
     seal_object,
     set_stand_in,
+    source_name,
     stand_in_of,
     stood_for,
 )
@@ -50,7 +56,8 @@ def carry_edits(context: bpy.types.Context) -> tuple[BakeWarning, ...]:
     """Carry all edits on what a bake made to the user's own datablocks; returns what to warn of."""
     leave_edit_modes(context, recorded_objects() + _stand_in_objects())
     know_earlier_versions()
-    warnings = list(material_edits.carry_edits())
+    _part_duplicates()
+    warnings = [*material_edits.carry_edits(), *_carry_places(), *_deleted_stand_ins()]
     users = _objects_by_mesh()
     for mesh in [mesh for mesh in bpy.data.meshes if mesh.library is None and is_made(mesh)]:
         known = stand_in_of(mesh)
@@ -62,6 +69,52 @@ def carry_edits(context: bpy.types.Context) -> tuple[BakeWarning, ...]:
         if is_edited_object(obj)
     ]
     return tuple(warnings)
+
+
+def _part_duplicates() -> None:
+    """Give stand-in meshes that the user duplicated, along with their objects, an original of their own."""
+    for mesh in [mesh for mesh in bpy.data.meshes if mesh.library is None and mesh.users]:
+        known, original = stand_in_of(mesh), mesh.get(ORIGINAL)
+        if known is None or original is None or known.names.mesh in ("", mesh.name):
+            continue
+        duplicated = bpy.data.meshes.get((known.names.mesh, None))
+        other = stand_in_of(duplicated)
+        if other is None or duplicated.get(ORIGINAL) != original or other.names.mesh != duplicated.name:
+            continue
+        mesh[ORIGINAL] = original.copy()
+        set_stand_in(mesh, replace(known, names=replace(known.names, mesh=mesh.name)))
+
+
+def _carry_places() -> list[BakeWarning]:
+    """Move curves and texts to where their stand-ins were moved."""
+    warnings = []
+    for stand_in in _stand_in_objects():
+        place, source = placed(stand_in), _shown_source(stand_in)
+        if source is None or place is None or moved_place(stand_in) is None or source.type == "META":
+            continue
+        source.matrix_world = stand_in.matrix_basis @ Matrix(place).inverted_safe() @ source.matrix_world
+        place_again(stand_in)
+        warnings.append(BakeWarning(source.name, f"object '{source.name}' was moved where its lightmap was"))
+    return warnings
+
+
+def _deleted_stand_ins() -> list[BakeWarning]:
+    """Warn of hidden objects whose stand-ins were deleted: they show again."""
+    shown = {stand_in.get(INSTANCER) for stand_in in _stand_in_objects()}
+    hidden = [obj for obj in recorded_objects() if is_recorded(obj) and obj.radiosity_bake.is_hidden]
+    return [
+        BakeWarning(
+            obj.name, f"only the lightmap of object '{obj.name}' was deleted: delete '{obj.name}' itself"
+        )
+        for obj in hidden
+        if obj not in shown and obj.type != "META"
+    ]
+
+
+def _shown_source(stand_in: bpy.types.Object) -> bpy.types.Object | None:
+    """Return the object that a stand-in object stands for, unless that is one of many instances."""
+    source = stand_in.get(INSTANCER)
+    return source if source is not None and source_name(stand_in) == source.name else None
 
 
 def know_earlier_versions() -> None:
@@ -116,8 +169,9 @@ def _carry(mesh: bpy.types.Mesh, known: StandIn, users: Sequence[bpy.types.Objec
     if original is not None and shown_on is not None and not carry_names(mesh, original, shown_on):
         edited = True
     known = stand_in_of(mesh) or known
-    if slots and not (edited or removed):
-        edited = not _move_slots(mesh, known, original, users)
+    if slots and not removed and (known.kind == EVALUATED or not edited):
+        moved = _move_slots(mesh, known, original, users)
+        edited = edited or not moved
         if not edited:
             _seal_again(mesh, known)
     elif slots:
@@ -131,6 +185,11 @@ def _carry(mesh: bpy.types.Mesh, known: StandIn, users: Sequence[bpy.types.Objec
             message = f"the mesh of object '{name}' is gone: it keeps what its modifiers made of it"
             return [BakeWarning(name, f"{message}; they stay switched off")]
         if not edited:
+            return []
+        if original is not None and known.modifiers and not is_made(users[0]) and not users[0].modifiers:
+            # They were applied: what they made is the object's mesh now.
+            mesh[ORIGINAL] = released_copy(mesh, original.name)
+            set_stand_in(mesh, replace(known, modifiers=(), seal=digest(mesh)))
             return []
         kept = released_copy(mesh, f"{name}{EDITED}")
         kept.use_fake_user = True
@@ -149,8 +208,12 @@ def _move_slots(
     users: Sequence[bpy.types.Object],
 ) -> bool:
     """Give newly assigned materials to the slots of the original or the object; False if they fit neither."""
+    source = _shown_source(users[0]) if is_made(users[0]) else None
+    if original is None and source is not None:
+        original = source.data  # a curve or a text
     if original is None:
         return False
+    whole = known.kind == OWN or known.slots == max(len(original.materials), 1)
     for slot, material in enumerate(mesh.materials):
         before = stood_for(mesh, slot)
         if is_copy(material) or material == before:
@@ -164,7 +227,7 @@ def _move_slots(
             for obj in users:
                 link_to_object(obj, slot)
                 obj.material_slots[slot].material = material
-        elif slot == len(original.materials) and known.kind == OWN and original.library is None:
+        elif slot == len(original.materials) and whole and original.library is None:
             original.materials.append(material)
         else:
             return False

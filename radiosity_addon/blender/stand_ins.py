@@ -182,6 +182,11 @@ def moved_place(obj: bpy.types.Object) -> list[float] | None:
     return _place(obj) if place is not None and place != _place(obj) else None
 
 
+def place_again(obj: bpy.types.Object) -> None:
+    """Remember where a stand-in object is now as the place it was put."""
+    obj[STAND_IN] = json.dumps({**_told(obj), "place": _place(obj)})
+
+
 def is_edited_object(obj: bpy.types.Object) -> bool:
     """Whether the user has moved a stand-in object, renamed it, or added anything to it."""
     told = _told(obj)
