@@ -57,7 +57,7 @@ class MarkedFolder:
         with suppress(OSError):
             found = self.path.lstat()
             if stat.S_ISDIR(found.st_mode) and (found.st_dev, found.st_ino) == self._identity:
-                shutil.rmtree(self.path, ignore_errors=True)
+                _remove(self.path)
 
     def release(self) -> None:
         """Leave the folder where it is, for others to find as that of a process that is no more."""
@@ -84,7 +84,19 @@ def clean_up_folders(
         with _claimed(path) as ours:
             removable = ours and done_with(path)
         if removable:
-            shutil.rmtree(path, ignore_errors=True)
+            _remove(path)
+
+
+def _remove(folder: Path) -> None:
+    """Remove a folder, its mark last: what a kill leaves of it must still be known as ours."""
+    with suppress(OSError), os.scandir(folder) as entries:
+        for entry in [entry for entry in entries if entry.name != MARK]:
+            if entry.is_dir(follow_symlinks=False):
+                shutil.rmtree(entry.path, ignore_errors=True)
+            else:
+                with suppress(OSError):
+                    Path(entry.path).unlink()
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 def abandoned(parent: Path, prefix: str) -> Iterator[Path]:

@@ -24,7 +24,13 @@ from .tally import Tally
 
 COUNT = 320
 
-OPEN = "import bpy, os, sys; bpy.ops.wm.open_mainfile(filepath=sys.argv[1], use_scripts=False); os._exit(0)"
+OPEN = """
+import bpy, os, sys
+bpy.ops.wm.open_mainfile(filepath=sys.argv[1], use_scripts=False)
+for image in bpy.data.images:
+    len(image.pixels)  # reads its file
+os._exit(0)
+"""
 IMPORT = """
 import bpy, os, sys
 bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)

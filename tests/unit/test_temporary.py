@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+
+from radiosity_addon.marked_folders import MARK, MarkedFolder
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -117,3 +121,32 @@ def test_the_folder_of_a_living_process_is_left_alone(
     living.remove()
     assert (path / "mine.txt").exists()
     assert (tmp_path / "moved" / "file").exists()
+
+
+def test_a_folder_loses_its_mark_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a kill leaves of a folder that is removed must be known as ours by the next start."""
+    folder = MarkedFolder(tmp_path, "radiosity-")
+    for name in ("blender_abc", "zzz"):
+        (folder.path / name).mkdir()
+        (folder.path / name / "quit.blend").write_text("x")
+    removed: list[str] = []
+    scandir = os.scandir
+
+    def in_order(path: str) -> contextlib.AbstractContextManager[list[os.DirEntry[str]]]:
+        with scandir(path) as entries:
+            return contextlib.nullcontext(sorted(entries, key=lambda entry: entry.name))
+
+    def noted(call: Callable[..., None]) -> Callable[..., None]:
+        def run(path: object, **more: object) -> None:
+            removed.append(Path(str(path)).name)
+            call(path, **more)
+
+        return run
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "scandir", in_order)
+        for name in ("unlink", "rmdir"):
+            patch.setattr(os, name, noted(getattr(os, name)))
+        folder.close()
+    assert not folder.path.exists()
+    assert removed[-2:] == [MARK, folder.path.name]
