@@ -128,7 +128,7 @@ def _copy_object(random: Random, obj: bpy.types.Object, own: bool) -> Check:
     if not linked:
         made.data = obj.data.copy()
     bpy.context.scene.collection.objects.link(made)
-    name, count = made.name, len(made.data.polygons)
+    name, source, count = made.name, obj.name, len(made.data.polygons)
     # An empty slot shows a material of the bake meanwhile.
     shown = [slot.material.name if slot.material is not None else "" for slot in made.material_slots]
     filled = [bool(title) and not title.startswith("No Material (Lightmap)") for title in shown]
@@ -139,6 +139,9 @@ def _copy_object(random: Random, obj: bpy.types.Object, own: bool) -> Check:
             return f"the {'linked ' if linked else ''}copy is gone"
         if now.data is None or (own and len(now.data.polygons) != count):
             return "the copy has lost its mesh"
+        beside = bpy.data.objects.get(source)
+        if not linked and beside is not None and beside.data == now.data:
+            return "the copy shares a mesh now"
         after = [slot.material is not None for slot in now.material_slots]
         if any(was and not is_now for was, is_now in zip(filled, after, strict=False)):
             return "the copy has lost a material"
