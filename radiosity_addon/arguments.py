@@ -6,6 +6,8 @@ import os
 from argparse import ArgumentTypeError
 from pathlib import Path
 
+from .errors import BakeError
+
 MAX_NAME = 255
 """Bytes of a file's or folder's name that file systems allow."""
 
@@ -60,6 +62,19 @@ def folder_of(word: str) -> Path:
             f"{quoted(word)} is longer than {MAX_PATH - OWN_NAMES} bytes; give a shorter path"
         )
     return path
+
+
+def check_folder(path: Path) -> None:
+    """Refuse a path that no output folder can have, wherever it comes from.
+
+    Raises
+    ------
+    BakeError
+    """
+    try:
+        folder_of(str(path))
+    except ArgumentTypeError as error:
+        raise BakeError(f"cannot write to the output folder {error}") from error
 
 
 def name_of(word: str) -> str:

@@ -6,6 +6,7 @@ of the open file shows it; and if no copy `baked.blend` next to it may show it.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -102,7 +103,8 @@ def _folders(context: bpy.types.Context) -> list[Path]:
     """Return where bakes of the open file have written, and where the next one would; none in a network."""
     last = [_last_folder(scene) for scene in bpy.data.scenes]
     found = {folder for folder in (output_folder(context), *last) if folder is not None}
-    return sorted(folder for folder in found if not _is_remote(folder) and folder.is_dir())
+    # `Path.is_dir` raises for a name that is too long.
+    return sorted(folder for folder in found if not _is_remote(folder) and os.path.isdir(folder))  # noqa: PTH112
 
 
 def _is_remote(folder: Path) -> bool:

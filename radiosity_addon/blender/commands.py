@@ -101,7 +101,7 @@ def bake(
         if report_copy is not None:
             make_folder_of(report_copy)
             report.write_copy(report_copy)
-        files = written_files(report.as_dict(), preview)
+        files = written_files(report.as_dict(), preview, keep)
         if plot is not None:
             from .plot import render_plot
 
@@ -227,8 +227,9 @@ def open_or_build(scene: Path | None, loaded: Path | None, allowed: Permissions)
     return ()
 
 
-def written_files(report: dict, preview: bool = True) -> list[tuple[str, str]]:
-    """What a bake, with a preview or without, has left in its folder, for people to read."""
+def written_files(report: dict, preview: bool = True, kept: bool = False) -> list[tuple[str, str]]:
+    """What a bake, with a preview or a sidecar or without, has left in its folder, for people to read."""
+    from ..file_names import SIDECAR_NAME
     from .output import BLEND_NAME, PREVIEW_NAME, REPORT_NAME
 
     images = list(dict.fromkeys(entry["image"] for entry in report["objects"]))
@@ -241,6 +242,7 @@ def written_files(report: dict, preview: bool = True) -> list[tuple[str, str]]:
             for image in shown
         ),
         *([(PREVIEW_NAME, "what it looks like")] if preview else []),
+        *([(SIDECAR_NAME, "what --relight needs")] if kept else []),
         (REPORT_NAME, "objects, figures and warnings"),
     ]
 

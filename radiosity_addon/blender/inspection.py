@@ -201,7 +201,8 @@ def _of_the_file(folder: Path | None) -> Iterator[Finding]:
         message = "the file is not saved: lightmaps will be packed into it; save it to have files beside it"
         yield Finding(INFO, "file", message)
         return
-    existing = next(each for each in (folder, *folder.parents) if each.exists())
+    # `Path.exists` raises for a name that is too long.
+    existing = next(each for each in (folder, *folder.parents) if os.path.exists(each))  # noqa: PTH110
     if not existing.is_dir() or not os.access(existing, os.W_OK):
         yield Finding(ERROR, "file", f"cannot write to the output folder '{folder}': choose another")
 

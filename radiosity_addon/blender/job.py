@@ -29,7 +29,7 @@ from .group_images import GroupImages, each_image, write_groups
 from .images import lightmap_files, possible_names, relative_path, set_folder, write_pages
 from .light_shares import crowded_materials
 from .live_picture import Seen, seen_triangles
-from .only_changed import kept_warning, narrow, remember
+from .only_changed import gone_objects, kept_warning, narrow, remember
 from .output import BLEND_NAME, PREVIEW_NAME, OutputFolder, save_copy
 from .preview import SAMPLES, render_preview
 from .rebake import EarlierBake, Originals, replacing_earlier
@@ -163,7 +163,7 @@ def run_bake(
         scope = Scope.of(context.scene, export, is_partial=settings.objects is not None or unchanged > 0)
         remarks = [*notes, *originals.warnings, *shared_warnings(context.scene, export)]
         if unchanged:
-            remarks.append(kept_warning(unchanged))
+            remarks.append(kept_warning(unchanged, gone_objects(context.scene, export.bake_scene)))
         elif scope.in_scene and keeping is not None:
             remarks.append(_cannot_relight(len(scope.in_scene)))
         keeping = None if scope.in_scene else keeping

@@ -9,6 +9,8 @@ not renewed.
 from __future__ import annotations
 
 import hashlib
+import json
+from collections.abc import Sequence
 from dataclasses import fields, replace
 from typing import Any
 
@@ -32,13 +34,38 @@ _OF_NO_CONSEQUENCE = frozenset({"objects", "threads", "memory_limit", "unwrap_se
 """Settings that change no texel of what is kept."""
 
 
-def kept_warning(count: int) -> BakeWarning:
-    """Say what was not renewed."""
+_NAMED = 5
+"""Objects that a warning names."""
+
+
+def kept_warning(count: int, gone: Sequence[str]) -> BakeWarning:
+    """Say what was not renewed: `count` objects kept their lightmaps, and others are gone."""
     message = (
         f"{count} unchanged objects kept their lightmaps: light and shadow that the changed "
         "ones throw on them are as before; bake all to renew them"
     )
-    return BakeWarning("scene", message)
+    return BakeWarning("scene", f"{message}; {_gone_words(gone)}" if gone else message)
+
+
+def gone_objects(scene: bpy.types.Scene, bake_scene: BakeScene) -> list[str]:
+    """Return the names of the objects that the last bake had and this one has not, but for renamed ones."""
+    before = json.loads(scene.radiosity.baked_objects or "{}")
+    names = {item.name for item in bake_scene.objects}
+    gone = [name for name in before if name not in names]
+    if not gone:
+        return []
+    now = {_short_print(bake_scene, item) for item in bake_scene.objects}
+    return [name for name in gone if before[name] not in now]
+
+
+def _gone_words(gone: Sequence[str]) -> str:
+    named = ", ".join(f"'{name}'" for name in gone[:_NAMED])
+    more = f" and {len(gone) - _NAMED} more" if len(gone) > _NAMED else ""
+    return f"gone since the last bake: {named}{more}; light and shadow from there stay until you bake all"
+
+
+def _short_print(bake_scene: BakeScene, item: BakeObject) -> str:
+    return fingerprint(bake_scene, item)[:16]
 
 
 def narrow(
@@ -80,6 +107,9 @@ def narrow(
     if any(len(files_of(bpy.data.objects[name, None])) > 1 for name in kept):
         return everything  # light groups, whose lightmaps are made together
     if len(kept) == len(pairs):
+        gone = gone_objects(scene, bake_scene)
+        if gone:
+            raise NothingToDoError(f"no object has changed that gets a lightmap, but {_gone_words(gone)}")
         raise NothingToDoError("nothing has changed since the last bake: there is nothing to do")
     narrowed = tuple(replace(item, bake=item.bake and item.name not in kept) for item in bake_scene.objects)
     if settings.atlas == "shared" and settings.texel_density is None:
@@ -90,7 +120,7 @@ def narrow(
 
 
 def remember(scene: bpy.types.Scene, export: Export, result: BakeResult, settings: BakeSettings) -> None:
-    """Note on every object what it was baked as."""
+    """Note on every object what it was baked as, and on the scene which objects there were."""
     sources = {
         target.name: source for source, target in zip(export.sources, export.bake_scene.objects, strict=True)
     }
@@ -105,6 +135,8 @@ def remember(scene: bpy.types.Scene, export: Export, result: BakeResult, setting
         obj.radiosity_bake.texels_per_metre = told.get("texels_per_metre", 0.0)
         obj.radiosity_bake.light = light
     scene.radiosity.baked_light = light
+    prints = {item.name: _short_print(export.bake_scene, item) for item in export.bake_scene.objects}
+    scene.radiosity.baked_objects = json.dumps(prints)
 
 
 def fingerprint(bake_scene: BakeScene, item: BakeObject) -> str:

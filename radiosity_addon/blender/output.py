@@ -16,6 +16,7 @@ from typing import Any
 
 import bpy
 
+from ..arguments import check_folder
 from ..errors import BakeError, RadiosityError
 from ..file_names import BLEND_NAME, PLAIN_NAMES, PREVIEW_NAME, REPORT_NAME, FileNames, folded
 from ..manifest import FILES as LISTED
@@ -104,6 +105,7 @@ class OutputFolder:
         What a killed bake has left there is cleaned up first. A report in the place of this bake's
         must be ours.
         """
+        check_folder(self.path)
         missing = [folder for folder in (self.path, *self.path.parents) if not folder.exists()]
         try:
             self.path.mkdir(parents=True, exist_ok=True)
@@ -150,6 +152,7 @@ class OutputFolder:
     def refusal(self, names: Iterable[str]) -> str | None:
         """Return why a bake that writes files of these names would stop, if it would; changes no file."""
         try:
+            check_folder(self.path)
             if self.path.is_dir():
                 self._meet_earlier()
                 self.expect(names)

@@ -243,6 +243,11 @@ class RadiositySettings(MethodProperties, bpy.types.PropertyGroup):
         description="What lamps and settings were at the last bake",
         options={"HIDDEN"},
     )
+    baked_objects: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Baked Objects",
+        description="The objects of the last bake, and what their shapes were",
+        options={"HIDDEN"},
+    )
     last_bake: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Last Bake",
         description="Figures and warnings of the last bake",

@@ -95,6 +95,7 @@ def forget(scene: bpy.types.Scene) -> None:
     group = scene.radiosity
     group.property_unset("last_bake")
     group.property_unset("baked_light")
+    group.property_unset("baked_objects")
     names = [prop.identifier for prop in group.bl_rna.properties if not prop.is_readonly]
     if not any(map(group.is_property_set, names)):
         scene.property_unset("radiosity")

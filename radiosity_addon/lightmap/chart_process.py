@@ -27,6 +27,14 @@ WORTH_A_PROCESS = 2000
 PATIENCE = 600.0
 """Seconds after which the other process is given up, and the work done in this one."""
 
+LONGEST_CHART = 2048
+"""Texels to which xatlas scales a longer chart to pack it, where all charts take about 1024 × 1024.
+
+It draws each chart's bounding box as a bitmap whose size in bits it counts in 32 bits: a thin frame whose
+sides are 100,000 times as long as wide made it write outside of it, and end the process. The scale is
+of no consequence, as charts are brought to their own scale later.
+"""
+
 
 def run_xatlas(vertices: Float, faces: Int) -> tuple[Any, Float, Int]:
     """Cut a mesh into charts in this process.
@@ -54,6 +62,7 @@ def run_xatlas(vertices: Float, faces: Int) -> tuple[Any, Float, Int]:
     packing = xatlas.PackOptions()
     packing.rotate_charts = False
     packing.bilinear = False
+    packing.max_chart_size = LONGEST_CHART
     atlas.generate(xatlas.ChartOptions(), packing)
     _, indices, uv = atlas[0]
     _, chart_of_vertex = atlas.get_mesh_vertex_assignment(0)

@@ -174,7 +174,8 @@ class TexelGeometry:
         edges = self.uv[:, 1:].astype(np.float64) - self.uv[:, :1]
         flat = 0.5 * np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
         flat *= np.array([len(numbers) ** 2 for numbers in self.index])[np.maximum(self.page_of_triangle, 0)]
-        return np.asarray(self._scene.areas / np.maximum(flat, 1e-300))
+        # Far below what single-precision UVs can enclose, and far enough from 0 for any area.
+        return np.asarray(self._scene.areas / np.maximum(flat, 1e-200))
 
     @property
     def reach(self) -> Array:

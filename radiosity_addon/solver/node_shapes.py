@@ -47,8 +47,10 @@ class NodeShapes:
         distance = np.linalg.norm(self.middle[other] - self.middle[one], axis=1)
         gap = np.maximum(distance - self.radius[one] - self.radius[other], 0.0)
         areas = self.area[one], self.area[other]
-        far = areas[0] * areas[1] / np.maximum(np.pi * gap**2, 1e-300)
-        return np.asarray(np.minimum(np.minimum(*areas), far))
+        least, product, square = np.minimum(*areas), areas[0] * areas[1], np.pi * gap**2
+        # The quotient counts only where it is below `least`: elsewhere it could overflow.
+        far = np.divide(product, square, out=least.copy(), where=product < least * square)
+        return np.asarray(np.minimum(least, far))
 
     def may_see(self, one: Array, other: Array) -> Array:
         """Return (n,) False where one surely lies behind all faces of the other."""

@@ -45,6 +45,7 @@ def test_without_a_preview(run: Run, room: Path, tmp_path: Path) -> None:
     files = {"baked.blend", "lightmap.exr", "lightmap.relight", "report.json"}
     assert set(digest(tmp_path / "out")) == files
     assert "preview.png" not in done.out
+    assert all(f"  {name} " in done.out for name in files)
     assert "preview" not in read_report(tmp_path / "out")["seconds"]
     done = run("bake", room, "--output", tmp_path / "out", "--relight", "--no-preview")
     assert (done.code, done.err) == (0, "")

@@ -194,6 +194,19 @@ def test_a_new_object_is_a_change(room: Path) -> None:
     assert shown() == {**ONE_PAGE, "New": "room_Scene_lightmap_2.exr"}
 
 
+def test_an_object_that_is_gone_is_named(room: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    bpy.data.objects["Shelf"].name = "Board"
+    assert bake() == {"CANCELLED"}
+    assert "nothing has changed" in capfd.readouterr().out
+    bpy.data.objects.remove(bpy.data.objects["Board"])
+    assert bake() == {"CANCELLED"}
+    assert "gone since the last bake: 'Shelf'" in capfd.readouterr().out
+    bpy.data.objects["Box"].location.x -= 0.5
+    assert bake() == {"FINISHED"}
+    last = runtime.last_bake(bpy.context.scene)
+    assert any("gone since the last bake: 'Shelf'" in message for _, message in last.warnings)
+
+
 def test_a_cancelled_one_leaves_the_earlier_bake(room: Path) -> None:
     from radiosity_addon.blender.job import run_bake
     from radiosity_addon.blender.output import OutputFolder

@@ -13,6 +13,8 @@ import pytest
 import radiosity_addon
 from radiosity_addon.blender import runtime
 from radiosity_addon.blender.bake_record import is_baked, shows_lightmap
+from radiosity_addon.blender.check_panel import look
+from radiosity_addon.blender.cleaning import interrupted_folders
 from radiosity_addon.blender.cornell import build_cornell_box
 from radiosity_addon.blender.job import run_bake
 from radiosity_addon.blender.output import OutputFolder
@@ -91,6 +93,23 @@ def test_nothing_selected_is_an_error_message_and_no_change(box: bpy.types.Scene
         bake()
     assert made() == before
     assert not runtime.running.active
+
+
+@pytest.mark.parametrize("folder", ["//" + "x" * 300, "//" + "/".join(["x" * 200] * 4)])
+def test_a_folder_whose_name_is_too_long_is_one_line(
+    folder: str, box: bpy.types.Scene, tmp_path: Path
+) -> None:
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
+    box.radiosity.output_folder = folder
+    assert interrupted_folders(bpy.context) == []
+    with pytest.raises(
+        RuntimeError, match=r"cannot write to the output folder .* (too long|longer)"
+    ) as refusal:
+        bpy.ops.radiosity.bake()
+    assert len(str(refusal.value).strip().splitlines()) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["room.blend"]
+    found = look(bpy.context)
+    assert any("cannot write to the output folder" in finding.message for finding in found.findings)
 
 
 def test_an_unwritable_folder_is_an_error_message(box: bpy.types.Scene, tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from radiosity_addon.lightmap import chart_process, growers
+from radiosity_addon.lightmap.charts import unwrap
 
 
 @pytest.fixture(scope="module")
@@ -58,3 +59,22 @@ def test_without_another_process_the_work_is_done_here(
     with ThreadPoolExecutor(1) as thread:
         _, chart = thread.submit(growers.grow_charts, *bowl).result()
     assert len(chart) == len(bowl[1])
+
+
+@pytest.mark.parametrize("width", [1e-3, 1e-5, 1e-6])
+def test_a_frame_of_thin_strips_becomes_charts(width: float) -> None:
+    """Unlimited, the bitmap in which xatlas packs it takes more bits than it can count."""
+    outer = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    inner = outer * (1 - 2 * width) + width
+    corners = np.column_stack((np.concatenate([outer, inner]), np.zeros(8)))
+    side, after = np.arange(4), np.roll(np.arange(4), -1)
+    halves = [np.stack([side, after, 4 + after], axis=1), np.stack([side, 4 + after, 4 + side], axis=1)]
+    triangles = corners[np.concatenate(halves)]
+    # Where it is unlimited this ends the process, so another one tries first.
+    vertices = (corners - 0.5) / np.sqrt(0.5 * width)
+    assert chart_process.run_apart(vertices, np.concatenate(halves)) is not None
+    *_, charts = unwrap(triangles, np.tile(side, 2), growers.grow_charts)
+    assert (charts.chart >= 0).all()
+    edges = charts.uv[:, 1:] - charts.uv[:, :1]
+    area = 0.5 * np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
+    np.testing.assert_allclose(area.sum(), 4 * width, rtol=0.01)

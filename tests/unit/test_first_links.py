@@ -30,6 +30,16 @@ def limits_of(hierarchy: Hierarchy, **given: float) -> first_links._Limits:
     return first_links._Limits(float(hierarchy.faces.area.sum()), SolverSettings().min_area, **given)
 
 
+def test_nodes_that_touch_exchange_at_most_the_smaller_area() -> None:
+    """However large they are: their gap is 0."""
+    large = 1e5 * box_room()[0]
+    shapes = NodeShapes(Hierarchy(Scene(large, grey(len(large), 0.5), grey(len(large), 0.0))))
+    one, other = (each.reshape(-1) for each in np.indices((shapes.count, shapes.count)))
+    with np.errstate(all="raise"):
+        bound = shapes.exchange_bound(one, other)
+    np.testing.assert_array_equal(bound, np.minimum(shapes.area[one], shapes.area[other]))
+
+
 @pytest.mark.parametrize("faint", [0.0, 1e-5, 1e-3])
 def test_the_estimate_tells_how_many_links_there_are(
     clutter: Scene, faint: float, monkeypatch: pytest.MonkeyPatch

@@ -146,3 +146,9 @@ def test_whole_texels_are_sampled_over_the_middle_half_of_their_squares() -> Non
     spots = corners[:, :1] + weights @ (corners[:, 1:] - corners[:, :1])
     lower_left = np.stack([geometry.column[rows], geometry.row[rows]], axis=1)[:, None]
     np.testing.assert_allclose(spots, lower_left + 0.5 + 0.5 * (u - 0.5), atol=1e-4)
+
+
+def test_a_large_triangle_without_texels_has_endless_ones() -> None:
+    geometry = texel_geometry(scene_of(1e5 * slanted()), np.zeros_like(QUAD_UV), SIZE)
+    with np.errstate(all="raise"):
+        assert (geometry.texel_area > 1e100).all()
