@@ -106,25 +106,6 @@ def test_two_different_edits_are_both_kept(then: Callable[[], list[str]]) -> Non
 
 
 @AFTER
-@pytest.mark.parametrize("slots", [0, 1])
-def test_a_material_assigned_to_the_original_survives_an_edit_of_a_stand_in(
-    then: Callable[[], list[str]], slots: int
-) -> None:
-    first, _ = _pair()
-    mesh = first.data
-    if not slots:
-        mesh.materials.clear()
-    bake_by_hand()
-    third = bpy.data.objects.new("Third", mesh)
-    bpy.context.scene.collection.objects.link(third)
-    mesh.materials.append(principled_material(name="New"))
-    first.data.vertices[0].co.z = 0.5
-    assert "First" in then()
-    assert first.data.vertices[0].co.z == 0.5
-    assert third.data.materials[-1].name == "New"
-
-
-@AFTER
 def test_a_material_assigned_to_a_stand_in_stays(then: Callable[[], list[str]]) -> None:
     first, second = _pair()
     bake_by_hand()

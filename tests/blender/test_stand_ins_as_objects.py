@@ -138,3 +138,22 @@ def test_deleting_what_shows_a_text_s_lightmap_is_answered(then: Callable[[], li
     bpy.data.objects.remove(bpy.data.objects["Text (Lightmap)"])
     assert then() == ["Text"]
     assert not text.hide_render
+
+
+@AFTER
+@pytest.mark.parametrize("slots", [0, 1])
+def test_a_material_assigned_to_the_original_survives_an_edit_of_a_stand_in(
+    then: Callable[[], list[str]], slots: int
+) -> None:
+    first = add_plane("First", principled_material())
+    mesh = first.data
+    _link(bpy.data.objects.new("Second", mesh))
+    if not slots:
+        mesh.materials.clear()
+    bake_by_hand()
+    third = _link(bpy.data.objects.new("Third", mesh))
+    mesh.materials.append(principled_material(name="New"))
+    first.data.vertices[0].co.z = 0.5
+    assert "First" in then()
+    assert first.data.vertices[0].co.z == 0.5
+    assert third.data.materials[-1].name == "New"
