@@ -66,7 +66,14 @@ def images_of(report: dict[str, Any]) -> list[str]:
 
 def listed(folder: Path) -> dict[str, dict[str, Any]]:
     """Return every file that a report in the folder lists, by name."""
-    return {name: dict(told) for report in reports(folder).values() for name, told in report["files"].items()}
+    found = {}
+    for report in reports(folder).values():
+        files = report.get("files")
+        for name, told in files.items() if isinstance(files, dict) else ():
+            # A trial may have put anything else in place of an entry.
+            if isinstance(told, dict) and isinstance(told.get("sha256"), str):
+                found[name] = dict(told)
+    return found
 
 
 def broken_result(folder: Path) -> list[str]:
