@@ -10,7 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.options.bake_settings import BakeSettings
 
 ROOT = Path(__file__).resolve().parents[1]
 SHARED_SCENES = ROOT.parent / "shared" / "scenes"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from radiosity_addon.bake_scene import LIGHTMAP_UV_LAYER
+from radiosity_addon.scene.bake_scene import LIGHTMAP_UV_LAYER
 
 from .layout import objects_with_layout
 

@@ -10,11 +10,11 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from radiosity_addon.bake_scene import BakeObject
-from radiosity_addon.blender.export import export_scene
-from radiosity_addon.settings import BakeSettings
-from radiosity_addon.solver.lights import EnvironmentLight
-from radiosity_addon.solver.scene import Scene
+from radiosity_addon.blender.scene_export.export import export_scene
+from radiosity_addon.lights.sun_and_sky import EnvironmentLight
+from radiosity_addon.options.bake_settings import BakeSettings
+from radiosity_addon.scene.bake_scene import BakeObject
+from radiosity_addon.scene.scene import Scene
 
 
 def flatten(sky: tuple[float, float, float] | None) -> None:

@@ -17,12 +17,13 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from radiosity_addon.bake_scene import BakeResult, BakeScene
-from radiosity_addon.pipeline import bake, bake_and_keep
-from radiosity_addon.rebaking import bake_moved
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.bake.pipeline import bake, bake_and_keep
+from radiosity_addon.bake.rebaking import bake_moved
+from radiosity_addon.bake.result.result import BakeResult
+from radiosity_addon.base.progress import drain
+from radiosity_addon.options.bake_settings import BakeSettings
+from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import Scene
-from radiosity_addon.solver.steps import drain
 from tests.cornell import cornell_box
 from tests.unit.texel_scenes import bake_scene
 
@@ -48,8 +49,8 @@ def office() -> tuple[BakeScene, str, Callable[[np.ndarray], np.ndarray]]:
     """The office, and one of its chairs half a metre aside and turned by 25°."""
     import bpy
 
-    from radiosity_addon.blender.export import export_scene
-    from radiosity_addon.blender.files import empty_scene
+    from radiosity_addon.blender.files.files import empty_scene
+    from radiosity_addon.blender.scene_export.export import export_scene
 
     from .interior.office import build_office
 

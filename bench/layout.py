@@ -5,10 +5,10 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from radiosity_addon.bake_scene import LIGHTMAP_UV_LAYER
-from radiosity_addon.blender.export import export_scene
-from radiosity_addon.lightmap.atlas import AtlasInput, run_atlas
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.blender.scene_export.export import export_scene
+from radiosity_addon.lightmap.unwrap.atlas import AtlasInput, run_atlas
+from radiosity_addon.options.bake_settings import BakeSettings
+from radiosity_addon.scene.bake_scene import LIGHTMAP_UV_LAYER
 
 
 def lay_out(resolution: int) -> dict[str, np.ndarray]:

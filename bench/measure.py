@@ -53,8 +53,8 @@ def ours(job: dict[str, Any]) -> dict[str, Any]:
     """Bake with the add-on: `run` holds the settings; the pixels go to `pixels`."""
     import bpy
 
-    from radiosity_addon.blender.export import export_scene
-    from radiosity_addon.pipeline import bake
+    from radiosity_addon.bake.pipeline import bake
+    from radiosity_addon.blender.scene_export.export import export_scene
 
     from .prepare import case_of, open_prepared
 
@@ -107,8 +107,8 @@ TASKS = {"prepare": prepare, "cycles": cycles, "ours": ours, "oidn": oidn, "room
 
 def settings_of(run: dict[str, Any], **more: Any) -> Any:
     """Return the `BakeSettings` of one of our bakes; what it says of solver and gather becomes the preset."""
-    from radiosity_addon import quality
-    from radiosity_addon.settings import BakeSettings
+    from radiosity_addon.bake import quality
+    from radiosity_addon.options.bake_settings import BakeSettings
 
     given = {name: value for name, value in run.items() if name not in ("solver", "gather")}
     settings = BakeSettings(**given, **more)

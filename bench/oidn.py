@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pyoidn
 
-from radiosity_addon.lightmap.dilate import dilate
+from radiosity_addon.lightmap.images.dilate import dilate
 
 
 def denoised(pixels: np.ndarray, coverage: np.ndarray, filter_type: str) -> np.ndarray:

@@ -8,12 +8,12 @@ from typing import Any
 import bpy
 import numpy as np
 
-from radiosity_addon.bake_scene import LIGHTMAP_UV_LAYER
-from radiosity_addon.blender.cornell import build_cornell_box
-from radiosity_addon.blender.export import export_scene
-from radiosity_addon.blender.files import empty_scene, open_scene
-from radiosity_addon.lightmap.rasterise import rasterise
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.blender.files.cornell import build_cornell_box
+from radiosity_addon.blender.files.files import empty_scene, open_scene
+from radiosity_addon.blender.scene_export.export import export_scene
+from radiosity_addon.lightmap.texels.rasterize import rasterise
+from radiosity_addon.options.bake_settings import BakeSettings
+from radiosity_addon.scene.bake_scene import LIGHTMAP_UV_LAYER
 from tests.golden import cornell_reference
 
 from . import cycles

@@ -16,14 +16,15 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from radiosity_addon.bake_scene import BakeScene, LightmapPage
-from radiosity_addon.pipeline import bake, bake_and_keep
-from radiosity_addon.relighting import KeptBake, relight
-from radiosity_addon.responses import Responses
-from radiosity_addon.settings import BakeSettings
-from radiosity_addon.sidecar import read_sidecar, write_sidecar
+from radiosity_addon.bake.pipeline import bake, bake_and_keep
+from radiosity_addon.bake.relight.kept_bake import KeptBake, relight
+from radiosity_addon.bake.relight.responses import Responses
+from radiosity_addon.bake.sidecar.sidecar import read_sidecar, write_sidecar
+from radiosity_addon.base.progress import drain
+from radiosity_addon.lightmap.images.page import LightmapPage
+from radiosity_addon.options.bake_settings import BakeSettings
+from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import Scene
-from radiosity_addon.solver.steps import drain
 from tests.cornell import cornell_box
 from tests.relit_rooms import BAKED, CHANGED, lit_bake
 from tests.unit.texel_scenes import bake_scene
@@ -126,8 +127,9 @@ def measure_panel(resolution: int, quality: str) -> dict[str, Any]:
     import bpy
 
     import radiosity_addon
-    from radiosity_addon.blender import kept_bakes, live_state
-    from radiosity_addon.blender.cornell import build_cornell_box
+    from radiosity_addon.blender.files.cornell import build_cornell_box
+    from radiosity_addon.blender.relight.relight_scene import kept_bakes
+    from radiosity_addon.blender.session import live_state
 
     say("Cornell box in Blender: the buttons, with export and files")
     radiosity_addon.register()

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from radiosity_addon.bake_scene import BakeObject, BakeScene
-from radiosity_addon.pipeline import bake
-from radiosity_addon.quality import quality_of
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.bake.pipeline import bake
+from radiosity_addon.bake.quality import quality_of
+from radiosity_addon.options.bake_settings import BakeSettings
+from radiosity_addon.scene.bake_scene import BakeObject, BakeScene
 from radiosity_addon.solver import Scene, solve_progress
 from tests.rooms import box_room
 

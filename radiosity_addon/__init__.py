@@ -10,12 +10,16 @@ from __future__ import annotations
 def register() -> None:
     """Add the operators, the panel, the settings and the command line to Blender."""
     from .blender import registration
+    from .blender.command_line import host
 
     registration.register()
+    host.register()
 
 
 def unregister() -> None:
     """Take out of Blender all that `register` added."""
     from .blender import registration
+    from .blender.command_line import host
 
+    host.unregister()
     registration.unregister()

@@ -6,8 +6,8 @@ import os
 import sys
 from typing import NoReturn
 
-from .interrupts import Interrupts
-from .temporary import TemporaryFolder
+from .cli.interrupts import Interrupts
+from .files.temporary_folder import TemporaryFolder
 
 
 def leave(code: int, temporary: TemporaryFolder) -> NoReturn:
@@ -21,7 +21,7 @@ def leave(code: int, temporary: TemporaryFolder) -> NoReturn:
 
 if __name__ == "__main__":
     with Interrupts() as interrupts:
-        from .cli import main  # Ctrl-C waits while modules are imported
+        from .blender.command_line.main import main  # Ctrl-C waits while modules are imported
 
         temporary = TemporaryFolder()
         code = main(interrupts=interrupts)

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from radiosity_addon.bake_scene import BakeScene
+from radiosity_addon.lights.environment import SkyPatch, pixel_bounds
+from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import AreaLight, EnvironmentLight, PointLight, Scene
-from radiosity_addon.solver.environment import SkyPatch, pixel_bounds
 from tests.rooms import box_room, grey, rectangle, solid_box
 from tests.unit.texel_scenes import bake_scene
 

@@ -8,14 +8,14 @@ from functools import cache
 
 import numpy as np
 
+from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.solver import Scene
-from radiosity_addon.solver.assembly import collocation, galerkin, linear
-from radiosity_addon.solver.basis import Basis, constant_basis
-from radiosity_addon.solver.elements import subdivide_evenly
-from radiosity_addon.solver.embree import EmbreeCaster
-from radiosity_addon.solver.hierarchy import Hierarchy
-from radiosity_addon.solver.linear_system import LinearSystem
-from radiosity_addon.solver.vertex_basis import vertex_basis
+from radiosity_addon.solver.equations.assembly import collocation, galerkin, linear
+from radiosity_addon.solver.equations.fixed_elements import subdivide_evenly
+from radiosity_addon.solver.equations.linear_system import LinearSystem
+from radiosity_addon.solver.equations.vertex_basis import vertex_basis
+from radiosity_addon.solver.hierarchy.basis import Basis, constant_basis
+from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from tests.cornell import cornell_box
 from tests.rooms import CEILING, box_room, grey
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from radiosity_addon.scene.textures import SurfaceImages
 from radiosity_addon.solver import Scene
-from radiosity_addon.solver.surface_images import SurfaceImages
 from tests.rooms import box_room, grey, rectangle
 from tests.unit.texel_scenes import QUAD_UV
 

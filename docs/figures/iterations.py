@@ -10,8 +10,8 @@ import scenes
 from matplotlib.figure import Figure
 from measures import assembled
 
-from radiosity_addon.solver.linear_system import LinearSystem
-from radiosity_addon.solver.matrix_properties import matrix_properties
+from radiosity_addon.solver.equations.linear_system import LinearSystem
+from radiosity_addon.solver.equations.matrix_report import matrix_properties
 from radiosity_addon.solver.methods.conjugate_gradient import conjugate_gradient
 from radiosity_addon.solver.methods.gauss_seidel import gauss_seidel
 from radiosity_addon.solver.methods.jacobi import jacobi

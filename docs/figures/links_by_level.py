@@ -11,7 +11,7 @@ import scenes
 from matplotlib.figure import Figure
 from measures import solved
 
-from radiosity_addon.solver.hierarchy import Hierarchy
+from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 
 LEVELS = (0, 1, 2, 3)
 FORM_FACTOR_ERROR = 0.1

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from measures import assembled
 
 from radiosity_addon.solver import Scene
-from radiosity_addon.solver.independent_sets import independent_sets
-from radiosity_addon.solver.matrix_properties import matrix_properties, symmetrised
+from radiosity_addon.solver.equations.independent_sets import independent_sets
+from radiosity_addon.solver.equations.matrix_report import matrix_properties, symmetrised
 
 
 def figure(small: bool) -> Figure:

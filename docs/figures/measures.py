@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from radiosity_addon.solver import Scene, SolverSettings, SolverState, solve_progress
-from radiosity_addon.solver.assembly import galerkin
-from radiosity_addon.solver.elements import subdivide_evenly
-from radiosity_addon.solver.linear_system import LinearSystem
-from radiosity_addon.solver.state import begin
+from radiosity_addon.solver.equations.assembly import galerkin
+from radiosity_addon.solver.equations.fixed_elements import subdivide_evenly
+from radiosity_addon.solver.equations.linear_system import LinearSystem
+from radiosity_addon.solver.state.state import begin
 
 
 def solved(scene: Scene, **settings: Any) -> SolverState:

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 
-from radiosity_addon.solver.hierarchy import Hierarchy
+from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 
 EYE = np.array([0.0, -8.0, 2.73])
 FOCAL = 35.0 / 25.0

@@ -7,7 +7,7 @@ import numpy as np
 import scenes
 from matplotlib.figure import Figure
 
-from radiosity_addon.solver.form_factor import disk_factor, triangle_to_triangle
+from radiosity_addon.form_factors.formulas import disk_factor, triangle_to_triangle
 
 HOWELL_C11 = {0.5: 0.4152532836, 1.0: 0.1998248957, 2.0: 0.0685895888}
 """Howell's catalog of configuration factors, C-11."""

@@ -6,8 +6,8 @@ import drawing
 import numpy as np
 from matplotlib.figure import Figure
 
+from radiosity_addon.base.radiometry import intensity_of_flux, irradiance_from_point
 from radiosity_addon.solver import PointLight
-from radiosity_addon.solver.radiometry import intensity_of_flux, irradiance_from_point
 
 FLUX = 100.0
 HEIGHT = 2.0

@@ -8,7 +8,7 @@ import scenes
 from matplotlib.figure import Figure
 from measures import solved
 
-from radiosity_addon.solver.residual import CONSTANT, DELTA, Residual
+from radiosity_addon.solver.gather.residual import CONSTANT, DELTA, Residual
 
 NAMES = {
     "galerkin": "Galerkin, constant",

@@ -8,7 +8,7 @@ import scenes
 from matplotlib.figure import Figure
 from measures import assembled
 
-from radiosity_addon.solver.linear_system import LinearSystem
+from radiosity_addon.solver.equations.linear_system import LinearSystem
 
 ROUNDS = 3
 

@@ -16,11 +16,11 @@ import numpy as np
 from PIL import Image
 
 import radiosity_addon
-from radiosity_addon.blender.cornell import build_cornell_box
-from radiosity_addon.blender.job import run_bake
-from radiosity_addon.blender.light_mixer import mixers, sliders_of
-from radiosity_addon.blender.png import render_png
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.blender.datablocks.png import render_png
+from radiosity_addon.blender.files.cornell import build_cornell_box
+from radiosity_addon.blender.images.light_mixer import mixers, sliders_of
+from radiosity_addon.blender.jobs.job import run_bake
+from radiosity_addon.options.bake_settings import BakeSettings
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -1,4 +1,4 @@
-"""All that the extension adds to Blender, in one order, and takes out again in the reverse."""
+"""All that the extension adds to Blender but its command, in one order; taken out in the reverse."""
 
 from __future__ import annotations
 
@@ -8,30 +8,26 @@ from functools import partial
 
 import bpy
 
-from . import (
-    bake_record,
+from .datablocks import bake_record
+from .files import ownership
+from .overlays import overlay_properties, overlay_view
+from .relight import kept_bakes, lightmap_versions, live_switch, relight_properties
+from .scene_records import object_roles
+from .session import runtime
+from .ui import (
     check_panel,
     cleaning,
-    cli_host,
     edit_guard,
-    kept_bakes,
     light_group_operators,
     light_group_panels,
     light_group_properties,
-    lightmap_versions,
     object_panel,
-    object_roles,
     operators,
-    overlay_properties,
-    overlay_view,
-    ownership,
     panels,
     preferences,
     preset_menu,
     properties,
     relight_operators,
-    relight_properties,
-    runtime,
 )
 
 CLASSES = (
@@ -57,7 +53,7 @@ def register() -> None:
     try:
         for module in (
             *(bake_record, object_roles, light_group_properties, properties),
-            *(kept_bakes, lightmap_versions, relight_properties),
+            *(kept_bakes, lightmap_versions, relight_properties, live_switch),
             *(overlay_properties, overlay_view, edit_guard),
         ):
             module.register()
@@ -70,8 +66,6 @@ def register() -> None:
             _undo.append(module.unregister)
         _undo.append(check_panel.forget_checks)
         _undo.append(runtime.stop_running)
-        cli_host.register()
-        _undo.append(cli_host.unregister)
     except BaseException:
         unregister()
         raise

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Generator
 
-from .lights import AreaLight, EnvironmentLight, PointLight, SpotLight, SunLight
+from ..lights.sun_and_sky import AreaLight, EnvironmentLight, PointLight, SpotLight, SunLight
+from ..options.solver_settings import SolverSettings
+from ..scene.scene import Scene
 from .methods import steps_of
-from .scene import Scene
-from .settings import SolverSettings
 from .solution import Solution
-from .state import SolverState
+from .state.state import SolverState
 
 __all__ = [
     "AreaLight",

@@ -1,7 +1,7 @@
 """A solved scene whose triangles have moved, by the elements that it was solved with.
 
 What rays met is numbered by these elements, so they move with their faces. Their light is not solved
-again: texels bring what has changed (`lightmap/moved.py`), and the hierarchy is where they start.
+again: texels bring what has changed (`lightmap/update/moved.py`), and the hierarchy is where they start.
 """
 
 from __future__ import annotations
@@ -10,14 +10,16 @@ from copy import copy
 
 import numpy as np
 
-from .arrays import Array
-from .cut_outs import ray_caster
+from ..base.arrays import Array
+from ..base.triangles import split_in_four
+from ..scene.faces import Faces
+from ..scene.opacity import ray_caster
+from ..scene.scene import Scene
 from .element_transport import Relightable
-from .hierarchy import LEAF, Faces, Hierarchy, split_in_four
-from .light_sources import LightSources
-from .local_pass import LocalPass
+from .emitters.light_sources import LightSources
+from .gather.local_pass import LocalPass
+from .hierarchy.nodes import LEAF, Hierarchy
 from .methods.hierarchical import HierarchicalState
-from .scene import Scene
 
 
 def on_scene(hierarchy: Hierarchy, scene: Scene) -> Hierarchy:

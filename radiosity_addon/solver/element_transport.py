@@ -10,16 +10,16 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-from ..errors import UsageError
-from .anderson import Anderson
-from .arrays import Array
-from .bounce import bounce
-from .light_links import join_light_links, link_lights
-from .light_sources import LightSources
-from .local_pass import LocalPass
+from ..base.arrays import Array
+from ..base.errors import UsageError
+from .emitters.light_sources import LightSources
+from .gather.local_pass import LocalPass
+from .links.light_links import join_light_links, link_lights
+from .links.transport import push
 from .methods.hierarchical import HierarchicalState
-from .state import SolverState
-from .transport import push
+from .state.anderson import Anderson
+from .state.iteration import bounce
+from .state.state import SolverState
 
 ITERATIONS = 100
 """At most: accelerated, a digit takes some three."""

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from .arrays import Array
+from ..base.arrays import Array
 from .element_transport import Relightable
-from .link_record import LinkRecord, record_links
-from .local_pass import LocalPass
-from .power import power_balance
-from .residual import Residual
-from .state import SolverState
+from .gather.local_pass import LocalPass
+from .gather.residual import Residual
+from .state.link_record import LinkRecord, record_links
+from .state.power import power_balance
+from .state.state import SolverState
 
 POINT_RAYS = 1024
 """Hemisphere rays of a single point in `Solution.irradiance`."""

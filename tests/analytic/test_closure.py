@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from bench.rooms import room
-from radiosity_addon.quality import QUALITIES
+from radiosity_addon.bake.quality import QUALITIES
+from radiosity_addon.base.sampling import cosine_hemisphere, points_on_triangles, to_world
 from radiosity_addon.solver import PointLight, Scene, Solution
 from radiosity_addon.solver.methods.hierarchical import HierarchicalState, solve_steps
-from radiosity_addon.solver.sampling import cosine_hemisphere, points_on_triangles, to_world
 from tests.cornell import cornell_box
 from tests.rooms import CEILING, box_room, coloured_room, grey, solid_box
 

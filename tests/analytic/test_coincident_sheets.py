@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.bake_scene import LightmapPage
-from radiosity_addon.pipeline import bake
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.bake.pipeline import bake
+from radiosity_addon.base.progress import drain
+from radiosity_addon.lightmap.images.page import LightmapPage
+from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.solver import PointLight, Scene
-from radiosity_addon.solver.steps import drain
 from tests.rooms import box_room, grey, rectangle
 from tests.unit.texel_scenes import bake_scene
 

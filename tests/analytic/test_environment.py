@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.solver import Scene, SolverSettings, solve
-from radiosity_addon.solver.environment import (
+from radiosity_addon.base.sampling import stratified_square
+from radiosity_addon.lights.environment import (
     CELLS,
     EnvironmentImage,
     SkyPatch,
@@ -17,8 +17,8 @@ from radiosity_addon.solver.environment import (
     pixel_bounds,
     solid_angles,
 )
-from radiosity_addon.solver.lights import EnvironmentLight, Light
-from radiosity_addon.solver.sampling import stratified_square
+from radiosity_addon.lights.sun_and_sky import EnvironmentLight, Light
+from radiosity_addon.solver import Scene, SolverSettings, solve
 from tests.rooms import grey, rectangle
 
 SHAPE = (128, 256)

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from radiosity_addon.solver.form_factor import (
+from radiosity_addon.form_factors.formulas import (
     cap_cosine,
     disk_factor,
     point_to_ellipse,

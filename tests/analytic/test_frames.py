@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from radiosity_addon.lightmap.reconstruct import GatherSettings, reconstruct
-from radiosity_addon.lightmap.sweeps import TexelLight
-from radiosity_addon.lightmap.texel_geometry import TexelGeometry
+from radiosity_addon.base.progress import drain
+from radiosity_addon.lightmap.lighting.gather_settings import GatherSettings
+from radiosity_addon.lightmap.lighting.reconstruct import reconstruct
+from radiosity_addon.lightmap.lighting.sweeps import TexelLight
+from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
+from radiosity_addon.lights.light import Light
 from radiosity_addon.solver import EnvironmentLight, Scene, SolverSettings, SunLight, solve
-from radiosity_addon.solver.light_base import Light
-from radiosity_addon.solver.steps import drain
 from tests.rooms import grey, rectangle
 from tests.unit.texel_scenes import QUAD_UV, texel_geometry
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap.reconstruct import GatherSettings, reconstruct
+from radiosity_addon.base.progress import drain
+from radiosity_addon.lightmap.lighting.gather_settings import GatherSettings
+from radiosity_addon.lightmap.lighting.reconstruct import reconstruct
 from radiosity_addon.solver import EnvironmentLight, Scene, SolverSettings, solve
-from radiosity_addon.solver.steps import drain
 from tests.rooms import grey, rectangle
 from tests.unit.texel_scenes import QUAD_UV, texel_geometry
 

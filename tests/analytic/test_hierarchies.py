@@ -7,11 +7,11 @@ from functools import cache
 import numpy as np
 import pytest
 
+from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.solver import PointLight, Scene, Solution, SolverSettings, solve
-from radiosity_addon.solver.elements import subdivide_below
-from radiosity_addon.solver.embree import EmbreeCaster
-from radiosity_addon.solver.exchange import exchange_areas
-from radiosity_addon.solver.hierarchy import Hierarchy
+from radiosity_addon.solver.equations.exchange_areas import exchange_areas
+from radiosity_addon.solver.equations.fixed_elements import subdivide_below
+from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from radiosity_addon.solver.methods import hierarchical, multi_level
 from radiosity_addon.solver.methods.hierarchical import HierarchicalState
 from radiosity_addon.solver.methods.multi_level import MultiLevelState

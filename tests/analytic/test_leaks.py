@@ -12,9 +12,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from radiosity_addon.bake_scene import BakedObject, BakeResult, BakeScene, LightmapPage
-from radiosity_addon.pipeline import bake
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.bake.pipeline import bake
+from radiosity_addon.bake.result.result import BakedObject, BakeResult
+from radiosity_addon.lightmap.images.page import LightmapPage
+from radiosity_addon.options.bake_settings import BakeSettings
+from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import EnvironmentLight, PointLight, Scene
 from tests.rooms import CEILING, box_room, grey, rectangle, solid_box
 from tests.unit.texel_scenes import bake_scene

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.errors import SceneError
-from radiosity_addon.solver.form_factor import cap_cosine, point_to_ellipse, point_to_polygon
-from radiosity_addon.solver.lights import (
+from radiosity_addon.base.errors import SceneError
+from radiosity_addon.base.sampling import points_on_triangles, stratified_square
+from radiosity_addon.form_factors.formulas import cap_cosine, point_to_ellipse, point_to_polygon
+from radiosity_addon.lights.sun_and_sky import (
     AreaLight,
     EnvironmentLight,
     Lamp,
@@ -16,7 +17,6 @@ from radiosity_addon.solver.lights import (
     SpotLight,
     SunLight,
 )
-from radiosity_addon.solver.sampling import points_on_triangles, stratified_square
 
 DOWN = (0.0, 0.0, -1.0)
 

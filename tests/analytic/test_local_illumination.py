@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.bake_scene import BakeObject, BakeScene
-from radiosity_addon.pipeline import bake
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.bake.pipeline import bake
+from radiosity_addon.options.bake_settings import BakeSettings
+from radiosity_addon.scene.bake_scene import BakeObject, BakeScene
 from radiosity_addon.solver import PointLight, Scene
 from tests.rooms import grey, rectangle
 

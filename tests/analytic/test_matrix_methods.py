@@ -7,13 +7,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from radiosity_addon.errors import UsageError
+from radiosity_addon.base.errors import UsageError
+from radiosity_addon.form_factors.formulas import point_to_polygon
 from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, SolverSettings
-from radiosity_addon.solver.form_factor import point_to_polygon
+from radiosity_addon.solver.equations.vertex_basis import INWARD
 from radiosity_addon.solver.methods import steps_of
 from radiosity_addon.solver.methods.dense import dense
 from radiosity_addon.solver.methods.matrix import MatrixState
-from radiosity_addon.solver.vertex_basis import INWARD
 from tests.cornell import cornell_box
 from tests.rooms import CEILING, FLOOR, WALLS, area_mean, box_room, grey, rectangle, sphere
 from tests.systems import assembled

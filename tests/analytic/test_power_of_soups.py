@@ -7,10 +7,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from radiosity_addon.pipeline import bake
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.bake.pipeline import bake
+from radiosity_addon.base.progress import drain
+from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.solver import Scene, SolverSettings, solve
-from radiosity_addon.solver.steps import drain
 from tests.analytic.soup_tracer import Soup, measure
 from tests.rooms import CEILING, box_room, grey, rectangle, solid_box
 from tests.unit.texel_scenes import bake_scene

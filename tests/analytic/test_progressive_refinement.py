@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.solver import PointLight, Scene, SolverSettings, solve
-from radiosity_addon.solver.assembly import galerkin, with_lamps
-from radiosity_addon.solver.elements import subdivide_evenly
-from radiosity_addon.solver.embree import EmbreeCaster
-from radiosity_addon.solver.hierarchy import Hierarchy
-from radiosity_addon.solver.linear_system import LinearSystem
+from radiosity_addon.solver.equations.assembly import galerkin, with_lamps
+from radiosity_addon.solver.equations.fixed_elements import subdivide_evenly
+from radiosity_addon.solver.equations.linear_system import LinearSystem
+from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from radiosity_addon.solver.methods import steps_of
 from radiosity_addon.solver.methods.shooting import solve_steps
-from radiosity_addon.solver.state import SolverState
+from radiosity_addon.solver.state.state import SolverState
 from tests.cornell import cornell_box
 from tests.rooms import CEILING, FLOOR, box_room, coloured_room, grey
 

@@ -7,14 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from radiosity_addon.bake_scene import BakeResult, BakeScene
-from radiosity_addon.errors import SceneError
-from radiosity_addon.pipeline import bake, bake_and_keep
-from radiosity_addon.rebaking import bake_moved, can_move, moved_objects
-from radiosity_addon.relighting import KeptBake, relight
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.bake.pipeline import bake, bake_and_keep
+from radiosity_addon.bake.rebaking import bake_moved, can_move, moved_objects
+from radiosity_addon.bake.relight.kept_bake import KeptBake, relight
+from radiosity_addon.bake.result.result import BakeResult
+from radiosity_addon.base.errors import SceneError
+from radiosity_addon.base.progress import drain
+from radiosity_addon.options.bake_settings import BakeSettings
+from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import PointLight, Scene
-from radiosity_addon.solver.steps import drain
 from tests.moved_rooms import ELSEWHERE, PLACE, laid_out_as, room
 from tests.rooms import box_room, grey, solid_box
 from tests.unit.texel_scenes import bake_scene

@@ -8,14 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from radiosity_addon.bake_scene import BakeScene, LightmapPage
-from radiosity_addon.errors import SceneError, UsageError
-from radiosity_addon.lightmap.earlier_light import EarlierLight
-from radiosity_addon.pipeline import bake, bake_and_keep
-from radiosity_addon.relighting import KeptBake, relight
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.bake.pipeline import bake, bake_and_keep
+from radiosity_addon.bake.relight.kept_bake import KeptBake, relight
+from radiosity_addon.base.errors import SceneError, UsageError
+from radiosity_addon.base.progress import drain
+from radiosity_addon.lightmap.images.page import LightmapPage
+from radiosity_addon.lightmap.lighting.warm_start import EarlierLight
+from radiosity_addon.options.bake_settings import BakeSettings
+from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import PointLight, Scene
-from radiosity_addon.solver.steps import drain
 from tests.cornell import cornell_box
 from tests.relit_rooms import BAKED, CHANGED, NAMES, lit_bake, lit_room
 from tests.rooms import box_room, grey

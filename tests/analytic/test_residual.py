@@ -5,22 +5,22 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, Solution, SolverSettings, SpotLight
-from radiosity_addon.solver.assembly import collocation, galerkin, linear
-from radiosity_addon.solver.basis import Basis, constant_basis
-from radiosity_addon.solver.elements import subdivide_evenly
-from radiosity_addon.solver.linear_system import LinearSystem
-from radiosity_addon.solver.methods.matrix import MatrixState
-from radiosity_addon.solver.radiometry import (
+from radiosity_addon.base.radiometry import (
     brdf_of_reflectance,
     intensity_of_flux,
     irradiance_from_point,
     radiosity_of_radiance,
     reflected_radiance,
 )
-from radiosity_addon.solver.residual import Residual
-from radiosity_addon.solver.state import begin
-from radiosity_addon.solver.vertex_basis import vertex_basis
+from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, Solution, SolverSettings, SpotLight
+from radiosity_addon.solver.equations.assembly import collocation, galerkin, linear
+from radiosity_addon.solver.equations.fixed_elements import subdivide_evenly
+from radiosity_addon.solver.equations.linear_system import LinearSystem
+from radiosity_addon.solver.equations.vertex_basis import vertex_basis
+from radiosity_addon.solver.gather.residual import Residual
+from radiosity_addon.solver.hierarchy.basis import Basis, constant_basis
+from radiosity_addon.solver.methods.matrix import MatrixState
+from radiosity_addon.solver.state.state import begin
 from tests.rooms import CEILING, box_room, grey, rectangle, solid_box
 
 

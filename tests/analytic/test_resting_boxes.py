@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.bake_scene import LightmapPage
-from radiosity_addon.pipeline import bake
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.bake.pipeline import bake
+from radiosity_addon.base.progress import drain
+from radiosity_addon.lightmap.images.page import LightmapPage
+from radiosity_addon.lights.sun_and_sky import Light
+from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, SunLight
-from radiosity_addon.solver.lights import Light
-from radiosity_addon.solver.steps import drain
 from tests.rooms import box_room, grey, rectangle, solid_box
 from tests.unit.texel_scenes import bake_scene
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.errors import SceneError
+from radiosity_addon.base.errors import SceneError
+from radiosity_addon.base.sampling import stratified_square
 from radiosity_addon.solver import SpotLight
-from radiosity_addon.solver.sampling import stratified_square
 
 DOWN = (0.0, 0.0, -1.0)
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from radiosity_addon.form_factors.formulas import point_to_polygon
+from radiosity_addon.scene.textures import SurfaceImages
 from radiosity_addon.solver import PointLight, Scene, SolverSettings, solve
-from radiosity_addon.solver.form_factor import point_to_polygon
-from radiosity_addon.solver.surface_images import SurfaceImages
 from tests.rooms import CEILING, box_room, grey, rectangle
 from tests.textured_rooms import furnace, image, patterned
 from tests.unit.texel_scenes import QUAD_UV

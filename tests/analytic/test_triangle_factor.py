@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.solver import triangle_factor
-from radiosity_addon.solver.form_factor import point_to_polygon, triangle_to_triangle
-from radiosity_addon.solver.sampling import points_on_triangles, stratified_square
+from radiosity_addon.base.sampling import points_on_triangles, stratified_square
+from radiosity_addon.form_factors import triangle_pairs
+from radiosity_addon.form_factors.formulas import point_to_polygon, triangle_to_triangle
 from tests.rooms import FLOOR, box_room
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -149,7 +149,7 @@ def test_far_and_near_rules_agree(monkeypatch: pytest.MonkeyPatch) -> None:
     first = shape @ np.stack([random_rotation(rng) for _ in range(2000)])
     second = shape @ np.stack([random_rotation(rng) for _ in range(2000)]) + 3 * rng.normal(size=(2000, 1, 3))
     mixed = triangle_to_triangle(first, second)
-    monkeypatch.setattr(triangle_factor, "FAR", 0.0)
+    monkeypatch.setattr(triangle_pairs, "FAR", 0.0)
     outline = triangle_to_triangle(first, second)
     assert (mixed != outline).mean() > 0.05
     np.testing.assert_allclose(mixed, outline, atol=2e-5)
@@ -250,10 +250,10 @@ def test_tiny_receiver_beside_a_huge_source() -> None:
 def test_kronrod_rule_is_exact_to_degree_22_and_its_gauss_rule_to_13() -> None:
     for degree in range(23):
         exact = (1 + (-1) ** degree) / (degree + 1)
-        powers = triangle_factor.KRONROD_NODES**degree
-        assert powers @ triangle_factor.KRONROD_WEIGHTS == pytest.approx(exact, abs=1e-14)
+        powers = triangle_pairs.KRONROD_NODES**degree
+        assert powers @ triangle_pairs.KRONROD_WEIGHTS == pytest.approx(exact, abs=1e-14)
         if degree <= 13:
-            assert powers @ triangle_factor.GAUSS_WEIGHTS == pytest.approx(exact, abs=1e-14)
+            assert powers @ triangle_pairs.GAUSS_WEIGHTS == pytest.approx(exact, abs=1e-14)
 
 
 @pytest.mark.parametrize("width", [1e-6, 1e-8, 1e-10, 1e-13])

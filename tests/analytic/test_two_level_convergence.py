@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from radiosity_addon.solver import PointLight, Scene, SolverSettings, solve
-from radiosity_addon.solver.hierarchy import Hierarchy
-from radiosity_addon.solver.local_pass import LocalPass
+from radiosity_addon.solver.gather.local_pass import LocalPass
+from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from radiosity_addon.solver.methods import steps_of
-from radiosity_addon.solver.state import SolverState
+from radiosity_addon.solver.state.state import SolverState
 from tests.cornell import cornell_box
 from tests.rooms import CEILING, FLOOR, box_room, coloured_room, grey, rectangle
 

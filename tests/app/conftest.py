@@ -39,7 +39,7 @@ class Outcome:
 @pytest.fixture
 def run(capfd: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:
     """The command line, called in this process: quick, and just what `python -m` calls."""
-    from radiosity_addon.cli import main
+    from radiosity_addon.blender.command_line.main import main
 
     def call(*words: object) -> Outcome:
         capfd.readouterr()

@@ -126,18 +126,18 @@ def test_a_baked_file_bakes_again_as_the_original_does(run: Run, room: Path, tmp
 
 def test_inside_a_blender_that_has_the_file_open(room: Path, tmp_path: Path) -> None:
     """What `blender -b room.blend --command radiosity …` calls."""
-    from radiosity_addon.blender import cli_host
+    from radiosity_addon.blender.command_line import host
 
     bpy.ops.wm.open_mainfile(filepath=str(room))
-    assert cli_host.run(["bake", "--output", str(tmp_path / "out"), *QUICK, "--quiet"]) == 0
+    assert host.run(["bake", "--output", str(tmp_path / "out"), *QUICK, "--quiet"]) == 0
     assert {entry["object"] for entry in read_report(tmp_path / "out")["objects"]} == {
         "Floor",
         "Wall",
         "Cube",
     }
-    assert cli_host.run(["bake", "--resolution", "0"]) == 2
-    assert cli_host.run(["bake"]) == 2  # an open file needs --output
-    assert cli_host.run(["--help"]) == 0
+    assert host.run(["bake", "--resolution", "0"]) == 2
+    assert host.run(["bake"]) == 2  # an open file needs --output
+    assert host.run(["--help"]) == 0
 
 
 # --- in a process of its own ---
@@ -170,7 +170,7 @@ def replacing(source, goal):
     return replace(source, goal)
 
 Path.replace = replacing
-from radiosity_addon.cli import main
+from radiosity_addon.blender.command_line.main import main
 main(sys.argv[2:])
 """
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import bpy
 import pytest
 
-from radiosity_addon.blender import job
-from radiosity_addon.blender.commands import registered
-from radiosity_addon.blender.inspection import ERROR, inspect
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.blender.command_line.verbs import registered
+from radiosity_addon.blender.jobs import job
+from radiosity_addon.blender.jobs.inspection import ERROR, inspect
+from radiosity_addon.options.bake_settings import BakeSettings
 
 Run = Callable[..., object]
 

@@ -58,7 +58,7 @@ def save_small(path: Path) -> Path:
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory: pytest.TempPathFactory) -> np.ndarray:
     """The same room, baked by the default method."""
-    from radiosity_addon.cli import main
+    from radiosity_addon.blender.command_line.main import main
 
     folder = tmp_path_factory.mktemp("reference")
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)

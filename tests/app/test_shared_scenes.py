@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import radiosity_addon
-from radiosity_addon.blender.files import open_scene
-from radiosity_addon.blender.job import run_bake
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.blender.files.files import open_scene
+from radiosity_addon.blender.jobs.job import run_bake
+from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.file_dump import differences, dump_file
 
 QUICK = BakeSettings(resolution=64, quality="draft")

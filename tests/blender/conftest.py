@@ -25,7 +25,7 @@ def _empty_file() -> None:
 @pytest.fixture
 def record() -> Iterator[None]:
     """The type of what a bake remembers, registered without the rest of the add-on."""
-    from radiosity_addon.blender import bake_record
+    from radiosity_addon.blender.datablocks import bake_record
 
     if hasattr(bpy.types.Object, "radiosity_bake"):
         yield

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import bpy
 
-from radiosity_addon.blender.bake_record import is_made
-from radiosity_addon.blender.copy_marks import ORIGINAL
+from radiosity_addon.blender.datablocks.bake_record import is_made
+from radiosity_addon.blender.material_copies.copy_marks import ORIGINAL
 from tests.blender.hand_bake import (
     BASE,
     add_plane,

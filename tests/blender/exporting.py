@@ -7,10 +7,10 @@ from typing import Any
 import bpy
 import numpy as np
 
-from radiosity_addon.bake_scene import BakeObject
-from radiosity_addon.blender.export import export_scene
-from radiosity_addon.blender.export_sources import Export
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.blender.scene_export.export import export_scene
+from radiosity_addon.blender.scene_records.export_sources import Export
+from radiosity_addon.options.bake_settings import BakeSettings
+from radiosity_addon.scene.bake_scene import BakeObject
 from tests.blender.scenes import add_mesh, add_object
 
 TRIANGLE = ((0, 0, 0), (1, 0, 0), (0, 1, 0))

@@ -9,14 +9,15 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from radiosity_addon.bake_scene import BakeResult, LightGroup, LightmapPage
-from radiosity_addon.blender.apply import apply_lightmaps
-from radiosity_addon.blender.export import export_scene
-from radiosity_addon.blender.group_images import write_groups
-from radiosity_addon.blender.images import write_pages
-from radiosity_addon.blender.light_mixer import mixers, sliders_of
-from radiosity_addon.blender.rebake import originals_shown, replacing_earlier
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.bake.result.result import BakeResult, LightGroup
+from radiosity_addon.blender.apply.apply import apply_lightmaps
+from radiosity_addon.blender.apply.rebake import originals_shown, replacing_earlier
+from radiosity_addon.blender.images.group_images import write_groups
+from radiosity_addon.blender.images.images import write_pages
+from radiosity_addon.blender.images.light_mixer import mixers, sliders_of
+from radiosity_addon.blender.scene_export.export import export_scene
+from radiosity_addon.lightmap.images.page import LightmapPage
+from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.hand_bake import add_plane, hand_result, principled_material
 
 LAMP, GLOW = (0.25, 0.5, 2.0), (0.5, 0.0, 1.0)

@@ -9,13 +9,14 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from radiosity_addon.bake_scene import BakedObject, BakeResult, LightmapPage
-from radiosity_addon.blender.apply import apply_lightmaps
-from radiosity_addon.blender.export import export_scene
-from radiosity_addon.blender.export_sources import Export
-from radiosity_addon.blender.images import write_pages
-from radiosity_addon.blender.rebake import originals_shown, replacing_earlier
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.bake.result.result import BakedObject, BakeResult
+from radiosity_addon.blender.apply.apply import apply_lightmaps
+from radiosity_addon.blender.apply.rebake import originals_shown, replacing_earlier
+from radiosity_addon.blender.images.images import write_pages
+from radiosity_addon.blender.scene_export.export import export_scene
+from radiosity_addon.blender.scene_records.export_sources import Export
+from radiosity_addon.lightmap.images.page import LightmapPage
+from radiosity_addon.options.bake_settings import BakeSettings
 
 TEXEL = (0.25, 0.5, 3.0)
 BASE = (0.5, 0.25, 0.75)

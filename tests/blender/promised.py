@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 import pytest
 
-from radiosity_addon.cli import main
+from radiosity_addon.blender.command_line.main import main
 from tests.reliability.folders import reports
 from tests.reliability.sandbox import build_room
 
@@ -66,7 +66,7 @@ def refuse_work(monkeypatch: pytest.MonkeyPatch) -> None:
     def worked(*_arguments: object) -> None:
         raise AssertionError("the bake was not stopped before the work")
 
-    monkeypatch.setattr("radiosity_addon.blender.job.bake_steps", worked)
+    monkeypatch.setattr("radiosity_addon.blender.jobs.job.bake_steps", worked)
 
 
 def bake() -> None:

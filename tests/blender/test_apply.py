@@ -9,13 +9,13 @@ import bpy
 import numpy as np
 import pytest
 
-from radiosity_addon.blender import bake_record
-from radiosity_addon.blender.apply import apply_lightmaps, check_targets
-from radiosity_addon.blender.export import export_scene
-from radiosity_addon.blender.images import write_pages
-from radiosity_addon.blender.node_group import GROUP_NAME
-from radiosity_addon.errors import BakeError, SceneError
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.base.errors import BakeError, SceneError
+from radiosity_addon.blender.apply.apply import apply_lightmaps, check_targets
+from radiosity_addon.blender.datablocks import bake_record
+from radiosity_addon.blender.images.images import write_pages
+from radiosity_addon.blender.images.node_group import GROUP_NAME
+from radiosity_addon.blender.scene_export.export import export_scene
+from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.file_dump import differences, dump_file
 from tests.blender.hand_bake import add_plane, bake_by_hand, hand_result, principled_material
 from tests.blender.zoo import build_zoo

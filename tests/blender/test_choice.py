@@ -9,8 +9,8 @@ import bpy
 import numpy as np
 import pytest
 
-from radiosity_addon.blender.scene_objects import copy_evaluated_meshes
-from radiosity_addon.errors import SceneError, UsageError
+from radiosity_addon.base.errors import SceneError, UsageError
+from radiosity_addon.blender.scene_records.scene_objects import copy_evaluated_meshes
 from tests.blender.exporting import (
     CUBE,
     CUBE_FACES,

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import radiosity_addon
-from radiosity_addon.bake_scene import LIGHTMAP_UV_LAYER
-from radiosity_addon.blender.job import run_bake
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.blender.jobs.job import run_bake
+from radiosity_addon.options.bake_settings import BakeSettings
+from radiosity_addon.scene.bake_scene import LIGHTMAP_UV_LAYER
 from tests.blender.scenes import add_lamp, add_mesh, shader_material
 
 INDIRECT_LX = {0.2: 26.04, 0.5: 104.17, 0.8: 416.67, 0.9: 937.5, 0.95: 1979.17}

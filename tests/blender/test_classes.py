@@ -11,9 +11,11 @@ import bpy
 import pytest
 
 import radiosity_addon
-from radiosity_addon.blender import panels, registration, runtime
-from radiosity_addon.blender.cornell import build_cornell_box
-from radiosity_addon.blender.sections import Section
+from radiosity_addon.blender import registration
+from radiosity_addon.blender.files.cornell import build_cornell_box
+from radiosity_addon.blender.session import runtime
+from radiosity_addon.blender.ui import panels
+from radiosity_addon.blender.ui.sections import Section
 
 BLENDER = Path(radiosity_addon.__file__).parent / "blender"
 SOURCES = sorted(path for path in BLENDER.rglob("*.py") if "presets" not in path.parts)

@@ -8,11 +8,11 @@ import bpy
 import numpy as np
 import pytest
 
-from radiosity_addon.blender.cornell import LAMP_RADIANCE, REFLECTANCE, build_cornell_box, lamp_power
-from radiosity_addon.blender.export import export_scene
-from radiosity_addon.blender.export_sources import Export
-from radiosity_addon.settings import BakeSettings
-from radiosity_addon.solver.lights import AreaLight
+from radiosity_addon.blender.files.cornell import LAMP_RADIANCE, REFLECTANCE, build_cornell_box, lamp_power
+from radiosity_addon.blender.scene_export.export import export_scene
+from radiosity_addon.blender.scene_records.export_sources import Export
+from radiosity_addon.lights.sun_and_sky import AreaLight
+from radiosity_addon.options.bake_settings import BakeSettings
 
 _WALLS = ["Floor", "Ceiling", "Back Wall", "Right Wall", "Left Wall"]
 _BLOCKS = ["Short Block", "Tall Block"]

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import radiosity_addon
-from radiosity_addon.cli import main
+from radiosity_addon.blender.command_line.main import main
 from tests.reliability.folders import broken_result, changes, leftovers, tree
 
 FIXTURES = Path(__file__).resolve().parents[1] / "fixtures" / "v0.1.0"

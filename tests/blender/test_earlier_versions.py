@@ -7,8 +7,8 @@ from pathlib import Path
 import bpy
 import pytest
 
-from radiosity_addon.blender import bake_record
-from radiosity_addon.blender.restore import restore_scene
+from radiosity_addon.blender.apply.restore import restore_scene
+from radiosity_addon.blender.datablocks import bake_record
 from tests.blender.hand_bake import bake_by_hand
 
 pytestmark = pytest.mark.usefixtures("record")

@@ -8,8 +8,8 @@ import bpy
 import numpy as np
 import pytest
 
-from radiosity_addon.blender import bake_record
-from radiosity_addon.blender.restore import restore
+from radiosity_addon.blender.apply.restore import restore
+from radiosity_addon.blender.datablocks import bake_record
 from tests.blender.file_dump import differences_since, dump_file
 from tests.blender.hand_bake import add_plane, bake_by_hand, principled_material
 

@@ -8,12 +8,12 @@ import bpy
 import numpy as np
 import pytest
 
-from radiosity_addon.blender import surface_bake
-from radiosity_addon.blender.export import export_scene
-from radiosity_addon.blender.materials import read_material
-from radiosity_addon.settings import BakeSettings
-from radiosity_addon.solver.scene import Scene
-from radiosity_addon.solver.surface_images import SurfaceImages
+from radiosity_addon.blender.cycles import surface_bake
+from radiosity_addon.blender.materials.materials import read_material
+from radiosity_addon.blender.scene_export.export import export_scene
+from radiosity_addon.options.bake_settings import BakeSettings
+from radiosity_addon.scene.scene import Scene
+from radiosity_addon.scene.textures import SurfaceImages
 from tests.blender.exporting import CUBE, CUBE_FACES, add_cube, add_instance
 from tests.blender.material_zoo import BLUE, RED, ZOO, cut_out, diffuse_of, feed, make_all_vary
 from tests.blender.scenes import add_mesh, add_node, shader_material
@@ -87,7 +87,7 @@ def _look_up(images: SurfaceImages, scene: Scene) -> tuple[np.ndarray, np.ndarra
 
 @pytest.mark.parametrize("colorspace", ["Non-Color", "sRGB"])
 def test_an_image_texture_gives_its_own_texels(colorspace: str) -> None:
-    from radiosity_addon.blender.image_values import linear_from_srgb
+    from radiosity_addon.blender.datablocks.image_values import linear_from_srgb
 
     image, pixels = _picture(8, colorspace)
     material, node = diffuse_of("ShaderNodeTexImage")

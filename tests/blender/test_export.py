@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from radiosity_addon.errors import SceneError
+from radiosity_addon.base.errors import SceneError
 from tests.blender.exporting import (
     CUBE,
     CUBE_FACES,

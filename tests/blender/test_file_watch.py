@@ -11,15 +11,16 @@ import bpy
 import pytest
 
 import radiosity_addon
-from radiosity_addon.blender import runtime, window_job
-from radiosity_addon.blender.bake_record import recorded_objects
-from radiosity_addon.blender.cornell import build_cornell_box
-from radiosity_addon.blender.file_watch import guarded
-from radiosity_addon.blender.job import run_bake
-from radiosity_addon.blender.relight import run_relight
-from radiosity_addon.errors import BakeError, RadiosityError
-from radiosity_addon.keeping import Keeping
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.bake.keep import Keeping
+from radiosity_addon.base.errors import BakeError, RadiosityError
+from radiosity_addon.blender.datablocks.bake_record import recorded_objects
+from radiosity_addon.blender.files.cornell import build_cornell_box
+from radiosity_addon.blender.jobs import window_job
+from radiosity_addon.blender.jobs.file_watch import guarded
+from radiosity_addon.blender.jobs.job import run_bake
+from radiosity_addon.blender.relight.relight_scene import run_relight
+from radiosity_addon.blender.session import runtime
+from radiosity_addon.options.bake_settings import BakeSettings
 
 QUICK = BakeSettings(resolution=16, quality="draft")
 

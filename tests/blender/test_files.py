@@ -9,8 +9,8 @@ import addon_utils
 import bpy
 import pytest
 
-from radiosity_addon.blender.files import empty_scene, open_scene
-from radiosity_addon.errors import SceneError
+from radiosity_addon.base.errors import SceneError
+from radiosity_addon.blender.files.files import empty_scene, open_scene
 from tests.blender.scenes import add_lamp, add_mesh
 
 

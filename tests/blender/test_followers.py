@@ -7,10 +7,10 @@ from pathlib import Path
 import bpy
 import pytest
 
-from radiosity_addon.blender.export import export_scene
-from radiosity_addon.blender.rebake import originals_shown
-from radiosity_addon.blender.restore import restore
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.blender.apply.rebake import originals_shown
+from radiosity_addon.blender.apply.restore import restore
+from radiosity_addon.blender.scene_export.export import export_scene
+from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.hand_bake import add_plane, bake_by_hand
 from tests.blender.scenes import add_lamp, add_mesh, add_object
 

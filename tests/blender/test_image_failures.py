@@ -17,8 +17,8 @@ import os, resource, sys
 from pathlib import Path
 import bpy
 import numpy as np
-from radiosity_addon.blender.images import save_image
-from radiosity_addon.errors import BakeError
+from radiosity_addon.blender.images.images import save_image
+from radiosity_addon.base.errors import BakeError
 
 image = bpy.data.images.new("page", 64, 64, float_buffer=True, is_data=True)
 image.pixels.foreach_set(np.random.default_rng(0).random(64 * 64 * 4, dtype=np.float32))

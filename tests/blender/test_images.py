@@ -9,8 +9,9 @@ import bpy
 import numpy as np
 import pytest
 
-from radiosity_addon.bake_scene import BakeResult, LightmapPage
-from radiosity_addon.blender.images import (
+from radiosity_addon.bake.result.result import BakeResult
+from radiosity_addon.base.errors import BakeError
+from radiosity_addon.blender.images.images import (
     image_scale,
     lightmap_files,
     page_file_names,
@@ -18,8 +19,8 @@ from radiosity_addon.blender.images import (
     set_folder,
     write_pages,
 )
-from radiosity_addon.errors import BakeError
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.lightmap.images.page import LightmapPage
+from radiosity_addon.options.bake_settings import BakeSettings
 
 
 def _page(seed: int = 0) -> LightmapPage:

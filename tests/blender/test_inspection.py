@@ -14,14 +14,15 @@ import bpy
 import pytest
 
 import radiosity_addon
-from radiosity_addon.blender import check_panel, runtime
-from radiosity_addon.blender.cornell import build_cornell_box
-from radiosity_addon.blender.inspection import ERROR, INFO, WARNING, Inspection, inspect
-from radiosity_addon.blender.job import run_bake
-from radiosity_addon.blender.output import BLEND_NAME, PREVIEW_NAME, OutputFolder
-from radiosity_addon.errors import BakeError
-from radiosity_addon.settings import BakeSettings
-from radiosity_addon.solver.steps import drain
+from radiosity_addon.base.errors import BakeError
+from radiosity_addon.base.progress import drain
+from radiosity_addon.blender.files.cornell import build_cornell_box
+from radiosity_addon.blender.files.output import BLEND_NAME, PREVIEW_NAME, OutputFolder
+from radiosity_addon.blender.jobs.inspection import ERROR, INFO, WARNING, Inspection, inspect
+from radiosity_addon.blender.jobs.job import run_bake
+from radiosity_addon.blender.session import runtime
+from radiosity_addon.blender.ui import check_panel
+from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.scenes import QUAD, add_lamp, add_mesh, set_world
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -57,7 +58,7 @@ def test_the_cornell_box_is_as_it_should_be(tmp_path: Path) -> None:
     build_cornell_box()
     found = look(tmp_path)
     assert (found.objects, found.triangles, found.scene_triangles) == (7, 34, 34)
-    assert found.foresight.pages == (256,)
+    assert found.estimate.pages == (256,)
     assert not found.is_odd
     # A bake of it has 56,642 texels (bench/results/cornell.json).
     assert found.texels == pytest.approx(56_642, rel=0.25)

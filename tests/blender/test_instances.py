@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from radiosity_addon.blender.scene_objects import copy_evaluated_meshes
+from radiosity_addon.blender.scene_records.scene_objects import copy_evaluated_meshes
 from tests.blender.exporting import (
     CUBE,
     CUBE_FACES,

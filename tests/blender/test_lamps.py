@@ -9,10 +9,10 @@ import bpy
 import numpy as np
 import pytest
 
-from radiosity_addon.blender.export import export_scene
-from radiosity_addon.errors import SceneError
-from radiosity_addon.settings import BakeSettings
-from radiosity_addon.solver.lights import AreaLight, Lamp
+from radiosity_addon.base.errors import SceneError
+from radiosity_addon.blender.scene_export.export import export_scene
+from radiosity_addon.lights.sun_and_sky import AreaLight, Lamp
+from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.scenes import add_lamp, add_mesh, add_node, add_object, measure_irradiance, with_nodes
 
 # A quad so small that the light hardly changes over it, tilted so that the cosine matters.

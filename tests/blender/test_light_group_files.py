@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import radiosity_addon
-from radiosity_addon.blender.job import run_bake
-from radiosity_addon.blender.light_mixer import mixers, sliders_of
-from radiosity_addon.blender.output import OutputFolder
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.blender.files.output import OutputFolder
+from radiosity_addon.blender.images.light_mixer import mixers, sliders_of
+from radiosity_addon.blender.jobs.job import run_bake
+from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.scenes import add_lamp, add_mesh, set_world, shader_material
 
 QUICK = {"resolution": 32, "quality": "draft", "atlas": "per-object", "light_groups": True}

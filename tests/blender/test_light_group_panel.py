@@ -8,11 +8,11 @@ import bpy
 import pytest
 
 import radiosity_addon
-from radiosity_addon.blender import light_group_panels
-from radiosity_addon.blender.light_group_properties import listed_groups, outdate
-from radiosity_addon.blender.light_membership import NAME
-from radiosity_addon.blender.light_mixer import mixers, sliders_of
-from radiosity_addon.blender.properties import settings_of
+from radiosity_addon.blender.images.light_mixer import mixers, sliders_of
+from radiosity_addon.blender.scene_records.light_membership import NAME
+from radiosity_addon.blender.ui import light_group_panels
+from radiosity_addon.blender.ui.light_group_properties import listed_groups, outdate
+from radiosity_addon.blender.ui.properties import settings_of
 from tests.blender.group_bake import bake_groups, lit_plane, slide
 from tests.blender.scenes import add_lamp, add_mesh, set_world, shader_material
 
@@ -79,7 +79,7 @@ def test_the_list_follows_collections_though_they_do_not_tell(
     collection.radiosity_light_group = "lamps"
     assert listed() == [("lamps", 0, 0, 0, 1, 0)]
     collection.objects.link(lamps["one"])
-    monkeypatch.setattr("radiosity_addon.blender.light_group_properties.OUTDATED_AFTER", 0.0)
+    monkeypatch.setattr("radiosity_addon.blender.ui.light_group_properties.OUTDATED_AFTER", 0.0)
     assert listed() == [("lamps", 1, 0, 0, 1, 0)]
 
 

@@ -8,9 +8,9 @@ import bpy
 import pytest
 
 import radiosity_addon
-from radiosity_addon.bake_scene import BakeScene
-from radiosity_addon.blender.export import export_scene
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.blender.scene_export.export import export_scene
+from radiosity_addon.options.bake_settings import BakeSettings
+from radiosity_addon.scene.bake_scene import BakeScene
 from tests.blender.scenes import add_lamp, add_mesh, add_object, set_world, shader_material
 
 

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 import radiosity_addon
-from radiosity_addon.blender.bake_record import made_datablocks
-from radiosity_addon.blender.group_images import shown_images, update_images
-from radiosity_addon.blender.light_mixer import mixers, sliders_of
-from radiosity_addon.blender.light_shares import MANY_IMAGES, LightShares, crowded_materials
-from radiosity_addon.blender.lightmap_materials import LightmapMaterials
-from radiosity_addon.blender.restore import restore
-from radiosity_addon.errors import BakeError
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.base.errors import BakeError
+from radiosity_addon.blender.apply.restore import restore
+from radiosity_addon.blender.datablocks.bake_record import made_datablocks
+from radiosity_addon.blender.images.group_images import shown_images, update_images
+from radiosity_addon.blender.images.light_mixer import mixers, sliders_of
+from radiosity_addon.blender.material_copies.light_shares import MANY_IMAGES, LightShares, crowded_materials
+from radiosity_addon.blender.material_copies.lightmap_materials import LightmapMaterials
+from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.file_dump import differences_since, dump_file
 from tests.blender.group_bake import (
     EMISSION,

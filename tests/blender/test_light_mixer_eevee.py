@@ -21,7 +21,7 @@ sys.path.insert(0, sys.argv[1])
 import bpy
 import radiosity_addon
 from tests.blender import group_bake, hand_bake
-from radiosity_addon.blender.light_mixer import mixers, sliders_of
+from radiosity_addon.blender.images.light_mixer import mixers, sliders_of
 bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
 radiosity_addon.register()
 group_bake.lit_plane()

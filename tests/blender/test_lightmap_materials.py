@@ -9,13 +9,14 @@ import bpy
 import numpy as np
 import pytest
 
-from radiosity_addon.bake_scene import BakedObject, BakeResult, LightmapPage
-from radiosity_addon.blender.apply import apply_lightmaps
-from radiosity_addon.blender.export import export_scene
-from radiosity_addon.blender.images import write_pages
-from radiosity_addon.blender.lightmap_materials import set_lightmap_only
-from radiosity_addon.blender.restore import restore
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.bake.result.result import BakedObject, BakeResult
+from radiosity_addon.blender.apply.apply import apply_lightmaps
+from radiosity_addon.blender.apply.restore import restore
+from radiosity_addon.blender.images.images import write_pages
+from radiosity_addon.blender.material_copies.lightmap_materials import set_lightmap_only
+from radiosity_addon.blender.scene_export.export import export_scene
+from radiosity_addon.lightmap.images.page import LightmapPage
+from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.hand_bake import (
     BASE,
     TEXEL,

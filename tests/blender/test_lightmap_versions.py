@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 
 import radiosity_addon
-from radiosity_addon.blender import kept_bakes, lightmap_versions
-from radiosity_addon.blender.image_marks import REPORT, VERSION
-from radiosity_addon.manifest import FILES, read_report
+from radiosity_addon.blender.datablocks.image_marks import REPORT, VERSION
+from radiosity_addon.blender.relight.relight_scene import kept_bakes, lightmap_versions
+from radiosity_addon.files.baked_files import FILES, read_report
 from tests.blender.scenes import add_lamp, add_mesh
 
 Array = np.ndarray[Any, Any]
@@ -247,8 +247,8 @@ def test_nothing_is_left_behind(room: Path) -> None:
 
 
 def test_a_failure_while_relighting_leaves_the_version(room: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from radiosity_addon.blender.output import OutputFolder
-    from radiosity_addon.errors import BakeError
+    from radiosity_addon.base.errors import BakeError
+    from radiosity_addon.blender.files.output import OutputFolder
 
     def full(*_: object) -> None:
         raise BakeError("the disk is full")

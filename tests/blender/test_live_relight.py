@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 import radiosity_addon
-from radiosity_addon.blender import kept_bakes, lightmap_versions, live_state
-from radiosity_addon.blender.image_marks import VERSION
-from radiosity_addon.blender.live_relight import _notice
-from radiosity_addon.blender.node_group import EMISSION
-from radiosity_addon.manifest import digest
+from radiosity_addon.blender.datablocks.image_marks import VERSION
+from radiosity_addon.blender.images.node_group import EMISSION
+from radiosity_addon.blender.relight.live_relight import _notice
+from radiosity_addon.blender.relight.relight_scene import kept_bakes, lightmap_versions
+from radiosity_addon.blender.session import live_state
+from radiosity_addon.files.baked_files import digest
 from tests.blender.scenes import shader_material
 from tests.blender.test_relight import change_lights, glowing, lightmap, relative, relight, room
 

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 import radiosity_addon
-from radiosity_addon.bake_scene import Picture
-from radiosity_addon.blender import live_view
-from radiosity_addon.blender.cornell import build_cornell_box
-from radiosity_addon.blender.export import export_scene
-from radiosity_addon.blender.job import run_bake
-from radiosity_addon.blender.live_picture import corner_arrays, display_colors, seen_triangles
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.bake.result.progress import Picture
+from radiosity_addon.blender.files.cornell import build_cornell_box
+from radiosity_addon.blender.jobs import live_view
+from radiosity_addon.blender.jobs.job import run_bake
+from radiosity_addon.blender.jobs.live_picture import corner_arrays, display_colors, seen_triangles
+from radiosity_addon.blender.scene_export.export import export_scene
+from radiosity_addon.options.bake_settings import BakeSettings
 
 QUICK = BakeSettings(resolution=32, quality="draft", method="shooting", elements=60, max_iterations=5)
 
@@ -117,7 +117,7 @@ def test_instances_are_seen_where_their_instancer_is() -> None:
 
 @pytest.mark.parametrize("patient", [False, True])
 def test_a_bake_comes_with_pictures_that_brighten(patient: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("radiosity_addon.pipeline.PICTURE_SECONDS", 0.0)
+    monkeypatch.setattr("radiosity_addon.bake.pipeline.PICTURE_SECONDS", 0.0)
     build_cornell_box()
     came = pictures(patient)
     # Before it begins, direct light, after each of the shots, at the end.
@@ -133,7 +133,7 @@ def test_a_bake_comes_with_pictures_that_brighten(patient: bool, monkeypatch: py
 
 
 def test_pictures_hold_only_what_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("radiosity_addon.pipeline.PICTURE_SECONDS", 0.0)
+    monkeypatch.setattr("radiosity_addon.bake.pipeline.PICTURE_SECONDS", 0.0)
     build_cornell_box()
     whole = pictures()[-1]
     bpy.data.objects["Right Wall"].hide_set(True)

@@ -9,16 +9,16 @@ import bpy
 import numpy as np
 import pytest
 
-from radiosity_addon.blender.bake_record import is_made
-from radiosity_addon.blender.copy_marks import ORIGINAL
-from radiosity_addon.blender.export import export_scene
-from radiosity_addon.blender.material_digest import digest
-from radiosity_addon.blender.material_edits import carry_edits
-from radiosity_addon.blender.materials import read_material
-from radiosity_addon.blender.rebake import originals_shown
-from radiosity_addon.blender.restore import restore
-from radiosity_addon.blender.stripping import stripped_copy
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.blender.apply.rebake import originals_shown
+from radiosity_addon.blender.apply.restore import restore
+from radiosity_addon.blender.datablocks.bake_record import is_made
+from radiosity_addon.blender.material_copies.copy_marks import ORIGINAL
+from radiosity_addon.blender.material_copies.material_digest import digest
+from radiosity_addon.blender.material_copies.material_edits import carry_edits
+from radiosity_addon.blender.material_copies.stripping import stripped_copy
+from radiosity_addon.blender.materials.materials import read_material
+from radiosity_addon.blender.scene_export.export import export_scene
+from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.edited_copies import (
     GREEN,
     Material,

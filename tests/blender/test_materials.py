@@ -9,10 +9,10 @@ import bpy
 import numpy as np
 import pytest
 
-from radiosity_addon.blender.export import export_scene
-from radiosity_addon.blender.image_values import image_mean, linear_from_srgb
-from radiosity_addon.blender.materials import Surface, read_material
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.blender.datablocks.image_values import image_mean, linear_from_srgb
+from radiosity_addon.blender.materials.materials import Surface, read_material
+from radiosity_addon.blender.scene_export.export import export_scene
+from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.scenes import add_mesh, add_node, measure_irradiance, shader_material, with_nodes
 
 _RED = (0.6, 0.2, 0.1, 1.0)

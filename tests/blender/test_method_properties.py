@@ -8,10 +8,10 @@ import bpy
 import pytest
 
 import radiosity_addon
-from radiosity_addon.blender import panels
-from radiosity_addon.blender.properties import settings_of
-from radiosity_addon.methods import METHODS, SETTINGS
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.blender.ui import panels
+from radiosity_addon.blender.ui.properties import settings_of
+from radiosity_addon.options.bake_settings import BakeSettings
+from radiosity_addon.options.methods import METHODS, SETTINGS
 
 
 class Layout:
@@ -98,7 +98,7 @@ def test_the_assembly_is_given_as_chosen(group: bpy.types.PropertyGroup) -> None
 
 
 def test_the_last_bake_tells_how_it_was_solved() -> None:
-    from radiosity_addon.blender import runtime
+    from radiosity_addon.blender.session import runtime
 
     solver = {
         "method": "gauss-seidel",

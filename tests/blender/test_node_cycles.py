@@ -7,9 +7,9 @@ from collections.abc import Callable
 import bpy
 import pytest
 
-from radiosity_addon.blender.materials import read_material
-from radiosity_addon.blender.restore import restore
-from radiosity_addon.blender.shader_nodes import is_followed
+from radiosity_addon.blender.apply.restore import restore
+from radiosity_addon.blender.materials.materials import read_material
+from radiosity_addon.blender.materials.shader_nodes import is_followed
 from tests.blender.hand_bake import add_plane, bake_by_hand
 from tests.blender.scenes import add_node, with_nodes
 

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 import radiosity_addon
-from radiosity_addon.blender import runtime
-from radiosity_addon.blender.bake_record import mark_made, recorded_objects
-from radiosity_addon.blender.copy_marks import ADDED
+from radiosity_addon.blender.datablocks.bake_record import mark_made, recorded_objects
+from radiosity_addon.blender.material_copies.copy_marks import ADDED
+from radiosity_addon.blender.session import runtime
 from tests.blender.scenes import add_lamp, add_mesh, shader_material
 
 
@@ -208,10 +208,10 @@ def test_an_object_that_is_gone_is_named(room: Path, capfd: pytest.CaptureFixtur
 
 
 def test_a_cancelled_one_leaves_the_earlier_bake(room: Path) -> None:
-    from radiosity_addon.blender.job import run_bake
-    from radiosity_addon.blender.output import OutputFolder
-    from radiosity_addon.blender.ownership import panel_names
-    from radiosity_addon.blender.properties import settings_of
+    from radiosity_addon.blender.files.output import OutputFolder
+    from radiosity_addon.blender.files.ownership import panel_names
+    from radiosity_addon.blender.jobs.job import run_bake
+    from radiosity_addon.blender.ui.properties import settings_of
 
     before = digests(room)
     bpy.data.objects["Box"].location.x -= 0.5

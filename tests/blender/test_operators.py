@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 
 import radiosity_addon
-from radiosity_addon.blender import runtime
-from radiosity_addon.blender.bake_record import is_baked, shows_lightmap
-from radiosity_addon.blender.check_panel import look
-from radiosity_addon.blender.cleaning import interrupted_folders
-from radiosity_addon.blender.cornell import build_cornell_box
-from radiosity_addon.blender.job import run_bake
-from radiosity_addon.blender.output import OutputFolder
-from radiosity_addon.errors import BakeError, SceneError
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.base.errors import BakeError, SceneError
+from radiosity_addon.blender.datablocks.bake_record import is_baked, shows_lightmap
+from radiosity_addon.blender.files.cornell import build_cornell_box
+from radiosity_addon.blender.files.output import OutputFolder
+from radiosity_addon.blender.jobs.job import run_bake
+from radiosity_addon.blender.session import runtime
+from radiosity_addon.blender.ui.check_panel import look
+from radiosity_addon.blender.ui.cleaning import interrupted_folders
+from radiosity_addon.options.bake_settings import BakeSettings
 
 QUICK = BakeSettings(resolution=32, quality="draft")
 
@@ -248,7 +248,7 @@ def test_a_failure_after_the_lightmaps_show_takes_them_off_again(
         raise BakeError("the disk is full")
 
     before = made(), showing()
-    monkeypatch.setattr("radiosity_addon.blender.job.render_preview", fail)
+    monkeypatch.setattr("radiosity_addon.blender.jobs.job.render_preview", fail)
     with pytest.raises(BakeError, match="the disk is full"):
         list(run_bake(bpy.context, QUICK, OutputFolder(tmp_path / "out"), with_copy=True))
     assert (made(), showing()) == before

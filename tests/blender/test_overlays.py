@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 import radiosity_addon
-from radiosity_addon.blender import kept_details, lightmap_values, overlay_view
-from radiosity_addon.blender import overlay_properties as kinds
-from radiosity_addon.blender.color_scale import ColorScale, automatic_scale
-from radiosity_addon.blender.cornell import build_cornell_box
-from radiosity_addon.blender.job import run_bake
-from radiosity_addon.blender.kept_details import details_of
-from radiosity_addon.blender.lightmap_values import lightmap_of, object_statistics, page_values
-from radiosity_addon.blender.overlay_pictures import (
+from radiosity_addon.base.radiometry import luminous
+from radiosity_addon.blender.files.cornell import build_cornell_box
+from radiosity_addon.blender.jobs.job import run_bake
+from radiosity_addon.blender.overlays import lightmap_values, overlay_view
+from radiosity_addon.blender.overlays import overlay_properties as kinds
+from radiosity_addon.blender.overlays.color_scale import ColorScale, automatic_scale
+from radiosity_addon.blender.overlays.lightmap_values import lightmap_of, object_statistics, page_values
+from radiosity_addon.blender.overlays.overlay_pictures import (
     CHECKERS,
     STATE_COLORS,
     WIDEST,
@@ -27,8 +27,9 @@ from radiosity_addon.blender.overlay_pictures import (
     missing,
     overlay_picture,
 )
-from radiosity_addon.settings import BakeSettings
-from radiosity_addon.solver.radiometry import luminous
+from radiosity_addon.blender.session import kept_details
+from radiosity_addon.blender.session.kept_details import details_of
+from radiosity_addon.options.bake_settings import BakeSettings
 
 EVERY = (
     *(kinds.FALSE_COLOR, kinds.DENSITY, kinds.CHECKER, kinds.TEXELS),

@@ -9,9 +9,9 @@ import bpy
 import numpy as np
 import pytest
 
-from radiosity_addon.blender.plot import render_drawing, render_plot
-from radiosity_addon.errors import BakeError
-from radiosity_addon.plot_layout import BLUE, Dot, Drawing, Line, Text
+from radiosity_addon.base.errors import BakeError
+from radiosity_addon.blender.command_line.plot import render_drawing, render_plot
+from radiosity_addon.cli.plot_layout import BLUE, Dot, Drawing, Line, Text
 from tests.blender.file_dump import differences, dump_file
 
 HISTORY = [

@@ -9,13 +9,13 @@ import bpy
 import numpy as np
 import pytest
 
-from radiosity_addon.blender.apply import apply_lightmaps
-from radiosity_addon.blender.export import export_scene
-from radiosity_addon.blender.images import set_folder, write_pages
-from radiosity_addon.blender.output import PREVIEW_NAME, OutputFolder
-from radiosity_addon.blender.preview import MAX_SIDE, render_preview
-from radiosity_addon.errors import BakeError
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.base.errors import BakeError
+from radiosity_addon.blender.apply.apply import apply_lightmaps
+from radiosity_addon.blender.files.output import PREVIEW_NAME, OutputFolder
+from radiosity_addon.blender.images.images import set_folder, write_pages
+from radiosity_addon.blender.jobs.preview import MAX_SIDE, render_preview
+from radiosity_addon.blender.scene_export.export import export_scene
+from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.file_dump import differences, dump_file
 from tests.blender.hand_bake import hand_result
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from radiosity_addon.blender.materials import read_material
+from radiosity_addon.blender.materials.materials import read_material
 from tests.blender.scenes import shader_material
 from tests.blender.test_materials import _BLUE, _RED, _check, _messages
 

@@ -10,14 +10,16 @@ import numpy as np
 import pytest
 
 import radiosity_addon
-from radiosity_addon.bake_scene import BakedObject, BakeResult, BakeScene, LightmapPage
-from radiosity_addon.blender.apply import apply_lightmaps
-from radiosity_addon.blender.bake_record import recorded_objects
-from radiosity_addon.blender.export import export_scene
-from radiosity_addon.blender.images import write_pages
-from radiosity_addon.blender.rebake import originals_shown, replacing_earlier
-from radiosity_addon.blender.restore import restore
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.bake.result.result import BakedObject, BakeResult
+from radiosity_addon.blender.apply.apply import apply_lightmaps
+from radiosity_addon.blender.apply.rebake import originals_shown, replacing_earlier
+from radiosity_addon.blender.apply.restore import restore
+from radiosity_addon.blender.datablocks.bake_record import recorded_objects
+from radiosity_addon.blender.images.images import write_pages
+from radiosity_addon.blender.scene_export.export import export_scene
+from radiosity_addon.lightmap.images.page import LightmapPage
+from radiosity_addon.options.bake_settings import BakeSettings
+from radiosity_addon.scene.bake_scene import BakeScene
 
 SETTINGS = BakeSettings(resolution=4)
 

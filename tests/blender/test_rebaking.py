@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import radiosity_addon
-from radiosity_addon.blender import kept_bakes
+from radiosity_addon.blender.relight.relight_scene import kept_bakes
 from tests.blender.scenes import add_lamp, add_mesh
 
 

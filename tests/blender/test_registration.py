@@ -13,8 +13,8 @@ import pytest
 
 import radiosity_addon
 from radiosity_addon.blender import registration
-from radiosity_addon.blender.properties import settings_of
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.blender.ui.properties import settings_of
+from radiosity_addon.options.bake_settings import BakeSettings
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 import radiosity_addon
-from radiosity_addon.blender import kept_bakes
-from radiosity_addon.blender.bake_record import is_made
-from radiosity_addon.blender.images import image_scale
-from radiosity_addon.blender.light_inputs import inputs_of
-from radiosity_addon.blender.node_group import EMISSION, SCALE
-from radiosity_addon.cli import main
-from radiosity_addon.manifest import is_as_written
+from radiosity_addon.blender.command_line.main import main
+from radiosity_addon.blender.datablocks.bake_record import is_made
+from radiosity_addon.blender.images.images import image_scale
+from radiosity_addon.blender.images.node_group import EMISSION, SCALE
+from radiosity_addon.blender.materials.light_inputs import inputs_of
+from radiosity_addon.blender.relight.relight_scene import kept_bakes
+from radiosity_addon.files.baked_files import is_as_written
 from tests.blender.scenes import add_lamp, add_mesh, add_object, set_world, shader_material
 
 LIGHTMAP = "baked_Scene_lightmap.exr"

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import radiosity_addon
-from radiosity_addon.blender import kept_bakes, live_state
-from radiosity_addon.blender.images import image_scale
+from radiosity_addon.blender.images.images import image_scale
+from radiosity_addon.blender.relight.relight_scene import kept_bakes
+from radiosity_addon.blender.session import live_state
 from tests.blender.test_relight import lightmap, relight, room
 
 

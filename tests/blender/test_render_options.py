@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from radiosity_addon.blender.export_sources import Export
+from radiosity_addon.blender.scene_records.export_sources import Export
 from tests.blender.exporting import add_cube, export_with, objects_by_name
 from tests.blender.scenes import add_lamp, add_mesh, measure_irradiance, set_world
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import bpy
 import pytest
 
-from radiosity_addon.blender import bake_record
-from radiosity_addon.blender.restore import restore
-from radiosity_addon.errors import BakeError
+from radiosity_addon.base.errors import BakeError
+from radiosity_addon.blender.apply.restore import restore
+from radiosity_addon.blender.datablocks import bake_record
 from tests.blender.file_dump import differences, dump_file
 from tests.blender.hand_bake import bake_by_hand
 from tests.blender.zoo import build_zoo

@@ -7,14 +7,14 @@ from pathlib import Path
 import bpy
 import pytest
 
-from radiosity_addon.blender import bake_record
-from radiosity_addon.blender.apply import apply_lightmaps
-from radiosity_addon.blender.export import export_scene
-from radiosity_addon.blender.files import open_scene
-from radiosity_addon.blender.images import write_pages
-from radiosity_addon.blender.restore import restore
-from radiosity_addon.errors import BakeError
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.base.errors import BakeError
+from radiosity_addon.blender.apply.apply import apply_lightmaps
+from radiosity_addon.blender.apply.restore import restore
+from radiosity_addon.blender.datablocks import bake_record
+from radiosity_addon.blender.files.files import open_scene
+from radiosity_addon.blender.images.images import write_pages
+from radiosity_addon.blender.scene_export.export import export_scene
+from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.file_dump import differences, differences_since, dump_file
 from tests.blender.hand_bake import hand_result
 from tests.blender.zoo import build_zoo

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 import radiosity_addon
-from radiosity_addon.blender.job import run_bake
-from radiosity_addon.blender.restore import restore
-from radiosity_addon.errors import UsageError
-from radiosity_addon.pipeline import bake
-from radiosity_addon.settings import BakeSettings
-from radiosity_addon.solver.steps import drain
+from radiosity_addon.bake.pipeline import bake
+from radiosity_addon.base.errors import UsageError
+from radiosity_addon.base.progress import drain
+from radiosity_addon.blender.apply.restore import restore
+from radiosity_addon.blender.jobs.job import run_bake
+from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.exporting import add_cube, add_instance, export_with, objects_by_name
 from tests.blender.file_dump import differences, dump_file
 from tests.blender.scenes import (

@@ -9,15 +9,16 @@ import bpy
 import pytest
 
 import radiosity_addon
-from radiosity_addon.blender import kept_bakes, runtime
-from radiosity_addon.blender.bake_record import recorded_objects
-from radiosity_addon.blender.job import run_bake
-from radiosity_addon.blender.output import OutputFolder
-from radiosity_addon.blender.ownership import panel_names
-from radiosity_addon.blender.restore import restore
-from radiosity_addon.blender.scopes import files_of
-from radiosity_addon.errors import BakeError
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.base.errors import BakeError
+from radiosity_addon.blender.apply.restore import restore
+from radiosity_addon.blender.apply.scopes import files_of
+from radiosity_addon.blender.datablocks.bake_record import recorded_objects
+from radiosity_addon.blender.files.output import OutputFolder
+from radiosity_addon.blender.files.ownership import panel_names
+from radiosity_addon.blender.jobs.job import run_bake
+from radiosity_addon.blender.relight.relight_scene import kept_bakes
+from radiosity_addon.blender.session import runtime
+from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.exporting import add_instance
 from tests.blender.file_dump import differences_since, dump_file
 from tests.blender.scenes import add_lamp, add_mesh, shader_material
@@ -179,7 +180,7 @@ def test_a_failed_bake_of_another_scene_changes_nothing(scenes, monkeypatch: pyt
     def fail(*_: object) -> None:
         raise BakeError("the disk is full")
 
-    monkeypatch.setattr("radiosity_addon.blender.job._report", fail)
+    monkeypatch.setattr("radiosity_addon.blender.jobs.job._report", fail)
     with pytest.raises(BakeError, match="full"):
         list(run_bake(bpy.context, QUICK, None))
     assert differences_since(before, dump_file()) == []

@@ -6,10 +6,10 @@ import bpy
 import numpy as np
 import pytest
 
-from radiosity_addon.blender.export import export_scene
-from radiosity_addon.pipeline import bake
-from radiosity_addon.settings import BakeSettings
-from radiosity_addon.solver.steps import drain
+from radiosity_addon.bake.pipeline import bake
+from radiosity_addon.base.progress import drain
+from radiosity_addon.blender.scene_export.export import export_scene
+from radiosity_addon.options.bake_settings import BakeSettings
 from tests.golden.rows.geometry import lit, moved
 
 SETTINGS = BakeSettings(resolution=48, quality="draft", keep_uvs=True)

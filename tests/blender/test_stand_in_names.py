@@ -7,9 +7,9 @@ from collections.abc import Callable
 import bpy
 import pytest
 
-from radiosity_addon.blender.bake_record import is_made
-from radiosity_addon.blender.rebake import originals_shown
-from radiosity_addon.blender.restore import restore_scene
+from radiosity_addon.blender.apply.rebake import originals_shown
+from radiosity_addon.blender.apply.restore import restore_scene
+from radiosity_addon.blender.datablocks.bake_record import is_made
 from tests.blender.hand_bake import add_plane, bake_by_hand, principled_material
 
 pytestmark = pytest.mark.usefixtures("record")

@@ -9,13 +9,14 @@ import bpy
 import numpy as np
 import pytest
 
-from radiosity_addon.blender import collect as collecting
-from radiosity_addon.blender import rebake, surface_bake, surface_batches, sweep, world_pixels
-from radiosity_addon.blender.bake_record import is_made
-from radiosity_addon.blender.export import export_scene, export_steps
-from radiosity_addon.blender.export_sources import Export
-from radiosity_addon.settings import BakeSettings
-from radiosity_addon.solver.steps import drain
+from radiosity_addon.base.progress import drain
+from radiosity_addon.blender.apply import rebake, sweep
+from radiosity_addon.blender.cycles import surface_bake, surface_batches, world_pixels
+from radiosity_addon.blender.datablocks.bake_record import is_made
+from radiosity_addon.blender.scene_export import collect as collecting
+from radiosity_addon.blender.scene_export.export import export_scene, export_steps
+from radiosity_addon.blender.scene_records.export_sources import Export
+from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.hand_bake import bake_by_hand
 from tests.blender.scenes import add_lamp
 

@@ -9,9 +9,9 @@ import bpy
 import numpy as np
 import pytest
 
-from radiosity_addon.blender.render_state import render_depsgraph
-from radiosity_addon.blender.scene_objects import visible_objects
-from radiosity_addon.errors import SceneError
+from radiosity_addon.base.errors import SceneError
+from radiosity_addon.blender.scene_records.render_state import render_depsgraph
+from radiosity_addon.blender.scene_records.scene_objects import visible_objects
 from tests.blender.exporting import (
     add_cube,
     add_instance,

@@ -8,12 +8,12 @@ import bpy
 import numpy as np
 import pytest
 
-from radiosity_addon.bake_scene import BakeScene
-from radiosity_addon.blender.export import export_scene
-from radiosity_addon.settings import BakeSettings
-from radiosity_addon.solver.environment import CELLS, cell_directions, pixel_bounds, solid_angles
-from radiosity_addon.solver.form_factor import point_to_polygon
-from radiosity_addon.solver.lights import EnvironmentLight
+from radiosity_addon.blender.scene_export.export import export_scene
+from radiosity_addon.form_factors.formulas import point_to_polygon
+from radiosity_addon.lights.environment import CELLS, cell_directions, pixel_bounds, solid_angles
+from radiosity_addon.lights.sun_and_sky import EnvironmentLight
+from radiosity_addon.options.bake_settings import BakeSettings
+from radiosity_addon.scene.bake_scene import BakeScene
 from tests.blender.scenes import QUAD, add_mesh, add_node, measure_irradiance, set_world, shader_material
 
 _METER = [(x * 0.0005, y * 0.0005, 0.0) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]

@@ -7,15 +7,16 @@ from typing import Any
 import bpy
 import numpy as np
 
-from radiosity_addon.bake_scene import BakeResult, BakeScene
-from radiosity_addon.blender import job
-from radiosity_addon.blender.restore import restore
-from radiosity_addon.errors import SceneError, UsageError
-from radiosity_addon.settings import BakeSettings
-from radiosity_addon.solver.environment import EnvironmentImage
-from radiosity_addon.solver.lights import EnvironmentLight
-from radiosity_addon.solver.scene import Scene
-from radiosity_addon.solver.steps import drain
+from radiosity_addon.bake.result.result import BakeResult
+from radiosity_addon.base.errors import SceneError, UsageError
+from radiosity_addon.base.progress import drain
+from radiosity_addon.blender.apply.restore import restore
+from radiosity_addon.blender.jobs import job
+from radiosity_addon.lights.environment import EnvironmentImage
+from radiosity_addon.lights.sun_and_sky import EnvironmentLight
+from radiosity_addon.options.bake_settings import BakeSettings
+from radiosity_addon.scene.bake_scene import BakeScene
+from radiosity_addon.scene.scene import Scene
 from tests.blender.file_dump import differences_since, dump_file
 
 from .scenes import build

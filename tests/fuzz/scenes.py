@@ -8,7 +8,7 @@ from random import Random
 import bpy
 from mathutils import Matrix, Vector
 
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.options.bake_settings import BakeSettings
 
 from . import shapes, surfaces
 

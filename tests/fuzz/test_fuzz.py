@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 import radiosity_addon
-from radiosity_addon.lightmap import texel_pages
-from radiosity_addon.solver.arrays import Array
+from radiosity_addon.base.arrays import Array
+from radiosity_addon.lightmap.images import texel_pages
 
 from .checks import check
 from .scenes import SCENES

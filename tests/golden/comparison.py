@@ -9,12 +9,13 @@ import numpy as np
 
 from bench.error_measure import relative_rmse
 from bench.layout import objects_with_layout
-from radiosity_addon.bake_scene import BakeResult, BakeWarning
-from radiosity_addon.blender.export import export_scene
-from radiosity_addon.lightmap.rasterise import rasterise
-from radiosity_addon.pipeline import bake
-from radiosity_addon.settings import BakeSettings
-from radiosity_addon.solver.steps import drain
+from radiosity_addon.bake.pipeline import bake
+from radiosity_addon.bake.result.result import BakeResult
+from radiosity_addon.base.bake_warning import BakeWarning
+from radiosity_addon.base.progress import drain
+from radiosity_addon.blender.scene_export.export import export_scene
+from radiosity_addon.lightmap.texels.rasterize import rasterise
+from radiosity_addon.options.bake_settings import BakeSettings
 from tests.golden import references
 from tests.golden.rows import Row
 

@@ -18,7 +18,7 @@ import bpy
 
 from bench import cycles
 from bench.layout import lay_out, write_layout
-from radiosity_addon.blender.cornell import build_cornell_box
+from radiosity_addon.blender.files.cornell import build_cornell_box
 from tests.golden.cornell_reference import FILE, Reference
 
 RESOLUTION = 256

@@ -9,8 +9,8 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from radiosity_addon.bake_scene import LIGHTMAP_UV_LAYER
-from radiosity_addon.blender.png import render_png
+from radiosity_addon.blender.datablocks.png import render_png
+from radiosity_addon.scene.bake_scene import LIGHTMAP_UV_LAYER
 from tests.golden.rows.stage import emptied_nodes
 
 SIZE = (168, 128)

@@ -118,7 +118,7 @@ def _prepared(sandbox: Sandbox, name: str) -> Iterator[None]:
 
 
 def _command_line(sandbox: Sandbox, *words: object) -> str:
-    from radiosity_addon.cli import main
+    from radiosity_addon.blender.command_line.main import main
 
     told = io.StringIO()
     given = ("bake", sandbox.scene, "--output", sandbox.out, "--quiet", *words)

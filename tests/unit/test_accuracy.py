@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.errors import UsageError
-from radiosity_addon.lightmap import accuracy
-from radiosity_addon.lightmap.interpolate import Interpolation
-from radiosity_addon.lightmap.reconstruct import GatherSettings
-from radiosity_addon.lightmap.stored_links import StoredLinks
-from radiosity_addon.lightmap.sweeps import TexelLight, estimated_noise, relative_error
-from radiosity_addon.quality import LADDER, for_error
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.bake.quality import LADDER, for_error
+from radiosity_addon.base.errors import UsageError
+from radiosity_addon.lightmap.lighting import accuracy
+from radiosity_addon.lightmap.lighting.gather_settings import GatherSettings
+from radiosity_addon.lightmap.lighting.interpolate import Interpolation
+from radiosity_addon.lightmap.lighting.stored_links import StoredLinks
+from radiosity_addon.lightmap.lighting.sweeps import TexelLight, estimated_noise, relative_error
+from radiosity_addon.options.bake_settings import BakeSettings
 
 
 def links_of(sources: np.ndarray) -> StoredLinks:

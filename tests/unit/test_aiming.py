@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from radiosity_addon.base.progress import drain
+from radiosity_addon.base.sampling import stratified_square
 from radiosity_addon.solver import PointLight, Scene, SolverSettings, solve
-from radiosity_addon.solver.aiming import CONTRAST, MOST, AimedRays, BrightElements
-from radiosity_addon.solver.gathering import NOTHING
-from radiosity_addon.solver.local_pass import Footprints, Gathered, LocalPass
-from radiosity_addon.solver.sampling import stratified_square
-from radiosity_addon.solver.steps import drain
+from radiosity_addon.solver.gather.bright_patches import CONTRAST, MOST, AimedRays, BrightElements
+from radiosity_addon.solver.gather.final_gather import NOTHING
+from radiosity_addon.solver.gather.local_pass import Footprints, Gathered, LocalPass
 from tests.rooms import box_room, grey, solid_box
 
 RAYS = 64

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from radiosity_addon.solver import PointLight, Scene, SolverSettings
-from radiosity_addon.solver.anderson import Anderson
-from radiosity_addon.solver.bounce import bounce
 from radiosity_addon.solver.methods import hierarchical
 from radiosity_addon.solver.methods.hierarchical import STALLED, exhausted, iterate
+from radiosity_addon.solver.state.anderson import Anderson
+from radiosity_addon.solver.state.iteration import bounce
 from tests.rooms import box_room, grey
 from tests.unit.solved_rooms import solved
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from radiosity_addon import cli
-from radiosity_addon.arguments import MAX_PATH, escaped, folder_of, name_of, path_of, printable
-from radiosity_addon.settings import MAX_SEED, MAX_THREADS, BakeSettings
+from radiosity_addon.blender.command_line.main import main
+from radiosity_addon.files.path_checks import MAX_PATH, escaped, folder_of, name_of, path_of, printable
+from radiosity_addon.options.bake_settings import MAX_SEED, MAX_THREADS, BakeSettings
 
 IMPOSSIBLE = [
     "",
@@ -66,7 +66,7 @@ def test_impossible_names_are_refused(word: str) -> None:
 def test_every_option_refuses_them_with_one_line(
     option: str, word: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert cli.main(["bake", "scene.blend", "--output", "o", option, word]) == 2
+    assert main(["bake", "scene.blend", "--output", "o", option, word]) == 2
     err = capsys.readouterr().err
     assert err.startswith("error: ")
     assert err.count("\n") == 1
@@ -78,7 +78,7 @@ def test_every_option_refuses_them_with_one_line(
 def test_a_scene_that_no_file_can_be_is_a_usage_error(
     verb: str, word: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert cli.main([verb, word, "--output", "o"]) == 2
+    assert main([verb, word, "--output", "o"]) == 2
     assert capsys.readouterr().err.count("\n") == 1
 
 
@@ -90,7 +90,7 @@ def test_a_scene_that_no_file_can_be_is_a_usage_error(
 def test_numbers_that_blender_cannot_hold(
     option: str, value: object, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert cli.main(["bake", "scene.blend", "--output", "o", option, str(value)]) == 2
+    assert main(["bake", "scene.blend", "--output", "o", option, str(value)]) == 2
     err = capsys.readouterr().err
     assert err.count("\n") == 1
     assert option.strip("-") in err

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.solver import Scene, arrivals
-from radiosity_addon.solver.arrivals import HELD_RAYS, LAMP_RAYS, RAYS, Arrivals
-from radiosity_addon.solver.cut_outs import ray_caster
-from radiosity_addon.solver.hierarchy import Hierarchy
+from radiosity_addon.scene.opacity import ray_caster
+from radiosity_addon.solver import Scene
+from radiosity_addon.solver.balance import enclosure
+from radiosity_addon.solver.balance.enclosure import HELD_RAYS, LAMP_RAYS, RAYS, Arrivals
+from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from tests.rooms import CEILING, FLOOR, box_room, grey, rectangle
 
 EVERYTHING = 1e9
@@ -18,7 +19,7 @@ EVERYTHING = 1e9
 @pytest.fixture
 def alike(monkeypatch: pytest.MonkeyPatch) -> None:
     """Large leaves ask no more rays than small ones."""
-    monkeypatch.setattr(arrivals, "SPREAD_RAYS", 0)
+    monkeypatch.setattr(enclosure, "SPREAD_RAYS", 0)
 
 
 def measured(triangles: np.ndarray, min_area: float, shines: np.ndarray | bool = False) -> Arrivals:
@@ -52,7 +53,7 @@ def test_neighbours_whose_rays_disagree_ask_their_own() -> None:
 
 @pytest.mark.usefixtures("alike")
 def test_too_many_share_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(arrivals, "MOST_RAYS", 0)
+    monkeypatch.setattr(enclosure, "MOST_RAYS", 0)
     assert len(np.unique(measured(open_box()[0], EVERYTHING).share)) == 1
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from radiosity_addon.base.sampling import stratified_square
+from radiosity_addon.lights.environment import SkyPatch, pixel_bounds
+from radiosity_addon.lights.sun_and_sky import Lamp
 from radiosity_addon.solver import AreaLight, PointLight, SpotLight, SunLight
-from radiosity_addon.solver.boxes import Boxes
-from radiosity_addon.solver.environment import SkyPatch, pixel_bounds
-from radiosity_addon.solver.lights import Lamp
-from radiosity_addon.solver.sampling import stratified_square
+from radiosity_addon.solver.gather.boxes import Boxes
 
 BOXES = Boxes(np.array([(0.0, 0.0, 0.0), (2.0, 2.0, 1.0)]), np.array([(1.0, 0.5, 0.4), (2.5, 2.6, 3.0)]))
 COUNT = 200
@@ -69,7 +69,7 @@ def test_no_shadow_ray_meets_a_box_unforeseen(lamp: Lamp) -> None:
     meets = BOXES.met_by(at, reach, np.zeros(COUNT), 1.0).any(axis=1)
     assert meets.sum() > 5
     assert not (meets & ~foreseen).any()
-    # It is of use only if it does not foresee what is far from happening.
+    # It is of use only if it does not estimate_bake what is far from happening.
     assert foreseen.sum() < COUNT - 20
 
 

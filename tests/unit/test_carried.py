@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from radiosity_addon.base.triangles import split_in_four
 from radiosity_addon.solver import Scene
 from radiosity_addon.solver.carried import on_scene
-from radiosity_addon.solver.hierarchy import Hierarchy, split_in_four
-from radiosity_addon.solver.light_gains import LightGains
+from radiosity_addon.solver.gather.light_gains import LightGains
+from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from tests.rooms import box_room, grey
 
 

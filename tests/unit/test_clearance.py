@@ -7,13 +7,13 @@ import dataclasses
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap import clearance, crossings
-from radiosity_addon.lightmap.clearance import clear_texels
-from radiosity_addon.lightmap.crossings import HOOD, LIFT, OUTSET, crossing_steps
-from radiosity_addon.lightmap.texel_geometry import TexelGeometry
+from radiosity_addon.base.progress import drain
+from radiosity_addon.lightmap.texels import clearance, occlusion
+from radiosity_addon.lightmap.texels.clearance import clear_texels
+from radiosity_addon.lightmap.texels.occlusion import HOOD, LIFT, OUTSET, crossing_steps
+from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
+from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.solver import Scene
-from radiosity_addon.solver.embree import EmbreeCaster
-from radiosity_addon.solver.steps import drain
 from tests.rooms import grey, rectangle, solid_box, sphere
 from tests.unit.texel_scenes import QUAD_UV, texel_geometry
 
@@ -69,7 +69,7 @@ def test_probes_find_the_same_where_clear_texels_are_left_out(
     found = drain(crossing_steps(geometry, caster))
     some = clear(geometry, caster)
     rays = caster.rays
-    monkeypatch.setattr(crossings, "clear_texels", lambda of, *_: np.zeros(len(of), dtype=bool))
+    monkeypatch.setattr(occlusion, "clear_texels", lambda of, *_: np.zeros(len(of), dtype=bool))
     every = drain(crossing_steps(geometry, caster))
     assert rays < caster.rays - rays
     assert some.mean() > 0.2

@@ -11,12 +11,14 @@ from types import ModuleType
 
 import pytest
 
-from radiosity_addon import cli
-from radiosity_addon.errors import BakeError, SceneError, UsageError
-from radiosity_addon.permissions import Permissions
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.base.errors import BakeError, SceneError, UsageError
+from radiosity_addon.blender import command_line
+from radiosity_addon.blender.command_line.main import main
+from radiosity_addon.options.bake_settings import BakeSettings
+from radiosity_addon.options.permissions import Permissions
 
 ROOT = Path(__file__).resolve().parents[2]
+VERBS = "radiosity_addon.blender.command_line.verbs"
 
 
 options: list[dict] = []
@@ -28,13 +30,11 @@ def verbs(monkeypatch: pytest.MonkeyPatch) -> list[tuple]:
     """Calls that reach the Blender layer, recorded instead of carried out."""
     calls: list[tuple] = []
     options.clear()
-    stand_in = ModuleType("radiosity_addon.blender.commands")
+    stand_in = ModuleType(VERBS)
     stand_in.bake = lambda *args, **more: calls.append(("bake", *args)) or options.append(more)
     stand_in.restore = lambda *args: calls.append(("restore", *args))
-    package = ModuleType("radiosity_addon.blender")
-    package.commands = stand_in
-    monkeypatch.setitem(sys.modules, "radiosity_addon.blender", package)
-    monkeypatch.setitem(sys.modules, "radiosity_addon.blender.commands", stand_in)
+    monkeypatch.setitem(sys.modules, VERBS, stand_in)
+    monkeypatch.setattr(command_line, "verbs", stand_in, raising=False)
     return calls
 
 
@@ -44,11 +44,11 @@ def failing(verbs: list[tuple], error: BaseException) -> None:
     def bake(*_: object, **_more: object) -> None:
         raise error
 
-    sys.modules["radiosity_addon.blender.commands"].bake = bake
+    sys.modules[VERBS].bake = bake
 
 
 def test_defaults_are_those_of_the_settings(verbs: list[tuple]) -> None:
-    assert cli.main(["bake", "room.blend", "--output", "out"]) == 0
+    assert main(["bake", "room.blend", "--output", "out"]) == 0
     (verb, scene, loaded, output, settings, report, *_) = verbs[0]
     assert (verb, scene, loaded, output, report) == ("bake", Path("room.blend"), None, Path("out"), None)
     assert settings == BakeSettings(
@@ -69,7 +69,7 @@ def test_defaults_are_those_of_the_settings(verbs: list[tuple]) -> None:
 
 def test_light_groups_arrive_those_of_the_file_and_those_that_are_named(verbs: list[tuple]) -> None:
     line = ["bake", "s.blend", "--output", "o", "--light-groups", "--light-group", "Day=Sun, World"]
-    assert cli.main([*line, "--light-group", "Küche=Lamp.001"]) == 0
+    assert main([*line, "--light-group", "Küche=Lamp.001"]) == 0
     settings = verbs[0][4]
     assert settings.light_groups
     assert settings.groups == (("Day", ("Sun", "World")), ("Küche", ("Lamp.001",)))
@@ -79,7 +79,7 @@ def test_light_groups_arrive_those_of_the_file_and_those_that_are_named(verbs: l
 def test_a_light_group_needs_a_name_and_members(
     text: str, verbs: list[tuple], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert cli.main(["bake", "s.blend", "--output", "o", "--light-group", text]) == 2
+    assert main(["bake", "s.blend", "--output", "o", "--light-group", text]) == 2
     assert f"--light-group {text}: give a name and what is in it" in capsys.readouterr().err
     assert not verbs
 
@@ -91,7 +91,7 @@ def test_every_option_arrives(verbs: list[tuple]) -> None:
         "--quiet --report r.json --plot p.PNG --method two-level --elements 900 --patches 30 --contrast 0.25 "
         "--memory-limit 0.5 --overwrite --allow-scripts"
     )
-    assert cli.main(line.split()) == 0
+    assert main(line.split()) == 0
     (_, scene, _, output, settings, report, plot, keep, allowed, console, _) = verbs[0]
     assert (scene, output, console.quiet) == (Path("s.glb"), Path("o"), True)
     assert (report, plot, keep) == (Path("r.json"), Path("p.PNG"), False)
@@ -117,13 +117,13 @@ def test_every_option_arrives(verbs: list[tuple]) -> None:
 
 
 def test_a_bake_has_a_preview_unless_it_is_declined(verbs: list[tuple]) -> None:
-    assert cli.main(["bake"]) == 0
-    assert cli.main(["bake", "--no-preview"]) == 0
+    assert main(["bake"]) == 0
+    assert main(["bake", "--no-preview"]) == 0
     assert [each["preview"] for each in options] == [True, False]
 
 
 def test_a_bake_is_kept_if_it_can_be(verbs: list[tuple], capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["bake", "--keep"]) == 0
+    assert main(["bake", "--keep"]) == 0
     assert verbs[0][-4] is True
     assert verbs[0][-3] == Permissions()
     for line, message in (
@@ -132,7 +132,7 @@ def test_a_bake_is_kept_if_it_can_be(verbs: list[tuple], capsys: pytest.CaptureF
         ("--keep --relight", "not allowed with"),
         ("--relight --plot p.png", "solves nothing"),
     ):
-        assert cli.main(["bake", *line.split()]) == 2
+        assert main(["bake", *line.split()]) == 2
         assert message in capsys.readouterr().err
     assert len(verbs) == 1
 
@@ -150,23 +150,23 @@ def test_a_bake_is_kept_if_it_can_be(verbs: list[tuple], capsys: pytest.CaptureF
     ],
 )
 def test_a_method_and_its_settings_arrive(line: str, given: dict, verbs: list[tuple]) -> None:
-    assert cli.main(["bake", "--method", *line.split()]) == 0
+    assert main(["bake", "--method", *line.split()]) == 0
     assert verbs[0][4] == BakeSettings(method=line.split()[0], **given)
 
 
 def test_the_bundled_scene_has_a_default_output(verbs: list[tuple]) -> None:
-    assert cli.main(["bake"]) == 0
+    assert main(["bake"]) == 0
     assert verbs[0][1] is None
     assert verbs[0][3] == Path("out/cornell")
 
 
 def test_a_loaded_file_is_the_scene(verbs: list[tuple]) -> None:
-    assert cli.main(["bake", "--output", "o"], loaded=Path("open.blend")) == 0
+    assert main(["bake", "--output", "o"], loaded=Path("open.blend")) == 0
     assert verbs[0][1:4] == (None, Path("open.blend"), Path("o"))
 
 
 def test_restore(verbs: list[tuple]) -> None:
-    assert cli.main(["restore", "baked.blend", "--output", "back.blend"]) == 0
+    assert main(["restore", "baked.blend", "--output", "back.blend"]) == 0
     assert verbs[0][:4] == ("restore", Path("baked.blend"), None, Path("back.blend"))
 
 
@@ -210,7 +210,7 @@ def test_restore(verbs: list[tuple]) -> None:
 def test_usage_errors_are_one_line_and_2(
     line: str, says: str, verbs: list[tuple], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert cli.main(line.split()) == 2
+    assert main(line.split()) == 2
     captured = capsys.readouterr()
     assert captured.out == ""
     assert verbs == []
@@ -221,7 +221,7 @@ def test_usage_errors_are_one_line_and_2(
 
 @pytest.mark.parametrize("line", ["-h", "bake --help", "restore -h"])
 def test_help_is_0(line: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(line.split()) == 0
+    assert main(line.split()) == 0
     assert "usage:" in capsys.readouterr().out
 
 
@@ -239,7 +239,7 @@ def test_each_way_to_end_has_its_code(
     error: BaseException, code: int, verbs: list[tuple], capsys: pytest.CaptureFixture[str]
 ) -> None:
     failing(verbs, error)
-    assert cli.main(["bake"]) == code
+    assert main(["bake"]) == code
     err = capsys.readouterr().err
     assert err.startswith("error: ")
     assert err.count("\n") == 1
@@ -247,7 +247,7 @@ def test_each_way_to_end_has_its_code(
 
 def test_a_defect_of_ours_shows_its_traceback(verbs: list[tuple], capsys: pytest.CaptureFixture[str]) -> None:
     failing(verbs, ZeroDivisionError("oops"))
-    assert cli.main(["bake"]) == 1
+    assert main(["bake"]) == 1
     err = capsys.readouterr().err
     assert "Traceback" in err
     assert "ZeroDivisionError: oops" in err.splitlines()[-1]
@@ -267,9 +267,9 @@ def test_an_interrupt_that_a_callback_swallows_still_ends_in_130(
                 raise SceneError("the importer failed") from stop
         args[-1].check()
 
-    sys.modules["radiosity_addon.blender.commands"].bake = bake
+    sys.modules[VERBS].bake = bake
     before = signal.getsignal(signal.SIGINT)
-    assert cli.main(["bake"]) == 130
+    assert main(["bake"]) == 130
     assert signal.getsignal(signal.SIGINT) is before
 
 
@@ -285,8 +285,8 @@ def test_a_deferred_stage_is_finished_before_the_interrupt(verbs: list[tuple]) -
         interrupts.check()
         finished.append(False)
 
-    sys.modules["radiosity_addon.blender.commands"].bake = bake
-    assert cli.main(["bake"]) == 130
+    sys.modules[VERBS].bake = bake
+    assert main(["bake"]) == 130
     assert finished == [True]
 
 
@@ -307,7 +307,8 @@ def run_python(code: str) -> subprocess.CompletedProcess[str]:
 
 def test_parsing_imports_neither_blender_nor_arrays() -> None:
     done = run_python(
-        "import sys; from radiosity_addon import cli; code = cli.main(['bake', '--resolution', '0']); "
+        "import sys; from radiosity_addon.blender.command_line.main import main; "
+        "code = main(['bake', '--resolution', '0']); "
         "print(code, sorted({m.split('.')[0] for m in sys.modules} & {'bpy', 'numpy', 'embreex', 'xatlas'}))"
     )
     assert done.stdout.strip() == "2 []"
@@ -315,7 +316,7 @@ def test_parsing_imports_neither_blender_nor_arrays() -> None:
 
 def console_run(body: str) -> str:
     """What a fresh process writes to standard output while a console is open."""
-    done = run_python(f"import ctypes, os\nfrom radiosity_addon.console import Console\n{body}")
+    done = run_python(f"import ctypes, os\nfrom radiosity_addon.cli.console import Console\n{body}")
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -350,7 +351,7 @@ def test_progress_off_a_terminal_is_a_line_a_stage_and_a_step(quiet: bool, expec
 
 
 def test_summary_says_where_how_long_and_what_to_look_at() -> None:
-    from radiosity_addon.console import summary
+    from radiosity_addon.cli.console import summary
 
     report = {
         "objects": [{"object": "Floor"}],

@@ -5,18 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from radiosity_addon.form_factors.formulas import point_to_polygon
+from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.solver import Scene, SolverSettings
-from radiosity_addon.solver.cluster_links import ClusterLinks, gather_at_clusters, no_cluster_links
-from radiosity_addon.solver.cluster_pairs import measure_cluster_links
-from radiosity_addon.solver.embree import EmbreeCaster
-from radiosity_addon.solver.first_links import CONE, FACE_SIZE, MIXED_SIZE, SIZE, first_links
-from radiosity_addon.solver.form_factor import point_to_polygon
-from radiosity_addon.solver.hierarchy import Hierarchy
-from radiosity_addon.solver.links import Links
-from radiosity_addon.solver.node_shapes import NodeShapes
-from radiosity_addon.solver.power import link_closure
-from radiosity_addon.solver.transport import node_radiosity
-from radiosity_addon.solver.tree_top import TreeTop
+from radiosity_addon.solver.hierarchy.bounds import NodeShapes
+from radiosity_addon.solver.hierarchy.cluster_cut import TreeTop
+from radiosity_addon.solver.hierarchy.nodes import Hierarchy
+from radiosity_addon.solver.links.cluster_links import ClusterLinks, gather_at_clusters, no_cluster_links
+from radiosity_addon.solver.links.cluster_pairs import measure_cluster_links
+from radiosity_addon.solver.links.element_links import Links
+from radiosity_addon.solver.links.initial import CONE, FACE_SIZE, MIXED_SIZE, SIZE, first_links
+from radiosity_addon.solver.links.transport import node_radiosity
+from radiosity_addon.solver.state.power import link_closure
 from tests.rooms import box_room, grey, rectangle, sphere
 
 MANY = 6_000_000

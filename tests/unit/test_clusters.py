@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from radiosity_addon.scene.faces import Faces
 from radiosity_addon.solver import Scene
-from radiosity_addon.solver.clusters import Clusters, build_clusters
-from radiosity_addon.solver.hierarchy import Faces, Hierarchy
+from radiosity_addon.solver.hierarchy.clusters import Clusters, build_clusters
+from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from tests.rooms import box_room, grey, rectangle
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from radiosity_addon.rays.caster import NO_HIT, RayCaster, surface_offset
+from radiosity_addon.rays.coplanar import LIFT, facing_copies
+from radiosity_addon.rays.embree import EmbreeCaster
+from radiosity_addon.scene.opacity import ray_caster
 from radiosity_addon.solver import Scene
-from radiosity_addon.solver.coincident import LIFT, facing_copies
-from radiosity_addon.solver.cut_outs import ray_caster
-from radiosity_addon.solver.embree import EmbreeCaster
-from radiosity_addon.solver.visibility import NO_HIT, RayCaster, surface_offset
 from tests.rooms import box_room, grey, rectangle, solid_box
 
 OFFSET = 1e-5

@@ -7,7 +7,7 @@ import pytest
 
 from radiosity_addon.solver import Scene
 from radiosity_addon.solver.methods.hierarchical import HierarchicalState
-from radiosity_addon.solver.power import power_balance
+from radiosity_addon.solver.state.power import power_balance
 from tests.rooms import CEILING, box_room, grey, rectangle
 from tests.unit.solved_rooms import solved
 

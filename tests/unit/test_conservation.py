@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from radiosity_addon.solver import Scene
-from radiosity_addon.solver.cluster_links import gather_at_clusters
-from radiosity_addon.solver.conservation import LIMIT, LIMIT_CLOSED, LIMIT_RECEIVED, Conservation
-from radiosity_addon.solver.hierarchy import LEAF
-from radiosity_addon.solver.link_sums import sent, sent_by_leaves
+from radiosity_addon.solver.balance.conservation import LIMIT, LIMIT_CLOSED, LIMIT_RECEIVED, Conservation
+from radiosity_addon.solver.balance.link_sums import sent, sent_by_leaves
+from radiosity_addon.solver.hierarchy.nodes import LEAF
+from radiosity_addon.solver.links.cluster_links import gather_at_clusters
+from radiosity_addon.solver.links.transport import gather, node_radiosity, pull, push
 from radiosity_addon.solver.methods.hierarchical import HierarchicalState
-from radiosity_addon.solver.transport import gather, node_radiosity, pull, push
 from tests.rooms import CEILING, box_room, grey, rectangle
 from tests.unit.solved_rooms import corridor, furnished, solved
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from radiosity_addon.base.polygons import areas
+from radiosity_addon.scene.coincident_pairs import coincident_pairs, tolerances
+from radiosity_addon.scene.faces import Faces
+from radiosity_addon.scene.opacity import ray_caster
+from radiosity_addon.scene.textures import SurfaceImages
 from radiosity_addon.solver import Scene
-from radiosity_addon.solver.coincident_pairs import coincident_pairs, tolerances
-from radiosity_addon.solver.cut_outs import ray_caster
-from radiosity_addon.solver.hierarchy import Faces, Hierarchy
-from radiosity_addon.solver.polygon_clip import areas
-from radiosity_addon.solver.surface_images import SurfaceImages
-from radiosity_addon.solver.textured_emitters import emitter_groups
+from radiosity_addon.solver.emitters.textured_emitters import emitter_groups
+from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from tests.rooms import box_room, grey, rectangle, solid_box, sphere
 
 X, Y, Z = np.eye(3)

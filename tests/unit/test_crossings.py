@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap.crossings import Crossings, crossing_steps
+from radiosity_addon.base.progress import drain
+from radiosity_addon.lightmap.texels.occlusion import Crossings, crossing_steps
+from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.solver import Scene
-from radiosity_addon.solver.embree import EmbreeCaster
-from radiosity_addon.solver.steps import drain
 from tests.rooms import grey, rectangle, solid_box
 from tests.unit.texel_scenes import QUAD_UV, texel_geometry
 

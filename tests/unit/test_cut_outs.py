@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from radiosity_addon.rays.caster import NO_HIT, BruteForceCaster
+from radiosity_addon.rays.embree import EmbreeCaster
+from radiosity_addon.scene.opacity import CutOutCaster, ray_caster
+from radiosity_addon.scene.textures import SurfaceImages
 from radiosity_addon.solver import Scene
-from radiosity_addon.solver.cut_outs import CutOutCaster, ray_caster
-from radiosity_addon.solver.embree import EmbreeCaster
-from radiosity_addon.solver.surface_images import SurfaceImages
-from radiosity_addon.solver.visibility import NO_HIT, BruteForceCaster
 from tests.rooms import grey, rectangle
 from tests.textured_rooms import image
 from tests.unit.texel_scenes import QUAD_UV

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from radiosity_addon.array_file import read_arrays, write_arrays
-from radiosity_addon.errors import RadiosityError, SceneError
-from radiosity_addon.pipeline import bake_and_keep
-from radiosity_addon.relighting import relight
-from radiosity_addon.settings import BakeSettings
-from radiosity_addon.sidecar import MAGIC, VERSION, read_sidecar, write_sidecar
-from radiosity_addon.solver.steps import drain
+from radiosity_addon.bake.pipeline import bake_and_keep
+from radiosity_addon.bake.relight.kept_bake import relight
+from radiosity_addon.bake.sidecar.array_file import read_arrays, write_arrays
+from radiosity_addon.bake.sidecar.sidecar import MAGIC, VERSION, read_sidecar, write_sidecar
+from radiosity_addon.base.errors import RadiosityError, SceneError
+from radiosity_addon.base.progress import drain
+from radiosity_addon.options.bake_settings import BakeSettings
 from tests.relit_rooms import CHANGED, lit_bake
 
 Array = np.ndarray[Any, Any]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap.dilate import dilate
+from radiosity_addon.lightmap.images.dilate import dilate
 
 
 def page(seed: int, height: int, width: int, share: float) -> tuple[np.ndarray, np.ndarray]:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from radiosity_addon.solver import Scene
-from radiosity_addon.solver.elements import subdivide_evenly
-from radiosity_addon.solver.hierarchy import Hierarchy
+from radiosity_addon.solver.equations.fixed_elements import subdivide_evenly
+from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from tests.rooms import box_room, grey, rectangle
 
 

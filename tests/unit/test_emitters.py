@@ -5,15 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.solver import Scene, SolverSettings, emitters, solve
-from radiosity_addon.solver.embree import EmbreeCaster
-from radiosity_addon.solver.emitters import EmitterGroup
-from radiosity_addon.solver.footprints import Footprints, SpreadPoints
-from radiosity_addon.solver.form_factor import point_to_polygon
-from radiosity_addon.solver.hierarchy import Faces
-from radiosity_addon.solver.sampling import stratified_square
-from radiosity_addon.solver.shadow_share import ShadowShare
-from radiosity_addon.solver.steps import drain
+from radiosity_addon.base.progress import drain
+from radiosity_addon.base.sampling import stratified_square
+from radiosity_addon.form_factors.formulas import point_to_polygon
+from radiosity_addon.rays.embree import EmbreeCaster
+from radiosity_addon.scene.faces import Faces
+from radiosity_addon.solver import Scene, SolverSettings, solve
+from radiosity_addon.solver.emitters import emitters
+from radiosity_addon.solver.emitters.emitters import EmitterGroup
+from radiosity_addon.solver.gather.footprints import Footprints, SpreadPoints
+from radiosity_addon.solver.gather.soft_shadows import ShadowShare
 from tests.rooms import grey, rectangle
 
 OFFSET = 1e-6

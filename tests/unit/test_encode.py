@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from radiosity_addon.errors import BakeError, UsageError
-from radiosity_addon.lightmap.encode import encode_png16, png16_scale, to_quantity
+from radiosity_addon.base.errors import BakeError, UsageError
+from radiosity_addon.lightmap.images.encode import encode_png16, png16_scale, to_quantity
 
 IRRADIANCE = np.array([[np.pi, 2.0, 0.0]])
 REFLECTANCE = np.array([[0.5, 0.25, 0.75]])

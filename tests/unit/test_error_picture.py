@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from radiosity_addon.bake_scene import BakeResult, BakeScene
-from radiosity_addon.errors import UsageError
-from radiosity_addon.lightmap.dilate import dilate
-from radiosity_addon.pipeline import bake
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.bake.pipeline import bake
+from radiosity_addon.bake.result.result import BakeResult
+from radiosity_addon.base.errors import UsageError
+from radiosity_addon.lightmap.images.dilate import dilate
+from radiosity_addon.options.bake_settings import BakeSettings
+from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import EnvironmentLight, PointLight, Scene
 from tests.cornell import cornell_box
 from tests.rooms import box_room, grey, rectangle

@@ -50,5 +50,5 @@ def test_the_zip_has_the_package_at_its_root_and_the_same_bytes_each_time(tmp_pa
         names = archive.namelist()
         assert archive.read("wheels/a-cp311.whl") == b"not to be changed"
         assert archive.read("__init__.py") == (ROOT / "radiosity_addon" / "__init__.py").read_bytes()
-    assert {"blender_manifest.toml", "LICENSE", "solver/scene.py"} <= set(names)
+    assert {"blender_manifest.toml", "LICENSE", "scene/scene.py"} <= set(names)
     assert not [name for name in names if "__pycache__" in name or name.startswith("radiosity_addon")]

@@ -6,7 +6,7 @@ import itertools
 
 import pytest
 
-from radiosity_addon.file_names import (
+from radiosity_addon.files.file_names import (
     MAX_OBJECT,
     PLAIN_NAMES,
     FileNames,

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.solver import Scene, SolverSettings, first_links
-from radiosity_addon.solver.cluster_links import ClusterLinks
-from radiosity_addon.solver.embree import EmbreeCaster
-from radiosity_addon.solver.hierarchy import Hierarchy
-from radiosity_addon.solver.links import Links
+from radiosity_addon.rays.embree import EmbreeCaster
+from radiosity_addon.solver import Scene, SolverSettings
+from radiosity_addon.solver.hierarchy.bounds import NodeShapes
+from radiosity_addon.solver.hierarchy.nodes import Hierarchy
+from radiosity_addon.solver.links import initial
+from radiosity_addon.solver.links.cluster_links import ClusterLinks
+from radiosity_addon.solver.links.element_links import Links
 from radiosity_addon.solver.methods import hierarchical
-from radiosity_addon.solver.node_shapes import NodeShapes
 from tests.rooms import box_room, grey, sphere
 
 
@@ -26,8 +27,8 @@ def clutter() -> Scene:
     return Scene(triangles, grey(len(triangles), 0.5), emission)
 
 
-def limits_of(hierarchy: Hierarchy, **given: float) -> first_links._Limits:
-    return first_links._Limits(float(hierarchy.faces.area.sum()), SolverSettings().min_area, **given)
+def limits_of(hierarchy: Hierarchy, **given: float) -> initial._Limits:
+    return initial._Limits(float(hierarchy.faces.area.sum()), SolverSettings().min_area, **given)
 
 
 def test_nodes_that_touch_exchange_at_most_the_smaller_area() -> None:
@@ -47,12 +48,12 @@ def test_the_estimate_tells_how_many_links_there_are(
     """Whole if nothing is thinned, and within five standard errors or so if most is."""
     hierarchy = Hierarchy(clutter)
     shapes, limits = NodeShapes(hierarchy), limits_of(hierarchy, faint=faint)
-    pairs = first_links._first_pairs(hierarchy, shapes, limits, 10**9)
+    pairs = initial._first_pairs(hierarchy, shapes, limits, 10**9)
     assert pairs is not None
-    monkeypatch.setattr(first_links, "THINNED", 10**9)
-    assert first_links._estimate(hierarchy, shapes, limits) == len(pairs[0])
-    monkeypatch.setattr(first_links, "THINNED", 1 << 12)
-    assert first_links._estimate(hierarchy, shapes, limits) == pytest.approx(len(pairs[0]), rel=0.15)
+    monkeypatch.setattr(initial, "THINNED", 10**9)
+    assert initial._estimate(hierarchy, shapes, limits) == len(pairs[0])
+    monkeypatch.setattr(initial, "THINNED", 1 << 12)
+    assert initial._estimate(hierarchy, shapes, limits) == pytest.approx(len(pairs[0]), rel=0.15)
 
 
 def test_the_order_in_which_pairs_are_walked_changes_none(
@@ -62,8 +63,8 @@ def test_the_order_in_which_pairs_are_walked_changes_none(
     shapes, limits = NodeShapes(hierarchy), limits_of(hierarchy)
     found = []
     for block in (10**9, 1000):
-        monkeypatch.setattr(first_links, "BLOCK", block)
-        pairs = first_links._first_pairs(hierarchy, shapes, limits, 10**9)
+        monkeypatch.setattr(initial, "BLOCK", block)
+        pairs = initial._first_pairs(hierarchy, shapes, limits, 10**9)
         assert pairs is not None
         found.append(np.sort(pairs[0].astype(np.int64) << 32 | pairs[1]))
     np.testing.assert_array_equal(*found)
@@ -73,20 +74,20 @@ def test_the_order_in_which_pairs_are_walked_changes_none(
 def made(scene: Scene, max_links: int) -> tuple[Links, ClusterLinks, float]:
     hierarchy = Hierarchy(scene)
     caster = EmbreeCaster(scene.triangles, 1)
-    return first_links.first_links(hierarchy, NodeShapes(hierarchy), caster, SolverSettings(), max_links)
+    return initial.first_links(hierarchy, NodeShapes(hierarchy), caster, SolverSettings(), max_links)
 
 
 def test_a_small_budget_makes_links_coarse_and_says_so(
     clutter: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(first_links, "WANTED", np.inf)
+    monkeypatch.setattr(initial, "WANTED", np.inf)
     *_, faint = made(clutter, 10**9)
     assert faint == 0.0
-    monkeypatch.setattr(first_links, "FEWEST", 1)
+    monkeypatch.setattr(initial, "FEWEST", 1)
     told = []
     for budget in (400_000, 100_000):
         links, together, faint = made(clutter, budget)
-        assert len(links) + len(together) <= first_links.SLACK * first_links.BUDGET * budget
+        assert len(links) + len(together) <= initial.SLACK * initial.BUDGET * budget
         told.append(faint)
     assert 0 < told[0] < told[1] < 0.1
 
@@ -98,28 +99,28 @@ def test_links_are_few_while_the_error_asks_for_no_finer(
     hierarchy = Hierarchy(clutter)
     shapes = NodeShapes(hierarchy)
     caster = EmbreeCaster(clutter.triangles, 1)
-    monkeypatch.setattr(first_links, "WANTED", 600.0)
-    links, together, faint = first_links.first_links(
+    monkeypatch.setattr(initial, "WANTED", 600.0)
+    links, together, faint = initial.first_links(
         hierarchy, shapes, caster, SolverSettings(error=1e-3), 10**6
     )
-    assert len(links) + len(together) <= first_links.SLACK * 600 / 1e-3**0.5
-    assert 0.0 < faint <= first_links.COARSEST_FAINT * 1e-3
-    monkeypatch.setattr(first_links, "WANTED", 1.0)
-    links, together, faint = first_links.first_links(
+    assert len(links) + len(together) <= initial.SLACK * 600 / 1e-3**0.5
+    assert 0.0 < faint <= initial.COARSEST_FAINT * 1e-3
+    monkeypatch.setattr(initial, "WANTED", 1.0)
+    links, together, faint = initial.first_links(
         hierarchy, shapes, caster, SolverSettings(error=1e-3), 10**6
     )
     assert len(links) + len(together) > 1 / 1e-3**0.5
-    assert 0.5 < faint / (first_links.COARSEST_FAINT * 1e-3) <= 1.0
+    assert 0.5 < faint / (initial.COARSEST_FAINT * 1e-3) <= 1.0
 
 
 def test_coarse_first_links_still_send_what_there_is(clutter: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every leaf sends no more than it has, and the mean light is that of the fine links."""
     *_, (_, fine) = hierarchical.solve_steps(clutter, SolverSettings(error=1e-3))
-    monkeypatch.setattr(first_links, "FEWEST", 1)
+    monkeypatch.setattr(initial, "FEWEST", 1)
     settings = SolverSettings(error=1e-3, max_links=50_000)
     *_, (_, coarse) = hierarchical.solve_steps(clutter, settings)
     # Finer than BF_ε asks for none need be; a short budget alone makes them coarser.
-    assert fine.details["hierarchical"]["first_faint"] <= first_links.COARSEST_FAINT * 1e-3
+    assert fine.details["hierarchical"]["first_faint"] <= initial.COARSEST_FAINT * 1e-3
     assert coarse.details["hierarchical"]["first_faint"] > fine.details["hierarchical"]["first_faint"]
     assert coarse.n_links <= 50_000
     assert coarse.residual < settings.tolerance

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.solver.embree import EmbreeCaster
-from radiosity_addon.solver.emitters import EmitterGroup
-from radiosity_addon.solver.footprints import Footprints, SpreadPoints
-from radiosity_addon.solver.lights import AreaLight, PointLight
-from radiosity_addon.solver.sampling import points_on_triangles, stratified_square
-from radiosity_addon.solver.shadow_share import MAIN_PART, ShadowShare
-from radiosity_addon.solver.steps import drain
+from radiosity_addon.base.progress import drain
+from radiosity_addon.base.sampling import points_on_triangles, stratified_square
+from radiosity_addon.lights.sun_and_sky import AreaLight, PointLight
+from radiosity_addon.rays.embree import EmbreeCaster
+from radiosity_addon.solver.emitters.emitters import EmitterGroup
+from radiosity_addon.solver.gather.footprints import Footprints, SpreadPoints
+from radiosity_addon.solver.gather.soft_shadows import MAIN_PART, ShadowShare
 from tests.rooms import rectangle
 
 COUNT = 400

@@ -7,17 +7,18 @@ from pathlib import Path
 
 import pytest
 
-from radiosity_addon.foresight import Lit, foresee
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.bake.estimate import LightmappedObject as Item
+from radiosity_addon.bake.estimate import estimate_bake
+from radiosity_addon.options.bake_settings import BakeSettings
 
 RESULTS = Path(__file__).resolve().parents[2] / "bench" / "results"
 
 BOX = [
-    Lit(f"Part {number}", 2 if number < 5 else 10, area) for number, area in enumerate([5, 5, 5, 5, 5, 2, 3])
+    Item(f"Part {number}", 2 if number < 5 else 10, area) for number, area in enumerate([5, 5, 5, 5, 5, 2, 3])
 ]
 """About the Cornell box: five walls and two blocks, 34 triangles with the lamp's."""
 
-OFFICE = [Lit(f"Thing {number}", 390, 4.0) for number in range(100)]
+OFFICE = [Item(f"Thing {number}", 390, 4.0) for number in range(100)]
 """As many triangles as the office has, in a hundred objects."""
 
 
@@ -33,7 +34,7 @@ def test_texels_time_and_memory_are_of_the_right_size(case: str, quality: str) -
     (bake,) = (entry for entry in measured["ours"] if entry["label"] == quality)
     cores = measured["context"]["machine"]["cores"]
     settings = BakeSettings(resolution=measured["resolution"], quality=quality, threads=cores)
-    plan = foresee(objects, measured["triangles"], settings)
+    plan = estimate_bake(objects, measured["triangles"], settings)
     assert plan.seconds is not None
     for found, expected in (
         (sum(plan.texels), measured["texels"]),
@@ -45,34 +46,34 @@ def test_texels_time_and_memory_are_of_the_right_size(case: str, quality: str) -
 
 
 def test_pages_follow_a_density() -> None:
-    coarse, fine = (foresee(BOX, 34, BakeSettings(texel_density=density)) for density in (20.0, 80.0))
+    coarse, fine = (estimate_bake(BOX, 34, BakeSettings(texel_density=density)) for density in (20.0, 80.0))
     assert len(coarse.pages) == len(fine.pages) == 1
     assert fine.pages[0] / coarse.pages[0] == pytest.approx(4.0, rel=0.1)
     assert sum(coarse.texels) == pytest.approx(30 * 20.0**2)
 
 
 def test_what_does_not_fit_one_page_takes_more() -> None:
-    plan = foresee(BOX, 34, BakeSettings(texel_density=100.0, max_resolution=256))
+    plan = estimate_bake(BOX, 34, BakeSettings(texel_density=100.0, max_resolution=256))
     assert len(plan.pages) > 3
     assert max(plan.pages) <= 256
 
 
 def test_each_object_has_its_own_page_if_asked() -> None:
-    plan = foresee(BOX, 34, BakeSettings(atlas="per-object", resolution=64))
+    plan = estimate_bake(BOX, 34, BakeSettings(atlas="per-object", resolution=64))
     assert plan.pages == (64,) * 7
 
 
 def test_texel_scales_share_out_texels() -> None:
-    one, other = foresee([Lit("A", 2, 4.0), Lit("B", 2, 4.0, scale=2.0)], 4, BakeSettings()).texels
+    one, other = estimate_bake([Item("A", 2, 4.0), Item("B", 2, 4.0, scale=2.0)], 4, BakeSettings()).texels
     assert other == pytest.approx(4 * one)
 
 
 def test_wider_padding_leaves_fewer_texels() -> None:
-    plain, apart = (sum(foresee(OFFICE, 39_000, BakeSettings(mip_levels=levels)).texels) for levels in (0, 3))
+    plain, apart = (sum(estimate_bake(OFFICE, 39_000, BakeSettings(mip_levels=levels)).texels) for levels in (0, 3))
     assert apart < plain
     assert apart > 0
 
 
 def test_nobody_knows_how_long_an_error_that_is_asked_for_takes() -> None:
-    assert foresee(BOX, 34, BakeSettings(relative_error=0.02)).seconds is None
-    assert foresee(BOX, 34, BakeSettings(method="jacobi")).seconds is None
+    assert estimate_bake(BOX, 34, BakeSettings(relative_error=0.02)).seconds is None
+    assert estimate_bake(BOX, 34, BakeSettings(method="jacobi")).seconds is None

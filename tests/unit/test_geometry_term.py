@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.solver.embree import EmbreeCaster
-from radiosity_addon.solver.form_factor import point_to_polygon
-from radiosity_addon.solver.geometry_term import geometry_term, kernel, ray_geometry_term, sees, throughput
-from radiosity_addon.solver.visibility import BruteForceCaster, RayCaster
+from radiosity_addon.form_factors.formulas import point_to_polygon
+from radiosity_addon.form_factors.kernel import geometry_term, kernel, ray_geometry_term, sees, throughput
+from radiosity_addon.rays.caster import BruteForceCaster, RayCaster
+from radiosity_addon.rays.embree import EmbreeCaster
 from tests.rooms import box_room, rectangle, solid_box
 
 CUBE_FACTOR = 0.19982489569838746

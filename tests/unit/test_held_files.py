@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from radiosity_addon.errors import BakeError
-from radiosity_addon.held_files import HeldFiles
+from radiosity_addon.base.errors import BakeError
+from radiosity_addon.files.file_versions import HeldFiles
 
 
 def write(path: Path, content: bytes) -> str:

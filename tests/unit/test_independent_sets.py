@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from radiosity_addon.solver import Scene, SolverSettings
-from radiosity_addon.solver.independent_sets import describe_sets, independent_sets
-from radiosity_addon.solver.linear_system import LinearSystem
+from radiosity_addon.solver.equations.independent_sets import describe_sets, independent_sets
+from radiosity_addon.solver.equations.linear_system import LinearSystem
 from radiosity_addon.solver.methods import steps_of
 from radiosity_addon.solver.methods.dense import dense
 from radiosity_addon.solver.methods.jacobi import jacobi
@@ -56,7 +56,7 @@ def test_a_shared_hat_joins_what_sees_nothing() -> None:
 
 def test_many_elements_are_all_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever the chunks of rows: 40 rings of 5, shuffled."""
-    monkeypatch.setattr("radiosity_addon.solver.independent_sets.CHUNK_ROWS", 3)
+    monkeypatch.setattr("radiosity_addon.solver.equations.independent_sets.CHUNK_ROWS", 3)
     order = np.random.default_rng(0).permutation(200)
     exchange = np.zeros((200, 200))
     for ring in order.reshape(40, 5):

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap.interpolate import GatherPoints, Interpolation, _linear_weights, fit
-from radiosity_addon.lightmap.point_grid import PER_CELL
-from radiosity_addon.lightmap.texel_geometry import TexelGeometry
+from radiosity_addon.lightmap.lighting.interpolate import GatherPoints, Interpolation, _linear_weights, fit
+from radiosity_addon.lightmap.lighting.point_grid import PER_CELL
+from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
+from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.solver import Scene
-from radiosity_addon.solver.embree import EmbreeCaster
 from tests.rooms import grey, rectangle, sphere
 from tests.unit.texel_scenes import QUAD_UV, in_cell, texel_geometry
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from radiosity_addon.solver.hierarchy import Hierarchy
-from radiosity_addon.solver.known_sums import corrected
-from radiosity_addon.solver.links import Links
-from radiosity_addon.solver.scene import Scene
+from radiosity_addon.scene.scene import Scene
+from radiosity_addon.solver.balance.visibility_correction import corrected
+from radiosity_addon.solver.hierarchy.nodes import Hierarchy
+from radiosity_addon.solver.links.element_links import Links
 from tests.rooms import grey, rectangle
 
 ALL = np.ones(4, dtype=bool)

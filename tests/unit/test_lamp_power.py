@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from radiosity_addon.lights.light import Emitter
 from radiosity_addon.solver import AreaLight, PointLight, Scene
-from radiosity_addon.solver.lamp_power import lost_by_lamp
-from radiosity_addon.solver.light_base import Emitter
-from radiosity_addon.solver.power import power_balance
+from radiosity_addon.solver.state.lamp_power import lost_by_lamp
+from radiosity_addon.solver.state.power import power_balance
 from tests.rooms import box_room, grey, rectangle, solid_box
 from tests.unit.solved_rooms import solved
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from radiosity_addon.rays.caster import Hits
+from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.solver import Scene
-from radiosity_addon.solver.embree import EmbreeCaster
-from radiosity_addon.solver.gathering import NOTHING
-from radiosity_addon.solver.hierarchy import Hierarchy
-from radiosity_addon.solver.leaf_parts import CELLS, LeafParts
-from radiosity_addon.solver.visibility import Hits
+from radiosity_addon.solver.gather.final_gather import NOTHING
+from radiosity_addon.solver.gather.sub_cells import CELLS, LeafParts
+from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from tests.rooms import grey, rectangle, solid_box
 
 FLOOR = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0))

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from radiosity_addon.bake_scene import BakeScene
-from radiosity_addon.errors import UsageError
-from radiosity_addon.light_groups import are_wanted, check_groups, members, shared_out
-from radiosity_addon.pipeline import bake
-from radiosity_addon.settings import MAX_GROUPS, OTHERS, BakeSettings
+from radiosity_addon.bake.pipeline import bake
+from radiosity_addon.bake.relight.light_groups import are_wanted, check_groups, members, shared_out
+from radiosity_addon.base.errors import UsageError
+from radiosity_addon.options.bake_settings import MAX_GROUPS, OTHERS, BakeSettings
+from radiosity_addon.scene.bake_scene import BakeScene
 from tests.relit_rooms import lit_bake
 
 NAMES = ("Bulb", "Bulb", "Window", "World", "Glow")

@@ -7,26 +7,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from radiosity_addon.solver import (
-    AreaLight,
-    EnvironmentLight,
-    PointLight,
-    Scene,
-    SpotLight,
-    SunLight,
-    light_links,
-)
-from radiosity_addon.solver.embree import EmbreeCaster
-from radiosity_addon.solver.hierarchy import LEAF, Hierarchy, split_in_four
-from radiosity_addon.solver.light_links import (
+from radiosity_addon.base.triangles import split_in_four
+from radiosity_addon.lights.sun_and_sky import light_strengths
+from radiosity_addon.rays.embree import EmbreeCaster
+from radiosity_addon.solver import AreaLight, EnvironmentLight, PointLight, Scene, SpotLight, SunLight
+from radiosity_addon.solver.hierarchy.nodes import LEAF, Hierarchy
+from radiosity_addon.solver.links import light_links
+from radiosity_addon.solver.links.light_links import (
     LightLinks,
-    light_strengths,
     link_lights,
     measure_light,
     no_light_links,
     sky_share,
 )
-from radiosity_addon.solver.transport import push
+from radiosity_addon.solver.links.transport import push
 from tests.rooms import box_room, grey, rectangle, solid_box
 
 FLOOR = rectangle((0, 0, 0), (2, 0, 0), (0, 2, 0))

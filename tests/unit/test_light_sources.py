@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.errors import SceneError
-from radiosity_addon.light_groups import shared_out
-from radiosity_addon.lightmap.earlier_light import MOST, EarlierLight
+from radiosity_addon.bake.relight.light_groups import shared_out
+from radiosity_addon.base.errors import SceneError
+from radiosity_addon.lightmap.lighting.warm_start import MOST, EarlierLight
+from radiosity_addon.rays.embree import EmbreeCaster
+from radiosity_addon.scene.faces import Faces
 from radiosity_addon.solver import PointLight, Scene
-from radiosity_addon.solver.embree import EmbreeCaster
-from radiosity_addon.solver.hierarchy import Faces
-from radiosity_addon.solver.light_gains import LightGains
-from radiosity_addon.solver.light_sources import LightSources
+from radiosity_addon.solver.emitters.light_sources import LightSources
+from radiosity_addon.solver.gather.light_gains import LightGains
 from tests.rooms import box_room, grey
 
 RED, ORANGE, BLUE = (4.0, 0.0, 0.0), (8.0, 4.0, 0.0), (0.0, 0.0, 2.0)

@@ -9,9 +9,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from radiosity_addon.errors import BakeError, UsageError
-from radiosity_addon.solver.linear_system import LinearSystem
-from radiosity_addon.solver.matrix_properties import extreme_eigenvalues
+from radiosity_addon.base.errors import BakeError, UsageError
+from radiosity_addon.solver.equations.linear_system import LinearSystem
+from radiosity_addon.solver.equations.matrix_report import extreme_eigenvalues
 from radiosity_addon.solver.methods.conjugate_gradient import conjugate_gradient
 from radiosity_addon.solver.methods.dense import dense
 from radiosity_addon.solver.methods.gauss_seidel import gauss_seidel

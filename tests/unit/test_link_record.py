@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from radiosity_addon.solver import PointLight, Scene, SolverSettings, SunLight
-from radiosity_addon.solver.link_record import leaves_on, nearest_leaf, record_links
 from radiosity_addon.solver.methods import steps_of
+from radiosity_addon.solver.state.link_record import leaves_on, nearest_leaf, record_links
 from tests.rooms import box_room, grey, rectangle
 from tests.unit.solved_rooms import corridor, furnished, solved
 

@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.solver import Scene, links
-from radiosity_addon.solver.embree import EmbreeCaster
-from radiosity_addon.solver.form_factor import triangle_to_triangle
-from radiosity_addon.solver.geometry_term import kernel
-from radiosity_addon.solver.hierarchy import Hierarchy, split_in_four
-from radiosity_addon.solver.links import Links, join, measure_links, no_links
-from radiosity_addon.solver.pairs import element_factors
+from radiosity_addon.base.triangles import split_in_four
+from radiosity_addon.form_factors.formulas import triangle_to_triangle
+from radiosity_addon.form_factors.kernel import kernel
+from radiosity_addon.rays.embree import EmbreeCaster
+from radiosity_addon.solver import Scene
+from radiosity_addon.solver.hierarchy.nodes import Hierarchy
+from radiosity_addon.solver.links import element_links
+from radiosity_addon.solver.links.element_links import Links, join, measure_links, no_links
+from radiosity_addon.solver.links.pair_factors import element_factors
 from tests.rooms import box_room, grey, rectangle, solid_box
 
 
@@ -236,7 +238,7 @@ def test_chunks_order_and_company_change_nothing(monkeypatch: pytest.MonkeyPatch
     whole = measure_links(hierarchy, caster, receiver, source, seed=3)
     assert as_bytes(measure_links(hierarchy, caster, receiver, source, seed=3)) == as_bytes(whole)
     assert as_bytes(measure_links(hierarchy, caster, receiver, source, seed=4)) != as_bytes(whole)
-    monkeypatch.setattr(links, "CHUNK", 57)
+    monkeypatch.setattr(element_links, "CHUNK", 57)
     assert as_bytes(measure_links(hierarchy, caster, receiver, source, seed=3)) == as_bytes(whole)
     order = np.random.default_rng(0).permutation(len(receiver))
     mixed = measure_links(hierarchy, caster, receiver[order], source[order], seed=3)

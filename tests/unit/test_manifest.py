@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from radiosity_addon.manifest import (
+from radiosity_addon.files.baked_files import (
     NoReportError,
     Owner,
     entries,

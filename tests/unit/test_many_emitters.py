@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.solver import emitters
-from radiosity_addon.solver.emitter_tree import EmitterTree
-from radiosity_addon.solver.emitters import EmitterGroup
-from radiosity_addon.solver.merged_faces import merge_flat
-from radiosity_addon.solver.sampling import stratified_square
+from radiosity_addon.base.sampling import stratified_square
+from radiosity_addon.solver.emitters import emitters
+from radiosity_addon.solver.emitters.emitter_tree import EmitterTree
+from radiosity_addon.solver.emitters.emitters import EmitterGroup
+from radiosity_addon.solver.emitters.merged_faces import merge_flat
 from tests.rooms import rectangle, sphere
 
 CENTRE = np.array([2.5, 2.0, 2.0])

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from radiosity_addon.solver.linear_system import LinearSystem
-from radiosity_addon.solver.matrix_properties import (
+from radiosity_addon.solver.equations.linear_system import LinearSystem
+from radiosity_addon.solver.equations.matrix_report import (
     asymmetry,
     diagonal_dominance,
     extreme_eigenvalues,

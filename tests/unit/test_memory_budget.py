@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from radiosity_addon.errors import UsageError
+from radiosity_addon.base.errors import UsageError
+from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.solver import PointLight, Scene, SolverSettings
-from radiosity_addon.solver.embree import EmbreeCaster
-from radiosity_addon.solver.hierarchy import Hierarchy
-from radiosity_addon.solver.light_links import link_lights
-from radiosity_addon.solver.memory_budget import (
+from radiosity_addon.solver.hierarchy.nodes import Hierarchy
+from radiosity_addon.solver.links.light_links import link_lights
+from radiosity_addon.solver.methods import hierarchical
+from radiosity_addon.solver.state.memory import (
     ELEMENT_BYTES,
     FACE_BYTES,
     LIGHT_LINK_BYTES,
@@ -22,7 +23,6 @@ from radiosity_addon.solver.memory_budget import (
     link_budget,
     refinable,
 )
-from radiosity_addon.solver.methods import hierarchical
 from tests.rooms import box_room, grey
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -9,20 +9,20 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap import source_means, stored_links, sweeps
-from radiosity_addon.lightmap.crossings import Crossings
-from radiosity_addon.lightmap.interpolate import Interpolation
-from radiosity_addon.lightmap.part_links import Parts
-from radiosity_addon.lightmap.point_grid import PointGrid
-from radiosity_addon.lightmap.stored_links import StoredLinks
-from radiosity_addon.lightmap.sweeps import TexelLight, TexelTransport, sweep_steps
+from radiosity_addon.bake.texel_memory import LIT_BYTES
+from radiosity_addon.base import scratch as scratch_module
+from radiosity_addon.base.progress import drain
+from radiosity_addon.base.scratch import Scratch, is_in_file, trim
+from radiosity_addon.lightmap.lighting import source_means, stored_links, sweeps
+from radiosity_addon.lightmap.lighting.interpolate import Interpolation
+from radiosity_addon.lightmap.lighting.part_links import Parts
+from radiosity_addon.lightmap.lighting.point_grid import PointGrid
+from radiosity_addon.lightmap.lighting.stored_links import StoredLinks
+from radiosity_addon.lightmap.lighting.sweeps import TexelLight, TexelTransport, sweep_steps
+from radiosity_addon.lightmap.texels.occlusion import Crossings
 from radiosity_addon.solver import PointLight, Scene, SolverSettings, solve
-from radiosity_addon.solver import scratch as scratch_module
-from radiosity_addon.solver.aiming import AimedRays
-from radiosity_addon.solver.local_pass import NOTHING, Footprints
-from radiosity_addon.solver.scratch import Scratch, is_in_file, trim
-from radiosity_addon.solver.steps import drain
-from radiosity_addon.texel_memory import LIT_BYTES
+from radiosity_addon.solver.gather.bright_patches import AimedRays
+from radiosity_addon.solver.gather.local_pass import NOTHING, Footprints
 from tests.rooms import box_room, grey
 from tests.unit.test_sweeps import identity, room_with_texels
 

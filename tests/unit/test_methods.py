@@ -11,11 +11,11 @@ from typing import Any
 
 import pytest
 
-from radiosity_addon.errors import UsageError
-from radiosity_addon.methods import METHODS, SETTINGS
-from radiosity_addon.quality import QUALITIES, SHOOTING_TOLERANCES, quality_of, used_settings
-from radiosity_addon.settings import BakeSettings
-from radiosity_addon.solver.settings import SolverSettings
+from radiosity_addon.bake.quality import QUALITIES, SHOOTING_TOLERANCES, quality_of, used_settings
+from radiosity_addon.base.errors import UsageError
+from radiosity_addon.options.bake_settings import BakeSettings
+from radiosity_addon.options.methods import METHODS, SETTINGS
+from radiosity_addon.options.solver_settings import SolverSettings
 
 VALUES = {
     "elements": 700,

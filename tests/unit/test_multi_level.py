@@ -7,17 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from radiosity_addon.errors import UsageError
-from radiosity_addon.quality import quality_of
-from radiosity_addon.settings import BakeSettings
-from radiosity_addon.solver import PointLight, Scene, SolverSettings, memory_budget, solve
-from radiosity_addon.solver.exchange import exchange_areas
-from radiosity_addon.solver.hierarchy import LEAF, Hierarchy
-from radiosity_addon.solver.link_census import elements_by_level, leaves_by_level, links_by_level
+from radiosity_addon.bake.quality import quality_of
+from radiosity_addon.base.errors import UsageError
+from radiosity_addon.options.bake_settings import BakeSettings
+from radiosity_addon.solver import PointLight, Scene, SolverSettings, solve
+from radiosity_addon.solver.equations.exchange_areas import exchange_areas
+from radiosity_addon.solver.equations.refine_patch import facing_pairs
+from radiosity_addon.solver.hierarchy.nodes import LEAF, Hierarchy
+from radiosity_addon.solver.links.census import elements_by_level, leaves_by_level, links_by_level
+from radiosity_addon.solver.links.transport import gather
 from radiosity_addon.solver.methods import hierarchical, multi_level
 from radiosity_addon.solver.methods.multi_level import MultiLevelState, refuse_too_many_faces
-from radiosity_addon.solver.refine_patch import facing_pairs
-from radiosity_addon.solver.transport import gather
+from radiosity_addon.solver.state import memory
 from tests.rooms import CEILING, box_room, grey
 from tests.unit.solved_rooms import furnished
 
@@ -276,10 +277,10 @@ def test_memory_bounds_the_links_of_the_refined_hierarchy() -> None:
     """A limit too small for what the error asks stops refinement like a budget of links, and says so."""
     *_, (_, free) = hierarchical.solve_steps(furnished(), SolverSettings(error=1e-3))
     settings = SolverSettings(error=1e-3, memory_limit=1.0)
-    others = 2**30 - memory_budget.free_bytes(free.hierarchy, settings)
-    limit = (others + (len(free.links) // 2) * memory_budget.LINK_BYTES) / 2**30
+    others = 2**30 - memory.free_bytes(free.hierarchy, settings)
+    limit = (others + (len(free.links) // 2) * memory.LINK_BYTES) / 2**30
     tight = SolverSettings(error=1e-3, memory_limit=limit)
     *_, (_, bound) = hierarchical.solve_steps(furnished(), tight)
     assert free.over_budget == 0.0
     assert bound.over_budget > 1e-3
-    assert len(bound.links) <= memory_budget.link_budget(bound.hierarchy, tight, 0) < len(free.links)
+    assert len(bound.links) <= memory.link_budget(bound.hierarchy, tight, 0) < len(free.links)

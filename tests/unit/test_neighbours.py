@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.solver import Scene
-from radiosity_addon.solver.embree import EmbreeCaster
-from radiosity_addon.solver.hierarchy import Hierarchy
-from radiosity_addon.solver.neighbours import neighbours
+from radiosity_addon.solver.hierarchy.neighbors import neighbours
+from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from tests.rooms import box_room, grey, rectangle
 
 

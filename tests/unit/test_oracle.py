@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from radiosity_addon.solver import Scene
-from radiosity_addon.solver.hierarchy import LEAF, Hierarchy
-from radiosity_addon.solver.links import Links
-from radiosity_addon.solver.oracle import children_of_links, choose_side, misplaced_power
+from radiosity_addon.solver.hierarchy.nodes import LEAF, Hierarchy
+from radiosity_addon.solver.links.element_links import Links
+from radiosity_addon.solver.links.refine import children_of_links, choose_side, misplaced_power
 from tests.rooms import grey
 
 

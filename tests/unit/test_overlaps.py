@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.methods import METHODS
+from radiosity_addon.options.methods import METHODS
+from radiosity_addon.scene.overlaps import OVERLAP, shares
 from radiosity_addon.solver import Scene, SolverSettings, solve
 from radiosity_addon.solver.methods import steps_of
-from radiosity_addon.solver.overlaps import OVERLAP, shares
 from tests.rooms import CEILING, FLOOR, area_mean, box_room, grey
 
 

@@ -10,13 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from radiosity_addon.bake_scene import BakeResult, BakeScene, Progress
-from radiosity_addon.errors import SceneError
-from radiosity_addon.methods import METHODS
-from radiosity_addon.pipeline import bake
-from radiosity_addon.quality import QUALITIES, quality_of
-from radiosity_addon.settings import BakeSettings
-from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, first_links, solve
+from radiosity_addon.bake.pipeline import bake
+from radiosity_addon.bake.quality import QUALITIES, quality_of
+from radiosity_addon.bake.result.progress import Progress
+from radiosity_addon.bake.result.result import BakeResult
+from radiosity_addon.base.errors import SceneError
+from radiosity_addon.options.bake_settings import BakeSettings
+from radiosity_addon.options.methods import METHODS
+from radiosity_addon.scene.bake_scene import BakeScene
+from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, solve
+from radiosity_addon.solver.links import initial
 from tests.rooms import FLOOR, box_room, grey, rectangle, solid_box, sphere
 from tests.unit.texel_scenes import QUAD_UV, bake_object, bake_scene, in_cell
 
@@ -241,7 +244,7 @@ def test_kept_uvs_come_back_bit_for_bit() -> None:
 def test_pictures_tile_the_room_and_the_last_one_is_the_solution(
     method: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("radiosity_addon.pipeline.PICTURE_SECONDS", 0.0)
+    monkeypatch.setattr("radiosity_addon.bake.pipeline.PICTURE_SECONDS", 0.0)
     room = lit_room(lights=[LAMP], two_sided=True)
     given = {"elements": 60} if "elements" in METHODS[method].settings else {}
     settings = BakeSettings(quality="draft", resolution=16, method=method, **given)
@@ -334,7 +337,7 @@ def test_links_that_had_to_begin_coarse_are_told_of(monkeypatch: pytest.MonkeyPa
     count = len(triangles)
     scene = Scene(triangles, grey(count, 0.5), grey(count, 0.0), lights=[LAMP])
     clutter = bake_scene(scene, ("Room", 12), ("Balls", count - 12))
-    monkeypatch.setattr(first_links, "FEWEST", 1)
+    monkeypatch.setattr(initial, "FEWEST", 1)
 
     def told(**settings: Any) -> list[str]:
         warnings = run(clutter, resolution=16, **settings).warnings
@@ -343,5 +346,5 @@ def test_links_that_had_to_begin_coarse_are_told_of(monkeypatch: pytest.MonkeyPa
     assert told() == []
     (message,) = told(max_links=2_000)
     share = float(message.split("up to ")[1].split("%")[0])
-    assert 100 * first_links.COARSEST_FAINT * QUALITIES["draft"].solver.error < share < 100
+    assert 100 * initial.COARSEST_FAINT * QUALITIES["draft"].solver.error < share < 100
     assert "raise the most links and the memory limit" in message

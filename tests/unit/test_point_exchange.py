@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.solver.embree import EmbreeCaster
-from radiosity_addon.solver.form_factor import point_to_polygon
-from radiosity_addon.solver.hierarchy import split_in_four
-from radiosity_addon.solver.lights import EnvironmentLight, PointLight
-from radiosity_addon.solver.point_exchange import corner_factors, visible_share
-from radiosity_addon.solver.point_light import lamp_irradiance
+from radiosity_addon.base.triangles import split_in_four
+from radiosity_addon.form_factors.formulas import point_to_polygon
+from radiosity_addon.lights.sun_and_sky import EnvironmentLight, PointLight
+from radiosity_addon.rays.embree import EmbreeCaster
+from radiosity_addon.solver.equations.point_exchange import corner_factors, visible_share
+from radiosity_addon.solver.links.light_at_points import lamp_irradiance
 from tests.rooms import rectangle
 
 TRIANGLE = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from radiosity_addon.scene.faces import Faces
 from radiosity_addon.solver import AreaLight, EnvironmentLight, PointLight, Scene, SpotLight, SunLight
-from radiosity_addon.solver.hierarchy import Faces
-from radiosity_addon.solver.power import light_power, link_closure, power_balance
+from radiosity_addon.solver.state.lamp_power import light_power
+from radiosity_addon.solver.state.power import link_closure, power_balance
 from tests.rooms import CEILING, box_room, grey, rectangle
 from tests.unit.solved_rooms import furnished, solved
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.solver import AreaLight, EnvironmentLight, PointLight, SpotLight, SunLight
-from radiosity_addon.solver.radiometry import (
+from radiosity_addon.base.radiometry import (
     HEMISPHERE,
     SPHERE,
     brdf_of_reflectance,
@@ -24,6 +23,7 @@ from radiosity_addon.solver.radiometry import (
     reflected_radiance,
     sphere_area,
 )
+from radiosity_addon.solver import AreaLight, EnvironmentLight, PointLight, SpotLight, SunLight
 
 UP = np.array([[0.0, 0.0, 1.0]])
 

@@ -3,9 +3,13 @@
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap import rasterise as module
-from radiosity_addon.lightmap.clip import area_in_unit_square, clip_to_unit_square, polygon_area_centroid
-from radiosity_addon.lightmap.rasterise import coverage_sum, rasterise, sample_footprints
+from radiosity_addon.lightmap.texels import rasterize as module
+from radiosity_addon.lightmap.texels.clip import (
+    area_in_unit_square,
+    clip_to_unit_square,
+    polygon_area_centroid,
+)
+from radiosity_addon.lightmap.texels.rasterize import coverage_sum, rasterise, sample_footprints
 
 SQUARE = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], dtype=np.float32)
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.solver import Scene, refine_patch
-from radiosity_addon.solver.form_factor import triangle_to_triangle
-from radiosity_addon.solver.hierarchy import LEAF, Hierarchy
-from radiosity_addon.solver.oracle_factor import oracle1, source_factor_bounds
-from radiosity_addon.solver.refine_patch import RefinePatch, facing_pairs
+from radiosity_addon.form_factors.formulas import triangle_to_triangle
+from radiosity_addon.solver import Scene
+from radiosity_addon.solver.equations import refine_patch
+from radiosity_addon.solver.equations.form_factor_oracle import oracle1, source_factor_bounds
+from radiosity_addon.solver.equations.refine_patch import RefinePatch, facing_pairs
+from radiosity_addon.solver.hierarchy.nodes import LEAF, Hierarchy
 from tests.rooms import box_room, grey, rectangle
 from tests.unit.solved_rooms import furnished
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from radiosity_addon.bake_scene import BakeObject, BakeScene
-from radiosity_addon.lightmap.greedy import greedy_object, share_of
-from radiosity_addon.remarks import small_objects
-from radiosity_addon.solver.scene import Scene
+from radiosity_addon.bake.bake_warnings import small_objects
+from radiosity_addon.lightmap.unwrap.greedy import greedy_object, share_of
+from radiosity_addon.scene.bake_scene import BakeObject, BakeScene
+from radiosity_addon.scene.scene import Scene
 
 
 class Texels:

@@ -9,9 +9,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from radiosity_addon.bake_scene import BakeResult, BakeWarning, LightGroup, LightmapPage
-from radiosity_addon.errors import BakeError
-from radiosity_addon.report import MAX_HISTORY, BakeReport, LightmapFile, solver_part, thinned
+from radiosity_addon.bake.result.report import MAX_HISTORY, BakeReport, LightmapFile, solver_part, thinned
+from radiosity_addon.bake.result.result import BakeResult, LightGroup
+from radiosity_addon.base.bake_warning import BakeWarning
+from radiosity_addon.base.errors import BakeError
+from radiosity_addon.lightmap.images.page import LightmapPage
 from tests.unit.texel_scenes import bake_object
 
 SOLVER = {

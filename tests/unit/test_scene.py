@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from radiosity_addon.errors import SceneError
+from radiosity_addon.base.errors import SceneError
+from radiosity_addon.base.radiometry import MAX_REFLECTANCE
 from radiosity_addon.solver import PointLight, Scene
-from radiosity_addon.solver.scene import MAX_REFLECTANCE
 from tests.rooms import box_room, grey
 
 TRIANGLES = np.array([[[0.0, 0, 0], [2, 0, 0], [0, 1, 0]], [[0, 0, 1], [1, 1, 2], [2, 2, 3]]])

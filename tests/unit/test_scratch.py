@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from radiosity_addon import pipeline
-from radiosity_addon.bake_scene import BakeResult
-from radiosity_addon.errors import BakeError
-from radiosity_addon.pipeline import bake
-from radiosity_addon.settings import BakeSettings
-from radiosity_addon.solver import scratch as module
-from radiosity_addon.solver.scratch import SMALLEST, Scratch, is_in_file, row_numbers
+from radiosity_addon.bake import pipeline
+from radiosity_addon.bake.pipeline import bake
+from radiosity_addon.bake.result.result import BakeResult
+from radiosity_addon.base import scratch as module
+from radiosity_addon.base.errors import BakeError
+from radiosity_addon.base.scratch import SMALLEST, Scratch, is_in_file, row_numbers
+from radiosity_addon.options.bake_settings import BakeSettings
 from tests.cornell import cornell_box
 from tests.unit.texel_scenes import bake_scene
 

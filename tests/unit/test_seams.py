@@ -7,14 +7,14 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap.atlas import AtlasInput, run_atlas
-from radiosity_addon.lightmap.dilate import dilate
-from radiosity_addon.lightmap.seam_steps import seam_steps
-from radiosity_addon.lightmap.seams import Seams, find_seams
-from radiosity_addon.lightmap.stitch import stitch, stitch_pages
-from radiosity_addon.lightmap.texel_geometry import TexelGeometry
+from radiosity_addon.lightmap.images.dilate import dilate
+from radiosity_addon.lightmap.images.seam_steps import seam_steps
+from radiosity_addon.lightmap.images.seams import Seams, find_seams
+from radiosity_addon.lightmap.images.stitch import stitch, stitch_pages
+from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
+from radiosity_addon.lightmap.unwrap.atlas import AtlasInput, run_atlas
+from radiosity_addon.rays.caster import BruteForceCaster
 from radiosity_addon.solver import Scene
-from radiosity_addon.solver.visibility import BruteForceCaster
 from tests.rooms import grey, rectangle, solid_box
 from tests.unit.lightmap_meshes import quads, uv_sphere
 from tests.unit.texel_scenes import QUAD_UV, in_cell, texel_geometry

@@ -10,17 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from radiosity_addon.array_file import read_arrays, write_arrays
-from radiosity_addon.bake_scene import BakeResult, BakeScene
-from radiosity_addon.errors import BakeError, SceneError
-from radiosity_addon.fingerprint import check_same, fingerprint
-from radiosity_addon.pipeline import bake_and_keep
-from radiosity_addon.plain_objects import flatten, restore
-from radiosity_addon.relight_check import aligned, dark, strengths_in
-from radiosity_addon.relighting import KeptBake, relight
-from radiosity_addon.responses import Responses
-from radiosity_addon.settings import BakeSettings
-from radiosity_addon.sidecar import (
+from radiosity_addon.bake.pipeline import bake_and_keep
+from radiosity_addon.bake.relight.kept_bake import KeptBake, relight
+from radiosity_addon.bake.relight.responses import Responses
+from radiosity_addon.bake.relight.scene_digest import check_same, fingerprint
+from radiosity_addon.bake.relight.source_strengths import aligned, dark, strengths_in
+from radiosity_addon.bake.result.result import BakeResult
+from radiosity_addon.bake.sidecar.array_file import read_arrays, write_arrays
+from radiosity_addon.bake.sidecar.plain_objects import flatten, restore
+from radiosity_addon.bake.sidecar.sidecar import (
     MAGIC,
     VERSION,
     check_belongs,
@@ -28,10 +26,13 @@ from radiosity_addon.sidecar import (
     sidecar_entry,
     write_sidecar,
 )
+from radiosity_addon.base.errors import BakeError, SceneError
+from radiosity_addon.base.progress import drain
+from radiosity_addon.lights.environment import EnvironmentImage
+from radiosity_addon.options.bake_settings import BakeSettings
+from radiosity_addon.scene.bake_scene import BakeScene
+from radiosity_addon.scene.textures import SurfaceImages
 from radiosity_addon.solver import PointLight, Scene
-from radiosity_addon.solver.environment import EnvironmentImage
-from radiosity_addon.solver.steps import drain
-from radiosity_addon.solver.surface_images import SurfaceImages
 from tests.relit_rooms import BAKED, CHANGED, NAMES, lit_bake
 from tests.textured_rooms import furnace
 from tests.unit.texel_scenes import bake_scene

@@ -11,11 +11,19 @@ from pathlib import Path
 
 import pytest
 
-from radiosity_addon import staging as staging_module
-from radiosity_addon.errors import BakeError
-from radiosity_addon.manifest import digest
-from radiosity_addon.marked_folders import MARK
-from radiosity_addon.staging import EARLIER, JOURNAL, PREFIX, Staging, clean_up, is_interrupted, replacing
+from radiosity_addon.base.errors import BakeError
+from radiosity_addon.files import publish as staging_module
+from radiosity_addon.files.baked_files import digest
+from radiosity_addon.files.marked_folders import MARK
+from radiosity_addon.files.publish import (
+    EARLIER,
+    JOURNAL,
+    PREFIX,
+    Staging,
+    clean_up,
+    is_interrupted,
+    replacing,
+)
 
 ROOT = Path(__file__).resolve().parents[2]
 A, B, C = "a.exr", "b.exr", "c.exr"
@@ -23,7 +31,7 @@ A, B, C = "a.exr", "b.exr", "c.exr"
 KILLED = """
 import os, sys
 from pathlib import Path
-from radiosity_addon.staging import Staging
+from radiosity_addon.files.publish import Staging
 
 target, after = Path(sys.argv[1]), int(sys.argv[2])
 staging = Staging(target)

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from radiosity_addon.errors import SceneError
-from radiosity_addon.solver.hierarchy import split_in_four
-from radiosity_addon.solver.scene import MAX_REFLECTANCE, WHOLE_TRIANGLE, Scene
-from radiosity_addon.solver.surface_images import SurfaceImages, where_there
+from radiosity_addon.base.errors import SceneError
+from radiosity_addon.base.radiometry import MAX_REFLECTANCE
+from radiosity_addon.base.triangles import WHOLE_TRIANGLE, split_in_four
+from radiosity_addon.scene.scene import Scene
+from radiosity_addon.scene.textures import SurfaceImages, where_there
 
 LOWER, UPPER = [[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap.surface_tiles import SurfaceTiles, lay_out_again, lay_out_surfaces
-from radiosity_addon.solver.surface_images import SurfaceImages
+from radiosity_addon.lightmap.images.surface_tiles import SurfaceTiles, lay_out_again, lay_out_surfaces
+from radiosity_addon.scene.textures import SurfaceImages
 
 SIDE = 128
 

@@ -5,16 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap.interpolate import Interpolation
-from radiosity_addon.lightmap.part_links import SWEEPS, PartLinks, Parts, PartSweeps
-from radiosity_addon.lightmap.reconstruct import GatherSettings, reconstruct
-from radiosity_addon.lightmap.source_means import Means, mean_of_sources
-from radiosity_addon.lightmap.stored_links import StoredLinks
-from radiosity_addon.lightmap.sweeps import TexelLight, TexelTransport, sweep_steps
-from radiosity_addon.lightmap.texel_geometry import TexelGeometry
+from radiosity_addon.base.progress import drain
+from radiosity_addon.lightmap.lighting.gather_settings import GatherSettings
+from radiosity_addon.lightmap.lighting.interpolate import Interpolation
+from radiosity_addon.lightmap.lighting.part_links import SWEEPS, PartLinks, Parts, PartSweeps
+from radiosity_addon.lightmap.lighting.reconstruct import reconstruct
+from radiosity_addon.lightmap.lighting.source_means import Means, mean_of_sources
+from radiosity_addon.lightmap.lighting.stored_links import StoredLinks
+from radiosity_addon.lightmap.lighting.sweeps import TexelLight, TexelTransport, sweep_steps
+from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
 from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, SolverSettings, solve
-from radiosity_addon.solver.local_pass import NOTHING, SKY
-from radiosity_addon.solver.steps import drain
+from radiosity_addon.solver.gather.local_pass import NOTHING, SKY
 from tests.rooms import box_room, grey, rectangle
 from tests.unit.texel_scenes import QUAD_UV, texel_geometry
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap.crossings import crossing_steps
-from radiosity_addon.lightmap.texel_cells import ALONG, CELLS, TexelCells
-from radiosity_addon.lightmap.texel_geometry import TexelGeometry
+from radiosity_addon.base.progress import drain
+from radiosity_addon.lightmap.texels.cells import ALONG, CELLS, TexelCells
+from radiosity_addon.lightmap.texels.occlusion import crossing_steps
+from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
+from radiosity_addon.rays.caster import Hits
 from radiosity_addon.solver import PointLight, Scene, SolverSettings, solve
-from radiosity_addon.solver.local_pass import NOTHING
-from radiosity_addon.solver.steps import drain
-from radiosity_addon.solver.visibility import Hits
+from radiosity_addon.solver.gather.local_pass import NOTHING
 from tests.rooms import grey, rectangle, solid_box
 from tests.unit.texel_scenes import QUAD_UV, texel_geometry
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap.texel_geometry import NO_TEXEL, TexelGeometry
+from radiosity_addon.lightmap.texels.texel_geometry import NO_TEXEL, TexelGeometry
+from radiosity_addon.rays.caster import NO_HIT, Hits
 from radiosity_addon.solver import Scene
-from radiosity_addon.solver.visibility import NO_HIT, Hits
 from tests.rooms import grey, rectangle
 from tests.unit.texel_scenes import QUAD_UV, in_cell, texel_geometry
 

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from radiosity_addon import pipeline, texel_memory
-from radiosity_addon.errors import UsageError
-from radiosity_addon.foresight import Lit, foresee
-from radiosity_addon.pipeline import bake
-from radiosity_addon.settings import BakeSettings
-from radiosity_addon.texel_memory import least_bytes, pages_of, process_bytes, refuse_too_large
+from radiosity_addon.bake import pipeline, texel_memory
+from radiosity_addon.bake.estimate import LightmappedObject, estimate_bake
+from radiosity_addon.bake.pipeline import bake
+from radiosity_addon.bake.texel_memory import least_bytes, pages_of, process_bytes, refuse_too_large
+from radiosity_addon.base.errors import UsageError
+from radiosity_addon.options.bake_settings import BakeSettings
 from tests.rooms import box_room, grey
 from tests.unit.texel_scenes import bake_scene
 
@@ -25,8 +25,8 @@ ON_8_GB = 30_000_000
 
 PEAK = """
 import os, sys
-from radiosity_addon.pipeline import bake
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.bake.pipeline import bake
+from radiosity_addon.options.bake_settings import BakeSettings
 from tests.rooms import FLOOR, box_room, grey
 from tests.unit.texel_scenes import bake_scene
 from radiosity_addon.solver import PointLight, Scene
@@ -98,8 +98,8 @@ def test_settings_alone_tell_the_pages_of_a_shared_atlas() -> None:
 
 def test_a_bake_stays_within_the_limit_by_what_is_foreseen() -> None:
     """Beyond the limit it is files that grow."""
-    ground = [Lit("Ground", 2, 250_000.0)]
-    plans = [foresee(ground, 2, BakeSettings(texel_density=density)) for density in (1.0, 8.0)]
+    ground = [LightmappedObject("Ground", 2, 250_000.0)]
+    plans = [estimate_bake(ground, 2, BakeSettings(texel_density=density)) for density in (1.0, 8.0)]
     assert plans[0].files == 0
     assert plans[1].files > 0
     assert plans[0].memory < plans[1].memory <= 4 * 2**30 - min(process_bytes(), 2 * 2**30)

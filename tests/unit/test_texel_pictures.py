@@ -8,12 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from radiosity_addon import texel_pictures
-from radiosity_addon.bake_scene import NO_TEXEL_HERE, SHUT_IN, BakeResult, BakeScene, Progress, TexelPicture
-from radiosity_addon.pipeline import bake
-from radiosity_addon.settings import BakeSettings
+from radiosity_addon.bake.pipeline import bake
+from radiosity_addon.bake.result import texel_pictures
+from radiosity_addon.bake.result.progress import Progress, TexelPicture
+from radiosity_addon.bake.result.result import BakeResult
+from radiosity_addon.bake.result.texel_pictures import TexelPictures, coarser
+from radiosity_addon.lightmap.texels.states import NO_TEXEL_HERE, SHUT_IN
+from radiosity_addon.options.bake_settings import BakeSettings
+from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import PointLight, Scene
-from radiosity_addon.texel_pictures import TexelPictures, coarser
 from tests.rooms import box_room, grey, solid_box
 from tests.unit.texel_scenes import bake_scene
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from radiosity_addon.scene.textures import SurfaceImages
 from radiosity_addon.solver import AreaLight, PointLight, Scene
-from radiosity_addon.solver.surface_images import SurfaceImages
 from tests.rooms import box_room, grey, rectangle
 from tests.textured_rooms import furnace, image, patterned
 from tests.unit.test_pipeline import run, texels

@@ -5,11 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.solver.cluster_links import gather_at_clusters
-from radiosity_addon.solver.hierarchy import LEAF, Hierarchy
-from radiosity_addon.solver.links import Links, no_links
+from radiosity_addon.solver.hierarchy.nodes import LEAF, Hierarchy
+from radiosity_addon.solver.links.cluster_links import gather_at_clusters
+from radiosity_addon.solver.links.element_links import Links, no_links
+from radiosity_addon.solver.links.transport import (
+    gather,
+    inner_by_level,
+    node_radiosity,
+    pull,
+    push,
+    push_pull,
+)
 from radiosity_addon.solver.methods.hierarchical import HierarchicalState
-from radiosity_addon.solver.transport import gather, inner_by_level, node_radiosity, pull, push, push_pull
 from tests.unit.solved_rooms import corridor, solved
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from radiosity_addon.solver import Scene
-from radiosity_addon.solver.hierarchy import Hierarchy
-from radiosity_addon.solver.tree_top import TreeTop
+from radiosity_addon.solver.hierarchy.cluster_cut import TreeTop
+from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from tests.rooms import box_room, grey
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.bake_scene import BakeScene
-from radiosity_addon.lightmap.turned_faces import turned_away
+from radiosity_addon.lightmap.images.turned_faces import turned_away
+from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import PointLight, Scene
 from tests.rooms import box_room, grey, rectangle, solid_box
 from tests.unit.test_pipeline import run

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.solver.embree import EmbreeCaster
-from radiosity_addon.solver.visibility import NO_HIT, BruteForceCaster, RayCaster, surface_offset
+from radiosity_addon.rays.caster import NO_HIT, BruteForceCaster, RayCaster, surface_offset
+from radiosity_addon.rays.embree import EmbreeCaster
 from tests.rooms import box_room, rectangle, solid_box, sphere
 
 CASTERS = (BruteForceCaster, EmbreeCaster)
@@ -170,7 +170,7 @@ def test_threads_and_chunks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> N
     distances = rng.uniform(0.1, 6, 5000)
     whole = EmbreeCaster(triangles, threads=1)
     free, hits = whole.visible(origins, directions, distances), whole.first_hits(origins, directions)
-    monkeypatch.setattr("radiosity_addon.solver.embree.CHUNK", 333)
+    monkeypatch.setattr("radiosity_addon.rays.embree.CHUNK", 333)
     pieces = EmbreeCaster(triangles, threads=3)
     assert pieces.visible(origins, directions, distances).tobytes() == free.tobytes()
     again = pieces.first_hits(origins, directions)

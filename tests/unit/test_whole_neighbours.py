@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap.whole_neighbours import whole_neighbour
-from radiosity_addon.solver.embree import EmbreeCaster
-from radiosity_addon.solver.local_pass import NOTHING
+from radiosity_addon.lightmap.texels.nearest_uncut import whole_neighbour
+from radiosity_addon.rays.embree import EmbreeCaster
+from radiosity_addon.solver.gather.local_pass import NOTHING
 from tests.rooms import rectangle, solid_box
 from tests.unit.test_crossings import FLOOR, SIZE, crossings_of, slab
 

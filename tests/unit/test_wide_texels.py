@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap.reconstruct import WIDE, GatherSettings, reconstruct
+from radiosity_addon.base.progress import drain
+from radiosity_addon.lightmap.lighting.gather_settings import GatherSettings
+from radiosity_addon.lightmap.lighting.reconstruct import WIDE, reconstruct
+from radiosity_addon.lights.sun_and_sky import PointLight
 from radiosity_addon.solver import Scene, SolverSettings, solve
-from radiosity_addon.solver.lights import PointLight
-from radiosity_addon.solver.steps import drain
 from tests.rooms import grey, rectangle
 from tests.unit.texel_scenes import QUAD_UV, in_cell, texel_geometry
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from radiosity_addon.bake_scene import BakeObject, BakeScene
-from radiosity_addon.lightmap.rasterise import rasterise
-from radiosity_addon.lightmap.texel_geometry import TexelGeometry
+from radiosity_addon.lightmap.texels.rasterize import rasterise
+from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
+from radiosity_addon.scene.bake_scene import BakeObject, BakeScene
 from radiosity_addon.solver import Scene
 
 QUAD_UV = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], dtype=np.float32)

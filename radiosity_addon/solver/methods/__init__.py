@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from importlib import import_module
 from typing import cast
 
-from ..scene import Scene
-from ..settings import SolverSettings
-from ..state import SolverState
+from ...options.solver_settings import SolverSettings
+from ...scene.scene import Scene
+from ..state.state import SolverState
 
 
 def steps_of(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float, SolverState]]:

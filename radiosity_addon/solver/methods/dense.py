@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...errors import BakeError
-from ..arrays import Array
-from ..linear_system import LinearSystem
-from ..scene import Scene
-from ..settings import SolverSettings
-from ..state import SolverState
+from ...base.arrays import Array
+from ...base.errors import BakeError
+from ...options.solver_settings import SolverSettings
+from ...scene.scene import Scene
+from ..equations.linear_system import LinearSystem
+from ..state.state import SolverState
 from .matrix import Iterate, solve_matrix
 
 

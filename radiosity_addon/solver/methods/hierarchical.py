@@ -12,29 +12,29 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..anderson import Anderson
-from ..arrays import Array
-from ..bounce import bounce, reflect, relative_residual
-from ..cluster_links import ClusterLinks, join_cluster_links, no_cluster_links
-from ..cluster_pairs import measure_cluster_links
-from ..conservation import Balance, Conservation, received_by_faces
-from ..first_links import first_links
-from ..light_links import link_lights
-from ..link_census import elements_by_level, leaves_by_level, linked_leaves, links_by_level
-from ..links import Links, join, measure_links, no_links
-from ..memory_budget import link_budget, most_light_elements, refinable, refuse_too_large
-from ..node_shapes import NodeShapes
-from ..oracle import (
+from ...base.arrays import Array
+from ...options.solver_settings import SolverSettings
+from ...scene.scene import Scene
+from ..balance.conservation import Balance, Conservation, received_by_faces
+from ..hierarchy.bounds import NodeShapes
+from ..hierarchy.cluster_cut import TreeTop
+from ..links.census import elements_by_level, leaves_by_level, linked_leaves, links_by_level
+from ..links.cluster_links import ClusterLinks, join_cluster_links, no_cluster_links
+from ..links.cluster_pairs import measure_cluster_links
+from ..links.element_links import Links, join, measure_links, no_links
+from ..links.initial import first_links
+from ..links.light_links import link_lights
+from ..links.refine import (
     children_of_cluster_links,
     children_of_links,
     misplaced_at_clusters,
     misplaced_power,
 )
-from ..power import link_closure
-from ..scene import Scene
-from ..settings import SolverSettings
-from ..state import SolverState, begin
-from ..tree_top import TreeTop
+from ..state.anderson import Anderson
+from ..state.iteration import bounce, reflect, relative_residual
+from ..state.memory import link_budget, most_light_elements, refinable, refuse_too_large
+from ..state.power import link_closure
+from ..state.state import SolverState, begin
 
 COARSENING = (64.0, 16.0, 4.0, 1.0)
 """BF_ε of the rounds, in units of the final one: start coarse, tighten (our addition)."""

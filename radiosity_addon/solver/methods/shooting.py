@@ -22,14 +22,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...errors import UsageError
-from ..arrays import Array
-from ..elements import subdivide_evenly
-from ..exchange import exchange_areas
-from ..overlaps import arriving, shares
-from ..scene import Scene
-from ..settings import SolverSettings
-from ..state import SolverState, begin
+from ...base.arrays import Array
+from ...base.errors import UsageError
+from ...options.solver_settings import SolverSettings
+from ...scene.overlaps import arriving, shares
+from ...scene.scene import Scene
+from ..equations.exchange_areas import exchange_areas
+from ..equations.fixed_elements import subdivide_evenly
+from ..state.state import SolverState, begin
 
 HISTORY_STEP = 1.1
 """Shots are noted in the history when their number has grown by this factor: thousands make 100 entries."""

@@ -20,16 +20,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...errors import UsageError
-from ..arrays import Array
-from ..elements import subdivide_evenly
-from ..exchange import exchange_areas
-from ..hierarchy import LEAF
-from ..neighbours import neighbours
-from ..overlaps import arriving, shares
-from ..scene import Scene
-from ..settings import SolverSettings
-from ..state import SolverState, begin
+from ...base.arrays import Array
+from ...base.errors import UsageError
+from ...options.solver_settings import SolverSettings
+from ...scene.overlaps import arriving, shares
+from ...scene.scene import Scene
+from ..equations.exchange_areas import exchange_areas
+from ..equations.fixed_elements import subdivide_evenly
+from ..hierarchy.neighbors import neighbours
+from ..hierarchy.nodes import LEAF
+from ..state.state import SolverState, begin
 
 FINEST = 1.0 / 64
 """Adaptive subdivision makes no element smaller than this part of the mean of step 1: three levels."""

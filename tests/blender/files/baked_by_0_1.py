@@ -8,7 +8,7 @@ import sys
 import bpy
 
 import radiosity_addon
-from radiosity_addon.blender import rebake
+from radiosity_addon.blender.apply import rebake
 from tests.blender.hand_bake import add_plane, bake_by_hand, principled_material
 
 radiosity_addon.register()

@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from radiosity_addon.bake_scene import LIGHTMAP_UV_LAYER
+from radiosity_addon.scene.bake_scene import LIGHTMAP_UV_LAYER
 
 TEXELS = 128
 """Rectangles of the layout are given in texels of a lightmap of this size, whatever is baked."""

@@ -24,9 +24,9 @@ from file_dump import differences, dump_file
 ANSWER = Path(sys.argv[sys.argv.index("--") + 1])
 FILE = bpy.data.filepath
 MODULE = "bl_ext.user_default.radiosity_addon"
-live_view = importlib.import_module(f"{MODULE}.blender.live_view")
-pipeline = importlib.import_module(f"{MODULE}.pipeline")
-runtime = importlib.import_module(f"{MODULE}.blender.runtime")
+live_view = importlib.import_module(f"{MODULE}.blender.jobs.live_view")
+pipeline = importlib.import_module(f"{MODULE}.bake.pipeline")
+runtime = importlib.import_module(f"{MODULE}.blender.session.runtime")
 
 seen = {"pictures": [], "shots": []}
 

@@ -18,10 +18,10 @@ from file_dump import differences, dump_file
 ANSWER = Path(sys.argv[sys.argv.index("--") + 1])
 MODULE = "bl_ext.user_default.radiosity_addon"
 
-cleaning = importlib.import_module(f"{MODULE}.blender.cleaning")
-staging = importlib.import_module(f"{MODULE}.staging")
-runtime = importlib.import_module(f"{MODULE}.blender.runtime")
-window_job = importlib.import_module(f"{MODULE}.blender.window_job")
+cleaning = importlib.import_module(f"{MODULE}.blender.ui.cleaning")
+staging = importlib.import_module(f"{MODULE}.files.publish")
+runtime = importlib.import_module(f"{MODULE}.blender.session.runtime")
+window_job = importlib.import_module(f"{MODULE}.blender.jobs.window_job")
 
 CORNER = 0.0625  # where an edit puts a corner
 

@@ -18,12 +18,12 @@ from file_dump import differences, dump_file
 ANSWER, RESOLUTION, QUALITY = sys.argv[sys.argv.index("--") + 1 :]
 ANSWER = Path(ANSWER)
 MODULE = "bl_ext.user_default.radiosity_addon"
-live_view = importlib.import_module(f"{MODULE}.blender.live_view")
-kept_details = importlib.import_module(f"{MODULE}.blender.kept_details")
-overlay_pictures = importlib.import_module(f"{MODULE}.blender.overlay_pictures")
-overlay_panel = importlib.import_module(f"{MODULE}.blender.overlay_panel")
-runtime = importlib.import_module(f"{MODULE}.blender.runtime")
-texel_pictures = importlib.import_module(f"{MODULE}.texel_pictures")
+live_view = importlib.import_module(f"{MODULE}.blender.jobs.live_view")
+kept_details = importlib.import_module(f"{MODULE}.blender.session.kept_details")
+overlay_pictures = importlib.import_module(f"{MODULE}.blender.overlays.overlay_pictures")
+overlay_panel = importlib.import_module(f"{MODULE}.blender.ui.overlay_panel")
+runtime = importlib.import_module(f"{MODULE}.blender.session.runtime")
+texel_pictures = importlib.import_module(f"{MODULE}.bake.result.texel_pictures")
 
 OVERLAYS = ("FALSE_COLOR", "DENSITY", "CHECKER", "TEXELS", "ELEMENTS", "LINKS", "ERROR")
 CURSOR = (-0.6, 1.2, 0.0)

@@ -18,8 +18,8 @@ ANSWER = Path(sys.argv[sys.argv.index("--") + 1])
 MODULE = "bl_ext.user_default.radiosity_addon"
 HEADER = 34  # pixels at the sidebar's top: the panel's title, which a click would fold
 
-check_panel = importlib.import_module(f"{MODULE}.blender.check_panel")
-runtime = importlib.import_module(f"{MODULE}.blender.runtime")
+check_panel = importlib.import_module(f"{MODULE}.blender.ui.check_panel")
+runtime = importlib.import_module(f"{MODULE}.blender.session.runtime")
 
 seen = {}
 

@@ -1,0 +1,76 @@
+"""A bake of which is kept what lights it anew, if that is asked for: in memory, or in a sidecar."""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Generator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ..options.bake_settings import BakeSettings
+from ..scene.bake_scene import BakeScene
+from .pipeline import bake, bake_and_keep
+from .rebaking import bake_moved, can_move
+from .relight.kept_bake import KeptBake
+from .result.progress import Progress
+from .result.result import BakeResult
+from .sidecar.sidecar import write_sidecar
+
+
+@dataclass(frozen=True)
+class Keeping:
+    """How a bake is kept.
+
+    Attributes
+    ----------
+    sidecar : bool
+        Whether it is written to a file beside its lightmaps.
+    mark : str
+        The bake's own name, by which its images and its sidecar are known to belong together.
+    earlier : KeptBake or None
+        A kept bake of the same scene: if only places of objects have changed since, just what they touch
+        is baked anew.
+    """
+
+    sidecar: bool = False
+    mark: str = field(default_factory=lambda: uuid.uuid4().hex)
+    earlier: KeptBake | None = field(default=None, repr=False, compare=False)
+
+
+def can_keep(settings: BakeSettings) -> bool:
+    """Tell whether bakes of these settings can be lit anew."""
+    return settings.method == "hierarchical" and settings.quantity != "residual"
+
+
+def moves_alone(bake_scene: BakeScene, settings: BakeSettings, keeping: Keeping | None) -> bool:
+    """Tell whether all that a bake has to do is to follow what moved since an earlier one that was kept."""
+    earlier = None if keeping is None else keeping.earlier
+    return earlier is not None and can_move(earlier, bake_scene, settings)
+
+
+def bake_steps(
+    bake_scene: BakeScene, settings: BakeSettings, keeping: Keeping | None, sidecar: Path | None
+) -> Generator[Progress, None, tuple[BakeResult, KeptBake | None]]:
+    """Bake, and keep the bake if that is asked for.
+
+    Parameters
+    ----------
+    keeping : Keeping or None
+    sidecar : Path or None
+        Where its file goes, to be published with the bake; None writes none.
+
+    Raises
+    ------
+    RadiosityError
+        Those of `bake_and_keep` and `write_sidecar`.
+    """
+    if keeping is None:
+        return (yield from bake(bake_scene, settings)), None
+    if keeping.earlier is not None and moves_alone(bake_scene, settings, keeping):
+        result, kept = yield from bake_moved(keeping.earlier, bake_scene)
+    else:
+        result, kept = yield from bake_and_keep(bake_scene, settings)
+    if sidecar is not None:
+        yield Progress("sidecar", 1.0)
+        write_sidecar(sidecar, kept, result, keeping.mark)
+    return result, kept

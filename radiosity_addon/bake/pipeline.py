@@ -1,0 +1,382 @@
+"""The bake as prose: unwrap, rasterise, solve, light the texels, encode.
+
+A generator: each step yields `Progress`, so that a headless caller may exhaust it and a
+window may advance it between two redraws. Closing it cancels; nothing outside was touched.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from ..base.arrays import Array
+from ..base.errors import BakeError, SceneError, UsageError
+from ..base.scratch import Scratch, tiles
+from ..lightmap.images.page import LightmapPage
+from ..lightmap.images.seams import Seams, find_seams
+from ..lightmap.images.texel_pages import texel_pages
+from ..lightmap.images.turned_faces import turned_away
+from ..lightmap.lighting.accuracy import light_within
+from ..lightmap.lighting.error_picture import summary, texel_residual
+from ..lightmap.lighting.gather_settings import GatherSettings
+from ..lightmap.lighting.light_so_far import LightSoFar
+from ..lightmap.lighting.reconstruct import reconstruct
+from ..lightmap.lighting.sweeps import TexelLight
+from ..lightmap.texels.rasterize import rasterise
+from ..lightmap.texels.texel_geometry import TexelGeometry
+from ..lightmap.texels.texel_materials import FOOTPRINT, texel_materials
+from ..lightmap.unwrap.atlas import Atlas, AtlasInput, AtlasOptions, build_atlas
+from ..lightmap.unwrap.packing import Limits, padding_for
+from ..options.bake_settings import BakeSettings
+from ..rays.caster import RayCaster
+from ..scene.bake_scene import BakeObject, BakeScene
+from ..solver import Solution, SolverSettings, SolverState, solve_progress
+from ..solver.element_transport import Relightable
+from .bake_warnings import of_solution, small_objects
+from .estimate import refuse_before_unwrapping
+from .quality import for_error, quality_of, used_settings
+from .relight.kept_bake import KeptBake, Moves, Solved, shown
+from .relight.light_groups import are_wanted, check_groups, group_pages
+from .result.details import More, more_of
+from .result.progress import Picture, Progress
+from .result.report import solver_part
+from .result.result import BakedObject, BakeResult, LightGroup
+from .result.texel_pictures import TexelPictures
+from .texel_memory import refuse_too_large, share_out_memory, texel_scratch
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, eq=False)
+class TexelValues:
+    """What texels hold, (n, 3), and what it was made of: a residual of nothing else."""
+
+    values: Array
+    caster: RayCaster
+    light: TexelLight | None = None
+    relightable: Relightable | None = None
+    materials: tuple[Array, Array] | None = None
+
+
+UNWRAP, RASTERISE, SOLVE, LIGHT, ENCODE = 0.0, 0.02, 0.04, 0.29, 0.98
+"""How far the whole is when each stage begins: shares of the time of the box and the office at medium quality
+(bench/results), of which the time left is reckoned."""
+
+MOST_SHOWN = 1 << 22
+"""More texels than these are not shown while they are lit: their pictures would take too much memory."""
+
+DILATED = 8
+"""Texels past the charts that are filled ring by ring, if not more are free."""
+
+PICTURE_SECONDS = 0.25
+"""Time between two pictures of the solution: often enough to watch, too rarely to cost much."""
+
+
+def bake(bake_scene: BakeScene, settings: BakeSettings) -> Generator[Progress, None, BakeResult]:
+    """Bake lightmaps for a scene.
+
+    Parameters
+    ----------
+    bake_scene : BakeScene
+    settings : BakeSettings
+
+    Yields
+    ------
+    progress : Progress
+
+    Returns
+    -------
+    result : BakeResult
+
+    Raises
+    ------
+    SceneError
+        If no object is to get a lightmap.
+    BakeError
+        If the lightmaps cannot be laid out.
+    """
+    result, _ = yield from _bake(bake_scene, settings, keep=are_wanted(bake_scene, settings))
+    return result
+
+
+def bake_and_keep(
+    bake_scene: BakeScene, settings: BakeSettings
+) -> Generator[Progress, None, tuple[BakeResult, KeptBake]]:
+    """Bake lightmaps, and keep what lights them anew (`kept_bake.py`).
+
+    Every lamp is asked for with all its shadow rays, those that are dark now too, so that scenes of
+    many lamps take longer than by `bake`. Parameters, yields and errors are those of `bake`.
+
+    Raises
+    ------
+    UsageError
+        If the method keeps no links, or the quantity is the residual.
+    """
+    result, kept = yield from _bake(bake_scene, settings, keep=True)
+    assert kept is not None
+    return result, kept
+
+
+def _bake(
+    bake_scene: BakeScene, settings: BakeSettings, keep: bool
+) -> Generator[Progress, None, tuple[BakeResult, KeptBake | None]]:
+    """Bake, and keep what lights the scene anew if asked to."""
+    if keep and settings.quantity == "residual":
+        raise UsageError("a residual is of all light together: bake another quantity to light it anew")
+    if are_wanted(bake_scene, settings):
+        check_groups(bake_scene, settings)
+    seconds: dict[str, float] = {}
+    quality = quality_of(settings)
+    baked = baked_objects(bake_scene)
+    if not baked:
+        raise SceneError("nothing to bake: give the scene a render-visible mesh with faces")
+
+    refuse_before_unwrapping(bake_scene, settings)
+    yield Progress("unwrap", UNWRAP)
+    with timed(seconds, "unwrap"):
+        atlas = yield from _unwrap(bake_scene, baked, settings)
+    yield Progress("rasterise", RASTERISE)
+    sizes = [page.resolution for page in atlas.pages]
+    refuse_too_large(sizes, settings)
+    scratch = texel_scratch(sizes, settings)
+    with timed(seconds, "rasterise"):
+        geometry = _texels(bake_scene, baked, atlas, scratch)
+    yield Progress("solve", SOLVE)
+    with timed(seconds, "solve"):
+        solution = yield from solve(bake_scene, quality.solver)
+    yield Progress("light", LIGHT)
+    is_shown = share_out_memory(geometry, settings, keep)
+    with timed(seconds, "light"):
+        so_far = LightSoFar() if is_shown and len(geometry) <= MOST_SHOWN else None
+        steps = _texel_values(bake_scene, solution, geometry, quality.gather, settings, keep, so_far)
+        pictures = None if so_far is None else TexelPictures(so_far)
+        lit = yield from staged(steps, "light", LIGHT, ENCODE, pictures)
+        del so_far, pictures
+    report = solver_part(solution.final_report(), used_settings(quality.solver), bake_scene.objects)
+    sides = solution.triangle_irradiance, solution.back_irradiance
+    of_light = (*turned_away(baked, bake_scene.scene.areas, *sides), *of_solution(solution, quality.solver))
+    solved = Solved(report, (*atlas.warnings, *of_light))
+    more = more_of(solution, baked, geometry, lit.light, settings.light)
+    return (yield from finish(bake_scene, settings, atlas, geometry, solved, lit, more, seconds))
+
+
+def finish(
+    bake_scene: BakeScene,
+    settings: BakeSettings,
+    atlas: Atlas,
+    geometry: TexelGeometry,
+    solved: Solved,
+    lit: TexelValues,
+    more: More,
+    seconds: dict[str, float],
+) -> Generator[Progress, None, tuple[BakeResult, KeptBake | None]]:
+    """Put what texels hold on pages, and tell of the bake; what was kept goes on in the kept bake."""
+    baked = baked_objects(bake_scene)
+    yield Progress("encode", ENCODE)
+    with timed(seconds, "encode"):
+        seams = _seams(bake_scene, lit.caster, geometry, settings)
+        rings = max(DILATED, _padding(settings))
+        pages = texel_pages(geometry, lit.values, seams, rings)
+        _check(solved.report, pages)
+    kept = None
+    if lit.relightable and lit.materials and lit.light is not None and lit.light.kept is not None:
+        lighting = lit.relightable, lit.light.kept
+        moves = None if lit.light.traced is None else Moves(atlas, lit.light.traced, solved)
+        kept = KeptBake(bake_scene, settings, *lighting, geometry, seams, rings, *lit.materials, moves)
+    groups: tuple[LightGroup, ...] = ()
+    if kept is not None and are_wanted(bake_scene, settings):
+        with timed(seconds, "groups"):
+            groups = yield from staged(group_pages(kept, pages), "groups", ENCODE, 1.0)
+
+    report = dict(solved.report)
+    if lit.light is not None:
+        report["estimated_error"] = lit.light.error
+    if settings.quantity == "residual":
+        report["error_picture"] = summary(lit.values)
+    of_texels = small_objects(bake_scene, baked, geometry)
+    warnings = (*bake_scene.warnings, *of_texels, *solved.warnings)
+    objects = tuple(
+        BakedObject(item, placed.uv, placed.page) for item, placed in zip(baked, atlas.objects, strict=True)
+    )
+    told = _told(atlas, pages)
+    return BakeResult(pages, objects, report, warnings, seconds, told, groups, *more), kept
+
+
+def baked_objects(bake_scene: BakeScene) -> list[BakeObject]:
+    """Return the objects that get lightmaps."""
+    return [item for item in bake_scene.objects if item.bake and item.count]
+
+
+def _unwrap(
+    bake_scene: BakeScene, baked: list[BakeObject], settings: BakeSettings
+) -> Generator[Progress, None, Atlas]:
+    """Lay the objects' charts out on pages."""
+    inputs = [
+        AtlasInput(item.name, bake_scene.scene.triangles[item.rows], item.polygon, item.uv, item.texel_scale)
+        for item in baked
+    ]
+    options = AtlasOptions(
+        settings.resolution,
+        settings.texel_density,
+        settings.atlas == "shared",
+        settings.pages,
+        Limits(settings.max_resolution, _padding(settings)),
+        settings.unwrap_seconds,
+    )
+    for step in build_atlas(inputs, options):
+        if isinstance(step, Atlas):
+            return step
+        yield Progress("unwrap", UNWRAP + (RASTERISE - UNWRAP) * step)
+    raise AssertionError("the atlas ended without a result")
+
+
+def _padding(settings: BakeSettings) -> int:
+    """Return the free texels between charts."""
+    return padding_for(settings.mip_levels) if settings.padding is None else settings.padding
+
+
+def _texels(bake_scene: BakeScene, baked: list[BakeObject], atlas: Atlas, scratch: Scratch) -> TexelGeometry:
+    """Find the texels that the objects cover, and where they lie in the world."""
+    count = len(bake_scene.scene)
+    uv = np.zeros((count, 3, 2), dtype=np.float32)
+    page_of_triangle = np.full(count, -1, dtype=np.int32)
+    for item, placed in zip(baked, atlas.objects, strict=True):
+        uv[item.rows] = placed.uv
+        page_of_triangle[item.rows] = placed.page
+    # What has no area has no side to be lit from, whatever its UVs say.
+    page_of_triangle[bake_scene.scene.areas == 0] = -1
+    rows = [np.flatnonzero(page_of_triangle == page) for page in range(len(atlas.pages))]
+    texels = [rasterise(uv[of], page.resolution, scratch) for of, page in zip(rows, atlas.pages, strict=True)]
+    return TexelGeometry(bake_scene.scene, uv, page_of_triangle, texels, rows, scratch)
+
+
+def solve(bake_scene: BakeScene, settings: SolverSettings) -> Generator[Progress, None, Solution]:
+    """Solve, with a picture of the solution at first, now and then, and at the end."""
+    steps = solve_progress(bake_scene.scene, settings)
+    state: SolverState | None = None
+    next_picture = 0.0
+    while True:
+        try:
+            fraction, state = next(steps)
+        except StopIteration as done:
+            if state is not None:
+                yield Progress("solve", LIGHT, _picture(state))
+            solution: Solution = done.value
+            return solution
+        picture = None
+        if time.perf_counter() >= next_picture:
+            picture = _picture(state)
+            next_picture = time.perf_counter() + PICTURE_SECONDS
+        yield Progress("solve", SOLVE + (LIGHT - SOLVE) * fraction, picture)
+
+
+def _picture(state: SolverState) -> Picture | None:
+    """Return what the solution looks like now; None while new elements have no radiosity yet."""
+    hierarchy, radiosity = state.hierarchy, state.shown()
+    if len(radiosity) < hierarchy.n_elements:
+        return None
+    leaves = hierarchy.leaves
+    face = hierarchy.face[leaves]
+    return Picture(
+        hierarchy.corners[leaves].astype(np.float32),
+        radiosity[leaves].astype(np.float32),
+        hierarchy.faces.triangle[face],
+        hierarchy.faces.front[face],
+    )
+
+
+def staged(
+    steps: Generator[float, None, T],
+    stage: str,
+    begin: float,
+    end: float,
+    pictures: TexelPictures | None = None,
+) -> Generator[Progress, None, T]:
+    """Run steps that yield the fraction they have done as one stage, from `begin` to `end` of the whole."""
+    while True:
+        try:
+            fraction = next(steps)
+        except StopIteration as done:
+            result: T = done.value
+            return result
+        texels = None if pictures is None else pictures.next()
+        yield Progress(stage, begin + (end - begin) * fraction, texels=texels)
+
+
+def _texel_values(
+    bake_scene: BakeScene,
+    solution: Solution,
+    geometry: TexelGeometry,
+    gather: GatherSettings,
+    settings: BakeSettings,
+    keep: bool,
+    so_far: LightSoFar | None,
+) -> Generator[float, None, TexelValues]:
+    """Compute the quantity asked for at all texels, and estimate the light's relative error."""
+    if settings.quantity == "residual":
+        residual = yield from texel_residual(solution, geometry, gather)
+        return TexelValues(residual, solution.local_pass.caster)
+    relightable = solution.relightable(bake_scene.emitter) if keep else None
+    local = solution.local_pass if relightable is None else relightable.local
+    where = bake_scene.scene, local, geometry
+    if settings.relative_error is None:
+        light = yield from reconstruct(*where, gather, so_far)
+    else:
+        within = settings.relative_error, so_far
+        light = yield from light_within(*where, lambda e: for_error(e).gather, *within)
+    if not keep:
+        # Hits were looked up in it: it is large, and stays in memory.
+        light = replace(light, table=None)
+    materials = texel_materials(bake_scene.scene, geometry, FOOTPRINT)
+    values = shown(light, *materials, settings, geometry.scratch)
+    return TexelValues(values, local.caster, light, relightable, materials)
+
+
+def _seams(
+    bake_scene: BakeScene, caster: RayCaster, geometry: TexelGeometry, settings: BakeSettings
+) -> Seams | None:
+    """Find the seams to stitch; None for an error picture, which is to show what is there."""
+    if settings.quantity == "residual":
+        return None
+    seams = find_seams(bake_scene.scene, geometry, caster)
+    return seams if settings.quantity != "radiosity" else seams.of_one_material(bake_scene.scene)
+
+
+def _check(report: dict[str, Any], pages: tuple[LightmapPage, ...]) -> None:
+    """Refuse to hand out a result that is not finite: a defect must not look like a dark room."""
+    finite = all(
+        np.isfinite(page.pixels[rows]).all() for page in pages for rows in tiles(len(page.pixels), 256)
+    )
+    if not np.isfinite(report["residual"]) or not finite:
+        raise BakeError(
+            "the solution is not finite: this is a defect of the solver; please report the scene, "
+            "and try another quality meanwhile"
+        )
+
+
+def _told(atlas: Atlas, pages: tuple[LightmapPage, ...]) -> tuple[dict[str, float], ...]:
+    """Return what the report says of each page."""
+    return tuple(
+        {
+            "resolution": laid.resolution,
+            "texels_per_metre": laid.density,
+            "utilisation": float(page.coverage.mean()),
+            "objects": sum(item.page == number for item in atlas.objects),
+        }
+        for number, (laid, page) in enumerate(zip(atlas.pages, pages, strict=True))
+    )
+
+
+@contextmanager
+def timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
+    """Note how long a stage took."""
+    started = time.perf_counter()
+    try:
+        yield
+    finally:
+        seconds[stage] = time.perf_counter() - started

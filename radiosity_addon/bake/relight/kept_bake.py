@@ -1,0 +1,262 @@
+"""A bake kept in memory, and its lightmaps for other strengths of its lights: no ray is traced.
+
+What is kept is light-independent (geometry and reflectance): gather hits, each lamp's gain at each texel,
+the hierarchy's links. Colour and power of lamps, emission, and the world's colour and strength may change;
+whatever moves, turns or reflects otherwise needs a new bake.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...base.bake_warning import BakeWarning
+from ...base.errors import BakeError, SceneError
+from ...base.scratch import Scratch, tiles
+from ...lightmap.images.encode import presentable, to_quantity
+from ...lightmap.images.page import LightmapPage
+from ...lightmap.images.seams import Seams
+from ...lightmap.images.texel_pages import texel_pages
+from ...lightmap.lighting.relight_texels import kept_bytes, relight_steps
+from ...lightmap.lighting.sweeps import LitTexels, TexelLight
+from ...lightmap.lighting.traced_texels import TracedTexels
+from ...lightmap.texels.texel_geometry import TexelGeometry
+from ...lightmap.unwrap.atlas import Atlas
+from ...lights.sun_and_sky import Light
+from ...options.bake_settings import BakeSettings
+from ...scene.bake_scene import BakeScene
+from ...scene.scene import Scene
+from ...solver.element_transport import Relightable
+from ...solver.emitters.light_sources import LightSources
+from ..result.progress import Progress
+
+STRENGTHS = ("power", "irradiance", "radiance")
+"""The fields of lights that may change."""
+
+DAMAGED = (
+    *(ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError),
+    *(FloatingPointError, ZeroDivisionError, RecursionError, MemoryError, np.linalg.LinAlgError),
+)
+"""What computing with a sidecar can raise that is not as it was written."""
+
+SAME = 1e-5
+"""Emission that differs from what its material's strength says by no more than this part is as expected."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """What a bake tells of its hierarchy: the solver's part of the report, and warnings."""
+
+    report: dict[str, Any]
+    warnings: tuple[BakeWarning, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Moves:
+    """What baking anew needs of a kept bake after some objects moved (`rebaking.py`).
+
+    Attributes
+    ----------
+    atlas : Atlas
+        Where charts lie.
+    traced : TracedTexels
+        How texels were lit.
+    solved : Solved
+        Of the bake that the hierarchy was solved for.
+    """
+
+    atlas: Atlas
+    traced: TracedTexels
+    solved: Solved
+
+
+@dataclass(frozen=True, eq=False)
+class KeptBake:
+    """All that relighting needs of a bake.
+
+    Attributes
+    ----------
+    bake_scene, settings
+        The bake's.
+    solved : Relightable
+    lit : LitTexels
+    geometry, seams, rings
+        The texels, what is stitched, and how far pages are dilated [texels].
+    reflectance, emission : (n, 3) float64
+        Of the texels as they show; emission [W/m²] as it was baked.
+    moves : Moves or None
+        Without it nothing can be moved.
+    origin : str
+        The sidecar that it was read from, if it was.
+    """
+
+    bake_scene: BakeScene
+    settings: BakeSettings
+    solved: Relightable
+    lit: LitTexels
+    geometry: TexelGeometry
+    seams: Seams | None
+    rings: int
+    reflectance: Array
+    emission: Array
+    moves: Moves | None = None
+    origin: str = ""
+
+    @property
+    def sources(self) -> LightSources:
+        """What can be changed."""
+        return self.solved.sources
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the sources: lamps', the world's, and emissive materials'."""
+        names = [light.name for light in self.sources.lights]
+        count = len(self.sources) - len(names)
+        given = self.bake_scene.emitter_names or tuple(f"emission {1 + row}" for row in range(count))
+        return (*names, *given[:count])
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """The light groups that the scene puts the sources in; "" where in none."""
+        lights = self.bake_scene.light_groups or ("",) * len(self.sources.lights)
+        count = len(self.sources) - len(lights)
+        return (*lights, *(self.bake_scene.emitter_groups or ("",) * count)[:count])
+
+    @property
+    def strengths(self) -> Array:
+        """(s, 3) The sources' strengths as they were baked, see `LightSources`."""
+        return np.asarray(self.sources.strengths)
+
+    @property
+    def nbytes(self) -> int:
+        """What the texels' part takes in memory."""
+        return kept_bytes(self.lit)
+
+    def strengths_of(self, scene: Scene) -> Array:
+        """Return (s, 3) the strengths of the sources in a scene that differs in them alone.
+
+        Raises
+        ------
+        SceneError
+            If anything else differs.
+        """
+        before = self.bake_scene.scene
+        alike = len(scene) == len(before) and len(scene.lights) == len(before.lights)
+        alike = alike and all(
+            np.array_equal(getattr(scene, name), getattr(before, name))
+            for name in (
+                "triangles",
+                "normals",
+                "reflectance",
+                "opacity",
+                "two_sided",
+                "in_bounces",
+                "in_shadows",
+            )
+        )
+        if not alike:
+            raise SceneError("a surface, a reflectance or the number of lamps has changed; bake again")
+        for light, other in zip(before.lights, scene.lights, strict=True):
+            if not differs_in_strength_alone(light, other):
+                raise SceneError(f"lamp '{light.name}' has changed in more than its strength; bake again")
+        exitance = np.zeros((len(self.sources) - len(scene.lights), 3))
+        emits = self.sources.emitter >= 0
+        np.maximum.at(exitance, self.sources.emitter[emits], scene.emission[emits])
+        lamps = np.array([light.strength for light in scene.lights]).reshape(-1, 3)
+        strengths = self.sources.checked(np.concatenate([lamps, exitance]))
+        told = self.sources.emission(before.emission, np.arange(len(scene)), strengths)
+        if np.abs(told - scene.emission).max(initial=0.0) > SAME * scene.emission.max(initial=0.0):
+            raise SceneError(
+                "emission has changed in more than its strength, or is new somewhere; bake again"
+            )
+        return strengths
+
+
+def relight(kept: KeptBake, strengths: Array) -> Generator[Progress, None, tuple[LightmapPage, ...]]:
+    """Compute the lightmaps for other strengths of the sources.
+
+    Parameters
+    ----------
+    strengths : (s, 3) float
+        See `KeptBake.strengths`.
+
+    Raises
+    ------
+    SceneError
+        If the sources cannot have them.
+    BakeError
+        If no light comes of it: the sidecar that the bake was read from is damaged.
+    """
+    wanted = kept.sources.checked(strengths)
+    if not kept.origin:
+        return (yield from _relight(kept, wanted))
+    try:
+        return (yield from _relight(kept, wanted))
+    except (*DAMAGED, BakeError) as error:
+        raise damaged(kept.origin) from error
+
+
+def damaged(path: Path | str) -> BakeError:
+    """Return the error for a sidecar that no bake has written."""
+    return BakeError(f"'{path}' is not used: it is damaged; bake again")
+
+
+def _relight(kept: KeptBake, wanted: Array) -> Generator[Progress, None, tuple[LightmapPage, ...]]:
+    """Compute the lightmaps for strengths that are checked."""
+    scratch = kept.geometry.scratch
+    steps = relight_steps(kept.lit, kept.solved, wanted, scratch)
+    while True:
+        try:
+            yield Progress("relight", 0.95 * next(steps))
+        except StopIteration as done:
+            light: TexelLight = done.value
+            break
+    emission = kept.sources.emission(kept.emission, kept.geometry.triangle, wanted)
+    values = shown(light, kept.reflectance, emission, kept.settings, scratch)
+    pages = presentable(texel_pages(kept.geometry, values, kept.seams, kept.rings))
+    yield Progress("relight", 1.0)
+    return pages
+
+
+def shown(
+    light: TexelLight, reflectance: Array, emission: Array, settings: BakeSettings, scratch: Scratch
+) -> Array:
+    """Return (n, 3) float32 what texels are to hold of their light; reflectance and emission as they show."""
+    values = scratch.empty(light.direct.shape, np.float32)
+    parts = {"all": (light.direct, light.indirect), "direct": (light.direct,), "indirect": (light.indirect,)}
+    for rows in tiles(len(values)):
+        irradiance = np.add.reduce([part[rows] for part in parts[settings.light]])
+        emitted = np.zeros((len(irradiance), 3)) if settings.light == "indirect" else emission[rows]
+        values[rows] = to_quantity(irradiance, reflectance[rows], emitted, settings.quantity)
+    return values
+
+
+def differs_in_strength_alone(one: Light, other: Light) -> bool:
+    """Tell whether two lights differ at most in colour and strength, but for rounding."""
+    if type(one) is not type(other):
+        return False
+    return all(
+        _equal(getattr(one, entry.name), getattr(other, entry.name))
+        for entry in fields(one)
+        if entry.name not in STRENGTHS
+    )
+
+
+def same_light(one: Light, other: Light) -> bool:
+    """Tell whether two lights are the same."""
+    alike = type(one) is type(other)
+    return alike and all(_equal(getattr(one, e.name), getattr(other, e.name)) for e in fields(one))
+
+
+def _equal(one: Any, other: Any) -> bool:
+    """Tell whether values are the same: of skies, whose pictures are rendered anew, but for rounding."""
+    if not isinstance(one, np.ndarray) or not isinstance(other, np.ndarray):
+        return bool(one == other)
+    if one.shape != other.shape:
+        return False
+    return bool(np.abs(one - other).max(initial=0.0) <= SAME * np.abs(one).max(initial=0.0))

@@ -1,0 +1,170 @@
+"""Light groups: named sets of a scene's sources of light, each with lightmaps of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...base.errors import UsageError
+from ...base.scratch import tiles
+from ...lightmap.images.page import LightmapPage
+from ...options.bake_settings import MAX_GROUPS, OTHERS, BakeSettings
+from ...scene.bake_scene import BakeScene
+from ..result.result import LightGroup
+from .kept_bake import KeptBake, relight
+
+BAND = 64
+"""Rows of a page that are shared out at once."""
+
+
+def are_wanted(bake_scene: BakeScene, settings: BakeSettings) -> bool:
+    """Tell whether a bake makes lightmaps of light groups."""
+    known = any((*bake_scene.light_groups, *bake_scene.emitter_groups))
+    return bool(settings.groups) or (settings.light_groups and known)
+
+
+def group_of(name: str, of_scene: str, settings: BakeSettings) -> str:
+    """Return the group of a source, `OTHERS` if it is in none.
+
+    Parameters
+    ----------
+    name : str
+        The source's.
+    of_scene : str
+        The group that the scene puts it in, or "".
+    """
+    for group, wanted in settings.groups:
+        if name in wanted:
+            return group
+    return (of_scene if settings.light_groups else "") or OTHERS
+
+
+def check_groups(bake_scene: BakeScene, settings: BakeSettings) -> None:
+    """Refuse before the work what light groups cannot be.
+
+    Raises
+    ------
+    UsageError
+        If a member is no source, or there are too many groups.
+    """
+    lights, emitters = bake_scene.scene.lights, bake_scene.emitter_names
+    names = (*(light.name for light in lights), *emitters)
+    if bake_scene.emitter is not None:
+        _check_members(settings, names)
+    given = (
+        *(bake_scene.light_groups or ("",) * len(lights)),
+        *(bake_scene.emitter_groups or ("",) * len(emitters)),
+    )
+    found = {group_of(*of, settings) for of in zip(names, given, strict=True)}
+    if len(found) > MAX_GROUPS:
+        raise UsageError(
+            f"{len(found)} light groups are more than the {MAX_GROUPS} that materials can mix: join some"
+        )
+
+
+def _check_members(settings: BakeSettings, names: Sequence[str]) -> None:
+    for name, wanted in settings.groups:
+        for member in wanted:
+            if member not in names:
+                raise UsageError(
+                    f"light group '{name}': there is no lamp, emissive material or world '{member}'"
+                )
+
+
+def group_pages(
+    kept: KeptBake, pages: tuple[LightmapPage, ...], strengths: Array | None = None
+) -> Generator[float, None, tuple[LightGroup, ...]]:
+    """Compute the lightmaps of each of the light groups; yields the fraction done.
+
+    They sum to the whole: what sweeps that end, clamps at 0 and stitching leave of it, a small
+    part, is shared out over the groups in proportion.
+
+    Parameters
+    ----------
+    pages : tuple of LightmapPage
+        Those of all light together.
+    strengths : (s, 3) float64 or None
+        The sources', with which `pages` were lit; None for those of the bake.
+    """
+    given = kept.strengths if strengths is None else kept.sources.checked(strengths)
+    chosen = members(kept.settings, kept.names, kept.groups, given)
+    found = []
+    for number, (_, rows) in enumerate(chosen):
+        steps = relight(kept, given * rows[:, None])
+        while True:
+            try:
+                fraction = next(steps).fraction
+            except StopIteration as done:
+                found.append(done.value)
+                break
+            yield (number + fraction) / len(chosen)
+    for number, page in enumerate(pages):
+        share_out(page.pixels, [of[number].pixels for of in found])
+    return tuple(
+        LightGroup(
+            name,
+            found[group],
+            tuple(dict.fromkeys(np.array(kept.names, dtype=object)[rows])),
+        )
+        for group, (name, rows) in enumerate(chosen)
+    )
+
+
+def shared_out(whole: Array, parts: Array) -> Array:
+    """Return (g, …) float32 what `share_out` makes of parts."""
+    result = parts.astype(np.float64)
+    share_out(whole, list(result))
+    return result.astype(np.float32)
+
+
+def share_out(whole: Array, parts: Sequence[Array]) -> None:
+    """Scale parts of an image where they are, so that they sum to the `whole` (height, …), none below 0.
+
+    Where no part has anything, the largest of them over all takes what there is.
+    """
+    light = np.zeros(len(parts))
+    for rows in tiles(len(whole), BAND):
+        light += [np.maximum(part[rows], 0.0).sum(dtype=np.float64) for part in parts]
+    largest = int(light.argmax())
+    for rows in tiles(len(whole), BAND):
+        shares = np.maximum(np.stack([part[rows] for part in parts]).astype(np.float64), 0.0)
+        total = shares.sum(axis=0)
+        shares *= np.where(total > 0, whole[rows] / np.where(total > 0, total, 1.0), 0.0)
+        shares[largest] += np.where(total > 0, 0.0, whole[rows])
+        for part, share in zip(parts, shares, strict=True):
+            part[rows] = share
+
+
+def members(
+    settings: BakeSettings, names: Sequence[str], of_scene: Sequence[str], strengths: Array
+) -> list[tuple[str, Array]]:
+    """Tell which sources are in which group.
+
+    Parameters
+    ----------
+    names, of_scene : sequence of str
+        The s sources' names, and the groups that the scene puts them in.
+    strengths : (s, 3) float64
+        Theirs: `OTHERS` is there only if it was asked for, or something in it shines.
+
+    Returns
+    -------
+    members : list of (str, (s,) bool)
+        The settings' groups in their order, then the scene's by name, `OTHERS` last.
+
+    Raises
+    ------
+    UsageError
+        If a member is no source.
+    """
+    _check_members(settings, names)
+    label = np.array([group_of(*of, settings) for of in zip(names, of_scene, strict=True)], dtype=object)
+    asked = [name for name, _ in settings.groups]
+    rest = sorted(set(label) - {*asked, OTHERS})
+    found = [(name, label == name) for name in (*asked, *rest)]
+    left = label == OTHERS
+    if OTHERS not in asked and (left & strengths.any(axis=1)).any():
+        found.append((OTHERS, left))
+    return found

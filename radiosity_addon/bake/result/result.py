@@ -1,0 +1,128 @@
+"""What a bake yields: pages, the objects on them, and details for overlays and the report."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from ...base.arrays import Array
+from ...base.bake_warning import BakeWarning
+from ...lightmap.images.page import LightmapPage
+from ...scene.bake_scene import BakeObject
+from ...solver.state.link_record import LinkRecord
+
+
+@dataclass(frozen=True)
+class LightGroup:
+    """The lightmaps of one group's light.
+
+    Parameters
+    ----------
+    name : str
+    pages : tuple of LightmapPage
+        Parallel to the bake's; over all groups they sum to them.
+    sources : tuple of str
+        The names of the lamps, emissive materials and the world in it, each once.
+    """
+
+    name: str
+    pages: tuple[LightmapPage, ...]
+    sources: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class BakedObject:
+    """The lightmap of one object: its UVs and the page they point into.
+
+    Parameters
+    ----------
+    object : BakeObject
+    uv : (count, 3, 2) float32
+        Per triangle corner, in [0, 1], v up.
+    page : int
+        Index into `BakeResult.pages`.
+    """
+
+    object: BakeObject
+    uv: Array
+    page: int
+
+
+@dataclass(frozen=True, eq=False)
+class PageDetails:
+    """What is known of a page's texels besides their light.
+
+    Parameters
+    ----------
+    state : (height, width) uint8
+        One of `TEXEL_STATES`, or `NO_TEXEL_HERE`.
+    noise : (height, width) float16
+        Estimated error of the irradiance, in units of `unit`.
+    misfit : (height, width) float16
+        Irradiance of the solver's element less that of the texel, in units of `unit`: what of the element's
+        light was wrong, or too coarse.
+    unit : float [W/m²]
+    """
+
+    state: Array
+    noise: Array
+    misfit: Array
+    unit: float
+
+
+@dataclass(frozen=True, eq=False)
+class BakeDetails:
+    """What overlays show of a bake.
+
+    Parameters
+    ----------
+    links : LinkRecord
+    pages : tuple of PageDetails
+        Parallel to the bake's; none for a bake of a residual.
+    """
+
+    links: LinkRecord
+    pages: tuple[PageDetails, ...]
+
+    @property
+    def nbytes(self) -> int:
+        """Memory it takes."""
+        arrays = [getattr(page, name) for page in self.pages for name in ("state", "noise", "misfit")]
+        return self.links.nbytes + sum(int(array.nbytes) for array in arrays)
+
+
+@dataclass(frozen=True)
+class BakeResult:
+    """All that a bake yields.
+
+    Parameters
+    ----------
+    pages : tuple of LightmapPage
+    objects : tuple of BakedObject
+    solver : dict
+        What the report says of the solver: "method", its "settings", "elements", "links", "rays",
+        "iterations", "residual", "power_W", "closure_area_mean", "history", and what the method
+        itself has to tell.
+    warnings : tuple of BakeWarning
+        The scene's and the bake's own.
+    seconds : dict of str to float
+        Wall-clock time of each stage.
+    atlas : tuple of dict
+        Parallel to `pages`: "resolution", "texels_per_metre" of objects at texel scale 1,
+        "utilisation" (the share of texels that show a surface) and the number of "objects".
+    groups : tuple of LightGroup
+        Those that were asked for, and one of what is in none of them.
+    light : tuple of dict
+        Parallel to `objects`: statistics of the light on their fronts, see `bake_details.statistics`.
+    details : BakeDetails or None
+    """
+
+    pages: tuple[LightmapPage, ...]
+    objects: tuple[BakedObject, ...]
+    solver: dict[str, Any]
+    warnings: tuple[BakeWarning, ...]
+    seconds: dict[str, float] = field(default_factory=dict)
+    atlas: tuple[dict[str, float], ...] = ()
+    groups: tuple[LightGroup, ...] = ()
+    light: tuple[dict[str, Any], ...] = ()
+    details: BakeDetails | None = None

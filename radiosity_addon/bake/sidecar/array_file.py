@@ -1,0 +1,250 @@
+"""A file of numbers and arrays that tells whether it is whole, and of which reading it runs nothing.
+
+The head is a few bytes of magic, a version, and a digest of all that follows: a description in JSON,
+then arrays in compressed blocks. Bytes of equal weight lie together (the first of every number, then the
+second …), which halves what integers and fractions of about the same size take.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+import struct
+import zlib
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+import numpy.typing as npt
+
+from ...base.errors import BakeError
+
+Array = npt.NDArray[Any]
+
+BLOCK = 1 << 22
+"""Bytes of an array that are compressed at a time: blocks are independent, a thread each."""
+
+LEVEL = 1
+"""Of zlib: more takes several times as long for a tenth less."""
+
+KINDS = (
+    "bool",
+    "int8",
+    "int16",
+    "int32",
+    "int64",
+    "uint8",
+    "uint16",
+    "uint32",
+    "uint64",
+    "float32",
+    "float64",
+)
+"""Types of arrays that may be stored: plain numbers, never objects."""
+
+MOST = 1 << 38
+"""Bytes that a file may claim to hold, unless the caller allows fewer."""
+
+RATIO, SPARE = 32, 1 << 24
+"""Arrays may take this many times the bytes of their file, and these more. Those of a bake take about three
+times as many; zlib itself can pack a thousand to one."""
+
+HEAD_RATIO, HEAD_SPARE = 64, 1 << 20
+"""The same for the description."""
+
+MOST_HEAD = 1 << 26
+"""Bytes of a description at most."""
+
+MOST_AXES = 8
+"""Of an array."""
+
+_HEAD = struct.Struct("<16sI32sQ")
+
+_DAMAGED = (
+    *(ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError),
+    *(RecursionError, MemoryError, zlib.error, struct.error),
+)
+"""What reading a file that is not as it was written can raise."""
+
+
+class ArrayFileError(BakeError):
+    """A file that cannot be used; the message says what is wrong with it, without its name."""
+
+
+class TooLargeError(ArrayFileError):
+    """A file that may be whole but takes more memory than is allowed."""
+
+
+def write_arrays(path: Path, magic: bytes, version: int, told: Any, arrays: list[Array]) -> int:
+    """Write a description and arrays; return the bytes that they take.
+
+    Parameters
+    ----------
+    magic : bytes
+        16 of them at most: the kind of file.
+    told : any
+        What JSON can hold.
+    arrays : list of arrays of the `KINDS`
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    with ThreadPoolExecutor() as threads:
+        blocks = [list(threads.map(_compressed, _blocks(array))) for array in arrays]
+    entries = [
+        {"kind": array.dtype.name, "shape": list(array.shape), "blocks": [len(block) for block in some]}
+        for array, some in zip(arrays, blocks, strict=True)
+    ]
+    head = zlib.compress(json.dumps({"told": told, "arrays": entries}).encode())
+    body = [head, *(block for some in blocks for block in some)]
+    digest = hashlib.blake2b(digest_size=32)
+    for part in body:
+        digest.update(part)
+    with path.open("wb") as file:
+        file.write(_HEAD.pack(magic, version, digest.digest(), len(head)))
+        file.writelines(body)
+        return file.tell()
+
+
+def read_arrays(path: Path, magic: bytes, version: int, most: int = MOST) -> tuple[Any, list[Array]]:
+    """Read what `write_arrays` wrote.
+
+    Parameters
+    ----------
+    most : int
+        Bytes that it may take in memory; what would take more is refused before it is unpacked.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+    ArrayFileError
+        If it is of another kind or version, not as it was written, or too large.
+    """
+    with _opened(path) as file:
+        size = os.fstat(file.fileno()).st_size
+        _check_head(file.read(_HEAD.size), magic, version)
+        if size > most:
+            raise TooLargeError(f"it has {size >> 20} MB, more than the memory limit of {most >> 20} MB")
+        file.seek(0)
+        content = file.read(size)
+    digest, length = _check_head(content, magic, version)
+    body = memoryview(content)[_HEAD.size :]
+    if hashlib.blake2b(body, digest_size=32).digest() != digest:
+        raise ArrayFileError("it is damaged")
+    try:
+        head = json.loads(_unpacked(body[:length], min(HEAD_RATIO * length + HEAD_SPARE, MOST_HEAD)))
+        entries, room = head["arrays"], min(RATIO * len(body) + SPARE, MOST)
+        total = _total(entries)
+        if total > room:
+            raise ArrayFileError(f"it claims to hold {total >> 20} MB, which a file of its size cannot")
+        if total > most:
+            raise TooLargeError(f"it takes {total >> 20} MB, more than the memory limit of {most >> 20} MB")
+        return head["told"], _read(body[length:], entries)
+    except _DAMAGED as error:
+        raise ArrayFileError("it is damaged") from error
+
+
+def read_digest(path: Path, magic: bytes, version: int) -> str:
+    """Return the digest that a file's head holds, without reading the rest; errors as of `read_arrays`."""
+    with _opened(path) as file:
+        return _check_head(file.read(_HEAD.size), magic, version)[0].hex()
+
+
+def _opened(path: Path) -> BinaryIO:
+    """Open a file to read; a device or a pipe, which may have no end, is none."""
+    if path.exists() and not path.is_file():
+        raise ArrayFileError("it is no such file")
+    return path.open("rb")
+
+
+def _check_head(content: bytes, magic: bytes, version: int) -> tuple[bytes, int]:
+    """Return the digest and the description's length that a file's first bytes hold."""
+    if len(content) < _HEAD.size:
+        raise ArrayFileError("it is cut off")
+    kind, found, digest, length = _HEAD.unpack_from(content)
+    if kind != magic.ljust(16, b"\0"):
+        raise ArrayFileError("it is no such file")
+    if found != version:
+        raise ArrayFileError(f"it has version {found}, and this is for version {version}")
+    return digest, length
+
+
+def _unpacked(packed: memoryview, most: int) -> bytes:
+    """Expand bytes, to so many at most."""
+    expander = zlib.decompressobj()
+    content = expander.decompress(packed, most + 1)
+    if len(content) > most or not expander.eof:
+        raise ValueError("too long, or cut off")
+    return content
+
+
+def _total(entries: list[dict[str, Any]]) -> int:
+    """Return the bytes that arrays would take, which may be any number."""
+    total = 0
+    for entry in entries:
+        if entry["kind"] not in KINDS or len(entry["shape"]) > MOST_AXES:
+            raise ValueError("unknown kind of array")
+        count = 1
+        for size in entry["shape"]:
+            if type(size) is not int or not 0 <= size <= MOST:
+                raise ValueError("impossible shape")
+            count *= size
+        total += count * np.dtype(entry["kind"]).itemsize
+    return total
+
+
+def _blocks(array: Array) -> list[Array]:
+    """Cut an array into flat blocks."""
+    if array.dtype.name not in KINDS:
+        raise TypeError(f"arrays of {array.dtype} cannot be stored")
+    flat = np.ascontiguousarray(array).reshape(-1)
+    step = BLOCK // array.dtype.itemsize
+    return [flat[first : first + step] for first in range(0, len(flat), step)]
+
+
+def _compressed(block: Array) -> bytes:
+    width = block.dtype.itemsize
+    planes = np.ascontiguousarray(block.view(np.uint8).reshape(-1, width).T)
+    return zlib.compress(planes.tobytes(), LEVEL)
+
+
+def _read(body: memoryview, entries: list[dict[str, Any]]) -> list[Array]:
+    """Return the arrays that entries tell of."""
+    made, jobs, at = [], [], 0
+    for entry in entries:
+        dtype, shape = np.dtype(entry["kind"]), tuple(entry["shape"])
+        count = math.prod(shape)
+        step = BLOCK // dtype.itemsize
+        if len(entry["blocks"]) != -(-count // step):
+            raise ValueError("impossible array")
+        flat = np.empty(count, dtype=dtype)
+        made.append(flat.reshape(shape))
+        for number, size in enumerate(entry["blocks"]):
+            if type(size) is not int or not 0 <= size <= len(body) - at:
+                raise ValueError("impossible block")
+            jobs.append((flat[number * step : (number + 1) * step], body[at : at + size]))
+            at += size
+    if at != len(body):
+        raise ValueError("more or less than was told")
+    with ThreadPoolExecutor() as threads:
+        list(threads.map(_expand, jobs))
+    return made
+
+
+def _expand(job: tuple[Array, memoryview]) -> None:
+    """Fill a block from its compressed bytes."""
+    target, packed = job
+    width = target.dtype.itemsize
+    # No more is unpacked than there is room for, whatever the bytes say.
+    bytes_of = np.frombuffer(_unpacked(packed, target.nbytes), dtype=np.uint8).reshape(width, -1)
+    if bytes_of.size != target.nbytes:
+        raise ValueError("too short")
+    if target.dtype == np.bool_ and (bytes_of > 1).any():
+        raise ValueError("neither true nor false")
+    target.view(np.uint8).reshape(-1, width)[:] = bytes_of.T

@@ -1,0 +1,13 @@
+"""A warning of a bake: which object it is about, and what was used instead."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class BakeWarning:
+    """Something that was not understood: whose it is, and what was used instead."""
+
+    name: str
+    message: str

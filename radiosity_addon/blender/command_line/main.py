@@ -1,0 +1,118 @@
+"""Run one command: parse its words, do what the verb asks for, and turn however it ends into an exit code.
+
+What a verb does is imported when it runs: help and refusals need neither Blender nor NumPy.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import traceback
+from collections.abc import Sequence
+from contextlib import nullcontext, suppress
+from pathlib import Path
+
+from ...base.errors import RadiosityError
+from ...cli.console import Console
+from ...cli.interrupts import Interrupts
+from ...cli.parser import bake_output, build_parser, check_keeping, check_plot, settings_of
+from ...files.path_checks import printable
+from ...options.bake_settings import BakeSettings
+from ...options.permissions import Permissions
+
+EXIT_DONE = 0
+EXIT_FAILED = 1
+EXIT_USAGE = 2
+EXIT_INTERRUPTED = 130
+
+INTERRUPTED = "interrupted; nothing was written"
+
+
+def main(
+    argv: Sequence[str] | None = None,
+    prog: str = "python -m radiosity_addon",
+    loaded: Path | None = None,
+    interrupts: Interrupts | None = None,
+) -> int:
+    """Run one command and return its exit code; nothing is raised, nothing exits.
+
+    Parameters
+    ----------
+    argv : sequence of str or None
+        The words after the program's name; None takes them from the process.
+    prog : str
+        How the user started us, for the help texts.
+    loaded : Path or None
+        The scene file the host has open already (`blender -b FILE --command …`):
+        it is what a command without SCENE works on.
+    interrupts : Interrupts or None
+        Those of the caller, if it has entered some.
+
+    Returns
+    -------
+    code : int
+        0 done, 1 scene or bake error, 2 usage, 130 interrupted.
+    """
+    try:
+        request = build_parser(prog).parse_args(sys.argv[1:] if argv is None else list(argv))
+        settings = settings_of(request) if request.verb == "bake" else None
+        if settings is not None and not request.check:
+            request.output = bake_output(request, loaded)
+            check_plot(request.plot)
+            check_keeping(request, settings)
+    except RadiosityError as error:
+        return _fail(str(error), error.exit_code)
+    except SystemExit as help_was_asked:
+        return int(help_was_asked.code or 0)
+    with Interrupts() if interrupts is None else nullcontext(interrupts) as those:
+        return _run(request, settings, loaded, those)
+
+
+def _run(
+    request: argparse.Namespace, settings: BakeSettings | None, loaded: Path | None, interrupts: Interrupts
+) -> int:
+    """Run the verb and turn however it ends into an exit code."""
+    try:
+        from . import verbs
+    except ModuleNotFoundError as error:
+        return _fail(
+            f"{error.name} is not installed; run this through build.py or inside Blender", EXIT_FAILED
+        )
+    allowed = Permissions(request.overwrite, request.allow_scripts)
+    try:
+        interrupts.check()
+        interrupts.deferred = request.verb == "bake" and not request.check  # its stages say when
+        with Console(quiet=request.quiet) as console:
+            if settings is not None and request.check:
+                return verbs.check(request.scene, loaded, request.output, settings, allowed, console)
+            if settings is not None and request.relight:
+                from .relight_verb import relight
+
+                folder = request.output, settings, request.report, allowed
+                preview = not request.no_preview
+                relight(request.scene, loaded, *folder, console, interrupts, preview=preview)
+            elif settings is not None:
+                given = request.output, settings, request.report, request.plot, request.keep, allowed
+                preview = not request.no_preview
+                verbs.bake(request.scene, loaded, *given, console, interrupts, preview=preview)
+            else:
+                verbs.restore(request.scene, loaded, request.output, allowed, console)
+    except KeyboardInterrupt:
+        return _fail(INTERRUPTED, EXIT_INTERRUPTED)
+    except RadiosityError as error:
+        # An importer that Ctrl-C stopped comes back with a failure of its own.
+        if interrupts.requested:
+            return _fail(INTERRUPTED, EXIT_INTERRUPTED)
+        return _fail(str(error), error.exit_code)
+    except MemoryError:
+        return _fail("out of memory; lower the resolution, the texel density or the quality", EXIT_FAILED)
+    except Exception as error:  # noqa: BLE001 (the last resort: a code and a line, not a bare crash)
+        traceback.print_exc()
+        return _fail(f"internal error, please report it: {type(error).__name__}: {error}", EXIT_FAILED)
+    return EXIT_DONE
+
+
+def _fail(message: str, code: int) -> int:
+    with suppress(OSError, ValueError):  # nobody may read it: the exit code still says it
+        print(f"error: {printable(message)}", file=sys.stderr, flush=True)  # noqa: T201
+    return code

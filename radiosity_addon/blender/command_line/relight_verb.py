@@ -1,0 +1,142 @@
+"""`bake --relight`: the bake in an output folder lit anew, by its sidecar and the lights of a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import bpy
+
+from ...bake.keep import Keeping
+from ...bake.relight.source_strengths import strengths_in
+from ...bake.result.progress import Progress
+from ...bake.result.report import BakeReport
+from ...bake.sidecar.sidecar import StoredBake, check_belongs, read_sidecar
+from ...base.bake_warning import BakeWarning
+from ...base.errors import UsageError
+from ...base.progress import drain
+from ...cli.console import Console, summary
+from ...cli.interrupts import Interrupts
+from ...files.file_names import BLEND_NAME, PREVIEW_NAME, SIDECAR_NAME
+from ...options.bake_settings import BakeSettings
+from ...options.permissions import Permissions
+from ..files.single_files import check_places, make_folder_of
+from .verbs import open_or_build, output_of, registered, same_file, written_files
+
+if TYPE_CHECKING:
+    from ..files.output import OutputFolder
+
+EXPORT, RELIGHT, APPLY = 0.1, 0.2, 0.5
+"""How far the whole is when each part begins; rough."""
+
+
+def relight(
+    scene: Path | None,
+    loaded: Path | None,
+    output: Path,
+    settings: BakeSettings,
+    report_copy: Path | None,
+    allowed: Permissions,
+    console: Console,
+    interrupts: Interrupts,
+    *,
+    preview: bool = True,
+) -> None:
+    """Light the bake in a folder anew, as the lights of the scene that was baked are now.
+
+    Parameters
+    ----------
+    scene, loaded, report_copy, allowed, console, interrupts, preview
+        As for `commands.bake`.
+    output : Path
+        The folder with the bake and its sidecar.
+    settings : BakeSettings
+        As they were given; the bake has its own, and others than those are refused.
+
+    Raises
+    ------
+    RadiosityError
+        If the sidecar cannot be used, or the scene differs in more than strengths of its lights.
+    """
+    with registered():
+        from ..files.output import BLEND_NAME, REPORT_NAME
+        from ..jobs.job import WRITING_STAGES
+
+        source = scene or loaded
+        if source is not None and same_file(source, output / BLEND_NAME):
+            raise UsageError(
+                f"--relight takes the scene that was baked, not '{source}', which it would replace"
+            )
+        check_places({} if report_copy is None else {"--report": report_copy}, source)
+        console.progress("read", 0.0)
+        stored = read_sidecar(output / SIDECAR_NAME, settings.memory_limit)
+        check_belongs(stored, output / REPORT_NAME)
+        given = replace(settings, memory_limit=None)
+        if given not in (BakeSettings(), replace(stored.settings, memory_limit=None)):
+            raise UsageError(f"the bake in {output} has its own settings: give --relight no others")
+        notes = open_or_build(scene, loaded, allowed)
+        folder = output_of(output, source, allowed, report_copy)
+        job = relight_into(bpy.context, stored, folder, notes, preview)
+        try:
+            while True:
+                try:
+                    progress = next(job)
+                except StopIteration as done:
+                    report = done.value
+                    break
+                interrupts.check()
+                interrupts.deferred = progress.stage in WRITING_STAGES
+                console.progress(progress.stage, progress.fraction)
+        finally:
+            interrupts.deferred = True
+            job.close()
+        if report_copy is not None:
+            make_folder_of(report_copy)
+            report.write_copy(report_copy)
+        files = written_files(report.as_dict(), preview)
+        console.lines(summary(str(output), files, report.as_dict()))
+
+
+def relight_into(
+    context: bpy.types.Context,
+    stored: StoredBake,
+    folder: OutputFolder,
+    notes: tuple[BakeWarning, ...] = (),
+    preview: bool = True,
+) -> Generator[Progress, None, BakeReport]:
+    """Light a stored bake anew, and write its folder as a bake would; the scene shows the lightmaps then.
+
+    Raises
+    ------
+    RadiosityError
+    """
+    from ..apply.rebake import Originals
+    from ..images.images import group_file_names, page_file_names
+    from ..jobs.job import deliver, timed
+    from ..jobs.preview import QUICK_SAMPLES
+    from ..relight.relight_scene import lit
+    from ..scene_export.export import export_steps, exporting
+
+    seconds: dict[str, float] = {}
+    with folder as output:
+        output.expect((BLEND_NAME, PREVIEW_NAME, output.names.sidecar))
+        yield Progress("export", EXPORT)
+        with timed(seconds, "export"):
+            shown = Originals(context)
+            steps = export_steps(context, stored.settings, dark=True, shown=shown)
+            export = yield from exporting(steps)
+        with timed(seconds, "relight"):
+            kept = stored.kept(export.bake_scene)
+            yield Progress("relight", RELIGHT)
+            pages, groups = drain(lit(kept, strengths_in(kept, export.bake_scene)))
+        result = stored.result(export.bake_scene, pages)
+        result = replace(result, groups=groups, warnings=(*notes, *result.warnings))
+        output.expect(page_file_names(result, stored.settings))
+        output.expect(name for of in group_file_names(result, stored.settings) for name in of)
+        yield Progress("apply", APPLY)
+        keeping = Keeping(sidecar=True, mark=stored.mark)
+        made = export, result, output, seconds, keeping
+        samples = QUICK_SAMPLES if preview else None
+        return (yield from deliver(context, stored.settings, *made, samples))

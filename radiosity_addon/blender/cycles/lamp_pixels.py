@@ -1,0 +1,74 @@
+"""Look at what a lamp's own nodes make of its light: Cycles renders the inside of a sphere around it."""
+
+from __future__ import annotations
+
+import bmesh
+import bpy
+import numpy as np
+
+from ...base.radiometry import brdf_of_reflectance, intensity_of_flux
+from .world_pixels import look_around, only_for_now, panorama_scene
+
+SIZE = (16, 32)
+"""Rows and columns of the picture: directions in which the lamp is asked."""
+
+_SUBDIVISIONS = 5
+_REFLECTANCE = 0.5
+
+
+def lamp_factor(lamp: bpy.types.Light) -> tuple[np.ndarray, float]:
+    """Return what a lamp's nodes multiply its light with, and by how much that varies with direction.
+
+    Parameters
+    ----------
+    lamp : Light
+        With a node tree, not evaluated. What its nodes know of its shape or place is lost.
+
+    Returns
+    -------
+    factor : (3,) float64
+        The mean over directions.
+    variation : float
+        The standard deviation over directions, relative to the mean.
+
+    Raises
+    ------
+    BakeError
+        If Cycles could not render it.
+    """
+    with only_for_now():
+        scene = panorama_scene(None)
+        bulb = lamp.copy()
+        bulb.type, bulb.energy, bulb.color = "POINT", 1.0, (1.0, 1.0, 1.0)
+        bulb = bpy.data.lights[bulb.name]  # its type has changed
+        bulb.shadow_soft_size = 0.0
+        for name, value in {"use_temperature": False, "exposure": 0.0, "normalize": True}.items():
+            if hasattr(bulb, name):
+                setattr(bulb, name, value)
+        scene.collection.objects.link(bpy.data.objects.new("Radiosity Lamp", bulb))
+        scene.collection.objects.link(_sphere())
+        scene.cycles.max_bounces = 0
+        scene.cycles.light_sampling_threshold = 0.0
+        pixels = look_around(scene, SIZE, f"lamp '{lamp.name}'").reshape(-1, 3)
+    factors = pixels / (brdf_of_reflectance(_REFLECTANCE) * intensity_of_flux(1.0))
+    mean = factors.mean(axis=0)
+    return mean, float(factors.std(axis=0).max() / max(float(mean.max()), 1e-12))
+
+
+def _sphere() -> bpy.types.Object:
+    """Return a matte sphere of radius 1."""
+    mesh = bpy.data.meshes.new("Radiosity Lamp")
+    shape = bmesh.new()
+    bmesh.ops.create_icosphere(shape, subdivisions=_SUBDIVISIONS, radius=1.0)
+    shape.to_mesh(mesh)
+    shape.free()
+    material = bpy.data.materials.new("Radiosity Lamp")
+    if bpy.app.version < (5, 0):
+        material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    diffuse = tree.nodes.new("ShaderNodeBsdfDiffuse")
+    diffuse.inputs["Color"].default_value = (_REFLECTANCE,) * 3 + (1.0,)
+    tree.links.new(diffuse.outputs[0], tree.nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
+    mesh.materials.append(material)
+    return bpy.data.objects.new("Radiosity Lamp", mesh)

@@ -1,0 +1,392 @@
+"""A look at the open scene before it is baked: what will be baked, how large, and what is odd about it.
+
+Meshes and materials are read as a bake reads them, but nothing is rendered, unwrapped or solved: an
+office takes a second or two.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import bpy
+import numpy as np
+
+from ...bake.estimate import Estimate, LightmappedObject, estimate_bake
+from ...bake.texel_memory import refuse_too_large
+from ...base import scratch
+from ...base.errors import RadiosityError
+from ...lightmap.unwrap.greedy import greedy_object, share_of
+from ...options.bake_settings import BakeSettings
+from ...scene.bake_scene import LIGHTMAP_UV_LAYER
+from ..apply.rebake import originals_shown
+from ..datablocks.mesh_arrays import world_from_object
+from ..files.foreseen_files import refusal
+from ..materials.materials import uses_nodes
+from ..scene_export.collect import collect
+from ..scene_export.export import check_names, chosen_pieces
+from ..scene_records.object_roles import BAKEABLE_TYPES
+from ..scene_records.pieces import Collected, Piece
+from ..scene_records.render_state import render_depsgraph
+
+if TYPE_CHECKING:
+    from ..cycles.lamps import LampFactors
+    from ..files.output import OutputFolder
+
+ERROR, WARNING, INFO = "ERROR", "WARNING", "INFO"
+"""The bake would stop; the result may disappoint; worth knowing."""
+
+FEW_TEXELS = 64
+"""Objects with fewer texels are called tiny: 8 × 8."""
+
+BLACK = 0.01
+"""What reflects less is called black."""
+
+ODD_SCALE = 100.0
+"""Scales that were not applied are told of from here on, and from its inverse down."""
+
+HUGE, MINUTE = 5000.0, 0.02
+"""Sizes of a scene [m] that look like a mistaken unit."""
+
+CLOSED = 1e-4
+"""A surface is taken for closed if the vectors of its areas sum to less than this share of them."""
+
+NOTED_FILES = 1e9
+"""Temporary files are told of from this size on [bytes]."""
+
+NAMED = 3
+"""So many objects are named in a finding."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something odd: how bad (`ERROR`, `WARNING`, `INFO`), whose it is, and what to do."""
+
+    level: str
+    name: str
+    message: str
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """What a bake of the scene will be.
+
+    Parameters
+    ----------
+    objects, triangles : int
+        That get lightmaps.
+    scene_triangles : int
+        All, what only lights and blocks among them.
+    estimate : Estimate
+    findings : tuple of Finding
+        The worst first.
+    """
+
+    objects: int
+    triangles: int
+    scene_triangles: int
+    estimate: Estimate
+    findings: tuple[Finding, ...]
+
+    @property
+    def texels(self) -> int:
+        """About how many texels will be lit."""
+        return round(sum(self.estimate.texels))
+
+    @property
+    def is_odd(self) -> bool:
+        """Whether there is something to look at before time is spent."""
+        return any(finding.level != INFO for finding in self.findings)
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """A piece in the world: its area [m²], the box around it (2, 3) and, if it is closed, its volume [m³]."""
+
+    area: float
+    box: np.ndarray
+    volume: float | None
+
+
+def inspect(
+    context: bpy.types.Context,
+    settings: BakeSettings,
+    folder: Path | None,
+    output: OutputFolder | None = None,
+    files: Collection[str] = (),
+) -> Inspection:
+    """Look at the context's scene.
+
+    Parameters
+    ----------
+    context : Context
+    settings : BakeSettings
+        Of the bake to be.
+    folder : Path or None
+        Where it would write; None where it packs.
+    output : OutputFolder or None
+        The same as the bake would have it; None if it is not known which files there are.
+    files : collection of str
+        What it would write besides lightmaps and the report.
+
+    Raises
+    ------
+    SceneError
+        If a coordinate is NaN or infinite.
+    """
+    factors: LampFactors = {}
+    with originals_shown(context) as edited, render_depsgraph(context) as depsgraph:
+        collected = collect(depsgraph, factors, settings)
+    findings = [Finding(WARNING, warning.name, warning.message) for warning in edited]
+    try:
+        check_names(context, collected.pieces, settings)
+        chosen = chosen_pieces(context, collected.pieces, settings.objects)
+    except RadiosityError as error:
+        chosen = []
+        findings.append(Finding(ERROR, context.scene.name, str(error)))
+    shapes = {id(piece): _shape(piece) for piece in collected.pieces if len(piece.mesh)}
+    lit = [_lit(piece, shapes) for piece in chosen]
+    triangles = sum(len(piece.mesh) for piece in collected.pieces)
+    plan = estimate_bake(lit, triangles, settings)
+    refused = None if output is None else refusal(output, settings, collected, chosen, files)
+    if refused is not None:
+        findings.append(Finding(ERROR, "file", refused))
+    findings += [
+        *_of_the_file(folder),
+        *_of_light(context, collected, settings),
+        *_of_visibility(context),
+        *_of_layers(chosen, settings),
+        *_of_texels(lit, plan),
+        *_of_shapes(context, collected, shapes),
+        *_of_size(shapes),
+        *_of_memory(plan, settings),
+        *(Finding(INFO, warning.name, warning.message) for warning in collected.warnings),
+    ]
+    findings.sort(key=lambda finding: (ERROR, WARNING, INFO).index(finding.level))
+    return Inspection(
+        objects=len(chosen),
+        triangles=sum(item.triangles for item in lit),
+        scene_triangles=triangles,
+        estimate=plan,
+        findings=tuple(dict.fromkeys(findings)),
+    )
+
+
+def _lit(piece: Piece, shapes: dict[int, _Shape]) -> LightmappedObject:
+    shape = shapes.get(id(piece))
+    area = 0.0 if shape is None else shape.area
+    return LightmappedObject(piece.source.name, len(piece.mesh), area, piece.role.texel_scale)
+
+
+def _shape(piece: Piece) -> _Shape:
+    corners, _, _ = world_from_object(piece.mesh, piece.matrix)
+    flat = corners.reshape(-1, 3)
+    box = np.stack([flat.min(axis=0), flat.max(axis=0)])
+    local = corners - box.mean(axis=0)
+    vectors = 0.5 * np.cross(local[:, 1] - local[:, 0], local[:, 2] - local[:, 0])
+    area = float(np.linalg.norm(vectors, axis=1).sum())
+    closed = area > 0 and np.linalg.norm(vectors.sum(axis=0)) < CLOSED * area
+    volume = float(np.einsum("tk,tk->t", local[:, 0], vectors).sum() / 3.0) if closed else None
+    return _Shape(area, box, volume)
+
+
+def _of_the_file(folder: Path | None) -> Iterator[Finding]:
+    """Say where lightmaps go, where that may surprise."""
+    if folder is None:
+        message = "the file is not saved: lightmaps will be packed into it; save it to have files beside it"
+        yield Finding(INFO, "file", message)
+        return
+    # `Path.exists` raises for a name that is too long.
+    existing = next(each for each in (folder, *folder.parents) if os.path.exists(each))  # noqa: PTH110
+    if not existing.is_dir() or not os.access(existing, os.W_OK):
+        yield Finding(ERROR, "file", f"cannot write to the output folder '{folder}': choose another")
+
+
+def _of_light(context: bpy.types.Context, collected: Collected, settings: BakeSettings) -> Iterator[Finding]:
+    """Say whether anything shines, and which surfaces are black."""
+    shown = {row for piece in collected.pieces for row in np.unique(piece.surface).tolist()}
+    surfaces = [(row, collected.surfaces[row]) for row in sorted(shown)]
+    emits = any(surface.emission.any() or surface.varies for _, surface in surfaces)
+    if not collected.lights and not emits and not _shines(context.scene.world):
+        scene = context.scene.name
+        if settings.sky:
+            yield Finding(INFO, scene, f"scene '{scene}' has no light: a white sky will be added")
+        else:
+            message = (
+                f"scene '{scene}' has no light at all: the lightmaps will be black; add a lamp or the sky"
+            )
+            yield Finding(WARNING, scene, message)
+    for row, surface in surfaces:
+        material = collected.materials[row]
+        black = surface.reflectance.max() < BLACK and not surface.emission.any() and not surface.varies
+        if material is not None and black and surface.opacity > 0:
+            message = f"material '{material.name}' is black: what has it looks black however it is lit"
+            yield Finding(INFO, material.name, message)
+
+
+def _shines(world: bpy.types.World | None) -> bool:
+    """Tell whether a world may give light, without rendering it."""
+    if world is None:
+        return False
+    if not uses_nodes(world):
+        return any(world.color)
+    backgrounds = [node for node in world.node_tree.nodes if node.type in {"BACKGROUND", "EMISSION"}]
+    if not backgrounds:
+        return bool(world.node_tree.links)
+    return any(_may_shine(node) for node in backgrounds)
+
+
+def _may_shine(node: bpy.types.Node) -> bool:
+    color, strength = node.inputs["Color"], node.inputs["Strength"]
+    return (strength.is_linked or strength.default_value > 0) and (
+        color.is_linked or any(color.default_value[:3])
+    )
+
+
+def _of_visibility(context: bpy.types.Context) -> Iterator[Finding]:
+    """Name what is baked though it is not seen in the viewport, and what is seen and not baked."""
+    surfaces = [obj for obj in context.view_layer.objects if obj.type in BAKEABLE_TYPES]
+    left_out = [obj.name for obj in surfaces if obj.hide_render and obj.visible_get()]
+    unseen = [obj.name for obj in surfaces if not obj.hide_render and not obj.visible_get()]
+    if left_out:
+        message = f"{_names(left_out)} hidden from renders but seen here: left out of the bake"
+        yield Finding(WARNING, left_out[0], message)
+    if unseen:
+        message = f"{_names(unseen)} hidden in the viewport but not from renders: part of the bake"
+        yield Finding(WARNING, unseen[0], message)
+
+
+def _of_layers(chosen: Sequence[Piece], settings: BakeSettings) -> Iterator[Finding]:
+    """Say whose UV layers are missing or too many."""
+    full = [piece.source.name for piece in chosen if not piece.has_lightmap_layer and piece.uv_layers >= 8]
+    if full:
+        yield Finding(
+            ERROR, full[0], f"{_names(full)} without room for another UV layer: remove one of the eight"
+        )
+    without = [piece.source.name for piece in chosen if piece.uv_layers == 0]
+    if without:
+        message = f"{_names(without)} without UVs of their own: '{LIGHTMAP_UV_LAYER}' becomes the first layer"
+        yield Finding(INFO, without[0], message)
+    if settings.keep_uvs:
+        new = [piece.source.name for piece in chosen if not piece.has_lightmap_layer]
+        if new:
+            message = f"{_names(new)} without a UV layer '{LIGHTMAP_UV_LAYER}' to keep: unwrapped anew"
+            yield Finding(WARNING, new[0], message)
+
+
+def _of_texels(lit: Sequence[LightmappedObject], plan: Estimate) -> Iterator[Finding]:
+    """Name objects that get hardly any texels, and one that gets nearly all."""
+    tiny = [
+        item.name
+        for item, texels in zip(lit, plan.texels, strict=True)
+        if item.area > 0 and texels < FEW_TEXELS
+    ]
+    greedy = greedy_object([item.name for item in lit], plan.texels)
+    if tiny:
+        mend = (
+            "raise the resolution or the texel scale"
+            if greedy is None
+            else f"'{greedy}' takes nearly all of them"
+        )
+        yield Finding(WARNING, tiny[0], f"{_names(tiny)} about to get fewer than 8 × 8 texels: {mend}")
+    if greedy is not None:
+        taken = share_of(max(plan.texels), sum(plan.texels))
+        message = (
+            f"object '{greedy}' takes {taken} of all texels: lower its texel scale, or set it to Light Only, "
+            "to leave more to the others"
+        )
+        yield Finding(WARNING, greedy, message)
+
+
+def _of_shapes(
+    context: bpy.types.Context, collected: Collected, shapes: dict[int, _Shape]
+) -> Iterator[Finding]:
+    """Name objects that are inside out, and scales that look forgotten."""
+    pieces = [piece for piece in collected.pieces if id(piece) in shapes]
+    centres = np.array([shapes[id(piece)].box.mean(axis=0) for piece in pieces]).reshape(-1, 3)
+    others = [
+        obj.matrix_world.translation for obj in context.scene.objects if obj.type in {"LIGHT", "CAMERA"}
+    ]
+    centres = np.concatenate([centres, np.array(others, dtype=np.float64).reshape(-1, 3)])
+    inverted = []
+    for number, piece in enumerate(pieces):
+        shape = shapes[id(piece)]
+        if shape.volume is None or shape.volume >= -1e-6 * shape.area**1.5:
+            continue
+        inside = ((centres > shape.box[0]) & (centres < shape.box[1])).all(axis=1)
+        inside[number] = False
+        # A room is inside out, and right so: it is seen from within.
+        if not inside.any():
+            inverted.append(piece.source.name)
+    if inverted:
+        message = (
+            f"{_names(inverted)} inside out, it seems: normals point inwards, so lightmaps would be black"
+        )
+        yield Finding(WARNING, inverted[0], message)
+    for piece in pieces:
+        scale = np.linalg.norm(piece.matrix[:3, :3], axis=0)
+        if not piece.source.is_instance and (scale.max() > ODD_SCALE or scale.min() < 1.0 / ODD_SCALE):
+            told = " × ".join(f"{value:g}" for value in scale)
+            message = f"object '{piece.source.name}' has a scale of {told}: apply it if that is a mistake"
+            yield Finding(WARNING, piece.source.name, message)
+
+
+def _of_size(shapes: dict[int, _Shape]) -> Iterator[Finding]:
+    """Doubt the unit of a scene of an unlikely size."""
+    if not shapes:
+        return
+    boxes = np.array([shape.box for shape in shapes.values()])
+    size = float((boxes[:, 1].max(axis=0) - boxes[:, 0].min(axis=0)).max())
+    if size > HUGE or size < MINUTE:
+        told = f"{size / 1000:.3g} km" if size > HUGE else f"{1000 * size:.3g} mm"
+        yield Finding(
+            WARNING,
+            "scene",
+            f"the scene is {told} large: lamps and texels count in metres, so check the unit",
+        )
+
+
+def _of_memory(plan: Estimate, settings: BakeSettings) -> Iterator[Finding]:
+    """Say whether pages are too large for the memory limit, and whether memory or disk may not do."""
+    try:
+        refuse_too_large(plan.pages, settings)
+    except RadiosityError as error:
+        yield Finding(ERROR, "memory", str(error))
+        return
+    if plan.files > NOTED_FILES:
+        disk = shutil.disk_usage(scratch.folder()).free
+        message = (
+            f"about {plan.files / 1e9:.1f} GB of temporary files will be written to '{scratch.folder()}'"
+        )
+        if plan.files > disk:
+            message += f", where {disk / 1e9:.1f} GB are free: free some, or raise the memory limit"
+        yield Finding(WARNING if plan.files > disk else INFO, "memory", message)
+    free = free_memory()
+    if free is not None and plan.memory > free:
+        message = (
+            f"about {plan.memory / 1e9:.1f} GB will be needed and {free / 1e9:.1f} GB are free: "
+            "lower the resolution or the quality"
+        )
+        yield Finding(WARNING, "memory", message)
+
+
+def free_memory() -> float | None:
+    """Return the memory that is free [bytes]; None where the system does not tell."""
+    try:
+        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
+        values = {line.split(":")[0]: float(line.split()[1]) for line in lines}
+        return 1024.0 * values["MemAvailable"]
+    except (OSError, KeyError, ValueError, IndexError):
+        return None
+
+
+def _names(names: Sequence[str]) -> str:
+    """Say which objects, with the verb: "object 'A' is", "5 objects ('A', 'B', 'C' …) are"."""
+    if len(names) == 1:
+        return f"object '{names[0]}' is"
+    named = ", ".join(f"'{name}'" for name in names[:NAMED])
+    return f"{len(names)} objects ({named}{' …' if len(names) > NAMED else ''}) are"

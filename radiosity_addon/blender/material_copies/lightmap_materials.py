@@ -1,0 +1,237 @@
+"""Copies of materials that show a lightmap: base color × lightmap, plus their own light.
+
+One copy for each (material, image, whether UVs are pinned, whether its slot is empty), shared
+between the objects for which these are the same. A copy holds the original's nodes, connected,
+so that it can be edited as the original can; `material_edits.py` carries such edits to the original.
+"""
+
+from __future__ import annotations
+
+import uuid
+from typing import Any
+
+import bpy
+
+from ...base.radiometry import brdf_of_reflectance, radiance_of_radiosity
+from ...scene.bake_scene import LIGHTMAP_UV_LAYER
+from ..datablocks.bake_record import is_made, mark_made
+from ..datablocks.image_marks import GROUP
+from ..images.images import image_scale
+from ..images.light_mixer import factor_of
+from ..images.node_group import (
+    BASE_COLOR,
+    EMISSION,
+    EMISSION_FACTOR,
+    LIGHTMAP,
+    LIGHTMAP_ONLY,
+    SCALE,
+    SHADER,
+    SURFACE,
+    lightmap_group,
+)
+from ..materials.materials import is_volume, read_material, uses_nodes
+from .copy_marks import (
+    COPY_NAME,
+    EMPTY_SLOT,
+    FED,
+    FED_BY,
+    NO_MATERIAL,
+    ORIGINAL,
+    PLAIN,
+    SAMPLING,
+    SUFFIX,
+    TOKEN,
+    copied_groups,
+    mark_added,
+    source_name,
+)
+from .copy_record import record
+from .false_colors import false_colors
+from .light_shares import LightShares
+from .surface_nodes import Surface, feed_color, feed_float, read_surface
+from .uv_pin import pin_uvs
+
+RADIANCE_PER_TEXEL = {
+    "irradiance_over_pi": 1.0,
+    "irradiance": brdf_of_reflectance(1.0),
+    "radiosity": radiance_of_radiosity(1.0),
+    "residual": 10.0 * radiance_of_radiosity(1.0),
+}
+"""What a texel of 1 makes a surface send out [W/m²/sr]: of a white one for the irradiances
+(L = H/π), of the surface itself for radiosity (L = B/π, reflection and emission included). A
+residual is shown ten times its size: an error of a tenth looks as bright as the light itself."""
+
+
+class LightmapMaterials:
+    """Makes the lightmap copies of materials for one bake, each once; `shares` where it has light groups."""
+
+    def __init__(self, quantity: str, shares: LightShares | None = None) -> None:
+        self._quantity = quantity
+        self._shares = shares
+        self._made: dict[tuple[Any, ...], bpy.types.Material] = {}
+        self._glows: dict[bpy.types.Material | None, bool] = {}
+
+    def copy_of(
+        self,
+        material: bpy.types.Material | None,
+        image: bpy.types.Image,
+        pinned: bool,
+        group: str = "",
+        empty_slot: bool = False,
+    ) -> bpy.types.Material:
+        """Return the copy of `material` that shows `image`.
+
+        Parameters
+        ----------
+        material : Material or None
+            None gives a plain grey.
+        image : Image
+            The lightmap page.
+        pinned : bool
+            The object had no UV layer of its own.
+        group : str
+            The light group whose sliders its own light follows, if it has any; "" for none.
+        empty_slot : bool
+            The material is the mesh's; the object's own slot, which the copy fills, is empty.
+        """
+        group = group if self._glows.get(material, True) else ""
+        key = (material, image, pinned, group, empty_slot)
+        if key not in self._made:
+            self._made[key] = self._make(material, image, pinned, group)
+            if empty_slot:
+                self._made[key][EMPTY_SLOT] = True
+            if not self._glows.setdefault(material, False):
+                self._made[material, image, pinned, "", empty_slot] = self._made[key]
+        return self._made[key]
+
+    def _make(
+        self, material: bpy.types.Material | None, image: bpy.types.Image, pinned: bool, group: str
+    ) -> bpy.types.Material:
+        """Build one copy."""
+        if material is None:
+            copy = bpy.data.materials.new(NO_MATERIAL)
+        else:
+            copy = material.copy()
+            copy.name = f"{material.name}{SUFFIX}"
+            copy[ORIGINAL] = material
+        mark_made(copy)
+        copy[COPY_NAME], copy[TOKEN] = copy.name, uuid.uuid4().hex
+        constant = read_material(material)
+        radiance = radiance_of_radiosity(constant.emission)
+        unknown = Surface(
+            tuple(constant.reflectance.tolist()), tuple(radiance.tolist()), glows=bool(radiance.any())
+        )
+        if material is None or not uses_nodes(material):
+            copy[PLAIN] = True
+            _make_plain_nodes(copy, unknown.base)
+        tree = copy.node_tree
+        record_content = record(copy)
+        before, active = {node.name for node in tree.nodes}, tree.nodes.active
+        if pinned:
+            pin_uvs(tree)
+        outputs = [node for node in tree.nodes if node.type == "OUTPUT_MATERIAL"]
+        for index, output in enumerate(outputs or [tree.nodes.new("ShaderNodeOutputMaterial")]):
+            if is_volume(output):
+                continue
+            surface = read_surface(tree, output.inputs["Surface"], unknown)
+            self._wire(tree, output, surface, image, group)
+            if surface.glows:
+                self._glows[material], copy[GROUP] = True, group
+            if index == 0:
+                _skip_light_sampling(copy, surface)
+        mark_added(tree, before)
+        tree.nodes.active = active
+        for inner in dict.fromkeys(copied_groups(tree)):
+            mark_added(inner, {node.name for node in inner[ORIGINAL].nodes})
+        record_content()
+        return copy
+
+    def _wire(
+        self,
+        tree: bpy.types.NodeTree,
+        output: bpy.types.Node,
+        surface: Surface,
+        image: bpy.types.Image,
+        light_group: str,
+    ) -> None:
+        """Wire UV Map → Image → group → output; the transparent part stays so."""
+        x, y = output.location.x - 500, output.location.y + 400
+        uv_map = tree.nodes.new("ShaderNodeUVMap")
+        uv_map.uv_map = LIGHTMAP_UV_LAYER
+        uv_map.location = (x - 200, y + 450)
+        texture = tree.nodes.new("ShaderNodeTexImage")
+        texture.image = image
+        texture.extension = "EXTEND"
+        texture.interpolation = "Linear"
+        texture.location = (x, y + 450)
+        group = tree.nodes.new("ShaderNodeGroup")
+        group.node_tree = lightmap_group()
+        group.name = group.label = group.node_tree.name
+        group.location = (x + 300, y + 300)
+        tree.links.new(uv_map.outputs["UV"], texture.inputs["Vector"])
+        texel, scale = texture.outputs["Color"], image_scale(image)
+        if self._quantity == "residual":
+            texel = false_colors(tree, texel)
+        if self._shares is not None:
+            mixer = self._shares.wire(tree, texture, uv_map.outputs["UV"])
+            texel, scale = mixer.outputs[0], 1.0
+            if light_group:
+                tree.links.new(factor_of(mixer, light_group), group.inputs[EMISSION_FACTOR])
+        tree.links.new(texel, group.inputs[LIGHTMAP])
+        for link in list(output.inputs["Surface"].links):
+            tree.links.new(link.from_socket, group.inputs[SURFACE]).is_muted = link.is_muted
+        group.inputs[SCALE].default_value = RADIANCE_PER_TEXEL[self._quantity] * scale
+
+        # Radiosity already holds what the surface reflects and emits, and so does its error.
+        if self._quantity not in ("radiosity", "residual"):
+            feed_color(tree, group.inputs[BASE_COLOR], surface.base)
+            feed_color(tree, group.inputs[EMISSION], surface.emission)
+        fed = group.inputs[BASE_COLOR], group.inputs[EMISSION]
+        group[FED] = [component for socket in fed for component in socket.default_value]
+        group[FED_BY] = [source_name(socket) for socket in fed]
+
+        shader = group.outputs[SHADER]
+        if surface.alpha != 1.0:
+            transparent = tree.nodes.new("ShaderNodeBsdfTransparent")
+            transparent.location = (x + 300, y + 450)
+            mix = tree.nodes.new("ShaderNodeMixShader")
+            mix.location = (x + 500, y + 300)
+            feed_float(tree, mix.inputs[0], surface.alpha)
+            tree.links.new(transparent.outputs[0], mix.inputs[1])
+            tree.links.new(shader, mix.inputs[2])
+            shader = mix.outputs[0]
+        tree.links.new(shader, output.inputs["Surface"])
+
+
+def set_lightmap_only(lightmap_only: bool) -> int:
+    """Show the lightmap alone, or base color × lightmap, in all lightmap materials.
+
+    Returns how many materials there are.
+    """
+    count = 0
+    for material in bpy.data.materials:
+        if is_made(material) and material.node_tree is not None:
+            for node in material.node_tree.nodes:
+                if node.type == "GROUP" and node.node_tree is not None and LIGHTMAP_ONLY in node.inputs:
+                    node.inputs[LIGHTMAP_ONLY].default_value = float(lightmap_only)
+            count += 1
+    return count
+
+
+def _make_plain_nodes(material: bpy.types.Material, color: Any) -> None:
+    """Have the material say by nodes what it is without: diffuse, of one color."""
+    if bpy.app.version < (5, 0):
+        material.use_nodes = True  # Blender 5.0 and later need no asking and warn of it
+    nodes = material.node_tree.nodes
+    nodes.clear()
+    shader, output = nodes.new("ShaderNodeBsdfDiffuse"), nodes.new("ShaderNodeOutputMaterial")
+    shader.inputs["Color"].default_value = (*color, 1.0)
+    output.location.x = 300
+    material.node_tree.links.new(shader.outputs[0], output.inputs["Surface"])
+
+
+def _skip_light_sampling(material: bpy.types.Material, surface: Surface) -> None:
+    """Keep Cycles from sampling baked walls as lamps: they are bright, but light nothing."""
+    if not surface.glows and hasattr(material, "cycles"):
+        material[SAMPLING] = material.cycles.emission_sampling
+        material.cycles.emission_sampling = "NONE"

@@ -1,0 +1,234 @@
+"""Digests of all that a user can edit in a material or a node group.
+
+The name, places of nodes, selections and open panels do not count. Node groups and images count by name.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from functools import cache
+from operator import attrgetter
+from typing import Any, TypeAlias
+
+import bpy
+
+from ..datablocks.keyed_paths import curves, path_of
+from ..images.node_group import BASE_COLOR, EMISSION
+from ..materials.materials import uses_nodes
+from .copy_marks import COPY_MARKS, FED, NODE_MARKS, ORIGINAL, is_added, is_copied_group
+
+Reader: TypeAlias = Callable[[Any], Any]
+Readers: TypeAlias = tuple[Reader, tuple[tuple[str, Reader], ...]]
+
+_NAME, _IDENTIFIER = attrgetter("name"), attrgetter("identifier")
+_LINK = attrgetter(
+    "from_node.name", "from_socket.identifier", "to_node.name", "to_socket.identifier", "is_muted"
+)
+_UI = ("active_", "show_", "bl_")
+
+_SIMPLE = frozenset((bool, int, float, str, type(None)))
+OUTPUTS_WITH_VALUES = {"RGB", "VALUE", "NORMAL"}
+
+_NOT_CONTENT = frozenset(
+    (
+        "rna_type", "name", "use_fake_user", "use_extra_user", "is_runtime_data", "tag", "use_nodes",
+        "node_tree", "animation_data", "asset_data", "preview", "grease_pencil", "lineart", "library",
+        "library_weak_reference", "override_library", "original", "texture_paint_images",
+        "texture_paint_slots", "paint_active_slot", "paint_clone_slot", "preview_render_type",
+        "use_preview_world", "select", "parent", "index", "position", "frame_current", "inspection_index",
+        "paired_output", "internal_links", "inputs", "outputs", "is_valid",
+    )
+)  # fmt: skip
+
+
+def digest(material: bpy.types.Material, as_copy: bool = False) -> str:
+    """Return the digest of a material.
+
+    Parameters
+    ----------
+    material : Material
+    as_copy : bool
+        It is a lightmap copy: our copies of node groups count as those they are of, and of the nodes that we
+        added only their links and what the user can set.
+    """
+    content = [_read(material, _NOT_CONTENT), _custom(material, COPY_MARKS), _animation(material)]
+    if uses_nodes(material):
+        content.append(_tree(material.node_tree, as_copy))
+    return _hash(content)
+
+
+def tree_digest(tree: bpy.types.NodeTree, as_copy: bool = False) -> str:
+    """Return the digest of a node group, as `digest`."""
+    return _hash([_interface(tree), _custom(tree, COPY_MARKS), _tree(tree, as_copy)])
+
+
+def links_of(tree: bpy.types.NodeTree) -> list[tuple[str, str, str, str, bool]]:
+    """Return the links of a tree, by names of nodes and identifiers of sockets, sorted."""
+    return sorted(map(_LINK, tree.links))
+
+
+def properties_of_material(material: bpy.types.Material) -> tuple[str, ...]:
+    """Return the names of a material's properties that count."""
+    return _names(type(material), _NOT_CONTENT)
+
+
+def properties_of_node(struct: bpy.types.bpy_struct) -> tuple[str, ...]:
+    """Return the names of the properties of a node, or of a struct in it, that count."""
+    without = _BASE_NODE if isinstance(struct, bpy.types.Node) else _NOT_CONTENT - {"name"}
+    return _names(type(struct), without)
+
+
+def animation_of(tree: bpy.types.NodeTree) -> Any:
+    """Return what moves a tree's values, as plain data."""
+    return _animation(tree)
+
+
+def _hash(content: Any) -> str:
+    return hashlib.blake2b(repr(content).encode("utf-8", "surrogatepass"), digest_size=16).hexdigest()
+
+
+def _tree(tree: bpy.types.NodeTree, as_copy: bool) -> list[Any]:
+    keyed = {curve.data_path for curve in curves(tree)}
+    nodes = [_node(node, as_copy, keyed) for node in sorted(tree.nodes, key=_NAME)]
+    return [nodes, links_of(tree), _animation(tree)]
+
+
+def _node(node: bpy.types.Node, as_copy: bool, keyed: set[str]) -> list[Any]:
+    kind = node.type
+    if as_copy and is_added(node):
+        return [node.name, kind, _values(_settable(node), keyed)]
+    content: list[Any] = [node.name, node.bl_idname, node.label, node.mute]
+    simple, others = _readers(type(node), _BASE_NODE)
+    content.append(simple(node))
+    for identifier, read in others:
+        value = getattr(node, identifier)
+        if as_copy and kind == "GROUP" and identifier == "node_tree" and is_copied_group(value):
+            value = value[ORIGINAL]
+        content.append(read(value))
+    inputs = node.inputs
+    content.append(_values(inputs, keyed))
+    if kind == "GROUP":  # others have the inputs that their properties say
+        content.append(list(map(_IDENTIFIER, inputs)))
+    if kind in OUTPUTS_WITH_VALUES:
+        content.append(_values(node.outputs, keyed))
+    if node.keys():
+        content.append(_custom(node, NODE_MARKS))
+    return content
+
+
+def _settable(node: bpy.types.Node) -> list[bpy.types.NodeSocket]:
+    """Return those sockets of a node of ours whose values the user may want to set."""
+    if node.get(FED) is not None:
+        return [node.inputs[BASE_COLOR], node.inputs[EMISSION]]
+    return list(node.outputs) if node.type in OUTPUTS_WITH_VALUES else []
+
+
+def _values(sockets: Any, keyed: set[str]) -> list[Any]:
+    """Return sockets' constants, but for those that keyframes and drivers move."""
+    if keyed:
+        sockets = [socket for socket in sockets if path_of(socket) not in keyed]
+    values = [getattr(socket, "default_value", None) for socket in sockets]
+    return [value if type(value) in _SIMPLE else _plain(value) for value in values]
+
+
+_BASE_NODE = frozenset(prop.identifier for prop in bpy.types.Node.bl_rna.properties) | _NOT_CONTENT - {
+    "node_tree"
+}
+
+
+def _interface(tree: bpy.types.NodeTree) -> list[Any]:
+    return [[item.item_type, item.name, _read(item, _NOT_CONTENT)] for item in tree.interface.items_tree]
+
+
+def _custom(owner: Any, marks: tuple[str, ...]) -> list[tuple[str, Any]]:
+    """Return the custom properties, but for ours and those that are registered."""
+    known = owner.bl_rna.properties
+    keys = [key for key in sorted(owner.keys()) if key not in marks and key not in known]
+    return [(key, _plain(owner[key])) for key in keys]
+
+
+def _animation(owner: bpy.types.ID) -> Any:
+    data = owner.animation_data
+    if data is None or (data.action is None and not data.drivers and not data.nla_tracks):
+        return None
+    action = None if data.action is None else data.action.name_full
+    moved = sorted((curve.data_path, curve.array_index) for curve in curves(owner))
+    drivers = sorted(
+        repr((curve.data_path, curve.array_index, curve.mute, _read(curve.driver, _NOT_CONTENT - {"name"})))
+        for curve in data.drivers
+    )
+    return [action, moved, drivers, [track.name for track in data.nla_tracks]]
+
+
+def _read(struct: Any, without: frozenset[str]) -> list[Any]:
+    """Return what a struct's properties hold."""
+    simple, others = _readers(type(struct), without)
+    return [simple(struct), *(read(getattr(struct, name)) for name, read in others)]
+
+
+def _readers(kind: Any, without: frozenset[str]) -> Readers:
+    # Properties can be registered at any time.
+    return _readers_of(kind, without, len(kind.bl_rna.properties))
+
+
+@cache
+def _readers_of(kind: Any, without: frozenset[str], _: int) -> Readers:
+    """Return how to get the plain properties of a kind of struct that count, and each of the others."""
+    plain: list[str] = []
+    others: list[tuple[str, Reader]] = []
+    for prop in kind.bl_rna.properties:
+        name = prop.identifier
+        if name in without or name.startswith(_UI):
+            continue
+        if prop.type == "COLLECTION":
+            others.append((name, _items))
+        elif prop.type == "POINTER":
+            others.append((name, _pointer))
+        elif prop.is_readonly:
+            continue
+        elif getattr(prop, "is_array", False) or getattr(prop, "is_enum_flag", False):
+            others.append((name, _plain))
+        else:
+            plain.append(name)
+    return (attrgetter(*plain) if plain else _nothing), tuple(others)
+
+
+def _names(kind: Any, without: frozenset[str]) -> tuple[str, ...]:
+    found = []
+    for prop in kind.bl_rna.properties:
+        counts = prop.type in ("COLLECTION", "POINTER") or not prop.is_readonly
+        if counts and prop.identifier not in without and not prop.identifier.startswith(_UI):
+            found.append(prop.identifier)
+    return tuple(found)
+
+
+def _nothing(_: Any) -> None:
+    return None
+
+
+def _items(values: Any) -> list[Any]:
+    return [_pointer(value) for value in values]
+
+
+def _pointer(value: Any) -> Any:
+    if value is None or isinstance(value, (bpy.types.ID, bpy.types.Node, bpy.types.NodeSocket)):
+        return _plain(value)
+    return _read(value, _NOT_CONTENT - {"name"})
+
+
+def _plain(value: Any) -> Any:
+    """Return a value of a property as plain data."""
+    if type(value) in _SIMPLE:
+        return value
+    if type(value) is bpy.types.bpy_prop_array and not isinstance(value[0], bpy.types.bpy_prop_array):
+        return value[:]
+    if isinstance(value, bpy.types.ID):
+        return (value.id_type, value.name_full)
+    if isinstance(value, bpy.types.bpy_struct):
+        return getattr(value, "name", "")
+    if isinstance(value, (set, frozenset)):
+        return sorted(value)
+    if hasattr(value, "to_dict"):
+        return repr(value.to_dict())
+    return [_plain(item) for item in value]

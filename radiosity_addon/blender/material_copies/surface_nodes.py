@@ -1,0 +1,251 @@
+"""Find what a material's shaders reflect, emit and cover, as sockets to wire on from.
+
+Nothing is evaluated: a texture that feeds Base Color keeps feeding it. A constant becomes a node
+that feeds its socket and all that is made of it, so that editing it shows at once. Where sockets must
+be combined (emission strength, Mix Shader) nodes are added too. So the tree has to be a copy.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import bpy
+
+from ..datablocks.bake_record import mark_made
+from ..datablocks.keyed_paths import is_keyed
+from ..images.node_group import socket_by_identifier
+from ..materials.shader_nodes import default_rgb, feed_of
+from .copy_marks import FOLLOWS, ORIGINAL, SOCKETS, VALUE, is_copied_group
+
+Color: TypeAlias = tuple[float, float, float]
+ColorSource: TypeAlias = Color | bpy.types.NodeSocket
+FloatSource: TypeAlias = float | bpy.types.NodeSocket
+
+BLACK: Color = (0.0, 0.0, 0.0)
+
+_UNREADABLE = {"BSDF_GLASS", "BSDF_REFRACTION", "GROUP_INPUT", "HOLDOUT"}
+"""Shaders whose color is not what they reflect diffusely."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A shader seen as a diffuse, emitting and partly transparent surface.
+
+    Parameters
+    ----------
+    base : color or socket
+        Reflectance.
+    emission : color or socket
+        Radiance it sends out of its own [W/m²/sr].
+    alpha : float or socket
+        0 lets everything through.
+    glows : bool
+        Its emission is not the constant 0.
+    """
+
+    base: ColorSource
+    emission: ColorSource = BLACK
+    alpha: FloatSource = 1.0
+    glows: bool = False
+
+
+def read_surface(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, unknown: Surface) -> Surface:
+    """Read the shader that feeds `socket`, through Mix and Add Shaders.
+
+    Parameters
+    ----------
+    tree : NodeTree
+        Nodes are added to it.
+    socket : NodeSocket
+        A shader input, such as Surface of the Material Output.
+    unknown : Surface
+        Taken for shaders that have no base color of their own to read.
+    """
+    feed = feed_of(socket, enter_groups=False)
+    node, source = feed.node, feed.socket
+    if node is None:
+        return Surface(BLACK)
+    if source.type != "SHADER" and node.type not in ("GROUP", "GROUP_INPUT"):
+        return Surface(BLACK, source, glows=True)
+    if node.type == "BSDF_PRINCIPLED":
+        emission, glows = _scaled(tree, node.inputs["Emission Color"], node.inputs["Emission Strength"])
+        return Surface(_source(tree, node.inputs["Base Color"]), emission, _alpha(tree, node), glows)
+    if node.type == "BSDF_DIFFUSE":
+        return Surface(_source(tree, node.inputs["Color"]))
+    if node.type == "EMISSION":
+        emission, glows = _scaled(tree, node.inputs["Color"], node.inputs["Strength"])
+        return Surface(BLACK, emission, glows=glows)
+    if node.type == "BSDF_TRANSPARENT":
+        return Surface(BLACK, alpha=0.0)
+    if node.type == "GROUP" and node.node_tree is not None:
+        return _grouped(node, source, unknown)
+    if node.type == "MIX_SHADER":
+        first, second = (read_surface(tree, node.inputs[i], unknown) for i in (1, 2))
+        return _mixed(tree, _source(tree, node.inputs[0]), first, second)
+    if node.type == "ADD_SHADER":
+        first, second = (read_surface(tree, node.inputs[i], unknown) for i in (0, 1))
+        return _added(tree, first, second)
+    if node.type in _UNREADABLE:
+        return unknown
+    color = node.inputs.get("Color") or node.inputs.get("Base Color")
+    return unknown if color is None else Surface(_source(tree, color))
+
+
+def feed_color(tree: bpy.types.NodeTree, target: bpy.types.NodeSocket, source: ColorSource) -> None:
+    """Link or set a color or vector input."""
+    if isinstance(source, bpy.types.NodeSocket):
+        tree.links.new(source, target)
+    else:
+        target.default_value = (*source, 1.0) if target.type == "RGBA" else source
+
+
+def feed_float(tree: bpy.types.NodeTree, target: bpy.types.NodeSocket, source: FloatSource) -> None:
+    """Link or set a float input."""
+    if isinstance(source, bpy.types.NodeSocket):
+        tree.links.new(source, target)
+    else:
+        target.default_value = source
+
+
+def _grouped(node: bpy.types.Node, output: bpy.types.NodeSocket, unknown: Surface) -> Surface:
+    """Read a shader inside a node group, through outputs added to a copy of the group."""
+    identifier = output.identifier
+    if not any(n.type == "GROUP_OUTPUT" and n.is_active_output for n in node.node_tree.nodes):
+        return unknown
+    if not is_copied_group(node.node_tree):
+        group = node.node_tree.copy()
+        mark_made(group)
+        group[ORIGINAL] = node.node_tree
+        node.node_tree = group
+    group = node.node_tree
+    result = next(n for n in group.nodes if n.type == "GROUP_OUTPUT" and n.is_active_output)
+    inner = read_surface(group, socket_by_identifier(result.inputs, identifier), unknown)
+
+    def outward(source: ColorSource | FloatSource, name: str) -> Any:
+        """Pass an inner socket through the group's border; constants need not."""
+        if not isinstance(source, bpy.types.NodeSocket):
+            return source
+        kind = "NodeSocketFloat" if name == "Alpha" else "NodeSocketColor"
+        declared = group.interface.new_socket(name, in_out="OUTPUT", socket_type=kind)
+        group[SOCKETS] = [*group.get(SOCKETS, ()), declared.identifier]
+        group.links.new(source, socket_by_identifier(result.inputs, declared.identifier))
+        return socket_by_identifier(node.outputs, declared.identifier)
+
+    base, emission, alpha = (
+        outward(inner.base, "Base Color"),
+        outward(inner.emission, "Emission"),
+        outward(inner.alpha, "Alpha"),
+    )
+    return Surface(base, emission, alpha, inner.glows)
+
+
+def _alpha(tree: bpy.types.NodeTree, node: bpy.types.Node) -> FloatSource:
+    """Return a node's alpha; a constant 0 or 1 stays one, as it takes other shaders."""
+    socket = node.inputs["Alpha"]
+    if not socket.is_linked and socket.default_value in (0.0, 1.0):
+        return float(socket.default_value)
+    return _source(tree, socket)
+
+
+def _source(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+    """Return the output that feeds an input: where nothing does, that of a new node with its constant.
+
+    The new node feeds the input too, unless muted links or nodes do in vain, or it is animated.
+    """
+    feed = feed_of(socket, enter_groups=False)
+    if feed.node is not None:
+        return feed.socket
+    is_color = socket.type == "RGBA"
+    node = tree.nodes.new("ShaderNodeRGB" if is_color else "ShaderNodeValue")
+    node.name = node.label = socket.name
+    node.location = (socket.node.location.x - 220, socket.node.location.y)
+    output = node.outputs[0]
+    output.default_value = socket.default_value
+    if socket.is_linked or is_keyed(socket):
+        node[FOLLOWS] = [socket.node.name, socket.identifier]
+    else:
+        node[VALUE] = list(output.default_value) if is_color else [output.default_value]
+        tree.links.new(output, socket)
+    return output
+
+
+def _scaled(
+    tree: bpy.types.NodeTree, color: bpy.types.NodeSocket, strength: bpy.types.NodeSocket
+) -> tuple[bpy.types.NodeSocket, bool]:
+    """Return color × strength of two inputs, and whether it is not the constant 0."""
+    glows = all(_linked(socket) or default_rgb(socket).any() for socket in (color, strength))
+    node = tree.nodes.new("ShaderNodeVectorMath")
+    node.operation = "SCALE"
+    tree.links.new(_source(tree, color), node.inputs["Vector"])
+    tree.links.new(_source(tree, strength), node.inputs["Scale"])
+    return node.outputs["Vector"], glows
+
+
+def _linked(socket: bpy.types.NodeSocket) -> bool:
+    """Whether something feeds a socket that is not a constant of ours."""
+    node = feed_of(socket, enter_groups=False).node
+    return node is not None and node.get(VALUE) is None
+
+
+def _mixed(tree: bpy.types.NodeTree, factor: FloatSource, first: Surface, second: Surface) -> Surface:
+    """Mix two surfaces; one that is wholly transparent lends no base color."""
+    base = _mix_colors(tree, factor, first.base, second.base)
+    if first.alpha == 0.0:
+        base = second.base
+    elif second.alpha == 0.0:
+        base = first.base
+    emission = _mix_colors(tree, factor, first.emission, second.emission)
+    alpha = _mix_floats(tree, factor, first.alpha, second.alpha)
+    return Surface(base, emission, alpha, first.glows or second.glows)
+
+
+def _added(tree: bpy.types.NodeTree, first: Surface, second: Surface) -> Surface:
+    """Add two surfaces, as a diffuse shader plus an emission; one opaque makes both opaque."""
+    alpha = second.alpha if first.alpha == 0.0 else first.alpha
+    base, emission = (
+        _add_colors(tree, first.base, second.base),
+        _add_colors(tree, first.emission, second.emission),
+    )
+    return Surface(base, emission, alpha, first.glows or second.glows)
+
+
+def _mix_colors(
+    tree: bpy.types.NodeTree, factor: FloatSource, first: ColorSource, second: ColorSource
+) -> ColorSource:
+    """Return first · (1 − factor) + second · factor."""
+    if isinstance(first, tuple) and first == second:
+        return first
+    node = tree.nodes.new("ShaderNodeMix")
+    node.data_type = "RGBA"
+    feed_float(tree, socket_by_identifier(node.inputs, "Factor_Float"), factor)
+    feed_color(tree, socket_by_identifier(node.inputs, "A_Color"), first)
+    feed_color(tree, socket_by_identifier(node.inputs, "B_Color"), second)
+    return socket_by_identifier(node.outputs, "Result_Color")
+
+
+def _mix_floats(
+    tree: bpy.types.NodeTree, factor: FloatSource, first: FloatSource, second: FloatSource
+) -> FloatSource:
+    """Return first · (1 − factor) + second · factor."""
+    if isinstance(first, float) and first == second:
+        return first
+    node = tree.nodes.new("ShaderNodeMix")
+    node.data_type = "FLOAT"
+    feed_float(tree, socket_by_identifier(node.inputs, "Factor_Float"), factor)
+    feed_float(tree, socket_by_identifier(node.inputs, "A_Float"), first)
+    feed_float(tree, socket_by_identifier(node.inputs, "B_Float"), second)
+    return socket_by_identifier(node.outputs, "Result_Float")
+
+
+def _add_colors(tree: bpy.types.NodeTree, first: ColorSource, second: ColorSource) -> ColorSource:
+    """Return first + second."""
+    if first == BLACK:
+        return second
+    if second == BLACK:
+        return first
+    node = tree.nodes.new("ShaderNodeVectorMath")
+    node.operation = "ADD"
+    feed_color(tree, node.inputs[0], first)
+    feed_color(tree, node.inputs[1], second)
+    return node.outputs["Vector"]

@@ -1,0 +1,251 @@
+"""Materials as radiosity sees them: reflectance, emission and opacity, read as constants.
+
+Where something varies over the surface the material says so (`Surface.varies`), and
+`surface_evaluation.py` has Cycles evaluate it; what is read here is then the fallback.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...base.bake_warning import BakeWarning
+from ...base.radiometry import MAX_REFLECTANCE, radiosity_of_radiance
+from .node_algebra import NodeAlgebra
+from .shader_nodes import (
+    MissingImageError,
+    NotConstantError,
+    Stack,
+    Value,
+    default_rgb,
+    evaluate,
+    feed_of,
+    output_node,
+)
+from .shader_terms import ShaderTerms, Terms, nothing
+from .shading_inputs import LIGHT_PATHS, asks_light_path
+from .surface_terms import surface_of_terms
+
+DEFAULT_GREY = 0.8
+"""Reflectance of a face without material, as in Cycles."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A material's constants.
+
+    Parameters
+    ----------
+    reflectance : (3,) float64 in [0, 0.99]
+        Where the surface is there.
+    emission : (3,) float64
+        Exitance of each side [W/m²], where the surface is there.
+    opacity : float in [0, 1]
+        The share of light that does not go straight through.
+    warnings : tuple of BakeWarning
+    varies : bool
+        Something it is made of varies over the surface, and means or defaults stand for it.
+    fallbacks : tuple of BakeWarning
+        Which; to be told of unless the material is evaluated.
+    is_volume : bool
+        It has a volume and no surface: fog, through which all light goes.
+    """
+
+    reflectance: np.ndarray
+    emission: np.ndarray
+    opacity: float = 1.0
+    warnings: tuple[BakeWarning, ...] = ()
+    varies: bool = False
+    fallbacks: tuple[BakeWarning, ...] = ()
+    is_volume: bool = False
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether its reflectance and emission say it all."""
+        return not self.varies and self.opacity == 1.0
+
+
+def read_material(material: bpy.types.Material | None) -> Surface:
+    """Return what a material reflects, emits and covers; None is Cycles' default grey."""
+    if material is None:
+        return Surface(np.full(3, DEFAULT_GREY), np.zeros(3))
+    reader = _Reader(material.name, "material")
+    if not uses_nodes(material):
+        terms = Terms(np.array(material.diffuse_color[:3], dtype=np.float64), np.zeros(3), np.zeros(3))
+    else:
+        terms = reader.material(material.node_tree)
+    reflectance, radiance, opacity = surface_of_terms(
+        terms.reflected[None], terms.radiance[None], terms.passed[None]
+    )
+    return Surface(
+        reader.clamped_reflectance(reflectance[0]),
+        radiosity_of_radiance(reader.not_negative("emission", radiance[0])),
+        float(opacity[0]),
+        tuple(reader.warnings),
+        reader.varies,
+        tuple(reader.fallbacks),
+        reader.is_volume,
+    )
+
+
+def ray_doubts(material: bpy.types.Material, surface: Surface) -> list[str]:
+    """Say what Cycles has otherwise because it is a matter of what a ray is for."""
+    said = []
+    passes = surface.opacity < 1.0 or (surface.varies and _may_pass(material.node_tree))
+    if passes and not getattr(material, "use_transparent_shadow", True):
+        said.append("Transparent Shadows is off, which is ignored: lamps shine through it as it looks")
+    if surface.emission.any() and asks_light_path(material.node_tree, tuple(LIGHT_PATHS)):
+        said.append("its emission asks for diffuse rays: it gets them all, where Cycles only counts some")
+    return said
+
+
+def _may_pass(tree: bpy.types.NodeTree) -> bool:
+    """Tell whether a tree has what could let light through."""
+    for node in tree.nodes:
+        alpha = node.inputs.get("Alpha") if node.type == "BSDF_PRINCIPLED" else None
+        if node.type == "BSDF_TRANSPARENT" or (alpha is not None and alpha.is_linked):
+            return True
+        if node.type == "GROUP" and node.node_tree is not None and _may_pass(node.node_tree):
+            return True
+    return False
+
+
+def is_volume(output: bpy.types.Node | None) -> bool:
+    """Tell whether a material's output has a volume and no surface."""
+    if output is None or feed_of(output.inputs["Surface"]).node is not None:
+        return False
+    return feed_of(output.inputs["Volume"]).node is not None
+
+
+def read_radiance(
+    owner: bpy.types.Light | bpy.types.World, kind: str
+) -> tuple[np.ndarray, tuple[BakeWarning, ...]]:
+    """Return the constant radiance that a lamp's or world's own node tree gives.
+
+    Parameters
+    ----------
+    owner : bpy.types.Light or bpy.types.World
+        One that has a node tree.
+    kind : "lamp" or "world"
+
+    Returns
+    -------
+    radiance : (3,) float64
+    warnings : tuple of BakeWarning
+    """
+    reader = _Reader(owner.name, kind)
+    output = output_node(owner.node_tree)
+    if output is None:
+        return np.zeros(3), ()
+    terms = reader.shader(output.inputs["Surface"], ())
+    if "Volume" in output.inputs and output.inputs["Volume"].is_linked:
+        reader.warn("its volume is ignored")
+    radiance = reader.not_negative("strength", terms.radiance)
+    return radiance, (*reader.fallbacks, *reader.warnings)
+
+
+def uses_nodes(owner: bpy.types.ID) -> bool:
+    """Tell whether a material, lamp or world is rendered by its node tree."""
+    if owner.node_tree is None:
+        return False
+    # Always true for materials and worlds from 5.0 on and for lamps a little later, gone in
+    # 6.0; until then asking for it warns.
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        return bool(getattr(owner, "use_nodes", True))
+
+
+class _Reader(ShaderTerms[Stack]):
+    """Reads one node tree as constants and collects its warnings."""
+
+    def __init__(self, name: str, kind: str) -> None:
+        self.name = name
+        self.kind = kind
+        self.warnings: list[BakeWarning] = []
+        self.fallbacks: list[BakeWarning] = []
+        self.varies = False
+        self.is_volume = False
+
+    def warn(self, message: str) -> None:
+        self._add(self.warnings, message)
+
+    def algebra(self, _: Stack) -> NodeAlgebra:
+        return NodeAlgebra(None)
+
+    def material(self, tree: bpy.types.NodeTree) -> Terms:
+        output = output_node(tree)
+        self.is_volume = is_volume(output)
+        if self.is_volume:
+            self.warn("its volume is ignored: light goes straight through")
+            return Terms(np.zeros(3), np.zeros(3), np.ones(3))
+        if output is None or feed_of(output.inputs["Surface"]).node is None:
+            self.warn(f"it has no surface shader; reflectance {_text(np.zeros(3))} is used")
+            return nothing()
+        for socket in ("Volume", "Displacement"):
+            if output.inputs[socket].is_linked:
+                self.warn(f"its {socket.lower()} is ignored")
+        return self.shader(output.inputs["Surface"], ())
+
+    def shader(self, socket: bpy.types.NodeSocket, place: Stack) -> Terms:
+        feed = feed_of(socket, place)
+        if feed.socket.type != "SHADER":
+            return self.glow(self.color(socket, place))
+        return nothing() if feed.node is None else self.terms(feed.node, feed.stack)
+
+    def color(self, socket: bpy.types.NodeSocket, place: Stack) -> np.ndarray:
+        """Return a socket's constant (3,), with a note where it stands for something else."""
+        try:
+            value = evaluate(socket, place)
+        except MissingImageError as reason:
+            default = default_rgb(socket)
+            self.warn(f"{socket.name} comes from {reason}; {_text(default)} is used")
+            return default
+        except NotConstantError as reason:
+            default = default_rgb(socket)
+            self._varying(f"{socket.name} comes from {reason}; {_text(default)} is used")
+            return default
+        if value.notes:
+            self._varying(
+                f"{socket.name} comes from {', '.join(value.notes)}; the mean {_text(value.rgb)} is used"
+            )
+        return value.rgb
+
+    def scalar(self, socket: bpy.types.NodeSocket, place: Stack) -> float:
+        """Return a number socket's constant, noting as `color` does."""
+        return Value(self.color(socket, place)).scalar
+
+    def not_understood(self, node: bpy.types.Node) -> Terms:
+        what = "reflectance" if self.kind == "material" else "radiance"
+        self.warn(f"{node.bl_label} is not understood; {what} {_text(np.zeros(3))} is used")
+        return nothing()
+
+    def clamped_reflectance(self, reflectance: np.ndarray) -> np.ndarray:
+        """Keep a reflectance where the light in a closed room still dies away."""
+        clamped = np.clip(np.nan_to_num(reflectance), 0.0, MAX_REFLECTANCE)
+        # The margin is what single-precision colours round by.
+        if (np.abs(clamped - reflectance) > 1e-6).any():
+            self.warn(f"reflectance {_text(reflectance)} is clamped to {_text(clamped)}")
+        return clamped
+
+    def not_negative(self, what: str, values: np.ndarray) -> np.ndarray:
+        """Replace negative, infinite and NaN values by 0."""
+        mended = np.where(np.isfinite(values) & (values >= 0), values, 0.0)
+        if (mended != values).any():
+            self.warn(f"{what} {_text(values)} is not possible; {_text(mended)} is used")
+        return mended
+
+    def _varying(self, message: str) -> None:
+        self.varies = True
+        self._add(self.fallbacks, message)
+
+    def _add(self, to: list[BakeWarning], message: str) -> None:
+        warning = BakeWarning(self.name, f"{self.kind} '{self.name}': {message}")
+        if warning not in to:
+            to.append(warning)
+
+
+def _text(rgb: np.ndarray) -> str:
+    return "({})".format(", ".join(f"{component:.3g}" for component in rgb))

@@ -1,0 +1,206 @@
+"""The light that the lightmaps on the objects hold, read back from their pixels: after a reload as well."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...bake.result.details import MEANS
+from ...base.arrays import Array
+from ...base.radiometry import irradiance_under_sky, luminous
+from ...lightmap.images.light_statistics import LightStatistics, light_statistics, told_texels
+from ...lightmap.texels.rasterize import rasterise
+from ...lightmap.texels.states import NO_TEXEL_HERE
+from ...scene.bake_scene import LIGHTMAP_UV_LAYER
+from ..datablocks.bake_record import is_made
+from ..datablocks.image_marks import QUANTITY_PROPERTY
+from ..datablocks.mesh_arrays import read_mesh, world_from_object
+from ..images.images import image_scale
+from ..session import kept_details
+
+
+@dataclass(frozen=True, eq=False)
+class ShownLightmap:
+    """An object that has a lightmap layer, as the viewport shows it.
+
+    Attributes
+    ----------
+    name : str
+    image : str or None
+        Name of its lightmap; None before a bake.
+    corners : (t, 3, 3) float32
+        World space, counter-clockwise from the front.
+    uv : (t, 3, 2) float32
+    """
+
+    name: str
+    image: str | None
+    corners: Array
+    uv: Array
+
+    @property
+    def areas(self) -> Array:
+        """(t,) float64 [m²]"""
+        corners = self.corners.astype(np.float64)
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        return np.asarray(0.5 * np.linalg.norm(normal, axis=1))
+
+    @property
+    def uv_areas(self) -> Array:
+        """(t,) float64: shares of the page."""
+        first, second = (self.uv[:, corner].astype(np.float64) - self.uv[:, 0] for corner in (1, 2))
+        return np.asarray(0.5 * np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]))
+
+
+@dataclass(frozen=True, eq=False)
+class PageValues:
+    """A lightmap's pixels.
+
+    Attributes
+    ----------
+    quantity : str
+        See `BakeSettings`.
+    values : (height, width, 3) float32 [W/m²]
+        Irradiance, or radiosity or residual if it holds these.
+    """
+
+    quantity: str
+    values: Array
+
+    def measured(self, unit: str, efficacy: float) -> Array:
+        """Return (height, width) the values in "lux" or "watt"s; see `unit_name`."""
+        if unit == "LUX" and self.quantity != "residual":
+            return luminous(self.values, efficacy)
+        return np.asarray(self.values @ MEANS)
+
+
+_pages: dict[str, PageValues] = {}
+_statistics: dict[tuple[str, str], tuple[LightStatistics, LightStatistics] | None] = {}
+
+
+def forget() -> None:
+    """Read pixels anew the next time: lightmaps have changed."""
+    _pages.clear()
+    _statistics.clear()
+
+
+def lightmap_of(obj: bpy.types.Object) -> bpy.types.Image | None:
+    """Return the lightmap that a baked object's materials show; None if it has none."""
+    for slot in obj.material_slots:
+        material = slot.material
+        if material is None or not is_made(material) or material.node_tree is None:
+            continue
+        for node in material.node_tree.nodes:
+            image = node.image if node.type == "TEX_IMAGE" else None
+            if image is not None and is_made(image) and QUANTITY_PROPERTY in image.keys():  # noqa: SIM118
+                return image
+    return None
+
+
+def shown_lightmaps(context: bpy.types.Context) -> Iterator[ShownLightmap]:
+    """Yield the visible objects whose meshes have a lightmap layer."""
+    for obj in visible_with_layer(context):
+        shown = shown_lightmap(obj)
+        if shown is not None:
+            yield shown
+
+
+def visible_with_layer(context: bpy.types.Context) -> Iterator[bpy.types.Object]:
+    """Yield the same as Blender's objects, whether there is anything on them or not."""
+    for obj in context.view_layer.objects:
+        if obj.type == "MESH" and LIGHTMAP_UV_LAYER in obj.data.uv_layers and obj.visible_get():
+            yield obj
+
+
+def shown_lightmap(obj: bpy.types.Object) -> ShownLightmap | None:
+    """Return one object's lightmap layer; None without."""
+    mesh = read_mesh(obj.data) if obj.type == "MESH" else None
+    if mesh is None or mesh.lightmap_uv is None or len(mesh) == 0:
+        return None
+    corners, _, mirrored = world_from_object(mesh, np.array(obj.matrix_world, dtype=np.float64))
+    uv = mesh.lightmap_uv[:, ::-1] if mirrored else mesh.lightmap_uv
+    image = lightmap_of(obj)
+    return ShownLightmap(
+        obj.name, None if image is None else image.name, corners.astype(np.float32), np.ascontiguousarray(uv)
+    )
+
+
+def page_values(image: bpy.types.Image) -> PageValues | None:
+    """Return a lightmap's pixels; None if its file is gone."""
+    if image.name not in _pages:
+        width, height = image.size
+        if width * height == 0 or image.channels == 0:
+            return None
+        pixels = np.empty(width * height * image.channels, dtype=np.float32)
+        try:
+            image.pixels.foreach_get(pixels)
+        except (RuntimeError, TypeError):  # a file that Blender names but cannot decode
+            return None
+        values = pixels.reshape(height, width, image.channels)[..., :3]
+        quantity = str(image.get(QUANTITY_PROPERTY, "irradiance_over_pi"))
+        factor = image_scale(image)
+        if quantity == "irradiance_over_pi":
+            factor = irradiance_under_sky(factor)
+        _pages[image.name] = PageValues(quantity, np.float32(factor) * values)
+    return _pages[image.name]
+
+
+def unit_name(quantity: str, unit: str) -> str:
+    """Return the unit of what `measured` gives: of light that leaves a surface it is not called lux."""
+    if unit != "LUX" or quantity == "residual":
+        return "W/m²"
+    return "lm/m²" if quantity == "radiosity" else "lx"
+
+
+def object_statistics(
+    obj: bpy.types.Object, scene: bpy.types.Scene, unit: str, efficacy: float
+) -> tuple[LightStatistics, str] | None:
+    """Sum up the light on an object's front, from its lightmap; None if it has none.
+
+    Texels that geometry divides or shuts in are left out while the bake is in memory, those without any light
+    after it has been reloaded.
+    """
+    image = lightmap_of(obj)
+    page = None if image is None else page_values(image)
+    if image is None or page is None:
+        return None
+    key = obj.name_full, image.name
+    if key not in _statistics:
+        _statistics[key] = _summed_up(obj, scene, image, page)
+    found = _statistics[key]
+    if found is None:
+        return None
+    of_watts, of_lumens = found
+    name = unit_name(page.quantity, unit)
+    if name == "W/m²":
+        return of_watts, name
+    return LightStatistics(
+        *(efficacy * getattr(of_lumens, part) for part in ("minimum", "mean", "maximum"))
+    ), name
+
+
+def _summed_up(
+    obj: bpy.types.Object, scene: bpy.types.Scene, image: bpy.types.Image, page: PageValues
+) -> tuple[LightStatistics, LightStatistics] | None:
+    """Return statistics in W/m² and, at one lumen a watt, in lux."""
+    shown = shown_lightmap(obj)
+    if shown is None:
+        return None
+    height = len(page.values)
+    texels = rasterise(shown.uv, height)
+    values = page.values[texels.row, texels.column].astype(np.float64)
+    of_texel = shown.areas / np.maximum(shown.uv_areas * height**2, 1e-300)
+    areas = of_texel[texels.triangle] * texels.area
+    kept = kept_details.details_of(scene)
+    known = None if kept is None else kept.page_of(image.name)
+    if known is not None:
+        state = known.state[texels.row, texels.column]
+        told = told_texels(np.where(state == NO_TEXEL_HERE, 0, state))
+    else:
+        told = values.any(axis=1) if values.any() else np.ones(len(values), dtype=bool)
+    of_watts = light_statistics(values[told] @ MEANS, areas[told])
+    of_lumens = light_statistics(luminous(values[told], 1.0), areas[told])
+    return None if of_watts is None or of_lumens is None else (of_watts, of_lumens)

@@ -1,0 +1,145 @@
+"""What the overlays show: for this session alone, no part of the file and of no undo."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...options.bake_settings import EFFICACY
+from ..session.redraw import redraw_viewports
+
+NONE, FALSE_COLOR, DENSITY, CHECKER, TEXELS, ELEMENTS, LINKS, ERROR = (
+    *("NONE", "FALSE_COLOR", "DENSITY", "CHECKER"),
+    *("TEXELS", "ELEMENTS", "LINKS", "ERROR"),
+)
+
+OF_THE_BAKE = frozenset({TEXELS, ELEMENTS, LINKS, ERROR})
+"""What needs the bake in memory; the others are told from lightmaps and UVs alone."""
+
+
+def _redraw(_settings: RadiosityOverlay, _context: bpy.types.Context) -> None:
+    redraw_viewports()
+
+
+class RadiosityOverlay(bpy.types.PropertyGroup):
+    """`window_manager.radiosity_overlay`."""
+
+    show: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Overlay",
+        description="What is drawn over the objects in the 3D viewports",
+        items=[
+            (NONE, "None", "Nothing"),
+            (FALSE_COLOR, "False Color", "The light that the lightmaps hold, as colors with a scale"),
+            (DENSITY, "Texel Density", "Lightmap pixels along one metre of surface, as colors with a scale"),
+            (CHECKER, "Texel Checker", "The lightmap's pixels themselves, light and dark in turn"),
+            (
+                TEXELS,
+                "Doubtful Texels",
+                "Texels that geometry divides or hides, which hold no light of the open",
+            ),
+            (ELEMENTS, "Elements", "The elements that the solver divided the surfaces into"),
+            (LINKS, "Links", "From where light comes to a face, and how much"),
+            (ERROR, "Error", "How far the light may be off, texel by texel"),
+        ],
+        default=NONE,
+        update=_redraw,
+    )
+    unit: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Unit",
+        description="What light is measured in",
+        items=[
+            ("LUX", "Lux", "Illuminance: how bright the light looks to the eye, weighed by its color [lx]"),
+            ("WATT", "W/m²", "Irradiance: the power that arrives, the mean of red, green and blue [W/m²]"),
+        ],
+        default="LUX",
+        update=_redraw,
+    )
+    efficacy: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="Efficacy",
+        description="Lumens that a watt of white light makes. 683 is the most there is, and what glTF's "
+        "lamps are read with; where powers are those of real lamps take theirs: a filament's 15, LEDs' 100",
+        default=EFFICACY,
+        min=1.0,
+        max=EFFICACY,
+        update=_redraw,
+    )
+    automatic: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Automatic Range",
+        description="Let the colors reach from zero to nearly all of what is shown",
+        default=True,
+        update=_redraw,
+    )
+    low: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="From", description="The value that has the first color", default=0.0, update=_redraw
+    )
+    high: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="To", description="The value that has the last color", default=500.0, update=_redraw
+    )
+    squares: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Texels a Square",
+        description="Width of the checker's squares in lightmap pixels",
+        default=1,
+        min=1,
+        soft_max=16,
+        update=_redraw,
+    )
+    links_of: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Of",
+        description="Whose links are shown",
+        items=[
+            (
+                "CURSOR",
+                "3D Cursor",
+                "The element nearest to the 3D cursor: Shift and right click to place it",
+            ),
+            (
+                "FACE",
+                "Active Face",
+                "The elements on the active object's active face, which edit mode chooses",
+            ),
+        ],
+        default="CURSOR",
+        update=_redraw,
+    )
+    most_links: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Most Links",
+        description="Only so many links are shown, those that bring the most light",
+        default=300,
+        min=1,
+        soft_max=5000,
+        max=100000,
+        update=_redraw,
+    )
+    error_of: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Error Of",
+        description="Which error is shown",
+        items=[
+            ("NOISE", "Lightmap", "Estimated noise of a texel's light: what more rays would lessen"),
+            (
+                "ELEMENTS",
+                "Elements",
+                "How far the solver's element is brighter or darker than the texels on it: what more "
+                "elements would lessen",
+            ),
+        ],
+        default="NOISE",
+        update=_redraw,
+    )
+
+
+def overlay_of(context: bpy.types.Context) -> RadiosityOverlay:
+    """Return the session's settings."""
+    return context.window_manager.radiosity_overlay
+
+
+def register() -> None:
+    """Register the settings and hang them on the window manager."""
+    bpy.utils.register_class(RadiosityOverlay)
+    bpy.types.WindowManager.radiosity_overlay = bpy.props.PointerProperty(
+        type=RadiosityOverlay, options={"SKIP_SAVE"}
+    )
+
+
+def unregister() -> None:
+    """Take the settings away."""
+    del bpy.types.WindowManager.radiosity_overlay
+    bpy.utils.unregister_class(RadiosityOverlay)

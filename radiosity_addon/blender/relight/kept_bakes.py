@@ -1,0 +1,139 @@
+"""Bakes kept for relighting: in this Blender's memory, each known by a mark that its scene remembers.
+
+The mark is saved with the file and goes back with undo, so that memory, images and a sidecar are only used
+together if they are of one bake.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ..datablocks.bake_record import is_made
+from ..datablocks.image_marks import GROUP, MARK, PAGE
+from .relight_properties import relight_of
+
+if TYPE_CHECKING:
+    from ...bake.relight.kept_bake import KeptBake
+    from ...base.arrays import Array
+
+
+@dataclass(eq=False, repr=False)
+class InMemory:
+    """A kept bake.
+
+    Attributes
+    ----------
+    bake : KeptBake
+    scene : str
+        The name of its scene.
+    shown : (s, 3) float64
+        The strengths that its images show.
+    """
+
+    bake: KeptBake
+    scene: str
+    shown: Array
+
+
+MOST_EARLIER = 1 << 30
+"""Bytes of bakes in memory that no scene shows, but may show again after undo."""
+
+_kept: dict[str, InMemory] = {}
+
+
+def mark_of(scene: bpy.types.Scene) -> str:
+    """Return the mark of the bake that a scene shows and that can be lit anew; "" if there is none."""
+    return str(relight_of(scene).mark)
+
+
+def set_mark(scene: bpy.types.Scene, mark: str) -> None:
+    """Remember the mark of a scene's bake; "" for one that is not kept."""
+    if mark or mark_of(scene):
+        scene.radiosity_relight.mark = mark
+
+
+def find(scene: bpy.types.Scene | None) -> InMemory | None:
+    """Return the scene's bake, if it is kept in memory."""
+    return None if scene is None else _kept.get(mark_of(scene))
+
+
+def put(scene: bpy.types.Scene, mark: str, bake: KeptBake) -> InMemory:
+    """Keep a scene's bake; earlier ones stay for undo, as far as there is room."""
+    _kept.pop(mark, None)
+    _kept[mark] = InMemory(bake, scene.name_full, bake.strengths)
+    _make_room(mark)
+    return _kept[mark]
+
+
+def _make_room(newest: str = "") -> None:
+    """Forget the oldest of the bakes that no scene shows, but for what `MOST_EARLIER` has room for."""
+    shown = {newest, *map(mark_of, bpy.data.scenes)}
+    earlier = [mark for mark in _kept if mark not in shown]
+    while sum(_kept[mark].bake.nbytes for mark in earlier) > MOST_EARLIER:
+        del _kept[earlier.pop(0)]
+
+
+def drop(scene: bpy.types.Scene) -> None:
+    """Have the scene show no bake any more; in memory it stays for undo, if there is room."""
+    if not scene.is_property_set("radiosity_relight"):
+        return
+    group = scene.radiosity_relight
+    group.property_unset("mark")
+    group.property_unset("strengths")
+    names = [prop.identifier for prop in group.bl_rna.properties if not prop.is_readonly]
+    if not any(map(group.is_property_set, names)):
+        scene.property_unset("radiosity_relight")
+    _make_room()
+
+
+def drop_all() -> None:
+    """Forget all bakes in memory."""
+    _kept.clear()
+
+
+def mark_images(images: Sequence[bpy.types.Image], mark: str) -> None:
+    """Have a bake's images known as its own."""
+    for image in images:
+        image[MARK] = mark
+
+
+def images_of(mark: str) -> dict[int, bpy.types.Image]:
+    """Return a bake's images of all light by page."""
+    return {int(image[PAGE]): image for image in _marked(mark) if not image[GROUP]}
+
+
+def group_images_of(mark: str) -> dict[str, list[bpy.types.Image]]:
+    """Return the images of a bake's light groups, by group, in the order of its pages."""
+    found: dict[str, list[bpy.types.Image]] = {}
+    for image in sorted(_marked(mark), key=lambda image: int(image[PAGE])):
+        if image[GROUP]:
+            found.setdefault(image[GROUP], []).append(image)
+    return found
+
+
+def _marked(mark: str) -> list[bpy.types.Image]:
+    own = [image for image in bpy.data.images if image.library is None and is_made(image)]
+    return [image for image in own if image.get(MARK) == mark]
+
+
+@persistent
+def _drop_with_the_file(*_: Any) -> None:
+    """Another file is being opened: what is kept belongs to this one."""
+    drop_all()
+
+
+def register() -> None:
+    """Forget what is kept when another file is opened."""
+    bpy.app.handlers.load_pre.append(_drop_with_the_file)
+
+
+def unregister() -> None:
+    """Forget everything."""
+    if _drop_with_the_file in bpy.app.handlers.load_pre:
+        bpy.app.handlers.load_pre.remove(_drop_with_the_file)
+    drop_all()

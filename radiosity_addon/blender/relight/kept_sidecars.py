@@ -1,0 +1,32 @@
+"""Whether a scene's bake can be relit: in memory, or from the sidecar next to its lightmaps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+
+from ...files.file_names import FileNames
+from ..files.lightmap_reports import bake_kept_by, report_of
+from . import kept_bakes
+
+
+def sidecar_of(mark: str) -> Path | None:
+    """Return the sidecar next to a bake's lightmaps, if there is one."""
+    images = kept_bakes.images_of(mark)
+    if not images or images[min(images)].packed_file is not None:
+        return None
+    report = report_of(images[min(images)])
+    path = report.with_name(FileNames.of_report(report.name).sidecar)
+    return path if path.is_file() else None
+
+
+def can_relight(scene: bpy.types.Scene) -> bool:
+    """Return whether the scene's bake is in memory or in a sidecar of its own; fast, for panels."""
+    mark = kept_bakes.mark_of(scene)
+    if not mark or kept_bakes.find(scene) is not None:
+        return bool(mark)
+    if sidecar_of(mark) is None:
+        return False
+    images = kept_bakes.images_of(mark)
+    return bake_kept_by(report_of(images[min(images)])) in ("", mark)

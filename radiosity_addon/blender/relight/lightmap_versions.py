@@ -1,0 +1,382 @@
+"""Which version of its file a lightmap image shows, and bringing versions back after undo and redo.
+
+Undo takes UV maps and image datablocks back, but no files and no pixels. So each image says which bytes its
+file has to have, by their digest, and that is saved and undone with it; the report next to the file says
+which bytes it has. Where the two differ after undo or redo, the file is put back as it was from those that
+are held (`file_versions.py`), published as any other, and the image loaded again.
+
+The handlers only compare. Files are copied in a thread, and a timer does what must be done with Blender;
+without a window, where no timer fires, all is done at once.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+from collections import OrderedDict
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ...bake.sidecar.sidecar_names import KEPT
+from ...base.errors import BakeError, RadiosityError
+from ...files import baked_files
+from ...files.file_names import REPORT_NAME
+from ...files.file_versions import MOST_FILES, HeldFiles
+from ..datablocks.bake_record import is_made
+from ..datablocks.image_marks import PAGE, REPORT, VERSION
+from ..files.lightmap_reports import forget_reports, images_described, listed_in, report_of
+from ..files.ownership import own_reports
+from ..session import lightmap_changes, live_state
+from ..session.redraw import redraw_sidebars, redraw_viewports
+
+if TYPE_CHECKING:
+    from ..files.output import OutputFolder
+
+TICK = 0.02
+"""Seconds between two looks at whether files have been copied."""
+
+FOREIGN = "The lightmaps on disk are from another bake than this file: bake again"
+
+
+@dataclass(eq=False, repr=False)
+class State:
+    """Of this session.
+
+    Attributes
+    ----------
+    message : str
+        What panels say; nothing where images and files belong together.
+    """
+
+    message: str = ""
+    held: HeldFiles | None = None
+    reports: OrderedDict[str, dict[str, Any]] = field(default_factory=OrderedDict)
+    """By the digest of each image that they list, the reports of files that were replaced."""
+    shown: dict[str, str] = field(default_factory=dict)
+    """By image, the version that its pixels in memory are; nothing for pixels that are in no file."""
+    swap: _Swap | None = None
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """An image whose file has other bytes than it should.
+
+    Attributes
+    ----------
+    image : str
+        Its name: references die at undo.
+    path : Path
+        Of the file.
+    version : str
+        The digest of the bytes that it should have.
+    report : Path
+        That lists it.
+    """
+
+    image: str
+    path: Path
+    version: str
+    report: Path
+
+
+state = State()
+
+
+def mark(images: Iterable[bpy.types.Image], report: str = REPORT_NAME) -> None:
+    """Note on images, just saved or packed, which version of their file they show, and the report with it."""
+    for image in images:
+        image[REPORT] = report
+        if image.packed_file is not None:
+            image[VERSION] = hashlib.sha256(image.packed_file.data).hexdigest()
+        else:
+            image[VERSION] = baked_files.digest(Path(bpy.path.abspath(image.filepath_raw)))
+        state.shown[image.name] = image[VERSION]
+
+
+def unsettle(images: Iterable[bpy.types.Image]) -> None:
+    """Note that images show pixels that no file has."""
+    for image in images:
+        state.shown[image.name] = ""
+
+
+def _open(report: Path) -> OutputFolder:
+    """Open the folder of a report of this file for files that it lists."""
+    from ..files.output import OutputFolder
+
+    for scene in bpy.data.scenes:
+        for own in own_reports(report.parent, scene):
+            if own.names.report == report.name:
+                return OutputFolder(report.parent, own.names, owner=own.owner).__enter__()
+    raise BakeError(f"'{report}' is no report of this file's")
+
+
+def hold(output: OutputFolder) -> None:
+    """Hold what is about to be replaced in a folder, with what its report says of it."""
+    told = output.earlier
+    if told is None:
+        return
+    listed = told[baked_files.FILES]
+    names = {path.name for path in output.staging.iterdir() if path.is_file()}
+    if state.held is None:
+        state.held = HeldFiles(Path(bpy.app.tempdir))
+    for name in sorted(names & listed.keys()):
+        # What relighting needs is large, and in memory as well.
+        if name != output.names.sidecar:
+            state.held.hold(output.path / name, str(listed[name]["sha256"]))
+    for name in images_described(told) & listed.keys():
+        state.reports[str(listed[name]["sha256"])] = told
+        state.reports.move_to_end(str(listed[name]["sha256"]))
+    while len(state.reports) > MOST_FILES:
+        state.reports.popitem(last=False)
+
+
+def lightmaps() -> list[bpy.types.Image]:
+    """Return the lightmap images of the open file that say which version they show."""
+    own = [image for image in bpy.data.images if image.library is None and is_made(image)]
+    return [image for image in own if PAGE in image.keys() and image.get(VERSION)]  # noqa: SIM118 (an ID)
+
+
+def differing() -> list[Wanted]:
+    """Return the images whose files have, by the reports next to them, other bytes than they should."""
+    found = []
+    for image in lightmaps():
+        if image.packed_file is not None:
+            continue
+        path, report = Path(bpy.path.abspath(image.filepath_raw)), report_of(image)
+        listed = listed_in(report).get(path.name)
+        if listed is not None and listed["sha256"] != image[VERSION]:
+            found.append(Wanted(image.name, path, image[VERSION], report))
+    return found
+
+
+def flush() -> None:
+    """Finish at once what is left to be brought back."""
+    if state.swap is not None:
+        state.swap.thread.join()
+        _finish()
+
+
+def follow() -> None:
+    """Begin to bring back what undo or redo wants to see: other files, other pixels."""
+    stale = any(_is_stale(image) for image in lightmaps())
+    wanted = differing()
+    if not (wanted or stale or state.swap is not None or state.message):
+        return
+    if bpy.app.background:
+        _cancel()
+        _reload_stale()
+        _begin(wanted)
+        flush()
+    elif not bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.register(_tick, first_interval=0.0, persistent=True)
+
+
+def check() -> None:
+    """Say so where the open file shows other bakes than are on the disk; touches nothing."""
+    state.message = FOREIGN if differing() else ""
+
+
+class _Swap:
+    """Files on their way back."""
+
+    def __init__(self, wanted: Sequence[Wanted]) -> None:
+        self.wanted = tuple(wanted)
+        self.outputs: dict[Path, OutputFolder] = {}
+        self.error = ""
+        try:
+            for one in wanted:
+                if one.report not in self.outputs:
+                    self.outputs[one.report] = _open(one.report)
+        except BaseException:
+            self.close()
+            raise
+        self.thread = threading.Thread(target=self._copy, name="radiosity versions", daemon=True)
+        self.thread.start()
+
+    def _copy(self) -> None:
+        """Copy what is held next to its place; in the thread, which knows nothing of Blender."""
+        assert state.held is not None
+        try:
+            for one in self.wanted:
+                state.held.copy_to(one.version, self.outputs[one.report].staging / one.path.name)
+        except RadiosityError as error:
+            self.error = str(error)
+
+    def publish(self) -> None:
+        """Put the files in their places, with the reports that they had."""
+        for report, output in self.outputs.items():
+            hold(output)
+            _stage_report(output, [one for one in self.wanted if one.report == report])
+            output.publish()
+
+    def close(self) -> None:
+        """Remove what was not published."""
+        for output in self.outputs.values():
+            output.__exit__(None, None, None)
+        self.outputs = {}
+
+
+def _begin(wanted: Sequence[Wanted]) -> None:
+    """Begin to bring files back, those that are held; say so of the others."""
+    held = state.held
+    there = [one for one in wanted if held is not None and one.version in held]
+    state.message = FOREIGN if len(there) < len(wanted) else ""
+    if not there:
+        return
+    try:
+        state.swap = _Swap(there)
+    except RadiosityError as error:
+        state.message = f"{FOREIGN} ({error})"
+
+
+def _finish() -> None:
+    """Publish what was copied, and show it."""
+    swap, state.swap = state.swap, None
+    assert swap is not None
+    try:
+        if swap.error:
+            raise BakeError(swap.error)
+        if set(swap.wanted) <= set(differing()):
+            swap.publish()
+            for one in swap.wanted:
+                _reload(bpy.data.images[one.image])
+    except RadiosityError as error:
+        state.message = f"{FOREIGN} ({error})"
+    finally:
+        swap.close()
+
+
+def _cancel() -> None:
+    """Give up what is on its way."""
+    swap, state.swap = state.swap, None
+    if swap is not None:
+        swap.thread.join()
+        swap.close()
+
+
+def _stage_report(output: OutputFolder, wanted: Sequence[Wanted]) -> None:
+    """Write the report that the files had, with all that lies in the folder now."""
+    from ...bake.result.report import BakeReport
+
+    now = output.earlier or {}
+    told = next((state.reports[one.version] for one in wanted if one.version in state.reports), now)
+    before, listed = (report.get(baked_files.FILES, {}) for report in (told, now))
+    if before.get(output.names.sidecar) != listed.get(output.names.sidecar):
+        # Its sidecar is not there any more.
+        told = {key: value for key, value in told.items() if key != KEPT}
+    output.write_report(BakeReport(dict(told)))
+
+
+def _is_stale(image: bpy.types.Image) -> bool:
+    return state.shown.get(image.name, image[VERSION]) != image[VERSION]
+
+
+def _reload_stale() -> None:
+    """Load the images again whose pixels in memory are of another version than their files."""
+    waiting = {one.image for one in differing()}
+    for image in lightmaps():
+        if _is_stale(image) and image.name not in waiting:
+            _reload(image)
+
+
+def _reload(image: bpy.types.Image) -> None:
+    image.reload()
+    image.update_tag()
+    state.shown[image.name] = image[VERSION]
+    lightmap_changes.announce()
+    with suppress(RadiosityError):
+        if live_state.state.live is not None:
+            live_state.state.live.look_again()
+
+
+def _tick() -> float | None:
+    """Carry on with what undo began; nothing may be raised."""
+    try:
+        if state.swap is not None and state.swap.thread.is_alive():
+            return TICK
+        if state.swap is not None:
+            _finish()
+        _reload_stale()
+        wanted = differing()
+        if wanted and not state.message:
+            _begin(wanted)
+        elif not wanted:
+            state.message = ""
+        if state.swap is not None:
+            return TICK
+        redraw_viewports()
+        redraw_sidebars(bpy.context)
+        return None
+    except Exception as error:  # noqa: BLE001 (a timer that raises is gone)
+        state.message = f"{FOREIGN} ({type(error).__name__}: {error})"
+        return None
+
+
+@persistent
+def _follow(*_: Any) -> None:
+    """Undo and redo bring images back, but neither pixels nor files."""
+    state.message = ""
+    follow()
+
+
+@persistent
+def _before_saving(*_: Any) -> None:
+    """What is saved must agree with the files next to it."""
+    if state.swap is None and not bpy.app.background and differing():
+        _begin(differing())
+    flush()
+
+
+@persistent
+def _forget(*_: Any) -> None:
+    """Another file is being opened: what is held belongs to this one."""
+    forget()
+
+
+@persistent
+def _opened(*_: Any) -> None:
+    check()
+
+
+def forget() -> None:
+    """Hold nothing any more."""
+    _cancel()
+    if state.held is not None:
+        state.held.close()
+    state.held, state.message = None, ""
+    state.reports.clear()
+    state.shown.clear()
+    forget_reports()
+
+
+def _handlers() -> tuple[tuple[list[Any], Any], ...]:
+    on = bpy.app.handlers
+    return (
+        (on.undo_post, _follow),
+        (on.redo_post, _follow),
+        (on.save_pre, _before_saving),
+        (on.load_pre, _forget),
+        (on.load_post, _opened),
+    )
+
+
+def register() -> None:
+    """Follow undo, redo, saving and opening."""
+    for handlers, ours in _handlers():
+        handlers.append(ours)
+
+
+def unregister() -> None:
+    """Follow nothing any more, and hold nothing."""
+    for handlers, ours in _handlers():
+        if ours in handlers:
+            handlers.remove(ours)
+    if bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.unregister(_tick)
+    forget()

@@ -1,0 +1,118 @@
+"""Strengths of a kept bake's sources as the file has them now, without exporting the scene.
+
+Lamps, materials and the world are read as constants. Where nodes make a light vary, which only Cycles can
+tell, its constant still follows its sliders: then its ratio to what it was at the start is taken.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...bake.relight.kept_bake import KeptBake, differs_in_strength_alone
+from ...base.arrays import Array
+from ...base.errors import SceneError
+from ...lights.environment import SkyPatch
+from ...lights.sun_and_sky import EnvironmentLight, Light
+from ..cycles.lamps import read_lamp
+from ..materials.light_inputs import shown_world
+from ..materials.materials import read_material, read_radiance, uses_nodes
+
+SAME = 1e-5
+"""A constant that is off by no more than this part is what the export found."""
+
+
+class StrengthReader:
+    """Reads the strengths of a scene's sources.
+
+    Parameters
+    ----------
+    scene : Scene
+    kept : KeptBake
+    strengths : (s, 3) float64
+        What the export of the scene as it is now found.
+    """
+
+    def __init__(self, scene: bpy.types.Scene, kept: KeptBake, strengths: Array) -> None:
+        self._scene, self._kept, self._given = scene.name_full, kept, strengths
+        self._lamps = {
+            light.name: _lamp(light.name)
+            for light in kept.bake_scene.scene.lights
+            if not _is_of_sky(light) and bpy.data.objects.get(light.name) is not None
+        }
+        self._reflectance: dict[str, Array] = {
+            material.name: read_material(material).reflectance for material in bpy.data.materials
+        }
+        self._first = self._constants()
+        with np.errstate(divide="ignore", invalid="ignore"):
+            off = np.abs(self._first - strengths) > SAME * np.abs(strengths).max(axis=1, keepdims=True)
+        self._varies = off.any(axis=1)
+
+    def read(self) -> Array:
+        """Return (s, 3) the strengths.
+
+        Raises
+        ------
+        SceneError
+            If a source has changed in more than its strength.
+        """
+        now = self._constants()
+        known = self._first > 0
+        ratio = np.where(known, now / np.where(known, self._first, 1.0), 0.0)
+        return np.where(self._varies[:, None], self._given * ratio, now)
+
+    def check_material(self, name: str) -> None:
+        """Refuse a material that reflects otherwise than at the start.
+
+        Raises
+        ------
+        SceneError
+        """
+        material, before = bpy.data.materials.get(name), self._reflectance.get(name)
+        if material is None or before is None:
+            return
+        if np.abs(read_material(material).reflectance - before).max() > SAME:
+            raise SceneError(f"material '{name}' reflects otherwise now: bake again")
+
+    def _constants(self) -> Array:
+        """Return (s, 3) the sources' strengths as far as constants tell them."""
+        lights = self._kept.bake_scene.scene.lights
+        rows = [self._of_light(light) for light in lights]
+        rows += [_of_material(name) for name in self._kept.names[len(lights) :]]
+        return np.array(rows, dtype=np.float64).reshape(-1, 3)
+
+    def _of_light(self, light: Light) -> Array:
+        if _is_of_sky(light):
+            return self._of_world(light.name)
+        before = self._lamps.get(light.name)
+        now = _lamp(light.name)
+        if now is None or before is None:
+            return np.zeros(3)
+        if not differs_in_strength_alone(before, now):
+            raise SceneError(f"lamp '{light.name}' has changed in more than its strength: bake again")
+        return now.strength
+
+    def _of_world(self, name: str) -> Array:
+        world = shown_world(bpy.data.scenes[self._scene], name)
+        if world is None:
+            return np.zeros(3)
+        if not uses_nodes(world):
+            return np.array(world.color[:3], dtype=np.float64)
+        return read_radiance(world, "world")[0]
+
+
+def _is_of_sky(light: Light) -> bool:
+    return isinstance(light, EnvironmentLight | SkyPatch)
+
+
+def _lamp(name: str) -> Light | None:
+    """Return a lamp object as a light, without what only Cycles knows of its nodes; None if it is hidden."""
+    obj = bpy.data.objects.get(name)
+    if obj is None or obj.type != "LIGHT" or obj.hide_render:
+        return None
+    return read_lamp(obj, np.array(obj.matrix_world, dtype=np.float64), {}, dark=True)[0]
+
+
+def _of_material(name: str) -> Array:
+    material = bpy.data.materials.get(name)
+    return np.zeros(3) if material is None else read_material(material).emission

@@ -1,0 +1,41 @@
+"""The switch *Live* of the session: on, it follows the lights of the scene in front of the user."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..session import live_state
+
+
+def start(scene: bpy.types.Scene) -> None:
+    """Follow the lights of a scene from now on."""
+    from .live_relight import LiveRelight  # with the solver, which registering is not to load
+
+    live_state.stop()
+    live_state.state.message = ""
+    live_state.state.live = LiveRelight(scene)
+
+
+def _switched(manager: bpy.types.WindowManager, context: bpy.types.Context) -> None:
+    if manager.radiosity_live:
+        start(context.scene)
+    elif live_state.state.live is not None:
+        live_state.stop()
+
+
+def register() -> None:
+    """Hang the switch on the session."""
+    bpy.types.WindowManager.radiosity_live = bpy.props.BoolProperty(
+        name="Live",
+        description="Light the scene anew while power and color of lamps, emission or world are being "
+        "changed. Anything else that changes switches it off",
+        default=False,
+        update=_switched,
+        options={"SKIP_SAVE"},
+    )
+
+
+def unregister() -> None:
+    """Follow no lights any more, and take the switch away."""
+    live_state.stop()
+    del bpy.types.WindowManager.radiosity_live

@@ -1,0 +1,167 @@
+"""A kept bake lit anew as the scene's lights are now: what the button and Live's first step run."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Generator
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...bake.relight.kept_bake import KeptBake, relight
+from ...bake.relight.light_groups import are_wanted, group_pages
+from ...bake.relight.source_strengths import strengths_in
+from ...bake.result.progress import Progress
+from ...bake.result.result import LightGroup
+from ...bake.sidecar.sidecar import StoredBake, read_sidecar
+from ...base.arrays import Array
+from ...base.background import in_thread
+from ...base.errors import BakeError
+from ...base.progress import drain
+from ...lightmap.images.page import LightmapPage
+from ..apply.rebake import Originals
+from ..scene_export.export import export_steps, exporting
+from . import kept_bakes, lightmap_versions
+from .kept_bakes import InMemory
+from .kept_sidecars import sidecar_of
+from .relight_properties import relight_of
+from .relit_images import rewrite
+from .relit_materials import refresh
+
+READ, LIT = 0.3, 0.95
+"""How far the whole is when the scene is read, and when it is lit."""
+
+Relit = tuple[tuple[LightmapPage, ...], tuple[LightGroup, ...]]
+
+
+@dataclass(frozen=True)
+class RelightReport:
+    """What was done: the seconds it took, and whether anything had changed."""
+
+    seconds: float
+    changed: bool
+
+
+def run_relight(
+    context: bpy.types.Context, patient: bool = False
+) -> Generator[Progress, None, RelightReport]:
+    """Light the scene's kept bake as its lights are now, and rewrite its lightmaps.
+
+    A generator as `run_bake`; closed, or after an error, everything is as it was.
+
+    Raises
+    ------
+    RadiosityError
+        If nothing was kept, or the scene differs in more than strengths of light; the message says in what.
+    """
+    started = time.perf_counter()
+    lightmap_versions.flush()
+    yield Progress("export", 0.0)
+    held, strengths = yield from exporting(strengths_steps(context, patient))
+    same = np.array_equal(strengths, held.shown)
+    steps = lit(held.bake, strengths)
+    pages, groups = yield from _shown(in_thread(steps) if patient else steps)
+    yield Progress("write", LIT)
+    mark = kept_bakes.mark_of(context.scene)
+    taken = time.perf_counter() - started
+    rewrite(mark, pages, groups, taken)
+    note_shown(context.scene, held, strengths)
+    return RelightReport(time.perf_counter() - started, not same)
+
+
+def read_strengths(context: bpy.types.Context) -> tuple[InMemory, Array]:
+    """Return the scene's kept bake, from memory or its sidecar, and (s, 3) its sources' strengths now.
+
+    Raises
+    ------
+    RadiosityError
+    """
+    return drain(strengths_steps(context))
+
+
+def strengths_steps(
+    context: bpy.types.Context, patient: bool = False
+) -> Generator[float, None, tuple[InMemory, Array]]:
+    """Read strengths as `read_strengths`, in steps as those of an export."""
+    scene = context.scene
+    held = kept_bakes.find(scene)
+    stored: KeptBake | StoredBake = stored_bake(scene) if held is None else held.bake
+    shown = Originals(context)
+    export = yield from export_steps(context, stored.settings, True, patient, shown)
+    if isinstance(stored, StoredBake):
+        held = kept_bakes.put(scene, kept_bakes.mark_of(scene), stored.kept(export.bake_scene))
+    assert held is not None
+    # Undo and redo may have changed it.
+    held.shown = noted_strengths(scene, held)
+    return held, strengths_in(held.bake, export.bake_scene)
+
+
+def stored_bake(scene: bpy.types.Scene) -> StoredBake:
+    """Return the scene's bake from its sidecar.
+
+    Raises
+    ------
+    BakeError
+        If there is none of this bake.
+    """
+    mark = kept_bakes.mark_of(scene)
+    images = kept_bakes.images_of(mark) if mark else {}
+    if not images:
+        raise BakeError("the scene shows no bake that was kept: bake with Keep for Relighting")
+    path = sidecar_of(mark)
+    if path is None:
+        raise BakeError("the bake is not in memory any more, and has no sidecar: bake again")
+    stored = read_sidecar(path)
+    if stored.mark != mark:
+        raise BakeError(f"'{path}' belongs to another bake: bake again")
+    return stored
+
+
+def lit(kept: KeptBake, strengths: Array) -> Generator[float, None, Relit]:
+    """Compute the pages of a kept bake, and those of its light groups; yields the fraction done."""
+    steps = relight(kept, strengths)
+    while True:
+        try:
+            yield next(steps).fraction
+        except StopIteration as done:
+            pages = done.value
+            break
+    if not are_wanted(kept.bake_scene, kept.settings):
+        return pages, ()
+    return pages, (yield from group_pages(kept, pages, strengths))
+
+
+def _shown(steps: Generator[float | None, None, Relit]) -> Generator[Progress, None, Relit]:
+    """Tell of the steps as progress."""
+    fraction = 0.0
+    try:
+        while True:
+            try:
+                fraction = next(steps) or fraction
+            except StopIteration as done:
+                return done.value
+            yield Progress("relight", READ + (LIT - READ) * fraction)
+    finally:
+        steps.close()
+
+
+def note_shown(scene: bpy.types.Scene, held: InMemory, strengths: Array) -> None:
+    """Remember what the lightmaps show, and have emissive surfaces glow so."""
+    lights = len(held.bake.sources.lights)
+    changed = (strengths != held.shown).any(axis=1)
+    names = {name for row, name in enumerate(held.bake.names) if changed[row] and row >= lights}
+    if held.bake.settings.quantity != "radiosity":  # there the lightmap itself holds it
+        refresh(names)
+    held.shown = strengths
+    scene.radiosity_relight.strengths = json.dumps(strengths.tolist())
+
+
+def noted_strengths(scene: bpy.types.Scene, held: InMemory) -> Array:
+    """Return the strengths that the scene says its lightmaps show: those of the bake if it says none."""
+    try:
+        noted = np.array(json.loads(relight_of(scene).strengths), dtype=np.float64)
+    except (ValueError, TypeError):
+        return held.bake.strengths
+    return noted if noted.shape == held.bake.strengths.shape else held.bake.strengths

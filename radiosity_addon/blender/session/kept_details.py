@@ -1,0 +1,89 @@
+"""What overlays need of a scene's last bake, in memory for as long as the scene shows that bake."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import bpy
+
+if TYPE_CHECKING:
+    from ...bake.result.result import BakeDetails, BakeResult, PageDetails
+    from ...base.arrays import Array
+    from ...scene.bake_scene import BakeObject
+
+
+STAND_IN_SUFFIX = " (Lightmap)"
+"""What the name of an object ends with that shows the lightmap of an instance."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class KeptDetails:
+    """Of one bake.
+
+    Attributes
+    ----------
+    details : BakeDetails
+    objects : dict of str to BakeObject
+        What got a lightmap.
+    images : tuple of str
+        Names of the pages' images.
+    bake : str
+        The scene's memory of its last bake, by which it is told that it still is the last.
+    """
+
+    details: BakeDetails
+    objects: dict[str, BakeObject]
+    images: tuple[str, ...]
+    bake: str
+
+    def page_of(self, image: str) -> PageDetails | None:
+        """Return what is known of an image's texels, if anything is."""
+        known = dict(zip(self.images, self.details.pages, strict=False))
+        return known.get(image)
+
+    def seen(self) -> Array:
+        """Return (t,) bool which of the scene's triangles are on objects with a lightmap that are shown."""
+        import numpy as np
+
+        record = self.details.links
+        ends = [item.first + item.count for item in self.objects.values()]
+        seen = np.zeros(max([int(record.triangle.max(initial=-1)) + 1, *ends]), dtype=bool)
+        for name, item in self.objects.items():
+            seen[item.rows] = _is_shown(name)
+        return seen
+
+
+_kept: dict[str, KeptDetails] = {}
+
+
+def keep(scene: bpy.types.Scene, result: BakeResult, images: Sequence[str]) -> None:
+    """Keep a bake that the scene has just remembered."""
+    if result.details is not None:
+        objects = {baked.object.name: baked.object for baked in result.objects}
+        _kept[scene.name_full] = KeptDetails(
+            result.details, objects, tuple(images), scene.radiosity.last_bake
+        )
+
+
+def details_of(scene: bpy.types.Scene) -> KeptDetails | None:
+    """Return what is kept of the scene's last bake; None after a reload, an undo, or without a bake."""
+    found = _kept.get(scene.name_full)
+    return found if found is not None and found.bake == scene.radiosity.last_bake else None
+
+
+def drop(scene: bpy.types.Scene) -> None:
+    """Forget what is kept of a scene's bake."""
+    _kept.pop(scene.name_full, None)
+
+
+def drop_all() -> None:
+    """Forget everything, as another file is opened or the extension is switched off."""
+    _kept.clear()
+
+
+def _is_shown(name: str) -> bool:
+    """Tell whether an object, or the stand-in of an instance "Instancer/Object", is seen."""
+    there = [bpy.data.objects.get(name + ending) for ending in ("", STAND_IN_SUFFIX)]
+    return any(obj.visible_get() for obj in there if obj is not None)

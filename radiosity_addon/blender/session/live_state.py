@@ -1,0 +1,39 @@
+"""Whether Live is on, and what it has to say: light to import, for panels and operators."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+
+
+@dataclass(eq=False, repr=False)
+class State:
+    """Of this session.
+
+    Attributes
+    ----------
+    live : LiveRelight or None
+        What follows the lights now.
+    message : str
+        Why it is off, if not because somebody switched it off.
+    """
+
+    live: Any = None
+    message: str = ""
+
+
+state = State()
+
+
+def stop(message: str = "") -> None:
+    """Follow no lights any more, and say why, if there is a reason; harmless where none are followed."""
+    live, state.live = state.live, None
+    state.message = message
+    if live is None:
+        return
+    live.close()
+    manager = bpy.context.window_manager
+    if manager is not None and getattr(manager, "radiosity_live", False):
+        manager.radiosity_live = False

@@ -1,0 +1,145 @@
+"""What panels draw from: the running bake's progress, and the last bake's figures.
+
+`draw()` runs at every redraw, so nothing here computes: the last bake is parsed once
+for each new text the scene holds.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import bpy
+
+from ...cli.similar_warnings import one_of_each
+from ...options.methods import METHODS
+from . import kept_details
+
+MAX_WARNINGS = 100
+"""A scene keeps this many of the last bake's warnings; the report has them all."""
+
+
+@dataclass(eq=False, repr=False)
+class Running:
+    """The bake that is going on in this Blender, if any."""
+
+    active: bool = False
+    stage: str = ""
+    fraction: float = 0.0
+    seconds_left: float | None = None
+    """About how long it still takes; None as long as nobody can know."""
+    stop: Callable[[], None] | None = None
+    """Ends it from outside its operator."""
+
+
+@dataclass(frozen=True)
+class LastBake:
+    """Figures and warnings of the last bake of a scene."""
+
+    figures: tuple[tuple[str, str], ...] = ()
+    warnings: tuple[tuple[str, str], ...] = ()
+    """One of each kind where there are many alike."""
+    warning_count: int = 0
+    folder: str = ""
+
+
+@dataclass(eq=False, repr=False)
+class _Cache:
+    """What was found last: without this text the decorator would work one out, slowly."""
+
+    text: str = ""
+    parsed: LastBake | None = None
+
+
+running = Running()
+interrupted = False
+"""Whether a bake of the open file was killed while it replaced its lightmaps."""
+_cache = _Cache()
+
+
+def stop_running() -> None:
+    """End the bake that is going on, if any, as the extension is switched off under it."""
+    if running.stop is not None:
+        running.stop()
+
+
+def remember(scene: bpy.types.Scene, report: dict, folder: str) -> None:
+    """Keep what the panel shows of a finished bake with the scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    report : dict
+        As it is written to report.json.
+    folder : str
+        Where the files are; empty if they are packed.
+    """
+    warnings = one_of_each(report["warnings"])
+    scene.radiosity.last_bake = json.dumps(
+        {
+            "objects": len(report["objects"]),
+            "images": len({entry["image"] for entry in report["objects"]}),
+            "solver": {key: value for key, value in report["solver"].items() if key != "history"},
+            "seconds": sum(report["seconds"].values()),
+            "warnings": [[w["name"], w["message"]] for w in warnings[:MAX_WARNINGS]],
+            "warning_count": len(warnings),
+            "folder": folder,
+        }
+    )
+
+
+def forget(scene: bpy.types.Scene) -> None:
+    """Drop the scene's memory of its last bake, and all trace of us where nothing else was set."""
+    kept_details.drop(scene)
+    group = scene.radiosity
+    group.property_unset("last_bake")
+    group.property_unset("baked_light")
+    group.property_unset("baked_objects")
+    names = [prop.identifier for prop in group.bl_rna.properties if not prop.is_readonly]
+    if not any(map(group.is_property_set, names)):
+        scene.property_unset("radiosity")
+
+
+def last_bake(scene: bpy.types.Scene) -> LastBake | None:
+    """Return the last bake of the scene; None if there was none."""
+    text = scene.radiosity.last_bake
+    if not text:
+        return None
+    if text != _cache.text:
+        _cache.text, _cache.parsed = text, _parse(text)
+    return _cache.parsed
+
+
+def _parse(text: str) -> LastBake | None:
+    """Return what `remember` wrote; None for what somebody else put there."""
+    try:
+        record = json.loads(text)
+        solver = record["solver"]
+        figures = [
+            ("Method", METHODS[solver["method"]].label),
+            ("Time", f"{record['seconds']:.1f} s"),
+            ("Objects", f"{record['objects']:,}"),
+            ("Images", f"{record['images']:,}"),
+            ("Elements", f"{solver['elements']:,}"),
+            ("Links", f"{solver['links']:,}"),
+            ("Rays", f"{solver['rays']:,}"),
+        ]
+        if solver.get("iterations"):
+            figures.append(("Iterations", f"{solver['iterations']:,}"))
+        if solver.get("residual") is not None:
+            figures.append(("Residual", f"{solver['residual']:.1e}"))
+        if len(solver.get("independent_sets", ())) > 1:
+            # Parts that exchange no light, such as closed rooms, each solved by itself.
+            figures.append(("Separate parts", f"{len(solver['independent_sets']):,}"))
+        if solver.get("closure_area_mean") is not None:
+            # The share of light that meets a surface: 1 in a closed scene, less where it may leave.
+            figures.append(("Meets a surface", f"{solver['closure_area_mean']:.2%}"))
+        return LastBake(
+            figures=tuple(figures),
+            warnings=tuple((str(name), str(message)) for name, message in record["warnings"]),
+            warning_count=int(record["warning_count"]),
+            folder=str(record["folder"]),
+        )
+    except (ValueError, KeyError, TypeError):
+        return None

@@ -1,0 +1,236 @@
+"""Where one surface goes on in another chart: pairs of places on the page that are one place in the world.
+
+A seam is an edge of two triangles whose lightmap coordinates differ on its two sides. Only those
+count over which light goes on unbroken: the shading normal is the same on both sides, the surface
+does not fold, and no third surface stands on the edge. Across a crease a step is right.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...rays.caster import RayCaster
+from ...scene.scene import Scene
+from ..texels.texel_geometry import NO_TEXEL, TexelGeometry
+
+SAME_NORMAL = 0.99
+"""Least cosine between the shading normals of the two sides, …"""
+
+NO_FOLD = 0.5
+"""… and between the triangles' own."""
+
+SAMPLES_PER_TEXEL = 2.0
+"""Samples along a seam, per texel of the finer side."""
+
+SAME_UV = 1e-3
+"""Sides that lie closer than this on the page [texels] are one."""
+
+NEAR = 3.0
+"""A texel that far [texels] from a place on a seam has nothing to do with it."""
+
+CHUNK = 1 << 16
+"""Places tested at once; bounds the temporaries to about 40 MB."""
+
+LIFT, SAGITTA = 2.0, 0.6
+"""Lines of sight over a seam run this many ray offsets above the surface, and this part of
+length · √(1 − cos of the turn) more, for bulges."""
+
+
+@dataclass(frozen=True)
+class Seams:
+    """s places on seams, and the texels a bilinear look-up of either side reads there.
+
+    Attributes
+    ----------
+    texel : (s, 2, 4) int64
+        One side's four texels, then the other's, numbered row by row and page after page.
+    weight : (s, 2, 4) float64
+        Of the texels; either side's sum to 1.
+    length : (s,) float64
+        Of the seam that the place stands for, in texels, at most 1.
+    triangle : (s, 2) int64
+        The scene's triangles on either side.
+    """
+
+    texel: Array
+    weight: Array
+    length: Array
+    triangle: Array
+
+    def __len__(self) -> int:
+        return len(self.length)
+
+    def take(self, rows: Array) -> Seams:
+        """Return some of the places: a mask or row numbers."""
+        return Seams(self.texel[rows], self.weight[rows], self.length[rows], self.triangle[rows])
+
+    def of_one_material(self, scene: Scene) -> Seams:
+        """Return the places whose two sides reflect and emit alike, which images do not tell."""
+        alike = np.ones(len(self), dtype=bool)
+        for values in (scene.reflectance, scene.emission):
+            alike &= (values[self.triangle[:, 0]] == values[self.triangle[:, 1]]).all(axis=1)
+        if scene.images is not None:
+            alike &= ~scene.images.textured[self.triangle].any(axis=1)
+        return self.take(alike)
+
+    def sides(self, values: Array) -> Array:
+        """Return (s, 2, k) what bilinear look-ups give on either side; `values` (n, k) of all texels."""
+        return np.asarray(np.einsum("sab,sabk->sak", self.weight, values[self.texel]))
+
+
+def find_seams(scene: Scene, geometry: TexelGeometry, caster: RayCaster | None = None) -> Seams:
+    """Find the seams of all charts on all pages.
+
+    Parameters
+    ----------
+    caster : RayCaster or None
+        Tells which seams have something standing on them; None takes it that none has.
+    """
+    triangle, corner = _shared_edges(scene, geometry)
+    ends, pages = _on_pages(geometry, triangle, corner)
+    extent = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
+    apart = (np.abs(ends[:, 0] - ends[:, 1]) > SAME_UV).any(axis=(1, 2)) | (pages[:, 0] != pages[:, 1])
+    edges = np.flatnonzero(apart & (extent.max(axis=1) > 0))
+    count = np.maximum(np.ceil(SAMPLES_PER_TEXEL * extent[edges].max(axis=1)), 1).astype(np.int64)
+    edge, total = np.repeat(edges, count), np.repeat(count, count)
+    along = (np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / total
+    share = along[:, None, None]
+    spots = (1 - share) * ends[edge, :, 0] + share * ends[edge, :, 1]
+    texel, weight, inside = _bilinear(spots, pages[edge], [len(numbers) for numbers in geometry.index])
+    seams = Seams(texel, weight, extent[edge].max(axis=1) / total, triangle[edge]).take(inside)
+    edge, along = edge[inside], along[inside, None]
+    start, end = (scene.triangles[triangle[edge, 0], corner[edge, 0, k]] for k in (0, 1))
+    size = np.linalg.norm(end - start, axis=1) / np.maximum(extent[edge].min(axis=1), 1e-9)
+    size = np.clip(size, geometry.texel_size, 100 * geometry.texel_size)
+    return seams.take(_clean(geometry, seams, start + along * (end - start), size, caster))
+
+
+def _on_pages(geometry: TexelGeometry, triangle: Array, corner: Array) -> tuple[Array, Array]:
+    """Return (p, side, end, 2) where edges' ends lie on their sides' pages [texels], and (p, 2) the pages."""
+    pages = geometry.page_of_triangle[triangle]
+    sizes = np.array([len(numbers) for numbers in geometry.index])
+    ends = geometry.uv[triangle[:, :, None], corner].astype(np.float64) * sizes[pages][:, :, None, None]
+    return ends, pages
+
+
+def _clean(geometry: TexelGeometry, seams: Seams, at: Array, size: Array, caster: RayCaster | None) -> Array:
+    """Return (s,) which places read their own surface's texels only, with nothing between the sides."""
+    index = geometry.index[0].ravel() if len(geometry.index) == 1 else _in_one(geometry)
+    good = np.zeros(len(seams), dtype=bool)
+    for first in range(0, len(seams), CHUNK):
+        rows = np.arange(first, min(first + CHUNK, len(seams)))
+        numbers, weight = index[seams.texel[rows]], seams.weight[rows]
+        own = _own_texels_only(geometry, numbers, weight, at[rows], size[rows])
+        rows, numbers, weight = rows[own], numbers[own], weight[own]
+        good[rows] = True if caster is None else _open(geometry, caster, numbers, weight)
+    return good
+
+
+def _in_one(geometry: TexelGeometry) -> Array:
+    """Return all pages' numbers of texels, one page after the other."""
+    return np.concatenate([numbers.ravel() for numbers in geometry.index])
+
+
+def _shared_edges(scene: Scene, geometry: TexelGeometry) -> tuple[Array, Array]:
+    """Return the edges of exactly two triangles that go on in each other.
+
+    Returns
+    -------
+    triangle : (p, 2) int
+    corner : (p, 2, 2) int
+        Which of the triangle's corners are the edge's ends, in the same order on both sides.
+    """
+    every = np.flatnonzero(scene.areas > 0)
+    vertex = _weld(scene.triangles[every])
+    corners = np.array([[0, 1], [1, 2], [2, 0]])
+    ends = vertex[:, corners].reshape(-1, 2)
+    flip = ends[:, 0] > ends[:, 1]
+    corner = np.where(
+        flip[:, None], np.tile(corners[:, ::-1], (len(every), 1)), np.tile(corners, (len(every), 1))
+    )
+    key = ends.min(axis=1) * (int(vertex.max(initial=0)) + 1) + ends.max(axis=1)
+    order = np.argsort(key, kind="stable")
+    key = key[order]
+    new = np.flatnonzero(np.concatenate([[True], key[1:] != key[:-1]])) if len(key) else np.zeros(0, np.int64)
+    pairs = new[np.diff(np.append(new, len(key))) == 2]
+    first, second = order[pairs], order[pairs + 1]
+    triangle = np.stack([every[first // 3], every[second // 3]], axis=1)
+    corner = np.stack([corner[first], corner[second]], axis=1)
+    kept = (geometry.page_of_triangle[triangle] >= 0).all(axis=1)
+    # Front beside front: seen from the other side the edge runs the other way.
+    kept &= flip[first] != flip[second]
+    normal = scene.face_normals[triangle]
+    kept &= np.einsum("pk,pk->p", normal[:, 0], normal[:, 1]) > NO_FOLD
+    shading = scene.normals[triangle[:, :, None], corner]
+    shading = shading / np.maximum(np.linalg.norm(shading, axis=3, keepdims=True), 1e-12)
+    kept &= (np.einsum("pek,pek->pe", shading[:, 0], shading[:, 1]) > SAME_NORMAL).all(axis=1)
+    return triangle[kept], corner[kept]
+
+
+def _weld(triangles: Array) -> Array:
+    """Return (t, 3) int64: the number of each corner's place; equal for corners a hair apart at most."""
+    points = triangles.reshape(-1, 3)
+    if not len(points):
+        return np.zeros((0, 3), dtype=np.int64)
+    low = points.min(axis=0)
+    hair = 1e-6 * max(float((points.max(axis=0) - low).max()), 1e-30)
+    cell = np.rint((points - low) / hair).astype(np.int64)
+    # 21 bits an axis: 10⁶ cells fit.
+    key = (cell[:, 0] << 42) | (cell[:, 1] << 21) | cell[:, 2]
+    number = np.unique(key, return_inverse=True)[1]
+    return np.asarray(number.reshape(-1, 3), dtype=np.int64)
+
+
+def _bilinear(spots: Array, pages: Array, sizes: Sequence[int]) -> tuple[Array, Array, Array]:
+    """Return (s, 2, 4) texels and weights at (s, 2, 2) places in texels, and (s,) whether on the page."""
+    size = np.asarray(sizes, dtype=np.int64)
+    first = np.concatenate([[0], np.cumsum(size * size)])[:-1][pages]
+    width = size[pages]
+    inside = ((spots >= 0) & (spots <= width[..., None])).all(axis=(1, 2))
+    corner = np.floor(spots - 0.5)
+    share = spots - 0.5 - corner
+    low = corner.astype(np.int64)
+    texels, weights = [], []
+    for up in (0, 1):
+        for right in (0, 1):
+            column = np.clip(low[..., 0] + right, 0, width - 1)
+            row = np.clip(low[..., 1] + up, 0, width - 1)
+            texels.append(first + row * width + column)
+            weights.append(
+                (share[..., 0] if right else 1 - share[..., 0]) * (share[..., 1] if up else 1 - share[..., 1])
+            )
+    return np.stack(texels, axis=2), np.stack(weights, axis=2), inside
+
+
+def _own_texels_only(geometry: TexelGeometry, numbers: Array, weight: Array, at: Array, size: Array) -> Array:
+    """Return (s,) which places read no other surface's texels, but their own on both sides.
+
+    Parameters
+    ----------
+    numbers : (s, 2, 4) int
+        The covered texels among those read, or NO_TEXEL.
+    at, size : (s, 3), (s,) float64
+        Where the places are, and the width of a texel there [m].
+    """
+    covered = (numbers != NO_TEXEL) & (weight > 0)
+    distance = np.linalg.norm(geometry.position[numbers] - at[:, None, None], axis=3)
+    own = ~covered | (distance < NEAR * size[:, None, None])
+    return np.asarray(own.all(axis=(1, 2)) & covered.any(axis=2).all(axis=1))
+
+
+def _open(geometry: TexelGeometry, caster: RayCaster, numbers: Array, weight: Array) -> Array:
+    """Return (s,) between which sides nothing stands: the texels read most see each other."""
+    best = np.where((numbers != NO_TEXEL) & (weight > 0), weight, -1.0).argmax(axis=2)
+    ends = np.take_along_axis(numbers, best[:, :, None], axis=2)[..., 0]
+    at, normal, facet = geometry.position[ends], geometry.normal[ends], geometry.surface_normal[ends]
+    length = np.linalg.norm(at[:, 1] - at[:, 0], axis=1)
+    turn = np.minimum(*(np.einsum("sk,sk->s", of[:, 0], of[:, 1]) for of in (normal, facet)))
+    lift = LIFT * caster.surface_offset + SAGITTA * length * np.sqrt(np.maximum(1.0 - turn, 0.0))
+    at = at + lift[:, None, None] * normal
+    along = at[:, 1] - at[:, 0]
+    length = np.linalg.norm(along, axis=1)
+    return np.asarray(caster.visible(at[:, 0], along / np.maximum(length, 1e-300)[:, None], length))

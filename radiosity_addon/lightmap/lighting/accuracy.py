@@ -1,0 +1,56 @@
+"""Light texels to an error that was asked for: look harder until the estimate says it is reached."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+
+from ...base.progress import scaled
+from ...scene.scene import Scene
+from ...solver.gather.local_pass import LocalPass
+from ..texels.texel_geometry import TexelGeometry
+from .gather_settings import GatherSettings
+from .light_so_far import LightSoFar
+from .reconstruct import reconstruct
+from .sweeps import TexelLight
+
+TRIES = 4
+"""Times the texels are lit at most: each time the error is known better."""
+
+MARGIN = 0.9
+"""The next try aims at this part of what would just do."""
+
+
+def light_within(
+    scene: Scene,
+    local: LocalPass,
+    geometry: TexelGeometry,
+    settings_for: Callable[[float], GatherSettings],
+    error: float,
+    so_far: LightSoFar | None = None,
+) -> Generator[float, None, TexelLight]:
+    """Light the texels so that their estimated relative RMS error is at most `error`, if that can be had.
+
+    Parameters
+    ----------
+    settings_for : callable
+        How densely to gather for an error; at its limits it returns the same again.
+
+    Yields
+    ------
+    fraction : float
+        How many tries there will be is not known: each takes half of what is left.
+    """
+    goal, left = error, 1.0
+    settings = settings_for(goal)
+    for tries in range(TRIES, 0, -1):
+        steps = reconstruct(scene, local, geometry, settings, so_far)
+        light = yield from scaled(steps, 1.0 - left, 1.0 - 0.5 * left)
+        left *= 0.5
+        goal *= MARGIN * error / max(light.error, 1e-9)
+        before, settings = settings, settings_for(goal)
+        if light.error <= error or settings == before:
+            break
+        if tries > 1:
+            # It takes as much memory as the next one.
+            del light
+    return light

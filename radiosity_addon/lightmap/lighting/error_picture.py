@@ -1,0 +1,69 @@
+"""The residual of the elements' solution at every texel: an error picture.
+
+What is baked otherwise is not the elements' radiosity but light asked for anew at each texel.
+Here it is the elements that are judged: their radiosity B̂ at the texel, less what it would be
+by the light that B̂ itself sends there (handout (3.5)). So hits are looked up in the elements,
+and no sweep corrects them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...base.progress import scaled
+from ...base.sampling import stratified_square
+from ...solver.gather.residual import Residual
+from ...solver.solution import Solution
+from ..texels.occlusion import crossing_steps
+from ..texels.texel_geometry import TexelGeometry
+from .gather_settings import GatherSettings
+from .reconstruct import CROSSED, DIRECT, GATHERED, footprints, gather_texels
+
+SAMPLES = 4
+"""Points of a texel at which the elements are looked up: an edge between two may cross it."""
+
+
+def texel_residual(
+    solution: Solution, geometry: TexelGeometry, settings: GatherSettings
+) -> Generator[float, None, Array]:
+    """Compute r of all texels, each a mean over its footprint; yields the fraction done.
+
+    Returns
+    -------
+    residual : (n, 3) float64 [W/m²]
+        Positive where the elements are brighter than the light they send there makes the surface.
+    """
+    local, residual = solution.local_pass, solution.element_residual
+    direct = yield from scaled(local.direct_steps(footprints(geometry, local)), 0.0, DIRECT)
+    found = crossing_steps(geometry, local.caster, local.threads)
+    crossings = yield from scaled(found, DIRECT, CROSSED)
+    stored = gather_texels(local, geometry, settings, crossings, local.leaves_of)
+    links, _ = yield from scaled(stored, CROSSED, GATHERED)
+    arriving = links.irradiance_steps(residual.gathered(local), local.threads)
+    irradiance = direct + (yield from scaled(arriving, GATHERED, 1.0))
+    values = _residual_at(residual, geometry, irradiance)
+    yield 1.0
+    return values
+
+
+def summary(residual: Array) -> dict[str, list[float]]:
+    """Sum up (n, 3) residuals, all texels alike: for the report, a number for each channel [W/m²]."""
+    size = np.abs(residual)
+    return {
+        "mean": residual.mean(axis=0).tolist(),
+        "mean_absolute": size.mean(axis=0).tolist(),
+        "percentile_99_absolute": np.percentile(size, 99, axis=0).tolist(),
+        "largest_absolute": size.max(axis=0).tolist(),
+    }
+
+
+def _residual_at(residual: Residual, geometry: TexelGeometry, irradiance: Array) -> Array:
+    """Return (n, 3) the mean of r over every texel, for (n, 3) what arrives there."""
+    face = residual.front_of(geometry.triangle)
+    rows = np.arange(len(geometry))
+    weights = geometry.sample_weights(rows, stratified_square(rows, SAMPLES, 0))
+    values = (residual.given(face, weights[:, sample, 1:], irradiance) for sample in range(SAMPLES))
+    return np.asarray(sum(values) / SAMPLES)

@@ -1,0 +1,31 @@
+"""How finely texels gather."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class GatherSettings:
+    """How densely indirect light is gathered.
+
+    Parameters
+    ----------
+    strides : tuple of int
+        Lattices of gather points, coarse to fine, in texels; finer ones are used only where
+        coarser points do not reach. The last is 1, so that every texel is reached.
+    support : float
+        A texel whose coarser points weigh less than this together becomes a point itself.
+    rays : int
+        A gather point.
+    sweeps : int
+        Jacobi sweeps over the texels, at most, …
+    tolerance : float
+        … or until no texel changes by more than this part of the mean.
+    """
+
+    strides: tuple[int, ...] = (4, 2, 1)
+    support: float = 1.0
+    rays: int = 256
+    sweeps: int = 64
+    tolerance: float = 2e-4

@@ -1,0 +1,265 @@
+"""Jacobi sweeps over the texels along stored gather hits: no ray is traced.
+
+The unknowns are the texels and the parts that gather rays met where no texel answers (`part_links.py`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...base.progress import drain, scaled
+from ...base.scratch import Scratch, row_numbers, tiles, trim
+from ...solver.gather.light_gains import LightGains
+from .part_links import Parts, PartSweeps
+from .source_means import CHUNK_HITS, Means, by_channel, mean_steps
+from .stored_links import StoredLinks
+from .traced_texels import TracedTexels
+from .warm_start import EarlierLight
+
+TOLERANCE = 2e-4
+"""Largest change of any texel, relative to the mean, at which the sweeps end by default. Most texels are
+there at once; a dark closet next to a bright room, into which the hierarchy's elements leak across the
+wall's foot, takes as many sweeps as light would bounce in it."""
+
+STILL = 0.1
+"""A row of the table moves once it is off by this part of the tolerance: what sees only rows that rest
+need not be asked again, and most rest after a few sweeps."""
+
+SWEPT = 0.7
+"""A sweep takes the other part of the progress left: how many there will be is not known."""
+
+
+@dataclass(frozen=True)
+class TexelLight:
+    """Irradiance of n texels.
+
+    Attributes
+    ----------
+    direct, indirect : (n, 3) float64 [W/m²]
+        Their sum is the whole.
+    error : float
+        Estimate of the whole's RMS error, relative to its mean; 0 if it was not asked for.
+    table : (surfaces, 3) float32 or None [W/m²]
+        What texels and parts reflected in the end.
+    kept : LitTexels or None
+        What lights them anew, if it is kept, …
+    traced : TracedTexels or None
+        … and how they were lit.
+    noise : (n,) float32 or None [W/m²]
+        What `error` is the mean of: the estimated error of each texel.
+    state : (n,) uint8 or None
+        What geometry does to each, see `TEXEL_STATES`.
+    """
+
+    direct: Array
+    indirect: Array
+    error: float = 0.0
+    table: Array | None = None
+    kept: LitTexels | None = None
+    traced: TracedTexels | None = None
+    noise: Array | None = None
+    state: Array | None = None
+
+
+@dataclass(frozen=True)
+class TexelTransport:
+    """How light gets from texel to texel, whatever the lights: geometry and reflectance alone.
+
+    Attributes
+    ----------
+    links : StoredLinks
+    parts : Parts
+    reflectance : (n, 3) float64
+        Of the texels.
+    """
+
+    links: StoredLinks
+    parts: Parts
+    reflectance: Array
+
+
+@dataclass(frozen=True)
+class LitTexels:
+    """How light gets to n texels from each light, and on from texel to texel.
+
+    Attributes
+    ----------
+    transport : TexelTransport
+        Its parts keep gains as well.
+    gains : LightGains
+        Of the texels.
+    element : (n,) int32
+        The leaf element below each, whose light the sweeps start with, or NOTHING.
+    sweeps, tolerance
+        As for `sweep_steps`.
+    earlier : EarlierLight
+        What was solved before, the bake's own light first.
+    """
+
+    transport: TexelTransport
+    gains: LightGains
+    element: Array
+    sweeps: int
+    tolerance: float
+    earlier: EarlierLight
+
+
+def sweep_steps(
+    transport: TexelTransport,
+    start: Array,
+    lamps: Array,
+    beyond: Array,
+    sweeps: int,
+    tolerance: float = TOLERANCE,
+    threads: int = 0,
+    estimate: bool = True,
+    seen: Callable[[Array], None] | None = None,
+    scratch: Scratch | None = None,
+) -> Generator[float, None, TexelLight]:
+    """Iterate H = direct + Σ ρ H over the stored hits, started from the hierarchy's solution.
+
+    Parameters
+    ----------
+    transport : TexelTransport
+    start : (n, 3) float64 [W/m²]
+        What the texels reflect, by the hierarchy.
+    lamps : (n, 3) float64 [W/m²]
+        Irradiance of the texels straight from lamps and emissive surfaces.
+    beyond : (cells + 2, 3) float64 [W/m²]
+        Radiosity of the sky and of nothing, see `LocalPass.beyond`.
+    sweeps : int
+        At most so many, …
+    tolerance : float
+        … or until no texel changes by more than this part of the mean.
+    estimate : bool
+        Whether the error is estimated.
+    seen : callable or None
+        Is given the (n, 3) irradiance after every sweep [W/m²], to be looked at.
+    scratch : Scratch or None
+        Makes the texels' arrays; None keeps them in memory.
+
+    Yields
+    ------
+    fraction : float
+        Of an unknown number of sweeps: each takes its part of what is left.
+    """
+    links, reflectance, texel_count = transport.links, transport.reflectance, len(lamps)
+    parts = PartSweeps(transport.parts, texel_count, threads)
+    # Columns lie one after the other in memory.
+    surfaces = texel_count + len(transport.parts.start)
+    table = np.zeros((surfaces + len(beyond), 3), dtype=np.float32, order="F")
+    table[surfaces:] = beyond
+    direct, scratch = lamps, scratch or Scratch()
+    if beyond.any():
+        # The sky's light is direct: its share of the same rays.
+        direct = yield from scaled(links.irradiance_steps(table, threads, scratch), 0.0, 0.1)
+        for rows in tiles(texel_count):
+            direct[rows] = lamps[rows] + np.maximum(direct[rows], 0.0)
+
+    for rows in tiles(texel_count):
+        table[rows] = start[rows]
+    del start
+    table[texel_count:surfaces] = transport.parts.start
+    reached = _reached(links, parts, direct, len(beyond))
+    for rows in tiles(surfaces):
+        table[rows][~reached[rows]] = 0.0
+    del reached
+    indirect, left = scratch.zeros(direct.shape), 0.9
+    changed = np.ones(len(table), dtype=bool)
+    means = Means(links.sources, table.shape[1], threads, scratch)
+    still = STILL * tolerance * float(table[:texel_count].mean()) if texel_count else 0.0
+    for _ in range(sweeps):
+        parts.sweep(table, changed, still)
+        table[surfaces:] = 0.0
+        mean = yield from scaled(means.steps(table, changed), 1.0 - left, 1.0 - SWEPT * left)
+        left *= SWEPT
+        del indirect
+        # What aimed rays bring is added to it.
+        whole = by_channel(len(mean), table.shape[1], scratch)
+        for rows in tiles(len(mean)):
+            whole[rows] = mean[rows]
+        indirect = links.spread_out(table, whole, threads, scratch)
+        del whole
+        table[surfaces:] = beyond
+        changed[:] = False
+        largest, total = 0.0, 0.0
+        for rows in tiles(texel_count):
+            indirect[rows] = np.maximum(indirect[rows], 0.0)
+            radiosity = (reflectance[rows] * (direct[rows] + indirect[rows])).astype(np.float32)
+            change = np.abs(radiosity - table[rows]).max(axis=1)
+            moved = change > still
+            changed[rows] = moved
+            table[rows][moved] = radiosity[moved]
+            largest = max(largest, float(change.max()))
+            total += float(radiosity.sum(dtype=np.float64))
+        if seen is not None:
+            seen(direct + indirect)
+        if largest <= tolerance * total / max(3 * texel_count, 1):
+            break
+    if not estimate:
+        return TexelLight(direct, indirect, 0.0, table[:surfaces])
+    noise = estimated_noise(links, table, threads, scratch)
+    error = relative_error(noise, direct, indirect)
+    each = scratch.empty(texel_count, np.float32)
+    for rows in tiles(texel_count):
+        each[rows] = np.sqrt((noise[rows] ** 2).mean(axis=1))
+    return TexelLight(direct, indirect, error, table[:surfaces], noise=each)
+
+
+def relative_error(noise: Array, *irradiance: Array) -> float:
+    """Return the RMS of (n, 3) noise, relative to the mean of the sum of irradiances (n, 3)."""
+    squares = total = 0.0
+    for rows in tiles(len(noise)):
+        squares += float((noise[rows] ** 2).sum())
+        total += sum(float(part[rows].sum()) for part in irradiance)
+    return float(np.sqrt(squares / noise.size)) / (total / noise.size) if total > 0.0 else 0.0
+
+
+def estimated_noise(
+    links: StoredLinks, table: Array, threads: int = 0, scratch: Scratch | None = None
+) -> Array:
+    """Estimate (n, 3) the error of texels' irradiance: the noise of the gather rays [W/m²].
+
+    Half of a point's rays guess its irradiance with √2 times the noise of all of them, and share
+    that half with the whole: so the two differ by about the noise of the whole. Spread over the
+    texels as the irradiance is, noise that interpolation averages away drops out.
+
+    Parameters
+    ----------
+    links : StoredLinks
+    table : (rows, 3) float32
+        The radiosity that the links' sources had in the end, the sky's among it.
+    """
+    half = links.sources.shape[1] // 2
+    whole = drain(mean_steps(table, links.sources, threads, scratch=scratch))
+    part = drain(mean_steps(table, links.sources, threads, half, scratch))
+    for rows in tiles(len(part)):
+        part[rows] -= whole[rows]
+    del whole
+    return links.spread(part, scratch=scratch)
+
+
+def _reached(links: StoredLinks, parts: PartSweeps, direct: Array, beyond: int) -> Array:
+    """Return (table rows − beyond,) bool: what light can get to along the links, after any number of bounces.
+
+    The sweeps' fixed point is 0 elsewhere. Found outright, because from what the hierarchy leaked into
+    a sealed box they would only fade, by the reflectance a sweep.
+    """
+    reached = parts.lit_or_unknown(direct)
+    padded = np.append(reached, np.zeros(beyond, dtype=bool))  # nothing, and the sky, whose light is direct
+    aims = np.zeros(len(links.sources), dtype=bool)
+    while True:
+        dark, step = row_numbers(~aims), max(CHUNK_HITS // links.sources.shape[1], 1)
+        for first in range(0, len(dark), step):
+            some = dark[first : first + step]
+            aims[some] = padded[links.sources[some]].any(axis=1)
+            trim()
+        links.mark_aims(aims, padded)
+        more = ~padded[: len(direct)] & links.spread.any_of(aims)
+        padded[: len(direct)] |= more
+        if not (parts.reach(padded) or more.any()):
+            return padded[: len(reached)]

@@ -1,0 +1,172 @@
+"""Sixteenths of texels that geometry divides: what answers rays that hit such a texel.
+
+A texel that a wall stands on, or that a window's frame covers in part, shows the mean of what it
+holds, as it should. Light that comes back from it must not be the mean: a ray from inside a closed
+box would then bring the lit floor outside. Nor can a whole neighbour answer, for the strip beside a
+frame is darker than what lies a texel farther in the open. So a divided texel answers in cells,
+each as those of its points that see the cell's *anchor* in a straight line just above the surface;
+a hit asks the nearest cell whose anchor it sees (`solver/gather/sub_cells.py` does the same for elements).
+Through a gap the line of sight is free: what is below a hood asks what is below it, the rest what is not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...base.parallel import chunk_steps
+from ...rays.caster import Hits, sees
+from ...solver.gather.footprints import Footprints
+from ...solver.gather.local_pass import NOTHING, LocalPass, Resolver
+from .occlusion import Crossings, below_hood
+from .texel_geometry import TexelGeometry
+
+ALONG = 4
+"""Cells along a texel's side."""
+
+CELLS = ALONG**2
+
+ANCHOR = np.array([0.54, 0.47])
+"""Of a cell. Near the middle, but off it: walls stand on round fractions of a floor."""
+
+STARTS = 4
+"""Points of a cell that its gather rays start from: each costs a ray to the anchor."""
+
+LIFT = 2.0
+"""Points see each other this many surface offsets above their texel."""
+
+SAME_SURFACE = 0.9
+"""Cosine between the normals of a texel's triangle and of another one that the texel lies on as well."""
+
+CHUNK_TEXELS = 1 << 13
+"""Texels divided at once; bounds the temporaries to about 20 MB."""
+
+_FIRST = np.stack(np.divmod(np.arange(CELLS), ALONG)[::-1], axis=1) / ALONG
+"""(16, 2): the corner of every cell next to the texel's own first one, in the texel's unit square."""
+
+
+class TexelCells:
+    """The cells of some texels, numbered texel by texel.
+
+    Parameters
+    ----------
+    local : LocalPass
+    geometry : TexelGeometry
+    crossings : Crossings
+        Those have cells that are crossed or touched.
+    """
+
+    def __init__(self, local: LocalPass, geometry: TexelGeometry, crossings: Crossings) -> None:
+        self.local, self._geometry = local, geometry
+        self._rim, divided = crossings.rim, crossings.crossed | crossings.touched
+        self.texel = np.flatnonzero(divided).astype(np.int32)
+        """(d,) The divided texels."""
+        self._divided = divided
+        self._rank = np.cumsum(divided, dtype=np.int32) - 1
+        self._anchors = geometry.scratch.empty((len(self.texel), CELLS, 3))
+        self._below = np.zeros((len(self.texel), CELLS), dtype=bool)
+        spots = _FIRST + ANCHOR / ALONG
+
+        def place(part: slice) -> None:
+            texel = self.texel[part]
+            every = np.broadcast_to(spots, (len(texel), CELLS, 2))
+            spread = geometry.sample(texel, every, 1.0)
+            self._anchors[part] = spread + self._lift(texel)[:, None]
+            self._below[part] = self._below_hood(texel, spread)
+
+        for _ in chunk_steps(place, len(self.texel), CHUNK_TEXELS, local.threads):
+            pass
+
+    def __len__(self) -> int:
+        return CELLS * len(self.texel)
+
+    def texel_of(self, cell: Array) -> Array:
+        """Return (p,) the texel that each cell is of."""
+        return np.asarray(self.texel[cell // CELLS])
+
+    def renumbered(self, other: TexelCells) -> Array:
+        """Return (cells,) int32 the numbers that these cells have among another's, or NOTHING."""
+        number = np.where(other._divided[self.texel], other._rank[self.texel], NOTHING)
+        cell = CELLS * number[:, None] + np.arange(CELLS)
+        return np.where(number[:, None] == NOTHING, NOTHING, cell).ravel().astype(np.int32)
+
+    def at(self, texel: Array, hits: Hits) -> Array:
+        """Return (h,) int32: the nearest cell of its `texel` whose anchor each hit sees, or NOTHING."""
+        geometry, caster = self._geometry, self.local.caster
+        found = np.full(len(texel), NOTHING, dtype=np.int32)
+        normal = geometry.surface_normal[texel]
+        # On the page a texel may reach beyond its triangle onto one that looks elsewhere.
+        alike = np.einsum("hk,hk->h", geometry.face_normals[hits.triangle], normal) > SAME_SURFACE
+        waiting = np.flatnonzero(alike)
+        position = geometry.positions_of(hits) + self._lift(texel)
+        rank = self._rank[texel]
+        order = np.zeros((len(texel), CELLS), dtype=np.int8)
+        apart = self._anchors[rank[waiting]] - position[waiting, None]
+        order[waiting] = np.einsum("hkx,hkx->hk", apart, apart).argsort(axis=1, kind="stable")
+        below = self._below_hood(texel, geometry.positions_of(hits)[:, None])[:, 0]
+        for turn in range(CELLS):
+            if len(waiting) == 0:
+                break
+            cell = order[waiting, turn]
+            seen = self._below[rank[waiting], cell] == below[waiting]
+            alike = np.flatnonzero(seen)
+            asking = waiting[alike]
+            seen[alike] = sees(caster, position[asking], self._anchors[rank[asking], cell[alike]])
+            found[waiting[seen]] = CELLS * rank[waiting[seen]] + cell[seen]
+            waiting = waiting[~seen]
+        return found
+
+    def footprints(self, cell: Array) -> Footprints:
+        """Return cells as footprints: their samples see the anchor."""
+        geometry, caster = self._geometry, self.local.caster
+        texel, first = self.texel_of(cell), _FIRST[cell % CELLS]
+        lift, below = self._lift(texel), self._below[cell // CELLS, cell % CELLS]
+        anchor = self._anchors[cell // CELLS, cell % CELLS] - lift
+
+        def sample(rows: Array, u: Array) -> Array:
+            points = geometry.sample(texel[rows], first[rows][:, None] + u / ALONG, 1.0)
+            back = np.broadcast_to(anchor[rows][:, None], points.shape)
+            above = lift[rows][:, None]
+            seen = sees(caster, (points + above).reshape(-1, 3), (back + above).reshape(-1, 3))
+            # What lies behind a wall, or beyond the rim of a hood, is not of this cell.
+            own = seen.reshape(points.shape[:2])
+            own &= self._below_hood(texel[rows], points) == below[rows, None]
+            return np.asarray(np.where(own[..., None], points, back))
+
+        return Footprints(anchor, geometry.normal[texel], self._keys(cell), sample, starts=STARTS)
+
+    def upright(self, cell: Array) -> Array:
+        """Return (p, 3) the normals of the triangles that cells are on."""
+        return np.asarray(self._geometry.surface_normal[self.texel_of(cell)])
+
+    def gather(self, cell: Array, rays: int, resolve: Resolver) -> Generator[float, None, Array]:
+        """Gather over cells, (p, rays) sources; yields the fraction done."""
+        gathered = yield from self.local.gather_steps(
+            self.footprints(cell), self.upright(cell), rays, resolve
+        )
+        return gathered.sources
+
+    def lit(self, cell: Array) -> Footprints:
+        """Return cells as footprints that ask for lamps: their anchors alone."""
+        texel, geometry = self.texel_of(cell), self._geometry
+        expected = self.local.irradiance_at(geometry.triangle[texel], geometry.barycentric[texel])
+        anchor = self._anchors[cell // CELLS, cell % CELLS] - self._lift(texel)
+        return Footprints(anchor, geometry.normal[texel], self._keys(cell), expected=expected)
+
+    def _keys(self, cell: Array) -> Array:
+        """Return (p,) int64 what cells' rays are drawn by: the same whichever other texels are divided."""
+        texel = self.texel_of(cell).astype(np.int64)
+        return np.asarray(len(self._geometry) + CELLS * texel + cell % CELLS)
+
+    def _below_hood(self, texel: Array, points: Array) -> Array:
+        """Return (n, k) whether (n, k, 3) points of texels at a rim are below the hood; False elsewhere."""
+        below = np.zeros(points.shape[:2], dtype=bool)
+        at_rim = np.flatnonzero(self._rim[texel])
+        below[at_rim] = below_hood(self._geometry, self.local.caster, texel[at_rim], points[at_rim])
+        return below
+
+    def _lift(self, texel: Array) -> Array:
+        offset = LIFT * self.local.caster.surface_offset
+        return np.asarray(offset * self._geometry.surface_normal[texel])

@@ -1,0 +1,60 @@
+"""Whole texels next to a divided one: what answers a hit in a strip too narrow for a cell of its own."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...rays.caster import RayCaster, sees
+from ...solver.gather.local_pass import NOTHING
+from .occlusion import LIFT, Crossings
+from .texel_geometry import NO_TEXEL
+
+SAME_PLANE = 0.1
+"""A neighbour's centre may rise so much over the hit's plane, as a part of its distance."""
+
+SAME_SURFACE = 0.9
+"""Cosine between the normals of a texel and its neighbour: on the page it may be anything."""
+
+_AROUND = np.array([[r, c] for r in (-1, 0, 1) for c in (-1, 0, 1) if r or c])
+
+
+def whole_neighbour(
+    crossings: Crossings, caster: RayCaster, texel: Array, position: Array, below: Array
+) -> Array:
+    """Return (h,) int32: the nearest whole neighbour of each texel whose centre a point sees, or NOTHING.
+
+    Parameters
+    ----------
+    texel : (h,) int
+    position : (h, 3) float64
+        Points on them.
+    below : (h,) bool
+        Whether the points are below a hood: then the neighbour must be as well, and else must not.
+    """
+    geometry = crossings.geometry
+    around = np.full((len(texel), len(_AROUND)), NO_TEXEL, dtype=np.int32)
+    for page, numbers in enumerate(geometry.index):
+        mine = np.flatnonzero(geometry.page[texel] == page)
+        row = geometry.row[texel[mine]][:, None] + _AROUND[:, 0]
+        column = geometry.column[texel[mine]][:, None] + _AROUND[:, 1]
+        inside = (row >= 0) & (row < len(numbers)) & (column >= 0) & (column < len(numbers))
+        last = len(numbers) - 1
+        near = numbers[np.clip(row, 0, last), np.clip(column, 0, last)]
+        around[mine] = np.where(inside, near, NO_TEXEL)
+    whole = (around != NO_TEXEL) & ~crossings.crossed[around]
+    whole &= crossings.hooded[around] == below[:, None]
+    normal = geometry.surface_normal[texel]
+    along = geometry.position[around] - position[:, None]
+    distance = np.linalg.norm(along, axis=2)
+    whole &= np.abs(np.einsum("hak,hk->ha", along, normal)) <= SAME_PLANE * distance
+    whole &= np.einsum("hak,hk->ha", geometry.surface_normal[around], normal) > SAME_SURFACE
+    lift = LIFT * caster.surface_offset
+    hit, which = np.nonzero(whole)
+    end = geometry.position[around[hit, which]] + lift * geometry.surface_normal[around[hit, which]]
+    seen = sees(caster, position[hit] + lift * normal[hit], end)
+    distance = np.where(whole, distance, np.inf)
+    distance[hit[~seen], which[~seen]] = np.inf
+    best = distance.argmin(axis=1)
+    every = np.arange(len(texel))
+    return np.where(np.isfinite(distance[every, best]), around[every, best], NOTHING)

@@ -1,0 +1,163 @@
+"""Texels that geometry cuts in two: a wall's foot on a floor, the rim of what a box covers.
+
+Such a texel shows the mean of both sides, as it should, but answers no ray with it: see
+`cells.py`.
+
+What hovers closely over a surface (a window's frame a millimetre off the wall, a door in its
+frame) parts light from dark likewise, though nothing stands on the texel, and the gap lets lines
+of sight along the surface through. Short probes along the normal tell which texels are *hooded*,
+and which only partly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...base.parallel import chunk_steps
+from ...base.scratch import row_numbers
+from ...rays.caster import RayCaster
+from .clearance import clear_texels
+from .states import DIVIDED, HOODED, TOUCHED
+from .texel_geometry import TexelGeometry
+
+CHUNK = 1 << 14
+"""Texels tested at once; bounds the temporaries to about 60 MB."""
+
+LIFT = 2.0
+"""Segments run this many surface offsets above the surface."""
+
+INSET = 0.96
+"""Corners are drawn in to this part: a texel that ends at a wall is not crossed by it, …"""
+
+OUTSET = 1.01
+"""… but touched, if the wall crosses corners drawn out so far."""
+
+HOOD = 0.25
+"""What is nearer above a surface than this part of a texel's width hoods it. Light reaches about as far
+into a gap as the gap is high: into a high one it fades over texels, without a hood's sharp rim."""
+
+_CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]], dtype=np.float32)
+_EDGES = np.array([[0, 1], [1, 2], [2, 3], [3, 0]])
+_DIAGONALS = np.array([[0, 2], [1, 3]])
+_SPOTS = np.array([[u, v] for u in (0.02, 0.5, 0.98) for v in (0.02, 0.5, 0.98)], dtype=np.float32)
+
+
+@dataclass(frozen=True)
+class Crossings:
+    """What geometry does to n texels, (n,) bool each.
+
+    Attributes
+    ----------
+    geometry : TexelGeometry
+    cut : geometry stands on them
+    touched : they end at geometry; neither cut nor at a rim
+    rim : a hood's rim is above them
+    hooded : all of them is below a hood; neither cut nor at a rim
+    """
+
+    geometry: TexelGeometry
+    cut: Array
+    touched: Array
+    rim: Array
+    hooded: Array
+
+    @cached_property
+    def crossed(self) -> Array:
+        """Texels that are cut or at a rim: more than one light falls on them."""
+        return self.cut | self.rim
+
+    @property
+    def state(self) -> Array:
+        """(n,) uint8: see `TEXEL_STATES`."""
+        state = np.zeros(len(self.cut), dtype=np.uint8)
+        # The last one that holds counts.
+        for of, value in ((self.touched, TOUCHED), (self.hooded, HOODED), (self.crossed, DIVIDED)):
+            state[of] = value
+        return state
+
+    @cached_property
+    def alone(self) -> Array:
+        """Texels whose light is like no neighbour's, though a line of sight may join them."""
+        return self.crossed | self.hooded
+
+    @cached_property
+    def beside(self) -> Array:
+        """Texels next to a crossed one: what stands there takes half of what they see."""
+        return self.geometry.neighbourhood(self.crossed) & ~self.alone
+
+
+def crossing_steps(
+    geometry: TexelGeometry,
+    caster: RayCaster,
+    threads: int = 0,
+    before: Crossings | None = None,
+    anew: Array | None = None,
+) -> Generator[float, None, Crossings]:
+    """Find the texels that geometry cuts, touches or hoods; yields the fraction done.
+
+    Given how it was `before`, only some texels, row numbers, are tried `anew`.
+    """
+    if before is None or anew is None:
+        result = Crossings(geometry, *np.zeros((4, len(geometry)), dtype=bool))
+        clear = clear_texels(geometry, OUTSET, HOOD, LIFT * caster.surface_offset, threads)
+        doubted = row_numbers(~clear)
+    else:
+        were = (before.cut, before.touched, before.rim, before.hooded)
+        result, doubted = Crossings(geometry, *(flags.copy() for flags in were)), anew
+
+    def find(part: slice) -> None:
+        rows = doubted[part]
+        lift = LIFT * caster.surface_offset * geometry.surface_normal[rows][:, None]
+        # Of the texel on the page: hits land on the part outside its triangle as well.
+        square = geometry.squares(rows) + lift
+        middle = square.mean(axis=1, keepdims=True)
+        # All of the texel that is on its triangle: hits land all over it, though its light comes
+        # from the middle.
+        corners, ends = square.copy(), np.flatnonzero(~geometry.whole[rows])
+        spots = np.broadcast_to(_CORNERS, (len(ends), 4, 2))
+        corners[ends] = geometry.sample(rows[ends], spots, 1.0) + lift[ends]
+        centre = geometry.position[rows][:, None] + lift
+        from_centre = corners - centre
+        cut = ~_segments_free(caster, centre + INSET * from_centre, _EDGES)
+        doubtful = ~_segments_free(caster, middle + OUTSET * (square - middle), _DIAGONALS) & ~cut
+        some = np.flatnonzero(doubtful)
+        cut[some] = ~_segments_free(caster, centre[some] + INSET * from_centre[some], _DIAGONALS)
+        spots = geometry.sample(rows, np.broadcast_to(_SPOTS, (len(rows), *_SPOTS.shape)), 1.0)
+        below = below_hood(geometry, caster, rows, spots)
+        result.rim[rows] = below.any(axis=1) & ~below.all(axis=1)
+        result.hooded[rows] = below.all(axis=1) & ~cut
+        result.cut[rows], result.touched[rows] = cut, doubtful & ~cut & ~result.rim[rows]
+
+    yield from chunk_steps(find, len(doubted), CHUNK, threads)
+    return result
+
+
+def below_hood(geometry: TexelGeometry, caster: RayCaster, texel: Array, spots: Array) -> Array:
+    """Return (n, k) whether something is close above (n, k, 3) spots on texels."""
+    lift, normal = LIFT * caster.surface_offset, geometry.surface_normal[texel]
+    square = geometry.squares(texel)
+    width = np.linalg.norm(square[:, 2] - square[:, 0], axis=1) / np.sqrt(2.0)
+    height = np.maximum(HOOD * width, 2.0 * lift)
+    probes = np.broadcast_to(normal[:, None], spots.shape).reshape(-1, 3)
+    start = (spots + lift * normal[:, None]).reshape(-1, 3)
+    free = caster.visible(start, probes, np.repeat(height - lift, spots.shape[1]))
+    return np.asarray(~free.reshape(spots.shape[:2]))
+
+
+def _segments_free(caster: RayCaster, corners: Array, segments: Array) -> Array:
+    """Return (n,) whether all segments, pairs of (n, 4, 3) corners, meet nothing."""
+    return np.asarray(_free(caster, corners[:, segments[:, 0]], corners[:, segments[:, 1]]).all(axis=1))
+
+
+def _free(caster: RayCaster, start: Array, end: Array) -> Array:
+    """Return (n, k) whether segments between (n, k, 3) points meet nothing."""
+    along = (end - start).reshape(-1, 3)
+    length = np.linalg.norm(along, axis=1)
+    directions = along / np.maximum(length, 1e-300)[:, None]
+    free = caster.visible(start.reshape(-1, 3), directions, length)
+    return free.reshape(start.shape[:2])

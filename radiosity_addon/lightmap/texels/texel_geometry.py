@@ -1,0 +1,346 @@
+"""Where every lightmap texel lies in the world, over all pages at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...base.scratch import Scratch, tiles
+from ...rays.caster import Hits, surface_offset
+from ...scene.scene import Scene
+from .rasterize import FOOTPRINT, Texels, sample_footprints
+
+NO_TEXEL = -1
+
+EDGE_OFFSETS = 4.0
+"""Points keep this many ray offsets from the edges of their triangles."""
+
+SINK = 2.0
+"""Points that lie against another surface are so many ray offsets behind their own."""
+
+CHUNK = 1 << 16
+"""Texels placed at once; bounds the temporaries to about 40 MB."""
+
+_SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+
+
+class TexelGeometry:
+    """The n covered texels of all pages, numbered page by page.
+
+    Parameters
+    ----------
+    scene : Scene
+    uv : (t, 3, 2) float32
+        Lightmap coordinates of every scene triangle; rows without a lightmap are ignored.
+    page_of_triangle : (t,) int32
+        −1 where a triangle has no lightmap.
+    texels : sequence of Texels
+        One per page.
+    rows : sequence of (p,) int
+        Per page, the scene triangle of each of the page's triangles.
+    scratch : Scratch or None
+        Makes the texels' arrays; None keeps them in memory.
+
+    Attributes
+    ----------
+    scratch : Scratch
+        Makes arrays of what else there is of each texel.
+    uv, page_of_triangle, triangles, face_normals, normals
+        Of every scene triangle, as given.
+    page : (n,) int16, or int32 where there are more pages
+    row, column, triangle : (n,) int32
+    share : (n,) float32
+        What part of the texel its triangle covers.
+    centre_inside : (n,) bool
+        Whether the texel's centre is on its triangle.
+    whole : (n,) bool
+        Whether all of the texel is.
+    barycentric : (n, 2) float32
+        Weights of the triangle's second and third corner at the centre of the footprint.
+    position, normal, surface_normal : (n, 3) float64
+        Centre of the footprint; interpolated shading normal; the triangle's own normal.
+    """
+
+    scratch = Scratch()
+
+    def __init__(
+        self,
+        scene: Scene,
+        uv: Array,
+        page_of_triangle: Array,
+        texels: Sequence[Texels],
+        rows: Sequence[Array],
+        scratch: Scratch | None = None,
+    ) -> None:
+        self.scratch = scratch = scratch or Scratch()
+        self._scene = scene
+        self.uv, self.page_of_triangle = uv, page_of_triangle
+        self.triangles, self.face_normals, self.normals = scene.triangles, scene.face_normals, scene.normals
+        self._first = np.cumsum([0] + [len(page) for page in texels])
+        count = int(self._first[-1])
+        self.index = []
+        """per page (height, width) int32: the texel's number, or NO_TEXEL"""
+        for number, page in enumerate(texels):
+            numbers = np.full((page.resolution,) * 2, NO_TEXEL, dtype=np.int32)
+            for tile in tiles(len(page)):
+                own = np.arange(tile.start, tile.stop)
+                numbers[page.row[tile], page.column[tile]] = self._first[number] + own
+            self.index.append(numbers)
+        self.texels = self._joined(texels)
+        self.page = scratch.empty(count, np.int16 if len(texels) <= np.iinfo(np.int16).max else np.int32)
+        self.triangle, self.whole = scratch.empty(count, np.int32), scratch.empty(count, np.bool_)
+        self._inset = _edge_inset(scene)
+        self.surface_normal = scratch.empty((count, 3))
+        self.barycentric = scratch.empty((count, 2), np.float32)
+        self.position, self.normal = scratch.empty((count, 3)), scratch.empty((count, 3))
+        for number, (of, page) in enumerate(zip(rows, self.texels, strict=True)):
+            for tile in tiles(len(page), CHUNK):
+                mine = slice(self._first[number] + tile.start, self._first[number] + tile.stop)
+                triangle = of[page.triangle[tile]]
+                self.page[mine], self.triangle[mine] = number, triangle
+                self.whole[mine] = page.area[tile] >= 1.0
+                self.surface_normal[mine] = scene.face_normals[triangle]
+                centroid = page.centroid[tile].astype(np.float64)
+                self._put(mine, self._drawn_in(centroid[:, None], triangle)[:, 0])
+
+    def _joined(self, texels: Sequence[Texels]) -> list[Texels]:
+        """Put the pages' texels one after the other; return them as views of the whole."""
+        names = ("row", "column", "centre_inside", "area")
+        if len(texels) == 1:
+            (only,) = texels
+            self.row, self.column, self.centre_inside, self.share = (getattr(only, name) for name in names)
+            return [only]
+        whole = {}
+        for name in names:
+            parts = [getattr(page, name) for page in texels]
+            whole[name] = self.scratch.empty(int(self._first[-1]), parts[0].dtype if parts else np.int32)
+            for first, part in zip(self._first, parts, strict=False):
+                for tile in tiles(len(part)):
+                    whole[name][first + tile.start : first + tile.stop] = part[tile]
+        self.row, self.column, self.centre_inside, self.share = (whole[name] for name in names)
+        rows = [slice(first, first + len(page)) for first, page in zip(self._first, texels, strict=False)]
+        return [
+            replace(
+                page,
+                row=self.row[mine],
+                column=self.column[mine],
+                centre_inside=self.centre_inside[mine],
+                area=self.share[mine],
+            )
+            for mine, page in zip(rows, texels, strict=True)
+        ]
+
+    def _put(self, rows: slice, weights: Array) -> None:
+        """Put texels where barycentric weights (r, 3) of their triangles say."""
+        triangle, upright = self.triangle[rows], self.surface_normal[rows]
+        self.barycentric[rows] = weights[:, 1:]
+        self.position[rows] = self._sunk(rows, _at(self.triangles[triangle], weights[:, None]))[:, 0]
+        shading = np.einsum("nc,nck->nk", weights, self.normals[triangle])
+        length = np.linalg.norm(shading, axis=1, keepdims=True)
+        # A shading normal that vanished or turned behind the surface says nothing.
+        sane = (length[:, 0] > 1e-6) & (np.einsum("nk,nk->n", shading, upright) > 0)
+        self.normal[rows] = np.where(sane[:, None], shading / np.maximum(length, 1e-6), upright)
+
+    def __len__(self) -> int:
+        return len(self.page)
+
+    @cached_property
+    def texel_size(self) -> float:
+        """Width of a texel in the world [m], the median."""
+        if not len(self):
+            return 1.0
+        # The median of every texel's area, by how many there are of each triangle.
+        order = np.argsort(self.texel_area, kind="stable")
+        ends = np.cumsum(self.counts[order])
+        middle = np.searchsorted(ends, [(len(self) - 1) // 2, len(self) // 2], side="right")
+        return float(np.sqrt(self.texel_area[order[middle]].mean()))
+
+    @cached_property
+    def counts(self) -> Array:
+        """(t,) int64: how many texels each triangle has."""
+        found = np.zeros(len(self.triangles), dtype=np.int64)
+        for tile in tiles(len(self)):
+            some, count = np.unique(self.triangle[tile], return_counts=True)
+            found[some] += count
+        return found
+
+    @cached_property
+    def texel_area(self) -> Array:
+        """(t,) float64: what a texel is of every triangle [m²]; endless where it has none of a page."""
+        edges = self.uv[:, 1:].astype(np.float64) - self.uv[:, :1]
+        flat = 0.5 * np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
+        flat *= np.array([len(numbers) ** 2 for numbers in self.index])[np.maximum(self.page_of_triangle, 0)]
+        # Far below what single-precision UVs can enclose, and far enough from 0 for any area.
+        return np.asarray(self._scene.areas / np.maximum(flat, 1e-200))
+
+    @property
+    def reach(self) -> Array:
+        """(n,) float64: no point of a texel is farther from another one of it [m]."""
+        across, up = self._texel_edges
+        return np.asarray((np.linalg.norm(across, axis=1) + np.linalg.norm(up, axis=1))[self.triangle])
+
+    def on(self, scene: Scene) -> TexelGeometry:
+        """Return the same texels over a scene whose triangles have moved."""
+        rows = [np.flatnonzero(self.page_of_triangle == page) for page in range(len(self.texels))]
+        return TexelGeometry(scene, self.uv, self.page_of_triangle, self.texels, rows, self.scratch)
+
+    def first(self, page: int) -> int:
+        """Return the number of a page's first texel."""
+        return int(self._first[page])
+
+    def sample(self, rows: Array, u: Array, width: float = FOOTPRINT) -> Array:
+        """Return (r, k, 3) points spread over the middle `width` of r texels by u (r, k, 2)."""
+        points = np.empty((len(rows), u.shape[1], 3))
+        # What is inside a texel that is whole on its triangle needs no clipping.
+        inner = self.whole[rows] & ((width < 1.0) | ((u > 0.0) & (u < 1.0)).all(axis=(1, 2)))
+        plain, cut = np.flatnonzero(inner), np.flatnonzero(~inner)
+        points[plain] = self._in_plane(rows[plain], 0.5 + (u[plain].astype(np.float64) - 0.5) * width)
+        corners = self._scene.triangles[self.triangle[rows[cut]]]
+        points[cut] = _at(corners, self.sample_weights(rows[cut], u[cut], width))
+        return self._sunk(rows, points)
+
+    def _sunk(self, rows: Array | slice, points: Array) -> Array:
+        """Move points (r, k, 3) that lie against another surface behind their own, which stops their rays.
+
+        Rays that start above would pass the surface that the texel lies on.
+        """
+        layers = self._scene.layers
+        pressed = np.flatnonzero(layers.pressed_triangles[self.triangle[rows]])
+        if len(pressed) == 0:
+            return points
+        triangle = np.repeat(self.triangle[rows][pressed], points.shape[1])
+        chosen = points[pressed].reshape(-1, 3)
+        sunk = layers.is_pressed(triangle, layers.weights(2 * triangle.astype(np.int64), chosen))
+        depth = SINK * surface_offset(self.triangles)
+        chosen[sunk] -= depth * self.face_normals[triangle[sunk]]
+        points[pressed] = chosen.reshape(-1, *points.shape[1:])
+        return points
+
+    def squares(self, rows: Array) -> Array:
+        """Return (r, 4, 3) the corners of whole texels, in their triangles' planes but not cut by them."""
+        return self._in_plane(rows, np.broadcast_to(_SQUARE, (len(rows), 4, 2)))
+
+    def _in_plane(self, rows: Array, spots: Array) -> Array:
+        """Return (r, k, 3) points in the triangles' planes at places (r, k, 2) of texels as unit squares."""
+        triangle = self.triangle[rows]
+        start = np.stack([self.column[rows], self.row[rows]], axis=1) - self._places[triangle, :2]
+        across, up = self._texel_edges
+        points = spots[..., :1] * across[triangle, None]
+        points += spots[..., 1:] * up[triangle, None]
+        first = self._scene.triangles[triangle, 0]
+        points += (first + start[:, :1] * across[triangle] + start[:, 1:] * up[triangle])[:, None]
+        return np.asarray(points)
+
+    @cached_property
+    def _texel_edges(self) -> tuple[Array, Array]:
+        """(t, 3) float64 twice: the way to the next texel of the row, and of the column; 0 without area."""
+        edges = self._scene.triangles[:, 1:] - self._scene.triangles[:, :1]
+        place = self._places.astype(np.float64)
+        first, second = place[:, 2:4], place[:, 4:6]
+        whole = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+        part = np.where(whole == 0.0, 0.0, 1.0 / np.where(whole == 0.0, 1.0, whole))[:, None]
+        across = (second[:, 1:] * edges[:, 0] - first[:, 1:] * edges[:, 1]) * part
+        up = (first[:, :1] * edges[:, 1] - second[:, :1] * edges[:, 0]) * part
+        return across, up
+
+    def sample_weights(self, rows: Array, u: Array, width: float = FOOTPRINT) -> Array:
+        """Return (r, k, 3) the barycentric weights of the same points in the texels' triangles."""
+        weights = np.empty((len(rows), u.shape[1], 3))
+        for number, page in enumerate(self.texels):
+            mine = np.flatnonzero(self.page[rows] == number)
+            if len(mine) == 0:
+                continue
+            local = rows[mine] - self._first[number]
+            inside = sample_footprints(page.take(local), u[mine], width)
+            weights[mine] = self._drawn_in(inside, self.triangle[rows[mine]])
+        return weights
+
+    def _drawn_in(self, weights: Array, triangle: Array) -> Array:
+        """Move (n, k, 3) barycentric points that lie on an edge of their triangle off it by a hair."""
+        inside = np.maximum(weights, self._inset[triangle][:, None])
+        moved = (inside != weights).any(axis=2, keepdims=True)
+        return np.asarray(np.where(moved, inside / inside.sum(axis=2, keepdims=True), weights))
+
+    def neighbourhood(self, chosen: Array) -> Array:
+        """Grow a (n,) mask of texels by one texel in all eight directions of their page."""
+        grown = np.empty(len(self), dtype=bool)
+        for page, (numbers, inside) in enumerate(zip(self.index, self._framed, strict=True)):
+            mine = slice(self._first[page], self._first[page + 1])
+            image = np.zeros((len(numbers) + 2, numbers.shape[1] + 2), dtype=bool)
+            flat, own, result = image.ravel(), chosen[mine], grown[mine]
+            for tile in tiles(len(inside)):
+                flat[inside[tile]] = own[tile]
+            image[1:-1] = image[1:-1] | image[:-2] | image[2:]
+            image[:, 1:-1] = image[:, 1:-1] | image[:, :-2] | image[:, 2:]
+            for tile in tiles(len(inside)):
+                result[tile] = flat.take(inside[tile])
+        return grown
+
+    @cached_property
+    def _framed(self) -> list[Array]:
+        """Per page, where its texels lie in a page that is one texel larger all around, row by row."""
+        framed = [self.scratch.empty(len(page), np.int32) for page in self.texels]
+        for page, places in zip(self.texels, framed, strict=True):
+            for tile in tiles(len(page)):
+                places[tile] = (page.row[tile] + 1) * (page.resolution + 2) + page.column[tile] + 1
+        return framed
+
+    def positions_of(self, hits: Hits) -> Array:
+        """Return (h, 3) where rays hit; meaningless without a hit."""
+        weights = np.concatenate([np.zeros((len(hits.triangle), 1)), hits.barycentric], axis=1)
+        return _at(self._scene.triangles[hits.triangle], weights[:, None])[:, 0]
+
+    def texel_at(self, hits: Hits) -> Array:
+        """Return (h,) int32: the texel under each ray's hit; NO_TEXEL on backs and unbaked surfaces."""
+        found = np.full(len(hits.triangle), NO_TEXEL, dtype=np.int32)
+        baked = (hits.triangle >= 0) & hits.front
+        baked &= self.page_of_triangle[hits.triangle] >= 0
+        rows = np.flatnonzero(baked)
+        triangle = hits.triangle[rows]
+        place = self._places.take(triangle, axis=0)
+        second, third = hits.barycentric[rows, 0], hits.barycentric[rows, 1]
+        column = place[:, 0] + second * place[:, 2] + third * place[:, 4]
+        row = place[:, 1] + second * place[:, 3] + third * place[:, 5]
+        page = self.page_of_triangle[triangle] if len(self.index) > 1 else None
+        for number, numbers in enumerate(self.index):
+            mine = slice(None) if page is None else np.flatnonzero(page == number)
+            last = np.float32(len(numbers) - 1)
+            at = np.clip(row[mine], 0, last).astype(np.int64) * len(numbers)
+            at += np.clip(column[mine], 0, last).astype(np.int64)
+            found[rows[mine]] = numbers.ravel()[at]
+        return found
+
+    @cached_property
+    def _places(self) -> Array:
+        """(t, 6) float32: each triangle's first corner on its page and its edges from there, in texels."""
+        sizes = np.array([len(numbers) for numbers in self.index], dtype=np.float64)
+        corners = self.uv * sizes[np.maximum(self.page_of_triangle, 0)][:, None, None]
+        edges = corners[:, 1:] - corners[:, :1]
+        places = np.concatenate([corners[:, 0], edges[:, 0], edges[:, 1]], axis=1)
+        return np.asarray(places, dtype=np.float32)
+
+
+def _edge_inset(scene: Scene) -> Array:
+    """Return (t, 3) float64: the least barycentric weights of a point a few ray offsets inside.
+
+    A point on the very edge of a wall, lifted off it, would start in or behind the next wall
+    and see out of a closed room.
+    """
+    edges = np.roll(scene.triangles, -1, axis=1) - np.roll(scene.triangles, 1, axis=1)
+    heights = 2.0 * scene.areas[:, None] / np.maximum(np.linalg.norm(edges, axis=2), 1e-300)
+    inset = EDGE_OFFSETS * surface_offset(scene.triangles) / np.maximum(heights, 1e-300)
+    return np.asarray(np.minimum(inset, 0.25))
+
+
+def _at(corners: Array, weights: Array) -> Array:
+    """Return (n, k, 3) points at (n, k, 3) barycentric weights of (n, 3, 3) triangles.
+
+    Along the edges from the first corner, whose own weight is not used: float32 weights that
+    do not quite sum to 1 cannot lift a point off a plane far from the origin.
+    """
+    edges = corners[:, 1:] - corners[:, :1]
+    return np.asarray(corners[:, :1] + weights[:, :, 1:].astype(np.float64) @ edges)

@@ -1,0 +1,397 @@
+"""Lightmap UVs for all objects of a bake: charts, pages, and what becomes of UVs to keep.
+
+Kept UVs (an existing layer) stay as they are, bit for bit, wherever that is possible: on an
+object's own page always, on a shared page when all objects bring UVs and none lies over another's.
+Otherwise each object's kept layout is packed, as one chart of unchanged shape, beside the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.bake_warning import BakeWarning
+from ...base.errors import BakeError
+from ..texels.rasterize import coverage_sum
+from .chart_growers import PatientGrower
+from .charts import Charts, unwrap
+from .flatten import rescale_to_area, signed_double_area
+from .greedy import greedy_object, share_of
+from .packing import Limits, Packing, pack
+from .pages import least_pages, shared_out
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+Int = NDArray[np.int64]
+
+_PROBE = 1024
+"""Kept UVs are searched for overlaps at no more than this resolution: a finer one finds no larger ones."""
+
+_OVERLAP = 1.01
+"""A texel filled to more than this holds triangles that lie over each other."""
+
+_COLLAPSED = 1e-6
+"""Kept UVs whose area is less than this share of their extent, squared, are a line but for rounding."""
+
+
+@dataclass(frozen=True)
+class AtlasInput:
+    """One object to lay out.
+
+    Parameters
+    ----------
+    name : str
+    triangles : (n, 3, 3) float
+        Corners in world space [m].
+    polygon : (n,) int
+        The polygon of each triangle: it stays in one chart.
+    uv : (n, 3, 2) float32 or None
+        UVs to keep; None to unwrap.
+    scale : float
+        Its texels per metre, relative to the other objects.
+    """
+
+    name: str
+    triangles: Float
+    polygon: NDArray[np.int32]
+    uv: Float32 | None = None
+    scale: float = 1.0
+
+
+@dataclass(frozen=True)
+class AtlasOptions:
+    """How objects are laid out.
+
+    Parameters
+    ----------
+    resolution : int
+        Width and height of a page, if no density is given.
+    texel_density : float or None
+        Texels per metre; pages become as large as that needs, multiples of 4.
+    shared : bool
+        All objects on common pages, or each on its own.
+    pages : int
+        How many pages the objects share, if no density is given; with one, as many as it takes.
+    limits : Limits
+        Of every page.
+    unwrap_seconds : float
+        After so long an object's rest is cut into charts by the directions its faces look.
+    """
+
+    resolution: int = 512
+    texel_density: float | None = None
+    shared: bool = True
+    pages: int = 1
+    limits: Limits = field(default_factory=Limits)
+    unwrap_seconds: float = 60.0
+
+
+@dataclass(frozen=True)
+class AtlasObject:
+    """Where one object lies: its UVs (n, 3, 2) float32 in [0, 1], v up, and its page."""
+
+    uv: Float32
+    page: int
+
+
+@dataclass(frozen=True)
+class AtlasPage:
+    """One page.
+
+    Parameters
+    ----------
+    resolution : int
+        Width and height in texels.
+    density : float
+        Texels per metre of objects at scale 1, the mean over all their surface; 0 if there is none.
+    utilisation : float
+        The share of the page that charts cover, 0 to 1.
+    """
+
+    resolution: int
+    density: float
+    utilisation: float
+
+
+@dataclass(frozen=True)
+class Atlas:
+    """All objects, in the order they were given, and the pages they lie on."""
+
+    objects: tuple[AtlasObject, ...]
+    pages: tuple[AtlasPage, ...]
+    warnings: tuple[BakeWarning, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """One object's charts, and whether they are UVs to keep."""
+
+    source: AtlasInput
+    charts: Charts
+    kept: bool
+
+
+def build_atlas(objects: Sequence[AtlasInput], options: AtlasOptions) -> Iterator[float | Atlas]:
+    """Lay out all objects; yields the fraction done now and then, and at the end the `Atlas`.
+
+    Parameters
+    ----------
+    objects : sequence of AtlasInput
+    options : AtlasOptions
+
+    Raises
+    ------
+    BakeError
+        If there is nothing to lay out, or the density needs a page that is too large.
+    """
+    if not objects:
+        raise BakeError("there is no mesh to lay out: give an object with faces to bake")
+    warnings: list[BakeWarning] = []
+    layouts: list[_Layout] = []
+    total = sum(len(source.triangles) for source in objects)
+    done = 0
+    # A density's page is not known yet, and may be as large as any.
+    probe = _PROBE if options.texel_density is not None else min(options.resolution, _PROBE)
+    for source in objects:
+        layout = None
+        for layout in _lay_flat(source, probe, warnings, options.unwrap_seconds):
+            share = float((layout.charts.chart >= 0).mean()) if len(source.triangles) else 0.0
+            yield 0.7 * (done + share * len(source.triangles)) / max(total, 1)
+        assert layout is not None
+        layouts.append(layout)
+        done += len(source.triangles)
+
+    for laid in _lay_on_pages(layouts, options):
+        if laid is None:
+            yield 0.7
+    assert laid is not None
+    placed: list[AtlasObject | None] = [None] * len(layouts)
+    for number, (group, packing) in enumerate(laid):
+        if packing.crowded:
+            warnings.append(_crowded([layouts[each] for each in group], packing.resolution))
+        ends = np.cumsum([len(layouts[each].source.triangles) for each in group])
+        for each, uv in zip(group, np.split(packing.uv, ends[:-1]), strict=True):
+            placed[each] = AtlasObject(uv, number)
+    pages = tuple(_page(packing) for _, packing in laid)
+    yield Atlas(tuple(each for each in placed if each is not None), pages, tuple(warnings))
+
+
+def run_atlas(
+    objects: Sequence[AtlasInput],
+    resolution: int = 512,
+    texel_density: float | None = None,
+    shared: bool = True,
+    **options: Any,
+) -> Atlas:
+    """Run `build_atlas` through and return the `Atlas`."""
+    *_, result = build_atlas(objects, AtlasOptions(resolution, texel_density, shared, **options))
+    assert isinstance(result, Atlas)
+    return result
+
+
+_Laid = list[tuple[list[int], Packing]]
+"""Per page the numbers of its objects, and how they lie there."""
+
+
+def _lay_on_pages(layouts: list[_Layout], options: AtlasOptions) -> Iterator[_Laid | None]:
+    """Pack objects on as many pages as are asked for or needed; None now and then, at last the pages."""
+    density = options.texel_density
+    surfaces = [_surface([layout]) * layout.source.scale**2 for layout in layouts]
+    count = len(layouts)
+    if options.shared:
+        count = options.pages
+        if density is not None:
+            count = least_pages(sum(surfaces), density, options.limits.largest)
+    while True:
+        groups = shared_out(surfaces, count) if options.shared else [[each] for each in range(count)]
+        laid: _Laid = []
+        try:
+            for group in groups:
+                packing = None
+                for trial in _pack_group([layouts[each] for each in group], options):
+                    packing = trial or packing
+                    yield None
+                assert packing is not None
+                laid.append((group, packing))
+        except BakeError:
+            # What does not fit at the density asked for may fit on more pages.
+            if density is None or len(groups) == len(layouts):
+                raise
+            count = max(count, len(groups)) + 1
+            continue
+        yield laid
+        return
+
+
+def _pack_group(group: list[_Layout], options: AtlasOptions) -> Iterator[Packing | None]:
+    """Lay out one page, its kept UVs as they are where that is possible."""
+    kept = _kept_as_they_are(group, options.resolution, options.texel_density, options.limits.largest)
+    if kept is not None:
+        yield kept
+        return
+    yield from _pack_page(group, options.resolution, options.texel_density, options.limits)
+
+
+def _lay_flat(
+    source: AtlasInput, probe: int, warnings: list[BakeWarning], seconds: float
+) -> Iterator[_Layout]:
+    """Cut one object into charts, or take the UVs it has."""
+    triangles = np.asarray(source.triangles, dtype=np.float64).reshape(-1, 3, 3)
+    if source.uv is not None:
+        kept = _kept_charts(source, triangles, probe, warnings)
+        if kept is not None:
+            yield _Layout(source, _scaled(kept, source.scale), kept=True)
+            return
+    if not len(triangles):
+        yield _Layout(source, Charts(np.zeros((0, 3, 2)), np.zeros(0, dtype=np.int64), 0), kept=False)
+        return
+    grower = PatientGrower(seconds)
+    for charts in unwrap(triangles, np.asarray(source.polygon, dtype=np.int64), grower):
+        yield _Layout(source, _scaled(charts, source.scale), kept=False)
+    if grower.gave_up:
+        warnings.append(
+            BakeWarning(
+                source.name,
+                f"object '{source.name}' took more than {seconds:g} s to unwrap; the rest of it was cut by "
+                "the directions its faces look, which makes more seams: give it a UV layer Lightmap and "
+                "keep UVs, or simplify it",
+            )
+        )
+
+
+def _scaled(charts: Charts, scale: float) -> Charts:
+    """Return an object's charts at its own scale; one that is 1 changes no bit."""
+    return charts if scale == 1.0 else replace(charts, uv=charts.uv * scale)
+
+
+def _kept_charts(
+    source: AtlasInput, triangles: Float, probe: int, warnings: list[BakeWarning]
+) -> Charts | None:
+    """Take an object's UVs as one chart at world scale; None, with a warning, if they are useless.
+
+    Overlaps are searched for on a page of `probe` texels a side.
+    """
+    assert source.uv is not None
+    uv = source.uv.astype(np.float64)
+    if not np.isfinite(uv).all() or not _has_area(uv):
+        warnings.append(
+            BakeWarning(source.name, "its Lightmap UVs have no area or are not numbers; unwrapped anew")
+        )
+        return None
+    if uv.min() < -1e-6 or uv.max() > 1 + 1e-6:
+        warnings.append(
+            BakeWarning(source.name, "its Lightmap UVs leave the unit square; what is outside gets no light")
+        )
+    elif (coverage_sum(source.uv, probe) > _OVERLAP).any():
+        warnings.append(
+            BakeWarning(source.name, "its Lightmap UVs overlap; faces that share texels show the same light")
+        )
+    chart = np.zeros(len(uv), dtype=np.int64)
+    return Charts(rescale_to_area(uv, triangles, chart, 1), chart, 1)
+
+
+def _has_area(uv: Float) -> bool:
+    """Whether (n, 3, 2) UVs cover more than rounding leaves of a line or a point."""
+    area = np.abs(signed_double_area(uv)).sum()
+    return bool(area > _COLLAPSED * (np.ptp(uv.reshape(-1, 2), axis=0) ** 2).sum())
+
+
+def _kept_as_they_are(
+    group: list[_Layout], resolution: int, density: float | None, largest: int
+) -> Packing | None:
+    """Return the page of kept UVs left bit for bit, None if they must be packed."""
+    if not all(layout.kept for layout in group):
+        return None
+    kept = [layout.source.uv for layout in group if layout.source.uv is not None]
+    uv = np.concatenate(kept).astype(np.float32, copy=False)
+    if len(group) > 1 and not _apart(kept, min(resolution, _PROBE)):
+        return None
+    surface = _surface(group)
+    flat = float(0.5 * np.abs(signed_double_area(uv.astype(np.float64))).sum())
+    if density is not None:
+        size = density * np.sqrt(surface / flat)
+        if not size <= largest:
+            raise BakeError(
+                f"a texel density of {density:g} px/m needs a page above {largest} px for the kept "
+                f"UVs of {group[0].source.name}: lower the density"
+            )
+        resolution = max(4, 4 * int(np.ceil(size / 4)))
+    return Packing(uv, resolution, resolution * float(np.sqrt(flat / surface)) if surface > 0 else 0.0)
+
+
+def _apart(layouts: list[Float32], resolution: int) -> bool:
+    """Return whether no object's UVs lie over another's (nor wholly outside the page)."""
+    taken = np.zeros((resolution, resolution))
+    for uv in layouts:
+        if uv.min() < -1e-6 or uv.max() > 1 + 1e-6:
+            return False
+        # An object that overlaps itself is its own affair.
+        taken += np.minimum(coverage_sum(uv, resolution), 1.0)
+    return not (taken > _OVERLAP).any()
+
+
+def _pack_page(
+    group: list[_Layout], resolution: int, density: float | None, limits: Limits
+) -> Iterator[Packing | None]:
+    """Pack the charts of several objects together; triangles without area get a harmless place."""
+    uv = np.concatenate([layout.charts.uv for layout in group])
+    first = np.cumsum([0] + [layout.charts.count for layout in group])
+    chart = np.concatenate(
+        [
+            np.where(layout.charts.chart >= 0, layout.charts.chart + start, -1)
+            for layout, start in zip(group, first[:-1], strict=True)
+        ]
+    )
+    used = np.flatnonzero(chart >= 0)
+    if not len(used):
+        yield Packing(np.full(uv.shape, 0.5, dtype=np.float32), resolution if density is None else 4, 0.0)
+        return
+    for packing in pack(uv[used], chart[used], resolution, density, limits):
+        if packing is None:
+            yield None
+            continue
+        pages = np.empty(uv.shape, dtype=np.float32)
+        pages[used] = packing.uv
+        _park(pages, chart, [len(layout.source.triangles) for layout in group])
+        yield Packing(pages, packing.resolution, packing.density, packing.crowded)
+
+
+def _park(uv: Float32, chart: Int, lengths: list[int]) -> None:
+    """Put triangles without area on a corner of their own object, else of the page's first."""
+    start = 0
+    fallback = uv[np.flatnonzero(chart >= 0)[0], 0].copy()
+    for length in lengths:
+        rows = np.arange(start, start + length)
+        placed = rows[chart[rows] >= 0]
+        uv[rows[chart[rows] < 0]] = uv[placed[0], 0] if len(placed) else fallback
+        start += length
+
+
+def _page(packing: Packing) -> AtlasPage:
+    area = 0.5 * np.abs(signed_double_area(packing.uv.astype(np.float64))).sum()
+    return AtlasPage(packing.resolution, packing.density, min(float(area), 1.0))
+
+
+def _surface(group: list[_Layout]) -> float:
+    """Return the area of all triangles [m²]."""
+    corners = np.concatenate([np.asarray(layout.source.triangles, dtype=np.float64) for layout in group])
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return float(0.5 * np.linalg.norm(cross, axis=1).sum())
+
+
+def _crowded(group: list[_Layout], resolution: int) -> BakeWarning:
+    count = sum(layout.charts.count for layout in group)
+    surfaces = [_surface([layout]) * layout.source.scale**2 for layout in group]
+    greedy = greedy_object([layout.source.name for layout in group], surfaces)
+    fix = "raise the resolution or the number of pages"
+    if greedy is not None:
+        taken = share_of(max(surfaces), sum(surfaces))
+        fix = f"object '{greedy}' takes {taken} of the surface; lower its texel scale"
+    return BakeWarning(
+        group[0].source.name if len(group) == 1 else greedy or "atlas",
+        f"{resolution} px is too small to keep {count} charts apart, so light bleeds between them; {fix}",
+    )

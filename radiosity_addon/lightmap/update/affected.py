@@ -1,0 +1,120 @@
+"""What of a lit scene may change when some of its triangles move: texels, and what rays hit.
+
+Whatever is not named here is as it was. All is judged to the safe side.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...rays.caster import RayCaster
+from ...rays.embree import EmbreeCaster
+from ...solver.gather.boxes import Boxes
+from ...solver.gather.retracing import STALE, Moved
+from ..lighting.part_links import HitNumbers
+from ..lighting.traced_texels import TracedTexels
+from ..texels.occlusion import LIFT, Crossings
+from ..texels.terminator import SmoothLift
+from ..texels.texel_geometry import TexelGeometry
+
+NEAR = 1.5
+"""What is farther from a texel than this many times its size neither touches nor hoods it."""
+
+MARGIN = 4.0
+"""Boxes are this many surface offsets larger than what moved."""
+
+
+@dataclass(frozen=True, eq=False)
+class Disturbance:
+    """Some triangles moved.
+
+    Attributes
+    ----------
+    before, geometry : TexelGeometry
+        As it was, and is.
+    moved : (t,) bool
+        Triangles that are elsewhere.
+    boxes : Boxes
+        Around them, where they were and where they are.
+    """
+
+    before: TexelGeometry
+    geometry: TexelGeometry
+    moved: Array
+    boxes: Boxes
+
+    @staticmethod
+    def of(before: TexelGeometry, geometry: TexelGeometry, parts: list[Array], offset: float) -> Disturbance:
+        """Compare texels; `parts` are the rows of the triangles of each object that moved."""
+        moved = np.zeros(len(geometry.triangles), dtype=bool)
+        for rows in parts:
+            moved[rows] = True
+        places = [triangles[rows] for rows in parts for triangles in (before.triangles, geometry.triangles)]
+        return Disturbance(before, geometry, moved, Boxes.around(places, MARGIN * offset))
+
+    @cached_property
+    def texels(self) -> Array:
+        """(n,) bool: those that moved."""
+        return np.asarray(self.moved[self.geometry.triangle])
+
+    def traced(self, before: RayCaster) -> Moved:
+        """Return what tells the rays that what moved is in the way of; `before` casts those of before."""
+        return Moved(self.boxes, self._alone, before)
+
+    @cached_property
+    def _alone(self) -> RayCaster:
+        both = [some.triangles[self.moved] for some in (self.before, self.geometry)]
+        return EmbreeCaster(np.concatenate(both), threads=1)
+
+    @cached_property
+    def near(self) -> Array:
+        """(n,) bool: texels that moved, and those that what moved may stand on, touch or hood."""
+        geometry = self.geometry
+        return self.texels | self.boxes.near(geometry.position, NEAR * geometry.reach)
+
+    @cached_property
+    def widen(self) -> Array:
+        """(n,) float64: how far from a texel's middle shadow rays start at most [m]."""
+        geometry = self.geometry
+        return np.asarray(geometry.reach + SmoothLift(geometry).heights[geometry.triangle])
+
+    def divided(self, one: Crossings, other: Crossings) -> Array:
+        """Return (n,) bool: texels that something divides or touches before or after, and that may differ."""
+        split = one.crossed | one.touched | one.hooded | other.crossed | other.touched | other.hooded
+        return np.asarray(self.near & ~self.texels & split)
+
+    def renumbered(self, traced: TracedTexels, numbers: HitNumbers, divided: Array) -> Array:
+        """Return (numbers,) int32: what each hit of before is numbered now, or STALE.
+
+        Stale is what moved, what is beside it, and parts of leaves that it may cut.
+
+        Parameters
+        ----------
+        divided : (n,) bool
+            See `divided`.
+        """
+        old, count = traced.numbers, traced.numbers.texel_count
+        now = np.arange(old.end, dtype=np.int32)
+        # A hit on a divided texel may have been answered by a neighbour.
+        texels = self.texels | self.geometry.neighbourhood(divided)
+        now[:count][texels] = STALE
+        now[count : old.first_cell][self._parts_near(numbers)] = STALE
+        cells = old.cells.renumbered(numbers.cells)
+        of = old.cells.texel_of(np.arange(len(cells)))
+        stale = (cells < 0) | texels[of]
+        now[old.first_cell :] = np.where(stale, STALE, cells + numbers.first_cell)
+        return now
+
+    def _parts_near(self, numbers: HitNumbers) -> Array:
+        """Return (parts,) bool: those of leaves that moved, or that a box touches."""
+        local = numbers.local
+        hierarchy, offset = local.hierarchy, LIFT * local.caster.surface_offset
+        elements = np.arange(hierarchy.n_elements)
+        low, high = local.parts.bounds(elements)
+        touched = self.boxes.touching(low - offset, high + offset)
+        touched |= self.moved[hierarchy.faces.triangle[hierarchy.face]]
+        return np.asarray(touched[local.parts.leaf_of(np.arange(len(local.parts)))])

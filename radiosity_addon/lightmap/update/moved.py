@@ -1,0 +1,156 @@
+"""Texels lit after something moved: what it does not touch keeps what its rays met.
+
+The order is that of `reconstruct.py`: direct light, crossings, gather points, parts, sweeps. Each step
+keeps what was found before and asks anew only where what moved was or is in the way. Sweeps then go over all
+texels, for indirect light changes everywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...base.progress import scaled
+from ...solver.gather.local_pass import LocalPass, values_of
+from ..lighting.part_links import HitNumbers, KnownParts, Parts, gather_parts
+from ..lighting.reconstruct import resolver
+from ..lighting.stored_links import StoredLinks
+from ..lighting.sweeps import LitTexels, TexelLight, TexelTransport, sweep_steps
+from ..lighting.traced_texels import KeptPoints, TracedTexels
+from ..lighting.warm_start import EarlierLight
+from ..texels.cells import TexelCells
+from ..texels.occlusion import crossing_steps
+from .affected import Disturbance
+from .moved_light import texel_gains
+from .moved_parts import known_parts, look_again, renumbered
+from .moved_points import MovedPoints
+
+DIRECT, CROSSED, GATHERED, PARTS = 0.2, 0.25, 0.65, 0.85
+"""How much is done when a part ends; rough, from rooms at medium quality."""
+
+
+@dataclass(frozen=True, eq=False)
+class LitBefore:
+    """A scene's texels before something moved.
+
+    Attributes
+    ----------
+    lit : LitTexels
+    traced : TracedTexels
+    local : LocalPass
+        Of the scene as it was.
+    """
+
+    lit: LitTexels
+    traced: TracedTexels
+    local: LocalPass
+
+
+def moved_steps(
+    before: LitBefore, local: LocalPass, disturbance: Disturbance
+) -> Generator[float, None, tuple[TexelLight, LocalPass]]:
+    """Light the texels of a scene in which something moved; yields the fraction done.
+
+    Parameters
+    ----------
+    before : LitBefore
+    local : LocalPass
+        Of the scene as it is, by the same elements with the light they had, able to ask for every light
+        apart.
+    disturbance : Disturbance
+
+    Returns
+    -------
+    light : TexelLight
+    local : LocalPass
+        With elements that are lit as their texels are.
+    """
+    lit, traced, geometry = before.lit, before.traced, disturbance.geometry
+    asked = texel_gains(lit.gains, local, before.local, disturbance)
+    gains = yield from scaled(asked, 0.0, DIRECT)
+    direct = local.lit_by(gains)
+    more = direct - local.lit_by(lit.gains)
+    local = _brightened(local, lit.element, more)
+    near = np.flatnonzero(disturbance.near)
+    found = crossing_steps(geometry, local.caster, local.threads, traced.crossings, near)
+    crossings = yield from scaled(found, DIRECT, CROSSED)
+    numbers = HitNumbers(local, TexelCells(local, geometry, crossings), len(geometry))
+    resolve = resolver(geometry, crossings, numbers)
+    divided = disturbance.divided(traced.crossings, crossings)
+    now = disturbance.renumbered(traced, numbers, divided)
+
+    where = local, before.local, disturbance, traced.settings, crossings, divided, resolve
+    bright = traced.bright | local.bright
+    stored = MovedPoints(*where, bright).steps(_renumbered(lit.transport.links, traced, now), traced.points)
+    links, points = yield from scaled(stored, CROSSED, GATHERED)
+
+    known: list[KnownParts] = []
+    kept = known_parts(lit.transport.parts.links, traced, numbers, now)
+    at, width = GATHERED, (PARTS - GATHERED) / (len(kept) + 1)
+    for some in kept:
+        again = look_again(some, numbers, before.local, disturbance, resolve)
+        known.append((yield from scaled(again, at, at + width)))
+        at += width
+    reflectance = lit.transport.reflectance
+    further = gather_parts(numbers, links, resolve, lit.element, reflectance, known)
+    links, parts = yield from scaled(further, at, PARTS)
+
+    transport = TexelTransport(links, parts, reflectance)
+    chosen, error = KeptPoints.of(points), traced.error
+    traced = TracedTexels(traced.settings, crossings, numbers, chosen, parts.small, bright, error)
+    start = _start(before, traced, local, parts, now)
+    of_texels = np.maximum(start[: len(geometry)] + reflectance * more, 0.0)
+    transport = replace(transport, parts=replace(parts, start=start[len(geometry) :]))
+    limits = lit.sweeps, lit.tolerance, local.threads, False
+    swept = sweep_steps(transport, of_texels, direct, local.beyond(), *limits, scratch=geometry.scratch)
+    light = yield from scaled(swept, PARTS, 1.0)
+    assert local.sources is not None  # it asks for lights apart
+    assert light.table is not None
+    earlier = EarlierLight(local.sources.strengths, light.table)
+    lit = replace(lit, transport=transport, gains=gains, earlier=earlier)
+    light = replace(light, error=error, kept=lit, traced=traced)
+    return light, _lit_as(local, lit.element, light)
+
+
+def _renumbered(links: StoredLinks, traced: TracedTexels, now: Array) -> StoredLinks:
+    """Return stored links with sources as hits are numbered now."""
+    aimed = replace(links.aimed, sources=renumbered(traced.numbered(links.aimed.sources), now))
+    return replace(links, sources=renumbered(traced.numbered(links.sources), now), aimed=aimed)
+
+
+def _brightened(local: LocalPass, element: Array, more: Array) -> LocalPass:
+    """Add what texels get more of lamps, (n, 3) [W/m²], to their elements' light, in the mean."""
+    change, _ = _means(local, element, more)
+    return local.with_irradiance(np.maximum(local.state.irradiance + change, 0.0))
+
+
+def _lit_as(local: LocalPass, element: Array, light: TexelLight) -> LocalPass:
+    """Give elements the mean light of their texels, where they have any."""
+    mean, count = _means(local, element, light.direct + light.indirect)
+    return local.with_irradiance(np.where(count[:, None] > 0, mean, local.state.irradiance))
+
+
+def _means(local: LocalPass, element: Array, values: Array) -> tuple[Array, Array]:
+    """Return (e, 3) texels' mean values over elements, and (e,) how many texels there are."""
+    rows, total = element >= 0, local.hierarchy.n_elements
+    count = np.bincount(element[rows], minlength=total)
+    sums = [np.bincount(element[rows], values[rows, channel], minlength=total) for channel in range(3)]
+    return np.stack(sums, axis=1) / np.maximum(count, 1)[:, None], count
+
+
+def _start(before: LitBefore, traced: TracedTexels, local: LocalPass, parts: Parts, now: Array) -> Array:
+    """Return (rows, 3) what surfaces reflect to start with: what they did, or what the hierarchy says."""
+    element = np.concatenate([before.lit.element, parts.element])
+    start = values_of(local.reflected(), element)
+    old = before.traced
+    number = now[old.numbered(np.arange(old.row_count))]
+    stands = number >= 0
+    place = np.full(traced.numbers.end, -1)
+    place[traced.numbered(np.arange(traced.row_count))] = np.arange(traced.row_count)
+    row = place[number[stands]]
+    known = row >= 0
+    start[row[known]] = before.lit.earlier.baked[stands][known]
+    return start

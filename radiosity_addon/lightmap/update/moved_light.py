@@ -1,0 +1,92 @@
+"""What lamps add where something moved: shadow rays only where it may be, or was, in a lamp's way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from functools import partial
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...base.progress import scaled
+from ...solver.gather.boxes import Boxes
+from ...solver.gather.light_gains import LightGains
+from ...solver.gather.local_pass import AskedLight, Footprints, LocalPass
+from ..lighting.part_links import HitNumbers, KnownParts, lit_footprints
+from ..lighting.reconstruct import sample_of
+from ..texels.terminator import SmoothLift
+from ..texels.texel_geometry import TexelGeometry
+from .affected import Disturbance
+
+
+def changed_lights(local: LocalPass, before: LocalPass) -> list[tuple[AskedLight, bool]]:
+    """Pair the lights that shine on points with whether they themselves moved."""
+    old = {asked.number: asked.light for asked in before.lights()}
+    result = []
+    for asked in local.lights():
+        was = old.get(asked.number)
+        same_as = getattr(asked.light, "same_as", None)
+        result.append((asked, was is None or (same_as is not None and not same_as(was))))
+    return result
+
+
+def texel_gains(
+    kept: LightGains, local: LocalPass, before: LocalPass, disturbance: Disturbance
+) -> Generator[float, None, LightGains]:
+    """Ask for every light where it may have changed; yields the fraction done."""
+    geometry, lights = disturbance.geometry, changed_lights(local, before)
+    gains = LightGains(len(geometry))
+    lift = SmoothLift(geometry)
+    for done, (asked, moved) in enumerate(lights):
+        gain = kept.of(asked.number)
+        touched = disturbance.texels.copy()
+        touched |= moved | disturbance.boxes.between(geometry.position, asked.light, disturbance.widen)
+        # One texel more: a penumbra is followed from neighbour to neighbour.
+        around = np.flatnonzero(geometry.neighbourhood(touched))
+        steps = local.gain_steps(asked, _footprints(geometry, around, lift))
+        found = yield from scaled(steps, done / len(lights), (done + 1) / len(lights))
+        own = touched[around]
+        gain[around[own]] = found[own]
+        gains.put(asked.number, gain)
+    return gains
+
+
+def part_gains(
+    parts: KnownParts, numbers: HitNumbers, before: LocalPass, boxes: Boxes, at: Array, widen: Array
+) -> Generator[float, None, LightGains]:
+    """Ask for every light at those parts, at (p, 3) anchors, where it may have changed."""
+    assert parts.gains is not None  # kept parts keep them
+    local = numbers.local
+    lights = changed_lights(local, before)
+    gains = LightGains(len(parts.part))
+    for done, (asked, moved) in enumerate(lights):
+        gain = parts.gains.of(asked.number)
+        rows = np.flatnonzero(moved | boxes.between(at, asked.light, widen))
+        some = KnownParts(parts.is_leaf, parts.part[rows], parts.sources[rows])
+        steps = local.gain_steps(asked, lit_footprints(numbers, some), some.shadow_rays)
+        gain[rows] = yield from scaled(steps, done / len(lights), (done + 1) / len(lights))
+        gains.put(asked.number, gain)
+    return gains
+
+
+def _footprints(geometry: TexelGeometry, chosen: Array, lift: SmoothLift) -> Footprints:
+    """Return where some texels ask for light, as all of them do in a bake."""
+    return Footprints(
+        geometry.position[chosen],
+        geometry.normal[chosen],
+        chosen,
+        partial(sample_of, geometry, chosen),
+        _neighbours(geometry, chosen),
+        lift=lift.of(chosen),
+    )
+
+
+def _neighbours(geometry: TexelGeometry, chosen: Array) -> Callable[[Array], Array]:
+    """Return what grows a mask of some texels by their neighbours among these."""
+
+    def near(mask: Array) -> Array:
+        every = np.zeros(len(geometry), dtype=bool)
+        every[chosen] = mask
+        return np.asarray(geometry.neighbourhood(every)[chosen])
+
+    return near

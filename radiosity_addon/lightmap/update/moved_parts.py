@@ -1,0 +1,91 @@
+"""Parts of leaves and cells of texels where something moved: what of them still stands, and sees the same."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...base.progress import scaled
+from ...solver.gather.bright_patches import AimedRays
+from ...solver.gather.final_gather import Gathered, Resolver
+from ...solver.gather.light_gains import LightGains
+from ...solver.gather.local_pass import LocalPass
+from ...solver.gather.retracing import STALE, Before
+from ..lighting.part_links import HitNumbers, KnownParts, PartLinks
+from ..lighting.traced_texels import TracedTexels
+from .affected import Disturbance
+from .moved_light import part_gains
+
+
+def known_parts(
+    links: Sequence[PartLinks], traced: TracedTexels, numbers: HitNumbers, now: Array
+) -> list[KnownParts]:
+    """Return the parts that still stand, those of one kind together.
+
+    Parameters
+    ----------
+    traced : TracedTexels
+        How they were found.
+    numbers : HitNumbers
+        What hits are numbered by now, …
+    now : (numbers,) int32
+        … by what they were before; STALE for what does not stand any more.
+    """
+    kinds: dict[tuple[bool, int], list[KnownParts]] = {}
+    count = numbers.texel_count
+    for some in links:
+        part = now[traced.numbered(some.rows)]
+        stays = part != STALE
+        sources = renumbered(traced.numbered(some.sources[stays]), now)
+        is_leaf = part[stays] < numbers.first_cell
+        gains = None if some.gains is None else some.gains.take(stays)
+        assert is_leaf.all() or not is_leaf.any()  # links are of one kind
+        kept = KnownParts(bool(is_leaf.any()), part[stays] - count, sources, gains)
+        if len(kept.part):
+            kinds.setdefault((kept.is_leaf, kept.rays), []).append(kept)
+    return [_joined(of_kind) for of_kind in kinds.values()]
+
+
+def _joined(parts: list[KnownParts]) -> KnownParts:
+    gains = [some.gains for some in parts if some.gains is not None]
+    return KnownParts(
+        parts[0].is_leaf,
+        np.concatenate([some.part for some in parts]),
+        np.concatenate([some.sources for some in parts]),
+        LightGains.joined(gains),
+    )
+
+
+def renumbered(sources: Array, now: Array) -> Array:
+    """Return sources of any shape by their numbers now; negative ones stay."""
+    return np.asarray(np.where(sources >= 0, now[np.maximum(sources, 0)], sources))
+
+
+def look_again(
+    parts: KnownParts, numbers: HitNumbers, before: LocalPass, disturbance: Disturbance, resolve: Resolver
+) -> Generator[float, None, KnownParts]:
+    """Trace again what is touched of the rays of parts, and of those to lamps; yields the fraction done."""
+    local = numbers.local
+    if parts.is_leaf:
+        at = local.parts.footprints(parts.part)
+        upright, widen = at.normals, local.parts.radius(parts.part)
+    else:
+        cell = numbers.cell(parts.part)
+        at, upright = numbers.cells.footprints(cell), numbers.cells.upright(cell)
+        widen = disturbance.widen[numbers.cells.texel_of(cell)]
+    nowhere = np.zeros((0, 1, 3))
+    # Parts speak for nobody: how close things are to them is not asked.
+    unasked = np.full(len(parts.part), np.inf)
+    gathered = Gathered(parts.sources, unasked, AimedRays.none())
+    aimed = (
+        np.zeros(local.hierarchy.n_elements, dtype=bool),
+        np.zeros(len(disturbance.moved), dtype=bool),
+    )
+    moved = disturbance.traced(before.caster)
+    earlier = Before(gathered, (nowhere, nowhere), moved, widen, *aimed)
+    found = yield from scaled(local.regather_steps(at, upright, resolve, earlier), 0.0, 0.6)
+    asked = part_gains(parts, numbers, before, disturbance.boxes, at.points, widen)
+    gains = yield from scaled(asked, 0.6, 1.0)
+    return KnownParts(parts.is_leaf, parts.part, found.sources, gains)

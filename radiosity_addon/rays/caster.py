@@ -1,0 +1,143 @@
+"""Who sees whom: what a ray caster answers, and a plain NumPy one to test against.
+
+Rays start at the surface, moved along the receiving side's normal by `surface_offset`,
+a few float32 steps of the scene's extent: far enough not to hit the surface itself, so
+close that a point covered by a box starts inside the box and stays dark.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from ..base.arrays import Array
+
+OFFSET_STEPS = 64
+"""Ray origins leave the surface by this many float32 steps at the scene's border."""
+
+NO_HIT = -1
+
+
+@dataclass(frozen=True)
+class Hits:
+    """The first surfaces that n rays met.
+
+    Parameters
+    ----------
+    triangle : (n,) int32
+        Row of the scene's triangles, or NO_HIT.
+    barycentric : (n, 2) float32
+        Weights of the triangle's second and third corner.
+    front : (n,) bool
+        Whether the ray came from the triangle's front.
+    distance : (n,) float32
+        Along the unit direction [m]; infinite without a hit.
+    """
+
+    triangle: Array
+    barycentric: Array
+    front: Array
+    distance: Array
+
+    def take(self, rows: Array) -> Hits:
+        """Return the hits of a boolean mask or of row numbers."""
+        return Hits(self.triangle[rows], self.barycentric[rows], self.front[rows], self.distance[rows])
+
+
+class RayCaster(Protocol):
+    """Answers visibility queries about one fixed set of triangles."""
+
+    surface_offset: float
+    """How far ray origins leave their surface [m]."""
+
+    @property
+    def rays(self) -> int:
+        """Rays traced so far."""
+        ...
+
+    @property
+    def for_lamps(self) -> RayCaster:
+        """The caster that knows what stops the light of lamps; most often this one."""
+        ...
+
+    def visible(self, origins: Array, directions: Array, distances: Array) -> Array:
+        """Return (n,) bool: nothing lies within `distances` along the unit `directions`."""
+        ...
+
+    def passing(self, origins: Array, directions: Array, distances: Array, least: float = 0.0) -> Array:
+        """Return (n,) what share of light passes: `visible`, but between 0 and 1 through cut-outs.
+
+        Their opacity counts as at least `least` and as at most 1 − `least`, for callers that judge
+        by few rays: where some met a cut-out, more are needed.
+        """
+        ...
+
+    def first_hits(self, origins: Array, directions: Array) -> Hits:
+        """Return what each ray meets first."""
+        ...
+
+
+def surface_offset(triangles: Array) -> float:
+    """Return the distance [m] by which ray origins leave the surface of (t, 3, 3) `triangles`."""
+    if len(triangles) == 0:
+        return 1e-6
+    corners = triangles.reshape(-1, 3)
+    extent = float(np.max(corners.max(axis=0) - corners.min(axis=0)))
+    return max(OFFSET_STEPS * float(np.finfo(np.float32).eps) * extent, 1e-12)
+
+
+def sees(caster: RayCaster, start: Array, end: Array) -> Array:
+    """Return (n,) whether nothing lies between (n, 3) points."""
+    along = end - start
+    length = np.linalg.norm(along, axis=1)
+    return caster.visible(start, along / np.maximum(length, 1e-300)[:, None], length)
+
+
+class BruteForceCaster:
+    """Tests every ray against every triangle (Möller and Trumbore 1997): slow, obvious, the reference."""
+
+    def __init__(self, triangles: Array) -> None:
+        self._corner = np.asarray(triangles, dtype=np.float64)[:, 0]
+        self._edge_1 = triangles[:, 1] - self._corner
+        self._edge_2 = triangles[:, 2] - self._corner
+        self._normal = np.cross(self._edge_1, self._edge_2)
+        self.surface_offset = surface_offset(triangles)
+        self.rays = 0
+
+    @property
+    def for_lamps(self) -> RayCaster:
+        """All triangles stop the light of lamps here."""
+        return self
+
+    def visible(self, origins: Array, directions: Array, distances: Array) -> Array:
+        """See `RayCaster.visible`."""
+        return np.asarray(self.first_hits(origins, directions).distance >= distances)
+
+    def passing(self, origins: Array, directions: Array, distances: Array, least: float = 0.0) -> Array:  # noqa: ARG002
+        """Return the same: all surfaces are whole."""
+        return self.visible(origins, directions, distances)
+
+    def first_hits(self, origins: Array, directions: Array) -> Hits:
+        """See `RayCaster.first_hits`."""
+        self.rays += len(origins)
+        cross_2 = np.cross(directions[:, None], self._edge_2[None])
+        determinant = np.einsum("tk,ntk->nt", self._edge_1, cross_2)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            inverse = 1.0 / determinant
+            from_corner = origins[:, None] - self._corner[None]
+            u = inverse * np.einsum("ntk,ntk->nt", from_corner, cross_2)
+            cross_1 = np.cross(from_corner, self._edge_1[None])
+            v = inverse * np.einsum("nk,ntk->nt", directions, cross_1)
+            t = inverse * np.einsum("tk,ntk->nt", self._edge_2, cross_1)
+            hit = (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0) & (determinant != 0)
+        t = np.where(hit, t, np.inf)
+        nearest = np.argmin(t, axis=1)
+        row = np.arange(len(origins))
+        distance = t[row, nearest]
+        triangle = np.where(np.isfinite(distance), nearest, NO_HIT).astype(np.int32)
+        front = np.einsum("nk,nk->n", directions, self._normal[nearest]) < 0
+        weights = np.stack([u[row, nearest], v[row, nearest]], axis=1)
+        weights[triangle == NO_HIT] = 0
+        return Hits(triangle, weights.astype(np.float32), front, distance.astype(np.float32))

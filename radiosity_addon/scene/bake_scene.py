@@ -1,0 +1,85 @@
+"""What goes into the pipeline and what comes out: plain arrays, no bpy.
+
+The Blender side fills a `BakeScene` (export) and consumes a `BakeResult` (apply); the
+pipeline between them knows nothing of Blender.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..base.arrays import Array
+from ..base.bake_warning import BakeWarning
+from .scene import Scene
+
+LIGHTMAP_UV_LAYER = "Lightmap"
+
+
+@dataclass(frozen=True)
+class BakeObject:
+    """A run of consecutive triangles of the scene that came from one object.
+
+    Parameters
+    ----------
+    name : str
+        The original object's name, as the report and the user know it.
+    first, count : int
+        Its rows of `BakeScene.scene.triangles`.
+    bake : bool
+        Whether it gets a lightmap; otherwise it only lights and blocks.
+    polygon : (count,) int32
+        The mesh polygon each triangle belongs to; a polygon stays in one chart.
+    loops : (count, 3) int32
+        The mesh corner (loop) of each triangle corner: UVs go back through it.
+    uv : (count, 3, 2) float32 or None
+        The existing `Lightmap` UVs to keep; None to unwrap anew.
+    texel_scale : float
+        Its texels per metre, relative to the other objects.
+    """
+
+    name: str
+    first: int
+    count: int
+    bake: bool
+    polygon: Array
+    loops: Array
+    uv: Array | None = None
+    texel_scale: float = 1.0
+
+    @property
+    def rows(self) -> slice:
+        """Where its triangles are among the scene's."""
+        return slice(self.first, self.first + self.count)
+
+
+@dataclass(frozen=True)
+class BakeScene:
+    """A scene ready to bake: the solver's arrays and whose triangles they are.
+
+    Parameters
+    ----------
+    scene : Scene
+        Triangles in world space, counter-clockwise from the front whatever the sign of
+        the object's scale.
+    objects : tuple of BakeObject
+        They partition the scene's triangles in order.
+    warnings : tuple of BakeWarning
+    emitter : (t,) int32 or None
+        Which of the emissive materials each triangle has; any number where it emits nothing. None
+        takes every colour of emission for a material.
+    emitter_names : tuple of str
+        The names of those materials; one that is in several light groups is there once for each.
+    light_groups, emitter_groups : tuple of str
+        The light groups that the scene puts its lights and those materials in, "" where in none; nothing
+        where it knows none.
+    """
+
+    scene: Scene
+    objects: tuple[BakeObject, ...]
+    warnings: tuple[BakeWarning, ...] = ()
+    emitter: Array | None = None
+    emitter_names: tuple[str, ...] = ()
+    light_groups: tuple[str, ...] = ()
+    emitter_groups: tuple[str, ...] = ()
+
+

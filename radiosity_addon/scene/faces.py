@@ -1,0 +1,66 @@
+"""The sides of a scene's triangles that take part in the light."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..base.arrays import Array
+from .scene import Scene
+from .uncovered_parts import OwnParts
+
+NO_FACE = -1
+
+
+class Faces:
+    """The f sides of the scene's triangles that take part: fronts first, then backs.
+
+    Triangles without area, or out of the bounces, have no faces. Backs exist where `two_sided`.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        solid = np.flatnonzero((scene.areas > 0) & scene.in_bounces)
+        backs = solid[scene.two_sided[solid]]
+        self.triangle = np.concatenate([solid, backs]).astype(np.int32)
+        """(f,) int32"""
+        self.front = np.arange(len(self.triangle)) < len(solid)
+        """(f,) bool"""
+        corners = scene.triangles[self.triangle]
+        corners[~self.front] = corners[~self.front][:, [0, 2, 1]]
+        self.corners = corners
+        """(f, 3, 3) float64, counter-clockwise as seen from the side's own half-space"""
+        self.centre = corners.mean(axis=1)
+        """(f, 3) float64: the centroids [m]"""
+        sign = np.where(self.front, 1.0, -1.0)[:, None]
+        self.normal = scene.face_normals[self.triangle] * sign
+        """(f, 3) float64"""
+        self.area = scene.areas[self.triangle]
+        """(f,) float64 [m²]"""
+        self.reflectance = scene.reflectance[self.triangle]
+        """(f, 3) float64"""
+        self.exitance = scene.emission[self.triangle]
+        """(f, 3) float64 [W/m²]: what a face emits where nothing covers it"""
+        self.emission = self.exitance
+        """(f, 3) float64 [W/m²]"""
+        self.opacity = scene.opacity[self.triangle]
+        """(f,) float64: reflectance and emission are already multiplied by it. What other faces cover
+        counts as cut out (`layers.py`)"""
+        self.own: OwnParts | None = None
+        """What covers leave of the scene's sides; None without any."""
+        if scene.layers:
+            self.own = scene.layers.own
+            share = self.own.share_of(self.side)
+            self.reflectance = self.reflectance * share[:, None]
+            self.emission = self.exitance * share[:, None]
+            self.opacity = self.opacity * share
+        self.of_triangle = np.full((2, len(scene)), NO_FACE, dtype=np.int32)
+        """(2, t) int32: the face of each triangle's front (row 0) and back (row 1), or −1"""
+        self.of_triangle[0, solid] = np.arange(len(solid))
+        self.of_triangle[1, backs] = np.arange(len(solid), len(self.triangle))
+
+    def __len__(self) -> int:
+        return len(self.triangle)
+
+    @property
+    def side(self) -> Array:
+        """(f,) int: 2 t for the front of triangle t, 2 t + 1 for its back."""
+        return np.asarray(2 * self.triangle.astype(np.int64) + ~self.front)

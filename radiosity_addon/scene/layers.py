@@ -1,0 +1,374 @@
+"""Which of several surfaces in one place counts: what is covered neither sends, reflects nor absorbs.
+
+The sides of coincident triangles that face the same way share their place. A ray meets one of them: the
+outermost; in one plane one that emits before one that does not, a front before a back, and the one listed
+first. The others are covered there, as if cut out: they weigh what is left of them, and a ray that meets
+one is answered by its cover. A cover that is itself partly cut out covers by its opacity.
+
+Two-sided triangles that face each other have something solid behind one of them, such as a box that stands
+on a ground: their fronts touch, so both are covered, and their backs are what a ray meets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..base.arrays import Array
+from ..base.polygons import edge_distances
+from ..base.sampling import cosine_hemisphere, stratified_square, to_world
+from ..rays.caster import NO_HIT, Hits, surface_offset
+from ..rays.embree import EmbreeCaster
+from .coincident_pairs import CORNERS, CoincidentPairs, coincident_pairs, tolerances
+from .surfaces import Surfaces
+from .uncovered_parts import OwnParts, own_parts
+
+NEAR_EMITTERS = 3.0
+"""What emits is covered by what is this many surface offsets in front of it: shadow rays pass that by."""
+
+ONE_PLANE = 0.5
+"""So much of their tolerance apart, faces count as in one plane: rounding decides no more."""
+
+FINE = 1.0 / 64.0
+"""Heights that round to the same multiple of this part of the tolerance are equal."""
+
+PROBES = 32
+"""Rays that tell whether what is behind a face is solid."""
+
+MANY_COPIES = 4
+"""More exact copies of one triangle than these are not compared pair by pair."""
+
+MOST_COVERS = 16
+"""A hit is handed on from cover to cover this often at most."""
+
+INSIDE = -1e-9
+"""Points of a polygon's rim are in it."""
+
+
+@dataclass(frozen=True)
+class Covers:
+    """c covered parts, sorted by side; side 2 t is the front of triangle t, 2 t + 1 its back.
+
+    Attributes
+    ----------
+    side, by : (c,) int
+        What is covered, and what covers it.
+    part : (c, 8, 2) float64
+        A convex polygon, in weights of the triangle's second and third corner, counter-clockwise.
+    in_cover : (c, 8, 2) float64
+        The same in weights of the cover's triangle.
+    """
+
+    side: Array
+    by: Array
+    part: Array
+    in_cover: Array
+
+    def __len__(self) -> int:
+        return len(self.side)
+
+    def take(self, rows: Array) -> Covers:
+        """Return some of them."""
+        return Covers(self.side[rows], self.by[rows], self.part[rows], self.in_cover[rows])
+
+
+class Layers:
+    """What of a scene's sides is covered.
+
+    Parameters
+    ----------
+    scene : Surfaces
+    """
+
+    def __init__(self, scene: Surfaces) -> None:
+        self._scene = scene
+        solid = np.flatnonzero((scene.areas > 0) & scene.in_bounces)
+        tolerance = tolerances(scene.triangles)
+        emits = scene.emission.max(axis=1, initial=0.0) > 0
+        offset = surface_offset(scene.triangles)
+        reach = np.where(emits, np.maximum(tolerance, NEAR_EMITTERS * offset), tolerance)
+        copy, original = _many_copies(scene, solid, emits)
+        pairs = coincident_pairs(scene.triangles, np.setdiff1d(solid, copy), tolerance, reach)
+        contact, pressed = _contacts(scene, pairs, tolerance)
+        covers = _covers(scene, pairs, tolerance, emits, contact)
+        self.covers = _sorted([covers, _whole_covers(scene, copy, original)])
+        self._first = np.searchsorted(self.covers.side, np.arange(2 * len(scene) + 1))
+        self._pressed = pressed
+        self._first_pressed = np.searchsorted(pressed.side, 2 * np.arange(len(scene) + 1))
+
+    def __bool__(self) -> bool:
+        return len(self.covers) > 0
+
+    @cached_property
+    def own(self) -> OwnParts:
+        """What is left of the covered sides."""
+        return own_parts(
+            self.covers.side, self.covers.part, self.covers.by, self.covers.in_cover, self._scene
+        )
+
+    def owners(self, hits: Hits) -> Hits:
+        """Return hits with those on covered sides moved to what covers them."""
+        side = 2 * hits.triangle + ~hits.front
+        moved = np.flatnonzero((hits.triangle != NO_HIT) & self._is_covered[side])
+        if len(moved) == 0:
+            return hits
+        side, place = side[moved].astype(np.int64), hits.barycentric[moved].astype(np.float64)
+        waiting = np.arange(len(moved))
+        for _ in range(MOST_COVERS):
+            row, cover = holding(self._first, self.covers.part, side[waiting], place[waiting])
+            cut = None if self._scene.images is None else self._scene.images.cut_out
+            if cut is not None:
+                solid = ~cut[self.covers.by[cover] // 2]
+                row, cover = row[solid], cover[solid]
+            if len(row) == 0:
+                break
+            # Any cover will do: it hands on to its own.
+            row, only = np.unique(row, return_index=True)
+            cover, waiting = cover[only], waiting[row]
+            points = self.points(side[waiting], place[waiting])
+            side[waiting] = self.covers.by[cover]
+            place[waiting] = self.weights(side[waiting], points)
+        triangle, front, barycentric = hits.triangle.copy(), hits.front.copy(), hits.barycentric.copy()
+        triangle[moved], front[moved] = side // 2, side % 2 == 0
+        barycentric[moved] = place
+        return Hits(triangle, barycentric, front, hits.distance)
+
+    def is_pressed(self, triangle: Array, barycentric: Array) -> Array:
+        """Return (n,) whether points of triangles' fronts, (n,) and (n, 2), lie against another surface.
+
+        Only of those fronts that something solid is behind.
+        """
+        found = np.zeros(len(triangle), dtype=bool)
+        if len(self._pressed):
+            row, _ = holding(self._first_pressed, self._pressed.part, triangle, barycentric)
+            found[row] = True
+        return found
+
+    @cached_property
+    def pressed_triangles(self) -> Array:
+        """(t,) bool: triangles of which some points are pressed."""
+        return np.diff(self._first_pressed) > 0
+
+    @cached_property
+    def _is_covered(self) -> Array:
+        return np.diff(self._first) > 0
+
+    def points(self, side: Array, place: Array) -> Array:
+        """Return (n, 3) the points of sides at weights (n, 2) of their triangles' corners [m]."""
+        corners = self._scene.triangles[side // 2]
+        return np.asarray(corners[:, 0] + np.einsum("nw,nwk->nk", place, corners[:, 1:] - corners[:, :1]))
+
+    def weights(self, side: Array, points: Array) -> Array:
+        """Return (n, 2) the weights of points in sides' triangles, drawn into them."""
+        corners = self._scene.triangles[side // 2]
+        edges = corners[:, 1:] - corners[:, :1]
+        normal = np.cross(edges[:, 0], edges[:, 1])
+        square = np.maximum(np.einsum("nk,nk->n", normal, normal), 1e-300)
+        apart = points - corners[:, 0]
+        second = np.einsum("nk,nk->n", np.cross(apart, edges[:, 1]), normal) / square
+        third = np.einsum("nk,nk->n", np.cross(edges[:, 0], apart), normal) / square
+        second, third = np.maximum(second, 0.0), np.maximum(third, 0.0)
+        over = np.maximum(second + third, 1.0)
+        return np.stack([second / over, third / over], axis=1)
+
+
+def holding(first: Array, parts: Array, row: Array, place: Array) -> tuple[Array, Array]:
+    """Return the pairs of points (n,) and parts that they lie in.
+
+    Parameters
+    ----------
+    first : (r + 1,) int
+        The run of parts of each row.
+    parts : (c, k, 2) float64
+    row : (n,) int
+    place : (n, 2) float64
+    """
+    count = first[row + 1] - first[row]
+    point = np.repeat(np.arange(len(row)), count)
+    part = np.arange(len(point)) - np.repeat(np.cumsum(count) - count, count) + first[row][point]
+    polygon, at = parts[part], place[point][:, None]
+    inside = np.ones(len(point), dtype=bool)
+    for edge in range(parts.shape[1]):
+        inside &= edge_distances(at, polygon, edge)[:, 0] >= INSIDE
+    return point[inside], part[inside]
+
+
+def _contacts(scene: Surfaces, pairs: CoincidentPairs, tolerance: Array) -> tuple[Array, Covers]:
+    """Find the pairs whose fronts touch.
+
+    Returns
+    -------
+    contact : (p,) bool
+    pressed : Covers
+        Of fronts with something solid behind them, where they touch; sorted by side.
+    """
+    both = scene.two_sided[pairs.first] & scene.two_sided[pairs.second] & ~pairs.same
+    near = np.abs(pairs.height) <= np.maximum(tolerance[pairs.first], tolerance[pairs.second])
+    rows = np.flatnonzero(both & near)
+    contact = np.zeros(len(pairs), dtype=bool)
+    if len(rows) == 0:
+        return contact, _no_covers()
+    caster = EmbreeCaster(scene.triangles, only=scene.in_bounces)
+    sides, others, parts, theirs = [], [], [], []
+    for triangle, other, part, in_other in (
+        (pairs.first, pairs.second, pairs.in_first, pairs.in_second),
+        (pairs.second, pairs.first, pairs.in_second, pairs.in_first),
+    ):
+        behind = rows[_solid_behind(scene, caster, triangle[rows], part[rows], tolerance)]
+        contact[behind] = True
+        sides.append(2 * triangle[behind])
+        others.append(2 * other[behind])
+        parts.append(part[behind])
+        theirs.append(in_other[behind])
+    joined = Covers(*(np.concatenate(each) for each in (sides, others, parts, theirs)))
+    return contact, _sorted([joined])
+
+
+def _solid_behind(
+    scene: Surfaces, caster: EmbreeCaster, triangle: Array, part: Array, tolerance: Array
+) -> Array:
+    """Return (n,) whether most of what parts (n, k, 2) of triangles see behind them are other backs."""
+    count, corners = len(triangle), scene.triangles[triangle]
+    middle = part.mean(axis=1, keepdims=True)
+    # Half way from the middle to the corners.
+    spots = 0.5 * (middle + part)[:, np.arange(PROBES) % part.shape[1]]
+    points = corners[:, :1] + np.einsum("npw,nwk->npk", spots, corners[:, 1:] - corners[:, :1])
+    back = -scene.face_normals[triangle]
+    lift = np.maximum(caster.surface_offset, 2.0 * tolerance[triangle])
+    points = points + (lift[:, None] * back)[:, None]
+    unit = stratified_square(np.arange(count), PROBES, 83)
+    directions = to_world(cosine_hemisphere(unit), back)
+    hits = caster.first_hits(points.reshape(-1, 3), directions.reshape(-1, 3))
+    inner = (hits.triangle != NO_HIT) & ~hits.front
+    return np.asarray(inner.reshape(count, PROBES).mean(axis=1) > 0.5)
+
+
+def _covers(
+    scene: Surfaces, pairs: CoincidentPairs, tolerance: Array, emits: Array, contact: Array
+) -> Covers:
+    """Return what covers what."""
+    first, second = pairs.first, pairs.second
+    if len(pairs) == 0:
+        return _no_covers()
+    level, turned = _heights(scene, pairs, tolerance)
+    flat = np.abs(pairs.height) <= ONE_PLANE * np.maximum(tolerance[first], tolerance[second])
+    found: list[Covers] = []
+    for backs in (False, True):
+        # Of the first triangle its front, or its back; of the second what faces the same way.
+        one_is_back = np.full(len(pairs), backs)
+        other_is_back = one_is_back ^ ~pairs.same
+        exists = (~one_is_back | scene.two_sided[first]) & (~other_is_back | scene.two_sided[second])
+        # Heights are along a direction of the group: seen from the other side they count the other way.
+        sign = np.where(one_is_back ^ turned[first], -1, 1)
+        apart = sign * (level[first] - level[second])
+        listed = np.where(one_is_back == other_is_back, first < second, ~one_is_back)
+        wins = np.where(apart != 0, apart > 0, listed)
+        wins = np.where(flat & (emits[first] != emits[second]), emits[first], wins)
+        wins = np.where(contact, one_is_back, wins)
+        rows = np.flatnonzero(exists)
+        one, other = 2 * first[rows] + one_is_back[rows], 2 * second[rows] + other_is_back[rows]
+        won = wins[rows]
+        mine, theirs = pairs.in_first[rows], pairs.in_second[rows]
+        # Corner by corner the same, whichever way round that is for the cover.
+        turn = ~pairs.same[rows, None, None]
+        which = won[:, None, None]
+        found.append(
+            Covers(
+                np.where(won, other, one),
+                np.where(won, one, other),
+                np.where(which, theirs, mine),
+                np.where(which, np.where(turn, mine[:, ::-1], mine), np.where(turn, theirs[:, ::-1], theirs)),
+            )
+        )
+    return _sorted(found)
+
+
+def _sorted(covers: Sequence[Covers]) -> Covers:
+    """Return all of several, sorted by side."""
+    joined = Covers(*(np.concatenate([getattr(part, name) for part in covers]) for name in _NAMES))
+    return joined.take(np.argsort(joined.side, kind="stable"))
+
+
+def _no_covers() -> Covers:
+    none = np.zeros(0, dtype=np.int64)
+    return Covers(none, none, *np.zeros((2, 0, CORNERS, 2)))
+
+
+def _many_copies(scene: Surfaces, solid: Array, emits: Array) -> tuple[Array, Array]:
+    """Find opaque triangles of which there are many exact copies that face the same way.
+
+    Pairs of a thousand copies would be a million: all are covered by the one that counts.
+
+    Returns
+    -------
+    copy, original : (c,) int
+    """
+    none = np.zeros(0, dtype=np.int64)
+    opaque = solid if scene.images is None else solid[~scene.images.cut_out[solid]]
+    bits = np.ascontiguousarray(scene.triangles[opaque] + 0.0).view(np.uint64)
+    # A number for each triangle, whichever corner comes first.
+    mixed = bits * _ODD
+    number = (mixed[..., 0] ^ (mixed[..., 1] >> np.uint64(7)) ^ (mixed[..., 2] >> np.uint64(13))).sum(axis=1)
+    _, group, count = np.unique(number, return_inverse=True, return_counts=True)
+    rows = opaque[count[group.reshape(-1)] > MANY_COPIES]
+    if len(rows) == 0:
+        return none, none
+    corners = scene.triangles[rows] + 0.0
+    first = np.lexsort(corners.transpose(2, 0, 1), axis=1)[:, 0]
+    turned = np.take_along_axis(corners, ((first[:, None] + np.arange(3)) % 3)[..., None], axis=1)
+    kind = np.concatenate([turned.reshape(-1, 9), scene.two_sided[rows, None]], axis=1)
+    order = np.lexsort((rows, ~emits[rows]))
+    rows = rows[order]
+    _, first_row, group, count = np.unique(
+        kind[order], axis=0, return_index=True, return_inverse=True, return_counts=True
+    )
+    group = group.reshape(-1)
+    original = rows[first_row][group]
+    chosen = (count[group] > MANY_COPIES) & (rows != original)
+    return rows[chosen], original[chosen]
+
+
+def _whole_covers(scene: Surfaces, copy: Array, original: Array) -> Covers:
+    """Return covers of whole triangles, both sides of those that have two."""
+    backs = np.flatnonzero(scene.two_sided[copy])
+    side = np.concatenate([2 * copy, 2 * copy[backs] + 1])
+    by = np.concatenate([2 * original, 2 * original[backs] + 1])
+    whole = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])[[0, 1, 2, 2, 2, 2, 2, 2]]
+    parts = np.broadcast_to(whole, (len(side), CORNERS, 2))
+    return Covers(side, by, parts, parts)
+
+
+_ODD = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)
+
+
+_NAMES = ("side", "by", "part", "in_cover")
+
+
+def _heights(scene: Surfaces, pairs: CoincidentPairs, tolerance: Array) -> tuple[Array, Array]:
+    """Return (t,) how high triangles lie among those they coincide with, and whether they look down.
+
+    Along the normal of the largest of each group, in small steps: an order without circles.
+    """
+    count = len(scene)
+    group = np.arange(count)
+    while True:
+        low = np.minimum(group[pairs.first], group[pairs.second])
+        before = group.copy()
+        np.minimum.at(group, before[pairs.first], low)
+        np.minimum.at(group, before[pairs.second], low)
+        while not np.array_equal(group, group[group]):
+            group = group[group]
+        if np.array_equal(group, before):
+            break
+    order = np.lexsort((np.arange(count), -scene.areas, group))
+    _, start, number = np.unique(group[order], return_index=True, return_inverse=True)
+    reference = np.empty(count, dtype=np.int64)
+    reference[order] = order[start][number.reshape(-1)]
+    normal = scene.face_normals[reference]
+    apart = scene.triangles.mean(axis=1) - scene.triangles[reference].mean(axis=1)
+    height = np.einsum("nk,nk->n", apart, normal)
+    turned = np.einsum("nk,nk->n", scene.face_normals, normal) < 0
+    return np.rint(height / (FINE * tolerance[reference])), turned

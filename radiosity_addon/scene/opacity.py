@@ -1,0 +1,291 @@
+"""Rays through surfaces that are only partly there: leaves, fences, veils.
+
+Triangles that anything may be seen through are kept in a second ray caster, so that the others
+are asked as ever, and a scene without any has no second one. A ray that meets such a triangle
+looks up the opacity there. Asked how much light passes, what it leaves is multiplied up. Asked what
+is hit first, the surface is hit if a number drawn for the ray and the triangle is below it: where
+opacity is 0 or 1 no chance is left. That number depends on nothing but the two, so results do not
+depend on how rays are divided among threads.
+"""
+
+from __future__ import annotations
+
+from threading import Lock
+
+import numpy as np
+
+from ..base.arrays import Array
+from ..base.sampling import hash_keys
+from ..rays.caster import NO_HIT, Hits, RayCaster, surface_offset
+from ..rays.embree import TARGET_SLACK, EmbreeCaster
+from .layers import Layers
+from .scene import Scene
+from .stacks import Stacks
+from .textures import SurfaceImages
+
+MOST_LAYERS = 1000
+"""A ray that passed so many surfaces meets no other."""
+
+
+def ray_caster(scene: Scene, threads: int = 0) -> RayCaster:
+    """Return what answers for the light of a scene's surfaces; it knows what answers for that of lamps."""
+    lamps = None
+    if (scene.in_shadows != scene.in_bounces).any():
+        lamps = _caster(scene, threads, scene.in_shadows, None)
+    return _caster(scene, threads, scene.in_bounces, lamps)
+
+
+def _caster(scene: Scene, threads: int, only: Array, for_lamps: RayCaster | None) -> RayCaster:
+    caster = _plain_caster(scene, threads, only, for_lamps)
+    return LayeredCaster(caster, scene.layers) if scene.layers else caster
+
+
+def _plain_caster(scene: Scene, threads: int, only: Array, for_lamps: RayCaster | None) -> RayCaster:
+    if scene.images is None or not scene.images.cut_out.any():
+        return EmbreeCaster(scene.triangles, threads, only, for_lamps, scene.two_sided)
+    stacks = Stacks(scene, only)
+    return CutOutCaster(
+        scene.triangles, scene.images, threads, only, for_lamps, scene.two_sided, stacks if stacks else None
+    )
+
+
+class LayeredCaster:
+    """The same rays, but where several surfaces are in one place they meet the one that counts there."""
+
+    def __init__(self, caster: RayCaster, layers: Layers) -> None:
+        self._caster, self._layers = caster, layers
+        self.surface_offset = caster.surface_offset
+
+    @property
+    def for_lamps(self) -> RayCaster:
+        """The caster that knows what stops the light of lamps; most often this one."""
+        found = self._caster.for_lamps
+        return self if found is self._caster else found
+
+    @property
+    def rays(self) -> int:
+        """Rays traced so far, those to lamps among them."""
+        return self._caster.rays
+
+    def visible(self, origins: Array, directions: Array, distances: Array) -> Array:
+        """See `RayCaster.visible`."""
+        return self._caster.visible(origins, directions, distances)
+
+    def passing(self, origins: Array, directions: Array, distances: Array, least: float = 0.0) -> Array:
+        """See `RayCaster.passing`."""
+        return self._caster.passing(origins, directions, distances, least)
+
+    def first_hits(self, origins: Array, directions: Array) -> Hits:
+        """See `RayCaster.first_hits`."""
+        return self._layers.owners(self._caster.first_hits(origins, directions))
+
+
+class CutOutCaster:
+    """Visibility among triangles of which some are partly there.
+
+    Parameters
+    ----------
+    triangles : (t, 3, 3) float64
+        World-space corners [m].
+    images : SurfaceImages
+        Of the same triangles.
+    threads : int
+        0 means all cores. Results do not depend on it.
+    only : (t,) bool or None
+        The triangles that rays meet, where it is not all of them.
+    for_lamps : RayCaster or None
+        What stops the light of lamps, where that is something else.
+    two_sided : (t,) bool or None
+        The others' backs are black; None if that does not matter.
+    stacks : Stacks or None
+        The cut-outs that lie in one another, if there are any.
+    """
+
+    def __init__(
+        self,
+        triangles: Array,
+        images: SurfaceImages,
+        threads: int = 0,
+        only: Array | None = None,
+        for_lamps: RayCaster | None = None,
+        two_sided: Array | None = None,
+        stacks: Stacks | None = None,
+    ) -> None:
+        self._own_rays = 0
+        self._for_lamps = for_lamps
+        self._counting = Lock()
+        self.surface_offset = surface_offset(triangles)
+        self._images, self._stacks = images, stacks
+        met = np.ones(len(triangles), dtype=bool) if only is None else only
+        whole, cut = met & ~images.cut_out, met & images.cut_out
+        self._whole_rows = np.append(np.flatnonzero(whole), NO_HIT).astype(np.int32)
+        self._cut_rows = np.append(np.flatnonzero(cut), NO_HIT).astype(np.int32)
+        sides = (None, None) if two_sided is None else (two_sided[whole], two_sided[cut])
+        self._whole = EmbreeCaster(triangles[whole], threads, two_sided=sides[0])
+        self._cut = EmbreeCaster(triangles[cut], threads, two_sided=sides[1])
+
+    @property
+    def for_lamps(self) -> RayCaster:
+        """The caster that knows what stops the light of lamps; most often this one."""
+        return self if self._for_lamps is None else self._for_lamps
+
+    @property
+    def rays(self) -> int:
+        """Rays asked for so far, those to lamps among them; what they meet on their way does not count."""
+        return self._own_rays + (0 if self._for_lamps is None else self._for_lamps.rays)
+
+    def visible(self, origins: Array, directions: Array, distances: Array) -> Array:
+        """Return (n,) bool: nothing that is there lies within `distances` along the unit `directions`."""
+        self._count(len(origins))
+        free = self._whole.visible(origins, directions, distances)
+        rows = np.flatnonzero(free)
+        reach = distances[rows] * (1.0 - TARGET_SLACK)
+        free[rows] = self._first_there(origins[rows], directions[rows], reach).triangle == NO_HIT
+        return free
+
+    def passing(self, origins: Array, directions: Array, distances: Array, least: float = 0.0) -> Array:
+        """Return (n,) float64 what share of light passes: no chance here, but 1 − opacity of all it meets."""
+        self._count(len(origins))
+        share = self._whole.visible(origins, directions, distances).astype(np.float64)
+        free = np.flatnonzero(share)
+        ways = self._ways(free, origins, directions, distances * (1.0 - TARGET_SLACK))
+        while len(ways.ray):
+            at, hits = ways.meet()
+            opacity = np.clip(self._images.opacity_at(hits.triangle, hits.barycentric), least, 1.0 - least)
+            np.multiply.at(share, ways.ray[at], 1.0 - opacity)
+            ways.keep(share[ways.ray] > 0.0)
+        return share
+
+    def first_hits(self, origins: Array, directions: Array) -> Hits:
+        """Return what each ray meets first of what is there."""
+        self._count(len(origins))
+        hits = self._whole.first_hits(origins, directions)
+        nearer = self._first_there(origins, directions, hits.distance)
+        is_cut = nearer.triangle != NO_HIT
+        return Hits(
+            np.where(is_cut, nearer.triangle, self._whole_rows[hits.triangle]),
+            np.where(is_cut[:, None], nearer.barycentric, hits.barycentric),
+            np.where(is_cut, nearer.front, hits.front),
+            np.where(is_cut, nearer.distance, hits.distance),
+        )
+
+    def _first_there(self, origins: Array, directions: Array, reach: Array) -> Hits:
+        """Return the first cut-outs within `reach` that stop the rays."""
+        count = len(origins)
+        triangle = np.full(count, NO_HIT, dtype=np.int32)
+        barycentric = np.zeros((count, 2), dtype=np.float32)
+        front = np.zeros(count, dtype=bool)
+        distance = np.full(count, np.inf, dtype=np.float32)
+        ways = self._ways(np.arange(count), origins, directions, reach)
+        while len(ways.ray):
+            at, hits = ways.meet()
+            ray = ways.ray[at]
+            opacity = self._images.opacity_at(hits.triangle, hits.barycentric)
+            stops = np.flatnonzero(opacity > _drawn(origins[ray], directions[ray], hits.triangle))
+            # Of several in one place the outermost.
+            ended, first = np.unique(at[stops], return_index=True)
+            stops, stopped = stops[first], ways.ray[ended]
+            triangle[stopped], distance[stopped] = hits.triangle[stops], hits.distance[stops]
+            barycentric[stopped], front[stopped] = hits.barycentric[stops], hits.front[stops]
+            going = np.ones(len(ways.ray), dtype=bool)
+            going[ended] = False
+            ways.keep(going)
+        return Hits(triangle, barycentric, front, distance)
+
+    def _ways(self, ray: Array, origins: Array, directions: Array, reach: Array) -> _Ways:
+        offset, stacks = self.surface_offset, self._stacks
+        return _Ways(self._cut, self._cut_rows, offset, stacks, ray, origins, directions, reach)
+
+    def _count(self, rays: int) -> None:
+        with self._counting:
+            self._own_rays += rays
+
+
+class _Ways:
+    """Rays among cut-outs, from one to the next.
+
+    Parameters
+    ----------
+    cut : RayCaster
+        Of the cut-outs alone.
+    rows : (c + 1,) int32
+        The scene's triangle for each of its, and NO_HIT.
+    offset : float
+        How far beyond a cut-out rays go on [m].
+    stacks : Stacks or None
+    ray : (w,) int
+        Which of the n rays are on their way.
+    origins, directions : (n, 3) float
+    reach : (n,) float
+
+    Attributes
+    ----------
+    ray : (w,) int
+        Those still on their way.
+    """
+
+    def __init__(
+        self,
+        cut: RayCaster,
+        rows: Array,
+        offset: float,
+        stacks: Stacks | None,
+        ray: Array,
+        origins: Array,
+        directions: Array,
+        reach: Array,
+    ) -> None:
+        self._cut, self._rows, self._offset, self._stacks = cut, rows, offset, stacks
+        self._origins, self._directions, self._reach = origins, directions, reach
+        self.ray = ray
+        self._gone = np.zeros(len(ray))
+        # What each ray met in the last place: rounding may have it met once more.
+        self._last = np.full((len(ray), 1), NO_HIT, dtype=np.int32)
+        self._layers = 0
+
+    def meet(self) -> tuple[Array, Hits]:
+        """Take rays to the next cut-outs in their way; rays that meet none within reach end here.
+
+        Returns
+        -------
+        at : (h,) int
+            Which of the rays on their way meets it, sorted.
+        hits : Hits
+            h of them: none for a ray that met again what it has just passed, several where cut-outs lie in
+            one another, the outermost first.
+        """
+        start = self._origins[self.ray] + self._gone[:, None] * self._directions[self.ray]
+        hits = self._cut.first_hits(start, self._directions[self.ray])
+        distance, triangle = self._gone + hits.distance, self._rows[hits.triangle]
+        met = (triangle != NO_HIT) & (distance < self._reach[self.ray])
+        met &= self._layers < MOST_LAYERS
+        self._layers += 1
+        self._gone = distance + self._offset
+        self.keep(met)
+        triangle = triangle[met]
+        at = np.flatnonzero((self._last != triangle[:, None]).all(axis=1))
+        new = Hits(triangle, hits.barycentric[met], hits.front[met], distance[met]).take(at)
+        if self._stacks is None:
+            self._last = triangle[:, None]
+            return at, new
+        of, new = self._stacks.through(new)
+        number = np.arange(len(of)) - np.searchsorted(of, of)
+        last = np.full((len(triangle), max(self._last.shape[1], int(number.max(initial=0)) + 1)), NO_HIT)
+        last[:, : self._last.shape[1]] = self._last
+        last[at] = NO_HIT
+        last[at[of], number] = new.triangle
+        self._last = last
+        return at[of], new
+
+    def keep(self, going: Array) -> None:
+        """Go on with the rays of a mask."""
+        self.ray, self._gone, self._last = self.ray[going], self._gone[going], self._last[going]
+
+
+def _drawn(origins: Array, directions: Array, triangle: Array) -> Array:
+    """Return (n,) numbers in [0, 1) that look random, each a function of its ray and triangle alone."""
+    ray = np.concatenate([origins, directions], axis=1).astype(np.float32).view(np.uint32)
+    bits = hash_keys(triangle, 61)
+    for column in range(6):
+        bits = hash_keys(ray[:, column].astype(np.uint64) << np.uint64(32) | bits, 62)
+    return np.asarray(bits * 2.0**-32)

@@ -1,0 +1,43 @@
+"""Surfaces that lie in one another: no element sends or sees more than there is.
+
+Of coplanar surfaces in one place one counts (`layers.py`). Where others are too close for rays to
+tell which is in front, both are seen, ΣFV comes to 2, and light would grow without end. So an element
+sends only the share 1 / ΣFV of its radiosity: matrix methods, shooting and two-level alike, hence they still
+agree. Assemblies that are not reciprocal scale what an element receives.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..base.arrays import Array
+
+OVERLAP = 1.1
+"""ΣFV above this is no rounding and no want of rays: something is seen twice."""
+
+
+def shares(sums: Array, limit: float = OVERLAP) -> Array:
+    """Return (n,) the share of its light that each element exchanges: 1 / ΣFV above `limit`, else 1.
+
+    Parameters
+    ----------
+    sums : (n,) float64
+        ΣFV of each element.
+    """
+    over = sums > limit
+    return np.where(over, 1.0 / np.where(over, sums, 1.0), 1.0)
+
+
+def arriving(exchange: Array, opacity: Array) -> Array:
+    """Return (n,) Σ_j T_ij α_j [m²]: how much of what rows exchange finds a surface there.
+
+    Parameters
+    ----------
+    exchange : (n, m) float64
+        Exchange areas T.
+    opacity : (m,) float64
+        α of each column's surface: a link sees all of a surface's area, holes included.
+    """
+    if (opacity == 1.0).all():
+        return np.asarray(exchange.sum(axis=1))
+    return np.asarray(exchange @ opacity)

@@ -1,0 +1,77 @@
+"""Cut-outs in one place: a ray that meets one of them meets them all.
+
+A ray that passes a cut-out goes on a little behind it, and so misses what lies in the same place. `Stacks`
+tells what that is, the outermost first.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..base.arrays import Array
+from ..rays.caster import Hits
+from .layers import MOST_COVERS, Layers, holding
+from .scene import Scene
+
+
+class Stacks:
+    """Which cut-outs lie in one another.
+
+    Parameters
+    ----------
+    scene : Scene
+        With images.
+    met : (t,) bool
+        The triangles that rays meet.
+    """
+
+    def __init__(self, scene: Scene, met: Array) -> None:
+        assert scene.images is not None
+        self._layers: Layers = scene.layers
+        covers = self._layers.covers
+        thin = met & scene.images.cut_out
+        rows = np.flatnonzero(thin[covers.side // 2] & thin[covers.by // 2])
+        covers = covers.take(rows)
+        # Each pair both ways. Where the two face opposite ways, corners run clockwise on the cover.
+        side = np.concatenate([covers.side, covers.by])
+        order = np.argsort(side, kind="stable")
+        turned = (covers.side ^ covers.by) & 1 == 1
+        in_cover = np.where(turned[:, None, None], covers.in_cover[:, ::-1], covers.in_cover)
+        self._part = np.concatenate([covers.part, in_cover])[order]
+        self._other = np.concatenate([covers.by, covers.side])[order]
+        self._first = np.searchsorted(side[order], np.arange(2 * len(scene) + 1))
+        self._depth = _depths(covers.side, covers.by, 2 * len(scene))
+
+    def __bool__(self) -> bool:
+        return len(self._other) > 0
+
+    def through(self, hits: Hits) -> tuple[Array, Hits]:
+        """Return all that n rays meet where they hit cut-outs: (m,) which ray, sorted, and m hits."""
+        ray = np.arange(len(hits.triangle))
+        side = 2 * hits.triangle.astype(np.int64) + ~hits.front
+        place = hits.barycentric.astype(np.float64)
+        of, part = holding(self._first, self._part, side, place)
+        if len(of) == 0:
+            return ray, hits
+        other = self._other[part]
+        points = self._layers.points(side[of], place[of])
+        all_sides, all_rays = np.concatenate([side, other]), np.concatenate([ray, of])
+        order = np.lexsort((self._depth[all_sides], all_rays))
+        ray, side = all_rays[order], all_sides[order]
+        weights = np.concatenate([place, self._layers.weights(other, points)])[order]
+        found = Hits(
+            (side // 2).astype(np.int32), weights.astype(np.float32), side % 2 == 0, hits.distance[ray]
+        )
+        return ray, found
+
+
+def _depths(side: Array, by: Array, count: int) -> Array:
+    """Return (count,) how many covers lie on each side at most, one on the other."""
+    depth = np.zeros(count, dtype=np.int64)
+    for _ in range(MOST_COVERS):
+        deeper = depth.copy()
+        np.maximum.at(deeper, side, depth[by] + 1)
+        if np.array_equal(deeper, depth):
+            break
+        depth = deeper
+    return depth

@@ -1,0 +1,243 @@
+"""What surfaces look like in detail: images of reflectance, emission and opacity.
+
+One image holds the texels of all textured triangles, each triangle's own part of it placed
+by its corners' coordinates. Where opacity is below 1 a surface is only partly there: what is
+not neither reflects, emits nor blocks. So look-ups give reflectance and emission multiplied
+by opacity, which is what a piece of surface sends for what arrives on all of it, and what may
+be averaged; `where_there` divides again.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from ..base.arrays import Array
+from ..base.errors import SceneError
+from ..base.radiometry import MAX_REFLECTANCE
+from ..base.triangles import split_in_four
+
+CHANNELS = 7
+"""Reflectance RGB, emission RGB, opacity."""
+
+MAX_DEPTH = 8
+"""An area's mean is taken over 4^8 parts at most."""
+
+LEAST_DEPTH = 2
+"""And over 4^2 at least."""
+
+SMALL = 8.0
+"""Areas so many texels wide, at whose rims many of their samples lie, take four times as many."""
+
+THIN = 4.0
+"""Parts are at most so many texels long, however thin."""
+
+CHUNK_SAMPLES = 1 << 18
+"""Look-ups done at once; their temporaries take about 60 MB."""
+
+ROUNDING = 1e-4
+"""Coordinates may leave [0, 1], and opacity may miss 1, by this much."""
+
+
+class SurfaceImages:
+    """Reflectance, emission and opacity of triangles as one image.
+
+    Parameters
+    ----------
+    values : (h, w, 7) float
+        Reflectance RGB in [0, 1], clamped like a scene's; exitance RGB of each emitting side
+        [W/m²]; opacity in [0, 1]. Linear, row 0 is v = 0. Reflectance and emission are those of
+        the surface where it is there, not yet multiplied by opacity.
+    image_uv : (t, 3, 2) float
+        The corners of every scene triangle in the image, in [0, 1]; texel (r, c) covers
+        [c/w, (c+1)/w] × [r/h, (r+1)/h]. Look-ups are bilinear and reach half a texel beyond the
+        triangle: neighbours in the image need a border of their own texels.
+    textured : (t,) bool
+        Rows that are not take the scene's constants, and are opaque.
+
+    Raises
+    ------
+    SceneError
+        If shapes do not match, or a textured triangle meets a value out of range.
+    """
+
+    def __init__(self, values: Array, image_uv: Array, textured: Array) -> None:
+        self.values = np.array(values, dtype=np.float32)
+        self.image_uv = np.array(image_uv, dtype=np.float32)
+        self.textured = np.array(textured, dtype=bool)
+        if self.values.ndim != 3 or self.values.shape[2] != CHANNELS or 0 in self.values.shape:
+            raise SceneError(f"the surface image has shape {self.values.shape}; (h, w, {CHANNELS}) is needed")
+        if self.textured.ndim != 1 or self.image_uv.shape != (len(self.textured), 3, 2):
+            raise SceneError(
+                f"image_uv has shape {self.image_uv.shape} and textured {self.textured.shape}; "
+                "(t, 3, 2) and (t,) are needed"
+            )
+        self._check()
+        self.image_uv = np.clip(self.image_uv, 0.0, 1.0)
+        self.image_uv[~self.textured] = 0.0
+        self.values = np.maximum(np.where(np.isfinite(self.values), self.values, 0.0), 0.0)
+        self.values[..., :3] = np.minimum(self.values[..., :3], MAX_REFLECTANCE)
+        self.values[..., 6] = np.minimum(self.values[..., 6], 1.0)
+        self._weighed = self.values.copy()
+        self._weighed[..., :6] *= self.values[..., 6:]
+        self._opacity = np.ascontiguousarray(self.values[..., 6:])
+
+    def __len__(self) -> int:
+        return len(self.textured)
+
+    def same_as(self, other: SurfaceImages) -> bool:
+        """Whether another image shows the same on the same triangles."""
+        return all(
+            np.array_equal(getattr(self, name), getattr(other, name))
+            for name in ("textured", "image_uv", "values")
+        )
+
+    @cached_property
+    def cut_out(self) -> Array:
+        """(t,) bool: triangles that anything may be seen through."""
+        return self._meets(self.values[..., 6] < 1.0 - ROUNDING)
+
+    def at(self, triangle: Array, barycentric: Array) -> Array:
+        """Look up points of textured triangles, bilinearly.
+
+        Parameters
+        ----------
+        triangle : (n,) int
+        barycentric : (n, 2) float
+            Weights of the triangle's second and third corner.
+
+        Returns
+        -------
+        weighed : (n, 7) float32
+            Reflectance and emission, each multiplied by opacity, and opacity.
+        """
+        return _bilinear(self._weighed, self._place(triangle, barycentric))
+
+    def opacity_at(self, triangle: Array, barycentric: Array) -> Array:
+        """Return (n,) float32 the opacity at the same points."""
+        return _bilinear(self._opacity, self._place(triangle, barycentric))[:, 0]
+
+    def area_means(self, triangle: Array, corners: Array) -> Array:
+        """Average over parts of textured triangles.
+
+        The mean over the centroids of so many equal parts that a texel holds two at least,
+        or of 4^`MAX_DEPTH`, each of the texel it lies in. Nothing is interpolated: of a bright texel's
+        light none then lies on a dark part next to it, which nobody would think to divide.
+
+        Parameters
+        ----------
+        triangle : (n,) int
+        corners : (n, 3, 2) float
+            Each part's corners, as weights of its triangle's second and third corner.
+
+        Returns
+        -------
+        weighed : (n, 7) float64
+            As from `at`.
+        """
+        means = np.empty((len(triangle), CHANNELS))
+        place = self._place(np.repeat(triangle, 3), corners.reshape(-1, 2)).reshape(-1, 3, 2)
+        depth = _depth(place)
+        for levels in np.unique(depth):
+            inside = _centroids(int(levels))
+            rows = np.flatnonzero(depth == levels)
+            step = max(CHUNK_SAMPLES // len(inside), 1)
+            for first in range(0, len(rows), step):
+                some = rows[first : first + step]
+                points = np.einsum("sc,nck->nsk", inside, place[some]).reshape(-1, 2)
+                found = _nearest(self._weighed, points).reshape(len(some), len(inside), CHANNELS)
+                means[some] = found.mean(axis=1, dtype=np.float64)
+        return means
+
+    def _place(self, triangle: Array, barycentric: Array) -> Array:
+        """Return (n, 2) where points of triangles are in the image [texels]."""
+        height, width = self.values.shape[:2]
+        corners = self.image_uv[triangle].astype(np.float64)
+        weights = np.asarray(barycentric, dtype=np.float64)
+        uv = corners[:, 0] + np.einsum("nc,nck->nk", weights, corners[:, 1:] - corners[:, :1])
+        return np.asarray(uv * (width, height))
+
+    def _check(self) -> None:
+        """Refuse coordinates and texels that say nothing, naming the first triangle that has some."""
+        outside = ~np.isfinite(self.image_uv) | (self.image_uv < -ROUNDING) | (self.image_uv > 1 + ROUNDING)
+        _refuse(self.textured & outside.any(axis=(1, 2)), "has image coordinates outside [0, 1]")
+        self.image_uv[~self.textured] = 0.0
+        values = self.values
+        colours = ~(np.isfinite(values) & (values >= 0)).all(axis=2)
+        _refuse(self._meets(colours), "meets a texel that is negative, NaN or infinite")
+        above = (values[..., [0, 1, 2, 6]] > 1 + ROUNDING).any(axis=2)
+        _refuse(self._meets(above), "meets a texel of a reflectance or opacity above 1")
+
+    def _meets(self, marked: Array) -> Array:
+        """Return (t,) bool: textured triangles whose box in the image meets a marked texel (h, w)."""
+        height, width = marked.shape
+        before = np.zeros((height + 1, width + 1), dtype=np.int64)
+        before[1:, 1:] = marked.cumsum(axis=0).cumsum(axis=1)
+        # What a bilinear look-up reads: half a texel further on every side.
+        size = np.array([width, height])
+        low = np.floor(self.image_uv.min(axis=1) * size - 0.5).astype(np.int64)
+        high = np.floor(self.image_uv.max(axis=1) * size + 0.5).astype(np.int64) + 1
+        (left, bottom), (right, top) = np.clip(low, 0, size - 1).T, np.clip(high, 1, size).T
+        inside = before[top, right] - before[bottom, right] - before[top, left] + before[bottom, left]
+        return np.asarray(self.textured & (inside > 0))
+
+
+def where_there(weighed: Array) -> tuple[Array, Array]:
+    """Return the reflectance and emission (n, 3) of surfaces where they are there.
+
+    Parameters
+    ----------
+    weighed : (n, 7) float
+        From look-ups: reflectance and emission multiplied by opacity, and opacity.
+    """
+    opacity = weighed[:, 6:]
+    there = np.where(opacity > 0, opacity, 1.0)
+    return weighed[:, :3] / there, weighed[:, 3:6] / there
+
+
+def _refuse(bad: Array, complaint: str) -> None:
+    """Raise a SceneError for the first triangle of a (t,) mask."""
+    if bad.any():
+        raise SceneError(f"triangle {int(np.flatnonzero(bad)[0])} {complaint}")
+
+
+def _bilinear(image: Array, place: Array) -> Array:
+    """Look (h, w, k) up at (n, 2) places in texels, (n, k); beyond the middles of the rim its own values."""
+    height, width = image.shape[:2]
+    texels = image.reshape(height * width, -1)
+    place = np.clip(place - 0.5, 0.0, (width - 1.0, height - 1.0))
+    low = np.minimum(place.astype(np.int64), (max(width - 2, 0), max(height - 2, 0)))
+    part = (place - low).astype(np.float32)
+    right, up = int(width > 1), width * int(height > 1)
+    first = low[:, 1] * width + low[:, 0]
+    along, across = part[:, :1], part[:, 1:]
+    lower = texels[first] * (1 - along) + texels[first + right] * along
+    upper = texels[first + up] * (1 - along) + texels[first + up + right] * along
+    return np.asarray(lower * (1 - across) + upper * across)
+
+
+def _nearest(image: Array, place: Array) -> Array:
+    """Return (n, k) the texels of (h, w, k) that (n, 2) places lie in."""
+    height, width = image.shape[:2]
+    column, row = np.clip(place.astype(np.int64), 0, (width - 1, height - 1)).T
+    return np.asarray(image.reshape(height * width, -1).take(row * width + column, axis=0))
+
+
+def _depth(place: Array) -> Array:
+    """Return (n,) how often to halve the sides of (n, 3, 2) triangles in texels until they are small."""
+    edges = place - np.roll(place, 1, axis=1)
+    area = np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
+    longest = np.linalg.norm(edges, axis=2).max(axis=1, initial=0.0)
+    size = np.maximum(np.sqrt(area), longest / THIN)
+    finer = np.where(size < SMALL, 2.0 * size, size)
+    depth = np.ceil(np.log2(np.maximum(finer, 1.0))).astype(int)
+    return np.asarray(np.clip(depth, LEAST_DEPTH, MAX_DEPTH))
+
+
+def _centroids(depth: int) -> Array:
+    """Return (4^depth, 3) the centroids of a triangle's equal parts, as weights of its corners."""
+    parts = np.eye(3)[None]
+    for _ in range(depth):
+        parts = split_in_four(parts).reshape(-1, 3, 3)
+    return np.asarray(parts.mean(axis=1))

@@ -1,0 +1,243 @@
+"""What is left of sides that others cover: triangles in the weights of each side's corners."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..base.arrays import Array
+from ..base.polygons import areas, clip_half_plane, edge_distances
+from ..base.triangles import split_in_four
+from .surfaces import Surfaces
+
+NOTHING_LEFT = 1e-9
+"""Parts of a side smaller than this share of it are dropped."""
+
+EVEN = 0.05
+"""A cover whose opacity varies less over a part hides its mean, …"""
+
+FINEST = 5
+"""… or the part is split in four so often at most."""
+
+CHUNK_PAIRS = 1 << 17
+"""Elements and parts clipped at once; their temporaries take about 50 MB."""
+
+_SPOTS = np.sort((np.arange(1, 17)[:, None] * (0.7548776662466927, 0.5698402909980532)) % 1.0, axis=1)
+_SPOTS[:, 1] -= _SPOTS[:, 0]
+"""(16, 2) weights of points spread over a triangle."""
+
+_WHOLE = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+
+
+@dataclass(frozen=True)
+class OwnParts:
+    """The m parts that are left of s sides.
+
+    Attributes
+    ----------
+    sides : (s,) int
+        The sides of which something is covered, sorted; front 2 t and back 2 t + 1 of triangle t.
+    side : (m,) int
+        Whose part it is, sorted.
+    corners : (m, 3, 2) float64
+        In weights of the triangle's second and third corner, counter-clockwise.
+    level : (m,) float64
+        What shows of it through covers that are cut out; else 1.
+    """
+
+    sides: Array
+    side: Array
+    corners: Array
+    level: Array
+
+    @cached_property
+    def share(self) -> Array:
+        """(s,) float64: what part of each of `sides` is left."""
+        left = 2.0 * areas(self.corners) * self.level
+        return np.bincount(np.searchsorted(self.sides, self.side), left, minlength=len(self.sides))
+
+    def share_of(self, side: Array) -> Array:
+        """Return (n,) what part of sides is left; 1 of those that nothing covers."""
+        result = np.ones(len(side))
+        place = np.minimum(np.searchsorted(self.sides, side), max(len(self.sides) - 1, 0))
+        if len(self.sides):
+            found = self.sides[place] == side
+            result[found] = np.clip(self.share[place[found]], 0.0, 1.0)
+        return result
+
+    def parts_of(self, side: Array) -> tuple[Array, Array, Array]:
+        """Return the parts of sides (n,): which row, (k,), the corners (k, 3, 2), and the level (k,).
+
+        A side that nothing covers is one part.
+        """
+        begin, count = self._runs(side)
+        whole = ~np.isin(side, self.sides)
+        rows = np.repeat(np.arange(len(side)), np.where(whole, 1, count))
+        part = _within(begin, np.where(whole, 1, count))
+        corners, level = np.empty((len(rows), 3, 2)), np.ones(len(rows))
+        alone = whole[rows]
+        corners[alone] = _WHOLE
+        corners[~alone], level[~alone] = self.corners[part[~alone]], self.level[part[~alone]]
+        return rows, corners, level
+
+    def share_of_elements(self, side: Array, corners: Array) -> Array:
+        """Return (n,) what is left of counter-clockwise triangles (n, 3, 2) within sides (n,)."""
+        result = np.ones(len(side))
+        covered = np.flatnonzero(np.isin(side, self.sides))
+        begin, count = self._runs(side[covered])
+        result[covered] = 0.0
+        ends = np.cumsum(count)
+        start = 0
+        while start < len(covered):
+            done = ends[start - 1] if start else 0
+            stop = max(int(np.searchsorted(ends, done + CHUNK_PAIRS, side="right")), start + 1)
+            some = slice(start, stop)
+            start = stop
+            row = np.repeat(covered[some], count[some])
+            part = _within(begin[some], count[some])
+            common = _clipped(self.corners[part], corners[row])
+            result += np.bincount(row, areas(common) * self.level[part], minlength=len(side))
+        result[covered] /= np.maximum(areas(corners[covered]), 1e-300)
+        return np.clip(result, 0.0, 1.0)
+
+    def _runs(self, side: Array) -> tuple[Array, Array]:
+        begin = np.searchsorted(self.side, side, side="left")
+        return begin, np.searchsorted(self.side, side, side="right") - begin
+
+
+def own_parts(side: Array, part: Array, by: Array, in_cover: Array, scene: Surfaces) -> OwnParts:
+    """Return what covers leave of sides.
+
+    Parameters
+    ----------
+    side : (c,) int
+        What is covered; sorted.
+    part : (c, k, 2) float64
+        Where: convex, counter-clockwise.
+    by : (c,) int
+        The side that covers it.
+    in_cover : (c, k, 2) float64
+        Where on the cover's triangle, corner by corner the same.
+    """
+    sides, first, count = np.unique(side, return_index=True, return_counts=True)
+    own = np.arange(len(sides))
+    corners, level = np.broadcast_to(_WHOLE, (len(sides), 3, 2)).copy(), np.ones(len(sides))
+    cut = np.zeros(len(scene), dtype=bool) if scene.images is None else scene.images.cut_out
+    # A side's largest cover goes first: most often nothing is left then.
+    order = np.lexsort((-areas(part), np.repeat(np.arange(len(sides)), count)))
+    for number in range(int(count.max(initial=0))):
+        cover = np.where(count > number, order[np.minimum(first + number, len(side) - 1)], -1)[own]
+        asked = np.flatnonzero(cover >= 0)
+        if len(asked) == 0:
+            continue
+        chosen = cover[asked]
+        inner = _clipped(corners[asked], part[chosen])
+        met = areas(inner) > NOTHING_LEFT
+        asked, chosen, inner = asked[met], chosen[met], inner[met]
+        left = np.ones(len(own), dtype=bool)
+        left[asked] = False
+        pieces = [(own[left], corners[left], level[left])]
+        pieces += [
+            (own[asked[row]], each, level[asked[row]]) for row, each in _outside(corners[asked], part[chosen])
+        ]
+        seen_through = np.flatnonzero(cut[by[chosen] // 2])
+        if len(seen_through):
+            row, each = _fans(inner[seen_through])
+            of, one = asked[seen_through[row]], chosen[seen_through[row]]
+            pieces.append(_shining_through(own[of], each, level[of], one, part, in_cover, by, scene))
+        own, corners, level = (np.concatenate(values) for values in zip(*pieces, strict=True))
+    kept = (level > NOTHING_LEFT) & (areas(corners) > NOTHING_LEFT)
+    rows = np.flatnonzero(kept)
+    rows = rows[np.argsort(own[rows], kind="stable")]
+    return OwnParts(sides, sides[own[rows]], corners[rows], level[rows])
+
+
+def _clipped(triangles: Array, polygons: Array) -> Array:
+    """Return (n, …, 2) what triangles (n, 3, 2) and convex polygons (n, k, 2) have in common."""
+    result = triangles
+    for edge in range(polygons.shape[1]):
+        result = clip_half_plane(result, edge_distances(result, polygons, edge))
+    return result
+
+
+def _outside(triangles: Array, polygons: Array) -> list[tuple[Array, Array]]:
+    """Return what of triangles (n, 3, 2) lies outside of convex polygons, as triangles with their rows."""
+    found = []
+    rest = triangles
+    for edge in range(polygons.shape[1]):
+        distance = edge_distances(rest, polygons, edge)
+        # Polygons are padded: nothing is outside of an edge without length.
+        is_edge = (polygons[:, edge] != polygons[:, (edge + 1) % polygons.shape[1]]).any(axis=1)
+        found.append(_fans(clip_half_plane(rest, np.where(is_edge[:, None], -distance, -1.0))))
+        rest = clip_half_plane(rest, distance)
+    return found
+
+
+def _fans(polygons: Array) -> tuple[Array, Array]:
+    """Cut (n, k, 2) convex polygons into triangles with an area; return their rows and (m, 3, 2) corners."""
+    size = polygons.shape[1]
+    index = np.stack([np.zeros(size - 2, int), np.arange(1, size - 1), np.arange(2, size)], axis=1)
+    corners = polygons[:, index].reshape(-1, 3, 2)
+    row = np.repeat(np.arange(len(polygons)), size - 2)
+    kept = areas(corners) > NOTHING_LEFT
+    return row[kept], corners[kept]
+
+
+def _shining_through(
+    own: Array,
+    corners: Array,
+    level: Array,
+    cover: Array,
+    part: Array,
+    in_cover: Array,
+    by: Array,
+    scene: Surfaces,
+) -> tuple[Array, Array, Array]:
+    """Return parts that lie under cut-out covers, split where the opacity varies, and what shows of them."""
+    assert scene.images is not None
+    images = scene.images
+    done = []
+    for depth in range(FINEST + 1):
+        place = _moved(corners, part[cover], in_cover[cover])
+        opacity = images.area_means(by[cover] // 2, place)[:, 6]
+        spots = place[:, :1] + np.einsum("sw,nwk->nsk", _SPOTS, place[:, 1:] - place[:, :1])
+        there = np.repeat(by[cover] // 2, len(_SPOTS))
+        each = images.opacity_at(there, spots.reshape(-1, 2)).reshape(-1, len(_SPOTS))
+        ready = (np.ptp(each, axis=1) < EVEN) | (depth == FINEST)
+        done.append((own[ready], corners[ready], level[ready] * (1.0 - opacity[ready])))
+        open_ = ~ready
+        if not open_.any():
+            break
+        own, cover, level = (np.repeat(values[open_], 4) for values in (own, cover, level))
+        corners = split_in_four(corners[open_]).reshape(-1, 3, 2)
+    one, other, third = (np.concatenate(values) for values in zip(*done, strict=True))
+    return one, other, third
+
+
+def _moved(points: Array, part: Array, in_cover: Array) -> Array:
+    """Return points (n, p, 2), given along with polygons (n, k, 2), where the same polygons are elsewhere."""
+    row = np.arange(len(part))
+    # The map is affine: three corners that span the most say all.
+    apart = part - part[:, :1]
+    far = np.einsum("nkc,nkc->nk", apart, apart).argmax(axis=1)
+    along = apart[row, far]
+    wide = np.abs(along[:, None, 0] * apart[..., 1] - along[:, None, 1] * apart[..., 0]).argmax(axis=1)
+    across = apart[row, wide]
+    whole = along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]
+    whole = np.where(whole == 0.0, 1.0, whole)[:, None]
+    off = points - part[:, :1]
+    one = (off[..., 0] * across[:, None, 1] - off[..., 1] * across[:, None, 0]) / whole
+    other = (along[:, None, 0] * off[..., 1] - along[:, None, 1] * off[..., 0]) / whole
+    there = in_cover - in_cover[:, :1]
+    return np.asarray(
+        in_cover[:, :1]
+        + one[..., None] * there[row, far][:, None]
+        + other[..., None] * there[row, wide][:, None]
+    )
+
+
+def _within(begin: Array, count: Array) -> Array:
+    """Return the numbers begin, begin + 1, … of runs that are so long, one run after the other."""
+    return np.asarray(np.arange(int(count.sum())) - np.repeat(np.cumsum(count) - count - begin, count))

@@ -1,0 +1,218 @@
+"""Let every leaf send out what it has: no more, no less.
+
+Links of different levels do not add up at a leaf. It has fine links of its own to what is
+near and shares its ancestors' coarse links to what is far; in a corner the own ones are
+strong and the shared ones then too strong. The face's mean is exact, a leaf's sum may be a
+quarter off, and as such leaves are also brighter or darker than the rest of their face,
+power is made or lost, more with every bounce (6 % at a reflectance of 0.9).
+
+So rays find what share of each leaf's light arrives anywhere at all, in a closed scene
+simply all of it. What the leaf's own links leave of that is what it sends over shared ones:
+its radiosity is scaled when they take their mean. Where its own links alone send more than
+it has (faces closer together than rays can resolve are all hit), those are scaled too: so no leaf ever
+sends more than it has, and the iteration converges (but for what gradients of clusters make negative:
+`hierarchical.STALLED`).
+
+What a leaf receives is the same the other way round: where nothing escapes ΣFV = 1, and what its own links
+leave of that is what it receives over shared ones. A face that is its own leaf has all its light scaled, as
+links to clusters miss what is curved within them. Both balances are struck in turn (Sinkhorn 1964), and
+before them visibilities that few rays estimate are corrected (`known_sums`). The links as measured stay
+as they are: what they alone add up to is reported too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...rays.caster import RayCaster
+from ..hierarchy.cluster_cut import TreeTop
+from ..hierarchy.nodes import Hierarchy
+from ..links.cluster_links import ClusterLinks
+from ..links.element_links import Links
+from ..links.transport import pull
+from .enclosure import Arrivals
+from .link_sums import received_by_leaves, received_over_clusters, sent_by_leaves
+from .visibility_correction import corrected
+
+ROUNDS = 8
+"""How often both balances are struck in turn at most, …"""
+
+ENOUGH = 2e-3
+"""… until no face receives more or less by this part."""
+
+AMONG_THEMSELVES = 0.65
+"""Faces are balanced that get more than this part of their light from others whose sums are known."""
+
+KNOWN = 5e-3
+"""Standard error of what arrives from a face, if its sum is to count as known."""
+
+DOUBT = 3.0
+"""Standard errors that a leaf's own links may send more than its rays say arrives."""
+
+SURE = 0.01
+"""Faces that receive less than this over links to clusters, which miss more than rays, know which of their
+visibilities to blame for what they lack."""
+
+LIMIT = 2.0
+"""Largest factor: a leaf with hardly any links is not blown up, …"""
+
+LIMIT_CLOSED = 32.0
+"""… nor where all arrives; but there nothing is noise, and what is not sent is lost."""
+
+LIMIT_RECEIVED = 1.5
+"""Largest factor on what a face receives, and the inverse of the least: more is no error of a curve, and
+must not be hidden."""
+
+
+@dataclass(frozen=True)
+class Balance:
+    """What light is exchanged with.
+
+    Attributes
+    ----------
+    links : Links
+        To elements, their visibilities corrected (see `known_sums`).
+    sent, received : (e, 2) float64
+        What leaves' radiosity and their gathered light are scaled with, over their own links and
+        over those they share with their ancestors and clusters; 1 where nothing is known.
+    """
+
+    links: Links
+    sent: Array
+    received: Array
+
+
+class Conservation:
+    """Knows what share of each leaf's light arrives, and makes links exchange that."""
+
+    def __init__(self, caster: RayCaster, min_area: float, seed: int, threads: int = 0) -> None:
+        self.arrivals = Arrivals(caster, min_area, seed, threads)
+
+    def balance(
+        self,
+        hierarchy: Hierarchy,
+        top: TreeTop,
+        links: Links,
+        cluster_links: ClusterLinks,
+        rough: bool = False,
+    ) -> Balance:
+        """Return what to exchange light with, in place of what was measured.
+
+        Parameters
+        ----------
+        rough : bool
+            While links are still refined: only what leaves send is balanced, to keep the power.
+        """
+        self.arrivals.measure(hierarchy)
+        scale, received = np.ones((2, hierarchy.n_elements, 2))
+        if rough:
+            return Balance(links, self.factors(hierarchy, top, links, cluster_links), received)
+        closed = self.closed(hierarchy)
+        sure = closed & (received_over_clusters(hierarchy, top, cluster_links, scale) < SURE)
+        if sure.any():
+            rows = sum(received_by_leaves(hierarchy, top, links, cluster_links, scale))
+            columns = sum(sent_by_leaves(hierarchy, top, links, cluster_links))
+            sums = pull(hierarchy, np.stack([rows, columns], axis=1))[: len(closed)]
+            links = corrected(hierarchy, links, sure, sums[:, 0], sums[:, 1])
+        wanted, error, escapes = self.arrivals.of_faces(hierarchy)
+        known = closed | (~escapes & (error < KNOWN) & (wanted > 0.0))
+        if closed.any() and not known.all():
+            # What faces get from others, whose own sums nobody knows, is not theirs to correct.
+            among = np.where(known[hierarchy.face], 1.0, 0.0)[:, None] * scale
+            get = sum(received_by_leaves(hierarchy, top, links, cluster_links, scale))
+            get_from_known = sum(received_by_leaves(hierarchy, top, links, cluster_links, among))
+            gets = pull(hierarchy, np.stack([get, get_from_known], axis=1))[: len(known)]
+            known &= gets[:, 1] > AMONG_THEMSELVES * gets[:, 0]
+        if not (known & closed).any():
+            return Balance(links, self.factors(hierarchy, top, links, cluster_links), received)
+        leaves = hierarchy.leaves[known[hierarchy.face[hierarchy.leaves]]]
+        for number in range(ROUNDS):
+            own, shared = received_by_leaves(hierarchy, top, links, cluster_links, scale)
+            if number > 0:
+                sums = pull(hierarchy, received * np.stack([own, shared], axis=1)).sum(axis=1)
+                if np.abs(sums[: len(known)] - wanted)[known].max() < ENOUGH:
+                    break
+            received[leaves] = _receive(hierarchy, leaves, own, shared, wanted, closed)
+            scale = self.factors(hierarchy, top, links, cluster_links, received)
+        return Balance(links, scale, received)
+
+    def closed(self, hierarchy: Hierarchy) -> Array:
+        """Return (f,) whether all rays of a face arrived; after `factors`."""
+        face = hierarchy.face[hierarchy.leaves]
+        arrived = self.arrivals.share[hierarchy.leaves] == 1.0
+        return np.asarray(np.bincount(face, ~arrived, len(hierarchy.faces)) == 0)
+
+    def factors(
+        self,
+        hierarchy: Hierarchy,
+        top: TreeTop,
+        links: Links,
+        cluster_links: ClusterLinks,
+        received: Array | None = None,
+    ) -> Array:
+        """Return (e, 2): what to scale leaves' radiosity with, over own links and over shared ones.
+
+        Parameters
+        ----------
+        received : (e, 2) float64 or None
+            What the leaves' gathered light is scaled with, as from `balance`.
+        """
+        self.arrivals.measure(hierarchy)
+        leaves = hierarchy.leaves
+        own, shared = sent_by_leaves(hierarchy, top, links, cluster_links, received)
+        result = np.ones((hierarchy.n_elements, 2))
+        arriving = self.arrivals.share[leaves]
+        limit = np.where(arriving == 1.0, LIMIT_CLOSED, LIMIT)
+        result[leaves] = _over_shared(arriving, own[leaves], shared[leaves], limit)
+        # Own links are better than few rays: scaled down for rays' noise, and not up, they would lose power.
+        most = np.minimum(arriving + DOUBT * self.arrivals.error(leaves), 1.0)
+        result[leaves, 0] = np.minimum(1.0, most / np.maximum(own[leaves], 1e-300))
+        return result
+
+
+def _receive(
+    hierarchy: Hierarchy, leaves: Array, own: Array, shared: Array, wanted: Array, closed: Array
+) -> Array:
+    """Return (n, 2) what to scale leaves' own and shared light with, that faces receive what is `wanted`.
+
+    Leaf by leaf where all is 1. Where part ends on black backs, which few rays of a leaf tell roughly, by
+    one number a face.
+    """
+    face = hierarchy.face[leaves]
+    of_faces = pull(hierarchy, np.stack([own, shared], axis=1))[: len(closed)]
+    own = np.where(closed[face], own[leaves], of_faces[face, 0])
+    shared = np.where(closed[face], shared[leaves], of_faces[face, 1])
+    result = _over_shared(wanted[face], own, shared, LIMIT)
+    whole = leaves < len(closed)
+    result[whole] = _over_all(wanted[face], own + shared)[whole, None]
+    return result
+
+
+def _over_all(wanted: Array, sums: Array) -> Array:
+    """Return (n,) what (n,) sums are scaled with to make `wanted`, within `LIMIT_RECEIVED`."""
+    scale = np.clip(wanted / np.maximum(sums, 1e-300), 1.0 / LIMIT_RECEIVED, LIMIT_RECEIVED)
+    return np.where(sums > 0, scale, 1.0)
+
+
+def _over_shared(wanted: Array, own: Array, shared: Array, limit: Array | float) -> Array:
+    """Return (n, 2) what own and shared are scaled with to make `wanted`: own, if it can be, with 1."""
+    left = np.maximum(wanted - own, 0.0)
+    return np.stack(
+        [
+            np.minimum(1.0, wanted / np.maximum(own, 1e-300)),
+            np.where(shared > 0, np.minimum(left / np.maximum(shared, 1e-300), limit), 1.0),
+        ],
+        axis=1,
+    )
+
+
+def received_by_faces(
+    hierarchy: Hierarchy, top: TreeTop, balance: Balance, cluster_links: ClusterLinks
+) -> Array:
+    """Return (f,) ΣFV over each face's, its elements' and its clusters' links, as balanced."""
+    own, shared = received_by_leaves(hierarchy, top, balance.links, cluster_links, balance.sent)
+    balanced = balance.received * np.stack([own, shared], axis=1)
+    return np.asarray(pull(hierarchy, balanced)[: len(hierarchy.faces)].sum(axis=1))

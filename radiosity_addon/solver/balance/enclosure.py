@@ -1,0 +1,155 @@
+"""What share of the light of leaves arrives anywhere, found by rays.
+
+In a closed scene all of it, and the rays agree: no noise. Light that leaves the scene arrives nowhere,
+nor does what ends on the black back of a one-sided triangle.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...base.parallel import for_chunks
+from ...base.sampling import cosine_hemisphere, stratified_square, to_world
+from ...rays.caster import RayCaster
+from ..hierarchy.cluster_cut import TreeTop
+from ..hierarchy.nodes import Hierarchy
+from ..links.node_samples import node_samples
+from ..links.transport import pull
+
+RAYS = 32
+"""Hemisphere rays of a leaf; in a closed scene they all agree, and there is no noise at all."""
+
+LAMP_RAYS = 512
+"""Rays of a leaf that shines, where not all of the others arrive: most power starts there."""
+
+HELD_RAYS = 128
+"""Rays of other leaves of which none escapes, but some end on black backs."""
+
+SPREAD_RAYS = 1 << 17
+"""So many rays in all, by area, where not all arrive: of a few large leaves each carries much light …"""
+
+MOST_OF_ONE = 1 << 13
+"""… but no more of one leaf than these."""
+
+MOST_RAYS = 1 << 20
+"""Neighbours that share rays which disagree ask their own, unless they would be more than these."""
+
+CHUNK = 1 << 13
+"""Leaves measured at once: their rays take about 30 MB a thread."""
+
+
+class Arrivals:
+    """Remembers what arrives of each leaf's light, leaf by leaf as they appear.
+
+    Attributes
+    ----------
+    share : (e,) float64
+        Of leaves, what part of their light arrives; of those that never were leaves NaN.
+    escapes : (e,) bool
+        Whether any ray left the scene.
+    rays : (e,) int32
+        How many were asked.
+    """
+
+    def __init__(self, caster: RayCaster, min_area: float, seed: int, threads: int = 0) -> None:
+        self._caster, self._min_area, self._seed, self._threads = caster, min_area, seed, threads
+        self.share = np.zeros(0)
+        self.escapes = np.zeros(0, dtype=bool)
+        self.rays = np.zeros(0, dtype=np.int32)
+
+    def measure(self, hierarchy: Hierarchy) -> None:
+        """Trace the rays of leaves that are new."""
+        more = hierarchy.n_elements - len(self.share)
+        self.share = np.concatenate([self.share, np.full(more, np.nan)])
+        self.escapes = np.concatenate([self.escapes, np.zeros(more, dtype=bool)])
+        self.rays = np.concatenate([self.rays, np.full(more, RAYS, dtype=np.int32)])
+        leaves = hierarchy.leaves
+        new = leaves[np.isnan(self.share[leaves])]
+        faces = new[new < len(hierarchy.faces)]
+        if len(faces):
+            # Neighbours that together are no larger than an element may be share their rays.
+            large = np.flatnonzero(hierarchy.clusters.area > self._min_area)
+            top = TreeTop(hierarchy, large)
+            share, escapes = self._trace(hierarchy, top.tips, RAYS)
+            tip = top.tip[faces] - top.n_inner
+            self.share[faces], self.escapes[faces] = share[tip], escapes[tip]
+            apart = faces[(share[tip] > 0.0) & (share[tip] < 1.0) & (np.bincount(tip)[tip] > 1)]
+            if len(apart) * RAYS <= MOST_RAYS:
+                self._ask(hierarchy, apart, RAYS)
+        self._ask(hierarchy, new[len(faces) :], RAYS)
+        doubtful = new[(self.share[new] > 0.0) & (self.share[new] < 1.0)]
+        rays = self._wanted(hierarchy, doubtful)
+        for count in np.unique(rays[rays > RAYS]):
+            self._ask(hierarchy, doubtful[rays == count], int(count))
+
+    def _wanted(self, hierarchy: Hierarchy, leaves: Array) -> Array:
+        """Return (n,) how many rays of leaves tell what arrives, where not all does.
+
+        It depends on nothing but the leaf: the same whenever it appears.
+        """
+        part = hierarchy.area[leaves] / float(hierarchy.faces.area.sum())
+        # By fours, so that many leaves are asked together.
+        power = np.rint(0.5 * np.log2(np.maximum(part * (SPREAD_RAYS / RAYS), 1.0)))
+        rays = np.minimum(RAYS * 4 ** power.astype(np.int64), MOST_OF_ONE)
+        large = hierarchy.area[leaves] >= self._min_area
+        shines = hierarchy.emission[leaves].any(axis=1)
+        rays[large & shines] = np.maximum(rays[large & shines], LAMP_RAYS)
+        held = large & ~shines & ~self.escapes[leaves]
+        rays[held] = np.maximum(rays[held], HELD_RAYS)
+        return np.asarray(rays)
+
+    def error(self, leaves: Array) -> Array:
+        """Return (n,) the standard error of the share of some leaves."""
+        share = self.share[leaves]
+        return np.asarray(np.sqrt(share * (1.0 - share) / self.rays[leaves]))
+
+    def of_faces(self, hierarchy: Hierarchy) -> tuple[Array, Array, Array]:
+        """Return what is known of faces, after `measure`.
+
+        Returns
+        -------
+        share, error : (f,) float64
+            The part of their light that arrives, and its standard error.
+        escapes : (f,) bool
+        """
+        leaves, count = hierarchy.leaves, len(hierarchy.faces)
+        spread = np.zeros((hierarchy.n_elements, 2))
+        spread[leaves, 0] = self.share[leaves]
+        spread[leaves, 1] = self.escapes[leaves]
+        means = pull(hierarchy, spread)[:count]
+        rays = np.bincount(hierarchy.face[leaves], self.rays[leaves], count)
+        share = np.where(means[:, 0] > 1.0 - 1e-12, 1.0, means[:, 0])
+        return share, np.sqrt(share * (1.0 - share) / rays), means[:, 1] > 0.0
+
+    def _ask(self, hierarchy: Hierarchy, leaves: Array, rays: int) -> None:
+        """Trace so many rays of each of some leaves."""
+        self.share[leaves], self.escapes[leaves] = self._trace(hierarchy, hierarchy.n_clusters + leaves, rays)
+        self.rays[leaves] = rays
+
+    def _trace(self, hierarchy: Hierarchy, nodes: Array, rays: int) -> tuple[Array, Array]:
+        """Return (n,) the share of the light of nodes that arrives, and whether any ray leaves the scene."""
+        share, escapes = np.empty(len(nodes)), np.empty(len(nodes), dtype=bool)
+        faces = hierarchy.faces
+        has_black_backs = 2 * int(faces.front.sum()) > len(faces)
+
+        def measure(rows: slice) -> None:
+            chosen = nodes[rows]
+            quarter = np.broadcast_to(np.arange(rays) % 4, (len(chosen), rays))
+            points, normals = node_samples(hierarchy, chosen, quarter, chosen, self._seed + 41)
+            unit = stratified_square(chosen, rays, self._seed + 42)
+            normals = normals.reshape(-1, 3)
+            directions = to_world(cosine_hemisphere(unit).reshape(-1, 1, 3), normals)[:, 0]
+            start = points.reshape(-1, 3) + self._caster.surface_offset * normals
+            if has_black_backs:
+                hits = self._caster.first_hits(start, directions)
+                missed = hits.triangle < 0
+                lost = missed | (faces.of_triangle[(~hits.front).astype(np.int8), hits.triangle] < 0)
+            else:
+                lost = self._caster.passing(start, directions, np.full(len(start), np.inf))
+                missed = lost > 0
+            share[rows] = 1.0 - lost.reshape(-1, rays).mean(axis=1)
+            escapes[rows] = missed.reshape(-1, rays).any(axis=1)
+
+        for_chunks(measure, len(nodes), CHUNK * RAYS // rays, self._threads)
+        return share, escapes

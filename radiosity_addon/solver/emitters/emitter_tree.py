@@ -1,0 +1,194 @@
+"""Lamps of very many faces: from afar, groups of faces send like a rectangle.
+
+A bulb of ten thousand triangles cannot be asked triangle by triangle from every texel. A binary tree
+groups the faces by place and way of facing; each point goes down it until what is left is small for
+its distance and faces one way (Walter et al., Lightcuts: a scalable approach to illumination, 2005).
+Such a group sends like the rectangle that has its area vector, its centroid and its second moments;
+single faces are asked exactly. Which groups a point asks depends on the point alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...form_factors.formulas import point_to_polygon
+
+NEAREST = 3.0
+"""A flat group is asked as one from this many times its radius on, …"""
+
+CURVED = 4.0
+"""… one that is not flat from so many, if its normals span little …"""
+
+MOST_SLANT = 0.35
+"""… (the sine of the angle to the farthest from their mean), and none of its faces is turned away."""
+
+FLAT = 1e-5
+"""Sine of the angle to the farthest normal of a flat group."""
+
+THINNEST = 1e-3
+"""A rectangle's shorter side, as a part of its longer one, at least."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The nodes that n points ask, p pairs sorted by point.
+
+    Attributes
+    ----------
+    row, node : (p,) int
+    factor : (p,) float64
+        What the point gets from the node per unit of strength; above 0.
+    """
+
+    row: Array
+    node: Array
+    factor: Array
+
+
+class EmitterTree:
+    """Emissive faces under a balanced binary tree.
+
+    Parameters
+    ----------
+    corners : (m, 3, 3) float64
+    normals : (m, 3) float64
+    weight : (m,) float64 [m²]
+        Areas, times what part of the lamp's strength each face emits.
+    """
+
+    def __init__(self, corners: Array, normals: Array, weight: Array) -> None:
+        self.order, levels = _sorted_tree(corners.mean(axis=1), normals)
+        """(m,) int: the faces by their place in the tree: every node holds a run of them"""
+        corners, normals, weight = corners[self.order], normals[self.order], weight[self.order]
+        self.begin = np.concatenate([level[:-1] for level in levels])
+        self.end = np.concatenate([level[1:] for level in levels])
+        """(k,) int: the run of each node; level by level from the root, each node's two children follow"""
+        self._levels = np.cumsum([0] + [len(level) - 1 for level in levels])
+        depth = np.repeat(np.arange(len(levels)), np.diff(self._levels))
+        self._child = self._levels[1:][depth] + 2 * (np.arange(len(depth)) - self._levels[depth])
+        self._single = self.end - self.begin == 1
+        self.running = np.concatenate([[0.0], np.cumsum(weight)])
+        """(m + 1,) float64: summed weights along the order"""
+        self._describe(corners, normals, weight)
+
+    def _describe(self, corners: Array, normals: Array, weight: Array) -> None:
+        """Find every node's centre, radius, spread of normals, and rectangle."""
+        origin = corners.reshape(-1, 3).mean(axis=0)
+        local, centroid = corners - origin, corners.mean(axis=1) - origin
+        total = self._sums(weight)
+        heavy = np.maximum(total, 1e-300)
+        self.centre = self._sums(weight[:, None] * centroid) / heavy[:, None]
+        vector = self._sums(weight[:, None] * normals)
+        length = np.linalg.norm(vector, axis=1)
+        facing = vector / np.maximum(length, 1e-300)[:, None]
+        # ∫ x xᵀ over a triangle of area 1: (Σ v vᵀ + 9 c cᵀ) / 12.
+        square = np.einsum("mci,mcj->mij", local, local) + 9.0 * centroid[:, :, None] * centroid[:, None]
+        moment = self._sums(weight[:, None, None] * square / 12.0) / heavy[:, None, None]
+        moment -= self.centre[:, :, None] * self.centre[:, None]
+        across = np.eye(3) - facing[:, :, None] * facing[:, None]
+        width, axes = np.linalg.eigh(across @ moment @ across)
+        half = np.sqrt(3.0 * np.maximum(width[:, 1:], 0.0))
+        half[:, 0] = np.maximum(half[:, 0], THINNEST * half[:, 1])
+        one, other = axes[:, :, 1] * half[:, :1], axes[:, :, 2] * half[:, 1:]
+        turned = np.einsum("ki,ki->k", np.cross(one, other), facing) < 0
+        other[turned] *= -1.0
+        around = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+        self.centre += origin
+        self.polygon = self.centre[:, None] + around[:, :1] * one[:, None] + around[:, 1:] * other[:, None]
+        self._scale = length / np.maximum(4.0 * half.prod(axis=1), 1e-300)
+        single = np.flatnonzero(self._single)
+        of = self.begin[single]
+        # A repeated corner is an edge of no length.
+        self.polygon[single] = corners[of][:, [0, 1, 2, 2]]
+        area = 0.5 * np.linalg.norm(
+            np.cross(local[of, 1] - local[of, 0], local[of, 2] - local[of, 0]), axis=1
+        )
+        self._scale[single] = weight[of] / np.maximum(area, 1e-300)
+        self.facing = facing
+        self.radius, self._slant = self._extremes(corners, normals)
+        flat, coherent = self._slant <= FLAT, self._slant <= MOST_SLANT
+        self._smallness = np.where(flat, 1.0 / NEAREST, np.where(coherent, 1.0 / CURVED, 0.0))
+
+    def _sums(self, values: Array) -> Array:
+        """Return (k, …) the sums over every node's faces of (m, …)."""
+        running = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
+        return np.asarray(running[self.end] - running[self.begin])
+
+    def _extremes(self, corners: Array, normals: Array) -> tuple[Array, Array]:
+        """Return (k,) each centre's farthest corner, and the farthest normal's sine; 1 past 90°."""
+        radius, cosine = np.zeros((2, len(self.begin)))
+        for first, last in zip(self._levels[:-1], self._levels[1:], strict=True):
+            held = first + np.flatnonzero(self.end[first:last] > self.begin[first:last])
+            of = np.repeat(held, self.end[held] - self.begin[held])
+            apart = np.linalg.norm(corners - self.centre[of][:, None], axis=2).max(axis=1)
+            radius[held] = np.maximum.reduceat(apart, self.begin[held])
+            along = np.einsum("mi,mi->m", normals, self.facing[of])
+            cosine[held] = np.minimum.reduceat(along, self.begin[held])
+        sine = np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
+        return radius, np.where(cosine > 0.0, sine, 1.0)
+
+    def ask(self, points: Array, normals: Array) -> Asked:
+        """Return what points (n, 3) that face along `normals` get from nodes that together are all faces."""
+        row, node = np.arange(len(points)), np.zeros(len(points), dtype=np.int64)
+        rows, nodes = [], []
+        while len(row):
+            along = points.take(row, axis=0) - self.centre.take(node, axis=0)
+            distance = np.sqrt(np.einsum("pk,pk->p", along, along))
+            radius = self.radius.take(node)
+            slant = self._slant.take(node) * distance
+            # All below the point's horizon, or all faces turned away: a fan of normals within an angle
+            # and a ball within another are both left behind by the sum of their sines at most.
+            height = np.einsum("pk,pk->p", along, normals.take(row, axis=0))
+            front = np.einsum("pk,pk->p", along, self.facing.take(node, axis=0))
+            seen = (height <= radius) & (front >= -(radius + slant))
+            single = self._single.take(node)
+            whole = (slant <= FLAT * distance) | (front >= radius + slant)
+            asked = single | (whole & (radius <= self._smallness.take(node) * distance))
+            done = np.flatnonzero(seen & asked)
+            rows.append(row[done])
+            nodes.append(node[done])
+            more = np.flatnonzero(seen & ~asked)
+            child = self._child.take(node[more])
+            row = np.repeat(row[more], 2)
+            node = np.stack([child, child + 1], axis=1).ravel()
+        row, node = np.concatenate(rows), np.concatenate(nodes)
+        shapes = self.polygon.take(node, axis=0)
+        factor = point_to_polygon(points.take(row, axis=0), normals.take(row, axis=0), shapes, contact=False)
+        factor *= self._scale.take(node)
+        some = np.flatnonzero(factor > 0)
+        some = some[np.argsort(row[some], kind="stable")]
+        return Asked(row[some], node[some], factor[some])
+
+
+def _sorted_tree(places: Array, normals: Array) -> tuple[Array, list[Array]]:
+    """Sort faces into a balanced tree by halving runs along their widest axis of six.
+
+    Returns
+    -------
+    order : (m,) int
+    levels : list of (2^l + 1,) int
+        Where the runs of each level begin, and the last one ends; the last level's hold one face each, or
+        none.
+    """
+    size = 0.5 * np.linalg.norm(np.ptp(places, axis=0))
+    keys = np.concatenate([places, 0.5 * size * normals], axis=1)
+    count = len(places)
+    order, bounds = np.arange(count), np.array([0, count])
+    levels = [bounds]
+    while (np.diff(bounds) > 1).any():
+        run = np.repeat(np.arange(len(bounds) - 1), np.diff(bounds))
+        sorted_keys = keys[order]
+        held = np.flatnonzero(np.diff(bounds) > 0)
+        low = np.minimum.reduceat(sorted_keys, bounds[held], axis=0)
+        high = np.maximum.reduceat(sorted_keys, bounds[held], axis=0)
+        widest = np.zeros(len(bounds) - 1, dtype=np.int64)
+        widest[held] = (high - low).argmax(axis=1)
+        along = np.take_along_axis(sorted_keys, widest[run][:, None], axis=1)[:, 0]
+        order = order[np.lexsort((along, run))]
+        middle = (bounds[:-1] + bounds[1:] + 1) // 2
+        bounds = np.append(np.stack([bounds[:-1], middle], axis=1).ravel(), count)
+        levels.append(bounds)
+    return order, levels

@@ -1,0 +1,271 @@
+"""Emissive faces as lamps: exact unoccluded factor, samples in proportion to it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...base.radiometry import radiance_of_radiosity
+from ...base.sampling import points_on_triangles
+from ...form_factors.formulas import point_to_polygon
+from ...form_factors.kernel import ray_geometry_term, throughput
+from ...rays.caster import RayCaster
+from ...scene.faces import Faces
+from .emitter_tree import EmitterTree
+from .merged_faces import merge_flat
+
+CHUNK_PAIRS = 1 << 18
+"""Point and face pairs evaluated at once; bounds the temporaries to about 50 MB a thread."""
+
+MANY = 256
+"""More faces than these are asked in groups where they are far."""
+
+CHUNK_POINTS = 1 << 12
+"""Points that go down a tree of faces at once: each of them visits some hundred nodes."""
+
+ENDS = 2.0
+"""Surface offsets from an emissive face to where shadow rays end. Their starts are lifted by one, which
+must not put their ends back on the face."""
+
+NEAR_HORIZON = 1e-9
+"""So much of the group's extent a corner may seem to lie below the horizon and still be asked for."""
+
+
+class EmitterGroup:
+    """Faces of one emission, lit points see them as one lamp.
+
+    Parameters
+    ----------
+    corners : (m, 3, 3) float64
+    normals : (m, 3) float64
+    strength : (3,) float64
+        Exitance [W/m²].
+    offset : float
+        Shadow rays end this far off the surface, so that they do not meet it: `ENDS` times as far as
+        they start off theirs.
+    level : (m,) float64 or None
+        What part of `strength` each face emits; None for all of it.
+    """
+
+    def __init__(
+        self, corners: Array, normals: Array, strength: Array, offset: float, level: Array | None = None
+    ) -> None:
+        self._corners, self._normals, self._offset = corners, normals, offset
+        edges = corners[:, 1:] - corners[:, :1]
+        self._areas = 0.5 * np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+        self.strength = strength
+        self._level = np.ones(len(corners)) if level is None else level
+        # From a corner of theirs: heights over planes far from the origin would be rounded off.
+        self._origin = corners[0, 0]
+        self._outlines = corners - self._origin
+        self._reach = float(np.abs(self._outlines).max())
+        self._tree = None
+        if len(corners) > MANY:
+            self._tree = EmitterTree(corners, normals, self._areas * self._level)
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """(3,) float64 twice: the lower and upper corner of the box around all faces [m]."""
+        corners = self._corners.reshape(-1, 3)
+        return corners.min(axis=0), corners.max(axis=0)
+
+    def same_as(self, other: EmitterGroup) -> bool:
+        """Whether the other's faces are where these are."""
+        return self._corners.shape == other._corners.shape and bool((self._corners == other._corners).all())
+
+    @staticmethod
+    def of_faces(faces: Faces, caster: RayCaster, among: Array | None = None) -> list[EmitterGroup]:
+        """Group the emissive faces, if given those of a (f,) mask, by colour: visibility cannot mix it up."""
+        shines = faces.emission.max(axis=1, initial=0.0) > 0
+        rows = np.flatnonzero(shines if among is None else shines & among)
+        if len(rows) == 0:
+            return []
+        rows, corners, level = _uncovered(faces, rows)
+        colours, group = np.unique(faces.exitance[rows], axis=0, return_inverse=True)
+        group = group.reshape(-1)
+        offset = end_offset(caster)
+        lamps = []
+        for number, colour in enumerate(colours):
+            mine = group == number
+            whole, dim = np.flatnonzero(mine & (level == 1.0)), np.flatnonzero(mine & (level < 1.0))
+            merged, first = merge_flat(corners[whole])
+            normals = faces.normal[rows[whole][first]]
+            if len(dim) == 0:
+                lamps.append(EmitterGroup(merged, normals, colour, offset))
+                continue
+            merged = np.concatenate([merged, corners[dim]])
+            normals = np.concatenate([normals, faces.normal[rows[dim]]])
+            levels = np.concatenate([np.ones(len(first)), level[dim]])
+            lamps.append(EmitterGroup(merged, normals, colour, offset, levels))
+        return lamps
+
+    def unit_irradiance(self, points: Array, normals: Array) -> Array:
+        """Return (n,) the unoccluded irradiance per unit of exitance: Σ_m F(point → face m) · level."""
+        gain = np.empty(len(points))
+        if self._tree is not None:
+            for first in range(0, len(points), CHUNK_POINTS):
+                rows = slice(first, first + CHUNK_POINTS)
+                asked = self._tree.ask(points[rows], normals[rows])
+                gain[rows] = np.bincount(asked.row, asked.factor, minlength=len(points[rows]))
+            return gain
+        step = max(CHUNK_PAIRS // len(self._corners), 1)
+        for first in range(0, len(points), step):
+            rows = slice(first, first + step)
+            gain[rows] = self._factors(points[rows], normals[rows]).sum(axis=1)
+        return gain
+
+    def beside(self, points: Array, reach: Array) -> Array:
+        """Whether the box around one of the faces is within `reach` (n,) [m] of points, (n,) bool."""
+        low, high = self._corners.min(axis=1), self._corners.max(axis=1)
+        close = _box_distance(points, low.min(axis=0), high.max(axis=0)) <= reach
+        rows = np.flatnonzero(close)
+        step = max(CHUNK_PAIRS // len(self._corners), 1)
+        for first in range(0, len(rows), step):
+            some = rows[first : first + step]
+            apart = _box_distance(points[some, None], low, high)
+            close[some] = (apart <= reach[some, None]).any(axis=1)
+        return np.asarray(close)
+
+    def shadow_rays(self, points: Array, normals: Array, u: Array) -> tuple[Array, Array, Array]:
+        """Aim (n, k) rays at the faces in proportion to their factors.
+
+        The weights tell apart the rays to one face only; every face weighs as much as it has rays.
+        Else, so near a large face that no ray finds the spot most light comes from, the few rays to a
+        far and perhaps hidden face would decide.
+
+        Returns
+        -------
+        directions : (n, k, 3), distances : (n, k), weights : (n, k)
+        """
+        if self._tree is not None:
+            return self._rays_by_tree(self._tree, points, normals, u)
+        factors = self._factors(points, normals)
+        running = np.cumsum(factors, axis=1)
+        total = running[:, -1:]
+        rows = np.arange(len(points))[:, None]
+        pick = u[..., 0] * total
+        face = np.minimum((running[:, None, :] <= pick[..., None]).sum(axis=2), len(self._corners) - 1)
+        # What is left of the first coordinate within the chosen face places the point on it.
+        below = np.where(face > 0, running[rows, face - 1], 0.0)
+        width = np.maximum(factors[rows, face], 1e-300)
+        inside = np.stack([np.clip((pick - below) / width, 0.0, 1.0), u[..., 1]], axis=-1)
+        directions, distances, thrown = self._rays_to(points, normals, face, inside)
+        # A uniform point of a face stands for what the whole face would send, were it all there.
+        thrown *= self._level[face] * self._areas[face]
+        weights = np.where(total > 0, radiance_of_radiosity(thrown) / width, 0.0)
+        return directions, distances, _balanced(weights, face, len(self._corners))
+
+    def _rays_by_tree(
+        self, tree: EmitterTree, points: Array, normals: Array, u: Array
+    ) -> tuple[Array, Array, Array]:
+        """Aim (n, k) rays at nodes by what they send, and at faces of a node by their weights."""
+        asked = tree.ask(points, normals)
+        total = np.bincount(asked.row, asked.factor, minlength=len(points))
+        lit = np.flatnonzero(total > 0)
+        directions, (distances, weights) = np.zeros((*u.shape[:2], 3)), np.zeros((2, *u.shape[:2]))
+        directions[..., 2] = 1.0
+        if len(lit) == 0:
+            return directions, distances, weights
+        number = np.cumsum(total > 0) - 1
+        # One search for all points: those of the i-th lit one lie in (i, i + 1].
+        running = np.cumsum(asked.factor)
+        last = np.cumsum(np.bincount(asked.row, minlength=len(points)))[lit] - 1
+        first = np.append(0, last[:-1] + 1)
+        before = running[first] - asked.factor[first]
+        flat = (running - before[number[asked.row]]) / total[asked.row]
+        pick = np.clip(u[lit, :, 0].astype(np.float64), 0.0, 1.0 - 1e-12)
+        which = np.searchsorted(flat + number[asked.row], pick + np.arange(len(lit))[:, None], side="right")
+        which = np.clip(which, first[:, None], last[:, None])
+        share = asked.factor[which] / total[lit, None]
+        within = np.clip((pick - (flat[which] - share)) / share, 0.0, 1.0 - 1e-12)
+        node = asked.node[which]
+        low, high = tree.running[tree.begin[node]], tree.running[tree.end[node]]
+        wanted = low + within * (high - low)
+        slot = np.searchsorted(tree.running, wanted, side="right") - 1
+        slot = np.clip(slot, tree.begin[node], tree.end[node] - 1)
+        width = np.maximum(tree.running[slot + 1] - tree.running[slot], 1e-300)
+        inside = np.stack([np.clip((wanted - tree.running[slot]) / width, 0.0, 1.0), u[lit, :, 1]], axis=-1)
+        directions[lit], distances[lit], thrown = self._rays_to(
+            points[lit], normals[lit], tree.order[slot], inside
+        )
+        # A point of a node's faces stands for what the whole node would send, were it all there.
+        sent = radiance_of_radiosity(thrown * (high - low))
+        weights[lit] = _balanced(sent / np.maximum(asked.factor[which], 1e-300), which, len(asked.row))
+        return directions, distances, weights
+
+    def _rays_to(
+        self, points: Array, normals: Array, face: Array, inside: Array
+    ) -> tuple[Array, Array, Array]:
+        """Return directions, distances and throughput per area of rays to places on faces (n, k)."""
+        corners = self._corners[face]
+        targets = points_on_triangles(corners.reshape(-1, 3, 3), inside.reshape(-1, 1, 2))
+        targets = targets.reshape(*face.shape, 3)
+        along = targets + self._offset * self._normals[face] - points[:, None]
+        distances = np.linalg.norm(along, axis=2)
+        directions = along / np.maximum(distances, 1e-300)[..., None]
+        cos_r = np.einsum("nkc,nc->nk", directions, normals)
+        cos_s = -np.einsum("nkc,nkc->nk", directions, self._normals[face])
+        return directions, distances, throughput(ray_geometry_term(cos_r, cos_s, distances), 1.0, 1.0)
+
+    def _factors(self, points: Array, normals: Array) -> Array:
+        """Return (n, m) form factors from points to faces, times the faces' levels.
+
+        0 where not even the start of a ray, lifted off the surface, is in front of a face.
+        """
+        # A point of a footprint is rounded off its plane: a hair behind, it would see all of its own back.
+        apart = points - self._origin
+        height = apart @ self._normals.T
+        height -= np.einsum("mc,mc->m", self._outlines[:, 0], self._normals)
+        height += (self._offset / ENDS) * (normals @ self._normals.T)
+        seen = height > 0.0
+        # What is below the horizon, corner by corner, needs no closed form.
+        horizon = np.einsum("nx,nx->n", apart, normals) - NEAR_HORIZON * self._reach
+        above = np.zeros_like(seen)
+        for corner in range(self._outlines.shape[1]):
+            above |= normals @ self._outlines[:, corner].T > horizon[:, None]
+        point, face = np.nonzero(seen & above)
+        factors = np.zeros(seen.shape)
+        # Among the faces may be the back of the one the point is on.
+        found = point_to_polygon(points[point], normals[point], self._corners[face], contact=False)
+        factors[point, face] = found * self._level[face]
+        return factors
+
+
+def _uncovered(faces: Faces, rows: Array) -> tuple[Array, Array, Array]:
+    """Return what other faces leave of some: whose it is, corners (m, 3, 3), and what shows of it (m,)."""
+    if faces.own is None:
+        return rows, faces.corners[rows], np.ones(len(rows))
+    row, weights, level = faces.own.parts_of(faces.side[rows])
+    face = rows[row]
+    return face, corners_of_parts(faces, face, upright(faces, face, weights)), level
+
+
+def upright(faces: Faces, face: Array, weights: Array) -> Array:
+    """Return parts (m, 3, 2) of triangles the way round that is counter-clockwise as seen from the face."""
+    return np.where(faces.front[face, None, None], weights, weights[:, [0, 2, 1]])
+
+
+def corners_of_parts(faces: Faces, face: Array, weights: Array) -> Array:
+    """Return the corners (m, 3, 3) of parts in weights of their triangle's second and third corner."""
+    corner = np.where(faces.front[face, None, None], faces.corners[face], faces.corners[face][:, [0, 2, 1]])
+    return np.asarray(corner[:, :1] + np.einsum("pcw,pwk->pck", weights, corner[:, 1:] - corner[:, :1]))
+
+
+def end_offset(caster: RayCaster) -> float:
+    """Return how far off an emissive face shadow rays end [m]."""
+    return ENDS * caster.surface_offset
+
+
+def _box_distance(points: Array, low: Array, high: Array) -> Array:
+    """Return (…) how far points (…, 3) are from boxes [m], 0 inside."""
+    outside = np.maximum(np.maximum(low - points, points - high), 0.0)
+    return np.asarray(np.sqrt(np.einsum("...c,...c->...", outside, outside)))
+
+
+def _balanced(weights: Array, face: Array, faces: int) -> Array:
+    """Scale (n, k) weights so that in every row the rays to one face have 1 on average."""
+    keys = (np.arange(len(face))[:, None] * faces + face).ravel()
+    _, number = np.unique(keys, return_inverse=True)
+    number = number.reshape(-1)
+    mean = np.bincount(number, weights.ravel()) / np.bincount(number)
+    return np.asarray(weights / np.maximum(mean[number].reshape(weights.shape), 1e-300))

@@ -1,0 +1,235 @@
+"""Making the linear system: Galerkin or collocation, constant or linear elements (handout §3.2, §3.3).
+
+| assembly | K_ij | source |
+|---|---|---|
+| `galerkin` | area-averaged form factors between constant elements, one for each pair | (3.19), (3.27) |
+| `collocation` | from the centroid of i to the whole of constant element j | (3.13) |
+| `linear` | from vertex i to the hat of vertex j | (3.9)–(3.13) |
+
+All return the same `LinearSystem`, of the surfaces' own emission; `with_lamps` adds the lamps'
+light. The `…_steps` yield how far they are, so that a caller may show it or cancel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...base.parallel import for_chunks
+from ...form_factors.formulas import point_to_polygon
+from ...rays.caster import RayCaster
+from ...scene.faces import Faces
+from ...scene.overlaps import arriving, shares
+from ..hierarchy.basis import Basis, constant_basis
+from ..hierarchy.nodes import Hierarchy
+from .exchange_areas import exchange_areas
+from .linear_system import LinearSystem
+from .point_exchange import corner_factors, visible_share
+from .vertex_basis import vertex_basis
+
+BLOCK_PAIRS = 1 << 18
+"""Pairs between two reports of progress, about half a second's work; their numbers take 4 MB."""
+
+CHUNK_PAIRS = 1 << 16
+"""Pairs of a point and an element that one thread looks at together; about 60 MB."""
+
+FACING = 1e-13
+"""A face rises over another's plane if by more than this part of the scene's extent."""
+
+
+Steps = Generator[float, None, LinearSystem]
+
+
+def galerkin(hierarchy: Hierarchy, caster: RayCaster, seed: int = 0, threads: int = 0) -> LinearSystem:
+    """Assemble K_ij = δ_ij − ρ_i F_ij with area-averaged F, of constant elements on the leaves (3.26).
+
+    Reciprocal: T_ij = A_i F_ij V_ij is computed once for each pair.
+    """
+    return _finish(galerkin_steps(hierarchy, caster, constant_basis(hierarchy), seed, threads))
+
+
+def collocation(hierarchy: Hierarchy, caster: RayCaster, seed: int = 0, threads: int = 0) -> LinearSystem:
+    """Assemble K_ij = δ_ij − ρ_i F(x_i, j) V with x_i the centroids of constant elements (3.13)."""
+    return _finish(collocation_steps(hierarchy, caster, constant_basis(hierarchy), seed, threads))
+
+
+def linear(
+    hierarchy: Hierarchy, caster: RayCaster, basis: Basis | None = None, seed: int = 0, threads: int = 0
+) -> LinearSystem:
+    """Assemble K_ij = N_j(x_i) − ρ_i ∫ N_j κ V dA with hats N_j at the leaves' vertices (3.9).
+
+    Parameters
+    ----------
+    basis : Basis or None
+        From `vertex_basis`, which None calls; needed again to evaluate the solution.
+    """
+    return _finish(linear_steps(hierarchy, caster, basis or vertex_basis(hierarchy), seed, threads))
+
+
+def with_lamps(system: LinearSystem, direct: Array) -> LinearSystem:
+    """Return the system with E + ρ H_lamps for emission, given (n, 3) irradiance from lamps [W/m²]."""
+    return replace(system, emission=system.emission + system.reflectance * direct)
+
+
+def share_overlaps(system: LinearSystem, opacity: Array) -> tuple[LinearSystem, Array]:
+    """Keep elements from exchanging more than there is (see `overlaps`).
+
+    Of a reciprocal system every element *sends* only its share s, as in shooting: in C = s B
+    that is the same system with s ρ for ρ and s E for E, so T stays as it is, and symmetric.
+    Of others every row, what an element *receives*, is scaled in place.
+
+    Parameters
+    ----------
+    opacity : (n,) float64
+        Of each unknown's surface: what is not there takes no light.
+
+    Returns
+    -------
+    system : LinearSystem
+        Of the unknowns C.
+    sends : (n,) float64
+        s: B = C / s. 1 throughout where the rows were scaled, and where nothing overlaps.
+    """
+    share = shares(arriving(system.exchange, opacity) / system.area)
+    if system.reciprocal:
+        scale = share[:, None]
+        return replace(
+            system, reflectance=scale * system.reflectance, emission=scale * system.emission
+        ), share
+    for rows in _blocks(len(system)):
+        system.exchange[rows] *= share[rows, None]
+    return system, np.ones(len(system))
+
+
+def galerkin_steps(hierarchy: Hierarchy, caster: RayCaster, basis: Basis, seed: int, threads: int) -> Steps:
+    """See `galerkin`; yields the fraction done."""
+    count = len(basis)
+    exchange = np.zeros((count, count))
+    leaf, of_face = basis.leaf, basis.faces(hierarchy)
+    for rows in _blocks(count):
+        first = np.arange(rows.start, rows.stop)
+        seen = _facing(hierarchy.faces, of_face[rows], of_face)
+        seen &= np.arange(count)[None] > first[:, None]
+        one, other = np.nonzero(seen)
+        one += rows.start
+        values = exchange_areas(hierarchy, caster, leaf[one], leaf[other], seed, threads)
+        exchange[one, other] = values
+        exchange[other, one] = values
+        # The rows shorten: what is done grows as the area of the trapezoid above.
+        yield 1.0 - (1.0 - rows.stop / count) ** 2
+    return _system(hierarchy, basis, exchange, reciprocal=True)
+
+
+def collocation_steps(
+    hierarchy: Hierarchy, caster: RayCaster, basis: Basis, seed: int, threads: int
+) -> Steps:
+    """See `collocation`; yields the fraction done."""
+    exchange = np.zeros((len(basis), len(basis)))
+
+    def put(point: Array, leaf_row: Array, values: Array) -> None:
+        exchange[point, leaf_row] = basis.area[point] * values
+
+    def measure(points: Array, normals: Array, corners: Array, _: Array) -> Array:
+        return point_to_polygon(points, normals, corners)
+
+    yield from _point_rows(hierarchy, caster, basis, measure, put, seed, threads)
+    return _system(hierarchy, basis, exchange)
+
+
+def linear_steps(hierarchy: Hierarchy, caster: RayCaster, basis: Basis, seed: int, threads: int) -> Steps:
+    """See `linear`; yields the fraction done."""
+    exchange = np.zeros((len(basis), len(basis)))
+
+    def put(point: Array, leaf_row: Array, values: Array) -> None:
+        for corner in range(3):
+            place = (point, basis.corner[leaf_row, corner])
+            np.add.at(exchange, place, basis.area[point] * values[:, corner])
+
+    yield from _point_rows(hierarchy, caster, basis, corner_factors, put, seed, threads)
+    return _system(hierarchy, basis, exchange)
+
+
+def _point_rows(
+    hierarchy: Hierarchy,
+    caster: RayCaster,
+    basis: Basis,
+    measure: Callable[[Array, Array, Array, Array], Array],
+    put: Callable[[Array, Array, Array], None],
+    seed: int,
+    threads: int,
+) -> Iterator[float]:
+    """Measure all pairs of a node and a leaf, hand them to `put`, and yield the fraction done."""
+    points, of_face = basis.points(hierarchy), basis.faces(hierarchy)
+    leaf_face = hierarchy.face[basis.leaf]
+    corners, leaf_normals = hierarchy.corners[basis.leaf], hierarchy.normal[basis.leaf]
+    step = max(CHUNK_PAIRS // max(len(leaf_face), 1), 1)
+
+    def fill(rows: slice) -> None:
+        point, row = np.nonzero(_facing(hierarchy.faces, of_face[rows], leaf_face))
+        if len(point) == 0:
+            return
+        point += rows.start
+        facing = hierarchy.faces.normal[of_face[point]]
+        factors = measure(points[point], facing, corners[row], leaf_normals[row])
+        lit = np.flatnonzero(factors.reshape(len(point), -1).max(axis=1, initial=0.0) > 0)
+        point, row, factors = point[lit], row[lit], factors[lit]
+        pair = point.astype(np.int64) << 32 | row
+        share = visible_share(caster, points[point], facing[lit], corners[row], leaf_normals[row], pair, seed)
+        put(point, row, (factors.T * share).T)
+
+    for block in _blocks(len(basis), len(leaf_face)):
+        for_chunks(_shifted(fill, block.start), block.stop - block.start, step, threads)
+        yield block.stop / len(basis)
+
+
+def _shifted(work: Callable[[slice], None], start: int) -> Callable[[slice], None]:
+    """Return `work` on slices counted from `start`."""
+    return lambda rows: work(slice(start + rows.start, start + rows.stop))
+
+
+def _system(hierarchy: Hierarchy, basis: Basis, exchange: Array, reciprocal: bool = False) -> LinearSystem:
+    element = basis.elements()
+    return LinearSystem(
+        exchange=exchange,
+        reflectance=hierarchy.reflectance[element],
+        emission=hierarchy.emission[element],
+        area=basis.area,
+        mass=basis.mass(),
+        reciprocal=reciprocal,
+    )
+
+
+def _facing(faces: Faces, one: Array, other: Array) -> Array:
+    """Return (m, n) whether parts of face `one` (m,) and face `other` (n,) may look at each other."""
+    rows, row = np.unique(one, return_inverse=True)
+    columns, column = np.unique(other, return_inverse=True)
+    extent = np.abs(faces.corners).max(initial=0.0)
+    over = _rise(faces, rows, columns) > FACING * extent
+    over &= FACING * extent < _rise(faces, columns, rows).T
+    return np.asarray(over[row.reshape(-1)[:, None], column.reshape(-1)])
+
+
+def _rise(faces: Faces, base: Array, of: Array) -> Array:
+    """Return (b, o) how far the highest corner of faces `of` rises over the planes of faces `base`."""
+    normal = faces.normal[base]
+    ground = np.einsum("bk,bk->b", normal, faces.corners[base, 0])
+    height = normal @ faces.corners[of].reshape(-1, 3).T
+    return np.asarray(height.reshape(len(base), -1, 3).max(axis=2) - ground[:, None])
+
+
+def _blocks(count: int, columns: int | None = None) -> list[slice]:
+    """Return slices of rows of at most `BLOCK_PAIRS` pairs that cover 0 … count."""
+    step = max(BLOCK_PAIRS // max(columns or count, 1), 1)
+    return [slice(start, min(start + step, count)) for start in range(0, count, step)]
+
+
+def _finish(steps: Steps) -> LinearSystem:
+    while True:
+        try:
+            next(steps)
+        except StopIteration as done:
+            system: LinearSystem = done.value
+            return system

@@ -1,0 +1,122 @@
+"""What points receive from elements: point-to-polygon factors times visibility by rays.
+
+The row of a collocation matrix (handout §3.2.1): from one point to every element, whole or
+shared out over the element's three corners.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...base.sampling import points_on_triangles, stratified_square
+from ...base.triangles import split_in_four
+from ...form_factors.formulas import point_to_polygon
+from ...form_factors.kernel import LEAST, kernel
+from ...rays.caster import RayCaster
+
+NEAR = ((1.21, 4), (2.07, 2), (4.13, 1))
+"""(Distance over radius, generations): a nearer triangle is split so often before each part is
+shared out among the corners. Odd numbers: on a regular grid rounding must not decide between two."""
+
+CHUNK_PARTS = 1 << 17
+"""Parts looked at together; their arrays take some 50 MB."""
+
+_CUBATURE = np.array([[2.0, 0.5, 0.5], [0.5, 2.0, 0.5], [0.5, 0.5, 2.0]]) / 3.0
+"""Points of a triangle whose mean is exact to degree 2."""
+
+
+def visible_share(
+    caster: RayCaster,
+    points: Array,
+    normals: Array,
+    corners: Array,
+    source_normals: Array,
+    keys: Array,
+    seed: int,
+) -> Array:
+    """Return (n,) V: the share of the light from triangles to points that nothing blocks.
+
+    A ray from each quarter of the triangle; where the four disagree, sixteen. 1 where no ray
+    carries light.
+
+    Parameters
+    ----------
+    points, normals : (n, 3) float64
+    corners : (n, 3, 3) float64
+    source_normals : (n, 3) float64
+    keys : (n,) int
+        With the seed, what places each pair's samples.
+    """
+    lit, total = np.zeros(len(points)), np.zeros(len(points))
+    rows, first = np.arange(len(points)), 0
+    for count in (4, 12):
+        # Column k lies in quarter k mod 4.
+        quarters = np.tile(split_in_four(corners[rows]), (1, count // 4, 1, 1))
+        unit = stratified_square(keys[rows], count, seed, first)
+        ends = points_on_triangles(quarters.reshape(-1, 3, 3), unit.reshape(-1, 1, 2)).reshape(-1, count, 3)
+        facing, back = normals[rows, None], source_normals[rows, None]
+        weight = kernel(points[rows, None], facing, ends, back)
+        pair, sample = np.nonzero(weight > 0)
+        start = (points[rows] + caster.surface_offset * normals[rows])[pair]
+        along = ends[pair, sample] + caster.surface_offset * source_normals[rows[pair]] - start
+        distance = np.linalg.norm(along, axis=1)
+        free = caster.passing(start, along / np.maximum(distance, 1e-300)[:, None], distance, LEAST)
+        lit[rows] += np.bincount(pair, weight[pair, sample] * free, minlength=len(rows))
+        total[rows] += weight.sum(axis=1)
+        rows, first = np.flatnonzero((lit > 0) & (lit < total)), count
+    return np.where(total > 0, lit / np.where(total > 0, total, 1.0), 1.0)
+
+
+def corner_factors(points: Array, normals: Array, corners: Array, source_normals: Array) -> Array:
+    """Return ∫ N_k κ dA of triangles' three hats N_k, unoccluded, as seen from points (3.13).
+
+    The hats sum to 1, so these sum to the factor from the point to the triangle, exactly:
+    only how it is shared out is by cubature, or where the triangle is near by splitting it.
+
+    Parameters
+    ----------
+    points, normals : (n, 3) float64
+    corners : (n, 3, 3) float64
+    source_normals : (n, 3) float64
+
+    Returns
+    -------
+    factors : (n, 3) float64
+    """
+    factors = np.empty((len(points), 3))
+    centre = corners.mean(axis=1)
+    radius = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
+    ratio = np.linalg.norm(centre - points, axis=1) / radius
+    nearest = 0.0
+    for farthest, generations in (*NEAR, (np.inf, 0)):
+        rows = np.flatnonzero((ratio >= nearest) & (ratio < farthest))
+        step = max(CHUNK_PARTS // 4**generations, 1)
+        for start in range(0, len(rows), step):
+            some = rows[start : start + step]
+            factors[some] = _split_factors(
+                points[some], normals[some], corners[some], source_normals[some], generations
+            )
+        nearest = farthest
+    return factors
+
+
+def _split_factors(
+    points: Array, normals: Array, corners: Array, source_normals: Array, generations: int
+) -> Array:
+    """Return (n, 3) corner factors as sums over 4^generations parts of each triangle.
+
+    A part's factor is exact; a few values of the kernel tell where on the part it comes from.
+    """
+    parts, weights = corners, np.eye(3)[None]
+    for _ in range(generations):
+        parts = split_in_four(parts.reshape(-1, 3, 3))
+        weights = split_in_four(weights.reshape(-1, 3, 3))
+    count = 4**generations
+    parts, weights = parts.reshape(-1, 3, 3), _CUBATURE @ weights.reshape(-1, 3, 3)
+    points, normals, source_normals = (np.repeat(a, count, axis=0) for a in (points, normals, source_normals))
+    transfer = kernel(points[:, None], normals[:, None], _CUBATURE @ parts, source_normals[:, None])
+    # Where the horizon leaves all these dark they count alike.
+    transfer += 1e-30
+    transfer *= (point_to_polygon(points, normals, parts) / transfer.sum(axis=1))[:, None]
+    return np.asarray(transfer.reshape(-1, 3 * count) @ weights.reshape(-1, 3))

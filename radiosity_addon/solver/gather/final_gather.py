@@ -1,0 +1,288 @@
+"""Rays from points over their hemispheres, whose hits are kept: links at the finest level.
+
+Cosine-distributed, each stands for the same form factor; besides, rays aimed at the few
+elements that are far brighter than the rest (`bright_patches.py`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...base.parallel import chunk_steps
+from ...base.sampling import cosine_hemisphere, orthonormal_basis, stratified_square
+from ...lights.environment import SkyTable
+from ...rays.caster import Hits, RayCaster
+from .bright_patches import AimedRays, AimedTable, BrightElements
+from .footprints import Footprints
+
+CHUNK_RAYS = 1 << 16
+"""Rays a thread prepares at once; bounds its temporaries to about 10 MB."""
+
+AIMED_PART = 4
+"""One ray is aimed for so many cosine-distributed ones, where any are aimed."""
+
+SAME_PLACE = 1e-5
+"""Barycentric weights that differ by less are one place on a triangle."""
+
+Resolver = Callable[[Hits], Array]
+"""Hits → (n,) int32: the number under which a hit's radiosity will be looked up."""
+
+NOTHING = -2
+"""A gather ray that left through the surface it started on: it carries no light."""
+SKY = -3
+"""The sky's first cell; the others count down from it (see `SkyTable`). −1 is left to resolvers."""
+
+
+@dataclass(frozen=True)
+class Gathered:
+    """What the rays of n points met.
+
+    Attributes
+    ----------
+    sources : (n, rays) int32
+        What the resolver said; a cell of the sky where nothing was hit, NOTHING below the surface and where
+        aimed rays ask instead.
+    closeness : (n,) float64
+        Mean of 1/distance over the rays [1/m]: how quickly irradiance may change.
+    aimed : AimedRays
+    """
+
+    sources: Array
+    closeness: Array
+    aimed: AimedRays
+
+
+class Gathering:
+    """Traces the rays of some points.
+
+    Parameters
+    ----------
+    caster : RayCaster
+    at : Footprints
+        `near` is not used.
+    surface_normals : (n, 3) float64
+        Rays that dip below carry nothing, where `at.normals` shade.
+    rays : int
+        Cosine-distributed ones a point; each stands for a form factor of 1 / rays.
+    resolve, leaves_of : callable
+        Number the hits, and tell the leaf elements hit.
+    seed, threads : int
+    sky : SkyTable
+    """
+
+    def __init__(
+        self,
+        caster: RayCaster,
+        at: Footprints,
+        surface_normals: Array,
+        rays: int,
+        resolve: Resolver,
+        leaves_of: Resolver,
+        seed: int,
+        threads: int,
+        sky: SkyTable,
+    ) -> None:
+        self._caster, self._at, self._surface_normals, self._rays = caster, at, surface_normals, rays
+        self._resolve, self._leaves_of = resolve, leaves_of
+        self._seed, self.threads, self._sky = seed, threads, sky
+        self._into: Array | None = None
+        self._closeness = at.scratch.empty(len(at))
+        self._aimed: dict[int, AimedRays] = {}
+
+    @property
+    def sources(self) -> Array:
+        """(n, rays) int32: see `Gathered`; made when it is first asked for, unless it was given."""
+        if self._into is None:
+            self._into = np.empty((len(self._at), self._rays), dtype=np.int32)
+        return self._into
+
+    @sources.setter
+    def sources(self, into: Array) -> None:
+        self._into = into
+
+    def steps(self, bright: BrightElements | None, irradiance: Array) -> Generator[float, None, Gathered]:
+        """Trace all; yields the fraction done.
+
+        Parameters
+        ----------
+        bright : BrightElements or None
+            What is aimed at.
+        irradiance : (n,) float64 [W/m²]
+            What is about expected: noise is measured by it.
+        """
+        assert len(self.sources) == len(self._at)
+
+        def trace(part: slice) -> None:
+            rows = np.arange(part.start, part.stop)
+            shares = None if bright is None or not len(bright) else self.shares(rows, bright, irradiance)
+            aimed = self.trace_rows(rows, bright, shares)
+            if aimed is not None:
+                self._aimed[part.start] = aimed
+
+        aimed, chunk = AimedTable(self._at.scratch), max(CHUNK_RAYS // self._rays, 1)
+        steps = chunk_steps(trace, len(self._at), chunk, self.threads)
+        for start, fraction in zip(range(0, len(self._at), chunk), steps, strict=True):
+            found = self._aimed.pop(start, None)
+            if found is not None:
+                aimed.extend(found, start)
+            yield fraction
+        return self.gathered(aimed.all())
+
+    def gathered(self, aimed: AimedRays) -> Gathered:
+        """Return what was found, with these aimed rays."""
+        return Gathered(self.sources, self._closeness, aimed)
+
+    def take_up(self, before: Gathered) -> None:
+        """Start from what was found before, of which some is to be traced again (`retracing.py`)."""
+        self.sources, self._closeness = before.sources.copy(), before.closeness.copy()
+
+    def shares(self, rows: Array, bright: BrightElements, irradiance: Array) -> Array:
+        """Return (r, m) how some rows would share their aimed rays out."""
+        return bright.shares(self._at.points[rows], self._at.normals[rows], self._rays, irradiance[rows])
+
+    def trace_rows(
+        self, rows: Array, bright: BrightElements | None, shares: Array | None
+    ) -> AimedRays | None:
+        """Trace all rays of some rows; return the aimed ones, their rows numbered among these, if any."""
+        if bright is None or shares is None or not shares.any():
+            self._cosine(rows, None, None)
+            return None
+        self._cosine(rows, bright, shares)
+        return self._aim(rows, bright, shares)
+
+    def on_any(self, elements: Array, hosts: Array, hits: Hits) -> Array:
+        """Return (h,) whether hits are on some elements, (e,) bool, of some triangles, (t,) bool."""
+        found = (hits.triangle >= 0) & hosts[hits.triangle]
+        rows = np.flatnonzero(found)
+        leaf = self._leaves_of(hits.take(rows))
+        found[rows] = (leaf >= 0) & elements[np.maximum(leaf, 0)]
+        return np.asarray(found)
+
+    def planes(self, rows: Array) -> tuple[Array, Array]:
+        """Return (r, 3) twice: the points, and the normals of the hemispheres that rays leave by."""
+        return self._at.points[rows], self._at.normals[rows]
+
+    def directions(self, rows: Array) -> tuple[Array, Array]:
+        """Return where the cosine-distributed rays of some rows go.
+
+        Returns
+        -------
+        directions : (r, rays, 3) float32
+        upward : (r, rays) bool
+            Whether they leave the surface at all.
+        """
+        directions = self._directions(rows)
+        surface = self._surface_normals[rows].astype(np.float32)
+        return directions, (directions @ surface[:, :, None])[:, :, 0] > 0
+
+    def trace_again(
+        self, rows: Array, ray: Array, directions: Array, stale: Array, casters: tuple[RayCaster, RayCaster]
+    ) -> tuple[Array, Hits, Array]:
+        """Trace some cosine-distributed rays, as if their points aimed at nothing.
+
+        Parameters
+        ----------
+        rows, ray : (p,) int
+            In order of the rows.
+        directions : (p, 3) float32
+        stale : (p,) bool
+            Whether what was hit must be numbered anew even if it is hit again.
+        casters : RayCaster twice
+            Of what moved alone, where it was and where it is: who meets none of it has not changed. And of
+            the scene as it was: it tells how far rays went.
+
+        Returns
+        -------
+        changed : (c,) int
+            Which of the rays may have another source now.
+        hits : Hits
+            What these met.
+        nearer : (c,) float64 [1/m]
+            What they add to their points' closeness.
+        """
+        moved, before = casters
+        start = self._starts_of(rows, ray)
+        missed = moved.visible(start, directions, np.full(len(rows), np.inf))
+        asked = np.flatnonzero(~missed | stale)
+        start, along = start[asked], directions[asked]
+        hits, old = self._caster.first_hits(start, along), before.first_hits(start, along)
+        same = (hits.triangle == old.triangle) & (hits.front == old.front) & ~stale[asked]
+        same &= (np.abs(hits.barycentric - old.barycentric) < SAME_PLACE).all(axis=1)
+        other = np.flatnonzero(~same)
+        changed, hits, old = asked[other], hits.take(other), old.take(other)
+        self.sources[rows[changed], ray[changed]] = self._found(hits, along[other])
+        least = self._caster.surface_offset
+        nearer = 1.0 / np.maximum(hits.distance, least) - 1.0 / np.maximum(old.distance, least)
+        nearer = nearer.astype(np.float64) / self._rays
+        np.add.at(self._closeness, rows[changed], nearer)
+        return changed, hits, nearer
+
+    def _cosine(self, rows: Array, bright: BrightElements | None, shares: Array | None) -> None:
+        """Trace the cosine-distributed rays of some rows, and keep what they hit."""
+        rays = self._rays
+        directions, upward = self.directions(rows)
+        start = self._starts(rows, rays, self._seed + 4)
+        hits = self._caster.first_hits(start.reshape(-1, 3), directions.reshape(-1, 3))
+        found = self._found(hits, directions.reshape(-1, 3)).reshape(len(rows), rays)
+        found[~upward] = NOTHING
+        if bright is not None and shares is not None:
+            found[bright.left_out(shares, hits, self._leaves_of).reshape(found.shape)] = NOTHING
+        self.sources[rows] = found
+        inverse = 1.0 / np.maximum(hits.distance.reshape(len(rows), rays), self._caster.surface_offset)
+        self._closeness[rows] = inverse.mean(axis=1)
+
+    def _directions(self, rows: Array) -> Array:
+        """Return (r, rays, 3) float32: where the cosine-distributed rays of some rows go."""
+        normals = self._at.normals[rows]
+        local = cosine_hemisphere(stratified_square(self._at.keys[rows], self._rays, self._seed + 3))
+        frame = np.stack([*orthonormal_basis(normals), normals], axis=1).astype(np.float32)
+        return np.asarray(local @ frame)
+
+    def _found(self, hits: Hits, directions: Array) -> Array:
+        """Return (h,) int32 the numbers of what rays met, the sky where they met nothing."""
+        found = self._resolve(hits)
+        missed = np.flatnonzero(hits.triangle < 0)
+        found[missed] = SKY - self._sky.cells(directions[missed])
+        return found
+
+    def _aim(self, rows: Array, bright: BrightElements, shares: Array) -> AimedRays:
+        """Trace the rays that some rows aim at bright elements."""
+        count = max(self._rays // AIMED_PART, 1)
+        start = self._starts(rows, count, self._seed + 6)
+        unit = stratified_square(self._at.keys[rows], count, self._seed + 5)
+        aim = bright.aim(start, self._at.normals[rows], shares, unit)
+        hits = self._caster.first_hits(start[aim.row].reshape(-1, 3), aim.directions.reshape(-1, 3))
+        arrived = self._leaves_of(hits) == aim.element.ravel()
+        arrived &= np.einsum("nrk,nk->nr", aim.directions, self._surface_normals[rows[aim.row]]).ravel() > 0
+        sources = np.full(len(arrived), NOTHING, dtype=np.int32)
+        sources[arrived] = self._resolve(hits.take(arrived))
+        shape = aim.element.shape
+        return AimedRays(aim.row, sources.reshape(shape), aim.weights.astype(np.float32), aim.element)
+
+    def _starts(self, rows: Array, rays: int, seed: int) -> Array:
+        """Return (r, rays, 3) where rays start, just above the footprints."""
+        at = self._at
+        lift = self._caster.surface_offset * self._surface_normals[rows][:, None]
+        if at.sampler is None:
+            return np.repeat(at.points[rows][:, None] + lift, rays, axis=1)
+        some = min(at.starts or rays, rays)
+        starts = at.sampler(rows, stratified_square(at.keys[rows], some, seed)) + lift
+        return np.asarray(starts[:, np.arange(rays) * some // rays])
+
+    def _starts_of(self, rows: Array, ray: Array) -> Array:
+        """Return (p, 3) where some cosine-distributed rays, by row and number, start: as in `_starts`."""
+        at = self._at
+        lift = self._caster.surface_offset * self._surface_normals[rows]
+        if at.sampler is None:
+            return np.asarray(at.points[rows] + lift)
+        some = min(at.starts or self._rays, self._rays)
+        distinct, of = np.unique(rows, return_inverse=True)
+        of, place = of.reshape(-1), ray * some // self._rays
+        unit = stratified_square(at.keys[distinct], some, self._seed + 4)
+        if len(rows) < some * len(distinct):
+            return np.asarray(at.sampler(rows, unit[of, place][:, None])[:, 0] + lift)
+        return np.asarray(at.sampler(distinct, unit)[of, place] + lift)

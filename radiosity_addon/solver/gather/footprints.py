@@ -1,0 +1,207 @@
+"""Where light is asked for: points, and the footprints that samples are spread over."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...base.parallel import chunk_steps
+from ...base.progress import scaled
+from ...base.sampling import stratified_square
+from ...base.scratch import Scratch, marked, row_numbers, trim
+from ...lights.light import Lamp
+from ..emitters.emitters import EmitterGroup
+
+SPREAD = 4
+"""Points of each footprint that all lamps share."""
+
+CHUNK_POINTS = 1 << 14
+"""Footprints worked on at once; bounds the temporaries to about 20 MB a thread."""
+
+SAME_GAIN = 0.02
+"""Where a lamp gives the centre of a footprint what it gives its farthest point, up to this
+part, the centre stands for all: what bends that little bends a mean by its square."""
+
+UNEVEN, MORE_GAINS = 0.02, 64
+"""Where the few points differ by more than this part, as beside a lamp and at the rim of a spot's cone,
+so many are asked."""
+
+EDGE = 0.5
+"""Where centre and farthest point differ by more than this part, an edge of the lamp's beam crosses."""
+
+DARKEST = 0.25
+"""Noise is measured by the light expected, or by this part of the mean where that is darker."""
+
+Sampler = Callable[[Array, Array], Array]
+"""(rows, u (r, k, 2)) → (r, k, 3): points of the rows' footprints."""
+
+
+Lift = Callable[[Array, Array, Array], Array]
+"""(rows, starts (r, k, 3), directions (r, k, 3)) → (r, k, 3): where shadow rays start instead."""
+
+
+@dataclass(frozen=True)
+class Footprints:
+    """Where light is asked for.
+
+    Attributes
+    ----------
+    points, normals : (n, 3) float64
+        Centres of the footprints, unit normals.
+    keys : (n,) int
+        With the seed, what places each point's samples.
+    sampler : callable or None
+        Spreads the samples over each point's footprint; None keeps them at the point.
+    near : callable or None
+        Grows a (n,) mask of doubtful points to their neighbours, which then also get the
+        larger number of rays.
+    starts : int or None
+        From how many samples a point's gather rays start, each of them a run that is stratified by
+        itself; None gives every ray its own.
+    expected : (n,) float64 or None [W/m²]
+        About how much light there is, a mean of the channels: a lamp that can add little to it is
+        asked with few shadow rays. None asks all lamps alike.
+    lift : callable or None
+        Moves the starts of shadow rays off a smooth surface's flat triangles.
+    scratch : Scratch
+        Makes arrays of what is found at the points.
+    """
+
+    points: Array
+    normals: Array
+    keys: Array
+    sampler: Sampler | None = None
+    near: Callable[[Array], Array] | None = None
+    starts: int | None = None
+    expected: Array | None = None
+    lift: Lift | None = None
+    scratch: Scratch = field(default_factory=Scratch)
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def weight_of(self, irradiance: Array, rows: slice = slice(None)) -> Array:
+        """Return (r,) in [0, 1]: how much an irradiance (r,) [W/m²] of rows counts next to the expected."""
+        if self.expected is None or not len(irradiance):
+            return np.ones(len(irradiance))
+        scale = np.maximum(self.expected[rows], DARKEST * self.mean_expected)
+        return np.asarray(np.minimum(irradiance / np.maximum(scale, 1e-300), 1.0))
+
+    @cached_property
+    def mean_expected(self) -> float:
+        """The mean of what is expected [W/m²]."""
+        assert self.expected is not None
+        mean = float(self.expected.mean())
+        trim()
+        return mean
+
+
+class SpreadPoints:
+    """The centres of footprints and a few points spread over each, which all lamps share.
+
+    Attributes
+    ----------
+    at : Footprints
+    count : int
+        Points of each; 1, the centre, without a sampler.
+    """
+
+    def __init__(self, at: Footprints, seed: int, threads: int = 0) -> None:
+        self.at, self._seed, self._threads = at, seed, threads
+        self.count = SPREAD if at.sampler else 1
+        # From the centre: single precision is too coarse for the place of small things far from the origin.
+        self._apart = at.scratch.zeros((len(at), self.count, 3), np.float32)
+        self._farthest = np.zeros(len(at), dtype=np.int8)
+
+        def spread(part: slice) -> None:
+            if at.sampler is None:
+                return
+            rows = np.arange(part.start, part.stop)
+            points = at.sampler(rows, stratified_square(at.keys[part], SPREAD, seed))
+            apart = points - at.points[part, None]
+            self._apart[part] = apart
+            self._farthest[part] = (apart**2).sum(axis=2).argmax(axis=1)
+
+        for _ in chunk_steps(spread, len(at), CHUNK_POINTS, threads):
+            pass
+
+    def points(self, rows: Array | slice) -> Array:
+        """Return (r, count, 3) float64: the points of some footprints."""
+        return np.asarray(self.at.points[rows, None] + self._apart[rows])
+
+    def gain_steps(self, light: Lamp | EmitterGroup, least: float = 0.0) -> Generator[float, None, Array]:
+        """Compute (n,) the unoccluded irradiance per unit of strength, a mean over the footprint.
+
+        Where it is no more than `least` in the centre, that stands for all, unless a glowing face is
+        no farther than the footprint is wide: it may shine on what is beside the centre only. Without
+        `least`, where the farthest point gets the same.
+
+        Yields
+        ------
+        fraction : float
+        """
+        at = self.at
+        gain = at.scratch.empty(len(at))
+        varies, jump = np.zeros((2, len(at)), dtype=bool)
+
+        def ask(part: slice) -> None:
+            normals = at.normals[part]
+            own = light.unit_irradiance(at.points[part], normals)
+            if at.sampler is not None:
+                if isinstance(light, EmitterGroup) and least:
+                    varies[part] = (own > least) | light.beside(at.points[part], self._width(part))
+                else:
+                    spread = self.points(part)
+                    far = spread[np.arange(len(own)), self._farthest[part]]
+                    other = light.unit_irradiance(far, normals)
+                    varies[part] = np.abs(other - own) > SAME_GAIN * np.maximum(own, other)
+                    jump[part] = np.abs(other - own) > EDGE * np.maximum(own, other)
+            gain[part] = own
+
+        yield from scaled(chunk_steps(ask, len(at), CHUNK_POINTS, self._threads), 0.0, 0.5)
+        # Right under a lamp two points may happen to see it alike: their neighbours do not.
+        bent = row_numbers(varies if at.near is None or least else at.near(varies))
+
+        def average(part: slice) -> None:
+            gain[bent[part]] = self._varying(light, bent[part])
+
+        yield from scaled(chunk_steps(average, len(bent), CHUNK_POINTS, self._threads), 0.5, 1.0)
+        if at.near is not None and jump.any():
+            # An edge that only cuts a footprint's corner is found from its neighbours.
+            lit = marked(len(gain), lambda rows: gain[rows] > 0)
+            rows = row_numbers(at.near(jump) | (at.near(lit) & at.near(~lit)))
+            gain[rows] = self._many(light, rows)
+        return gain
+
+    def _width(self, part: slice) -> Array:
+        """Return (r,) how far a footprint reaches from its centre, twice: about its width [m]."""
+        return np.asarray(2.0 * np.sqrt((self._apart[part] ** 2).sum(axis=2).max(axis=1)))
+
+    def _varying(self, light: Lamp | EmitterGroup, rows: Array) -> Array:
+        """Return (r,) the mean gain at some rows, over which it varies."""
+        each = self._gains(light, rows, self.points(rows))
+        mean = each.mean(axis=1)
+        uneven = np.flatnonzero(each.std(axis=1) > UNEVEN * mean)
+        mean[uneven] = self._many(light, rows[uneven])
+        return np.asarray(mean)
+
+    def _many(self, light: Lamp | EmitterGroup, rows: Array) -> Array:
+        """Return (r,) the mean gain at some rows, by many points of each."""
+        mean = np.empty(len(rows))
+        step = CHUNK_POINTS // MORE_GAINS * SPREAD
+        for start in range(0, len(rows), step):
+            some = rows[start : start + step]
+            unit = stratified_square(self.at.keys[some], MORE_GAINS, self._seed)
+            assert self.at.sampler is not None
+            mean[start : start + step] = self._gains(light, some, self.at.sampler(some, unit)).mean(axis=1)
+        return mean
+
+    def _gains(self, light: Lamp | EmitterGroup, rows: Array, points: Array) -> Array:
+        """Return (r, k) the gain at (r, k, 3) points of some rows' footprints."""
+        count = points.shape[1]
+        gain = light.unit_irradiance(points.reshape(-1, 3), np.repeat(self.at.normals[rows], count, axis=0))
+        return np.asarray(gain.reshape(-1, count))

@@ -1,0 +1,207 @@
+"""The hierarchy's nodes: clusters above the faces, elements below (structure of arrays).
+
+A *face* is one side of one triangle: the two sides receive, reflect and emit apart. Every
+face is the root of a quadtree of *elements*, made by joining the midpoints of the edges;
+its first element has the face's own index. *Clusters* group faces.
+
+Nodes are numbered clusters first: node n < n_clusters is a cluster, node n ≥ n_clusters is
+element n − n_clusters. So a link's source may be either and its receiver is an element.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...base.triangles import WHOLE_TRIANGLE, split_in_four
+from ...scene.faces import Faces
+from ...scene.scene import Scene
+from .clusters import Clusters, build_clusters
+
+LEAF = -1
+
+
+class Hierarchy:
+    """Faces, the clusters above them and the elements below; grows as links ask for it.
+
+    Attributes
+    ----------
+    corners : (e, 3, 3) float64
+    face : (e,) int32
+    parent, first_child : (e,) int32
+        −1 for none. Four children are contiguous: three at the corners, one in the middle.
+    level : (e,) int32
+    area : (e,) float64 [m²]
+    reflectance, emission : (e, 3) float64
+        Area means over each element, multiplied by opacity; emission in W/m².
+    opacity : (e,) float64
+        Area means.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.faces = Faces(scene)
+        count = len(self.faces)
+        self.corners = self.faces.corners.copy()
+        self.face = np.arange(count, dtype=np.int32)
+        self.parent = np.full(count, LEAF, dtype=np.int32)
+        self.first_child = np.full(count, LEAF, dtype=np.int32)
+        self.level = np.zeros(count, dtype=np.int32)
+        self.area = self.faces.area.copy()
+        self.reflectance: Array = self.faces.reflectance.copy()
+        self.emission: Array = self.faces.emission.copy()
+        self.opacity: Array = self.faces.opacity.copy()
+        self._images = scene.images
+        self._plain = scene.reflectance, scene.emission, scene.opacity
+        self._detailed = np.zeros(count, dtype=bool)
+        """(f,) bool: faces whose elements differ: textured, or covered in part"""
+        if self._images is not None:
+            self._detailed |= self._images.textured[self.faces.triangle]
+        if self.faces.own is not None:
+            share = self.faces.own.share_of(self.faces.side)
+            self._detailed |= (share > 0.0) & (share < 1.0)
+        if self._detailed.any():
+            self._weights = np.where(
+                self.faces.front[:, None, None], WHOLE_TRIANGLE, WHOLE_TRIANGLE[[0, 2, 1]]
+            )
+        emits = self.faces.emission.max(axis=1, initial=0.0) > 0
+        # Emitters are grouped apart: averaged into a cluster of dark faces a small lamp is
+        # missed by a few samples. So are backs: each lies where its front lies, unseen from
+        # wherever the front is seen.
+        self.clusters: Clusters
+        self.roots: Array
+        self.clusters, self.roots = build_clusters(
+            self.faces,
+            [
+                np.flatnonzero(~emits & self.faces.front),
+                np.flatnonzero(~emits & ~self.faces.front),
+                np.flatnonzero(emits),
+            ],
+        )
+        """roots: the nodes that together hold every face once; first links start from them"""
+
+    @property
+    def n_clusters(self) -> int:
+        """Number of clusters, and the node of element 0."""
+        return len(self.clusters)
+
+    @property
+    def n_elements(self) -> int:
+        """Number of elements, inner ones included."""
+        return len(self.face)
+
+    @property
+    def leaves(self) -> Array:
+        """(l,) int: the elements without children; they tile all faces."""
+        return np.flatnonzero(self.first_child == LEAF)
+
+    @property
+    def normal(self) -> Array:
+        """(e, 3) float64: the unit normal of every element."""
+        return np.asarray(self.faces.normal[self.face])
+
+    @property
+    def opacity_where_hit(self) -> Array:
+        """(e,) float64: what to divide by for radiosity where a ray found a surface; never 0."""
+        return np.where(self.opacity > 0, self.opacity, 1.0)
+
+    def normal_of(self, elements: Array) -> Array:
+        """Return (n, 3) float64: the unit normals of some elements."""
+        return np.asarray(self.faces.normal[self.face[elements]])
+
+    def subdivide(self, elements: Array) -> None:
+        """Give four children to each of the distinct leaf `elements` (handout §4.2, Subdiv)."""
+        if len(elements) == 0:
+            return
+        first = self.n_elements + 4 * np.arange(len(elements), dtype=np.int32)
+        self.first_child[elements] = first
+        self.corners = np.concatenate([self.corners, split_in_four(self.corners[elements]).reshape(-1, 3, 3)])
+        self.face = np.concatenate([self.face, np.repeat(self.face[elements], 4)])
+        self.parent = np.concatenate([self.parent, np.repeat(elements, 4).astype(np.int32)])
+        self.first_child = np.concatenate([self.first_child, np.full(4 * len(elements), LEAF, np.int32)])
+        self.level = np.concatenate([self.level, np.repeat(self.level[elements] + 1, 4).astype(np.int32)])
+        self.area = np.concatenate([self.area, np.repeat(self.area[elements] / 4, 4)])
+        for name in ("reflectance", "emission", "opacity"):
+            values = getattr(self, name)
+            setattr(self, name, np.concatenate([values, np.repeat(values[elements], 4, axis=0)]))
+        if self._detailed.any():
+            self._look_up(elements)
+
+    def _look_up(self, elements: Array) -> None:
+        """Take the means over the new children of `elements`, and average them upwards."""
+        weights = split_in_four(self._weights[elements]).reshape(-1, 3, 2)
+        self._weights = np.concatenate([self._weights, weights])
+        above = elements[self._detailed[self.face[elements]]]
+        rows = (self.first_child[above][:, None] + np.arange(4)).ravel()
+        means = self._means(rows)
+        self.reflectance[rows], self.emission[rows] = means[:, :3], means[:, 3:6]
+        self.opacity[rows] = means[:, 6]
+        # Samples of large elements are coarser than those of their parts.
+        while len(above):
+            children = self.first_child[above][:, None] + np.arange(4)
+            for values in (self.reflectance, self.emission, self.opacity):
+                values[above] = values[children].mean(axis=1)
+            above = np.unique(self.parent[above])
+            above = above[above != LEAF]
+
+    def _means(self, elements: Array) -> Array:
+        """Return (n, 7) reflectance, emission and opacity of elements, less what others cover."""
+        triangle, weights = self.faces.triangle[self.face[elements]], self._weights[elements]
+        if self._images is None:
+            textured = np.zeros(len(elements), dtype=bool)
+        else:
+            textured = self._images.textured[triangle]
+        means = np.empty((len(elements), 7))
+        reflectance, emission, opacity = self._plain
+        means[:, :3], means[:, 3:6], means[:, 6] = (
+            reflectance[triangle],
+            emission[triangle],
+            opacity[triangle],
+        )
+        if self._images is not None:
+            means[textured] = self._images.area_means(triangle[textured], weights[textured])
+        if self.faces.own is not None:
+            side = self.faces.side[self.face[elements]]
+            back = side % 2 == 1
+            upright = np.where(back[:, None, None], weights[:, [0, 2, 1]], weights)
+            means *= self.faces.own.share_of_elements(side, upright)[:, None]
+        return means
+
+    def leaf_at(self, face: Array, barycentric: Array) -> Array:
+        """Find the leaf element under points of faces.
+
+        Parameters
+        ----------
+        face : (n,) int
+        barycentric : (n, 2) float
+            Weights of the *triangle's* second and third corner, as ray casting gives them.
+
+        Returns
+        -------
+        element : (n,) int32
+        """
+        v = np.asarray(barycentric, dtype=np.float64)
+        back = ~self.faces.front[face]
+        second, third = np.where(back, v[:, 1], v[:, 0]), np.where(back, v[:, 0], v[:, 1])
+        weights = np.stack([1.0 - second - third, second, third], axis=1)
+        element = face.astype(np.int32)
+        inner = np.flatnonzero(self.first_child[element] != LEAF)
+        while len(inner):
+            local = weights[inner]
+            child = np.where(local.max(axis=1) >= 0.5, local.argmax(axis=1), 3)
+            at_corner = 2.0 * local
+            at_corner[np.arange(len(inner)), np.minimum(child, 2)] -= 1.0
+            weights[inner] = np.where((child == 3)[:, None], 1.0 - 2.0 * local, at_corner)
+            element[inner] = self.first_child[element[inner]] + child
+            inner = inner[self.first_child[element[inner]] != LEAF]
+        return element
+
+
+def node_opacity(hierarchy: Hierarchy) -> Array:
+    """Return (n_nodes,) float64: the area mean of the opacity of every cluster and element."""
+    clusters, faces = hierarchy.clusters, hierarchy.faces
+    if (faces.opacity == 1.0).all():
+        return np.ones(hierarchy.n_clusters + hierarchy.n_elements)
+    of_clusters = clusters.average(faces.opacity[:, None], faces.area)[:, 0]
+    return np.concatenate([of_clusters, hierarchy.opacity])
+
+

@@ -1,0 +1,216 @@
+"""The first links: from one pair of roots down to pairs that look small from each other.
+
+Nowhere are all faces paired with all: a pair of nodes is dropped once one lies behind the
+other, linked once both look small, and opened on its larger side otherwise. Faces far
+smaller than the smallest element that is asked for are never told apart: clusters below A_ε
+are linked however near they are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...options.solver_settings import SolverSettings
+from ...rays.caster import RayCaster
+from ..hierarchy.bounds import NodeShapes
+from ..hierarchy.nodes import Hierarchy
+from .cluster_links import ClusterLinks
+from .cluster_pairs import measure_cluster_links
+from .element_links import Links, measure_links
+
+SIZE = 0.5
+"""Nodes are linked where their radii together are at most this part of their distance, …"""
+
+MIXED_SIZE = 0.4
+"""… or this part where the source's faces look different ways: some may be bright and turned away, …"""
+
+FACE_SIZE = 0.4
+"""… or this part where a single face receives: its links do not know where in the source the light is."""
+
+CONE = 0.35
+"""Faces receive together while none is turned further than this from their mean [rad], or faintly."""
+
+BUDGET = 0.4
+"""First links may take this part of `SolverSettings.max_links`; refinement needs the rest …"""
+
+FEWEST = 200_000
+"""… but so many in any case: loosened further they would mean nothing."""
+
+WANTED = 6000.0
+"""Over the square root of BF_ε: more first links than that are not wanted, as refinement adds those that
+carry light, …"""
+
+COARSEST_FAINT = 8.0
+"""… unless pairs that exchange more than this times BF_ε, as a share of all area, went into one link: then
+only the budget has it. A link's doubt is about an eighth of its factor, and more where it is refined."""
+
+FAINT = 1e-7
+"""Where there are more, pairs that exchange less than this share of all area are linked however large
+they look and whichever way their faces do; where that does not do, …"""
+
+FAINTER = 2.0
+"""… than so many times more, again and again."""
+
+THINNED = 1 << 14
+"""How many first links there will be is estimated by following so many pairs at a time."""
+
+SLACK = 1.25
+"""First links may be so many times more than estimated."""
+
+BLOCK = 1 << 16
+"""Pairs looked at together: their temporaries, some 20 MB, stay near the processor."""
+
+
+def first_links(
+    hierarchy: Hierarchy, shapes: NodeShapes, caster: RayCaster, settings: SolverSettings, max_links: int
+) -> tuple[Links, ClusterLinks, float]:
+    """Link all that may see each other, coarsely.
+
+    Parameters
+    ----------
+    max_links : int
+        The whole budget of links, of which these take `BUDGET`.
+
+    Returns
+    -------
+    links : Links
+        To faces, sorted by receiver.
+    cluster_links : ClusterLinks
+        To clusters.
+    faint : float
+        Pairs that exchange less than this share of all area had to be linked however large they
+        look, to keep within the budget; 0 if none.
+    """
+    most = max(int(BUDGET * max_links), FEWEST)
+    wanted = WANTED / max(settings.error, 1e-9) ** 0.5
+    limits, pairs = _Limits(float(hierarchy.faces.area.sum()), settings.min_area), None
+    while True:
+        while True:
+            count = _estimate(hierarchy, shapes, limits)
+            may_be_coarser = FAINTER * limits.faint <= COARSEST_FAINT * settings.error
+            if count <= min(wanted, most) or (count <= most and not may_be_coarser):
+                break
+            limits = limits.looser()
+        pairs = _first_pairs(hierarchy, shapes, limits, int(SLACK * most))
+        if pairs is not None:
+            break
+        limits = limits.looser()
+    count, (to, of) = hierarchy.n_clusters, pairs
+    single = to >= count
+    chance = settings.seed, settings.threads
+    to_faces = measure_links(hierarchy, caster, to[single] - count, of[single], *chance)
+    to_clusters = measure_cluster_links(hierarchy, shapes, caster, to[~single], of[~single], *chance)
+    return to_faces.sorted_by_receiver(), to_clusters, limits.faint
+
+
+@dataclass(frozen=True)
+class _Limits:
+    """How large, how near and how curved nodes may be that are linked as they are.
+
+    `area` is all faces' [m²]; `tiny`, of nodes, and `faint`, of what a pair exchanges, are shares of it.
+    """
+
+    area: float
+    tiny: float
+    faint: float = 0.0
+
+    def looser(self) -> _Limits:
+        return replace(self, faint=FAINTER * self.faint if self.faint > 0.0 else FAINT)
+
+
+def _first_pairs(
+    hierarchy: Hierarchy, shapes: NodeShapes, limits: _Limits, most: int
+) -> tuple[Array, Array] | None:
+    """Return the (n,) receivers and sources of the first links; None if there are more than `most`."""
+    waiting = [_root_pairs(hierarchy)]
+    to, of, found = [], [], 0
+    while waiting:
+        # The latest first, block by block: what waits never grows to a whole generation.
+        receiver, source = waiting.pop()
+        if len(receiver) > BLOCK:
+            waiting.append((receiver[BLOCK:], source[BLOCK:]))
+            receiver, source = receiver[:BLOCK], source[:BLOCK]
+        ready, opened = _judge(hierarchy, shapes, receiver, source, limits)
+        to.append(ready[0].astype(np.int32))
+        of.append(ready[1].astype(np.int32))
+        found += len(ready[0])
+        if found > most:
+            return None
+        if len(opened[0]):
+            waiting.append(opened)
+    return np.concatenate(to), np.concatenate(of)
+
+
+def _estimate(hierarchy: Hierarchy, shapes: NodeShapes, limits: _Limits) -> float:
+    """Estimate how many first links there are, from some of the pairs on the way to them.
+
+    Whenever more than `THINNED` pairs are to be opened, that many are drawn, and stand for all.
+    """
+    chance = np.random.default_rng(0)
+    receiver, source = _root_pairs(hierarchy)
+    total, weight = 0.0, 1.0
+    while len(receiver):
+        ready, (receiver, source) = _judge(hierarchy, shapes, receiver, source, limits)
+        total += weight * len(ready[0])
+        if len(receiver) > THINNED:
+            drawn = chance.choice(len(receiver), THINNED, replace=False)
+            weight *= len(receiver) / THINNED
+            receiver, source = receiver[drawn], source[drawn]
+    return total
+
+
+def _root_pairs(hierarchy: Hierarchy) -> tuple[Array, Array]:
+    """Return the (n,) receivers and sources to begin with: every root with every root."""
+    count = len(hierarchy.roots)
+    return np.repeat(hierarchy.roots, count), np.tile(hierarchy.roots, count)
+
+
+def _judge(
+    hierarchy: Hierarchy, shapes: NodeShapes, receiver: Array, source: Array, limits: _Limits
+) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+    """Return the pairs to link as they are, and those that come of opening the others."""
+    may = shapes.may_see(receiver, source)
+    receiver, source = receiver[may], source[may]
+    coarse = _looks_small(shapes, receiver, source, limits)
+    wide = shapes.cone[receiver] > CONE
+    ready = coarse & ~wide
+    if limits.faint > 0.0:
+        ready |= shapes.exchange_bound(receiver, source) <= limits.faint * limits.area
+    # Where only its many directions keep the receiver from being linked, opening the source is no use.
+    opened = _open_larger(hierarchy, shapes, receiver[~ready], source[~ready], (coarse & wide)[~ready])
+    return (receiver[ready], source[ready]), opened
+
+
+def _looks_small(shapes: NodeShapes, receiver: Array, source: Array, limits: _Limits) -> Array:
+    """Return (n,) which pairs are linked as they are, if the receiver's faces look much the same way."""
+    to_face, of_face = receiver >= shapes.count, source >= shapes.count
+    of_mixed = shapes.cone[source] > CONE
+    size = np.where(of_mixed, MIXED_SIZE, SIZE)
+    size = np.where(to_face, np.minimum(size, FACE_SIZE), size)
+    far = ~shapes.looks_large(receiver, source, size)
+    # A face beside a cluster is told apart from it: samples would scatter there.
+    tiny = limits.tiny * limits.area
+    small = (shapes.area[receiver] <= tiny) & (shapes.area[source] <= tiny) & ~to_face & ~of_mixed
+    return np.asarray(far | small | (to_face & of_face))
+
+
+def _open_larger(
+    hierarchy: Hierarchy,
+    shapes: NodeShapes,
+    receiver: Array,
+    source: Array,
+    only_receiver: Array,
+) -> tuple[Array, Array]:
+    """Replace pairs by pairs with the two children of their larger cluster."""
+    count, children = hierarchy.n_clusters, hierarchy.clusters.children
+    # What looks many ways is opened rather: it may not receive.
+    weight = np.where(shapes.cone[receiver] > CONE, 2.0, 1.0)
+    larger = weight * shapes.radius[receiver] >= shapes.radius[source]
+    opened = (receiver < count) & ((source >= count) | larger | only_receiver)
+    return (
+        np.concatenate([children[receiver[opened]].ravel(), np.repeat(receiver[~opened], 2)]),
+        np.concatenate([np.repeat(source[opened], 2), children[source[~opened]].ravel()]),
+    )

@@ -1,0 +1,334 @@
+"""Links from lamps and the sky to elements: their direct irradiance, refined like any link."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...base.arrays import Array
+from ...base.parallel import for_chunks
+from ...base.radiometry import irradiance_under_sky
+from ...base.sampling import cosine_hemisphere, points_on_triangles, stratified_square, to_world
+from ...base.triangles import split_in_four
+from ...lights.sun_and_sky import EnvironmentLight, Lamp, Light, SpotLight
+from ...rays.caster import RayCaster
+from ..hierarchy.nodes import LEAF, Hierarchy
+
+LAMP_SAMPLES = 4
+"""Shadow rays of each quarter of an element, each from a point of its own."""
+SKY_RAYS = 16
+"""Hemisphere rays of each quarter of an element."""
+COARSEST = 512
+"""An element larger than the scene's area over this is split before light is looked for on it."""
+
+NEAR = 0.5
+"""So is one that looks larger than this (radius over distance) from the lamp, or than this part
+of a spot's cone."""
+
+SMALL, SMALL_DIVISOR = 2e-5, 4
+"""Elements below this share of all area get so many times fewer samples: there are many of them."""
+
+TINY = 2.5e-6
+"""Those below this share get a quarter of that, over the whole element."""
+
+CHUNK = 1 << 13
+"""Elements measured at once; bounds the temporaries to some 30 MB a thread."""
+
+
+@dataclass(frozen=True)
+class LightLinks:
+    """How strongly each light lights each linked element, per unit of its strength.
+
+    Attributes
+    ----------
+    receiver : (l,) int32
+    light : (l,) int32
+        Row of the scene's lights.
+    gain : (l, 4) float32
+        Irradiance per unit of strength on each quarter of the receiver, visibility included.
+    """
+
+    receiver: Array
+    light: Array
+    gain: Array
+
+    def __len__(self) -> int:
+        return len(self.receiver)
+
+    def irradiance(self, strengths: Array, n_elements: int) -> Array:
+        """Return (n_elements, 4, 3): each element's share on its quarters, for (n_lights, 3) strengths."""
+        total = np.zeros((n_elements, 4, 3))
+        for channel in range(3):
+            for quarter in range(4):
+                arriving = self.gain[:, quarter] * strengths[self.light, channel]
+                total[:, quarter, channel] = np.bincount(self.receiver, arriving, minlength=n_elements)
+        return total
+
+
+def no_light_links() -> LightLinks:
+    """Return an empty set of light links."""
+    none = np.zeros(0, dtype=np.int32)
+    return LightLinks(none, none, np.zeros((0, 4), dtype=np.float32))
+
+
+def join_light_links(one: LightLinks, other: LightLinks) -> LightLinks:
+    """Return the links of both."""
+    return LightLinks(
+        np.concatenate([one.receiver, other.receiver]),
+        np.concatenate([one.light, other.light]),
+        np.concatenate([one.gain, other.gain]),
+    )
+
+
+def link_lights(
+    hierarchy: Hierarchy,
+    lights: Sequence[Light],
+    caster: RayCaster,
+    misplaced_power: float,
+    min_area: float,
+    seed: int,
+    threads: int = 0,
+    most_elements: int = 1 << 30,
+    as_if: Array | None = None,
+) -> LightLinks:
+    """Link every light to the elements it reaches, splitting where its light varies.
+
+    Parameters
+    ----------
+    misplaced_power : float
+        BF_ε [W]: an element is split while (spread of irradiance) × area exceeds it.
+    min_area : float
+        A_ε [m²]: no element becomes smaller.
+    most_elements : int
+        How many the hierarchy may grow to; the largest and most doubtful are split first.
+    as_if : (n_lights,) float64 or None
+        What the lights count for instead of their strengths; those at 0 get no links.
+    """
+    receivers, numbers, gains = [], [], []
+    coarse_area = float(hierarchy.faces.area.sum()) / COARSEST
+    for number, light in enumerate(lights):
+        strength = float(np.max(light.strength)) if as_if is None else float(as_if[number])
+        if strength <= 0.0 or not isinstance(light, Lamp | EnvironmentLight):
+            continue
+        waiting = np.arange(len(hierarchy.faces))
+        while len(waiting):
+            area = hierarchy.area[waiting]
+            may_split = (hierarchy.first_child[waiting] != LEAF) | (area >= 4 * min_area)
+            # Where few samples may miss the light altogether, they are not asked.
+            blind = may_split & ((area > coarse_area) | too_near(light, hierarchy, waiting))
+            blind = _affordable(hierarchy, waiting, blind, area, most_elements)
+            gain, doubt = np.zeros((len(waiting), 4)), np.zeros(len(waiting))
+            seeing = np.flatnonzero(~blind)
+            gain[seeing], doubt[seeing] = measure_light(
+                hierarchy, light, caster, waiting[seeing], seed + 101 * number, threads
+            )
+            misplaced = np.where(blind, np.inf, doubt * area * strength)
+            split = may_split & (misplaced > misplaced_power)
+            split = _affordable(hierarchy, waiting, split, misplaced, most_elements)
+            kept = ~split & (gain.max(axis=1) > 0)
+            receivers.append(waiting[kept])
+            gains.append(gain[kept])
+            numbers.append(np.full(int(kept.sum()), number))
+            parents = waiting[split]
+            hierarchy.subdivide(parents[hierarchy.first_child[parents] == LEAF])
+            waiting = (hierarchy.first_child[parents][:, None] + np.arange(4)).ravel()
+    empty = [np.zeros(0)]
+    return LightLinks(
+        np.concatenate(receivers or empty).astype(np.int32),
+        np.concatenate(numbers or empty).astype(np.int32),
+        np.concatenate(gains or [np.zeros((0, 4))]).astype(np.float32),
+    )
+
+
+def _affordable(hierarchy: Hierarchy, elements: Array, wanted: Array, weight: Array, most: int) -> Array:
+    """Return which of the elements `wanted` may be split with no more than `most` in all: the weightiest."""
+    new = np.flatnonzero(wanted & (hierarchy.first_child[elements] == LEAF))
+    room = max((most - hierarchy.n_elements) // 4, 0)
+    if len(new) <= room:
+        return wanted
+    kept = wanted.copy()
+    kept[new[np.argsort(-weight[new], kind="stable")[room:]]] = False
+    return kept
+
+
+def too_near(light: Light, hierarchy: Hierarchy, elements: Array) -> Array:
+    """Return (n,) whether a lamp's pool of light may fall between the samples on elements."""
+    position = getattr(light, "position", None)
+    if position is None:
+        return np.zeros(len(elements), dtype=bool)
+    corners = hierarchy.corners[elements]
+    centre = corners.mean(axis=1)
+    radius = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
+    along = centre - np.asarray(position)
+    distance = np.linalg.norm(along, axis=1)
+    before = np.einsum("nk,nk->n", along, hierarchy.faces.normal[hierarchy.face[elements]]) < 0
+    near = radius > NEAR * distance
+    if isinstance(light, SpotLight):
+        # The element's bounding sphere, as the lamp sees it, touches the cone and is not small beside it.
+        seen = np.arcsin(np.clip(radius / np.maximum(distance, 1e-300), 0.0, 1.0))
+        axis = np.asarray(light.direction)
+        off = np.arccos(np.clip(along @ axis / np.maximum(distance, 1e-300), -1.0, 1.0))
+        narrow, wide = light.half_angles
+        near |= (off - seen < wide) & (seen > NEAR * narrow)
+    return np.asarray(before & near)
+
+
+def measure_light(
+    hierarchy: Hierarchy,
+    light: Lamp | EnvironmentLight,
+    caster: RayCaster,
+    elements: Array,
+    seed: int,
+    threads: int = 0,
+) -> tuple[Array, Array]:
+    """Measure one light's irradiance on the quarters of elements, per unit of strength, and its doubt.
+
+    Returns
+    -------
+    gain : (n, 4) float64
+        On each quarter.
+    doubt : (n,) float64
+    """
+    gain, doubt = np.empty((len(elements), 4)), np.empty(len(elements))
+    area = hierarchy.area[elements]
+    share = area / float(hierarchy.faces.area.sum())
+    tiny, small = share < TINY, share < SMALL
+    for chosen, pieces, divisor in (
+        (~small, 4, 1),
+        (small & ~tiny, 4, SMALL_DIVISOR),
+        (tiny, 1, SMALL_DIVISOR),
+    ):
+        rows_of = np.flatnonzero(chosen)
+
+        def measure(
+            piece: slice, rows_of: Array = rows_of, pieces: int = pieces, divisor: int = divisor
+        ) -> None:
+            rows = rows_of[piece]
+            asked = _pieces(hierarchy, elements[rows], pieces)
+            if isinstance(light, EnvironmentLight):
+                gain[rows], doubt[rows] = _measure_sky(asked, light, caster, seed, divisor)
+            else:
+                gain[rows], doubt[rows] = _measure_lamp(asked, light, caster, seed, divisor)
+
+        for_chunks(measure, len(rows_of), CHUNK, threads)
+    return gain, doubt
+
+
+@dataclass(frozen=True)
+class _Pieces:
+    """Quarters of n elements, or the elements whole: their keys, corners and normals."""
+
+    count: int
+    keys: Array
+    corners: Array
+    normals: Array
+
+
+def _pieces(hierarchy: Hierarchy, elements: Array, count: int) -> _Pieces:
+    keys = (4 * elements[:, None] + np.arange(count)).ravel()
+    corners = hierarchy.corners[elements]
+    if count == 4:
+        corners = split_in_four(corners).reshape(-1, 3, 3)
+    normals = hierarchy.faces.normal[hierarchy.face[elements]]
+    return _Pieces(count, keys, corners, np.repeat(normals, count, axis=0))
+
+
+def _measure_sky(
+    asked: _Pieces, light: EnvironmentLight, caster: RayCaster, seed: int, divisor: int
+) -> tuple[Array, Array]:
+    """Measure the sky on pieces of elements (see `measure_light`); whole ones have a column only."""
+    rays = SKY_RAYS // divisor
+    points = points_on_triangles(asked.corners, stratified_square(asked.keys, rays, seed + 1))
+    share, error = sky_share(light, points, asked.normals, rays, caster, asked.keys, seed)
+    values = irradiance_under_sky(share.reshape(-1, asked.count))
+    # Expected noise of a quarter's mean is not a difference between quarters.
+    noise = irradiance_under_sky(error.reshape(-1, asked.count).mean(axis=1))
+    return values, np.maximum(values.std(axis=1) - noise, 0.0)
+
+
+def _measure_lamp(
+    asked: _Pieces, light: Lamp, caster: RayCaster, seed: int, divisor: int
+) -> tuple[Array, Array]:
+    """Measure a lamp on pieces of elements (see `measure_light`); whole ones have a column only."""
+    samples = LAMP_SAMPLES // divisor
+    points = points_on_triangles(asked.corners, stratified_square(asked.keys, samples, seed + 1))
+    unit = stratified_square(asked.keys, samples, seed)
+    open_gain, share = lamp_light(light, points, asked.normals, unit, caster)
+    values = (open_gain.mean(axis=1) * share).reshape(-1, asked.count)
+    missed = open_gain.reshape(len(values), -1).mean(axis=1) / (asked.count * samples + 2.0)
+    return values, np.hypot(values.std(axis=1), missed)
+
+
+def lamp_light(
+    light: Lamp, points: Array, normals: Array, unit: Array, caster: RayCaster
+) -> tuple[Array, Array]:
+    """Ask for a lamp's light at points, one shadow ray each.
+
+    Parameters
+    ----------
+    points : (n, k, 3) float64
+    normals : (n, 3) float64
+    unit : (n, k, 2) float
+        Places the point of the lamp each ray goes to.
+
+    Returns
+    -------
+    gain : (n, k) float64
+        Unoccluded irradiance per unit of strength.
+    share : (n,) float64
+        How much of it arrives, over the k points together.
+    """
+    flat = points.reshape(-1, 3)
+    facing = np.repeat(normals, points.shape[1], axis=0)
+    gain = light.unit_irradiance(flat, facing)
+    weights, passed = np.zeros(len(flat)), np.zeros(len(flat))
+    rows = np.flatnonzero(gain > 0)
+    directions, distances, above = light.shadow_rays(flat[rows], facing[rows], unit.reshape(-1, 1, 2)[rows])
+    start = flat[rows] + caster.surface_offset * facing[rows]
+    lamps = caster.for_lamps
+    free = lamps.passing(start, directions[:, 0], distances[:, 0]) if light.casts_shadow else True
+    # A lamp point below the horizon says nothing: the closed form has cut it off already.
+    weights[rows] = np.where(above[:, 0] > 0, gain[rows], 0.0)
+    passed[rows] = weights[rows] * free
+    shape = unit.shape[:2]
+    total = weights.reshape(shape).sum(axis=1)
+    share = np.where(total > 0, passed.reshape(shape).sum(axis=1) / np.where(total > 0, total, 1.0), 0.0)
+    return gain.reshape(shape), share
+
+
+def sky_share(
+    light: EnvironmentLight,
+    points: Array,
+    normals: Array,
+    rays: int,
+    caster: RayCaster,
+    keys: Array,
+    seed: int,
+) -> tuple[Array, Array]:
+    """Ask for a sky's light at points, relative to an open sky of its radiance.
+
+    `points` are (n, 3), or (n, rays, 3) to start every ray elsewhere.
+
+    Returns
+    -------
+    share : (n,) float64
+        The cosine-weighted share of each hemisphere that meets no surface, weighted by the
+        relative radiance there.
+    error : (n,) float64
+        Its standard error, were the rays independent.
+    """
+    share, error = np.empty(len(points)), np.empty(len(points))
+    for first in range(0, len(points), CHUNK):
+        rows = slice(first, first + CHUNK)
+        unit = stratified_square(keys[rows], rays, seed)
+        directions = to_world(cosine_hemisphere(unit), normals[rows])
+        start = points[rows] if points.ndim == 3 else points[rows, None]
+        start = np.broadcast_to(start + caster.surface_offset * normals[rows, None], directions.shape)
+        endless = np.full(directions.shape[0] * rays, np.inf)
+        free = caster.passing(start.reshape(-1, 3), directions.reshape(-1, 3), endless)
+        found = free.reshape(-1, rays) * light.relative(directions)
+        share[rows] = found.mean(axis=1)
+        error[rows] = found.std(axis=1) / np.sqrt(rays)
+    return share, error

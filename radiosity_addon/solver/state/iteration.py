@@ -1,0 +1,87 @@
+"""One step of the hierarchical methods' iteration: Gather, then PushPull (handout §4.2)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...base.arrays import Array
+from ..hierarchy.cluster_cut import TreeTop
+from ..links.cluster_links import ClusterLinks, gather_at_clusters
+from ..links.element_links import Links
+from ..links.transport import gather, push, push_pull, quarters_mean, shared_means
+from .state import SolverState
+
+
+def reflect(
+    state: SolverState,
+    links: Links,
+    lights: Array,
+    scale: Array | None = None,
+    cluster_links: ClusterLinks | None = None,
+    top: TreeTop | None = None,
+    received: Array | None = None,
+) -> tuple[Array, Array]:
+    """Gather over all links from the state's radiosity, then push and pull; the state stays.
+
+    Parameters
+    ----------
+    links : Links
+        Sorted by receiver.
+    lights : (e, 3) float64
+        What the leaves get straight from lamps [W/m²].
+    scale : (e, 2) float64 or None
+        See `transport.gather`.
+    cluster_links : ClusterLinks or None
+        What the faces of clusters receive together.
+    top : TreeTop or None
+        With all clusters of both sets of links; needed for the second.
+    received : (e, 2) float64 or None
+        What the light that leaves gather is scaled with, over own links and over shared ones
+        (`conservation`).
+
+    Returns
+    -------
+    irradiance, radiosity : (e, 3) float64 [W/m²]
+    """
+    hierarchy = state.hierarchy
+    means, sent = shared_means(hierarchy, state.radiosity, scale, top)
+    shared = None
+    if cluster_links is not None and len(cluster_links) and top is not None:
+        threads = state.settings.threads
+        # A face that looks past the horizon of what its neighbours see gets nothing, not less.
+        shared = np.maximum(gather_at_clusters(hierarchy, top, cluster_links, sent, threads), 0.0)
+    own = gather(hierarchy, links, state.radiosity, scale, top, (means, sent))
+    gathered = push(hierarchy, own)
+    if shared is not None:
+        gathered += shared.take(hierarchy.face, axis=0)
+    if received is not None:
+        # Only leaves count, and these have from their ancestors what is not their own.
+        of_leaves = quarters_mean(own)
+        gathered = received[:, 1:] * (gathered - of_leaves) + received[:, :1] * of_leaves
+    return push_pull(hierarchy, lights, gathered, state.emission, state.reflectance)
+
+
+def relative_residual(state: SolverState, radiosity: Array) -> float:
+    """Return Σ A |E + ρ K B − B| / Φ of the state's radiosity, given what it is reflected as."""
+    leaves = state.hierarchy.leaves
+    change = np.abs(radiosity[leaves] - state.radiosity[leaves])
+    return float((state.hierarchy.area[leaves] @ change).max()) / state.power
+
+
+def bounce(
+    state: SolverState,
+    links: Links,
+    lights: Array,
+    scale: Array | None = None,
+    cluster_links: ClusterLinks | None = None,
+    top: TreeTop | None = None,
+    received: Array | None = None,
+) -> None:
+    """Move the state's irradiance and radiosity on by one step (see `reflect`), and count it.
+
+    The step's change at the leaves is taken as the residual, that of the radiosity before.
+    """
+    irradiance, radiosity = reflect(state, links, lights, scale, cluster_links, top, received)
+    state.residual = relative_residual(state, radiosity)
+    state.irradiance, state.radiosity = irradiance, radiosity
+    state.iterations += 1
