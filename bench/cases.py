@@ -94,7 +94,7 @@ class Case:
     def key(self) -> str:
         """Return what changes whenever the prepared scene must: a folder name for the cache."""
         sources = {
-            "cornell": [ROOT / "radiosity_addon" / "blender" / "cornell.py"],
+            "cornell": [ROOT / "radiosity_addon" / "blender" / "files" / "cornell.py"],
             "interior": sorted((ROOT / "bench" / "interior").glob("*.py")),
             "file": [ROOT / "bench" / "flatten.py"],
         }[self.builder]

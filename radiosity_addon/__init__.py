@@ -13,7 +13,11 @@ def register() -> None:
     from .blender.command_line import host
 
     registration.register()
-    host.register()
+    try:
+        host.register()
+    except BaseException:
+        registration.unregister()
+        raise
 
 
 def unregister() -> None:

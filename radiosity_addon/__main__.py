@@ -6,8 +6,8 @@ import os
 import sys
 from typing import NoReturn
 
-from .cli.interrupts import Interrupts
-from .files.temporary_folder import TemporaryFolder
+from .cli import Interrupts
+from .files import TemporaryFolder
 
 
 def leave(code: int, temporary: TemporaryFolder) -> NoReturn:

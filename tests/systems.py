@@ -12,8 +12,8 @@ from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.solver import Scene
 from radiosity_addon.solver.equations.assembly import collocation, galerkin, linear
 from radiosity_addon.solver.equations.fixed_elements import subdivide_evenly
+from radiosity_addon.solver.equations.linear_basis import vertex_basis
 from radiosity_addon.solver.equations.linear_system import LinearSystem
-from radiosity_addon.solver.equations.vertex_basis import vertex_basis
 from radiosity_addon.solver.hierarchy.basis import Basis, constant_basis
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from tests.cornell import cornell_box

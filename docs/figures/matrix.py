@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from measures import assembled
 
 from radiosity_addon.solver import Scene
-from radiosity_addon.solver.equations.independent_sets import independent_sets
+from radiosity_addon.solver.equations.decomposition import independent_sets
 from radiosity_addon.solver.equations.matrix_report import matrix_properties, symmetrised
 
 

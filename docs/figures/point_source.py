@@ -6,7 +6,7 @@ import drawing
 import numpy as np
 from matplotlib.figure import Figure
 
-from radiosity_addon.base.radiometry import intensity_of_flux, irradiance_from_point
+from radiosity_addon.numerics.radiometry import intensity_of_flux, irradiance_from_point
 from radiosity_addon.solver import PointLight
 
 FLUX = 100.0

@@ -1,1 +1,22 @@
-"""TODO."""
+"""The bake: unwrap, rasterize, solve, light the texels, encode. Plain arrays, no Blender.
+
+`pipeline.py` reads as prose.
+"""
+
+from __future__ import annotations
+
+from .estimate import Estimate, LightmappedObject, estimate_bake
+from .keep import Keeping, bake_steps, can_keep, moves_alone
+from .texel_memory import pages_of, refuse_too_large
+
+__all__ = [
+    "Estimate",
+    "Keeping",
+    "LightmappedObject",
+    "bake_steps",
+    "can_keep",
+    "estimate_bake",
+    "moves_alone",
+    "pages_of",
+    "refuse_too_large",
+]

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..base.bake_warning import BakeWarning
-from ..lightmap.texels.texel_geometry import TexelGeometry
-from ..lightmap.unwrap.greedy import greedy_object, share_of
-from ..scene.bake_scene import BakeObject, BakeScene
+from ..base import BakeWarning
+from ..lightmap.texels import TexelGeometry
+from ..lightmap.unwrap import greedy_object, share_of
+from ..scene import BakeObject, BakeScene
 from ..solver import Solution, SolverSettings
-from ..solver.links.initial import COARSEST_FAINT
+from ..solver.links import COARSEST_FAINT
 from .quality import used_settings
 
 FEW_TEXELS = 8

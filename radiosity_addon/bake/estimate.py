@@ -10,11 +10,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..base.parallel import thread_count
-from ..lightmap.unwrap.packing import padding_for
-from ..lightmap.unwrap.pages import least_pages, shared_out
-from ..options.bake_settings import BakeSettings
-from ..scene.bake_scene import BakeScene
+from ..lightmap.unwrap import least_pages, padding_for, shared_out
+from ..numerics import thread_count
+from ..options import BakeSettings
+from ..scene import BakeScene
 from .texel_memory import least_bytes, pages_of, refuse_too_large, room
 
 FILLED = 0.85

@@ -7,14 +7,13 @@ from collections.abc import Generator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..options.bake_settings import BakeSettings
-from ..scene.bake_scene import BakeScene
+from ..options import BakeSettings
+from ..scene import BakeScene
 from .pipeline import bake, bake_and_keep
 from .rebaking import bake_moved, can_move
-from .relight.kept_bake import KeptBake
-from .result.progress import Progress
-from .result.result import BakeResult
-from .sidecar.sidecar import write_sidecar
+from .relight import KeptBake
+from .result import BakeResult, Progress
+from .sidecar import write_sidecar
 
 
 @dataclass(frozen=True)

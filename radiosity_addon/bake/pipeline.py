@@ -14,39 +14,40 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..base.arrays import Array
-from ..base.errors import BakeError, SceneError, UsageError
-from ..base.scratch import Scratch, tiles
-from ..lightmap.images.page import LightmapPage
-from ..lightmap.images.seams import Seams, find_seams
-from ..lightmap.images.texel_pages import texel_pages
-from ..lightmap.images.turned_faces import turned_away
-from ..lightmap.lighting.accuracy import light_within
-from ..lightmap.lighting.error_picture import summary, texel_residual
-from ..lightmap.lighting.gather_settings import GatherSettings
-from ..lightmap.lighting.light_so_far import LightSoFar
-from ..lightmap.lighting.reconstruct import reconstruct
-from ..lightmap.lighting.sweeps import TexelLight
-from ..lightmap.texels.rasterize import rasterise
-from ..lightmap.texels.texel_geometry import TexelGeometry
-from ..lightmap.texels.texel_materials import FOOTPRINT, texel_materials
-from ..lightmap.unwrap.atlas import Atlas, AtlasInput, AtlasOptions, build_atlas
-from ..lightmap.unwrap.packing import Limits, padding_for
-from ..options.bake_settings import BakeSettings
-from ..rays.caster import RayCaster
-from ..scene.bake_scene import BakeObject, BakeScene
+from ..base import BakeError, SceneError, UsageError
+from ..lightmap.images import LightmapPage, Seams, find_seams, texel_pages, turned_away
+from ..lightmap.lighting import (
+    GatherSettings,
+    LightSoFar,
+    TexelLight,
+    light_within,
+    reconstruct,
+    summary,
+    texel_residual,
+)
+from ..lightmap.texels import FOOTPRINT, TexelGeometry, rasterise, texel_materials
+from ..lightmap.unwrap import Atlas, AtlasInput, AtlasOptions, Limits, build_atlas, padding_for
+from ..numerics import Array, Scratch, tiles
+from ..options import BakeSettings
+from ..rays import RayCaster
+from ..scene import BakeObject, BakeScene
 from ..solver import Solution, SolverSettings, SolverState, solve_progress
 from ..solver.element_transport import Relightable
 from .bake_warnings import of_solution, small_objects
 from .estimate import refuse_before_unwrapping
 from .quality import for_error, quality_of, used_settings
-from .relight.kept_bake import KeptBake, Moves, Solved, shown
-from .relight.light_groups import are_wanted, check_groups, group_pages
-from .result.details import More, more_of
-from .result.progress import Picture, Progress
-from .result.report import solver_part
-from .result.result import BakedObject, BakeResult, LightGroup
-from .result.texel_pictures import TexelPictures
+from .relight import KeptBake, Moves, Solved, are_wanted, check_groups, group_pages, shown
+from .result import (
+    BakedObject,
+    BakeResult,
+    LightGroup,
+    More,
+    Picture,
+    Progress,
+    TexelPictures,
+    more_of,
+    solver_part,
+)
 from .texel_memory import refuse_too_large, share_out_memory, texel_scratch
 
 T = TypeVar("T")

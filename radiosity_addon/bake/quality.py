@@ -6,10 +6,8 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ..lightmap.lighting.gather_settings import GatherSettings
-from ..options.bake_settings import BakeSettings
-from ..options.methods import METHODS
-from ..options.solver_settings import SolverSettings
+from ..lightmap.lighting import GatherSettings
+from ..options import METHODS, BakeSettings, SolverSettings
 
 
 @dataclass(frozen=True)

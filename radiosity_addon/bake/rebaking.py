@@ -11,22 +11,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..base.arrays import Array
-from ..base.bake_warning import BakeWarning
-from ..base.errors import SceneError
-from ..lightmap.update.affected import Disturbance
-from ..lightmap.update.moved import LitBefore, moved_steps
-from ..options.bake_settings import BakeSettings
-from ..scene.bake_scene import BakeObject, BakeScene
-from ..scene.scene import Scene
-from ..scene.textures import SurfaceImages
-from ..solver.carried import carried
-from ..solver.emitters.light_sources import NO_SOURCE
+from ..base import BakeWarning, SceneError
+from ..lightmap.update import Disturbance, LitBefore, moved_steps
+from ..numerics import Array
+from ..options import BakeSettings
+from ..scene import BakeObject, BakeScene, Scene, SurfaceImages
+from ..solver.emitters import NO_SOURCE
+from ..solver.moved_elements import carried
 from .pipeline import TexelValues, baked_objects, finish, staged, timed
-from .relight.kept_bake import KeptBake, Solved, same_light, shown
-from .result.details import statistics
-from .result.progress import Progress
-from .result.result import BakeResult
+from .relight import KeptBake, Solved, same_light, shown
+from .result import BakeResult, Progress, statistics
 
 RIGID = 1e-4
 """Edges that differ by no more than this part have kept their length."""

@@ -2,7 +2,7 @@
 
 What is looked up at random stays in memory: the numbers of the pages' texels, the light that hits are
 looked up in, the images that Blender holds. Everything else is worked on in tiles and lives in files where
-memory is short (`base/scratch.py`). So only very large pages are refused (docs/decisions/0046).
+memory is short (`numerics/scratch.py`). So only very large pages are refused (docs/decisions/0046).
 """
 
 from __future__ import annotations
@@ -11,12 +11,10 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..base.errors import UsageError
-from ..base.parallel import thread_count
-from ..base.scratch import Scratch
-from ..lightmap.texels.texel_geometry import TexelGeometry
-from ..options.bake_settings import BakeSettings
-from ..options.solver_settings import SolverSettings
+from ..base import UsageError
+from ..lightmap.texels import TexelGeometry
+from ..numerics import Scratch, thread_count
+from ..options import BakeSettings, SolverSettings
 
 LIT_BYTES = 48.0
 """Of every texel while it is lit: its number, its light, what geometry does to it, which rays it needs."""

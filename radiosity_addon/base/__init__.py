@@ -1,1 +1,28 @@
-"""TODO."""
+"""What everything else may use: errors, warnings, progress of long work, time left.
+
+Needs nothing but Python.
+"""
+
+from __future__ import annotations
+
+from .bake_warning import BakeWarning
+from .errors import BakeError, NothingToDoError, RadiosityError, SceneError, UsageError
+from .progress import drain, scaled
+from .quiet_output import silenced
+from .similar_warnings import one_of_each
+from .time_left import RemainingTime, duration
+
+__all__ = [
+    "BakeError",
+    "BakeWarning",
+    "NothingToDoError",
+    "RadiosityError",
+    "RemainingTime",
+    "SceneError",
+    "UsageError",
+    "drain",
+    "duration",
+    "one_of_each",
+    "scaled",
+    "silenced",
+]

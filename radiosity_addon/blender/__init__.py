@@ -1,1 +1,4 @@
-"""The only layer that knows Blender: scene in, lightmaps out, and the front doors."""
+"""The only layer that imports `bpy`: scene in, lightmaps out, operators, panels, command line.
+
+Its rooms are used module by module, so that registering loads neither NumPy nor the solver.
+"""

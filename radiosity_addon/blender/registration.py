@@ -10,33 +10,28 @@ import bpy
 
 from .datablocks import bake_record
 from .files import ownership
-from .overlays import overlay_properties, overlay_view
-from .relight import kept_bakes, lightmap_versions, live_switch, relight_properties
-from .scene_records import object_roles
-from .session import runtime
-from .ui import (
-    check_panel,
+from .operators import (
+    bake_operators,
+    checks,
     cleaning,
     edit_guard,
     light_group_operators,
-    light_group_panels,
-    light_group_properties,
-    object_panel,
-    operators,
-    panels,
-    preferences,
-    preset_menu,
-    properties,
     relight_operators,
 )
+from .overlays import overlay_properties, overlay_view
+from .panels import bake_panel, check_panel, light_group_panels, object_panel
+from .relight import kept_bakes, lightmap_versions, live_switch, relight_properties
+from .scene_records import object_roles
+from .session import runtime
+from .settings import light_group_properties, preferences, preset_menu, properties
 
 CLASSES = (
     *preferences.CLASSES,
-    *operators.CLASSES,
+    *bake_operators.CLASSES,
     *relight_operators.CLASSES,
     *light_group_operators.CLASSES,
     *preset_menu.CLASSES,
-    *panels.CLASSES,
+    *bake_panel.CLASSES,
     *light_group_panels.CLASSES,
     *check_panel.CLASSES,
     *object_panel.CLASSES,
@@ -64,7 +59,7 @@ def register() -> None:
         for module in (preset_menu, ownership, cleaning):
             module.register()
             _undo.append(module.unregister)
-        _undo.append(check_panel.forget_checks)
+        _undo.append(checks.forget_checks)
         _undo.append(runtime.stop_running)
     except BaseException:
         unregister()

@@ -9,9 +9,8 @@ from collections.abc import Iterable
 from contextlib import suppress
 from typing import Any, TextIO
 
-from ..files.path_checks import escaped
-from .similar_warnings import one_of_each
-from .time_left import RemainingTime, duration
+from ..base import RemainingTime, duration, one_of_each
+from ..files import escaped
 
 STEP = 10
 """Without a terminal a stage prints a line again after this many per cent."""

@@ -9,18 +9,19 @@ import argparse
 from pathlib import Path
 from typing import Any, NoReturn
 
-from ..base.errors import UsageError
-from ..files.path_checks import folder_of, name_of, path_of
-from ..options.bake_settings import (
+from ..base import UsageError
+from ..files import folder_of, name_of, path_of
+from ..options import (
     ATLASES,
     FORMATS,
     LIGHTS,
+    METHODS,
     QUALITIES,
     QUANTITIES,
+    SETTINGS,
     BakeSettings,
     GroupSetting,
 )
-from ..options.methods import METHODS, SETTINGS
 
 SHARED_FIELDS = (
     *("texel_density", "pages", "max_resolution", "mip_levels", "padding", "unwrap_seconds"),

@@ -6,7 +6,7 @@ import os
 from argparse import ArgumentTypeError
 from pathlib import Path
 
-from ..base.errors import BakeError
+from ..base import BakeError
 
 MAX_NAME = 255
 """Bytes of a file's or folder's name that file systems allow."""

@@ -17,7 +17,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..base.errors import BakeError
+from ..base import BakeError
 from .baked_files import digest
 from .file_names import is_bake_name
 from .marked_folders import MarkedFolder, abandoned, clean_up_folders, is_own

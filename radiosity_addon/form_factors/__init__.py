@@ -1,1 +1,24 @@
-"""TODO."""
+"""Form factors in closed form: the share of the light leaving one shape that meets another.
+
+Points, polygons, triangles, discs and spheres; no visibility.
+"""
+
+from __future__ import annotations
+
+from .geometry_kernel import LEAST, kernel, ray_geometry_term, sees, throughput
+from .polygon import point_to_polygon
+from .round_shapes import cap_cosine, point_to_ellipse
+from .triangle_pairs import triangle_to_triangle, weighted_sums
+
+__all__ = [
+    "LEAST",
+    "cap_cosine",
+    "kernel",
+    "point_to_ellipse",
+    "point_to_polygon",
+    "ray_geometry_term",
+    "sees",
+    "throughput",
+    "triangle_to_triangle",
+    "weighted_sums",
+]

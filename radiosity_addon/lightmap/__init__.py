@@ -1,1 +1,4 @@
-"""From triangles to lightmap pages and back: charts, packing, texels, dilation, encoding."""
+"""From triangles to lightmap pages: unwrap, texels, light at texels, images.
+
+Its rooms are used directly; this package exports nothing.
+"""

@@ -1,1 +1,43 @@
-"""TODO."""
+"""Lamps and the sky: the irradiance each causes at a point, and rays that sample it.
+
+Cycles' lamps are the model.
+"""
+
+from __future__ import annotations
+
+from .area import AreaLight
+from .environment import (
+    WHOLE,
+    Bounds,
+    EnvironmentImage,
+    SkyPatch,
+    SkyTable,
+    bright_patches,
+    even_part,
+    pixel_bounds,
+    solid_angles,
+)
+from .light import Emitter, Lamp, Light
+from .point import PointLight, SpotLight
+from .sun_and_sky import EnvironmentLight, SunLight, light_strengths
+
+__all__ = [
+    "WHOLE",
+    "AreaLight",
+    "Bounds",
+    "Emitter",
+    "EnvironmentImage",
+    "EnvironmentLight",
+    "Lamp",
+    "Light",
+    "PointLight",
+    "SkyPatch",
+    "SkyTable",
+    "SpotLight",
+    "SunLight",
+    "bright_patches",
+    "even_part",
+    "light_strengths",
+    "pixel_bounds",
+    "solid_angles",
+]

@@ -7,11 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from ..base.radiometry import radiance_of_flux
-from ..base.sampling import concentric_disk, cosine_hemisphere, to_world, uniform_cone
-from ..form_factors.kernel import ray_geometry_term, throughput
-from ..form_factors.polygon import point_to_polygon
-from ..form_factors.round_shapes import point_to_ellipse
+from ..form_factors import point_to_ellipse, point_to_polygon, ray_geometry_term, throughput
+from ..numerics import concentric_disk, cosine_hemisphere, radiance_of_flux, to_world, uniform_cone
 from .light import Emitter, Float64Array, Rays, Samples, directions_to, row_cosines
 
 AREA_SHAPES = ("rectangle", "ellipse")

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from ..base.radiometry import irradiance_under_sky
+from ..numerics import irradiance_under_sky
 from .light import Float64Array, Lamp, Light, Rays, Samples, row_cosines
 from .sun_and_sky import EnvironmentLight
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..base.errors import SceneError
+from ..base import SceneError
 
 Float64Array = npt.NDArray[np.float64]
 Rays = tuple[Float64Array, Float64Array, Float64Array]

@@ -7,16 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from ..base.radiometry import (
+from ..form_factors import cap_cosine, ray_geometry_term
+from ..numerics import (
     HEMISPHERE,
+    concentric_disk,
     cone_solid_angle,
+    cosine_hemisphere,
     intensity_of_flux,
     irradiance_from_point,
     radiance_of_disc,
+    to_world,
+    uniform_cone,
 )
-from ..base.sampling import concentric_disk, cosine_hemisphere, to_world, uniform_cone
-from ..form_factors.kernel import ray_geometry_term
-from ..form_factors.round_shapes import cap_cosine
 from .light import Emitter, Float64Array, Rays, Samples, directions_to, row_cosines
 
 _INTENSITY = intensity_of_flux(1.0)

@@ -13,9 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from ..base.arrays import Array
-from ..base.sampling import to_world, uniform_cone
-from ..form_factors.round_shapes import cap_cosine
+from ..form_factors import cap_cosine
+from ..numerics import Array, to_world, uniform_cone
 from .area import AREA_SHAPES, AreaLight
 from .light import Float64Array, Lamp, Light, Rays, Samples, row_cosines
 from .point import PointLight, SpotLight

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ..base.errors import UsageError
+from ..base import UsageError
 from .methods import SETTINGS, check_method
 
 QUALITIES = ("draft", "medium", "high")

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..base.errors import UsageError
+from ..base import UsageError
 
 ASSEMBLIES = ("galerkin", "collocation", "linear")
 

@@ -12,7 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..base.arrays import Array
+from ..numerics import Array
 
 OFFSET_STEPS = 64
 """Ray origins leave the surface by this many float32 steps at the scene's border."""

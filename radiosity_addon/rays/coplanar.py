@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.arrays import Array
-from ..base.sampling import hash_keys
+from ..numerics import Array, hash_keys
 
 LIFT = 0.25
 """How far copies lie off their triangles, in units of the offset that rays start with: beyond the rounding of

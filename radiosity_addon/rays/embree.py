@@ -11,8 +11,7 @@ from threading import Lock
 
 import numpy as np
 
-from ..base.arrays import Array
-from ..base.parallel import for_chunks
+from ..numerics import Array, for_chunks
 from .caster import NO_HIT, Hits, RayCaster, surface_offset
 from .coplanar import facing_copies
 

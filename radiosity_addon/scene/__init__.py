@@ -1,1 +1,33 @@
-"""TODO."""
+"""The solver's input: triangles with reflectance, emission and textures, and lamps.
+
+Also which of several surfaces in one place counts, and rays that pass through cut-outs.
+"""
+
+from __future__ import annotations
+
+from .bake_scene import LIGHTMAP_UV_LAYER, BakeObject, BakeScene
+from .faces import Faces
+from .opacity import ray_caster
+from .overlaps import OVERLAP, arriving, shares
+from .scene import Scene
+from .texture_hash import Glow, glow_pattern, same_glow, texture_digest
+from .textures import CHANNELS, SurfaceImages, where_there
+
+__all__ = [
+    "CHANNELS",
+    "LIGHTMAP_UV_LAYER",
+    "OVERLAP",
+    "BakeObject",
+    "BakeScene",
+    "Faces",
+    "Glow",
+    "Scene",
+    "SurfaceImages",
+    "arriving",
+    "glow_pattern",
+    "ray_caster",
+    "same_glow",
+    "shares",
+    "texture_digest",
+    "where_there",
+]

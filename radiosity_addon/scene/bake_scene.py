@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..base.arrays import Array
-from ..base.bake_warning import BakeWarning
+from ..base import BakeWarning
+from ..numerics import Array
 from .scene import Scene
 
 LIGHTMAP_UV_LAYER = "Lightmap"

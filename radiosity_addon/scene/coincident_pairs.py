@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.arrays import Array
-from ..base.polygons import areas, clip_half_plane
+from ..numerics import Array, areas, clip_half_plane
 
 TOLERANCE = 1e-6
 """Faces that are no farther apart than this [m], …"""

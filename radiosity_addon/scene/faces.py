@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.arrays import Array
+from ..numerics import Array
 from .scene import Scene
 from .uncovered_parts import OwnParts
 

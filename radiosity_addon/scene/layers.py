@@ -17,11 +17,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.arrays import Array
-from ..base.polygons import edge_distances
-from ..base.sampling import cosine_hemisphere, stratified_square, to_world
-from ..rays.caster import NO_HIT, Hits, surface_offset
-from ..rays.embree import EmbreeCaster
+from ..numerics import Array, cosine_hemisphere, edge_distances, stratified_square, to_world
+from ..rays import NO_HIT, EmbreeCaster, Hits, surface_offset
 from .coincident_pairs import CORNERS, CoincidentPairs, coincident_pairs, tolerances
 from .surfaces import Surfaces
 from .uncovered_parts import OwnParts, own_parts

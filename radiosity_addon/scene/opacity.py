@@ -14,10 +14,8 @@ from threading import Lock
 
 import numpy as np
 
-from ..base.arrays import Array
-from ..base.sampling import hash_keys
-from ..rays.caster import NO_HIT, Hits, RayCaster, surface_offset
-from ..rays.embree import TARGET_SLACK, EmbreeCaster
+from ..numerics import Array, hash_keys
+from ..rays import NO_HIT, TARGET_SLACK, EmbreeCaster, Hits, RayCaster, surface_offset
 from .layers import Layers
 from .scene import Scene
 from .stacks import Stacks

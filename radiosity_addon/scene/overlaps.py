@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.arrays import Array
+from ..numerics import Array
 
 OVERLAP = 1.1
 """ΣFV above this is no rounding and no want of rays: something is seen twice."""

@@ -7,11 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.arrays import Array
-from ..base.errors import SceneError
-from ..base.radiometry import MAX_REFLECTANCE
-from ..base.triangles import WHOLE_TRIANGLE
-from ..lights.sun_and_sky import Light
+from ..base import SceneError
+from ..lights import Light
+from ..numerics import MAX_REFLECTANCE, WHOLE_TRIANGLE, Array
 from .layers import Layers
 from .textures import SurfaceImages
 

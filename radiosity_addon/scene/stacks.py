@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.arrays import Array
-from ..rays.caster import Hits
+from ..numerics import Array
+from ..rays import Hits
 from .layers import MOST_COVERS, Layers, holding
 from .scene import Scene
 

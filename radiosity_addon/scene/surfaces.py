@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from ..base.arrays import Array
+from ..numerics import Array
 from .textures import SurfaceImages
 
 

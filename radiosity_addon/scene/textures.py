@@ -13,10 +13,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.arrays import Array
-from ..base.errors import SceneError
-from ..base.radiometry import MAX_REFLECTANCE
-from ..base.triangles import split_in_four
+from ..base import SceneError
+from ..numerics import MAX_REFLECTANCE, Array, split_in_four
 
 CHANNELS = 7
 """Reflectance RGB, emission RGB, opacity."""

@@ -7,9 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.arrays import Array
-from ..base.polygons import areas, clip_half_plane, edge_distances
-from ..base.triangles import split_in_four
+from ..numerics import Array, areas, clip_half_plane, edge_distances, split_in_four
 from .surfaces import Surfaces
 
 NOTHING_LEFT = 1e-9

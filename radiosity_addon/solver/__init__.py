@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Generator
 
-from ..lights.sun_and_sky import AreaLight, EnvironmentLight, PointLight, SpotLight, SunLight
-from ..options.solver_settings import SolverSettings
-from ..scene.scene import Scene
+from ..lights import AreaLight, EnvironmentLight, PointLight, SpotLight, SunLight
+from ..options import SolverSettings
+from ..scene import Scene
 from .methods import steps_of
 from .solution import Solution
-from .state.state import SolverState
+from .state import SolverState
 
 __all__ = [
     "AreaLight",

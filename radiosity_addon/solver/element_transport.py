@@ -10,16 +10,13 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-from ..base.arrays import Array
-from ..base.errors import UsageError
-from .emitters.light_sources import LightSources
-from .gather.local_pass import LocalPass
-from .links.light_links import join_light_links, link_lights
-from .links.transport import push
+from ..base import UsageError
+from ..numerics import Array
+from .emitters import LightSources
+from .gather import LocalPass
+from .links import join_light_links, link_lights, push
 from .methods.hierarchical import HierarchicalState
-from .state.anderson import Anderson
-from .state.iteration import bounce
-from .state.state import SolverState
+from .state import Anderson, SolverState, bounce
 
 ITERATIONS = 100
 """At most: accelerated, a digit takes some three."""

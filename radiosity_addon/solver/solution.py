@@ -8,13 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Array
+from ..numerics import Array
 from .element_transport import Relightable
-from .gather.local_pass import LocalPass
-from .gather.residual import Residual
-from .state.link_record import LinkRecord, record_links
-from .state.power import power_balance
-from .state.state import SolverState
+from .gather import LocalPass, Residual
+from .state import LinkRecord, SolverState, power_balance, record_links
 
 POINT_RAYS = 1024
 """Hemisphere rays of a single point in `Solution.irradiance`."""

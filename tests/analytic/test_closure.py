@@ -13,7 +13,7 @@ import pytest
 
 from bench.rooms import room
 from radiosity_addon.bake.quality import QUALITIES
-from radiosity_addon.base.sampling import cosine_hemisphere, points_on_triangles, to_world
+from radiosity_addon.numerics.sampling import cosine_hemisphere, points_on_triangles, to_world
 from radiosity_addon.solver import PointLight, Scene, Solution
 from radiosity_addon.solver.methods.hierarchical import HierarchicalState, solve_steps
 from tests.cornell import cornell_box

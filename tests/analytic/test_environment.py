@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.base.sampling import stratified_square
 from radiosity_addon.lights.environment import (
     CELLS,
     EnvironmentImage,
@@ -18,6 +17,7 @@ from radiosity_addon.lights.environment import (
     solid_angles,
 )
 from radiosity_addon.lights.sun_and_sky import EnvironmentLight, Light
+from radiosity_addon.numerics.sampling import stratified_square
 from radiosity_addon.solver import Scene, SolverSettings, solve
 from tests.rooms import grey, rectangle
 

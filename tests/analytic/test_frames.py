@@ -6,7 +6,7 @@ import numpy as np
 
 from radiosity_addon.base.progress import drain
 from radiosity_addon.lightmap.lighting.gather_settings import GatherSettings
-from radiosity_addon.lightmap.lighting.reconstruct import reconstruct
+from radiosity_addon.lightmap.lighting.reconstruction import reconstruct
 from radiosity_addon.lightmap.lighting.sweeps import TexelLight
 from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
 from radiosity_addon.lights.light import Light

@@ -7,7 +7,7 @@ import pytest
 
 from radiosity_addon.base.progress import drain
 from radiosity_addon.lightmap.lighting.gather_settings import GatherSettings
-from radiosity_addon.lightmap.lighting.reconstruct import reconstruct
+from radiosity_addon.lightmap.lighting.reconstruction import reconstruct
 from radiosity_addon.solver import EnvironmentLight, Scene, SolverSettings, solve
 from tests.rooms import grey, rectangle
 from tests.unit.texel_scenes import QUAD_UV, texel_geometry

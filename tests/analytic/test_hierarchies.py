@@ -9,7 +9,7 @@ import pytest
 
 from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.solver import PointLight, Scene, Solution, SolverSettings, solve
-from radiosity_addon.solver.equations.exchange_areas import exchange_areas
+from radiosity_addon.solver.equations.exchange import exchange_areas
 from radiosity_addon.solver.equations.fixed_elements import subdivide_below
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from radiosity_addon.solver.methods import hierarchical, multi_level

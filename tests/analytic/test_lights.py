@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from radiosity_addon.base.errors import SceneError
-from radiosity_addon.base.sampling import points_on_triangles, stratified_square
 from radiosity_addon.form_factors.formulas import cap_cosine, point_to_ellipse, point_to_polygon
 from radiosity_addon.lights.sun_and_sky import (
     AreaLight,
@@ -17,6 +16,7 @@ from radiosity_addon.lights.sun_and_sky import (
     SpotLight,
     SunLight,
 )
+from radiosity_addon.numerics.sampling import points_on_triangles, stratified_square
 
 DOWN = (0.0, 0.0, -1.0)
 

@@ -10,7 +10,7 @@ import pytest
 from radiosity_addon.base.errors import UsageError
 from radiosity_addon.form_factors.formulas import point_to_polygon
 from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, SolverSettings
-from radiosity_addon.solver.equations.vertex_basis import INWARD
+from radiosity_addon.solver.equations.linear_basis import INWARD
 from radiosity_addon.solver.methods import steps_of
 from radiosity_addon.solver.methods.dense import dense
 from radiosity_addon.solver.methods.matrix import MatrixState

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.base.radiometry import (
+from radiosity_addon.numerics.radiometry import (
     brdf_of_reflectance,
     intensity_of_flux,
     irradiance_from_point,
@@ -15,8 +15,8 @@ from radiosity_addon.base.radiometry import (
 from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, Solution, SolverSettings, SpotLight
 from radiosity_addon.solver.equations.assembly import collocation, galerkin, linear
 from radiosity_addon.solver.equations.fixed_elements import subdivide_evenly
+from radiosity_addon.solver.equations.linear_basis import vertex_basis
 from radiosity_addon.solver.equations.linear_system import LinearSystem
-from radiosity_addon.solver.equations.vertex_basis import vertex_basis
 from radiosity_addon.solver.gather.residual import Residual
 from radiosity_addon.solver.hierarchy.basis import Basis, constant_basis
 from radiosity_addon.solver.methods.matrix import MatrixState

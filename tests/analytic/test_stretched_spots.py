@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from radiosity_addon.base.errors import SceneError
-from radiosity_addon.base.sampling import stratified_square
+from radiosity_addon.numerics.sampling import stratified_square
 from radiosity_addon.solver import SpotLight
 
 DOWN = (0.0, 0.0, -1.0)

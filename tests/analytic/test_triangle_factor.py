@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.base.sampling import points_on_triangles, stratified_square
 from radiosity_addon.form_factors import triangle_pairs
 from radiosity_addon.form_factors.formulas import point_to_polygon, triangle_to_triangle
+from radiosity_addon.numerics.sampling import points_on_triangles, stratified_square
 from tests.rooms import FLOOR, box_room
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -16,7 +16,7 @@ from pathlib import Path
 sys.path.insert(0, sys.argv[1])
 import bpy
 import numpy as np
-from radiosity_addon.blender import bake_record
+from radiosity_addon.blender.datablocks import bake_record
 from tests.blender import hand_bake as scenes
 bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
 bake_record.register()

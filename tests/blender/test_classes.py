@@ -13,9 +13,9 @@ import pytest
 import radiosity_addon
 from radiosity_addon.blender import registration
 from radiosity_addon.blender.files.cornell import build_cornell_box
+from radiosity_addon.blender.panels import bake_panel
+from radiosity_addon.blender.panels.sections import Section
 from radiosity_addon.blender.session import runtime
-from radiosity_addon.blender.ui import panels
-from radiosity_addon.blender.ui.sections import Section
 
 BLENDER = Path(radiosity_addon.__file__).parent / "blender"
 SOURCES = sorted(path for path in BLENDER.rglob("*.py") if "presets" not in path.parts)
@@ -130,7 +130,7 @@ def test_every_operator_says_what_it_does_and_every_panel_has_a_name() -> None:
 
 def test_every_section_has_a_name_of_its_own() -> None:
     sections = Section.__subclasses__()
-    assert {section.__name__ for section in sections} > {section.__name__ for section in panels.SECTIONS}
+    assert {section.__name__ for section in sections} > {section.__name__ for section in bake_panel.SECTIONS}
     assert len({section.name for section in sections}) == len(sections)
     assert all(section.label and section.name.startswith("radiosity_") for section in sections)
 

@@ -12,8 +12,8 @@ import pytest
 
 import radiosity_addon
 from radiosity_addon.blender.datablocks.bake_record import recorded_objects
+from radiosity_addon.blender.operators.cleaning import unused_lightmaps
 from radiosity_addon.blender.session import runtime
-from radiosity_addon.blender.ui.cleaning import unused_lightmaps
 from radiosity_addon.files.baked_files import digest, read_report, sealed, text_of
 from tests.blender.scenes import add_lamp, add_mesh
 
@@ -252,10 +252,10 @@ def test_a_crafted_folder_is_left_as_it_is(room: Path, crafted: str) -> None:
 def test_only_the_folder_of_a_bake_of_this_scene_is_opened(
     room: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from radiosity_addon.blender.ui import operators
+    from radiosity_addon.blender.operators import bake_operators
 
     opened = []
-    monkeypatch.setattr(operators, "_open", lambda folder: opened.append(folder))
+    monkeypatch.setattr(bake_operators, "_open", lambda folder: opened.append(folder))
     assert bpy.ops.radiosity.open_folder() == {"FINISHED"}
     (room / "lightmaps" / "room_Scene_report.json").rename(room / "lightmaps" / "notes.json")
     with pytest.raises(RuntimeError, match="no bake of this scene"):

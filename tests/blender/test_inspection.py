@@ -20,8 +20,8 @@ from radiosity_addon.blender.files.cornell import build_cornell_box
 from radiosity_addon.blender.files.output import BLEND_NAME, PREVIEW_NAME, OutputFolder
 from radiosity_addon.blender.jobs.inspection import ERROR, INFO, WARNING, Inspection, inspect
 from radiosity_addon.blender.jobs.job import run_bake
+from radiosity_addon.blender.operators import checks
 from radiosity_addon.blender.session import runtime
-from radiosity_addon.blender.ui import check_panel
 from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.scenes import QUAD, add_lamp, add_mesh, set_world
 
@@ -234,21 +234,21 @@ def test_many_triangles_take_a_moment_only(tmp_path: Path) -> None:
 def test_the_operator_tells_and_the_panel_remembers() -> None:
     build_cornell_box()
     scene = bpy.context.scene
-    assert check_panel.last_check(scene) is None
+    assert checks.last_check(scene) is None
     assert bpy.ops.radiosity.check("EXEC_DEFAULT") == {"FINISHED"}
-    found = check_panel.last_check(scene)
+    found = checks.last_check(scene)
     assert found.objects == 7
-    assert dict(check_panel.figures(found))["Images"] == "1 × 512²"
+    assert dict(checks.figures(found))["Images"] == "1 × 512²"
 
 
 def test_only_an_odd_scene_that_was_never_seen_is_looked_at_first() -> None:
     build_cornell_box()
-    assert not check_panel.look_first(bpy.context)
-    check_panel.forget_checks()
+    assert not checks.look_first(bpy.context)
+    checks.forget_checks()
     bpy.data.objects["Floor"].hide_set(True)
-    assert check_panel.look_first(bpy.context)
-    assert not check_panel.look_first(bpy.context)
-    check_panel.forget_checks()
+    assert checks.look_first(bpy.context)
+    assert not checks.look_first(bpy.context)
+    checks.forget_checks()
     bpy.context.scene.radiosity.last_bake = json.dumps(
         {
             "objects": 1,
@@ -261,7 +261,7 @@ def test_only_an_odd_scene_that_was_never_seen_is_looked_at_first() -> None:
         }
     )
     assert runtime.last_bake(bpy.context.scene) is not None
-    assert not check_panel.look_first(bpy.context)
+    assert not checks.look_first(bpy.context)
 
 
 def test_the_command_line_checks_without_baking(tmp_path: Path) -> None:

@@ -9,10 +9,10 @@ import pytest
 
 import radiosity_addon
 from radiosity_addon.blender.images.light_mixer import mixers, sliders_of
+from radiosity_addon.blender.panels import light_group_panels
 from radiosity_addon.blender.scene_records.light_membership import NAME
-from radiosity_addon.blender.ui import light_group_panels
-from radiosity_addon.blender.ui.light_group_properties import listed_groups, outdate
-from radiosity_addon.blender.ui.properties import settings_of
+from radiosity_addon.blender.settings.light_group_properties import listed_groups, outdate
+from radiosity_addon.blender.settings.properties import settings_of
 from tests.blender.group_bake import bake_groups, lit_plane, slide
 from tests.blender.scenes import add_lamp, add_mesh, set_world, shader_material
 

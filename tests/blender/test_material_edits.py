@@ -14,8 +14,8 @@ from radiosity_addon.blender.apply.restore import restore
 from radiosity_addon.blender.datablocks.bake_record import is_made
 from radiosity_addon.blender.material_copies.copy_marks import ORIGINAL
 from radiosity_addon.blender.material_copies.material_digest import digest
-from radiosity_addon.blender.material_copies.material_edits import carry_edits
-from radiosity_addon.blender.material_copies.stripping import stripped_copy
+from radiosity_addon.blender.material_edits.material_edits import carry_edits
+from radiosity_addon.blender.material_edits.stripping import stripped_copy
 from radiosity_addon.blender.materials.materials import read_material
 from radiosity_addon.blender.scene_export.export import export_scene
 from radiosity_addon.options.bake_settings import BakeSettings

@@ -8,8 +8,8 @@ import bpy
 import pytest
 
 import radiosity_addon
-from radiosity_addon.blender.ui import panels
-from radiosity_addon.blender.ui.properties import settings_of
+from radiosity_addon.blender.panels import bake_panel
+from radiosity_addon.blender.settings.properties import settings_of
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.options.methods import METHODS, SETTINGS
 
@@ -42,7 +42,7 @@ def group() -> Iterator[bpy.types.PropertyGroup]:
 def drawn() -> list[str]:
     """Names of what the Solver panel shows."""
     layout = Layout()
-    panels.SolverSection.draw(layout, bpy.context)
+    bake_panel.SolverSection.draw(layout, bpy.context)
     return layout.drawn
 
 

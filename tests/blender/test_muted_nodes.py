@@ -9,9 +9,9 @@ import bpy
 import numpy as np
 import pytest
 
-from radiosity_addon.base.radiometry import radiance_of_radiosity
 from radiosity_addon.blender.apply.restore import restore
 from radiosity_addon.blender.materials.materials import read_material
+from radiosity_addon.numerics.radiometry import radiance_of_radiosity
 from tests.blender.hand_bake import add_plane, bake_by_hand, seen_from_above
 from tests.blender.scenes import add_node, set_world, with_nodes
 

@@ -211,7 +211,7 @@ def test_a_cancelled_one_leaves_the_earlier_bake(room: Path) -> None:
     from radiosity_addon.blender.files.output import OutputFolder
     from radiosity_addon.blender.files.ownership import panel_names
     from radiosity_addon.blender.jobs.job import run_bake
-    from radiosity_addon.blender.ui.properties import settings_of
+    from radiosity_addon.blender.settings.properties import settings_of
 
     before = digests(room)
     bpy.data.objects["Box"].location.x -= 0.5

@@ -16,9 +16,9 @@ from radiosity_addon.blender.datablocks.bake_record import is_baked, shows_light
 from radiosity_addon.blender.files.cornell import build_cornell_box
 from radiosity_addon.blender.files.output import OutputFolder
 from radiosity_addon.blender.jobs.job import run_bake
+from radiosity_addon.blender.operators.checks import look
+from radiosity_addon.blender.operators.cleaning import interrupted_folders
 from radiosity_addon.blender.session import runtime
-from radiosity_addon.blender.ui.check_panel import look
-from radiosity_addon.blender.ui.cleaning import interrupted_folders
 from radiosity_addon.options.bake_settings import BakeSettings
 
 QUICK = BakeSettings(resolution=32, quality="draft")

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import radiosity_addon
-from radiosity_addon.base.radiometry import luminous
 from radiosity_addon.blender.files.cornell import build_cornell_box
 from radiosity_addon.blender.jobs.job import run_bake
 from radiosity_addon.blender.overlays import lightmap_values, overlay_view
@@ -29,6 +28,7 @@ from radiosity_addon.blender.overlays.overlay_pictures import (
 )
 from radiosity_addon.blender.session import kept_details
 from radiosity_addon.blender.session.kept_details import details_of
+from radiosity_addon.numerics.radiometry import luminous
 from radiosity_addon.options.bake_settings import BakeSettings
 
 EVERY = (

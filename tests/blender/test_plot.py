@@ -11,7 +11,7 @@ import pytest
 
 from radiosity_addon.base.errors import BakeError
 from radiosity_addon.blender.command_line.plot import render_drawing, render_plot
-from radiosity_addon.cli.plot_layout import BLUE, Dot, Drawing, Line, Text
+from radiosity_addon.blender.overlays.plot_layout import BLUE, Dot, Drawing, Line, Text
 from tests.blender.file_dump import differences, dump_file
 
 HISTORY = [

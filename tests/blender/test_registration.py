@@ -12,19 +12,14 @@ import bpy
 import pytest
 
 import radiosity_addon
-from radiosity_addon.blender import registration
-from radiosity_addon.blender.ui.properties import settings_of
+from radiosity_addon.blender.command_line import host
+from radiosity_addon.blender.settings.properties import settings_of
 from radiosity_addon.options.bake_settings import BakeSettings
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
-OURS = str(
-    [
-        *("alike", "blender", "errors", "file_names", "held_files", "manifest", "methods", "remaining"),
-        *("settings", "sidecar_names"),
-    ]
-)
+OURS = str(["base", "blender", "files", "options"])
 """What registering imports beside Blender's side; none of it is heavy."""
 
 
@@ -68,7 +63,7 @@ def test_a_failure_half_way_takes_back_the_first_half(monkeypatch: pytest.Monkey
     def fail() -> None:
         raise RuntimeError("no command today")
 
-    monkeypatch.setattr(registration.cli_host, "register", fail)
+    monkeypatch.setattr(host, "register", fail)
     with pytest.raises(RuntimeError, match="no command today"):
         radiosity_addon.register()
     assert traces() == set()

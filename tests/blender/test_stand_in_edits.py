@@ -12,7 +12,7 @@ from radiosity_addon.blender.apply.rebake import originals_shown
 from radiosity_addon.blender.apply.restore import restore_scene
 from radiosity_addon.blender.datablocks import bake_record
 from radiosity_addon.blender.datablocks.bake_record import is_made
-from radiosity_addon.blender.ui import edit_guard
+from radiosity_addon.blender.operators import edit_guard
 from tests.blender.exporting import add_instance
 from tests.blender.hand_bake import add_plane, bake_by_hand, principled_material
 

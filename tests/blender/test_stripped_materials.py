@@ -12,8 +12,8 @@ from radiosity_addon.blender.apply.restore import restore
 from radiosity_addon.blender.material_copies.copy_marks import ORIGINAL
 from radiosity_addon.blender.material_copies.lightmap_materials import set_lightmap_only
 from radiosity_addon.blender.material_copies.material_digest import digest, links_of
-from radiosity_addon.blender.material_copies.material_edits import carry_edits
-from radiosity_addon.blender.material_copies.stripping import stripped_copy
+from radiosity_addon.blender.material_edits.material_edits import carry_edits
+from radiosity_addon.blender.material_edits.stripping import stripped_copy
 from tests.blender.edited_copies import (
     EVERY,
     GREEN,

@@ -12,10 +12,10 @@ import bpy
 import pytest
 
 import radiosity_addon
-from radiosity_addon.blender.ui import preferences, preset_menu
-from radiosity_addon.blender.ui.preferences import output_folder
-from radiosity_addon.blender.ui.preset_menu import FOLDER, PRESET_PROPERTIES
-from radiosity_addon.blender.ui.properties import settings_of
+from radiosity_addon.blender.settings import preferences, preset_menu
+from radiosity_addon.blender.settings.preferences import output_folder
+from radiosity_addon.blender.settings.preset_menu import FOLDER, PRESET_PROPERTIES
+from radiosity_addon.blender.settings.properties import settings_of
 from tests.blender.scenes import add_lamp, add_mesh
 
 PRESETS = sorted((Path(preset_menu.__file__).parent / "presets" / FOLDER).glob("*.py"))

@@ -8,8 +8,8 @@ from typing import Any
 import blf
 import pytest
 
-from radiosity_addon.blender.ui.panels import SOLID, WORKBENCH
-from radiosity_addon.blender.ui.wrapped_text import draw_text, wrapped
+from radiosity_addon.blender.panels.bake_panel import SOLID, WORKBENCH
+from radiosity_addon.blender.panels.wrapped_text import draw_text, wrapped
 
 
 class Lines:

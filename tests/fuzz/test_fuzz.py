@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 import radiosity_addon
-from radiosity_addon.base.arrays import Array
-from radiosity_addon.lightmap.images import texel_pages
+from radiosity_addon.lightmap.images import page_assembly
+from radiosity_addon.numerics.arrays import Array
 
 from .checks import check
 from .scenes import SCENES
@@ -77,13 +77,13 @@ def test_layers_make_no_light(seed: int) -> None:
 
 def test_a_wrong_bake_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """The checks can fail: handed darkness below zero they say so."""
-    real = texel_pages.fill
+    real = page_assembly.fill
 
     def darker(pixels: Array, *given: Any) -> None:
         real(pixels, *given)
         pixels -= np.float32(1e6)
 
-    monkeypatch.setattr(texel_pages, "fill", darker)
+    monkeypatch.setattr(page_assembly, "fill", darker)
     radiosity_addon.register()
     try:
         with pytest.raises(AssertionError, match="page 0 holds -"):

@@ -8,10 +8,10 @@ import pytest
 from radiosity_addon.bake.quality import LADDER, for_error
 from radiosity_addon.base.errors import UsageError
 from radiosity_addon.lightmap.lighting import accuracy
+from radiosity_addon.lightmap.lighting.gather_links import StoredLinks
 from radiosity_addon.lightmap.lighting.gather_settings import GatherSettings
-from radiosity_addon.lightmap.lighting.interpolate import Interpolation
-from radiosity_addon.lightmap.lighting.stored_links import StoredLinks
 from radiosity_addon.lightmap.lighting.sweeps import TexelLight, estimated_noise, relative_error
+from radiosity_addon.lightmap.points.interpolation import Interpolation
 from radiosity_addon.options.bake_settings import BakeSettings
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from radiosity_addon.base.progress import drain
-from radiosity_addon.base.sampling import stratified_square
+from radiosity_addon.numerics.sampling import stratified_square
 from radiosity_addon.solver import PointLight, Scene, SolverSettings, solve
 from radiosity_addon.solver.gather.bright_patches import CONTRAST, MOST, AimedRays, BrightElements
 from radiosity_addon.solver.gather.final_gather import NOTHING

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from radiosity_addon.base.similar_warnings import one_of_each
 from radiosity_addon.cli.console import summary
-from radiosity_addon.cli.similar_warnings import one_of_each
 
 
 def warning(name: str, message: str) -> dict[str, str]:

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from radiosity_addon.base.errors import BakeError
+from radiosity_addon.lightmap.charts import cut_charts as charts_module
+from radiosity_addon.lightmap.charts.cut_charts import unwrap
+from radiosity_addon.lightmap.charts.flatten import project_polygons
+from radiosity_addon.lightmap.charts.growers import grow_charts
+from radiosity_addon.lightmap.charts.overlap import overlapping_triangles
 from radiosity_addon.lightmap.images.dilate import dilate
 from radiosity_addon.lightmap.texels.rasterize import coverage_sum, rasterise
-from radiosity_addon.lightmap.unwrap import charts as charts_module
 from radiosity_addon.lightmap.unwrap.atlas import Atlas, AtlasInput, AtlasOptions, build_atlas, run_atlas
-from radiosity_addon.lightmap.unwrap.chart_growers import grow_charts
-from radiosity_addon.lightmap.unwrap.charts import unwrap
-from radiosity_addon.lightmap.unwrap.flatten import project_polygons
-from radiosity_addon.lightmap.unwrap.overlap import overlapping_triangles
 
 from .lightmap_meshes import area_3d, area_uv, box, cornell, islands, lumpy_ngons, quads, uv_sphere
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from radiosity_addon.base.errors import BakeError
+from radiosity_addon.lightmap.charts.box_charts import box_charts
 from radiosity_addon.lightmap.texels.rasterize import coverage_sum, rasterise
 from radiosity_addon.lightmap.unwrap.atlas import Atlas, AtlasInput, run_atlas
-from radiosity_addon.lightmap.unwrap.box_charts import box_charts
 from radiosity_addon.lightmap.unwrap.packing import Limits, padding_for
 
 from .lightmap_meshes import area_uv, box, uv_sphere

@@ -8,7 +8,7 @@ from collections.abc import Generator
 
 import pytest
 
-from radiosity_addon.base.background import TURN, in_thread
+from radiosity_addon.blender.session.background import TURN, in_thread
 
 
 def finish(steps: Generator) -> tuple[list, object]:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.base.sampling import stratified_square
 from radiosity_addon.lights.environment import SkyPatch, pixel_bounds
 from radiosity_addon.lights.sun_and_sky import Lamp
+from radiosity_addon.numerics.sampling import stratified_square
 from radiosity_addon.solver import AreaLight, PointLight, SpotLight, SunLight
 from radiosity_addon.solver.gather.boxes import Boxes
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.base.triangles import split_in_four
+from radiosity_addon.numerics.triangles import split_in_four
 from radiosity_addon.solver import Scene
-from radiosity_addon.solver.carried import on_scene
 from radiosity_addon.solver.gather.light_gains import LightGains
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
+from radiosity_addon.solver.moved_elements import on_scene
 from tests.rooms import box_room, grey
 
 

@@ -8,8 +8,8 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap.unwrap import chart_growers, xatlas_worker
-from radiosity_addon.lightmap.unwrap.charts import unwrap
+from radiosity_addon.lightmap.charts import growers, xatlas_worker
+from radiosity_addon.lightmap.charts.cut_charts import unwrap
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +27,7 @@ def test_the_other_process_gives_the_same_charts(bowl) -> None:
     found = xatlas_worker.run_apart(*bowl)
     assert found is not None
     atlas, uv, chart = xatlas_worker.run_xatlas(*bowl)
-    chart_growers._resting.keep(atlas)
+    growers._resting.keep(atlas)
     np.testing.assert_array_equal(found[0], uv)
     np.testing.assert_array_equal(found[1], chart)
 
@@ -39,14 +39,14 @@ def test_only_a_thread_with_much_to_do_asks_for_a_process(bowl, monkeypatch: pyt
         asked.append(len(faces))
         return np.zeros((len(faces), 3, 2)), np.zeros(len(faces), dtype=np.int64)
 
-    monkeypatch.setattr(chart_growers, "run_apart", apart)
+    monkeypatch.setattr(growers, "run_apart", apart)
     vertices, faces = bowl
-    chart_growers.grow_charts(vertices, faces[:20])
-    chart_growers.grow_charts(vertices, faces)
+    growers.grow_charts(vertices, faces[:20])
+    growers.grow_charts(vertices, faces)
     assert asked == []
     with ThreadPoolExecutor(1) as thread:
-        thread.submit(chart_growers.grow_charts, vertices, faces[:20]).result()
-        thread.submit(chart_growers.grow_charts, vertices, faces).result()
+        thread.submit(growers.grow_charts, vertices, faces[:20]).result()
+        thread.submit(growers.grow_charts, vertices, faces).result()
     assert asked == [len(faces)]
 
 
@@ -57,7 +57,7 @@ def test_without_another_process_the_work_is_done_here(
     monkeypatch.setattr(sys, "executable", program)
     assert xatlas_worker.run_apart(*bowl) is None
     with ThreadPoolExecutor(1) as thread:
-        _, chart = thread.submit(chart_growers.grow_charts, *bowl).result()
+        _, chart = thread.submit(growers.grow_charts, *bowl).result()
     assert len(chart) == len(bowl[1])
 
 
@@ -73,7 +73,7 @@ def test_a_frame_of_thin_strips_becomes_charts(width: float) -> None:
     # Where it is unlimited this ends the process, so another one tries first.
     vertices = (corners - 0.5) / np.sqrt(0.5 * width)
     assert xatlas_worker.run_apart(vertices, np.concatenate(halves)) is not None
-    *_, charts = unwrap(triangles, np.tile(side, 2), chart_growers.grow_charts)
+    *_, charts = unwrap(triangles, np.tile(side, 2), growers.grow_charts)
     assert (charts.chart >= 0).all()
     edges = charts.uv[:, 1:] - charts.uv[:, :1]
     area = 0.5 * np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.base.polygons import areas
+from radiosity_addon.numerics.polygons import areas
 from radiosity_addon.scene.coincident_pairs import coincident_pairs, tolerances
 from radiosity_addon.scene.faces import Faces
 from radiosity_addon.scene.opacity import ray_caster

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from radiosity_addon.base.progress import drain
-from radiosity_addon.base.sampling import stratified_square
 from radiosity_addon.form_factors.formulas import point_to_polygon
+from radiosity_addon.numerics.sampling import stratified_square
 from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.scene.faces import Faces
 from radiosity_addon.solver import Scene, SolverSettings, solve

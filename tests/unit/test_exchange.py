@@ -7,7 +7,7 @@ import numpy as np
 from radiosity_addon.form_factors.formulas import triangle_to_triangle
 from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.scene.scene import Scene
-from radiosity_addon.solver.equations.exchange_areas import exchange_areas
+from radiosity_addon.solver.equations.exchange import exchange_areas
 from radiosity_addon.solver.equations.fixed_elements import subdivide_evenly
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from radiosity_addon.solver.links.pair_factors import PairSamples, open_share, pair_visibility, trace_pairs

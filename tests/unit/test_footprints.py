@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from radiosity_addon.base.progress import drain
-from radiosity_addon.base.sampling import points_on_triangles, stratified_square
 from radiosity_addon.lights.sun_and_sky import AreaLight, PointLight
+from radiosity_addon.numerics.sampling import points_on_triangles, stratified_square
 from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.solver.emitters.emitters import EmitterGroup
 from radiosity_addon.solver.gather.footprints import Footprints, SpreadPoints

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from radiosity_addon.form_factors.formulas import point_to_polygon
-from radiosity_addon.form_factors.kernel import geometry_term, kernel, ray_geometry_term, sees, throughput
+from radiosity_addon.form_factors.geometry_kernel import (
+    geometry_term,
+    kernel,
+    ray_geometry_term,
+    sees,
+    throughput,
+)
 from radiosity_addon.rays.caster import BruteForceCaster, RayCaster
 from radiosity_addon.rays.embree import EmbreeCaster
 from tests.rooms import box_room, rectangle, solid_box

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.base.triangles import split_in_four
+from radiosity_addon.numerics.triangles import split_in_four
 from radiosity_addon.scene.faces import Faces
 from radiosity_addon.solver import Scene
 from radiosity_addon.solver.hierarchy.nodes import LEAF, Hierarchy

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from radiosity_addon.solver import Scene, SolverSettings
-from radiosity_addon.solver.equations.independent_sets import describe_sets, independent_sets
+from radiosity_addon.solver.equations.decomposition import describe_sets, independent_sets
 from radiosity_addon.solver.equations.linear_system import LinearSystem
 from radiosity_addon.solver.methods import steps_of
 from radiosity_addon.solver.methods.dense import dense

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap.lighting.interpolate import GatherPoints, Interpolation, _linear_weights, fit
-from radiosity_addon.lightmap.lighting.point_grid import PER_CELL
+from radiosity_addon.lightmap.points.interpolation import GatherPoints, Interpolation, _linear_weights, fit
+from radiosity_addon.lightmap.points.point_grid import PER_CELL
 from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
 from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.solver import Scene

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from radiosity_addon.base.triangles import split_in_four
 from radiosity_addon.lights.sun_and_sky import light_strengths
+from radiosity_addon.numerics.triangles import split_in_four
 from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.solver import AreaLight, EnvironmentLight, PointLight, Scene, SpotLight, SunLight
 from radiosity_addon.solver.hierarchy.nodes import LEAF, Hierarchy

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.base.radiometry import luminous
-from radiosity_addon.lightmap.images.light_statistics import light_statistics, told_texels
+from radiosity_addon.lightmap.images.irradiance_statistics import light_statistics, told_texels
 from radiosity_addon.lightmap.texels.states import DIVIDED, HOODED, SHUT_IN, TOUCHED
+from radiosity_addon.numerics.radiometry import luminous
 
 
 def test_the_mean_is_by_area_and_the_ends_are_not() -> None:

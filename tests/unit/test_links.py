@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.base.triangles import split_in_four
 from radiosity_addon.form_factors.formulas import triangle_to_triangle
-from radiosity_addon.form_factors.kernel import kernel
+from radiosity_addon.form_factors.geometry_kernel import kernel
+from radiosity_addon.numerics.triangles import split_in_four
 from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.solver import Scene
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy

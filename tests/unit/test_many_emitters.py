@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.base.sampling import stratified_square
+from radiosity_addon.numerics.sampling import stratified_square
 from radiosity_addon.solver.emitters import emitters
 from radiosity_addon.solver.emitters.emitter_tree import EmitterTree
 from radiosity_addon.solver.emitters.emitters import EmitterGroup

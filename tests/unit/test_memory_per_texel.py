@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 
 from radiosity_addon.bake.texel_memory import LIT_BYTES
-from radiosity_addon.base import scratch as scratch_module
 from radiosity_addon.base.progress import drain
-from radiosity_addon.base.scratch import Scratch, is_in_file, trim
-from radiosity_addon.lightmap.lighting import source_means, stored_links, sweeps
-from radiosity_addon.lightmap.lighting.interpolate import Interpolation
+from radiosity_addon.lightmap.lighting import gather_links, source_means, sweeps
+from radiosity_addon.lightmap.lighting.gather_links import StoredLinks
 from radiosity_addon.lightmap.lighting.part_links import Parts
-from radiosity_addon.lightmap.lighting.point_grid import PointGrid
-from radiosity_addon.lightmap.lighting.stored_links import StoredLinks
 from radiosity_addon.lightmap.lighting.sweeps import TexelLight, TexelTransport, sweep_steps
+from radiosity_addon.lightmap.points.interpolation import Interpolation
+from radiosity_addon.lightmap.points.point_grid import PointGrid
 from radiosity_addon.lightmap.texels.occlusion import Crossings
+from radiosity_addon.numerics import scratch as scratch_module
+from radiosity_addon.numerics.scratch import Scratch, is_in_file, trim
 from radiosity_addon.solver import PointLight, Scene, SolverSettings, solve
 from radiosity_addon.solver.gather.bright_patches import AimedRays
 from radiosity_addon.solver.gather.local_pass import NOTHING, Footprints
@@ -86,7 +86,7 @@ MOST: list[int] = []
 
 def test_sweeps_take_no_memory_for_each_ray(in_files: Scratch, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(scratch_module, "TILE", 1 << 12)
-    monkeypatch.setattr(stored_links, "AIMED_ROWS", 1 << 10)
+    monkeypatch.setattr(gather_links, "AIMED_ROWS", 1 << 10)
     monkeypatch.setattr(source_means, "CHUNK_HITS", 1 << 14)
     monkeypatch.setattr(sweeps, "CHUNK_HITS", 1 << 14)
     tiled = swept(in_files)

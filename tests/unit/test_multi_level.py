@@ -11,7 +11,7 @@ from radiosity_addon.bake.quality import quality_of
 from radiosity_addon.base.errors import UsageError
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.solver import PointLight, Scene, SolverSettings, solve
-from radiosity_addon.solver.equations.exchange_areas import exchange_areas
+from radiosity_addon.solver.equations.exchange import exchange_areas
 from radiosity_addon.solver.equations.refine_patch import facing_pairs
 from radiosity_addon.solver.hierarchy.nodes import LEAF, Hierarchy
 from radiosity_addon.solver.links.census import elements_by_level, leaves_by_level, links_by_level

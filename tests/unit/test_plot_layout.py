@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from radiosity_addon.cli.plot_layout import (
+from radiosity_addon.blender.overlays.plot_layout import (
     BLUE,
     GREEN,
     HEIGHT,

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.base.triangles import split_in_four
 from radiosity_addon.form_factors.formulas import point_to_polygon
 from radiosity_addon.lights.sun_and_sky import EnvironmentLight, PointLight
+from radiosity_addon.numerics.triangles import split_in_four
 from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.solver.equations.point_exchange import corner_factors, visible_share
 from radiosity_addon.solver.links.light_at_points import lamp_irradiance

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from radiosity_addon.base.polygons import areas, clip_half_plane, edge_distances
+from radiosity_addon.numerics.polygons import areas, clip_half_plane, edge_distances
 
 
 def test_both_sides_of_a_line_through_corners_make_the_whole() -> None:

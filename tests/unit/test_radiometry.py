@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.base.radiometry import (
+from radiosity_addon.numerics.radiometry import (
     HEMISPHERE,
     SPHERE,
     brdf_of_reflectance,

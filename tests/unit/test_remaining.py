@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import pytest
 
-from radiosity_addon.cli.time_left import RemainingTime, duration
+from radiosity_addon.base.time_left import RemainingTime, duration
 
 
 class Clock:

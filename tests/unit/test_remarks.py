@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from radiosity_addon.bake.bake_warnings import small_objects
-from radiosity_addon.lightmap.unwrap.greedy import greedy_object, share_of
+from radiosity_addon.lightmap.unwrap.dominant_object import greedy_object, share_of
 from radiosity_addon.scene.bake_scene import BakeObject, BakeScene
 from radiosity_addon.scene.scene import Scene
 

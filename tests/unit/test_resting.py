@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import weakref
 
-from radiosity_addon.lightmap.unwrap.resting import Resting
+from radiosity_addon.lightmap.charts.delayed_release import Resting
 
 
 class Clock:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.base import sampling
+from radiosity_addon.numerics import sampling
 
 
 @pytest.mark.parametrize("first", [0, 16, 65536 - 16, 65536, 1 << 20])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from radiosity_addon.base.errors import SceneError
-from radiosity_addon.base.radiometry import MAX_REFLECTANCE
+from radiosity_addon.numerics.radiometry import MAX_REFLECTANCE
 from radiosity_addon.solver import PointLight, Scene
 from tests.rooms import box_room, grey
 

@@ -13,9 +13,9 @@ import pytest
 from radiosity_addon.bake import pipeline
 from radiosity_addon.bake.pipeline import bake
 from radiosity_addon.bake.result.result import BakeResult
-from radiosity_addon.base import scratch as module
 from radiosity_addon.base.errors import BakeError
-from radiosity_addon.base.scratch import SMALLEST, Scratch, is_in_file, row_numbers
+from radiosity_addon.numerics import scratch as module
+from radiosity_addon.numerics.scratch import SMALLEST, Scratch, is_in_file, row_numbers
 from radiosity_addon.options.bake_settings import BakeSettings
 from tests.cornell import cornell_box
 from tests.unit.texel_scenes import bake_scene

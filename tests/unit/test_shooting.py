@@ -10,7 +10,7 @@ import pytest
 
 from radiosity_addon.base.errors import UsageError
 from radiosity_addon.solver import PointLight, Scene, Solution, SolverSettings
-from radiosity_addon.solver.equations.exchange_areas import exchange_areas
+from radiosity_addon.solver.equations.exchange import exchange_areas
 from radiosity_addon.solver.methods import shooting, steps_of
 from radiosity_addon.solver.methods.shooting import LOOK_AHEAD, MOST_COLUMNS, ShootingState, solve_steps
 from tests.cornell import cornell_box

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from radiosity_addon.base.errors import SceneError
-from radiosity_addon.base.radiometry import MAX_REFLECTANCE
-from radiosity_addon.base.triangles import WHOLE_TRIANGLE, split_in_four
+from radiosity_addon.numerics.radiometry import MAX_REFLECTANCE
+from radiosity_addon.numerics.triangles import WHOLE_TRIANGLE, split_in_four
 from radiosity_addon.scene.scene import Scene
 from radiosity_addon.scene.textures import SurfaceImages, where_there
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from radiosity_addon.base.progress import drain
+from radiosity_addon.lightmap.lighting.gather_links import StoredLinks
 from radiosity_addon.lightmap.lighting.gather_settings import GatherSettings
-from radiosity_addon.lightmap.lighting.interpolate import Interpolation
 from radiosity_addon.lightmap.lighting.part_links import SWEEPS, PartLinks, Parts, PartSweeps
-from radiosity_addon.lightmap.lighting.reconstruct import reconstruct
+from radiosity_addon.lightmap.lighting.reconstruction import reconstruct
 from radiosity_addon.lightmap.lighting.source_means import Means, mean_of_sources
-from radiosity_addon.lightmap.lighting.stored_links import StoredLinks
 from radiosity_addon.lightmap.lighting.sweeps import TexelLight, TexelTransport, sweep_steps
+from radiosity_addon.lightmap.points.interpolation import Interpolation
 from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
 from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, SolverSettings, solve
 from radiosity_addon.solver.gather.local_pass import NOTHING, SKY

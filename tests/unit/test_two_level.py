@@ -9,7 +9,7 @@ import pytest
 
 from radiosity_addon.base.errors import UsageError
 from radiosity_addon.solver import PointLight, Scene, Solution, SolverSettings
-from radiosity_addon.solver.equations.exchange_areas import exchange_areas
+from radiosity_addon.solver.equations.exchange import exchange_areas
 from radiosity_addon.solver.methods import steps_of, two_level
 from radiosity_addon.solver.methods.two_level import FINEST, TwoLevelState, contrasts, solve_steps
 from tests.cornell import cornell_box

@@ -7,7 +7,7 @@ import pytest
 
 from radiosity_addon.solver import Scene
 from radiosity_addon.solver.equations.fixed_elements import subdivide_evenly
-from radiosity_addon.solver.equations.vertex_basis import INWARD, vertex_basis
+from radiosity_addon.solver.equations.linear_basis import INWARD, vertex_basis
 from radiosity_addon.solver.hierarchy.basis import Basis, constant_basis
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from tests.cornell import cornell_box

@@ -7,7 +7,7 @@ import pytest
 
 from radiosity_addon.base.progress import drain
 from radiosity_addon.lightmap.lighting.gather_settings import GatherSettings
-from radiosity_addon.lightmap.lighting.reconstruct import WIDE, reconstruct
+from radiosity_addon.lightmap.lighting.reconstruction import WIDE, reconstruct
 from radiosity_addon.lights.sun_and_sky import PointLight
 from radiosity_addon.solver import Scene, SolverSettings, solve
 from tests.rooms import grey, rectangle

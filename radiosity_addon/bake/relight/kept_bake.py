@@ -14,26 +14,18 @@ from typing import Any
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.bake_warning import BakeWarning
-from ...base.errors import BakeError, SceneError
-from ...base.scratch import Scratch, tiles
-from ...lightmap.images.encode import presentable, to_quantity
-from ...lightmap.images.page import LightmapPage
-from ...lightmap.images.seams import Seams
-from ...lightmap.images.texel_pages import texel_pages
-from ...lightmap.lighting.relight_texels import kept_bytes, relight_steps
-from ...lightmap.lighting.sweeps import LitTexels, TexelLight
-from ...lightmap.lighting.traced_texels import TracedTexels
-from ...lightmap.texels.texel_geometry import TexelGeometry
-from ...lightmap.unwrap.atlas import Atlas
-from ...lights.sun_and_sky import Light
-from ...options.bake_settings import BakeSettings
-from ...scene.bake_scene import BakeScene
-from ...scene.scene import Scene
+from ...base import BakeError, BakeWarning, SceneError
+from ...lightmap.images import LightmapPage, Seams, presentable, texel_pages, to_quantity
+from ...lightmap.lighting import LitTexels, TexelLight, TracedTexels, kept_bytes, relight_steps
+from ...lightmap.texels import TexelGeometry
+from ...lightmap.unwrap import Atlas
+from ...lights import Light
+from ...numerics import Array, Scratch, tiles
+from ...options import BakeSettings
+from ...scene import BakeScene, Scene
 from ...solver.element_transport import Relightable
-from ...solver.emitters.light_sources import LightSources
-from ..result.progress import Progress
+from ...solver.emitters import LightSources
+from ..result import Progress
 
 STRENGTHS = ("power", "irradiance", "radiance")
 """The fields of lights that may change."""

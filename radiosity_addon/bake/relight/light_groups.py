@@ -6,13 +6,12 @@ from collections.abc import Generator, Sequence
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.errors import UsageError
-from ...base.scratch import tiles
-from ...lightmap.images.page import LightmapPage
-from ...options.bake_settings import MAX_GROUPS, OTHERS, BakeSettings
-from ...scene.bake_scene import BakeScene
-from ..result.result import LightGroup
+from ...base import UsageError
+from ...lightmap.images import LightmapPage
+from ...numerics import Array, tiles
+from ...options import MAX_GROUPS, OTHERS, BakeSettings
+from ...scene import BakeScene
+from ..result import LightGroup
 from .kept_bake import KeptBake, relight
 
 BAND = 64

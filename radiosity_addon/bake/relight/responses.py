@@ -11,10 +11,10 @@ from collections.abc import Generator
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.errors import SceneError
-from ...lightmap.images.page import LightmapPage
-from ..result.progress import Progress
+from ...base import SceneError
+from ...lightmap.images import LightmapPage
+from ...numerics import Array
+from ..result import Progress
 from .kept_bake import KeptBake, relight
 
 MOST = 1 << 28

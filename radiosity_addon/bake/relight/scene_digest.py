@@ -12,11 +12,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.errors import SceneError
-from ...scene.bake_scene import BakeObject, BakeScene
-from ...scene.scene import Scene
-from ...scene.texture_digest import Glow, glow_pattern, same_glow, texture_digest
+from ...base import SceneError
+from ...numerics import Array
+from ...scene import BakeObject, BakeScene, Glow, Scene, glow_pattern, same_glow, texture_digest
 
 
 class ObjectPrint(NamedTuple):

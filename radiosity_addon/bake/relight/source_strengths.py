@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.errors import SceneError
-from ...lights.sun_and_sky import Light
-from ...scene.bake_scene import BakeScene
+from ...base import SceneError
+from ...lights import Light
+from ...numerics import Array
+from ...scene import BakeScene
 from .kept_bake import STRENGTHS, KeptBake
 from .scene_digest import check_same, fingerprint
 

@@ -8,17 +8,14 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.radiometry import luminous
-from ...base.scratch import tiles
-from ...lightmap.images.light_statistics import light_statistics, told_texels
-from ...lightmap.lighting.sweeps import TexelLight
-from ...lightmap.texels.states import NO_TEXEL_HERE, SHUT_IN, TOUCHED
-from ...lightmap.texels.texel_geometry import TexelGeometry
-from ...options.bake_settings import EFFICACY
-from ...scene.bake_scene import BakeObject
+from ...lightmap.images import light_statistics, told_texels
+from ...lightmap.lighting import TexelLight
+from ...lightmap.texels import NO_TEXEL_HERE, SHUT_IN, TOUCHED, TexelGeometry
+from ...numerics import Array, luminous, tiles
+from ...options import EFFICACY
+from ...scene import BakeObject
 from ...solver import Solution
-from ...solver.state.link_record import LinkRecord
+from ...solver.state import LinkRecord
 from .result import BakeDetails, PageDetails
 
 MEANS = np.full(3, 1.0 / 3.0)

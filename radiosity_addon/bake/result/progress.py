@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from ...base.arrays import Array
+from ...numerics import Array
 
 
 @dataclass(frozen=True)

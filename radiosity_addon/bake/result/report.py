@@ -11,10 +11,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ...base.errors import BakeError
-from ...files.baked_files import FILES, OWNER, sealed, text_of
-from ...files.publish import replacing
-from ...scene.bake_scene import LIGHTMAP_UV_LAYER, BakeObject
+from ...base import BakeError
+from ...files import FILES, OWNER, replacing, sealed, text_of
+from ...scene import LIGHTMAP_UV_LAYER, BakeObject
 from .result import BakeResult
 
 T = TypeVar("T")

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from ...base.arrays import Array
-from ...base.bake_warning import BakeWarning
-from ...lightmap.images.page import LightmapPage
-from ...scene.bake_scene import BakeObject
-from ...solver.state.link_record import LinkRecord
+from ...base import BakeWarning
+from ...lightmap.images import LightmapPage
+from ...numerics import Array
+from ...scene import BakeObject
+from ...solver.state import LinkRecord
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,9 @@ import time
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...lightmap.lighting.light_so_far import LightSoFar
-from ...lightmap.texels.texel_geometry import NO_TEXEL, TexelGeometry
+from ...lightmap.lighting import LightSoFar
+from ...lightmap.texels import NO_TEXEL, TexelGeometry
+from ...numerics import Array
 from .progress import LitSurfaces, TexelPicture
 
 SECONDS = 0.25

@@ -7,18 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...options.solver_settings import SolverSettings
-from ...scene.faces import Faces
-from ...solver.balance.conservation import Balance
+from ...numerics import Array
+from ...options import SolverSettings
+from ...scene import Faces
+from ...solver.balance import Balance
 from ...solver.element_transport import ElementTransport
-from ...solver.emitters.light_sources import LightSources
-from ...solver.hierarchy.cluster_cut import TreeTop
-from ...solver.hierarchy.clusters import Clusters
-from ...solver.hierarchy.nodes import LEAF, Hierarchy
-from ...solver.links.cluster_links import ClusterLinks
-from ...solver.links.element_links import Links
-from ...solver.links.light_links import LightLinks
+from ...solver.emitters import LightSources
+from ...solver.hierarchy import LEAF, Clusters, Hierarchy, TreeTop
+from ...solver.links import ClusterLinks, LightLinks, Links
 from ...solver.methods.hierarchical import HierarchicalState
 from .value_checks import LARGE, SLACK, instance, integers, number, numbers, require, whole
 

@@ -13,45 +13,28 @@ from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-from ...base.errors import BakeError, RadiosityError
-from ...files.file_names import SIDECAR_NAME as SIDECAR_NAME
-from ...lightmap.images.page import LightmapPage
-from ...lightmap.images.seams import Seams
-from ...lightmap.lighting.interpolate import Interpolation
-from ...lightmap.lighting.part_links import PartLinks, Parts
-from ...lightmap.lighting.stored_links import StoredLinks
-from ...lightmap.lighting.sweeps import LitTexels, TexelTransport
-from ...lightmap.lighting.warm_start import EarlierLight
-from ...lightmap.texels.texel_geometry import TexelGeometry
-from ...lights.area import AreaLight
-from ...lights.environment import EnvironmentImage, SkyPatch
-from ...lights.point import PointLight, SpotLight
-from ...lights.sun_and_sky import EnvironmentLight, SunLight
-from ...options.bake_settings import BakeSettings
-from ...options.solver_settings import SolverSettings
-from ...scene.bake_scene import BakeScene
-from ...scene.faces import Faces
-from ...solver.balance.conservation import Balance
+from ...base import BakeError, RadiosityError
+from ...files import BAKE, DIGEST, FILE, KEPT
+from ...files import SIDECAR_NAME as SIDECAR_NAME
+from ...lightmap.images import LightmapPage, Seams
+from ...lightmap.lighting import EarlierLight, LitTexels, PartLinks, Parts, StoredLinks, TexelTransport
+from ...lightmap.points import Interpolation
+from ...lightmap.texels import TexelGeometry
+from ...lights import AreaLight, EnvironmentImage, EnvironmentLight, PointLight, SkyPatch, SpotLight, SunLight
+from ...options import BakeSettings, SolverSettings
+from ...scene import BakeScene, Faces
+from ...solver.balance import Balance
 from ...solver.element_transport import ElementTransport, Relightable
-from ...solver.emitters.emitters import EmitterGroup
-from ...solver.emitters.light_sources import LightSources
-from ...solver.gather.bright_patches import AimedRays
-from ...solver.gather.light_gains import LightGains
-from ...solver.gather.local_pass import LocalPass
-from ...solver.hierarchy.cluster_cut import TreeTop
-from ...solver.hierarchy.clusters import Clusters
-from ...solver.hierarchy.nodes import Hierarchy
-from ...solver.links.cluster_links import ClusterLinks
-from ...solver.links.element_links import Links
-from ...solver.links.light_links import LightLinks
+from ...solver.emitters import EmitterGroup, LightSources
+from ...solver.gather import AimedRays, LightGains, LocalPass
+from ...solver.hierarchy import Clusters, Hierarchy, TreeTop
+from ...solver.links import ClusterLinks, LightLinks, Links
 from ...solver.methods.hierarchical import HierarchicalState
-from ..relight.kept_bake import DAMAGED, KeptBake, damaged
-from ..relight.scene_digest import check_same, fingerprint
-from ..result.result import BakedObject, BakeResult
+from ..relight import DAMAGED, KeptBake, check_same, damaged, fingerprint
+from ..result import BakedObject, BakeResult
 from .array_file import ArrayFileError, TooLargeError, read_arrays, read_digest, write_arrays
 from .plain_objects import flatten, restore
 from .sidecar_checks import check_stored, stored_layout
-from .sidecar_names import BAKE, DIGEST, FILE, KEPT
 
 MAGIC, VERSION = b"RADIOSITYRELIGHT", 2
 """Version 1 did not know textures, and what solving stores may differ from it."""

@@ -13,23 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from ...lightmap.images.seams import Seams
-from ...lightmap.lighting.interpolate import Interpolation
-from ...lightmap.lighting.part_links import PartLinks, Parts
-from ...lightmap.lighting.stored_links import StoredLinks
-from ...lightmap.lighting.sweeps import LitTexels, TexelTransport
-from ...lightmap.lighting.warm_start import EarlierLight
-from ...lightmap.texels.texel_geometry import TexelGeometry
-from ...lights.environment import SkyPatch, SkyTable
-from ...lights.sun_and_sky import Light
-from ...options.bake_settings import MAX_RESOLUTION, BakeSettings
+from ...lightmap.images import Seams
+from ...lightmap.lighting import EarlierLight, LitTexels, PartLinks, Parts, StoredLinks, TexelTransport
+from ...lightmap.points import Interpolation
+from ...lightmap.texels import TexelGeometry
+from ...lights import Light, SkyPatch, SkyTable
+from ...options import MAX_RESOLUTION, BakeSettings
 from ...solver.element_transport import ElementTransport, Relightable
-from ...solver.emitters.emitters import EmitterGroup
-from ...solver.emitters.light_sources import NO_SOURCE, LightSources
-from ...solver.gather.bright_patches import AimedRays
-from ...solver.gather.light_gains import LightGains
-from ...solver.gather.local_pass import NOTHING, LocalPass
-from ..relight.scene_digest import as_fingerprint
+from ...solver.emitters import NO_SOURCE, EmitterGroup, LightSources
+from ...solver.gather import NOTHING, AimedRays, LightGains, LocalPass
+from ..relight import as_fingerprint
 from .hierarchy_checks import MOST_LEVELS, MOST_THREADS, check_elements
 from .value_checks import LARGE, SLACK, array_of, instance, integers, number, numbers, require, whole
 

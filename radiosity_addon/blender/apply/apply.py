@@ -16,11 +16,9 @@ from dataclasses import replace
 import bpy
 from mathutils import Matrix
 
-from ...bake.result.result import BakedObject, BakeResult
-from ...base.bake_warning import BakeWarning
-from ...base.errors import BakeError
-from ...base.progress import drain
-from ...options.bake_settings import BakeSettings
+from ...bake.result import BakedObject, BakeResult
+from ...base import BakeError, BakeWarning, drain
+from ...options import BakeSettings
 from ..datablocks.bake_record import made_datablocks, mark_made, remove_datablocks, unmark_made
 from ..datablocks.edit_modes import leave_edit_modes
 from ..datablocks.uv_layers import check_room

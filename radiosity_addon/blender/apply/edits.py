@@ -16,8 +16,8 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ...base.bake_warning import BakeWarning
-from ...scene.bake_scene import LIGHTMAP_UV_LAYER
+from ...base import BakeWarning
+from ...scene import LIGHTMAP_UV_LAYER
 from ..datablocks.bake_record import (
     ASIDE,
     LAYER,
@@ -29,7 +29,6 @@ from ..datablocks.bake_record import (
 )
 from ..datablocks.edit_modes import leave_edit_modes
 from ..datablocks.uv_layers import LayerRecord, keep_values_of, set_record, take_layer_off
-from ..material_copies import material_edits
 from ..material_copies.material_slots import (
     drop_added_slots,
     is_copy,
@@ -37,6 +36,7 @@ from ..material_copies.material_slots import (
     original_of,
     show_originals,
 )
+from ..material_edits import material_edits
 from ..stand_ins.mesh_digest import digest
 from ..stand_ins.stand_in_names import carry_names
 from ..stand_ins.stand_ins import (

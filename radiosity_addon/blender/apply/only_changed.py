@@ -17,11 +17,10 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...bake.result.result import BakeResult
-from ...base.bake_warning import BakeWarning
-from ...base.errors import NothingToDoError
-from ...options.bake_settings import BakeSettings
-from ...scene.bake_scene import BakeObject, BakeScene
+from ...bake.result import BakeResult
+from ...base import BakeWarning, NothingToDoError
+from ...options import BakeSettings
+from ...scene import BakeObject, BakeScene
 from ..datablocks.bake_record import shows_lightmap
 from ..scene_records.export_sources import Export
 from .scopes import files_of

@@ -10,7 +10,7 @@ from contextlib import AbstractContextManager, contextmanager
 
 import bpy
 
-from ...base.bake_warning import BakeWarning
+from ...base import BakeWarning
 from ..datablocks.bake_record import ASIDE, made_datablocks, remove_datablocks
 from ..stand_ins.stand_ins import INSTANCER, own_mesh, source_name
 from .edits import carry_edits

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from ...base.bake_warning import BakeWarning
+from ...base import BakeWarning
 from ..datablocks.bake_record import made_datablocks, recorded_objects
 from ..stand_ins.stand_ins import INSTANCER
 from .edits import carry_edits

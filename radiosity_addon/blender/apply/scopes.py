@@ -7,8 +7,8 @@ from pathlib import Path
 
 import bpy
 
-from ...base.bake_warning import BakeWarning
-from ...files.file_names import folded
+from ...base import BakeWarning
+from ...files import folded
 from ..datablocks.bake_record import ASIDE, is_made, is_recorded, made_datablocks, recorded_objects
 from ..scene_records.export_sources import Export
 from ..stand_ins.replacements import shown_by

@@ -7,16 +7,15 @@ from typing import Any
 
 import bpy
 
-from .main import main
-
 COMMAND = "radiosity"
 
 _handles: list[Any] = []
 
 
 def register() -> None:
-    """Offer the command to Blender."""
-    _handles.append(bpy.utils.register_cli_command(COMMAND, run))
+    """Offer the command to Blender, once."""
+    if not _handles:
+        _handles.append(bpy.utils.register_cli_command(COMMAND, run))
 
 
 def unregister() -> None:
@@ -27,5 +26,7 @@ def unregister() -> None:
 
 def run(argv: list[str]) -> int:
     """Run one command on the file that Blender has open; return its exit code."""
+    from .main import main
+
     loaded = Path(bpy.data.filepath) if bpy.data.filepath else None
     return main(argv, prog=f"blender -b FILE --command {COMMAND}", loaded=loaded)

@@ -12,13 +12,10 @@ from collections.abc import Sequence
 from contextlib import nullcontext, suppress
 from pathlib import Path
 
-from ...base.errors import RadiosityError
-from ...cli.console import Console
-from ...cli.interrupts import Interrupts
-from ...cli.parser import bake_output, build_parser, check_keeping, check_plot, settings_of
-from ...files.path_checks import printable
-from ...options.bake_settings import BakeSettings
-from ...options.permissions import Permissions
+from ...base import RadiosityError
+from ...cli import Console, Interrupts, bake_output, build_parser, check_keeping, check_plot, settings_of
+from ...files import printable
+from ...options import BakeSettings, Permissions
 
 EXIT_DONE = 0
 EXIT_FAILED = 1

@@ -16,10 +16,10 @@ from typing import Any
 
 import bpy
 
-from ...base.errors import BakeError
-from ...cli.plot_layout import Colour, Dot, Drawing, Line, Point, Text, draw_history
-from ...options.methods import METHODS
+from ...base import BakeError
+from ...options import METHODS
 from ..datablocks.png import render_png
+from ..overlays.plot_layout import Colour, Dot, Drawing, Line, Point, Text, draw_history
 
 UNIT = 0.01
 """Length of a pixel in the scene."""

@@ -9,19 +9,14 @@ from typing import TYPE_CHECKING
 
 import bpy
 
-from ...bake.keep import Keeping
-from ...bake.relight.source_strengths import strengths_in
-from ...bake.result.progress import Progress
-from ...bake.result.report import BakeReport
-from ...bake.sidecar.sidecar import StoredBake, check_belongs, read_sidecar
-from ...base.bake_warning import BakeWarning
-from ...base.errors import UsageError
-from ...base.progress import drain
-from ...cli.console import Console, summary
-from ...cli.interrupts import Interrupts
-from ...files.file_names import BLEND_NAME, PREVIEW_NAME, SIDECAR_NAME
-from ...options.bake_settings import BakeSettings
-from ...options.permissions import Permissions
+from ...bake import Keeping
+from ...bake.relight import strengths_in
+from ...bake.result import BakeReport, Progress
+from ...bake.sidecar import StoredBake, check_belongs, read_sidecar
+from ...base import BakeWarning, UsageError, drain
+from ...cli import Console, Interrupts, summary
+from ...files import BLEND_NAME, PREVIEW_NAME, SIDECAR_NAME
+from ...options import BakeSettings, Permissions
 from ..files.single_files import check_places, make_folder_of
 from .verbs import open_or_build, output_of, registered, same_file, written_files
 

@@ -9,13 +9,10 @@ from typing import TYPE_CHECKING
 
 import bpy
 
-from ...bake.keep import Keeping
-from ...base.bake_warning import BakeWarning
-from ...base.errors import SceneError, UsageError
-from ...cli.console import Console, summary
-from ...cli.interrupts import Interrupts
-from ...options.bake_settings import BakeSettings
-from ...options.permissions import Permissions
+from ...bake import Keeping
+from ...base import BakeWarning, SceneError, UsageError
+from ...cli import Console, Interrupts, summary
+from ...options import BakeSettings, Permissions
 from ..files.single_files import check_existing, check_places, make_folder_of, owner_told
 from ..registration import register, unregister
 from ..relight import kept_bakes
@@ -165,7 +162,7 @@ def check(
     with registered():
         from ..files.output import BLEND_NAME, PREVIEW_NAME
         from ..jobs.inspection import ERROR, inspect
-        from ..ui.check_panel import figures
+        from ..operators.checks import figures
 
         console.progress("open", 0.0)
         open_or_build(scene, loaded, allowed)
@@ -230,7 +227,7 @@ def open_or_build(scene: Path | None, loaded: Path | None, allowed: Permissions)
 
 def written_files(report: dict, preview: bool = True, kept: bool = False) -> list[tuple[str, str]]:
     """What a bake, with a preview or a sidecar or without, has left in its folder, for people to read."""
-    from ...files.file_names import SIDECAR_NAME
+    from ...files import SIDECAR_NAME
     from ..files.output import BLEND_NAME, PREVIEW_NAME, REPORT_NAME
 
     images = list(dict.fromkeys(entry["image"] for entry in report["objects"]))

@@ -6,7 +6,7 @@ import bmesh
 import bpy
 import numpy as np
 
-from ...base.radiometry import brdf_of_reflectance, intensity_of_flux
+from ...numerics import brdf_of_reflectance, intensity_of_flux
 from .world_pixels import look_around, only_for_now, panorama_scene
 
 SIZE = (16, 32)

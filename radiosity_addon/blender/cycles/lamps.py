@@ -8,10 +8,9 @@ from collections.abc import Generator
 import bpy
 import numpy as np
 
-from ...base.bake_warning import BakeWarning
-from ...base.errors import SceneError
-from ...base.radiometry import cone_projected_solid_angle, sphere_area
-from ...lights.sun_and_sky import AreaLight, Light, PointLight, SpotLight, SunLight
+from ...base import BakeWarning, SceneError
+from ...lights import AreaLight, Light, PointLight, SpotLight, SunLight
+from ...numerics import cone_projected_solid_angle, sphere_area
 from ..datablocks.image_values import known_means_only
 from ..datablocks.mesh_arrays import all_finite
 from ..materials.materials import read_radiance, uses_nodes

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ...base.errors import BakeError
-from ...lightmap.images.surface_tiles import SurfaceTiles
-from ...options.bake_settings import BakeSettings
+from ...base import BakeError
+from ...lightmap.images import SurfaceTiles
+from ...options import BakeSettings
 from ..datablocks.bake_record import remove_datablocks
 from ..scene_records.export_sources import MaterialSource
 from .surface_rewiring import RewiredMaterial

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...lightmap.images.surface_tiles import SurfaceTiles, lay_out_again
+from ...lightmap.images import SurfaceTiles, lay_out_again
 from ..datablocks.bake_record import remove_datablocks
 from ..scene_records.export_sources import MaterialSource
 from .surface_bake import DrawnSurfaces, attribute_names, drawn_surfaces

@@ -13,16 +13,16 @@ from functools import partial
 import bpy
 import numpy as np
 
-from ...base.background import elsewhere
-from ...base.radiometry import MAX_REFLECTANCE, radiance_of_radiosity, radiosity_of_radiance
-from ...lightmap.images.surface_tiles import SurfaceTiles, lay_out_surfaces
-from ...options.bake_settings import BakeSettings
-from ...scene.textures import SurfaceImages
+from ...lightmap.images import SurfaceTiles, lay_out_surfaces
+from ...numerics import MAX_REFLECTANCE, radiance_of_radiosity, radiosity_of_radiance
+from ...options import BakeSettings
+from ...scene import SurfaceImages
 from ..datablocks.mesh_arrays import normal_matrix, world_from_object
 from ..materials.materials import Surface
 from ..materials.surface_terms import surface_of_terms
 from ..scene_records.export_sources import MaterialSource
 from ..scene_records.pieces import Piece
+from ..session.background import elsewhere
 from .surface_bake import SurfaceBake
 from .surface_batches import Batch, batches, material_facts
 from .surface_rewiring import CHANNELS

@@ -7,10 +7,17 @@ from collections.abc import Generator
 import bpy
 import numpy as np
 
-from ...base.bake_warning import BakeWarning
-from ...base.errors import SceneError
-from ...lights.environment import Bounds, SkyPatch, bright_patches, even_part, pixel_bounds, solid_angles
-from ...lights.sun_and_sky import EnvironmentLight, Light
+from ...base import BakeWarning, SceneError
+from ...lights import (
+    Bounds,
+    EnvironmentLight,
+    Light,
+    SkyPatch,
+    bright_patches,
+    even_part,
+    pixel_bounds,
+    solid_angles,
+)
 from ..datablocks.image_values import known_means_only
 from ..materials.materials import read_radiance, uses_nodes
 from .lamps import ALL_BOUNCES

@@ -11,8 +11,8 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...base.errors import BakeError
-from ...lights.environment import WHOLE, Bounds
+from ...base import BakeError
+from ...lights import WHOLE, Bounds
 
 WIDTH, HEIGHT = 512, 256
 SAMPLES = 16

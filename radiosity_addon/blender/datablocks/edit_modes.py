@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import bpy
 
-from ...base.errors import BakeError
+from ...base import BakeError
 
 
 def leave_edit_modes(context: bpy.types.Context, objects: Iterable[bpy.types.Object]) -> None:

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 import bpy
 import numpy as np
 
-from ...base.progress import drain
+from ...base import drain
 
 _ENCODED = ("sRGB", "AgX Base sRGB", "Filmic sRGB")
 _BAND_ROWS = 256  # rows decoded at a time: bounds the temporaries of a large image

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ...scene.bake_scene import LIGHTMAP_UV_LAYER
+from ...scene import LIGHTMAP_UV_LAYER
 
 _INFINITE = 1e18
 """What counts as infinite [m]: Blender stores an infinity it is given as the largest float,

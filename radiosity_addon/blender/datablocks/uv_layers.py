@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ...base.errors import BakeError, SceneError
-from ...scene.bake_scene import LIGHTMAP_UV_LAYER
+from ...base import BakeError, SceneError
+from ...scene import LIGHTMAP_UV_LAYER
 from .bake_record import LAYER
 
 MAX_UV_LAYERS = 8

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import bpy
 import numpy as np
 
-from ...base.radiometry import flux_of_radiance
+from ...numerics import flux_of_radiance
 
 METRES_PER_UNIT = 0.01
 

@@ -8,10 +8,8 @@ from pathlib import Path
 import addon_utils  # type: ignore[import-not-found]
 import bpy
 
-from ...base.bake_warning import BakeWarning
-from ...base.errors import SceneError
-from ...base.silenced import silenced
-from ...files.gltf_check import gltf_fault
+from ...base import BakeWarning, SceneError, silenced
+from ...files import gltf_fault
 
 
 def open_scene(path: str | Path, scripts: bool = False) -> tuple[BakeWarning, ...]:

@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from ...options.bake_settings import BakeSettings
+from ...options import BakeSettings
 from ..images.images import names_of_any
 from ..scene_records.pieces import Collected, Piece
 from .output import OutputFolder

@@ -10,9 +10,7 @@ from typing import Any
 
 import bpy
 
-from ...bake.sidecar.sidecar_names import BAKE, KEPT
-from ...files.baked_files import FILES, NoReportError, read_report
-from ...files.file_names import REPORT_NAME
+from ...files import BAKE, FILES, KEPT, REPORT_NAME, NoReportError, read_report
 from ..datablocks.image_marks import REPORT
 
 Listed = Mapping[str, Mapping[str, Any]]

@@ -17,13 +17,27 @@ from typing import Any
 
 import bpy
 
-from ...bake.result.report import BakeReport
-from ...base.errors import BakeError, RadiosityError
-from ...files.baked_files import FILES as LISTED
-from ...files.baked_files import OWNER, NoReportError, Owner, entries, is_as_written_steps, read_report
-from ...files.file_names import BLEND_NAME, PLAIN_NAMES, PREVIEW_NAME, REPORT_NAME, FileNames, folded
-from ...files.path_checks import check_folder
-from ...files.publish import Staging, clean_up, replacing
+from ...bake.result import BakeReport
+from ...base import BakeError, RadiosityError
+from ...files import (
+    BLEND_NAME,
+    OWNER,
+    PLAIN_NAMES,
+    PREVIEW_NAME,
+    REPORT_NAME,
+    FileNames,
+    NoReportError,
+    Owner,
+    Staging,
+    check_folder,
+    clean_up,
+    entries,
+    folded,
+    is_as_written_steps,
+    read_report,
+    replacing,
+)
+from ...files import FILES as LISTED
 from ..datablocks.bake_record import is_made
 from .ownership import is_read, owner_of
 

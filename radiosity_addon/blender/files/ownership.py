@@ -13,9 +13,8 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
-from ...base.errors import BakeError
-from ...files.baked_files import FILES, NoReportError, Owner, read_report, reports_in
-from ...files.file_names import REPORT_NAME, FileNames
+from ...base import BakeError
+from ...files import FILES, REPORT_NAME, FileNames, NoReportError, Owner, read_report, reports_in
 from ..datablocks.bake_record import is_made
 
 CORNELL_BOX = "<Cornell box>"

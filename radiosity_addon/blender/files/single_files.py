@@ -10,8 +10,8 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
-from ...base.errors import BakeError, UsageError
-from ...files.baked_files import OWNER, NoReportError, Owner, read_report
+from ...base import BakeError, UsageError
+from ...files import OWNER, NoReportError, Owner, read_report
 from .output import is_same_file, refuse_special
 from .ownership import is_read
 

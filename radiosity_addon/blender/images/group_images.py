@@ -8,12 +8,11 @@ from typing import TypeAlias
 
 import bpy
 
-from ...bake.result.result import BakeResult, LightGroup
-from ...base.errors import BakeError
-from ...files.file_names import PLAIN_NAMES, FileNames
-from ...lightmap.images.encode import png16_scale, presentable
-from ...lightmap.images.page import LightmapPage
-from ...options.bake_settings import BakeSettings
+from ...bake.result import BakeResult, LightGroup
+from ...base import BakeError
+from ...files import PLAIN_NAMES, FileNames
+from ...lightmap.images import LightmapPage, png16_scale, presentable
+from ...options import BakeSettings
 from ..datablocks.bake_record import is_made, remove_datablocks
 from ..datablocks.image_marks import GROUP, PAGE, SCALE_PROPERTY
 from ..session import lightmap_changes

@@ -13,17 +13,14 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...bake.relight.light_groups import are_wanted
-from ...bake.result.report import LightmapFile
-from ...bake.result.result import BakeResult
-from ...base.errors import BakeError
-from ...base.scratch import tiles
-from ...base.silenced import silenced
-from ...files.file_names import PLAIN_NAMES, FileNames, highest_page, unique_names
-from ...lightmap.images.encode import encode_png16, png16_scale, presentable
-from ...lightmap.images.page import LightmapPage
-from ...options.bake_settings import OTHERS, BakeSettings
-from ...scene.bake_scene import BakeScene
+from ...bake.relight import are_wanted
+from ...bake.result import BakeResult, LightmapFile
+from ...base import BakeError, silenced
+from ...files import PLAIN_NAMES, FileNames, highest_page, unique_names
+from ...lightmap.images import LightmapPage, encode_png16, png16_scale, presentable
+from ...numerics import tiles
+from ...options import OTHERS, BakeSettings
+from ...scene import BakeScene
 from ..datablocks.bake_record import mark_made, remove_datablocks
 from ..datablocks.image_marks import GROUP, PAGE, QUANTITY_PROPERTY, SCALE_PROPERTY
 from ..datablocks.png import check_whole

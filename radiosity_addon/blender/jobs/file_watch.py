@@ -12,7 +12,7 @@ from typing import TypeVar
 import bpy
 from bpy.app.handlers import persistent
 
-from ...base.errors import BakeError
+from ...base import BakeError
 
 T = TypeVar("T")
 R = TypeVar("R")

@@ -16,13 +16,12 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
-from ...bake.estimate import Estimate, LightmappedObject, estimate_bake
-from ...bake.texel_memory import refuse_too_large
-from ...base import scratch
-from ...base.errors import RadiosityError
-from ...lightmap.unwrap.greedy import greedy_object, share_of
-from ...options.bake_settings import BakeSettings
-from ...scene.bake_scene import LIGHTMAP_UV_LAYER
+from ...bake import Estimate, LightmappedObject, estimate_bake, refuse_too_large
+from ...base import RadiosityError
+from ...lightmap.unwrap import greedy_object, share_of
+from ...numerics import folder as scratch_folder
+from ...options import BakeSettings
+from ...scene import LIGHTMAP_UV_LAYER
 from ..apply.rebake import originals_shown
 from ..datablocks.mesh_arrays import world_from_object
 from ..files.foreseen_files import refusal
@@ -358,9 +357,9 @@ def _of_memory(plan: Estimate, settings: BakeSettings) -> Iterator[Finding]:
         yield Finding(ERROR, "memory", str(error))
         return
     if plan.files > NOTED_FILES:
-        disk = shutil.disk_usage(scratch.folder()).free
+        disk = shutil.disk_usage(scratch_folder()).free
         message = (
-            f"about {plan.files / 1e9:.1f} GB of temporary files will be written to '{scratch.folder()}'"
+            f"about {plan.files / 1e9:.1f} GB of temporary files will be written to '{scratch_folder()}'"
         )
         if plan.files > disk:
             message += f", where {disk / 1e9:.1f} GB are free: free some, or raise the memory limit"

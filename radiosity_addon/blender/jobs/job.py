@@ -9,19 +9,14 @@ from dataclasses import dataclass, replace
 
 import bpy
 
-from ...bake.keep import Keeping, bake_steps, moves_alone
-from ...bake.relight.kept_bake import KeptBake
-from ...bake.result.progress import Progress
-from ...bake.result.report import BakeReport
-from ...bake.result.result import BakeResult
-from ...bake.sidecar.sidecar import sidecar_entry
-from ...bake.sidecar.sidecar_names import KEPT
-from ...bake.texel_memory import pages_of, refuse_too_large
-from ...base.arrays import Array
-from ...base.background import in_thread
-from ...base.bake_warning import BakeWarning
-from ...files.file_names import PLAIN_NAMES
-from ...options.bake_settings import BakeSettings
+from ...bake import Keeping, bake_steps, moves_alone, pages_of, refuse_too_large
+from ...bake.relight import KeptBake
+from ...bake.result import BakeReport, BakeResult, Progress
+from ...bake.sidecar import sidecar_entry
+from ...base import BakeWarning
+from ...files import KEPT, PLAIN_NAMES
+from ...numerics import Array
+from ...options import BakeSettings
 from ..apply.apply import apply_steps, check_targets
 from ..apply.only_changed import gone_objects, kept_warning, narrow, remember
 from ..apply.rebake import EarlierBake, Originals, replacing_earlier
@@ -36,6 +31,7 @@ from ..relight import kept_bakes, lightmap_versions
 from ..scene_export.export import export_steps, exporting
 from ..scene_records.export_sources import Export
 from ..session import kept_details, runtime
+from ..session.background import in_thread
 from .live_picture import Seen, seen_triangles
 from .preview import SAMPLES, render_preview
 

@@ -8,9 +8,8 @@ from functools import lru_cache
 import bpy
 import numpy as np
 
-from ...bake.result.progress import LitSurfaces, Picture, TexelPicture
-from ...base.arrays import Array
-from ...base.radiometry import radiance_of_radiosity
+from ...bake.result import LitSurfaces, Picture, TexelPicture
+from ...numerics import Array, radiance_of_radiosity
 from ..scene_records.export_sources import Export, ExportSource
 
 HALF_MAX = 65504.0

@@ -18,7 +18,7 @@ from ..overlays.drawing import PagedSurfaces, over_the_objects
 from ..session.redraw import redraw_viewports as _redraw
 
 if TYPE_CHECKING:
-    from ...bake.result.progress import LitSurfaces, Picture, TexelPicture
+    from ...bake.result import LitSurfaces, Picture, TexelPicture
 
 WHITE = 16.0
 """Radiance that view transforms with soft highlights (AgX, Filmic) show white, at exposure 0 [W/m²/sr]."""

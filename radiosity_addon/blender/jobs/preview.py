@@ -11,8 +11,8 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from ...base.errors import BakeError
-from ...options.bake_settings import BakeSettings
+from ...base import BakeError
+from ...options import BakeSettings
 from ..datablocks.bake_record import is_made, shows_lightmap
 from ..datablocks.png import render_png
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bpy.app.translations import pgettext_iface as iface_
 
-from ...cli.time_left import duration
+from ...base import duration
 from ..session.runtime import Running
 
 

@@ -8,8 +8,7 @@ from typing import Any
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ...base.errors import NothingToDoError, RadiosityError
-from ...cli.time_left import RemainingTime
+from ...base import NothingToDoError, RadiosityError, RemainingTime
 from ..session import runtime
 from ..session.redraw import redraw_sidebars
 from . import live_view

@@ -1,1 +1,4 @@
-"""TODO."""
+"""Copies of materials that show a lightmap.
+
+Originals are never changed; a copy says what it was when it was made.
+"""

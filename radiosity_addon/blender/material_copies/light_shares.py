@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import bpy
 
-from ...bake.relight.light_groups import group_of
-from ...base.bake_warning import BakeWarning
-from ...options.bake_settings import BakeSettings
+from ...bake.relight import group_of
+from ...base import BakeWarning
+from ...options import BakeSettings
 from ..datablocks.bake_record import is_made
 from ..images.group_images import shown_images
 from ..images.images import image_scale

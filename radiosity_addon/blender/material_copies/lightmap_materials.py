@@ -12,8 +12,8 @@ from typing import Any
 
 import bpy
 
-from ...base.radiometry import brdf_of_reflectance, radiance_of_radiosity
-from ...scene.bake_scene import LIGHTMAP_UV_LAYER
+from ...numerics import brdf_of_reflectance, radiance_of_radiosity
+from ...scene import LIGHTMAP_UV_LAYER
 from ..datablocks.bake_record import is_made, mark_made
 from ..datablocks.image_marks import GROUP
 from ..images.images import image_scale

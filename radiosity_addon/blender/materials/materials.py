@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ...base.bake_warning import BakeWarning
-from ...base.radiometry import MAX_REFLECTANCE, radiosity_of_radiance
+from ...base import BakeWarning
+from ...numerics import MAX_REFLECTANCE, radiosity_of_radiance
 from .node_algebra import NodeAlgebra
 from .shader_nodes import (
     MissingImageError,

@@ -1,1 +1,4 @@
-"""TODO."""
+"""Overlays in the 3D viewports: elements, links, density, error, false color.
+
+Numbers come from the last bake and from the lightmaps.
+"""

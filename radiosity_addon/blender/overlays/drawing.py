@@ -8,7 +8,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ...base.arrays import Array
+    from ...numerics import Array
 
 NEARER = 2e-5
 """How much nearer than its object something is drawn, as a share of half the range of depths."""

@@ -8,13 +8,11 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ...bake.result.details import MEANS
-from ...base.arrays import Array
-from ...base.radiometry import irradiance_under_sky, luminous
-from ...lightmap.images.light_statistics import LightStatistics, light_statistics, told_texels
-from ...lightmap.texels.rasterize import rasterise
-from ...lightmap.texels.states import NO_TEXEL_HERE
-from ...scene.bake_scene import LIGHTMAP_UV_LAYER
+from ...bake.result import MEANS
+from ...lightmap.images import LightStatistics, light_statistics, told_texels
+from ...lightmap.texels import NO_TEXEL_HERE, rasterise
+from ...numerics import Array, irradiance_under_sky, luminous
+from ...scene import LIGHTMAP_UV_LAYER
 from ..datablocks.bake_record import is_made
 from ..datablocks.image_marks import QUANTITY_PROPERTY
 from ..datablocks.mesh_arrays import read_mesh, world_from_object

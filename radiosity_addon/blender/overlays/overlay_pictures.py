@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ...base.arrays import Array
-from ...lightmap.texels.states import DIVIDED, HOODED, NO_TEXEL_HERE, SHUT_IN, TOUCHED
-from ...solver.state.link_record import leaves_on, nearest_leaf
+from ...lightmap.texels import DIVIDED, HOODED, NO_TEXEL_HERE, SHUT_IN, TOUCHED
+from ...numerics import Array
+from ...solver.state import leaves_on, nearest_leaf
 from ..session.kept_details import STAND_IN_SUFFIX, KeptDetails, details_of
 from . import overlay_properties as kinds
 from .color_scale import ColorScale, automatic_scale

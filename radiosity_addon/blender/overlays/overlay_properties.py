@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ...options.bake_settings import EFFICACY
+from ...options import EFFICACY
 from ..session.redraw import redraw_viewports
 
 NONE, FALSE_COLOR, DENSITY, CHECKER, TEXELS, ELEMENTS, LINKS, ERROR = (

@@ -1,1 +1,4 @@
-"""TODO."""
+"""Relighting in Blender: kept bakes, rewriting lightmaps in place, Live, undo.
+
+Images and files always belong together.
+"""

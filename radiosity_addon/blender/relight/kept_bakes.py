@@ -18,8 +18,8 @@ from ..datablocks.image_marks import GROUP, MARK, PAGE
 from .relight_properties import relight_of
 
 if TYPE_CHECKING:
-    from ...bake.relight.kept_bake import KeptBake
-    from ...base.arrays import Array
+    from ...bake.relight import KeptBake
+    from ...numerics import Array
 
 
 @dataclass(eq=False, repr=False)

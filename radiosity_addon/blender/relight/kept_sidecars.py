@@ -6,7 +6,7 @@ from pathlib import Path
 
 import bpy
 
-from ...files.file_names import FileNames
+from ...files import FileNames
 from ..files.lightmap_reports import bake_kept_by, report_of
 from . import kept_bakes
 

@@ -17,15 +17,14 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
-from ...bake.relight.light_groups import are_wanted
-from ...bake.relight.responses import Responses
-from ...bake.result.result import LightGroup
-from ...base.arrays import Array
-from ...base.background import in_thread
-from ...base.errors import BakeError, RadiosityError
-from ...lightmap.images.page import LightmapPage
+from ...bake.relight import Responses, are_wanted
+from ...bake.result import LightGroup
+from ...base import BakeError, RadiosityError
+from ...lightmap.images import LightmapPage
+from ...numerics import Array
 from ..images.group_images import update_images
 from ..session import live_state
+from ..session.background import in_thread
 from . import kept_bakes, lightmap_versions
 from .live_scene import LiveScene
 from .live_strengths import StrengthReader

@@ -7,7 +7,7 @@ import hashlib
 import bpy
 import numpy as np
 
-from ...base.errors import SceneError
+from ...base import SceneError
 from ..datablocks.bake_record import is_made
 from .live_strengths import StrengthReader
 

@@ -9,11 +9,10 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ...bake.relight.kept_bake import KeptBake, differs_in_strength_alone
-from ...base.arrays import Array
-from ...base.errors import SceneError
-from ...lights.environment import SkyPatch
-from ...lights.sun_and_sky import EnvironmentLight, Light
+from ...bake.relight import KeptBake, differs_in_strength_alone
+from ...base import SceneError
+from ...lights import EnvironmentLight, Light, SkyPatch
+from ...numerics import Array
 from ..cycles.lamps import read_lamp
 from ..materials.light_inputs import shown_world
 from ..materials.materials import read_material, read_radiance, uses_nodes

@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 
-from ...options.bake_settings import BakeSettings
+from ...options import BakeSettings
 
 
 class RelightSettings(bpy.types.PropertyGroup):
@@ -52,7 +52,7 @@ def relight_of(scene: bpy.types.Scene) -> Any:
 
 def keeps(scene: bpy.types.Scene, settings: BakeSettings) -> bool:
     """Tell whether a bake of the scene from the panel is to be kept, and can be."""
-    from ...bake.keep import can_keep
+    from ...bake import can_keep
 
     chosen = relight_of(scene)
     return bool(chosen.keep or chosen.sidecar) and can_keep(settings)

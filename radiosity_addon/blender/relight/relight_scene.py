@@ -10,19 +10,15 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ...bake.relight.kept_bake import KeptBake, relight
-from ...bake.relight.light_groups import are_wanted, group_pages
-from ...bake.relight.source_strengths import strengths_in
-from ...bake.result.progress import Progress
-from ...bake.result.result import LightGroup
-from ...bake.sidecar.sidecar import StoredBake, read_sidecar
-from ...base.arrays import Array
-from ...base.background import in_thread
-from ...base.errors import BakeError
-from ...base.progress import drain
-from ...lightmap.images.page import LightmapPage
+from ...bake.relight import KeptBake, are_wanted, group_pages, relight, strengths_in
+from ...bake.result import LightGroup, Progress
+from ...bake.sidecar import StoredBake, read_sidecar
+from ...base import BakeError, drain
+from ...lightmap.images import LightmapPage
+from ...numerics import Array
 from ..apply.rebake import Originals
 from ..scene_export.export import export_steps, exporting
+from ..session.background import in_thread
 from . import kept_bakes, lightmap_versions
 from .kept_bakes import InMemory
 from .kept_sidecars import sidecar_of

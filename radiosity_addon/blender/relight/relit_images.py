@@ -10,10 +10,9 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...bake.result.report import BakeReport
-from ...bake.result.result import LightGroup
-from ...base.errors import BakeError
-from ...lightmap.images.page import LightmapPage
+from ...bake.result import BakeReport, LightGroup
+from ...base import BakeError
+from ...lightmap.images import LightmapPage
 from ..datablocks.image_marks import MARK, SCALE_PROPERTY, VERSION
 from ..files.output import OutputFolder
 from ..files.ownership import OwnReport, report_listing

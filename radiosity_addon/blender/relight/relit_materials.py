@@ -6,14 +6,14 @@ from collections.abc import Collection, Iterator
 
 import bpy
 
-from ...base.radiometry import radiance_of_radiosity
+from ...numerics import radiance_of_radiosity
 from ..datablocks.bake_record import is_made
 from ..images.node_group import EMISSION
 from ..material_copies.copy_marks import ORIGINAL, PLAIN, STATE
 from ..material_copies.copy_record import is_untouched
-from ..material_copies.copy_values import take_values
 from ..material_copies.material_digest import digest
-from ..material_copies.stripping import is_lightmap_node
+from ..material_edits.copy_values import take_values
+from ..material_edits.stripping import is_lightmap_node
 from ..materials.materials import read_material, uses_nodes
 
 _EMISSION_SOCKETS = {"Color", "Strength", "Emission Color", "Emission Strength"}

@@ -1,1 +1,4 @@
-"""TODO."""
+"""The open scene as arrays: what a bake gets.
+
+Reads the evaluated scene, changes nothing.
+"""

@@ -15,9 +15,9 @@ from contextlib import AbstractContextManager
 import bpy
 import numpy as np
 
-from ...base.bake_warning import BakeWarning
-from ...lights.sun_and_sky import Light
-from ...options.bake_settings import BakeSettings
+from ...base import BakeWarning
+from ...lights import Light
+from ...options import BakeSettings
 from ..cycles.lamps import LampFactors, read_lamp
 from ..cycles.surface_bake import can_evaluate
 from ..datablocks.image_values import Means, UnknownMeanError, Wanted, known_means_only, mean_of_named

@@ -11,16 +11,11 @@ from typing import TypeVar
 import bpy
 import numpy as np
 
-from ...bake.result.progress import Progress
-from ...base.background import elsewhere
-from ...base.bake_warning import BakeWarning
-from ...base.errors import SceneError, UsageError
-from ...base.progress import drain
-from ...lights.sun_and_sky import EnvironmentLight
-from ...options.bake_settings import BakeSettings
-from ...scene.bake_scene import BakeObject, BakeScene
-from ...scene.scene import Scene
-from ...scene.textures import SurfaceImages
+from ...bake.result import Progress
+from ...base import BakeWarning, SceneError, UsageError, drain
+from ...lights import EnvironmentLight
+from ...options import BakeSettings
+from ...scene import BakeObject, BakeScene, Scene, SurfaceImages
 from ..cycles.lamps import lamp_factors
 from ..cycles.surface_evaluation import evaluate_surfaces
 from ..cycles.world import read_world
@@ -31,6 +26,7 @@ from ..scene_records.object_roles import BAKE, BAKEABLE_TYPES, half_visible
 from ..scene_records.pieces import Collected, Piece
 from ..scene_records.render_options import option_warnings, world_of
 from ..scene_records.render_state import leave_edit_mode, render_depsgraph
+from ..session.background import elsewhere
 from .collect import collect_steps
 
 T = TypeVar("T")

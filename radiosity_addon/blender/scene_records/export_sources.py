@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import bpy
 
-from ...base.errors import SceneError
-from ...scene.bake_scene import BakeScene
+from ...base import SceneError
+from ...scene import BakeScene
 
 Matrix4 = tuple[tuple[float, ...], ...]
 

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 
 import bpy
 
-from ...base.bake_warning import BakeWarning
+from ...base import BakeWarning
 
 NAMED = 3
 """As many objects are named; of more, the number is told."""

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 import bpy
 
 if TYPE_CHECKING:
-    from ...base.bake_warning import BakeWarning
-    from ...options.bake_settings import BakeSettings
+    from ...base import BakeWarning
+    from ...options import BakeSettings
 
 BAKE, LIGHT_ONLY, IGNORE = "BAKE", "LIGHT_ONLY", "IGNORE"
 
@@ -97,7 +97,7 @@ def role_of(
     background : str or None
         The background scene it is of; None for what is of the scene itself.
     """
-    from ...base.bake_warning import BakeWarning  # with the solver, which registering is not to load
+    from ...base import BakeWarning  # with the solver, which registering is not to load
 
     both = (shown,) if shown == owner else (shown, owner)
     modes = {getattr(obj, "radiosity_mode", BAKE) for obj in both}
@@ -135,7 +135,7 @@ def role_of(
 
 def half_visible(name: str) -> BakeWarning:
     """Say what is not as in Cycles for an object that only one kind of rays meets."""
-    from ...base.bake_warning import BakeWarning
+    from ...base import BakeWarning
 
     return BakeWarning(
         name,

@@ -6,10 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...base.bake_warning import BakeWarning
-from ...base.errors import SceneError
-from ...lights.sun_and_sky import Light
-from ...scene.bake_scene import LIGHTMAP_UV_LAYER
+from ...base import BakeWarning, SceneError
+from ...lights import Light
+from ...scene import LIGHTMAP_UV_LAYER
 from ..datablocks.mesh_arrays import MeshArrays, RawMesh, all_finite, no_triangles, not_finite_message
 from ..materials.materials import DEFAULT_GREY, Surface
 from ..materials.shading_inputs import MeshValues

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 
 import bpy
 
-from ...base.bake_warning import BakeWarning
+from ...base import BakeWarning
 
 _USUAL_SPACE = "Linear Rec.709"
 

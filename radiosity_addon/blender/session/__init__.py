@@ -1,1 +1,4 @@
-"""TODO."""
+"""What this session of Blender remembers: the running bake, the last one, whether Live is on.
+
+Nothing here is part of the file.
+"""

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import bpy
 
 if TYPE_CHECKING:
-    from ...bake.result.result import BakeDetails, BakeResult, PageDetails
-    from ...base.arrays import Array
-    from ...scene.bake_scene import BakeObject
+    from ...bake.result import BakeDetails, BakeResult, PageDetails
+    from ...numerics import Array
+    from ...scene import BakeObject
 
 
 STAND_IN_SUFFIX = " (Lightmap)"

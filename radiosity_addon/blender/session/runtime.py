@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import bpy
 
-from ...cli.similar_warnings import one_of_each
-from ...options.methods import METHODS
+from ...base import one_of_each
+from ...options import METHODS
 from . import kept_details
 
 MAX_WARNINGS = 100

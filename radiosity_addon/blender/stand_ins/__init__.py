@@ -1,1 +1,4 @@
-"""TODO."""
+"""Stand-ins: meshes and objects that show a lightmap where the user's own cannot.
+
+And what follows from that for names, parents and references.
+"""

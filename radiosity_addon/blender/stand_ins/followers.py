@@ -12,7 +12,7 @@ from typing import Any
 import bpy
 from mathutils import Matrix
 
-from ...base.bake_warning import BakeWarning
+from ...base import BakeWarning
 from ..datablocks.bake_record import is_made
 from .stand_ins import own_mesh
 

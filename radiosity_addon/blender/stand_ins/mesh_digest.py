@@ -11,7 +11,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...scene.bake_scene import LIGHTMAP_UV_LAYER
+from ...scene import LIGHTMAP_UV_LAYER
 from ..datablocks.keyed_paths import curves
 from ..datablocks.uv_layers import KEPT_VALUES, LayerRecord, layer_record
 

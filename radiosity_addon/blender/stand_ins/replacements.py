@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 import bpy
 from mathutils import Matrix
 
-from ...bake.result.result import BakedObject
-from ...base.errors import BakeError
+from ...bake.result import BakedObject
+from ...base import BakeError
 from ..datablocks.bake_record import ORIGINAL, mark_made, record_baked, record_hiding
 from ..datablocks.uv_layers import check_room, layer_record, put_layer_on, set_record
 from ..material_copies.light_shares import LightShares

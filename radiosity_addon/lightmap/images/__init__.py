@@ -1,1 +1,32 @@
-"""TODO."""
+"""From texels to images: dilation, seams, encoding, statistics.
+
+No rays, no solver.
+"""
+
+from __future__ import annotations
+
+from .encode import encode_png16, png16_scale, presentable, to_quantity
+from .irradiance_statistics import LightStatistics, light_statistics, told_texels
+from .page import LightmapPage
+from .page_assembly import texel_pages
+from .seams import Seams, find_seams
+from .surface_tiles import SurfaceTiles, lay_out_again, lay_out_surfaces
+from .turned_faces import turned_away
+
+__all__ = [
+    "LightStatistics",
+    "LightmapPage",
+    "Seams",
+    "SurfaceTiles",
+    "encode_png16",
+    "find_seams",
+    "lay_out_again",
+    "lay_out_surfaces",
+    "light_statistics",
+    "png16_scale",
+    "presentable",
+    "texel_pages",
+    "to_quantity",
+    "told_texels",
+    "turned_away",
+]

@@ -8,9 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.errors import BakeError, UsageError
-from ...base.radiometry import brdf_of_reflectance, reflected_radiance
-from ...base.scratch import tiles
+from ...base import BakeError, UsageError
+from ...numerics import brdf_of_reflectance, reflected_radiance, tiles
 from .page import LightmapPage
 
 BAND = 256

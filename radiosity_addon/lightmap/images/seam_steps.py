@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.arrays import Array
-from ..texels.texel_geometry import NO_TEXEL, TexelGeometry
+from ...numerics import Array
+from ..texels import NO_TEXEL, TexelGeometry
 from .seams import Seams
 
 NEIGHBOUR = 2.5

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...rays.caster import RayCaster
-from ...scene.scene import Scene
-from ..texels.texel_geometry import NO_TEXEL, TexelGeometry
+from ...numerics import Array
+from ...rays import RayCaster
+from ...scene import Scene
+from ..texels import NO_TEXEL, TexelGeometry
 
 SAME_NORMAL = 0.99
 """Least cosine between the shading normals of the two sides, …"""

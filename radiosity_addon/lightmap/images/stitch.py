@@ -15,9 +15,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.arrays import Array
-from ...base.scratch import trim
-from ..texels.texel_geometry import NO_TEXEL, TexelGeometry
+from ...numerics import Array, trim
+from ..texels import NO_TEXEL, TexelGeometry
 from .seams import Seams
 
 Float32 = NDArray[np.float32]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.arrays import Array
+from ...numerics import Array
 
 MAX_LEG = 4096
 _FILLED = 0.9

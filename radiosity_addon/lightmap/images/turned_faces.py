@@ -10,9 +10,9 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.bake_warning import BakeWarning
-from ...scene.bake_scene import BakeObject
+from ...base import BakeWarning
+from ...numerics import Array
+from ...scene import BakeObject
 
 DARK = 0.02
 """A front that gets less than this part of its back's light is dark, …"""

@@ -1,1 +1,49 @@
-"""TODO."""
+"""Light at texels: direct light, gather points, and sweeps along stored hits.
+
+Needs a solved scene; traces each ray once.
+"""
+
+from __future__ import annotations
+
+from .accuracy import light_within
+from .error_picture import summary, texel_residual
+from .gather_links import StoredLinks
+from .gather_settings import GatherSettings
+from .part_links import HitNumbers, KnownParts, PartLinks, Parts, gather_parts, lit_footprints
+from .partial_light import LightSoFar
+from .reconstruction import STARTS, gather_at, gather_footprints, on_lattice, reconstruct, resolver, sample_of
+from .relight_texels import kept_bytes, relight_steps
+from .sweeps import LitTexels, TexelLight, TexelTransport, sweep_steps
+from .traced_texels import KeptPoints, TracedTexels
+from .warm_start import EarlierLight
+
+__all__ = [
+    "STARTS",
+    "EarlierLight",
+    "GatherSettings",
+    "HitNumbers",
+    "KeptPoints",
+    "KnownParts",
+    "LightSoFar",
+    "LitTexels",
+    "PartLinks",
+    "Parts",
+    "StoredLinks",
+    "TexelLight",
+    "TexelTransport",
+    "TracedTexels",
+    "gather_at",
+    "gather_footprints",
+    "gather_parts",
+    "kept_bytes",
+    "light_within",
+    "lit_footprints",
+    "on_lattice",
+    "reconstruct",
+    "relight_steps",
+    "resolver",
+    "sample_of",
+    "summary",
+    "sweep_steps",
+    "texel_residual",
+]

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator
 
-from ...base.progress import scaled
-from ...scene.scene import Scene
-from ...solver.gather.local_pass import LocalPass
-from ..texels.texel_geometry import TexelGeometry
+from ...base import scaled
+from ...scene import Scene
+from ...solver.gather import LocalPass
+from ..texels import TexelGeometry
 from .gather_settings import GatherSettings
-from .light_so_far import LightSoFar
-from .reconstruct import reconstruct
+from .partial_light import LightSoFar
+from .reconstruction import reconstruct
 from .sweeps import TexelLight
 
 TRIES = 4

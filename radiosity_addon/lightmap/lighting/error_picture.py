@@ -12,15 +12,13 @@ from collections.abc import Generator
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.progress import scaled
-from ...base.sampling import stratified_square
-from ...solver.gather.residual import Residual
+from ...base import scaled
+from ...numerics import Array, stratified_square
+from ...solver.gather import Residual
 from ...solver.solution import Solution
-from ..texels.occlusion import crossing_steps
-from ..texels.texel_geometry import TexelGeometry
+from ..texels import TexelGeometry, crossing_steps
 from .gather_settings import GatherSettings
-from .reconstruct import CROSSED, DIRECT, GATHERED, footprints, gather_texels
+from .reconstruction import CROSSED, DIRECT, GATHERED, footprints, gather_texels
 
 SAMPLES = 4
 """Points of a texel at which the elements are looked up: an edge between two may cross it."""

@@ -13,14 +13,12 @@ from functools import cached_property
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.progress import drain, scaled
-from ...base.scratch import marked, tiles
-from ...solver.gather.light_gains import LightGains
-from ...solver.gather.local_pass import NOTHING, Footprints, LocalPass, Resolver, values_of
-from ..texels.cells import TexelCells
+from ...base import drain, scaled
+from ...numerics import Array, marked, tiles
+from ...solver.gather import NOTHING, Footprints, LightGains, LocalPass, Resolver, values_of
+from ..texels import TexelCells
+from .gather_links import StoredLinks
 from .source_means import Means
-from .stored_links import StoredLinks
 
 OFTEN = 32
 """A part that so many rays met matters: …"""

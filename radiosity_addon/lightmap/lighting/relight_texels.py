@@ -12,11 +12,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.progress import scaled
-from ...base.scratch import Scratch, tiles
+from ...base import scaled
+from ...numerics import Array, Scratch, tiles
 from ...solver.element_transport import Relightable
-from ...solver.gather.local_pass import values_of
+from ...solver.gather import values_of
 from .sweeps import LitTexels, TexelLight, sweep_steps
 
 SOLVED = 0.3

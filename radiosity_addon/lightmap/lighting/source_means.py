@@ -6,10 +6,8 @@ from collections.abc import Generator
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.parallel import chunk_steps
-from ...base.progress import drain
-from ...base.scratch import Scratch, tiles
+from ...base import drain
+from ...numerics import Array, Scratch, chunk_steps, tiles
 
 CHUNK_HITS = 1 << 18
 """Hits averaged at once: their values stay in the processor's cache."""

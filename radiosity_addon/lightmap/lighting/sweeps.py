@@ -10,13 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.progress import drain, scaled
-from ...base.scratch import Scratch, row_numbers, tiles, trim
-from ...solver.gather.light_gains import LightGains
+from ...base import drain, scaled
+from ...numerics import Array, Scratch, row_numbers, tiles, trim
+from ...solver.gather import LightGains
+from .gather_links import StoredLinks
 from .part_links import Parts, PartSweeps
 from .source_means import CHUNK_HITS, Means, by_channel, mean_steps
-from .stored_links import StoredLinks
 from .traced_texels import TracedTexels
 from .warm_start import EarlierLight
 

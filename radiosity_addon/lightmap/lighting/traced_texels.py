@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...base.arrays import Array
-from ..texels.occlusion import Crossings
-from .interpolate import GatherPoints
+from ...numerics import Array
+from ..points import GatherPoints
+from ..texels import Crossings
 from .part_links import HitNumbers
 
 if TYPE_CHECKING:

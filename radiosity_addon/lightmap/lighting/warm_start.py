@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arrays import Array
+from ...numerics import Array
 
 MOST = 6
 """Solutions remembered: 12 bytes a texel each."""

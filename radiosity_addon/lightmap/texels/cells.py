@@ -15,11 +15,9 @@ from collections.abc import Generator
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.parallel import chunk_steps
-from ...rays.caster import Hits, sees
-from ...solver.gather.footprints import Footprints
-from ...solver.gather.local_pass import NOTHING, LocalPass, Resolver
+from ...numerics import Array, chunk_steps
+from ...rays import Hits, sees
+from ...solver.gather import NOTHING, Footprints, LocalPass, Resolver
 from .occlusion import Crossings, below_hood
 from .texel_geometry import TexelGeometry
 

@@ -13,9 +13,7 @@ from itertools import product
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.parallel import for_chunks
-from ...base.scratch import Scratch, tiles
+from ...numerics import Array, Scratch, for_chunks, tiles
 from .texel_geometry import TexelGeometry
 
 CELL = 2.0

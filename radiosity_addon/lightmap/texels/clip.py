@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.polygons import clip_half_plane
+from ...numerics import clip_half_plane
 
 Float = NDArray[np.float64]
 

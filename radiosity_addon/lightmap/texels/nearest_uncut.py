@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...rays.caster import RayCaster, sees
-from ...solver.gather.local_pass import NOTHING
+from ...numerics import Array
+from ...rays import RayCaster, sees
+from ...solver.gather import NOTHING
 from .occlusion import LIFT, Crossings
 from .texel_geometry import NO_TEXEL
 

@@ -17,10 +17,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.parallel import chunk_steps
-from ...base.scratch import row_numbers
-from ...rays.caster import RayCaster
+from ...numerics import Array, chunk_steps, row_numbers
+from ...rays import RayCaster
 from .clearance import clear_texels
 from .states import DIVIDED, HOODED, TOUCHED
 from .texel_geometry import TexelGeometry

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.scratch import Scratch, tiles
+from ...numerics import Scratch, tiles
 from .clip import area_in_unit_square, clip_to_unit_square, polygon_area_centroid, sample_polygons
 
 Float = NDArray[np.float64]

@@ -11,7 +11,7 @@ from copy import copy
 
 import numpy as np
 
-from ...base.arrays import Array
+from ...numerics import Array
 from .texel_geometry import TexelGeometry
 
 CUTOFF = 0.1

@@ -8,10 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.scratch import Scratch, tiles
-from ...rays.caster import Hits, surface_offset
-from ...scene.scene import Scene
+from ...numerics import Array, Scratch, tiles
+from ...rays import Hits, surface_offset
+from ...scene import Scene
 from .rasterize import FOOTPRINT, Texels, sample_footprints
 
 NO_TEXEL = -1

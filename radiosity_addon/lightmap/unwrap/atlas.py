@@ -14,15 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.bake_warning import BakeWarning
-from ...base.errors import BakeError
-from ..texels.rasterize import coverage_sum
-from .chart_growers import PatientGrower
-from .charts import Charts, unwrap
-from .flatten import rescale_to_area, signed_double_area
-from .greedy import greedy_object, share_of
+from ...base import BakeError, BakeWarning
+from ..charts import Charts, PatientGrower, rescale_to_area, signed_double_area, unwrap
+from ..texels import coverage_sum
+from .dominant_object import greedy_object, share_of
 from .packing import Limits, Packing, pack
-from .pages import least_pages, shared_out
+from .page_assignment import least_pages, shared_out
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.errors import BakeError
-from ...options.bake_settings import MAX_RESOLUTION
+from ...base import BakeError
+from ...options import MAX_RESOLUTION
+from ..charts import signed_double_area
 from .chart_profiles import Shapes, align, measure, outline
-from .flatten import signed_double_area
 from .skyline import Placement, place
 
 Float = NDArray[np.float64]

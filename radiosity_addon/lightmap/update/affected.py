@@ -10,16 +10,11 @@ from functools import cached_property
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...rays.caster import RayCaster
-from ...rays.embree import EmbreeCaster
-from ...solver.gather.boxes import Boxes
-from ...solver.gather.retracing import STALE, Moved
-from ..lighting.part_links import HitNumbers
-from ..lighting.traced_texels import TracedTexels
-from ..texels.occlusion import LIFT, Crossings
-from ..texels.terminator import SmoothLift
-from ..texels.texel_geometry import TexelGeometry
+from ...numerics import Array
+from ...rays import EmbreeCaster, RayCaster
+from ...solver.gather import STALE, Boxes, Moved
+from ..lighting import HitNumbers, TracedTexels
+from ..texels import LIFT, Crossings, SmoothLift, TexelGeometry
 
 NEAR = 1.5
 """What is farther from a texel than this many times its size neither touches nor hoods it."""

@@ -1,6 +1,6 @@
 """Texels lit after something moved: what it does not touch keeps what its rays met.
 
-The order is that of `reconstruct.py`: direct light, crossings, gather points, parts, sweeps. Each step
+The order is that of `reconstruction.py`: direct light, crossings, gather points, parts, sweeps. Each step
 keeps what was found before and asks anew only where what moved was or is in the way. Sweeps then go over all
 texels, for indirect light changes everywhere.
 """
@@ -12,17 +12,25 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.progress import scaled
-from ...solver.gather.local_pass import LocalPass, values_of
-from ..lighting.part_links import HitNumbers, KnownParts, Parts, gather_parts
-from ..lighting.reconstruct import resolver
-from ..lighting.stored_links import StoredLinks
-from ..lighting.sweeps import LitTexels, TexelLight, TexelTransport, sweep_steps
-from ..lighting.traced_texels import KeptPoints, TracedTexels
-from ..lighting.warm_start import EarlierLight
-from ..texels.cells import TexelCells
-from ..texels.occlusion import crossing_steps
+from ...base import scaled
+from ...numerics import Array
+from ...solver.gather import LocalPass, values_of
+from ..lighting import (
+    EarlierLight,
+    HitNumbers,
+    KeptPoints,
+    KnownParts,
+    LitTexels,
+    Parts,
+    StoredLinks,
+    TexelLight,
+    TexelTransport,
+    TracedTexels,
+    gather_parts,
+    resolver,
+    sweep_steps,
+)
+from ..texels import TexelCells, crossing_steps
 from .affected import Disturbance
 from .moved_light import texel_gains
 from .moved_parts import known_parts, look_again, renumbered

@@ -7,15 +7,11 @@ from functools import partial
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.progress import scaled
-from ...solver.gather.boxes import Boxes
-from ...solver.gather.light_gains import LightGains
-from ...solver.gather.local_pass import AskedLight, Footprints, LocalPass
-from ..lighting.part_links import HitNumbers, KnownParts, lit_footprints
-from ..lighting.reconstruct import sample_of
-from ..texels.terminator import SmoothLift
-from ..texels.texel_geometry import TexelGeometry
+from ...base import scaled
+from ...numerics import Array
+from ...solver.gather import AskedLight, Boxes, Footprints, LightGains, LocalPass
+from ..lighting import HitNumbers, KnownParts, lit_footprints, sample_of
+from ..texels import SmoothLift, TexelGeometry
 from .affected import Disturbance
 
 

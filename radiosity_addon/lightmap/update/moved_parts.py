@@ -6,15 +6,10 @@ from collections.abc import Generator, Sequence
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.progress import scaled
-from ...solver.gather.bright_patches import AimedRays
-from ...solver.gather.final_gather import Gathered, Resolver
-from ...solver.gather.light_gains import LightGains
-from ...solver.gather.local_pass import LocalPass
-from ...solver.gather.retracing import STALE, Before
-from ..lighting.part_links import HitNumbers, KnownParts, PartLinks
-from ..lighting.traced_texels import TracedTexels
+from ...base import scaled
+from ...numerics import Array
+from ...solver.gather import STALE, AimedRays, Before, Gathered, LightGains, LocalPass, Resolver
+from ..lighting import HitNumbers, KnownParts, PartLinks, TracedTexels
 from .affected import Disturbance
 from .moved_light import part_gains
 

@@ -12,19 +12,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.progress import scaled
-from ...base.scratch import row_numbers
-from ...solver.gather.bright_patches import AimedRays
-from ...solver.gather.final_gather import Gathered, Resolver
-from ...solver.gather.local_pass import LocalPass
-from ...solver.gather.retracing import Before
-from ..lighting.gather_settings import GatherSettings
-from ..lighting.interpolate import LIFT, SAGITTA, GatherPoints, Interpolation, refit
-from ..lighting.reconstruct import STARTS, gather_at, gather_footprints, on_lattice
-from ..lighting.stored_links import StoredLinks
-from ..lighting.traced_texels import KeptPoints
-from ..texels.occlusion import Crossings
+from ...base import scaled
+from ...numerics import Array, row_numbers
+from ...solver.gather import AimedRays, Before, Gathered, LocalPass, Resolver
+from ..lighting import (
+    STARTS,
+    GatherSettings,
+    KeptPoints,
+    StoredLinks,
+    gather_at,
+    gather_footprints,
+    on_lattice,
+)
+from ..points import LIFT, SAGITTA, GatherPoints, Interpolation, refit
+from ..texels import Crossings
 from .affected import Disturbance
 
 CLOSER = 1.05

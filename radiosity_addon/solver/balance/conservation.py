@@ -26,13 +26,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...rays.caster import RayCaster
-from ..hierarchy.cluster_cut import TreeTop
-from ..hierarchy.nodes import Hierarchy
-from ..links.cluster_links import ClusterLinks
-from ..links.element_links import Links
-from ..links.transport import pull
+from ...numerics import Array
+from ...rays import RayCaster
+from ..hierarchy import Hierarchy, TreeTop
+from ..links import ClusterLinks, Links, pull
 from .enclosure import Arrivals
 from .link_sums import received_by_leaves, received_over_clusters, sent_by_leaves
 from .visibility_correction import corrected

@@ -8,14 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.parallel import for_chunks
-from ...base.sampling import cosine_hemisphere, stratified_square, to_world
-from ...rays.caster import RayCaster
-from ..hierarchy.cluster_cut import TreeTop
-from ..hierarchy.nodes import Hierarchy
-from ..links.node_samples import node_samples
-from ..links.transport import pull
+from ...numerics import Array, cosine_hemisphere, for_chunks, stratified_square, to_world
+from ...rays import RayCaster
+from ..hierarchy import Hierarchy, TreeTop
+from ..links import node_samples, pull
 
 RAYS = 32
 """Hemisphere rays of a leaf; in a closed scene they all agree, and there is no noise at all."""

@@ -8,12 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arrays import Array
-from ..hierarchy.cluster_cut import TreeTop
-from ..hierarchy.nodes import LEAF, Hierarchy
-from ..links.cluster_links import ClusterLinks, gather_at_clusters
-from ..links.element_links import Links
-from ..links.transport import gather, node_radiosity, pull, push, quarters_mean
+from ...numerics import Array
+from ..hierarchy import LEAF, Hierarchy, TreeTop
+from ..links import ClusterLinks, Links, gather, gather_at_clusters, node_radiosity, pull, push, quarters_mean
 
 
 class Arriving:

@@ -13,9 +13,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...base.arrays import Array
-from ..hierarchy.nodes import Hierarchy
-from ..links.element_links import Links
+from ...numerics import Array
+from ..hierarchy import Hierarchy
+from ..links import Links
 
 ROUNDS = 6
 """How often what receivers and what sources lack is shared out in turn."""

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...form_factors.formulas import point_to_polygon
+from ...form_factors import point_to_polygon
+from ...numerics import Array
 
 NEAREST = 3.0
 """A flat group is asked as one from this many times its radius on, …"""

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.radiometry import radiance_of_radiosity
-from ...base.sampling import points_on_triangles
-from ...form_factors.formulas import point_to_polygon
-from ...form_factors.kernel import ray_geometry_term, throughput
-from ...rays.caster import RayCaster
-from ...scene.faces import Faces
+from ...form_factors import point_to_polygon, ray_geometry_term, throughput
+from ...numerics import Array, points_on_triangles, radiance_of_radiosity
+from ...rays import RayCaster
+from ...scene import Faces
 from .emitter_tree import EmitterTree
 from .merged_faces import merge_flat
 

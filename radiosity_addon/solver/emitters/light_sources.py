@@ -9,13 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.errors import SceneError
-from ...lights.environment import SkyTable
-from ...lights.sun_and_sky import Light, light_strengths
-from ...rays.caster import RayCaster
-from ...scene.faces import Faces
-from ...scene.scene import Scene
+from ...base import SceneError
+from ...lights import Light, SkyTable, light_strengths
+from ...numerics import Array
+from ...rays import RayCaster
+from ...scene import Faces, Scene
 from .emitters import EmitterGroup
 from .textured_emitters import emitter_groups
 

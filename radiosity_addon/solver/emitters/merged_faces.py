@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...base.arrays import Array
+from ...numerics import Array
 
 FLAT = 1e-6
 """Faces lie in one plane if their normals agree to this, and their corners to this part of their extent."""

@@ -9,13 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.polygons import areas
-from ...base.triangles import WHOLE_TRIANGLE, split_in_four
-from ...rays.caster import RayCaster
-from ...scene.faces import Faces
-from ...scene.scene import Scene
-from ...scene.textures import SurfaceImages
+from ...numerics import WHOLE_TRIANGLE, Array, areas, split_in_four
+from ...rays import RayCaster
+from ...scene import Faces, Scene, SurfaceImages
 from .emitters import EmitterGroup, corners_of_parts, end_offset, upright
 
 MOST_PIECES = 256

@@ -17,18 +17,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.parallel import for_chunks
-from ...form_factors.formulas import point_to_polygon
-from ...rays.caster import RayCaster
-from ...scene.faces import Faces
-from ...scene.overlaps import arriving, shares
-from ..hierarchy.basis import Basis, constant_basis
-from ..hierarchy.nodes import Hierarchy
-from .exchange_areas import exchange_areas
+from ...form_factors import point_to_polygon
+from ...numerics import Array, for_chunks
+from ...rays import RayCaster
+from ...scene import Faces, arriving, shares
+from ..hierarchy import Basis, Hierarchy, constant_basis
+from .exchange import exchange_areas
+from .linear_basis import vertex_basis
 from .linear_system import LinearSystem
 from .point_exchange import corner_factors, visible_share
-from .vertex_basis import vertex_basis
 
 BLOCK_PAIRS = 1 << 18
 """Pairs between two reports of progress, about half a second's work; their numbers take 4 MB."""

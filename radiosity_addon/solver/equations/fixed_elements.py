@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..hierarchy.nodes import Hierarchy
+from ..hierarchy import Hierarchy
 
 
 def subdivide_evenly(hierarchy: Hierarchy, count: int) -> None:

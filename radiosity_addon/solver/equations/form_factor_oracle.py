@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arrays import Array
-from ..hierarchy.nodes import Hierarchy
+from ...numerics import Array
+from ..hierarchy import Hierarchy
 
 COPLANAR = 1e-9
 """Heights below this share of the two radii count as none, as in `pairs.element_factors`."""

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.arrays import Array
+from ...numerics import Array
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...base.arrays import Array
+from ...numerics import Array
 from .linear_system import LinearSystem
 
 CHUNK_ROWS = 512

@@ -8,12 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.sampling import points_on_triangles, stratified_square
-from ...base.triangles import split_in_four
-from ...form_factors.formulas import point_to_polygon
-from ...form_factors.kernel import LEAST, kernel
-from ...rays.caster import RayCaster
+from ...form_factors import LEAST, kernel, point_to_polygon
+from ...numerics import Array, points_on_triangles, split_in_four, stratified_square
+from ...rays import RayCaster
 
 NEAR = ((1.21, 4), (2.07, 2), (4.13, 1))
 """(Distance over radius, generations): a nearer triangle is split so often before each part is

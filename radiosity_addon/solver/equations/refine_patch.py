@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arrays import Array
-from ..hierarchy.nodes import LEAF, Hierarchy
+from ...numerics import Array
+from ..hierarchy import LEAF, Hierarchy
 from .form_factor_oracle import oracle1, source_factor_bounds
 
 BLOCK = 1 << 22

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...lights.environment import SkyPatch
-from ...lights.sun_and_sky import AreaLight, Lamp, PointLight, SpotLight, SunLight
-from ..emitters.emitters import EmitterGroup
+from ...lights import AreaLight, Lamp, PointLight, SkyPatch, SpotLight, SunLight
+from ...numerics import Array
+from ..emitters import EmitterGroup
 
 WIDEST = 1.5
 """A part of the sky farther than this from its middle [rad] is everywhere."""

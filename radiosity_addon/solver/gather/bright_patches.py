@@ -13,14 +13,19 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.radiometry import radiance_of_radiosity
-from ...base.sampling import points_on_triangles
-from ...base.scratch import Rows, Scratch, tiles
-from ...base.triangles import split_in_four, split_in_sixteen
-from ...form_factors.kernel import ray_geometry_term, throughput
-from ...rays.caster import Hits
-from ..hierarchy.nodes import Hierarchy
+from ...form_factors import ray_geometry_term, throughput
+from ...numerics import (
+    Array,
+    Rows,
+    Scratch,
+    points_on_triangles,
+    radiance_of_radiosity,
+    split_in_four,
+    split_in_sixteen,
+    tiles,
+)
+from ...rays import Hits
+from ..hierarchy import Hierarchy
 
 EVEN = 0.2
 """This part of the rays at an element spreads over it evenly: lamps do not tell what other light there

@@ -11,11 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.parallel import chunk_steps
-from ...base.sampling import cosine_hemisphere, orthonormal_basis, stratified_square
-from ...lights.environment import SkyTable
-from ...rays.caster import Hits, RayCaster
+from ...lights import SkyTable
+from ...numerics import Array, chunk_steps, cosine_hemisphere, orthonormal_basis, stratified_square
+from ...rays import Hits, RayCaster
 from .bright_patches import AimedRays, AimedTable, BrightElements
 from .footprints import Footprints
 

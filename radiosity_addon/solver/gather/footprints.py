@@ -8,13 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.parallel import chunk_steps
-from ...base.progress import scaled
-from ...base.sampling import stratified_square
-from ...base.scratch import Scratch, marked, row_numbers, trim
-from ...lights.light import Lamp
-from ..emitters.emitters import EmitterGroup
+from ...base import scaled
+from ...lights import Lamp
+from ...numerics import Array, Scratch, chunk_steps, marked, row_numbers, stratified_square, trim
+from ..emitters import EmitterGroup
 
 SPREAD = 4
 """Points of each footprint that all lamps share."""

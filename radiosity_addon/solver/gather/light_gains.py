@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.scratch import Scratch, row_numbers, tiles
+from ...numerics import Array, Scratch, row_numbers, tiles
 
 SPARSE = 0.5
 """A light that reaches less than this part of the points is kept as the rows it reaches: 8 bytes each; else

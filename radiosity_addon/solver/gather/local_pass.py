@@ -14,17 +14,13 @@ from functools import cached_property
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.progress import drain, scaled
-from ...base.scratch import Scratch, tiles
-from ...lights.environment import SkyTable
-from ...lights.sun_and_sky import Lamp
-from ...rays.caster import Hits
-from ..emitters.emitters import EmitterGroup
-from ..emitters.light_sources import LightSources
-from ..emitters.textured_emitters import emitter_groups
-from ..hierarchy.nodes import Hierarchy
-from ..state.state import SolverState
+from ...base import drain, scaled
+from ...lights import Lamp, SkyTable
+from ...numerics import Array, Scratch, tiles
+from ...rays import Hits
+from ..emitters import EmitterGroup, LightSources, emitter_groups
+from ..hierarchy import Hierarchy
+from ..state import SolverState
 from .bright_patches import BrightElements
 from .final_gather import NOTHING, SKY, Gathered, Gathering, Resolver
 from .footprints import Footprints, Sampler, SpreadPoints

@@ -15,13 +15,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.parallel import for_chunks
-from ...base.triangles import split_in_four
-from ...form_factors.formulas import point_to_polygon
-from ..equations.point_exchange import corner_factors, visible_share
-from ..links.light_at_points import lamp_irradiance
-from ..state.state import SolverState
+from ...form_factors import point_to_polygon
+from ...numerics import Array, for_chunks, split_in_four
+from ..equations import corner_factors, visible_share
+from ..links import lamp_irradiance
+from ..state import SolverState
 from .local_pass import LocalPass
 
 CHUNK_PAIRS = 1 << 16

@@ -10,9 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.parallel import chunk_steps
-from ...rays.caster import RayCaster
+from ...numerics import Array, chunk_steps
+from ...rays import RayCaster
 from .boxes import Boxes
 from .bright_patches import AimedRays, BrightElements
 from .final_gather import CHUNK_RAYS, Gathered, Gathering

@@ -11,13 +11,10 @@ from collections.abc import Generator
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.parallel import chunk_steps
-from ...base.sampling import stratified_square
-from ...base.scratch import marked, row_numbers, tiles
-from ...lights.sun_and_sky import Lamp
-from ...rays.caster import RayCaster
-from ..emitters.emitters import EmitterGroup
+from ...lights import Lamp
+from ...numerics import Array, chunk_steps, marked, row_numbers, stratified_square, tiles
+from ...rays import RayCaster
+from ..emitters import EmitterGroup
 from .footprints import Footprints, SpreadPoints
 
 CHUNK_RAYS = 1 << 16

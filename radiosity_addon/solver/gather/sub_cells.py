@@ -10,11 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.sampling import points_on_triangles
-from ...base.triangles import split_in_sixteen
-from ...rays.caster import Hits, RayCaster, sees
-from ..hierarchy.nodes import Hierarchy
+from ...numerics import Array, points_on_triangles, split_in_sixteen
+from ...rays import Hits, RayCaster, sees
+from ..hierarchy import Hierarchy
 from .final_gather import NOTHING
 from .footprints import Footprints
 

@@ -1,1 +1,25 @@
-"""TODO."""
+"""The hierarchy of nodes: clusters above the faces, elements below them.
+
+Also the cut through the clusters that links go down to, and basis functions over the leaves.
+"""
+
+from __future__ import annotations
+
+from .basis import Basis, constant_basis
+from .bounds import NodeShapes
+from .cluster_cut import TreeTop
+from .clusters import Clusters
+from .neighbors import neighbours
+from .nodes import LEAF, Hierarchy, node_opacity
+
+__all__ = [
+    "LEAF",
+    "Basis",
+    "Clusters",
+    "Hierarchy",
+    "NodeShapes",
+    "TreeTop",
+    "constant_basis",
+    "neighbours",
+    "node_opacity",
+]

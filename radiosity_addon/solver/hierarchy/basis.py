@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.arrays import Array
+from ...numerics import Array
 from .nodes import Hierarchy
 
 INTERPOLATION_ROUNDS = 24

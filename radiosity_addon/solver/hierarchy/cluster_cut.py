@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arrays import Array
+from ...numerics import Array
 from .nodes import Hierarchy
 
 

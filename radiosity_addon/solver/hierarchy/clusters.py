@@ -11,8 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...scene.faces import Faces
+from ...numerics import Array
+from ...scene import Faces
 
 NORMAL_WEIGHT = 0.25
 """Opposite normals count like this share of the cluster's diagonal, twice, …"""

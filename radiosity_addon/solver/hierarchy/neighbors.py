@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...rays.caster import RayCaster
+from ...numerics import Array
+from ...rays import RayCaster
 from .nodes import Hierarchy
 
 ACROSS = 0.02

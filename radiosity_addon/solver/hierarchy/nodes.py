@@ -12,10 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.triangles import WHOLE_TRIANGLE, split_in_four
-from ...scene.faces import Faces
-from ...scene.scene import Scene
+from ...numerics import WHOLE_TRIANGLE, Array, split_in_four
+from ...scene import Faces, Scene
 from .clusters import Clusters, build_clusters
 
 LEAF = -1

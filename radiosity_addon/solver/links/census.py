@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arrays import Array
-from ..hierarchy.nodes import Hierarchy
+from ...numerics import Array
+from ..hierarchy import Hierarchy
 from .cluster_links import ClusterLinks
 from .element_links import Links
 

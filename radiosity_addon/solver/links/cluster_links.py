@@ -16,10 +16,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.parallel import for_chunks
-from ..hierarchy.cluster_cut import TreeTop
-from ..hierarchy.nodes import Hierarchy
+from ...numerics import Array, for_chunks
+from ..hierarchy import Hierarchy, TreeTop
 
 TERMS = 7
 """What a cluster passes on is linear in a face's normal and place, and a constant."""

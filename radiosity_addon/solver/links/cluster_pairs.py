@@ -15,16 +15,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.parallel import for_chunks
-from ...base.sampling import hash_keys
-from ...form_factors.formulas import point_to_polygon
-from ...form_factors.kernel import sees
-from ...rays.caster import RayCaster
-from ..hierarchy.bounds import NodeShapes
-from ..hierarchy.nodes import Hierarchy
+from ...form_factors import point_to_polygon, sees
+from ...numerics import Array, for_chunks, hash_keys
+from ...rays import RayCaster
+from ..hierarchy import Hierarchy, NodeShapes
 from .cluster_links import ClusterLinks, join_cluster_links
-from .node_samples import node_area, node_samples
+from .node_sampling import node_area, node_samples
 
 CHUNK_SAMPLES = 1 << 18
 """Point pairs measured at once: bounds the temporaries to about 100 MB a thread."""

@@ -15,12 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.parallel import for_chunks
-from ...base.triangles import split_in_four
-from ...form_factors.formulas import point_to_polygon
-from ...rays.caster import RayCaster
-from ..hierarchy.nodes import Hierarchy
+from ...form_factors import point_to_polygon
+from ...numerics import Array, for_chunks, split_in_four
+from ...rays import RayCaster
+from ..hierarchy import Hierarchy
 from .pair_factors import PairSamples, element_factors, open_share, trace_pairs
 
 CHUNK = 1 << 15

@@ -12,11 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...options.solver_settings import SolverSettings
-from ...rays.caster import RayCaster
-from ..hierarchy.bounds import NodeShapes
-from ..hierarchy.nodes import Hierarchy
+from ...numerics import Array
+from ...options import SolverSettings
+from ...rays import RayCaster
+from ..hierarchy import Hierarchy, NodeShapes
 from .cluster_links import ClusterLinks
 from .cluster_pairs import measure_cluster_links
 from .element_links import Links, measure_links

@@ -6,12 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.parallel import for_chunks
-from ...base.radiometry import irradiance_under_sky
-from ...base.sampling import stratified_square
-from ...lights.sun_and_sky import EnvironmentLight, Lamp, Light
-from ...rays.caster import RayCaster
+from ...lights import EnvironmentLight, Lamp, Light
+from ...numerics import Array, for_chunks, irradiance_under_sky, stratified_square
+from ...rays import RayCaster
 from .light_links import lamp_light, sky_share
 
 SHADOW_RAYS = 32

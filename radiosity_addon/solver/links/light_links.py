@@ -7,14 +7,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.parallel import for_chunks
-from ...base.radiometry import irradiance_under_sky
-from ...base.sampling import cosine_hemisphere, points_on_triangles, stratified_square, to_world
-from ...base.triangles import split_in_four
-from ...lights.sun_and_sky import EnvironmentLight, Lamp, Light, SpotLight
-from ...rays.caster import RayCaster
-from ..hierarchy.nodes import LEAF, Hierarchy
+from ...lights import EnvironmentLight, Lamp, Light, SpotLight
+from ...numerics import (
+    Array,
+    cosine_hemisphere,
+    for_chunks,
+    irradiance_under_sky,
+    points_on_triangles,
+    split_in_four,
+    stratified_square,
+    to_world,
+)
+from ...rays import RayCaster
+from ..hierarchy import LEAF, Hierarchy
 
 LAMP_SAMPLES = 4
 """Shadow rays of each quarter of an element, each from a point of its own."""

@@ -8,14 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.sampling import hash_keys, points_on_triangles, stratified_square
-from ...base.triangles import split_in_four
-from ...form_factors.formulas import point_to_polygon, triangle_to_triangle
-from ...form_factors.kernel import kernel, sees
-from ...form_factors.triangle_pairs import weighted_sums
-from ...rays.caster import RayCaster
-from ..hierarchy.nodes import Hierarchy
+from ...form_factors import kernel, point_to_polygon, sees, triangle_to_triangle, weighted_sums
+from ...numerics import Array, hash_keys, points_on_triangles, split_in_four, stratified_square
+from ...rays import RayCaster
+from ..hierarchy import Hierarchy
 
 EXACT_WITHIN = 1.0
 """Pairs nearer than this (distance of centres over the sum of radii) get the exact factor."""

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arrays import Array
-from ..hierarchy.cluster_cut import TreeTop
-from ..hierarchy.nodes import LEAF, Hierarchy
+from ...numerics import Array
+from ..hierarchy import LEAF, Hierarchy, TreeTop
 from .element_links import Links
 
 

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from importlib import import_module
 from typing import cast
 
-from ...options.solver_settings import SolverSettings
-from ...scene.scene import Scene
-from ..state.state import SolverState
+from ...options import SolverSettings
+from ...scene import Scene
+from ..state import SolverState
 
 
 def steps_of(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float, SolverState]]:

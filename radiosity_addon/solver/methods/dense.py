@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.errors import BakeError
-from ...options.solver_settings import SolverSettings
-from ...scene.scene import Scene
-from ..equations.linear_system import LinearSystem
-from ..state.state import SolverState
+from ...base import BakeError
+from ...numerics import Array
+from ...options import SolverSettings
+from ...scene import Scene
+from ..equations import LinearSystem
+from ..state import SolverState
 from .matrix import Iterate, solve_matrix
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ...base.arrays import Array
-from ...options.solver_settings import SolverSettings
-from ...scene.scene import Scene
-from ..equations.linear_system import LinearSystem
-from ..state.state import SolverState
+from ...numerics import Array
+from ...options import SolverSettings
+from ...scene import Scene
+from ..equations import LinearSystem
+from ..state import SolverState
 from .matrix import Iterate, solve_matrix
 
 

@@ -12,29 +12,44 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...options.solver_settings import SolverSettings
-from ...scene.scene import Scene
-from ..balance.conservation import Balance, Conservation, received_by_faces
-from ..hierarchy.bounds import NodeShapes
-from ..hierarchy.cluster_cut import TreeTop
-from ..links.census import elements_by_level, leaves_by_level, linked_leaves, links_by_level
-from ..links.cluster_links import ClusterLinks, join_cluster_links, no_cluster_links
-from ..links.cluster_pairs import measure_cluster_links
-from ..links.element_links import Links, join, measure_links, no_links
-from ..links.initial import first_links
-from ..links.light_links import link_lights
-from ..links.refine import (
+from ...numerics import Array
+from ...options import SolverSettings
+from ...scene import Scene
+from ..balance import Balance, Conservation, received_by_faces
+from ..hierarchy import NodeShapes, TreeTop
+from ..links import (
+    ClusterLinks,
+    Links,
     children_of_cluster_links,
     children_of_links,
+    elements_by_level,
+    first_links,
+    join,
+    join_cluster_links,
+    leaves_by_level,
+    link_lights,
+    linked_leaves,
+    links_by_level,
+    measure_cluster_links,
+    measure_links,
     misplaced_at_clusters,
     misplaced_power,
+    no_cluster_links,
+    no_links,
 )
-from ..state.anderson import Anderson
-from ..state.iteration import bounce, reflect, relative_residual
-from ..state.memory import link_budget, most_light_elements, refinable, refuse_too_large
-from ..state.power import link_closure
-from ..state.state import SolverState, begin
+from ..state import (
+    Anderson,
+    SolverState,
+    begin,
+    bounce,
+    link_budget,
+    link_closure,
+    most_light_elements,
+    refinable,
+    reflect,
+    refuse_too_large,
+    relative_residual,
+)
 
 COARSENING = (64.0, 16.0, 4.0, 1.0)
 """BF_ε of the rounds, in units of the final one: start coarse, tighten (our addition)."""

@@ -7,20 +7,26 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.errors import UsageError
-from ...options.solver_settings import SolverSettings
-from ...scene.overlaps import OVERLAP, arriving
-from ...scene.scene import Scene
-from ..equations.assembly import collocation_steps, galerkin_steps, linear_steps, share_overlaps, with_lamps
-from ..equations.fixed_elements import subdivide_evenly
-from ..equations.independent_sets import describe_sets, independent_sets
-from ..equations.linear_system import LinearSystem
-from ..equations.matrix_report import matrix_properties
-from ..equations.vertex_basis import vertex_basis
-from ..hierarchy.basis import Basis, constant_basis
-from ..links.light_at_points import lamp_irradiance
-from ..state.state import SolverState, begin
+from ...base import UsageError
+from ...numerics import Array
+from ...options import SolverSettings
+from ...scene import OVERLAP, Scene, arriving
+from ..equations import (
+    LinearSystem,
+    collocation_steps,
+    describe_sets,
+    galerkin_steps,
+    independent_sets,
+    linear_steps,
+    matrix_properties,
+    share_overlaps,
+    subdivide_evenly,
+    vertex_basis,
+    with_lamps,
+)
+from ..hierarchy import Basis, constant_basis
+from ..links import lamp_irradiance
+from ..state import SolverState, begin
 
 Iterate = tuple[Array, Array]
 """Radiosity (n, 3) [W/m²], and its residual power Σ A |E − K B| (3,) [W]."""

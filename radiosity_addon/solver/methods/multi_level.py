@@ -13,20 +13,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.errors import UsageError
-from ...options.solver_settings import SolverSettings
-from ...scene.overlaps import shares
-from ...scene.scene import Scene
-from ..equations.exchange_areas import exchange_areas
-from ..equations.form_factor_oracle import source_factor_bounds
-from ..equations.refine_patch import RefinePatch
-from ..hierarchy.nodes import Hierarchy
-from ..links.census import elements_by_level, leaves_by_level, links_by_level
-from ..links.element_links import Links, no_links
-from ..state.iteration import bounce
-from ..state.power import link_closure
-from ..state.state import SolverState, begin
+from ...base import UsageError
+from ...numerics import Array
+from ...options import SolverSettings
+from ...scene import Scene, shares
+from ..equations import RefinePatch, exchange_areas, source_factor_bounds
+from ..hierarchy import Hierarchy
+from ..links import Links, elements_by_level, leaves_by_level, links_by_level, no_links
+from ..state import SolverState, begin, bounce, link_closure
 
 PAIR_BYTES = 64
 """Memory a pair takes while it is refined, measured and sorted."""

@@ -22,14 +22,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.errors import UsageError
-from ...options.solver_settings import SolverSettings
-from ...scene.overlaps import arriving, shares
-from ...scene.scene import Scene
-from ..equations.exchange_areas import exchange_areas
-from ..equations.fixed_elements import subdivide_evenly
-from ..state.state import SolverState, begin
+from ...base import UsageError
+from ...numerics import Array
+from ...options import SolverSettings
+from ...scene import Scene, arriving, shares
+from ..equations import exchange_areas, subdivide_evenly
+from ..state import SolverState, begin
 
 HISTORY_STEP = 1.1
 """Shots are noted in the history when their number has grown by this factor: thousands make 100 entries."""

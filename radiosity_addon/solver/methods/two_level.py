@@ -20,16 +20,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.errors import UsageError
-from ...options.solver_settings import SolverSettings
-from ...scene.overlaps import arriving, shares
-from ...scene.scene import Scene
-from ..equations.exchange_areas import exchange_areas
-from ..equations.fixed_elements import subdivide_evenly
-from ..hierarchy.neighbors import neighbours
-from ..hierarchy.nodes import LEAF
-from ..state.state import SolverState, begin
+from ...base import UsageError
+from ...numerics import Array
+from ...options import SolverSettings
+from ...scene import Scene, arriving, shares
+from ..equations import exchange_areas, subdivide_evenly
+from ..hierarchy import LEAF, neighbours
+from ..state import SolverState, begin
 
 FINEST = 1.0 / 64
 """Adaptive subdivision makes no element smaller than this part of the mean of step 1: three levels."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arrays import Array
+from ...numerics import Array
 
 DEPTH = 5
 """Steps remembered: two arrays of radiosity each."""

@@ -4,11 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arrays import Array
-from ..hierarchy.cluster_cut import TreeTop
-from ..links.cluster_links import ClusterLinks, gather_at_clusters
-from ..links.element_links import Links
-from ..links.transport import gather, push, push_pull, quarters_mean, shared_means
+from ...numerics import Array
+from ..hierarchy import TreeTop
+from ..links import (
+    ClusterLinks,
+    Links,
+    gather,
+    gather_at_clusters,
+    push,
+    push_pull,
+    quarters_mean,
+    shared_means,
+)
 from .state import SolverState
 
 

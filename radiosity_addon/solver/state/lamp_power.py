@@ -7,17 +7,12 @@ from typing import TypeGuard
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.radiometry import irradiance_under_sky
-from ...base.sampling import stratified_square
-from ...lights.environment import SkyPatch
-from ...lights.light import Emitter
-from ...lights.sun_and_sky import EnvironmentLight, Light, SunLight
-from ...rays.caster import NO_HIT, RayCaster
-from ...scene.faces import Faces
-from ...scene.scene import Scene
-from ..hierarchy.nodes import Hierarchy
-from ..links.light_links import LightLinks
+from ...lights import Emitter, EnvironmentLight, Light, SkyPatch, SunLight
+from ...numerics import Array, irradiance_under_sky, stratified_square
+from ...rays import NO_HIT, RayCaster
+from ...scene import Faces, Scene
+from ..hierarchy import Hierarchy
+from ..links import LightLinks
 
 RAYS = 1 << 17
 """Rays of all lamps together, …"""

@@ -6,10 +6,10 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...lights.light import Light
-from ..hierarchy.nodes import LEAF
-from ..links.transport import shared_means
+from ...lights import Light
+from ...numerics import Array
+from ..hierarchy import LEAF
+from ..links import shared_means
 from .state import SolverState
 
 

@@ -11,11 +11,11 @@ import os
 
 import numpy as np
 
-from ...base.errors import UsageError
-from ...options.solver_settings import SolverSettings
-from ...scene.scene import Scene
-from ..hierarchy.nodes import Hierarchy
-from ..links.initial import FEWEST, SLACK
+from ...base import UsageError
+from ...options import SolverSettings
+from ...scene import Scene
+from ..hierarchy import Hierarchy
+from ..links import FEWEST, SLACK
 
 LINK_BYTES = 200
 """Memory a link takes while links are sorted and gathered over (52 bytes at rest, 48 to a cluster), …"""

@@ -9,12 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...base.sampling import cosine_hemisphere, points_on_triangles, stratified_square, to_world
-from ..hierarchy.cluster_cut import TreeTop
-from ..hierarchy.nodes import LEAF, Hierarchy, node_opacity
-from ..links.cluster_links import ClusterLinks, gather_at_clusters
-from ..links.element_links import Links
+from ...numerics import Array, cosine_hemisphere, points_on_triangles, stratified_square, to_world
+from ..hierarchy import LEAF, Hierarchy, TreeTop, node_opacity
+from ..links import ClusterLinks, Links, gather_at_clusters
 from .lamp_power import fate, is_stopped, lost_by_lamp
 from .state import SolverState
 

@@ -8,16 +8,13 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ...base.arrays import Array
-from ...lights.sun_and_sky import light_strengths
-from ...options.solver_settings import SolverSettings
-from ...rays.caster import RayCaster
-from ...scene.opacity import ray_caster
-from ...scene.scene import Scene
-from ..hierarchy.basis import Basis, constant_basis
-from ..hierarchy.nodes import Hierarchy
-from ..links.light_links import LightLinks, link_lights, no_light_links
-from ..links.transport import pull, push
+from ...lights import light_strengths
+from ...numerics import Array
+from ...options import SolverSettings
+from ...rays import RayCaster
+from ...scene import Scene, ray_caster
+from ..hierarchy import Basis, Hierarchy, constant_basis
+from ..links import LightLinks, link_lights, no_light_links, pull, push
 from .lamp_power import lamps_within_power, light_power
 
 

@@ -31,7 +31,7 @@ def test_registering_is_quick_and_imports_nothing_heavy(installed: Installed) ->
     answer = installed.answer("registration_cost.py")
     assert answer["enabled"] == [True, True]
     assert min(answer["seconds"]) < 0.05
-    assert not {"embreex", "xatlas", "solver", "pipeline", "lightmap"} & set(answer["modules"])
+    assert not {"embreex", "xatlas", "numerics", "solver", "bake", "lightmap"} & set(answer["modules"])
     assert all(path.startswith(installed.blender.inside(installed.resources)) for path in answer["wheels"])
 
 

@@ -40,7 +40,7 @@ def opened(name):
 
 def opened_section():
     """The same of the section in the sidebar."""
-    section = importlib.import_module(f"{MODULE}.blender.ui.light_group_panels").LightGroupSection
+    section = importlib.import_module(f"{MODULE}.blender.panels.light_group_panels").LightGroupSection
     draw = section.draw
 
     def draw_and_note(layout, context):

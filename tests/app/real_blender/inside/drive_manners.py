@@ -18,7 +18,7 @@ from file_dump import differences, dump_file
 ANSWER = Path(sys.argv[sys.argv.index("--") + 1])
 MODULE = "bl_ext.user_default.radiosity_addon"
 
-cleaning = importlib.import_module(f"{MODULE}.blender.ui.cleaning")
+cleaning = importlib.import_module(f"{MODULE}.blender.operators.cleaning")
 staging = importlib.import_module(f"{MODULE}.files.publish")
 runtime = importlib.import_module(f"{MODULE}.blender.session.runtime")
 window_job = importlib.import_module(f"{MODULE}.blender.jobs.window_job")

@@ -21,7 +21,7 @@ MODULE = "bl_ext.user_default.radiosity_addon"
 live_view = importlib.import_module(f"{MODULE}.blender.jobs.live_view")
 kept_details = importlib.import_module(f"{MODULE}.blender.session.kept_details")
 overlay_pictures = importlib.import_module(f"{MODULE}.blender.overlays.overlay_pictures")
-overlay_panel = importlib.import_module(f"{MODULE}.blender.ui.overlay_panel")
+overlay_panel = importlib.import_module(f"{MODULE}.blender.panels.overlay_panel")
 runtime = importlib.import_module(f"{MODULE}.blender.session.runtime")
 texel_pictures = importlib.import_module(f"{MODULE}.bake.result.texel_pictures")
 

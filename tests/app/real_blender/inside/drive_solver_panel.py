@@ -32,7 +32,7 @@ def noting(section):
 
 
 def script():
-    section = importlib.import_module(f"{MODULE}.blender.ui.panels").SolverSection
+    section = importlib.import_module(f"{MODULE}.blender.panels.bake_panel").SolverSection
     section.folded = False
     noting(section)
     yield from events.open_sidebar("Radiosity")

@@ -18,7 +18,7 @@ ANSWER = Path(sys.argv[sys.argv.index("--") + 1])
 MODULE = "bl_ext.user_default.radiosity_addon"
 HEADER = 34  # pixels at the sidebar's top: the panel's title, which a click would fold
 
-check_panel = importlib.import_module(f"{MODULE}.blender.ui.check_panel")
+checks = importlib.import_module(f"{MODULE}.blender.operators.checks")
 runtime = importlib.import_module(f"{MODULE}.blender.session.runtime")
 
 seen = {}
@@ -26,7 +26,7 @@ seen = {}
 
 def looked():
     """Somebody has looked at the scene."""
-    return check_panel.last_check(bpy.context.scene) is not None
+    return checks.last_check(bpy.context.scene) is not None
 
 
 def baking():
@@ -74,7 +74,7 @@ def script():
     bake_button = yield from events.click_down(HEADER, looked)
     yield from photograph("check", (440, 40, 600, 420))
     seen["baked_unlooked"] = baking()
-    seen["findings"] = [finding.message for finding in check_panel.last_check(bpy.context.scene).findings]
+    seen["findings"] = [finding.message for finding in checks.last_check(bpy.context.scene).findings]
     yield from events.key("ESC", *view)
     yield 0.3
     seen["after_check"] = differences(before, dump_file())

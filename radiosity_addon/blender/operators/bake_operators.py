@@ -1,0 +1,224 @@
+"""The operators behind the panel's buttons: each calls one function and reports its errors."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from ...base import RadiosityError, one_of_each
+from ..jobs import live_view
+from ..jobs.window_job import WindowJob
+from ..relight import kept_bakes
+from ..relight.relight_properties import keeps, relight_of
+from ..session import live_state, runtime
+from ..session.redraw import redraw_sidebars
+from ..settings.preferences import output_folder
+from ..settings.properties import settings_of
+from .checks import look_first
+
+if TYPE_CHECKING:
+    from ...bake import Keeping
+    from ...options import BakeSettings
+
+
+class RADIOSITY_OT_bake(WindowJob, bpy.types.Operator):
+    """Bake the light of the scene into lightmaps and show them on the objects"""
+
+    bl_idname = "radiosity.bake"
+    bl_label = "Bake Radiosity"
+    bl_options = {"REGISTER", "UNDO"}
+
+    _was_editing = False
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Offer the bake wherever there is a scene and no bake is running."""
+        if runtime.running.active:
+            cls.poll_message_set("A bake is running; press Esc to cancel it")
+            return False
+        if context.scene is None:
+            cls.poll_message_set("There is no scene")
+            return False
+        return True
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Start the bake, unless there is something to be looked at first."""
+        try:
+            in_window = not bpy.app.background and context.window is not None
+            if in_window and look_first(context):
+                self.report({"INFO"}, "Look at what is odd before this scene is baked for the first time")
+                bpy.ops.radiosity.check("INVOKE_DEFAULT")
+                return {"CANCELLED"}
+        except RadiosityError as error:
+            return self._fail(context, error)
+        return WindowJob.invoke(self, context, event)
+
+    def _start(self, context: bpy.types.Context, in_window: bool) -> Any:
+        from ..files.output import OutputFolder
+        from ..files.ownership import panel_names
+        from ..jobs.job import run_bake
+
+        live_state.stop()
+        self._was_editing = context.mode == "EDIT_MESH"
+        settings = settings_of(context)
+        folder = output_folder(context)
+        output = None if folder is None else OutputFolder(folder, panel_names(context.scene))
+        changed = context.scene.radiosity.scope == "changed"
+        keeping = self._keeping(context.scene, settings)
+        if in_window and context.scene.radiosity.show_while_solving:
+            live_view.begin(context.scene)
+        return run_bake(context, settings, output, patient=in_window, keeping=keeping, only_changed=changed)
+
+    @staticmethod
+    def _keeping(scene: bpy.types.Scene, settings: BakeSettings) -> Keeping | None:
+        """Return how the bake is to be kept for relighting; None if it is not."""
+        from ...bake import Keeping
+
+        if not keeps(scene, settings):
+            return None
+        chosen = relight_of(scene)
+        held = kept_bakes.find(scene) if chosen.only_moved else None
+        return Keeping(chosen.sidecar, earlier=None if held is None else held.bake)
+
+    def _follow(self, progress: Any) -> None:
+        if progress.picture is not None:
+            live_view.show(progress.picture)
+        if progress.texels is not None:
+            live_view.show_texels(progress.texels)
+
+    def _undone(self, context: bpy.types.Context) -> None:
+        """Go on with the editing that the export had to leave."""
+        if self._was_editing and context.mode == "OBJECT" and bpy.ops.object.mode_set.poll():
+            bpy.ops.object.mode_set(mode="EDIT")
+
+    def _succeeded(self, context: bpy.types.Context, in_window: bool) -> None:
+        from ..material_copies.lightmap_materials import set_lightmap_only
+        from .cleaning import look_for_interrupted
+
+        look_for_interrupted(context)
+
+        if in_window:
+            show_result(context)
+        report = self._report.as_dict()
+        if context.scene.radiosity.lightmap_only:
+            set_lightmap_only(True)
+        taken = sum(report["seconds"].values())
+        message = rpt_("Baked {} objects in {:.1f} s")
+        self.report({"INFO"}, message.format(len(report["objects"]), taken))
+        warnings = one_of_each(report["warnings"])
+        for warning in warnings[:3]:
+            self.report({"WARNING"}, f"{warning['name']}: {warning['message']}")
+        if len(warnings) > 3:
+            message = rpt_("and {} more warnings, listed in the panel")
+            self.report({"WARNING"}, message.format(len(warnings) - 3))
+
+
+class RADIOSITY_OT_restore(bpy.types.Operator):
+    """Take the lightmaps off this scene: what you edited since the bake stays"""
+
+    bl_idname = "radiosity.restore"
+    bl_label = "Restore"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        """Offer it unless a bake is running."""
+        if runtime.running.active:
+            cls.poll_message_set("A bake is running; press Esc to cancel it")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Bring every baked object of the scene back."""
+        from ..apply.restore import restore_scene
+
+        live_state.stop()
+        try:
+            restored = restore_scene(context, context.scene)
+        except RadiosityError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        runtime.forget(context.scene)
+        kept_bakes.drop(context.scene)
+        redraw_sidebars(context)
+        if not restored.count:
+            self.report({"INFO"}, "Nothing to restore: no object of this scene shows a lightmap")
+            return {"CANCELLED"}
+        self.report({"INFO"}, rpt_("Restored {} objects").format(restored.count))
+        for warning in restored.warnings:
+            self.report({"WARNING"}, warning.message)
+        return {"FINISHED"}
+
+
+class RADIOSITY_OT_add_cornell_box(bpy.types.Operator):
+    """Add the Cornell box, ready to bake, to this scene if it is empty, else in a scene of its own"""
+
+    bl_idname = "radiosity.add_cornell_box"
+    bl_label = "Add Cornell Box"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        """Offer it unless a bake is running."""
+        if runtime.running.active:
+            cls.poll_message_set("A bake is running; press Esc to cancel it")
+            return False
+        return True
+
+    def execute(self, _context: bpy.types.Context) -> set[str]:
+        """Build the box, in this scene if it is empty, and show it."""
+        from ..files.cornell import build_cornell_box
+
+        build_cornell_box()
+        return {"FINISHED"}
+
+
+class RADIOSITY_OT_open_folder(bpy.types.Operator):
+    """Show the lightmaps of the last bake in the file browser"""
+
+    bl_idname = "radiosity.open_folder"
+    bl_label = "Open Folder"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Offer it where the last bake wrote files."""
+        last = runtime.last_bake(context.scene)
+        if last is None or not last.folder:
+            cls.poll_message_set("The last bake wrote no files")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Open the folder, if it really is that of a bake of this scene."""
+        from ..files.ownership import own_reports
+
+        last = runtime.last_bake(context.scene)
+        folder = bpy.path.abspath(last.folder) if last is not None else ""
+        if not Path(folder).is_dir():
+            self.report({"ERROR"}, rpt_("The folder '{}' is not there any more").format(folder))
+            return {"CANCELLED"}
+        if not own_reports(Path(folder), context.scene):
+            message = rpt_("The folder '{}' holds no bake of this scene")
+            self.report({"ERROR"}, message.format(folder))
+            return {"CANCELLED"}
+        _open(folder)
+        return {"FINISHED"}
+
+
+def _open(folder: str) -> None:
+    """Show a folder in the system's file browser."""
+    bpy.ops.wm.path_open(filepath=folder)
+
+
+def show_result(context: bpy.types.Context) -> None:
+    """Switch a viewport that shows no materials to the preview that does, if that is wanted."""
+    space = context.space_data
+    wanted = context.scene.radiosity.show_result
+    if wanted and isinstance(space, bpy.types.SpaceView3D) and space.shading.type in {"WIREFRAME", "SOLID"}:
+        space.shading.type = "MATERIAL"
+
+
+CLASSES = (RADIOSITY_OT_bake, RADIOSITY_OT_restore, RADIOSITY_OT_add_cornell_box, RADIOSITY_OT_open_folder)

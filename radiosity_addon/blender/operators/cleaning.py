@@ -1,0 +1,224 @@
+"""*Clean* deletes lightmaps that bakes wrote and nothing shows any more; *Recover* ends an interrupted bake.
+
+A file goes only if a report of this .blend lists it and it is, to the byte, what a bake wrote; if no image
+of the open file shows it; and if no copy `baked.blend` next to it may show it.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import bpy
+from bpy.app.handlers import persistent
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from ...base import BakeError
+from ..session import runtime
+from ..session.redraw import redraw_sidebars
+from ..settings.preferences import output_folder
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Unused:
+    """What nothing shows any more.
+
+    Parameters
+    ----------
+    files : mapping of Path to list of str
+        To be deleted: by report, the names of the files next to it.
+    changed : tuple of Path
+        Left alone: they are not what a bake wrote.
+    """
+
+    files: Mapping[Path, list[str]] = field(default_factory=dict)
+    changed: tuple[Path, ...] = ()
+
+    @property
+    def count(self) -> int:
+        """How many files are to be deleted."""
+        return sum(map(len, self.files.values()))
+
+
+def unused_lightmaps(context: bpy.types.Context) -> Unused:
+    """Find the lightmaps that bakes of the open file wrote and that it does not show."""
+    from ...files import BLEND_NAME, FILES, LIGHTMAPS, PREVIEW_NAME, is_as_written, reports_in
+    from ..files.ownership import owner_of
+
+    images = [image for image in bpy.data.images if image.filepath_raw]
+    shown = {Path(bpy.path.abspath(each.filepath_raw, library=each.library)).resolve() for each in images}
+    here = Path(bpy.data.filepath).resolve() if bpy.data.filepath else None
+    files: dict[Path, list[str]] = {}
+    changed: list[Path] = []
+    for folder in _folders(context):
+        for report, told in reports_in(folder, owner_of(context.scene).is_source_of).items():
+            # A copy that the command line wrote shows all that is listed with it.
+            copy = folder / BLEND_NAME
+            if BLEND_NAME in told[FILES] and copy.exists() and copy.resolve() != here:
+                continue
+            for name, of in told[FILES].items():
+                path = folder / name
+                if path.suffix.lower() not in LIGHTMAPS or name == PREVIEW_NAME or not path.is_file():
+                    continue
+                if path.resolve() in shown:
+                    continue
+                if is_as_written(path, of):
+                    files.setdefault(folder / report, []).append(name)
+                else:
+                    changed.append(path)
+    return Unused(files, tuple(changed))
+
+
+def delete(unused: Unused) -> int:
+    """Delete the files that nothing shows, and take them off their reports; returns how many.
+
+    Raises
+    ------
+    OSError
+        If one cannot be deleted; those before it are gone.
+    """
+    from ...files import read_report, replacing, text_of, without
+
+    for report, names in unused.files.items():
+        told = read_report(report)
+        for name in names:
+            (report.parent / name).unlink()
+        with replacing(report) as aside:
+            aside.write_text(text_of(without(told, names)), encoding="utf-8")
+    return unused.count
+
+
+def interrupted_folders(context: bpy.types.Context) -> list[Path]:
+    """Return the folders of this file's bakes in which one was killed while it published; only looks."""
+    from ...files import is_interrupted
+
+    return [folder for folder in _folders(context) if is_interrupted(folder)]
+
+
+def _folders(context: bpy.types.Context) -> list[Path]:
+    """Return where bakes of the open file have written, and where the next one would; none in a network."""
+    last = [_last_folder(scene) for scene in bpy.data.scenes]
+    found = {folder for folder in (output_folder(context), *last) if folder is not None}
+    # `Path.is_dir` raises for a name that is too long.
+    return sorted(folder for folder in found if not _is_remote(folder) and os.path.isdir(folder))  # noqa: PTH112
+
+
+def _is_remote(folder: Path) -> bool:
+    """Return whether merely looking at a folder would ask another machine, which a file could name."""
+    here = Path(bpy.data.filepath).drive if bpy.data.filepath else ""
+    return folder.drive.startswith("\\\\") and folder.drive != here
+
+
+class RADIOSITY_OT_clean(bpy.types.Operator):
+    """Delete lightmap files that bakes of this file have written and that nothing in it shows any more"""
+
+    bl_idname = "radiosity.clean"
+    bl_label = "Clean Up Lightmaps"
+    bl_options = {"REGISTER"}
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        """Offer it unless a bake is running."""
+        if runtime.running.active:
+            cls.poll_message_set("A bake is running; press Esc to cancel it")
+            return False
+        return True
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Ask first: files do not come back by undo."""
+        found = unused_lightmaps(context)
+        if not found.count or bpy.app.background:
+            return self.execute(context)
+        message = rpt_("Delete {} lightmap files that nothing shows any more? Undo does not bring them back")
+        return context.window_manager.invoke_confirm(
+            self, event, title="Clean Up Lightmaps", message=message.format(found.count)
+        )
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Delete them."""
+        found = unused_lightmaps(context)
+        for path in found.changed:
+            message = rpt_("'{}' was changed since it was baked: it is left alone")
+            self.report({"WARNING"}, message.format(path.name))
+        try:
+            count = delete(found)
+        except OSError as error:
+            self.report({"ERROR"}, rpt_("Cannot delete '{}': {}").format(error.filename, error.strerror))
+            return {"CANCELLED"}
+        if not count:
+            self.report({"INFO"}, "Nothing to clean: every lightmap of this file is shown")
+            return {"CANCELLED"}
+        self.report({"INFO"}, rpt_("Deleted {} lightmap files").format(count))
+        return {"FINISHED"}
+
+
+class RADIOSITY_OT_recover(bpy.types.Operator):
+    """Put the files of the last whole bake back: a bake was interrupted while it replaced them"""
+
+    bl_idname = "radiosity.recover"
+    bl_label = "Recover Lightmaps"
+    bl_options = {"REGISTER"}
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        """Offer it where a bake was interrupted, unless one is running."""
+        if runtime.running.active:
+            cls.poll_message_set("A bake is running; press Esc to cancel it")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Put them back, and have the open file show them."""
+        from ...files import clean_up
+
+        done: list[Path] = []
+        try:
+            done = [folder.resolve() for folder in interrupted_folders(context) if clean_up(folder)]
+        except BakeError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        finally:
+            look_for_interrupted(context)
+        if not done:
+            self.report({"INFO"}, "Nothing to recover: no bake was interrupted")
+            return {"CANCELLED"}
+        for image in bpy.data.images:
+            if image.filepath and Path(bpy.path.abspath(image.filepath_raw)).parent.resolve() in done:
+                image.reload()
+        self.report({"INFO"}, "The lightmaps are those of the last whole bake again")
+        return {"FINISHED"}
+
+
+def look_for_interrupted(context: bpy.types.Context) -> None:
+    """Have the panel say whether a bake of the open file was interrupted; files are only looked at."""
+    runtime.interrupted = bool(interrupted_folders(context))
+    redraw_sidebars(context)
+
+
+@persistent
+def _look(*_: object) -> None:
+    """Another file was opened."""
+    look_for_interrupted(bpy.context)
+
+
+def _last_folder(scene: bpy.types.Scene) -> Path | None:
+    last = runtime.last_bake(scene) if scene.is_property_set("radiosity") else None
+    if last is None or not last.folder:
+        return None
+    return Path(bpy.path.abspath(last.folder))
+
+
+def register() -> None:
+    """Look at each file that is opened."""
+    bpy.app.handlers.load_post.append(_look)
+
+
+def unregister() -> None:
+    """Stop that."""
+    if _look in bpy.app.handlers.load_post:
+        bpy.app.handlers.load_post.remove(_look)
+
+
+CLASSES = (RADIOSITY_OT_clean, RADIOSITY_OT_recover)

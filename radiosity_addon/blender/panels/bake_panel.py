@@ -1,0 +1,276 @@
+"""The tab *Radiosity* in the 3D viewport's sidebar."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+from bpy.app.translations import pgettext_iface as iface_
+
+from ..jobs.progress_text import progress_text
+from ..session import runtime
+from ..settings.method_properties import AUTOMATIC, shown_settings
+from ..settings.preferences import folder_of, output_folder, preferences
+from ..settings.preset_menu import RADIOSITY_PT_presets
+from ..settings.properties import BY_ERROR
+from .check_panel import CheckSection
+from .light_group_panels import LightGroupSection
+from .object_panel import draw_overrides, has_role
+from .overlay_panel import OverlaySection
+from .relight_buttons import draw_relight_buttons
+from .relight_panel import RelightSection
+from .sections import Section, draw_sections
+from .wrapped_text import draw_text
+
+SHOWN_WARNINGS = 12
+
+
+class _Panel:
+    """Where our panels are."""
+
+    bl_label = "Radiosity Lightmaps"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Radiosity"
+
+
+class RADIOSITY_PT_progress(_Panel, bpy.types.Panel):
+    """How far the bake is that runs, in place of all buttons.
+
+    A panel of its own: within one, Blender takes a progress bar under the mouse for the first label of what
+    is drawn next, and shows that as a bar.
+    """
+
+    bl_idname = "RADIOSITY_PT_progress"
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        """Show it while a bake runs."""
+        return runtime.running.active
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        """Draw the progress bar."""
+        running = runtime.running
+        self.layout.progress(factor=running.fraction, text=progress_text(running), type="BAR")
+        self.layout.label(text="Esc cancels", icon="CANCEL")
+
+
+class RADIOSITY_PT_main(_Panel, bpy.types.Panel):
+    """Bake, Restore, the settings that matter, and below them sections that fold."""
+
+    bl_idname = "RADIOSITY_PT_main"
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        """Show it unless a bake runs."""
+        return not runtime.running.active
+
+    def draw_header_preset(self, _context: bpy.types.Context) -> None:
+        """Draw the button of the presets."""
+        RADIOSITY_PT_presets.draw_panel_header(self.layout)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the buttons and settings."""
+        _draw_buttons(self.layout, context)
+        _draw_settings(self.layout, context)
+        draw_sections(self.layout, SECTIONS, context)
+
+
+def _draw_buttons(layout: Any, context: bpy.types.Context) -> None:
+    """Draw what can be done, and what should be known of the last bake."""
+    column = layout.column()
+    column.scale_y = 1.5
+    column.operator("radiosity.bake", text="Bake Radiosity", icon="LIGHT_AREA")
+    layout.operator("radiosity.restore", icon="LOOP_BACK")
+    if runtime.interrupted:
+        box = layout.box()
+        draw_text(box, iface_("A bake was interrupted while it replaced its files"), "ERROR", context)
+        box.operator("radiosity.recover", icon="RECOVER_LAST")
+    draw_relight_buttons(layout, context)
+    hint = unseen_hint(context)
+    if hint is not None:
+        draw_text(layout.box(), iface_(hint), "INFO", context)
+
+
+def _draw_settings(layout: Any, context: bpy.types.Context) -> None:
+    """Draw the settings that matter for the next bake."""
+    settings = context.scene.radiosity
+    layout.prop(settings, "scope", expand=True)
+    layout.prop(settings, "size_mode", expand=True)
+
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    column = layout.column()
+    column.prop(settings, "resolution" if settings.size_mode == "resolution" else "texel_density")
+    column = layout.column()
+    column.prop(settings, "quality")
+    if settings.quality == BY_ERROR[0]:
+        column.prop(settings, "relative_error")
+    column.prop(settings, "atlas")
+    if settings.atlas == "shared" and settings.size_mode == "resolution":
+        column.prop(settings, "pages")
+    column = layout.column()
+    column.prop(settings, "output_folder")
+    if not settings.is_property_set("output_folder"):
+        _draw_preferred(column, folder_of(context), settings.output_folder)
+    if output_folder(context) is None:
+        text = iface_("The file is not saved: lightmaps will be packed into it")
+        draw_text(layout.box(), text, "INFO", context)
+    if not any(obj.type == "MESH" for obj in context.scene.objects):
+        layout.operator("radiosity.add_cornell_box", icon="CUBE")
+
+
+WORKBENCH = "The Workbench render engine shows no lightmaps: choose EEVEE or Cycles"
+SOLID = "Solid and wireframe views show no lightmaps: switch to Material Preview"
+
+
+def unseen_hint(context: bpy.types.Context) -> str | None:
+    """Say why the lightmaps of a baked scene are not seen; None where they are, or there are none."""
+    if runtime.last_bake(context.scene) is None:
+        return None
+    shading = getattr(getattr(context.space_data, "shading", None), "type", "MATERIAL")
+    if context.scene.render.engine == "BLENDER_WORKBENCH" and shading != "MATERIAL":
+        return WORKBENCH
+    return SOLID if shading in {"SOLID", "WIREFRAME"} else None
+
+
+class AdvancedSection(Section):
+    """Settings that most bakes leave alone."""
+
+    name = "radiosity_advanced"
+    label = "Advanced"
+
+    @classmethod
+    def draw(cls, layout: Any, context: bpy.types.Context) -> None:
+        """Draw the settings."""
+        layout.use_property_split = True
+        settings = context.scene.radiosity
+        column = layout.column()
+        for name in ("quantity", "light", "format"):
+            column.prop(settings, name)
+        column = layout.column()
+        if settings.size_mode == "density":
+            column.prop(settings, "max_resolution")
+        column.prop(settings, "mip_levels")
+        column = layout.column(heading="Scene")
+        column.prop(settings, "sky")
+        column.prop(settings, "keep_uvs")
+        column = layout.column(align=True)
+        column.prop(settings, "seed")
+        column.prop(settings, "threads")
+        if not settings.is_property_set("threads"):
+            _draw_preferred(column, preferences(context).threads, settings.threads)
+        column = layout.column(heading="Viewport")
+        column.prop(settings, "show_while_solving")
+        column.prop(settings, "show_result")
+        layout.operator("radiosity.clean", icon="BRUSH_DATA")
+
+
+class ObjectSection(Section):
+    """What the active object is there for."""
+
+    name = "radiosity_object"
+    label = "Active Object"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Show it for what can light, block or be baked."""
+        return has_role(context.object)
+
+    @classmethod
+    def draw(cls, layout: Any, context: bpy.types.Context) -> None:
+        """Draw its settings."""
+        layout.use_property_split = True
+        layout.label(text=context.object.name, icon="OBJECT_DATA", translate=False)
+        draw_overrides(layout, context.object)
+
+
+class SolverSection(Section):
+    """How the light's balance is solved."""
+
+    name = "radiosity_solver"
+    label = "Solver"
+
+    @classmethod
+    def draw(cls, layout: Any, context: bpy.types.Context) -> None:
+        """Draw the method, and of the settings those that apply to it."""
+        layout.use_property_split = True
+        settings = context.scene.radiosity
+        layout.prop(settings, "method")
+        column = layout.column()
+        for name in shown_settings(settings.method):
+            column.prop(settings, name)
+        layout.label(text=AUTOMATIC, icon="INFO")
+
+
+class LastBakeSection(Section):
+    """What the last bake measured."""
+
+    name = "radiosity_last_bake"
+    label = "Last Bake"
+    folded = False
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Show it once there was a bake."""
+        return runtime.last_bake(context.scene) is not None
+
+    @classmethod
+    def draw(cls, layout: Any, context: bpy.types.Context) -> None:
+        """Draw the figures."""
+        last = runtime.last_bake(context.scene) or runtime.LastBake()
+        column = layout.column(align=True)
+        for name, value in last.figures:
+            split = column.split(factor=0.45)
+            split.label(text=name)
+            split.label(text=value, translate=False)
+        layout.prop(context.scene.radiosity, "lightmap_only")
+        if last.folder:
+            layout.operator("radiosity.open_folder", icon="FILE_FOLDER")
+        draw_sections(layout, (WarningsSection,), context)
+
+
+class WarningsSection(Section):
+    """What the last bake did not understand, and what it used instead."""
+
+    name = "radiosity_warnings"
+    label = "Warnings"
+    folded = False
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Show it only where there is something to say."""
+        last = runtime.last_bake(context.scene)
+        return last is not None and bool(last.warnings)
+
+    @classmethod
+    def draw(cls, layout: Any, context: bpy.types.Context) -> None:
+        """Draw the warnings, the first ones of many."""
+        last = runtime.last_bake(context.scene) or runtime.LastBake()
+        for name, message in last.warnings[:SHOWN_WARNINGS]:
+            draw_text(layout.box(), f"{name}: {message}", "ERROR", context)
+        hidden = last.warning_count - len(last.warnings[:SHOWN_WARNINGS])
+        if hidden > 0:
+            text = iface_("and {} more, in the report").format(hidden)
+            layout.label(text=text, translate=False)
+
+
+def _draw_preferred(layout: Any, preferred: Any, shown: Any) -> None:
+    """Say that the preferences' value counts where the scene has none of its own."""
+    if preferred != shown:
+        layout.label(text=iface_("From the preferences: {}").format(preferred), icon="INFO", translate=False)
+
+
+SECTIONS: tuple[type[Section], ...] = (
+    ObjectSection,
+    SolverSection,
+    AdvancedSection,
+    CheckSection,
+    LightGroupSection,
+    LastBakeSection,
+    RelightSection,
+    OverlaySection,
+)
+"""Below the main settings, in this order."""
+
+CLASSES = (RADIOSITY_PT_progress, RADIOSITY_PT_main)

@@ -1,0 +1,113 @@
+"""The add-on's preferences: what scenes that say nothing else are baked with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ...options import SETTINGS
+
+DEFAULT_FOLDER = "//lightmaps/"
+
+PACKAGE = __package__.removesuffix(".blender.settings")
+"""The add-on's own module: `bl_ext.<repository>.radiosity_addon` where it is installed."""
+
+# Blender 4.5 and later want paths that start with // declared; 4.2 refuses the word.
+_RELATIVE_PATH = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set()
+
+
+class RADIOSITY_AP_preferences(bpy.types.AddonPreferences):
+    """Defaults for scenes that have not set them."""
+
+    bl_idname = PACKAGE
+
+    output_folder: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Folder",
+        description="Where lightmaps are written, for scenes in which no folder was chosen. One that begins "
+        "with // is beside the file",
+        default=DEFAULT_FOLDER,
+        subtype="DIR_PATH",
+        options=_RELATIVE_PATH,
+    )
+    memory_limit: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="Memory Limit",
+        description="Memory for elements and links in GiB, for scenes that set none; 0: as the quality says",
+        default=0.0,
+        min=0.0,
+        max=float(SETTINGS["memory_limit"].high),
+        precision=1,
+    )
+    threads: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Threads",
+        description="Processor threads, for scenes that set no number; 0 uses all. "
+        "The result does not depend on it",
+        default=0,
+        min=0,
+        max=1024,
+        soft_max=64,
+    )
+    check_first: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Check First",
+        description="Before a scene is baked for the first time, show what is odd about it, if anything is",
+        default=True,
+    )
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        """Draw them."""
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        column = layout.column(heading="For Scenes That Set Nothing Else")
+        column.prop(self, "output_folder")
+        column.prop(self, "memory_limit")
+        column.prop(self, "threads")
+        layout.column(heading="First Bake").prop(self, "check_first")
+
+
+class Defaults:
+    """The preferences of a Blender in which the add-on is only registered, not installed."""
+
+    output_folder = DEFAULT_FOLDER
+    memory_limit = 0.0
+    threads = 0
+    check_first = True
+
+
+def preferences(context: bpy.types.Context) -> Any:
+    """Return the add-on's preferences."""
+    entry = context.preferences.addons.get(PACKAGE)
+    found = None if entry is None else entry.preferences
+    return Defaults if found is None else found
+
+
+def folder_of(context: bpy.types.Context) -> str:
+    """Return where a scene's lightmaps go: its own folder, or the preferences'."""
+    scene, chosen = context.scene, ""
+    # Merely reading the settings would leave them in a file that has none.
+    if scene.is_property_set("radiosity") and scene.radiosity.is_property_set("output_folder"):
+        chosen = scene.radiosity.output_folder
+    return chosen.strip() or preferences(context).output_folder.strip() or DEFAULT_FOLDER
+
+
+def threads_of(context: bpy.types.Context) -> int:
+    """Return the threads a scene is baked with."""
+    group = context.scene.radiosity
+    return group.threads if group.is_property_set("threads") else preferences(context).threads
+
+
+def memory_limit_of(context: bpy.types.Context) -> float | None:
+    """Return the memory limit [GiB] of a scene that sets none; None leaves it to the quality."""
+    return preferences(context).memory_limit or None
+
+
+CLASSES = (RADIOSITY_AP_preferences,)
+
+
+def output_folder(context: bpy.types.Context) -> Path | None:
+    """Return where the panel's bake writes; None packs, for an unsaved file has no place."""
+    folder = folder_of(context)
+    if folder.startswith("//") and not bpy.data.filepath:
+        return None
+    return Path(bpy.path.abspath(folder)).resolve()

@@ -1,0 +1,57 @@
+"""Presets of settings, by Blender's own mechanism: four that come with the add-on, and the user's own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+from bl_operators.presets import AddPresetBase
+from bl_ui.utils import PresetPanel
+
+from ...options import SETTINGS
+
+FOLDER = "radiosity"
+"""Below `presets`, here and among the user's scripts."""
+
+PRESET_PROPERTIES = (
+    *("size_mode", "resolution", "texel_density", "max_resolution", "mip_levels"),
+    *("quality", "relative_error", "method"),
+    # How much memory there is, is the machine's affair.
+    *(name for name in SETTINGS if name != "memory_limit"),
+)
+"""What a preset sets, and all it sets: size, quality and method. See the user guide."""
+
+
+class RADIOSITY_OT_preset_add(AddPresetBase, bpy.types.Operator):
+    """Save size, quality and method as a preset, or remove one"""
+
+    bl_idname = "radiosity.preset_add"
+    bl_label = "Add Radiosity Preset"
+
+    preset_menu = "RADIOSITY_PT_presets"
+    preset_defines = ["settings = bpy.context.scene.radiosity"]
+    preset_values = [f"settings.{name}" for name in PRESET_PROPERTIES]
+    preset_subdir = FOLDER
+
+
+class RADIOSITY_PT_presets(PresetPanel, bpy.types.Panel):
+    """The presets, in the header of the tab's main panel."""
+
+    bl_idname = "RADIOSITY_PT_presets"
+    bl_label = "Radiosity Presets"
+    preset_subdir = FOLDER
+    preset_operator = "script.execute_preset"
+    preset_add_operator = "radiosity.preset_add"
+
+
+def register() -> None:
+    """Tell Blender where our presets are."""
+    bpy.utils.register_preset_path(str(Path(__file__).parent))
+
+
+def unregister() -> None:
+    """Have Blender forget it."""
+    bpy.utils.unregister_preset_path(str(Path(__file__).parent))
+
+
+CLASSES = (RADIOSITY_OT_preset_add, RADIOSITY_PT_presets)

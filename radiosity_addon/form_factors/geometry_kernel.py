@@ -1,0 +1,111 @@
+"""Two points that look at each other: geometry term, kernel, throughput, visibility.
+
+All are symmetric in the two points: what leaves one for the other finds the same way back.
+Whatever the solver samples between two surfaces is one of these.
+
+| function | symbol | unit |
+|---|---|---|
+| `geometry_term`, `ray_geometry_term` | G = cosθ cosθ' / r² (handout (2.20), (2.21)) | 1/m² |
+| `kernel` | κ = G / π, without visibility (2.25); the handout calls it G from its section 3 on | 1/m² |
+| `throughput` | T = dω dA = G dA dA' (1.2), (1.3) | m² sr |
+| `sees` | V: whether nothing lies between (2.18) | |
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..numerics import Array
+from ..rays import RayCaster
+
+LEAST = 1e-6
+"""Of what a cut-out lets pass, and of what it stops, as far as `sees` tells."""
+
+_TINY = 1e-150
+"""Least square of a distance: keeps a point and itself from 0/0, and its own square above 0."""
+
+
+def geometry_term(points: Array, normals: Array, other_points: Array, other_normals: Array) -> Array:
+    """Return G = cosθ cosθ' / r² [1/m²]; 0 where either faces away from the other.
+
+    Parameters
+    ----------
+    points, normals, other_points, other_normals : (..., 3) float
+        Broadcast against each other; normals are unit.
+
+    Returns
+    -------
+    geometry : (...) float
+    """
+    along = other_points - points
+    square = np.maximum(np.einsum("...k,...k->...", along, along), _TINY)
+    # The cosines of the unit direction, whose two lengths go into the one division by r⁴.
+    cosine = np.maximum(np.einsum("...k,...k->...", along, normals), 0.0)
+    other = np.maximum(-np.einsum("...k,...k->...", along, other_normals), 0.0)
+    return np.asarray(cosine * other / (square * square))
+
+
+def ray_geometry_term(cosine: Array, other_cosine: Array, distance: Array) -> Array:
+    """Return G [1/m²] of rays whose cosines and lengths are known already.
+
+    Parameters
+    ----------
+    cosine, other_cosine : (...) float
+        Between the ray and the normals at its two ends; negative ones count as 0.
+    distance : (...) float [m]
+        Where it is 0 the term is 0: a point does not light itself.
+    """
+    square = distance * distance
+    above = np.maximum(cosine, 0.0) * np.maximum(other_cosine, 0.0)
+    return np.asarray(above / np.where(square > 0.0, square, np.inf))
+
+
+def kernel(points: Array, normals: Array, other_points: Array, other_normals: Array) -> Array:
+    """Return κ = G/π [1/m²], the share of a matte surface's light that takes this way, per area.
+
+    B(x) = E(x) + ρ(x) ∫ B(x') κ(x, x') V(x, x') dA' (handout (2.25)). Parameters as for
+    `geometry_term`.
+    """
+    geometry = geometry_term(points, normals, other_points, other_normals)
+    geometry /= np.pi
+    return geometry
+
+
+def throughput(geometry: Array, area: Array | float, other_area: Array | float) -> Array:
+    """Return T = G dA dA' [m² sr] of pairs of small areas (handout (1.2), (1.3)).
+
+    Radiance times throughput is power, and T/π is what form factors are made of:
+    A_i F_ij = ∬ κ dA dA'.
+
+    Parameters
+    ----------
+    geometry : (...) float [1/m²]
+        G of the pair.
+    area, other_area : (...) float [m²]
+        With an `area` of 1 it is what a square metre there receives per radiance.
+    """
+    return np.asarray(geometry * area * other_area)
+
+
+def sees(
+    caster: RayCaster, points: Array, normals: Array, other_points: Array, other_normals: Array
+) -> Array:
+    """Return V of pairs of points on surfaces: whether nothing lies between them, or how much passes.
+
+    Both ends leave their surfaces by the caster's offset, so that no surface hides itself.
+    Facing away is the geometry term's affair and is not asked here.
+
+    Parameters
+    ----------
+    caster : RayCaster
+    points, normals, other_points, other_normals : (n, 3) float64
+
+    Returns
+    -------
+    visible : (n,) bool or float
+        Never 0 or 1 where a cut-out was met: others may find what few rays between do not.
+    """
+    start = points + caster.surface_offset * normals
+    along = other_points + caster.surface_offset * other_normals - start
+    distance = np.linalg.norm(along, axis=1)
+    return caster.passing(start, along / np.maximum(distance, _TINY)[:, None], distance, LEAST)

@@ -1,0 +1,67 @@
+"""Cutting meshes into charts: xatlas, and what stands in for it."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .box_charts import box_charts
+from .delayed_release import Resting
+from .xatlas_worker import beside_a_window, run_apart, run_xatlas
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+_resting = Resting()
+"""The latest of xatlas' atlases: destroyed right after their work they may hang."""
+
+
+def grow_charts(vertices: Float, faces: Int) -> tuple[Float, Int]:
+    """Cut a mesh into charts with xatlas.
+
+    Parameters
+    ----------
+    vertices : (v, 3) float64
+        At a scale where triangles are about 1 in area, welded.
+    faces : (n, 3) int64
+
+    Returns
+    -------
+    uv : (n, 3, 2) float64
+        Stretched along u and v, each chart otherwise; charts may lie over each other.
+    chart : (n,) int64
+        −1 for faces that xatlas left out.
+    """
+    if beside_a_window(faces):
+        grown = run_apart(vertices, faces)
+        if grown is not None:
+            return grown
+    atlas, uv, chart = run_xatlas(vertices, faces)
+    _resting.keep(atlas)
+    return uv, chart
+
+
+class PatientGrower:
+    """Grows charts with xatlas until an object has taken too long, and then by directions.
+
+    Attributes
+    ----------
+    gave_up : bool
+        Whether it came to that.
+    """
+
+    def __init__(self, seconds: float) -> None:
+        self._seconds, self._spent = seconds, 0.0
+        self.gave_up = False
+
+    def __call__(self, vertices: Float, faces: Int) -> tuple[Float, Int]:
+        """Cut a mesh into charts; see `grow_charts`."""
+        if self._spent >= self._seconds:
+            self.gave_up = True
+            return box_charts(vertices, faces)
+        started = time.perf_counter()
+        grown = grow_charts(vertices, faces)
+        self._spent += time.perf_counter() - started
+        return grown

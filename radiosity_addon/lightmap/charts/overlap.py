@@ -1,0 +1,67 @@
+"""Finding triangles of one chart that lie over each other."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..texels import overlapping_pairs
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+
+def overlapping_triangles(uv: Float, chart: Int) -> NDArray[np.intp]:
+    """Return the triangles that share ground with another one of their chart.
+
+    The charts are drawn side by side at some two hundred texels a triangle, on a page of
+    1448² at most; a texel's centre inside two triangles gives them away. Smaller overlaps
+    go unseen.
+
+    Parameters
+    ----------
+    uv : (n, 3, 2) float64
+        Every chart in its own place; charts may lie over each other.
+    chart : (n,) int64
+    """
+    if not len(uv):
+        return np.zeros(0, dtype=np.intp)
+    chart = np.unique(chart, return_inverse=True)[1].reshape(-1)
+    page, resolution = _side_by_side(uv, chart)
+    pairs = list(overlapping_pairs(page, resolution, centres_only=True))
+    if not pairs:
+        return np.zeros(0, dtype=np.intp)
+    texel = np.concatenate([part.texel for part in pairs])
+    triangle = np.concatenate([part.triangle for part in pairs])
+    crowded = np.bincount(texel, minlength=resolution**2)[texel] > 1
+    found: NDArray[np.intp] = np.unique(triangle[crowded]).astype(np.intp)
+    return found
+
+
+def _side_by_side(uv: Float, chart: Int) -> tuple[NDArray[np.float32], int]:
+    """Place charts in shelves, a texel apart; returns uv in [0, 1] and the page's resolution."""
+    count = int(chart.max()) + 1
+    low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
+    np.minimum.at(low, chart, uv.min(axis=1))
+    np.maximum.at(high, chart, uv.max(axis=1))
+    extent = high - low
+    wanted = float(np.clip(256 * len(uv), 2**14, 2**21))
+    scale = np.sqrt(wanted / max(float(extent.prod(axis=1).sum()), 1e-30))
+    scale = min(scale, 2048 / max(float(extent.max()), 1e-30))
+    size = np.ceil(extent * scale).astype(np.int64) + 1
+    width = max(int(np.sqrt(size.prod(axis=1).sum())), int(size[:, 0].max()))
+    order = np.argsort(-size[:, 1], kind="stable")
+    ends: Int = np.cumsum(size[order, 0])
+    corner = np.empty((count, 2))
+    start, height = 0, 0
+    while start < count:
+        before = ends[start] - size[order[start], 0]
+        stop = int(np.searchsorted(ends, before + width, side="right"))
+        shelf = order[start:stop]
+        corner[shelf, 0] = ends[start:stop] - size[shelf, 0] - before
+        corner[shelf, 1] = height
+        height += int(size[shelf[0], 1])
+        start = stop
+    resolution: int = max(width, height)
+    local = (uv - low[chart][:, None]) * scale + corner[chart][:, None]
+    return (local / resolution).astype(np.float32), int(resolution)

@@ -1,0 +1,61 @@
+"""What of the light on a surface a lighting designer reads first: least, mean, most, and how even it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...numerics import Array, tiles
+from ..texels import TOUCHED
+
+
+@dataclass(frozen=True)
+class LightStatistics:
+    """Of one surface.
+
+    Attributes
+    ----------
+    minimum, mean, maximum : float
+        In the unit of what was given; the mean is by area.
+    """
+
+    minimum: float
+    mean: float
+    maximum: float
+
+    @property
+    def uniformity(self) -> float | None:
+        """U₀, the least over the mean, as in EN 12464-1; None in the dark."""
+        return self.minimum / self.mean if self.mean > 0 else None
+
+    def as_dict(self) -> dict[str, float | None]:
+        """The numbers as the report names them."""
+        return {
+            "minimum": self.minimum,
+            "mean": self.mean,
+            "maximum": self.maximum,
+            "uniformity": self.uniformity,
+        }
+
+
+def light_statistics(values: Array, areas: Array) -> LightStatistics | None:
+    """Sum up (n,) values of texels that show (n,) float of the surface each; None without any area."""
+    total = weighed = 0.0
+    least, largest = np.inf, -np.inf
+    for rows in tiles(len(values)):
+        counted = values[rows][areas[rows] > 0]
+        total += float(areas[rows].sum())
+        weighed += float(values[rows] @ areas[rows])
+        least = min(least, float(counted.min(initial=np.inf)))
+        largest = max(largest, float(counted.max(initial=-np.inf)))
+    return LightStatistics(least, weighed / total, largest) if total > 0 else None
+
+
+def told_texels(state: Array) -> Array:
+    """Tell which of (n,) texels are of the surface as one sees it: none that are divided, hidden or shut in.
+
+    Those show the mean of two lights, or a dark that nobody looks at. All of them, if there are no others.
+    """
+    whole = (state == 0) | (state == TOUCHED)
+    return whole if whole.any() else np.ones(len(state), dtype=bool)

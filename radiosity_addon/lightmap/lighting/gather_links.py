@@ -1,0 +1,61 @@
+"""Links at the finest level: what the gather points saw, kept."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...numerics import Array, Scratch, tiles
+from ...solver.gather import AimedRays
+from ..points import Interpolation
+from .source_means import mean_steps
+
+AIMED_ROWS = 1 << 14
+"""Points whose aimed rays are looked up at once; bounds the temporaries to a few MB."""
+
+
+@dataclass(frozen=True)
+class StoredLinks:
+    """What the gather points saw, and how they speak for the texels.
+
+    Attributes
+    ----------
+    sources : (g, rays) int32
+        Rows of the table of radiosity: texels by number, parts of elements and cells of texels after them
+        (see `HitNumbers` for what they are before the table is made); NOTHING and the sky negative.
+    spread : Interpolation
+    aimed : AimedRays
+        What some of the points ask apart.
+    """
+
+    sources: Array
+    spread: Interpolation
+    aimed: AimedRays = field(default_factory=AimedRays.none)
+
+    def irradiance_steps(
+        self, table: Array, threads: int = 0, scratch: Scratch | None = None
+    ) -> Generator[float, None, Array]:
+        """Compute (n, 3) what a table of radiosity sends to the texels; yields the fraction done."""
+        mean = yield from mean_steps(table, self.sources, threads, scratch=scratch)
+        return self.spread_out(table, mean, threads, scratch)
+
+    def spread_out(
+        self, table: Array, mean: Array, threads: int = 0, scratch: Scratch | None = None
+    ) -> Array:
+        """Add what aimed rays brought to (g, 3) `mean`, and carry it from the gather points to the texels."""
+        aimed = self.aimed
+        for rows in tiles(len(aimed.row), AIMED_ROWS):
+            row, sources, weights = aimed.row[rows], aimed.sources[rows], aimed.weights[rows]
+            for channel in range(table.shape[1]):
+                values = table[:, channel][sources]
+                values[sources < 0] = 0.0
+                mean[row, channel] += np.einsum("ak,ak->a", values, weights)
+        return self.spread(mean, threads, scratch)
+
+    def mark_aims(self, aims: Array, marked: Array) -> None:
+        """Mark in (g,) bool the points whose aimed rays met a marked row of the table, (rows,) bool."""
+        aimed = self.aimed
+        for rows in tiles(len(aimed.row), AIMED_ROWS):
+            aims[aimed.row[rows][marked[aimed.sources[rows]].any(axis=1)]] = True

@@ -1,0 +1,164 @@
+"""The light of texels while it is still being computed, to be looked at.
+
+At first it is the hierarchy's. As lamps are asked, texels get the detail of direct light that elements are
+too large for; as gather points are done, they and the texels around them get what their rays brought; and
+each sweep replaces it all. Nothing of it goes into the result.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...numerics import Array
+from ...solver.gather import NOTHING, Gathered, LocalPass, values_of
+from ..texels import NO_TEXEL, TexelGeometry
+from .part_links import HitNumbers
+
+EVERY = 4
+"""One of so many gather rays is looked up: a picture needs no more, and is to cost next to nothing."""
+
+ALIKE = 0.9
+"""Cosine between the normals of a gather point and of a texel it may stand for."""
+
+
+class LightSoFar:
+    """What is known of n texels' light; `reconstruct` fills it in.
+
+    Attributes
+    ----------
+    version : int
+        Higher whenever something new is known; 0 before the texels are.
+    geometry : TexelGeometry
+    """
+
+    def __init__(self) -> None:
+        self.version = 0
+        self.geometry: TexelGeometry | None = None
+        self._local: LocalPass | None = None
+        self._numbers: HitNumbers | None = None
+        self._element = np.zeros(0, dtype=np.int32)
+        self._direct = self._reflectance = self._emission = np.zeros((0, 3))
+        self._waiting: list[tuple[Array, Gathered, int]] = []
+        self._expected: Array | None = None
+        self._indirect: Array | None = None
+        self._gathered = np.zeros(0, dtype=bool)
+        self._swept: Array | None = None
+
+    def begin(
+        self,
+        local: LocalPass,
+        geometry: TexelGeometry,
+        element: Array,
+        direct: Array,
+        materials: tuple[Array, Array],
+    ) -> None:
+        """Start from the hierarchy's light.
+
+        Parameters
+        ----------
+        element : (n,) int32
+            The leaf element below each texel, or NOTHING.
+        direct : (n, 3) float64 [W/m²]
+            All 0; it grows as lamps are asked.
+        materials : reflectance and emission, (n, 3) float64 each
+        """
+        self.geometry, self._local, self._element = geometry, local, element
+        self._direct, (self._reflectance, self._emission) = direct, materials
+        self._waiting, self._indirect = [], None
+        self._gathered = np.zeros(len(geometry), dtype=bool)
+        self.version += 1
+
+    def asked(self) -> None:
+        """Note that another lamp has been asked everywhere."""
+        self.version += 1
+
+    def met(self, numbers: HitNumbers, rows: Array, gathered: Gathered, stride: int) -> None:
+        """Note what (g,) texels gathered that lie `stride` texels apart."""
+        if len(rows):
+            self._numbers = numbers
+            self._waiting.append((rows, gathered, stride))
+            self.version += 1
+
+    def swept(self, irradiance: Array) -> None:
+        """Note the (n, 3) irradiance after a sweep [W/m²]."""
+        self._swept = irradiance
+        self.version += 1
+
+    def radiosity(self) -> Array:
+        """Return (n, 3) float32 what the texels send out, as far as that is known [W/m²]."""
+        irradiance = self._irradiance() if self._swept is None else self._swept
+        return np.asarray(self._emission + self._reflectance * irradiance, dtype=np.float32)
+
+    def _irradiance(self) -> Array:
+        if self._expected is None:
+            assert self._local is not None
+            self._expected = values_of(self._local.irradiance, self._element)
+        # The elements' light, spread over their texels as the direct light is: its mean stays theirs.
+        detail = self._direct - self._means_of_elements(self._direct)
+        light = np.maximum(self._expected + detail, self._direct) if detail.any() else self._expected.copy()
+        self._look_up()
+        if self._indirect is not None:
+            light[self._gathered] = (self._direct + self._indirect)[self._gathered]
+        return light
+
+    def _means_of_elements(self, values: Array) -> Array:
+        """Return (n, 3): the means of texels' values over those of the same element."""
+        row = self._element - NOTHING
+        count = np.maximum(np.bincount(row), 1)
+        means = np.stack([np.bincount(row, channel) / count for channel in values.T], axis=1)
+        return np.asarray(means[row])
+
+    def _look_up(self) -> None:
+        """Look up what came since the last time."""
+        waiting, self._waiting = self._waiting, []
+        for rows, gathered, stride in waiting:
+            if self._indirect is None:
+                self._indirect = np.zeros_like(self._direct)
+            texel, point = self._around(rows, stride)
+            self._indirect[texel] = self._brought(gathered)[point]
+            self._gathered[texel] = True
+
+    def _around(self, rows: Array, stride: int) -> tuple[Array, Array]:
+        """Return the texels that gather points speak for in the picture, and which point each takes."""
+        geometry = self.geometry
+        assert geometry is not None
+        step = np.stack(np.divmod(np.arange(stride**2), stride), axis=1)
+        row, column = (
+            at[rows][:, None] + step[:, axis] for axis, at in enumerate((geometry.row, geometry.column))
+        )
+        texel = np.full(row.shape, NO_TEXEL, dtype=np.int32)
+        for page, numbers in enumerate(geometry.index):
+            mine = (geometry.page[rows] == page)[:, None] & (row < len(numbers)) & (column < len(numbers))
+            texel[mine] = numbers[row[mine], column[mine]]
+        normal = geometry.surface_normal
+        near = np.einsum("gk,gsk->gs", normal[rows], normal[texel]) > ALIKE
+        point = np.broadcast_to(np.arange(len(rows))[:, None], texel.shape)
+        found = (texel != NO_TEXEL) & near
+        return texel[found], point[found]
+
+    def _brought(self, gathered: Gathered) -> Array:
+        """Return (g, 3) what rays brought by the hierarchy's light [W/m²]."""
+        mean = self._values_at(gathered.sources[:, ::EVERY]).mean(axis=1)
+        aimed = gathered.aimed
+        if len(aimed.row):
+            seen = self._values_at(aimed.sources)
+            seen[aimed.sources < 0] = 0.0
+            mean[aimed.row] += np.einsum("akc,ak->ac", seen, aimed.weights)
+        return np.asarray(mean)
+
+    def _values_at(self, sources: Array) -> Array:
+        """Return (g, k, 3) the radiosity of (g, k) hits as they are numbered before the table is made."""
+        local, numbers = self._local, self._numbers
+        assert local is not None
+        assert numbers is not None
+        flat = sources.ravel()
+        texel = flat[(flat >= 0) & (flat < numbers.texel_count)]
+        part = flat[(flat >= numbers.texel_count) & (flat < numbers.first_cell)] - numbers.texel_count
+        cell = flat[flat >= numbers.first_cell] - numbers.first_cell
+        element = np.full(len(flat), NOTHING, dtype=np.int64)
+        element[(flat >= 0) & (flat < numbers.texel_count)] = self._element[texel]
+        element[(flat >= numbers.texel_count) & (flat < numbers.first_cell)] = local.parts.leaf_of(part)
+        element[flat >= numbers.first_cell] = self._element[numbers.cells.texel_of(cell)]
+        values = values_of(local.reflected(), element)
+        values[flat < 0] = local.beyond()[flat[flat < 0]]
+        return np.asarray(values.reshape(*sources.shape, 3))

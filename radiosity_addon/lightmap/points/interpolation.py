@@ -1,0 +1,367 @@
+"""Irradiance between gather points: weights of a local linear fit in world space.
+
+A gather point may speak for a texel as far as irradiance can be expected to stay the
+same: distance times the mean closeness of what the point sees, plus the turn of the
+normal (the split-sphere estimate of Ward, Rubinstein and Clear 1988). Near a contact that
+reach goes to zero. What neighbours of a texel see d away, it sees no farther away than that and the
+way to them: so no point in the open speaks for texels beside a contact (neighbour clamping, Křivánek,
+Bouatouch, Pattanaik and Žára 2006). A point must also see the texel, just above the surface: in the
+open the reach is long, and a wall thin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...base import drain
+from ...numerics import Array, Scratch, chunk_steps, for_chunks, tiles
+from ...rays import RayCaster
+from ..texels import TexelGeometry
+from .point_grid import NONE, PointGrid
+from .weighed_pairs import Weighed, run_of
+
+REACH = 0.35
+"""Largest split-sphere change at which a gather point still counts."""
+
+SLOPE_DAMPING = 0.05
+"""Pull of the fitted slopes towards zero, relative to the spread of the points."""
+
+STEEPEST = 2.0
+"""How far a slope may lower a point's weight, as a multiple of it."""
+
+LIFT = 2.0
+"""Lines of sight run this many surface offsets above the surface, …"""
+
+SAGITTA = 0.6
+"""… and this part of distance · √(1 − cos of the turn) more: what a sphere of few facets needs."""
+
+CHUNK = 1 << 13
+"""Texels whose neighbours are weighed at once; bounds the temporaries to some 40 MB a thread."""
+
+
+class GatherPoints:
+    """The texels chosen to gather, level by level; finer levels only where coarser ones do not reach.
+
+    Attributes
+    ----------
+    texel : (g,) int32
+    closeness : (g,) float64
+        Mean inverse distance seen from each point [1/m].
+    """
+
+    def __init__(self, geometry: TexelGeometry, caster: RayCaster, alone: Array, threads: int = 0) -> None:
+        self.threads = threads
+        """0 means all cores."""
+        self._geometry, self._caster, self._alone = geometry, caster, alone
+        self.texel = np.zeros(0, dtype=np.int32)
+        self.closeness = np.zeros(0)
+        self.level = np.zeros(0, dtype=np.int8)
+        """(g,) int8: as which level each was added, from 0"""
+        self._grids: list[PointGrid] = []
+        self._weighed = Weighed.nothing()
+        scratch = geometry.scratch
+        self._number = scratch.empty(len(geometry), np.int32)
+        self.farthest = scratch.empty(len(geometry))
+        for rows in tiles(len(geometry)):
+            self._number[rows], self.farthest[rows] = -1, np.inf
+        """(n,) float64 [m]: what texels see is no farther off in the mean, by what points near them see."""
+
+    def __len__(self) -> int:
+        return len(self.texel)
+
+    def add(self, stride: int, texel: Array, closeness: Array) -> None:
+        """Add a level of points, about `stride` texels apart."""
+        geometry = self._geometry
+        numbers = len(self) + np.arange(len(texel), dtype=np.int32)
+        size = max(stride, 1.5) * geometry.texel_size
+        where = geometry.position, geometry.normal, texel
+        self._grids.append(PointGrid(*where, len(self), size, geometry.scratch))
+        self._number[texel] = numbers
+        level = np.full(len(texel), len(self._grids) - 1, dtype=np.int8)
+        self.level = np.concatenate([self.level, level])
+        self.texel = np.concatenate([self.texel, texel])
+        self.closeness = np.concatenate([self.closeness, closeness])
+
+    def pairs(self, texels: Array, level: int = 0) -> tuple[Array, Array]:
+        """Return rows of `texels` and gather points around them of all levels from `level`, sorted by row.
+
+        In the world, not on the page: the next chart or object goes on where one ends.
+        """
+        position, normal = self._geometry.position[texels], self._geometry.normal[texels]
+        grids = self._grids[level:]
+        near = [np.full((len(texels), 0), NONE, np.int32)] + [grid.near(position, normal) for grid in grids]
+        found = np.concatenate(near, axis=1)
+        # Its own point each texel has, should others crowd it out of its cell.
+        own = self._number[texels]
+        own[(found == own[:, None]).any(axis=1)] = NONE
+        found = np.concatenate([own[:, None], found], axis=1)
+        row, column = np.nonzero(found != NONE)
+        return row, found[row, column]
+
+    def kernel(self, texels: Array, point: Array) -> Array:
+        """Return (p,) weights in [0, 1] of gather points for texels (p,), pair by pair; 0 out of reach."""
+        geometry = self._geometry
+        of = self.texel.take(point)
+        along = geometry.position.take(of, axis=0) - geometry.position.take(texels, axis=0)
+        distance = np.sqrt(np.einsum("pk,pk->p", along, along))
+        closeness = np.maximum(self.closeness.take(point), self._own_closeness(texels))
+        change = distance * closeness
+        # A texel that geometry cuts in two, or hoods, speaks for itself alone, and nobody for it.
+        apart = self._alone.take(of) | self._alone.take(texels)
+        weight = np.where(of == texels, np.maximum(1.0 - change / REACH, 0.0) ** 2, 0.0)
+        row = np.flatnonzero((of != texels) & (change < REACH) & ~apart)
+        start, end = texels.take(row), of.take(row)
+        normal, other = geometry.normal.take(start, axis=0), geometry.normal.take(end, axis=0)
+        bend = np.sqrt(np.maximum(1.0 - np.einsum("pk,pk->p", normal, other), 0.0))
+        spoken = np.maximum(1.0 - (change[row] + bend) / REACH, 0.0) ** 2
+        # Over a bulge the straight line dips below the surface, by an eighth of the distance
+        # times the turn of the normal: start and end that much higher.
+        lift = LIFT * self._caster.surface_offset + SAGITTA * distance[row] * bend
+        begin = geometry.position.take(start, axis=0) + lift[:, None] * normal
+        directions = along.take(row, axis=0) + lift[:, None] * (other - normal)
+        length = np.sqrt(np.einsum("pk,pk->p", directions, directions))
+        directions /= np.maximum(length, 1e-300)[:, None]
+        heard = spoken > 0
+        weight[row[heard]] = spoken[heard] * self._caster.visible(
+            begin[heard], directions[heard], length[heard]
+        )
+        return np.asarray(weight)
+
+    def _own_closeness(self, texels: Array) -> Array:
+        """Return (p,) what texels that are points see themselves; elsewhere what their neighbours expect."""
+        number = self._number.take(texels)
+        if not len(self):
+            return np.zeros(len(texels))
+        around = 1.0 / self.farthest.take(texels)
+        return np.where(number >= 0, self.closeness.take(np.maximum(number, 0)), around)
+
+    def _clamp(self, texels: Array, point: Array) -> None:
+        """Note how near things are to texels (p,), sorted, by what points around them see, pair by pair."""
+        geometry = self._geometry
+        along = geometry.position[self.texel[point]] - geometry.position[texels]
+        farthest = 1.0 / np.maximum(self.closeness[point], 1e-300) + np.linalg.norm(along, axis=1)
+        first = np.flatnonzero(np.diff(texels, prepend=-1))
+        if len(first):
+            some = texels[first]
+            self.farthest[some] = np.minimum(self.farthest[some], np.minimum.reduceat(farthest, first))
+
+    def support(self, texels: Array) -> Array:
+        """Return (n,) the summed weights around texels: below 1 they need a point of their own.
+
+        From then on no point speaks for them that lies farther off than their neighbours allow.
+        """
+        return drain(self.support_steps(texels))
+
+    def support_steps(self, texels: Array) -> Generator[float, None, Array]:
+        """Compute the same; yields the fraction done."""
+        scratch = self._geometry.scratch
+        total = scratch.empty(len(texels))
+        parts: dict[int, tuple[Array, Array, Array]] = {}
+        kept = scratch.rows(1, np.int32), scratch.rows(1, np.int32), scratch.rows(1, np.float32)
+        self._weighed = Weighed.nothing()
+
+        def weigh(rows: slice) -> None:
+            row, point = self.pairs(texels[rows])
+            self._clamp(texels[rows][row], point)
+            weight = self.kernel(texels[rows][row], point)
+            total[rows] = np.bincount(row, weight, minlength=len(texels[rows]))
+            reached = np.flatnonzero(weight)
+            # In single precision: they are kept for all texels.
+            single = weight[reached].astype(np.float32)
+            parts[rows.start] = texels[rows][row[reached]], point[reached], single
+
+        steps = chunk_steps(weigh, len(texels), CHUNK, self.threads)
+        for start, fraction in zip(range(0, len(texels), CHUNK), steps, strict=True):
+            for table, values in zip(kept, parts.pop(start), strict=True):
+                table.extend(values)
+            yield fraction
+        in_order = all((np.diff(texels[rows]) > 0).all() for rows in tiles(len(texels)))
+        if in_order and len(texels):
+            self._weighed = Weighed(len(self._grids), texels, *(table.all()[:, 0] for table in kept))
+        return total
+
+    def weights_of(self, texels: slice) -> tuple[Array, Array, Array]:
+        """Return rows, points and weights above 0 for a run of all texels, sorted by row.
+
+        What `support_steps` weighed last is not weighed again.
+        """
+        known = self._weighed
+        run = np.arange(texels.start, texels.stop)
+        mine = run_of(known.texels, texels)
+        old = np.zeros(len(run), dtype=bool)
+        old[known.texels[mine] - texels.start] = True
+        # What has become a point since has learnt how close things are to it.
+        old &= self._number[run] < 0
+        kept = known.pairs_of(texels)
+        still = old[kept[0] - texels.start]
+        kept = (kept[0][still], kept[1][still], kept[2][still])
+        found = [self.weighed(run[~old], 0), self.weighed(run[old], known.levels), kept]
+        texel, point, weight = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        row = texel - texels.start
+        order = np.argsort(row.astype(np.int16 if len(run) < 1 << 15 else np.int64), kind="stable")
+        return row[order], point[order], weight[order]
+
+    def weighed(self, texels: Array, level: int = 0) -> tuple[Array, Array, Array]:
+        """Weigh the points of all levels from `level` for texels: (p,) texels, points, weights above 0."""
+        row, point = self.pairs(texels, level)
+        weight = self.kernel(texels[row], point)
+        reached = np.flatnonzero(weight)
+        return texels[row[reached]], point[reached], weight[reached].astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Interpolation:
+    """A sparse operator from gather points to texels, in rows.
+
+    Attributes
+    ----------
+    first : (n,) int64
+        Where each texel's entries start; every texel has at least one.
+    point : (m,) int32
+    weight : (m,) float32
+        The entries of a texel sum to 1.
+    """
+
+    first: Array
+    point: Array
+    weight: Array
+
+    def __call__(self, values: Array, threads: int = 1, scratch: Scratch | None = None) -> Array:
+        """Carry (g, k) values of the gather points to (n, k) of the texels."""
+        result = (scratch or Scratch()).empty((len(self.first), values.shape[1]))
+        columns = [np.ascontiguousarray(values[:, channel]) for channel in range(values.shape[1])]
+
+        def spread(rows: slice) -> None:
+            entries = self.entries_of(rows)
+            point, weight = self.point[entries].astype(np.intp), self.weight[entries]
+            first = self.first[rows] - entries.start
+            for channel, column in enumerate(columns):
+                result[rows, channel] = np.add.reduceat(column.take(point) * weight, first)
+
+        for_chunks(spread, len(self.first), CHUNK, threads)
+        return result
+
+    def any_of(self, chosen: Array) -> Array:
+        """Return (n,) bool: which texels take from any of the chosen points, (g,) bool."""
+        result = np.zeros(len(self.first), dtype=bool)
+        for rows in tiles(len(result)):
+            entries = self.entries_of(rows)
+            first = self.first[rows] - entries.start
+            result[rows] = np.logical_or.reduceat(chosen[self.point[entries]], first)
+        return result
+
+    def entries_of(self, rows: slice) -> slice:
+        """Return where the entries of a run of texels are."""
+        stop = self.first[rows.stop] if rows.stop < len(self.first) else len(self.point)
+        return slice(int(self.first[rows.start]), int(stop))
+
+
+def fit(points: GatherPoints, geometry: TexelGeometry) -> Interpolation:
+    """Weigh the gather points around every texel (see `fit_steps`)."""
+    return drain(fit_steps(points, geometry))
+
+
+def fit_steps(points: GatherPoints, geometry: TexelGeometry) -> Generator[float, None, Interpolation]:
+    """Weigh the gather points around every texel: a local linear fit, evaluated at the texel.
+
+    Yields
+    ------
+    fraction : float
+
+    Raises
+    ------
+    ValueError
+        If nothing speaks for a texel: it should have become a gather point itself.
+    """
+    parts: dict[int, tuple[Array, Array, Array]] = {}
+
+    def weigh(rows: slice) -> None:
+        row, point, kernel = points.weights_of(rows)
+        count = np.bincount(row, minlength=rows.stop - rows.start)
+        if not count.all():
+            raise ValueError(
+                "a texel has no gather point in reach: the last level must take all that lack one"
+            )
+        along = geometry.position[points.texel[point]] - geometry.position[row + rows.start]
+        parts[rows.start] = count, point.astype(np.int32), _linear_weights(along, kernel, count)
+
+    scratch = geometry.scratch
+    first = scratch.empty(len(geometry), np.int64)
+    point, weight = scratch.rows(1, np.int32), scratch.rows(1, np.float32)
+    total = 0
+    steps = chunk_steps(weigh, len(geometry), CHUNK, points.threads)
+    for start, fraction in zip(range(0, len(geometry), CHUNK), steps, strict=True):
+        count, numbers, weights = parts.pop(start)
+        first[start : start + len(count)] = total + np.cumsum(count) - count
+        total += len(numbers)
+        point.extend(numbers)
+        weight.extend(weights)
+        yield fraction
+    return Interpolation(first, point.all()[:, 0], weight.all()[:, 0])
+
+
+def refit(points: GatherPoints, geometry: TexelGeometry, texels: Array) -> tuple[Array, Array, Array]:
+    """Weigh the gather points around some texels, in ascending order, as `fit_steps` does.
+
+    Returns
+    -------
+    count : (k,) int
+        Entries of each texel.
+    point, weight : (m,) int32, float32
+        Texel by texel.
+
+    Raises
+    ------
+    ValueError
+        If nothing speaks for a texel.
+    """
+    counts, numbers, weights = [], [], []
+    for start in range(0, len(texels), CHUNK):
+        some = texels[start : start + CHUNK]
+        texel, point, kernel = points.weighed(some)
+        count = np.bincount(np.searchsorted(some, texel), minlength=len(some))
+        if not count.all():
+            raise ValueError("a texel has no gather point in reach: it should have become one")
+        along = geometry.position[points.texel[point]] - geometry.position[texel]
+        counts.append(count)
+        numbers.append(point.astype(np.int32))
+        weights.append(_linear_weights(along, kernel, count))
+    if not counts:
+        return np.zeros(0, np.int64), np.zeros(0, np.int32), np.zeros(0, np.float32)
+    return np.concatenate(counts), np.concatenate(numbers), np.concatenate(weights)
+
+
+def _linear_weights(along: Array, kernel: Array, count: Array) -> Array:
+    """Return (p,) float32 weights that reproduce linear functions of the position as far as damping allows.
+
+    Parameters
+    ----------
+    along : (p, 3) float64
+        From the texel to the point of each pair.
+    kernel : (p,) float64
+    count : (n,) int
+        How many pairs, one after the other, each texel has.
+    """
+    first = np.cumsum(count) - count
+    share = kernel / np.repeat(np.add.reduceat(kernel, first), count)
+    mean = np.add.reduceat(share[:, None] * along, first, axis=0)
+    offset = along - np.repeat(mean, count, axis=0)
+    # Least-norm slope in three dimensions: damping makes the flat direction harmless.
+    moment = np.empty((len(count), 3, 3))
+    for one in range(3):
+        for other in range(one, 3):
+            product = np.add.reduceat(share * offset[:, one] * offset[:, other], first)
+            moment[:, one, other] = moment[:, other, one] = product
+    damping = SLOPE_DAMPING * np.trace(moment, axis1=1, axis2=2) + 1e-18
+    moment += damping[:, None, None] * np.eye(3)
+    slope = np.linalg.solve(moment, -mean[:, :, None])[:, :, 0]
+    tilt = np.einsum("pk,pk->p", offset, np.repeat(slope, count, axis=0))
+    # A tight bunch of points far away knows nothing of a slope: no point counts against itself by
+    # more than it counts, which bounds the sum of all weights' sizes by 3.
+    steepest = STEEPEST / np.maximum(-np.minimum.reduceat(tilt, first), STEEPEST)
+    weights = share * (1.0 + np.repeat(steepest, count) * tilt)
+    weights /= np.repeat(np.add.reduceat(weights, first), count)
+    return np.asarray(weights, dtype=np.float32)

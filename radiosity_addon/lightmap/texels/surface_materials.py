@@ -1,0 +1,48 @@
+"""What reflects and emits at lightmap texels: constants of their triangles, or means of images."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...numerics import Array, marked, row_numbers, stratified_square, tiles, trim
+from ...scene import CHANNELS, Scene, where_there
+from .rasterize import FOOTPRINT
+from .texel_geometry import TexelGeometry
+
+SAMPLES = 16
+"""Points of a texel at which images are looked up."""
+
+CHUNK = 1 << 14
+"""Texels looked up at once; their temporaries take about 60 MB."""
+
+WHOLE = 1.0
+"""The width of whole texels: what their light reflects from when they are seen."""
+
+__all__ = ["FOOTPRINT", "WHOLE", "texel_materials"]
+
+
+def texel_materials(scene: Scene, geometry: TexelGeometry, width: float = WHOLE) -> tuple[Array, Array]:
+    """Average reflectance and emission over the middle `width` of every texel.
+
+    Returns
+    -------
+    reflectance, emission : (n, 3) float64
+        Of the surface where it is there; emission in W/m².
+    """
+    reflectance, emission = (geometry.scratch.empty((len(geometry), 3)) for _ in range(2))
+    for tile in tiles(len(geometry)):
+        triangle = geometry.triangle[tile]
+        reflectance[tile], emission[tile] = scene.reflectance[triangle], scene.emission[triangle]
+    if scene.images is None:
+        return reflectance, emission
+    images = scene.images
+    textured = row_numbers(marked(len(geometry), lambda tile: images.textured[geometry.triangle[tile]]))
+    for first in range(0, len(textured), CHUNK):
+        rows = textured[first : first + CHUNK]
+        weights = geometry.sample_weights(rows, stratified_square(rows, SAMPLES, 0), width)
+        triangle = np.repeat(geometry.triangle[rows], SAMPLES)
+        found = scene.images.at(triangle, weights[:, :, 1:].reshape(-1, 2))
+        mean = found.reshape(len(rows), SAMPLES, CHANNELS).mean(axis=1, dtype=np.float64)
+        reflectance[rows], emission[rows] = where_there(mean)
+        trim()
+    return reflectance, emission

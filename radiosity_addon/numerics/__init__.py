@@ -1,0 +1,85 @@
+"""Arrays: threads, memory with a limit, sampling, triangles and polygons, quantities of light.
+
+Knows neither scenes nor lamps.
+"""
+
+from __future__ import annotations
+
+from .arrays import Array
+from .parallel import chunk_steps, for_chunks, thread_count
+from .polygons import areas, clip_half_plane, edge_distances
+from .radiometry import (
+    HEMISPHERE,
+    MAX_REFLECTANCE,
+    brdf_of_reflectance,
+    cone_projected_solid_angle,
+    cone_solid_angle,
+    flux_of_radiance,
+    intensity_of_flux,
+    irradiance_from_point,
+    irradiance_under_sky,
+    luminous,
+    radiance_of_disc,
+    radiance_of_flux,
+    radiance_of_radiosity,
+    radiosity_of_radiance,
+    reflected_radiance,
+    sphere_area,
+)
+from .sampling import (
+    concentric_disk,
+    cosine_hemisphere,
+    hash_keys,
+    orthonormal_basis,
+    points_on_triangles,
+    stratified_square,
+    to_world,
+    uniform_cone,
+)
+from .scratch import TILE, Rows, Scratch, folder, marked, row_numbers, tiles, trim
+from .triangles import WHOLE_TRIANGLE, split_in_four, split_in_sixteen
+
+__all__ = [
+    "HEMISPHERE",
+    "MAX_REFLECTANCE",
+    "TILE",
+    "WHOLE_TRIANGLE",
+    "Array",
+    "Rows",
+    "Scratch",
+    "areas",
+    "brdf_of_reflectance",
+    "chunk_steps",
+    "clip_half_plane",
+    "concentric_disk",
+    "cone_projected_solid_angle",
+    "cone_solid_angle",
+    "cosine_hemisphere",
+    "edge_distances",
+    "flux_of_radiance",
+    "folder",
+    "for_chunks",
+    "hash_keys",
+    "intensity_of_flux",
+    "irradiance_from_point",
+    "irradiance_under_sky",
+    "luminous",
+    "marked",
+    "orthonormal_basis",
+    "points_on_triangles",
+    "radiance_of_disc",
+    "radiance_of_flux",
+    "radiance_of_radiosity",
+    "radiosity_of_radiance",
+    "reflected_radiance",
+    "row_numbers",
+    "sphere_area",
+    "split_in_four",
+    "split_in_sixteen",
+    "stratified_square",
+    "thread_count",
+    "tiles",
+    "to_world",
+    "trim",
+    "uniform_cone",
+]

@@ -1,0 +1,136 @@
+"""Textures as digests: show whether a surface still looks as it did, whatever its means over triangles.
+
+Reflectance and opacity must be equal texel by texel. Emission may change its strength: of its pattern a
+few random sums are kept, scaled to length 1, whose differences estimate how far two patterns are apart.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ..numerics import Array
+from .textures import SurfaceImages
+
+LOOKS, GLOWS = (0, 1, 2, 6), (3, 4, 5)
+"""Channels of the images: reflectance with opacity, and emission."""
+
+SUMS = 8
+"""Random sums of each channel of an emission."""
+
+SAME_PATTERN = 1e-4
+"""Patterns that differ by no more than this part (RMS) are one: rounding is far below, an edit far above."""
+
+CHUNK = 1 << 20
+"""Texels that are looked at at a time."""
+
+_STEPS = 1 << 13
+"""Weights of corners are told apart this finely to put a triangle's texels in order."""
+
+Glow = Sequence[Sequence[float]]
+"""The random sums of each channel, of length 1 or all 0; nothing where emission does not vary."""
+
+
+def texture_digest(images: SurfaceImages, rows: Array, step: float | None = None) -> str:
+    """Return a digest of what textured triangles reflect and let through; "" if that is constant.
+
+    It takes every texel, and does not depend on where in the image the triangles lie.
+
+    Parameters
+    ----------
+    rows : (n,) int
+        Triangles in their order; those without texture do not count.
+    step : float or None
+        Values are rounded to multiples of it; None takes them to the last bit.
+    """
+    digest, first = hashlib.blake2b(digest_size=16), None
+    varies = False
+    for values, count in _texels(images, rows):
+        seen = values[:, LOOKS]
+        seen = seen + 0.0 if step is None else np.round(seen / step).astype(np.int16)
+        first = seen[0] if first is None else first
+        varies = varies or bool((seen != first).any())
+        digest.update(count.astype(np.int64).tobytes())
+        digest.update(np.ascontiguousarray(seen).tobytes())
+    return digest.hexdigest() if varies else ""
+
+
+def glow_pattern(images: SurfaceImages, rows: Array) -> list[list[float]]:
+    """Return what tells the pattern of an emission from others, whatever its strength is; see `Glow`."""
+    sums, square = np.zeros((len(GLOWS), SUMS)), np.zeros(len(GLOWS))
+    low, high = np.full(len(GLOWS), np.inf), np.full(len(GLOWS), -np.inf)
+    chance = np.random.default_rng(0)
+    for values, _ in _texels(images, rows):
+        seen = values[:, GLOWS].astype(np.float64)
+        signs = chance.integers(0, 2, size=(len(seen), SUMS)) * 2.0 - 1.0
+        sums += seen.T @ signs
+        square += (seen**2).sum(axis=0)
+        low, high = np.minimum(low, seen.min(axis=0)), np.maximum(high, seen.max(axis=0))
+    if not (high - low > SAME_PATTERN * np.maximum(high, 0.0)).any():
+        return []
+    length = np.sqrt(square)[:, None]
+    scaled = np.where(length > 0.0, sums / np.where(length > 0.0, length, 1.0), 0.0)
+    return [[float(value) for value in channel] for channel in scaled]
+
+
+def same_glow(before: Glow, now: Glow) -> bool:
+    """Whether two emissions differ at most in their strength, channel by channel."""
+    if not now:
+        # A texture may have been dimmed to nothing; triangles' means tell of an even one.
+        return True
+    if not before:
+        return False
+    one, other = np.array(before, dtype=np.float64), np.array(now, dtype=np.float64)
+    if one.shape != other.shape or not np.isfinite(one).all():
+        return False
+    dark = ~other.any(axis=1)
+    apart = np.sqrt(((one - other) ** 2).mean(axis=1))
+    return bool((dark | (apart <= SAME_PATTERN)).all())
+
+
+def _texels(images: SurfaceImages, rows: Array) -> Iterator[tuple[Array, Array]]:
+    """Yield the texels (n, 7) whose centers lie on textured triangles, and how many each triangle has.
+
+    Triangles come in groups of one size in texels, and in their order; the texels of each by their weights.
+    """
+    rows = rows[images.textured[rows]]
+    height, width = images.values.shape[:2]
+    corners = images.image_uv[rows].astype(np.float64) * (width, height) - 0.5
+    low = np.rint(np.floor(corners.min(axis=1) + 1e-3)).astype(np.int64)
+    size = np.rint(np.ceil(corners.max(axis=1) - 1e-3)).astype(np.int64) - low + 1
+    for columns, lines in np.unique(size, axis=0):
+        mine = np.flatnonzero((size == (columns, lines)).all(axis=1))
+        grid = np.stack(np.meshgrid(np.arange(columns), np.arange(lines)), axis=-1).reshape(-1, 2)
+        step = max(CHUNK // max(len(grid), 1), 1)
+        for start in range(0, len(mine), step):
+            some = mine[start : start + step]
+            at = low[some, None] + grid
+            inside, order = _on_triangles(corners[some], at)
+            column, line = np.clip(at[..., 0], 0, width - 1), np.clip(at[..., 1], 0, height - 1)
+            pixel = np.take_along_axis(line * width + column, order, axis=1)
+            inside = np.take_along_axis(inside, order, axis=1)
+            count = inside.sum(axis=1)
+            if count.any():
+                yield images.values.reshape(-1, images.values.shape[2])[pixel[inside]], count
+
+
+def _on_triangles(corners: Array, at: Array) -> tuple[Array, Array]:
+    """Return which places (n, k, 2) lie on triangles (n, 3, 2), and their order by the corners' weights."""
+    edges = corners[:, 1:] - corners[:, :1]
+    area = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
+    along = at - corners[:, :1]
+    safe = np.where(area == 0.0, 1.0, area)[:, None]
+    second = (along[..., 0] * edges[:, None, 1, 1] - along[..., 1] * edges[:, None, 1, 0]) / safe
+    third = (edges[:, None, 0, 0] * along[..., 1] - edges[:, None, 0, 1] * along[..., 0]) / safe
+    hair = 0.25 / _STEPS
+    inside = (second >= -hair) & (third >= -hair) & (second + third <= 1.0 + hair)
+    # What has no area in the image is its first corner's texel.
+    point = area == 0.0
+    nearest = np.abs(along).sum(axis=2).argmin(axis=1)
+    inside[point] = np.arange(at.shape[1]) == nearest[point, None]
+    second[point[:, None] & np.ones_like(inside)] = 0.0
+    third[point[:, None] & np.ones_like(inside)] = 0.0
+    key = np.rint(third * _STEPS).astype(np.int64) * (4 * _STEPS) + np.rint(second * _STEPS).astype(np.int64)
+    return inside, np.argsort(key, axis=1, kind="stable")

@@ -1,0 +1,57 @@
+"""Stratified points on nodes, be they clusters or elements."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...numerics import Array, points_on_triangles, split_in_four, stratified_square
+from ..hierarchy import Hierarchy
+from .pair_factors import sample_clusters
+
+
+def node_area(hierarchy: Hierarchy, node: Array) -> Array:
+    """Return (n,) the area of nodes [m²]."""
+    area = np.empty(len(node))
+    single = node >= hierarchy.n_clusters
+    area[single] = hierarchy.area[node[single] - hierarchy.n_clusters]
+    area[~single] = hierarchy.clusters.area[node[~single]]
+    return area
+
+
+def node_samples(
+    hierarchy: Hierarchy, node: Array, quarter: Array, keys: Array, seed: int
+) -> tuple[Array, Array]:
+    """Return a point in each of some quarters of nodes.
+
+    Parameters
+    ----------
+    node : (n,) int
+    quarter : (n, k) int
+        Of an element its child's place, of a cluster a fourth of its area in order.
+    keys : (n,) int
+        With the seed, what places the points.
+
+    Returns
+    -------
+    points, normals : (n, k, 3) float64
+    """
+    count, samples = quarter.shape
+    points, normals = np.empty((count, samples, 3)), np.empty((count, samples, 3))
+    jitter = stratified_square(keys, samples, seed)
+    single = np.flatnonzero(node >= hierarchy.n_clusters)
+    element = node[single] - hierarchy.n_clusters
+    corners = split_in_four(hierarchy.corners[element])[np.arange(len(single))[:, None], quarter[single]]
+    points[single] = _one_in_each(corners, jitter[single])
+    normals[single] = hierarchy.faces.normal[hierarchy.face[element]][:, None]
+    grouped = np.flatnonzero(node < hierarchy.n_clusters)
+    along = stratified_square(keys[grouped], samples, seed + 1)[..., 0]
+    face = sample_clusters(hierarchy, node[grouped], (quarter[grouped] + along) / 4.0)
+    points[grouped] = _one_in_each(hierarchy.faces.corners[face], jitter[grouped])
+    normals[grouped] = hierarchy.faces.normal[face]
+    return points, normals
+
+
+def _one_in_each(corners: Array, unit: Array) -> Array:
+    """Return (n, k, 3): a point in each of (n, k, 3, 3) triangles, placed by (n, k, 2)."""
+    points = points_on_triangles(corners.reshape(-1, 3, 3), unit.reshape(-1, 1, 2))
+    return points.reshape(*unit.shape[:2], 3)
