@@ -15,7 +15,7 @@ from ..numerics import Array
 from .emitters import LightSources
 from .gather import LocalPass
 from .links import join_light_links, link_lights, push
-from .methods.hierarchical import HierarchicalState
+from .methods import HierarchicalState
 from .state import Anderson, SolverState, bounce
 
 ITERATIONS = 100

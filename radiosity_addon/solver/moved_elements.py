@@ -16,7 +16,7 @@ from .element_transport import Relightable
 from .emitters import LightSources
 from .gather import LocalPass
 from .hierarchy import LEAF, Hierarchy
-from .methods.hierarchical import HierarchicalState
+from .methods import HierarchicalState
 
 
 def on_scene(hierarchy: Hierarchy, scene: Scene) -> Hierarchy:

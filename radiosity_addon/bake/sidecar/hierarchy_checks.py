@@ -15,7 +15,7 @@ from ...solver.element_transport import ElementTransport
 from ...solver.emitters import LightSources
 from ...solver.hierarchy import LEAF, Clusters, Hierarchy, TreeTop
 from ...solver.links import ClusterLinks, LightLinks, Links
-from ...solver.methods.hierarchical import HierarchicalState
+from ...solver.methods import HierarchicalState
 from .value_checks import LARGE, SLACK, instance, integers, number, numbers, require, whole
 
 MOST_THREADS, MOST_LEVELS = 4096, 64

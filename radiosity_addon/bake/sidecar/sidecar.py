@@ -29,7 +29,7 @@ from ...solver.emitters import EmitterGroup, LightSources
 from ...solver.gather import AimedRays, LightGains, LocalPass
 from ...solver.hierarchy import Clusters, Hierarchy, TreeTop
 from ...solver.links import ClusterLinks, LightLinks, Links
-from ...solver.methods.hierarchical import HierarchicalState
+from ...solver.methods import HierarchicalState
 from ..relight import DAMAGED, KeptBake, check_same, damaged, fingerprint
 from ..result import BakedObject, BakeResult
 from .array_file import ArrayFileError, TooLargeError, read_arrays, read_digest, write_arrays

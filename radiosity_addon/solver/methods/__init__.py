@@ -9,6 +9,9 @@ from typing import cast
 from ...options import SolverSettings
 from ...scene import Scene
 from ..state import SolverState
+from .hierarchical import HierarchicalState
+
+__all__ = ["HierarchicalState", "steps_of"]
 
 
 def steps_of(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float, SolverState]]:
