@@ -17,11 +17,12 @@ import radiosity_addon
 from radiosity_addon.base.errors import BakeError
 from radiosity_addon.base.progress import drain
 from radiosity_addon.blender.files.cornell import build_cornell_box
-from radiosity_addon.blender.files.output import BLEND_NAME, PREVIEW_NAME, OutputFolder
+from radiosity_addon.blender.files.output import OutputFolder
 from radiosity_addon.blender.jobs.inspection import ERROR, INFO, WARNING, Inspection, inspect
 from radiosity_addon.blender.jobs.job import run_bake
 from radiosity_addon.blender.operators import checks
 from radiosity_addon.blender.session import runtime
+from radiosity_addon.files.file_names import BLEND_NAME, PREVIEW_NAME
 from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.scenes import QUAD, add_lamp, add_mesh, set_world
 

@@ -79,7 +79,7 @@ def test_the_list_follows_collections_though_they_do_not_tell(
     collection.radiosity_light_group = "lamps"
     assert listed() == [("lamps", 0, 0, 0, 1, 0)]
     collection.objects.link(lamps["one"])
-    monkeypatch.setattr("radiosity_addon.blender.ui.light_group_properties.OUTDATED_AFTER", 0.0)
+    monkeypatch.setattr("radiosity_addon.blender.settings.light_group_properties.OUTDATED_AFTER", 0.0)
     assert listed() == [("lamps", 1, 0, 0, 1, 0)]
 
 

@@ -14,15 +14,11 @@ import radiosity_addon
 from radiosity_addon.bake.result.report import BakeReport
 from radiosity_addon.bake.result.result import BakeResult
 from radiosity_addon.base.errors import BakeError
-from radiosity_addon.blender.files.output import (
-    BLEND_NAME,
-    REPORT_NAME,
-    OutputFolder,
-    save_copy,
-    save_restored,
-)
+from radiosity_addon.blender.files.output import OutputFolder
+from radiosity_addon.blender.files.saved_files import save_copy, save_restored
 from radiosity_addon.blender.images.images import set_folder, write_pages
 from radiosity_addon.files.baked_files import digest, read_report
+from radiosity_addon.files.file_names import BLEND_NAME, REPORT_NAME
 from radiosity_addon.lightmap.images.page import LightmapPage
 from radiosity_addon.options.bake_settings import BakeSettings
 

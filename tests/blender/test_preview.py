@@ -11,10 +11,11 @@ import pytest
 
 from radiosity_addon.base.errors import BakeError
 from radiosity_addon.blender.apply.apply import apply_lightmaps
-from radiosity_addon.blender.files.output import PREVIEW_NAME, OutputFolder
+from radiosity_addon.blender.files.output import OutputFolder
 from radiosity_addon.blender.images.images import set_folder, write_pages
 from radiosity_addon.blender.jobs.preview import MAX_SIDE, render_preview
 from radiosity_addon.blender.scene_export.export import export_scene
+from radiosity_addon.files.file_names import PREVIEW_NAME
 from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.file_dump import differences, dump_file
 from tests.blender.hand_bake import hand_result

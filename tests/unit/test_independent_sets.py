@@ -56,7 +56,7 @@ def test_a_shared_hat_joins_what_sees_nothing() -> None:
 
 def test_many_elements_are_all_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever the chunks of rows: 40 rings of 5, shuffled."""
-    monkeypatch.setattr("radiosity_addon.solver.equations.independent_sets.CHUNK_ROWS", 3)
+    monkeypatch.setattr("radiosity_addon.solver.equations.decomposition.CHUNK_ROWS", 3)
     order = np.random.default_rng(0).permutation(200)
     exchange = np.zeros((200, 200))
     for ring in order.reshape(40, 5):

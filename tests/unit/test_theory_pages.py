@@ -73,7 +73,7 @@ def test_every_page_ends_in_the_code(page: Path) -> None:
 
 def test_a_name_that_does_not_exist_is_noticed() -> None:
     with pytest.raises(AttributeError):
-        resolve("radiosity_addon.base.radiometry.no_such_function")
+        resolve("radiosity_addon.numerics.radiometry.no_such_function")
     with pytest.raises(AttributeError):
         resolve("radiosity_addon.solver.no_such_module.function")
 

@@ -56,7 +56,7 @@ def relight(
         If the sidecar cannot be used, or the scene differs in more than strengths of its lights.
     """
     with registered():
-        from ..files.output import BLEND_NAME, REPORT_NAME
+        from ...files import BLEND_NAME, REPORT_NAME
         from ..jobs.job import WRITING_STAGES
 
         source = scene or loaded

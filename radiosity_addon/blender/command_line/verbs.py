@@ -63,7 +63,7 @@ def bake(
         Whether a picture of the result is rendered.
     """
     with registered():
-        from ..files.output import BLEND_NAME
+        from ...files import BLEND_NAME
         from ..jobs.job import WRITING_STAGES, run_bake
 
         source = scene or loaded
@@ -160,7 +160,7 @@ def check(
         Where the bake would write.
     """
     with registered():
-        from ..files.output import BLEND_NAME, PREVIEW_NAME
+        from ...files import BLEND_NAME, PREVIEW_NAME
         from ..jobs.inspection import ERROR, inspect
         from ..operators.checks import figures
 
@@ -191,7 +191,7 @@ def restore(
     with registered():
         from ..apply.restore import restore_scene
         from ..files.files import open_scene
-        from ..files.output import save_restored
+        from ..files.saved_files import save_restored
 
         if scene is None and loaded is None:
             raise UsageError("restore needs SCENE, a baked .blend")
@@ -227,8 +227,7 @@ def open_or_build(scene: Path | None, loaded: Path | None, allowed: Permissions)
 
 def written_files(report: dict, preview: bool = True, kept: bool = False) -> list[tuple[str, str]]:
     """What a bake, with a preview or a sidecar or without, has left in its folder, for people to read."""
-    from ...files import SIDECAR_NAME
-    from ..files.output import BLEND_NAME, PREVIEW_NAME, REPORT_NAME
+    from ...files import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, SIDECAR_NAME
 
     images = list(dict.fromkeys(entry["image"] for entry in report["objects"]))
     shown = images if len(images) <= MAX_IMAGES else [f"{images[0]} … {images[-1]}"]

@@ -14,7 +14,7 @@ from ...bake.relight import KeptBake
 from ...bake.result import BakeReport, BakeResult, Progress
 from ...bake.sidecar import sidecar_entry
 from ...base import BakeWarning
-from ...files import KEPT, PLAIN_NAMES
+from ...files import BLEND_NAME, KEPT, PLAIN_NAMES, PREVIEW_NAME
 from ...numerics import Array
 from ...options import BakeSettings
 from ..apply.apply import apply_steps, check_targets
@@ -23,7 +23,8 @@ from ..apply.rebake import EarlierBake, Originals, replacing_earlier
 from ..apply.restore import restore
 from ..apply.scopes import files_shown_by, keeping_theirs, of_scene, shared_warnings
 from ..datablocks.bake_record import remove_datablocks
-from ..files.output import BLEND_NAME, PREVIEW_NAME, OutputFolder, save_copy
+from ..files.output import OutputFolder
+from ..files.saved_files import save_copy
 from ..images.group_images import GroupImages, each_image, write_groups
 from ..images.images import lightmap_files, possible_names, relative_path, set_folder, write_pages
 from ..material_copies.light_shares import crowded_materials
