@@ -17,7 +17,7 @@ from radiosity_addon.blender.relight.relight_scene import kept_bakes, lightmap_v
 from radiosity_addon.blender.session import live_state
 from radiosity_addon.files.baked_files import digest
 from tests.blender.scenes import shader_material
-from tests.blender.test_relight import change_lights, glowing, lightmap, relative, relight, room
+from tests.blender.test_relight_scene import change_lights, glowing, lightmap, relative, relight, room
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ import radiosity_addon
 from radiosity_addon.blender.images.images import image_scale
 from radiosity_addon.blender.relight.relight_scene import kept_bakes
 from radiosity_addon.blender.session import live_state
-from tests.blender.test_relight import lightmap, relight, room
+from tests.blender.test_relight_scene import lightmap, relight, room
 
 
 @pytest.fixture(params=["exr", "png16"])

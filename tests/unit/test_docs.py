@@ -17,6 +17,8 @@ NOT_FIGURES = {"__main__", "drawing", "measures", "painting", "scenes"}
 CODE = re.compile(r"`([^`\n]+)`")
 DOTTED = re.compile(r"radiosity_addon(\.\w+)+")
 PATH = re.compile(r"[\w./]+\.py")
+FOLDER = re.compile(r"(?:[a-z_]+/)+")
+MADE_BY_BUILDING = {"dist/", "out/"}
 IMAGE = re.compile(r"!\[[^\]]*\]\(images/(\w+)\.png\)")
 DISPLAYED = re.compile(r"\$\$(.+?)\$\$", re.DOTALL)
 INLINE = re.compile(r"(?<![\\$\w])\$(?!\s)([^$]+?)(?<!\s)\$(?![\d$])")
@@ -105,3 +107,20 @@ def test_formulas_read_on_a_git_host_too(page: Path) -> None:
         assert formula.count("{") == formula.count("}"), formula
     assert [formula for formula in in_lines if "\n" in formula] == []
     assert "$" not in INLINE.sub("", DISPLAYED.sub("", text))
+
+
+DOCS = [*(ROOT / "docs").rglob("*.md"), ROOT / "README.md", ROOT / "bench" / "README.md"]
+FROM_HERE = ("", "radiosity_addon", "radiosity_addon/solver", "docs/figures", "bench", "tests/app")
+PLACES = [ROOT / place for place in FROM_HERE]
+
+
+@pytest.mark.parametrize("page", DOCS, ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_file_that_the_docs_name_exists(page: Path) -> None:
+    folders = ("radiosity_addon", "tests", "bench", "docs", "build_tools")
+    names = {path.name for folder in folders for path in (ROOT / folder).rglob("*.py")} | {"build.py"}
+    for code in codes(page):
+        if PATH.fullmatch(code):
+            known = code in names if "/" not in code else any((place / code).is_file() for place in PLACES)
+            assert known, code
+        elif FOLDER.fullmatch(code) and code not in MADE_BY_BUILDING:
+            assert any((place / code).is_dir() for place in PLACES), code

@@ -9,7 +9,7 @@ from radiosity_addon.lightmap.texels.nearest_uncut import whole_neighbour
 from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.solver.gather.local_pass import NOTHING
 from tests.rooms import rectangle, solid_box
-from tests.unit.test_crossings import FLOOR, SIZE, crossings_of, slab
+from tests.unit.test_occlusion import FLOOR, SIZE, crossings_of, slab
 
 
 def neighbours(other: np.ndarray, spots: np.ndarray, below: bool = False) -> tuple[np.ndarray, np.ndarray]:
