@@ -6,12 +6,12 @@
 from __future__ import annotations
 
 from .estimate import Estimate, LightmappedObject, estimate_bake
-from .keep import Keeping, bake_steps, can_keep, moves_alone
+from .keep import KeepOptions, bake_steps, can_keep, moves_alone
 from .texel_memory import pages_of, refuse_too_large
 
 __all__ = [
     "Estimate",
-    "Keeping",
+    "KeepOptions",
     "LightmappedObject",
     "bake_steps",
     "can_keep",

@@ -17,7 +17,7 @@ from .sidecar import write_sidecar
 
 
 @dataclass(frozen=True)
-class Keeping:
+class KeepOptions:
     """How a bake is kept.
 
     Attributes
@@ -41,20 +41,20 @@ def can_keep(settings: BakeSettings) -> bool:
     return settings.method == "hierarchical" and settings.quantity != "residual"
 
 
-def moves_alone(bake_scene: BakeScene, settings: BakeSettings, keeping: Keeping | None) -> bool:
+def moves_alone(bake_scene: BakeScene, settings: BakeSettings, keeping: KeepOptions | None) -> bool:
     """Tell whether all that a bake has to do is to follow what moved since an earlier one that was kept."""
     earlier = None if keeping is None else keeping.earlier
     return earlier is not None and can_move(earlier, bake_scene, settings)
 
 
 def bake_steps(
-    bake_scene: BakeScene, settings: BakeSettings, keeping: Keeping | None, sidecar: Path | None
+    bake_scene: BakeScene, settings: BakeSettings, keeping: KeepOptions | None, sidecar: Path | None
 ) -> Generator[Progress, None, tuple[BakeResult, KeptBake | None]]:
     """Bake, and keep the bake if that is asked for.
 
     Parameters
     ----------
-    keeping : Keeping or None
+    keeping : KeepOptions or None
     sidecar : Path or None
         Where its file goes, to be published with the bake; None writes none.
 

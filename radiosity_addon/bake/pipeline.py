@@ -36,7 +36,7 @@ from ..solver.element_transport import Relightable
 from .bake_warnings import of_solution, small_objects
 from .estimate import refuse_before_unwrapping
 from .quality import for_error, quality_of, used_settings
-from .relight import KeptBake, Moves, Solved, are_wanted, check_groups, group_pages, shown
+from .relight import HierarchyReport, IncrementalState, KeptBake, are_wanted, check_groups, group_pages, shown
 from .result import (
     BakedObject,
     BakeResult,
@@ -161,7 +161,7 @@ def _bake(
     report = solver_part(solution.final_report(), used_settings(quality.solver), bake_scene.objects)
     sides = solution.triangle_irradiance, solution.back_irradiance
     of_light = (*turned_away(baked, bake_scene.scene.areas, *sides), *of_solution(solution, quality.solver))
-    solved = Solved(report, (*atlas.warnings, *of_light))
+    solved = HierarchyReport(report, (*atlas.warnings, *of_light))
     more = more_of(solution, baked, geometry, lit.light, settings.light)
     return (yield from finish(bake_scene, settings, atlas, geometry, solved, lit, more, seconds))
 
@@ -171,7 +171,7 @@ def finish(
     settings: BakeSettings,
     atlas: Atlas,
     geometry: TexelGeometry,
-    solved: Solved,
+    solved: HierarchyReport,
     lit: TexelValues,
     more: More,
     seconds: dict[str, float],
@@ -187,7 +187,7 @@ def finish(
     kept = None
     if lit.relightable and lit.materials and lit.light is not None and lit.light.kept is not None:
         lighting = lit.relightable, lit.light.kept
-        moves = None if lit.light.traced is None else Moves(atlas, lit.light.traced, solved)
+        moves = None if lit.light.traced is None else IncrementalState(atlas, lit.light.traced, solved)
         kept = KeptBake(bake_scene, settings, *lighting, geometry, seams, rings, *lit.materials, moves)
     groups: tuple[LightGroup, ...] = ()
     if kept is not None and are_wanted(bake_scene, settings):

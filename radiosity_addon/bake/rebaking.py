@@ -12,14 +12,14 @@ from dataclasses import replace
 import numpy as np
 
 from ..base import BakeWarning, SceneError
-from ..lightmap.update import Disturbance, LitBefore, moved_steps
+from ..lightmap.update import AffectedTexels, PreviousLight, moved_steps
 from ..numerics import Array
 from ..options import BakeSettings
 from ..scene import BakeObject, BakeScene, Scene, SurfaceImages
 from ..solver.emitters import NO_SOURCE
 from ..solver.moved_elements import carried
 from .pipeline import TexelValues, baked_objects, finish, staged, timed
-from .relight import KeptBake, Solved, same_light, shown
+from .relight import HierarchyReport, KeptBake, same_light, shown
 from .result import BakeResult, Progress, statistics
 
 RIGID = 1e-4
@@ -83,9 +83,9 @@ def bake_moved(
         geometry = kept.geometry.on(bake_scene.scene)
         rows = [np.arange(item.first, item.first + item.count) for item in moved]
         offset = solved.local.caster.surface_offset
-        disturbance = Disturbance.of(kept.geometry, geometry, rows, offset)
-        before = LitBefore(kept.lit, moves.traced, kept.solved.local)
-        steps = moved_steps(before, solved.local, disturbance)
+        affected = AffectedTexels.of(kept.geometry, geometry, rows, offset)
+        before = PreviousLight(kept.lit, moves.traced, kept.solved.local)
+        steps = moved_steps(before, solved.local, affected)
         light, local = yield from staged(steps, "light", 0.0, LIT)
     materials = kept.reflectance, kept.emission
     values = shown(light, *materials, settings, geometry.scratch)
@@ -93,7 +93,7 @@ def bake_moved(
     report = moves.solved.report
     names = dict.fromkeys([*report.get("moved", ()), *(item.name for item in moved)])
     report = {**report, "rays": local.caster.rays, "moved": list(names)}
-    told = Solved(report, moves.solved.warnings)
+    told = HierarchyReport(report, moves.solved.warnings)
     baked = baked_objects(bake_scene)
     more = statistics(baked, geometry, light, settings.light), None
     finished = finish(bake_scene, settings, moves.atlas, geometry, told, lit, more, seconds)

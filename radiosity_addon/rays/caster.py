@@ -62,19 +62,19 @@ class RayCaster(Protocol):
         """The caster that knows what stops the light of lamps; most often this one."""
         ...
 
-    def visible(self, origins: Array, directions: Array, distances: Array) -> Array:
+    def unoccluded(self, origins: Array, directions: Array, distances: Array) -> Array:
         """Return (n,) bool: nothing lies within `distances` along the unit `directions`."""
         ...
 
     def passing(self, origins: Array, directions: Array, distances: Array, least: float = 0.0) -> Array:
-        """Return (n,) what share of light passes: `visible`, but between 0 and 1 through cut-outs.
+        """Return (n,) what share of light passes: `unoccluded`, but between 0 and 1 through cut-outs.
 
         Their opacity counts as at least `least` and as at most 1 − `least`, for callers that judge
         by few rays: where some met a cut-out, more are needed.
         """
         ...
 
-    def first_hits(self, origins: Array, directions: Array) -> Hits:
+    def intersect(self, origins: Array, directions: Array) -> Hits:
         """Return what each ray meets first."""
         ...
 
@@ -92,7 +92,7 @@ def sees(caster: RayCaster, start: Array, end: Array) -> Array:
     """Return (n,) whether nothing lies between (n, 3) points."""
     along = end - start
     length = np.linalg.norm(along, axis=1)
-    return caster.visible(start, along / np.maximum(length, 1e-300)[:, None], length)
+    return caster.unoccluded(start, along / np.maximum(length, 1e-300)[:, None], length)
 
 
 class BruteForceCaster:
@@ -111,16 +111,16 @@ class BruteForceCaster:
         """All triangles stop the light of lamps here."""
         return self
 
-    def visible(self, origins: Array, directions: Array, distances: Array) -> Array:
-        """See `RayCaster.visible`."""
-        return np.asarray(self.first_hits(origins, directions).distance >= distances)
+    def unoccluded(self, origins: Array, directions: Array, distances: Array) -> Array:
+        """See `RayCaster.unoccluded`."""
+        return np.asarray(self.intersect(origins, directions).distance >= distances)
 
     def passing(self, origins: Array, directions: Array, distances: Array, least: float = 0.0) -> Array:  # noqa: ARG002
         """Return the same: all surfaces are whole."""
-        return self.visible(origins, directions, distances)
+        return self.unoccluded(origins, directions, distances)
 
-    def first_hits(self, origins: Array, directions: Array) -> Hits:
-        """See `RayCaster.first_hits`."""
+    def intersect(self, origins: Array, directions: Array) -> Hits:
+        """See `RayCaster.intersect`."""
         self.rays += len(origins)
         cross_2 = np.cross(directions[:, None], self._edge_2[None])
         determinant = np.einsum("tk,ntk->nt", self._edge_1, cross_2)

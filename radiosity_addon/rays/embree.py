@@ -89,7 +89,7 @@ class EmbreeCaster:
         """Rays traced so far, those to lamps among them."""
         return self._own_rays + (0 if self._for_lamps is None else self._for_lamps.rays)
 
-    def visible(self, origins: Array, directions: Array, distances: Array) -> Array:
+    def unoccluded(self, origins: Array, directions: Array, distances: Array) -> Array:
         """Return (n,) bool: nothing lies within `distances` along the unit `directions`."""
         count = len(origins)
         free = np.ones(count, dtype=bool)
@@ -110,9 +110,9 @@ class EmbreeCaster:
 
     def passing(self, origins: Array, directions: Array, distances: Array, least: float = 0.0) -> Array:  # noqa: ARG002
         """Return the same: all surfaces are whole."""
-        return self.visible(origins, directions, distances)
+        return self.unoccluded(origins, directions, distances)
 
-    def first_hits(self, origins: Array, directions: Array) -> Hits:
+    def intersect(self, origins: Array, directions: Array) -> Hits:
         """Return what each ray meets first."""
         count = len(origins)
         triangle = np.full(count, NO_HIT, dtype=np.int32)

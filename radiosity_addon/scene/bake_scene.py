@@ -81,5 +81,3 @@ class BakeScene:
     emitter_names: tuple[str, ...] = ()
     light_groups: tuple[str, ...] = ()
     emitter_groups: tuple[str, ...] = ()
-
-

@@ -238,7 +238,7 @@ def _solid_behind(
     points = points + (lift[:, None] * back)[:, None]
     unit = stratified_square(np.arange(count), PROBES, 83)
     directions = to_world(cosine_hemisphere(unit), back)
-    hits = caster.first_hits(points.reshape(-1, 3), directions.reshape(-1, 3))
+    hits = caster.intersect(points.reshape(-1, 3), directions.reshape(-1, 3))
     inner = (hits.triangle != NO_HIT) & ~hits.front
     return np.asarray(inner.reshape(count, PROBES).mean(axis=1) > 0.5)
 

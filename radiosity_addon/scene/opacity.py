@@ -65,17 +65,17 @@ class LayeredCaster:
         """Rays traced so far, those to lamps among them."""
         return self._caster.rays
 
-    def visible(self, origins: Array, directions: Array, distances: Array) -> Array:
-        """See `RayCaster.visible`."""
-        return self._caster.visible(origins, directions, distances)
+    def unoccluded(self, origins: Array, directions: Array, distances: Array) -> Array:
+        """See `RayCaster.unoccluded`."""
+        return self._caster.unoccluded(origins, directions, distances)
 
     def passing(self, origins: Array, directions: Array, distances: Array, least: float = 0.0) -> Array:
         """See `RayCaster.passing`."""
         return self._caster.passing(origins, directions, distances, least)
 
-    def first_hits(self, origins: Array, directions: Array) -> Hits:
-        """See `RayCaster.first_hits`."""
-        return self._layers.owners(self._caster.first_hits(origins, directions))
+    def intersect(self, origins: Array, directions: Array) -> Hits:
+        """See `RayCaster.intersect`."""
+        return self._layers.owners(self._caster.intersect(origins, directions))
 
 
 class CutOutCaster:
@@ -132,10 +132,10 @@ class CutOutCaster:
         """Rays asked for so far, those to lamps among them; what they meet on their way does not count."""
         return self._own_rays + (0 if self._for_lamps is None else self._for_lamps.rays)
 
-    def visible(self, origins: Array, directions: Array, distances: Array) -> Array:
+    def unoccluded(self, origins: Array, directions: Array, distances: Array) -> Array:
         """Return (n,) bool: nothing that is there lies within `distances` along the unit `directions`."""
         self._count(len(origins))
-        free = self._whole.visible(origins, directions, distances)
+        free = self._whole.unoccluded(origins, directions, distances)
         rows = np.flatnonzero(free)
         reach = distances[rows] * (1.0 - TARGET_SLACK)
         free[rows] = self._first_there(origins[rows], directions[rows], reach).triangle == NO_HIT
@@ -144,7 +144,7 @@ class CutOutCaster:
     def passing(self, origins: Array, directions: Array, distances: Array, least: float = 0.0) -> Array:
         """Return (n,) float64 what share of light passes: no chance here, but 1 − opacity of all it meets."""
         self._count(len(origins))
-        share = self._whole.visible(origins, directions, distances).astype(np.float64)
+        share = self._whole.unoccluded(origins, directions, distances).astype(np.float64)
         free = np.flatnonzero(share)
         ways = self._ways(free, origins, directions, distances * (1.0 - TARGET_SLACK))
         while len(ways.ray):
@@ -154,10 +154,10 @@ class CutOutCaster:
             ways.keep(share[ways.ray] > 0.0)
         return share
 
-    def first_hits(self, origins: Array, directions: Array) -> Hits:
+    def intersect(self, origins: Array, directions: Array) -> Hits:
         """Return what each ray meets first of what is there."""
         self._count(len(origins))
-        hits = self._whole.first_hits(origins, directions)
+        hits = self._whole.intersect(origins, directions)
         nearer = self._first_there(origins, directions, hits.distance)
         is_cut = nearer.triangle != NO_HIT
         return Hits(
@@ -253,7 +253,7 @@ class _Ways:
             one another, the outermost first.
         """
         start = self._origins[self.ray] + self._gone[:, None] * self._directions[self.ray]
-        hits = self._cut.first_hits(start, self._directions[self.ray])
+        hits = self._cut.intersect(start, self._directions[self.ray])
         distance, triangle = self._gone + hits.distance, self._rows[hits.triangle]
         met = (triangle != NO_HIT) & (distance < self._reach[self.ray])
         met &= self._layers < MOST_LAYERS

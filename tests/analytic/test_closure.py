@@ -119,7 +119,7 @@ def test_the_rest_receives_what_does_not_end_on_black_backs() -> None:
         points = points_on_triangles(faces.corners[side][None], rng.uniform(size=(1, count, 2)))[0]
         normals = np.repeat(faces.normal[side][None], count, axis=0)
         directions = to_world(cosine_hemisphere(rng.uniform(size=(count, 1, 2))), normals)[:, 0]
-        hits = state.caster.first_hits(points + state.caster.surface_offset * normals, directions)
+        hits = state.caster.intersect(points + state.caster.surface_offset * normals, directions)
         assert 0.75 < hits.front.mean() < 0.98
         assert state.balanced_closure()[side] == pytest.approx(hits.front.mean(), abs=ON_A_TRIANGLE)
 

@@ -11,7 +11,7 @@ import bpy
 import pytest
 
 import radiosity_addon
-from radiosity_addon.bake.keep import Keeping
+from radiosity_addon.bake.keep import KeepOptions
 from radiosity_addon.base.errors import BakeError, RadiosityError
 from radiosity_addon.blender.datablocks.bake_record import recorded_objects
 from radiosity_addon.blender.files.cornell import build_cornell_box
@@ -58,8 +58,8 @@ def blocks() -> list[str]:
     return sorted(f"{kind}/{block.name}" for kind in kinds for block in getattr(bpy.data, kind))
 
 
-def job(patient: bool = False) -> Any:
-    return guarded(run_bake(bpy.context, QUICK, None, patient=patient), bpy.context)
+def job(in_background: bool = False) -> Any:
+    return guarded(run_bake(bpy.context, QUICK, None, in_background=in_background), bpy.context)
 
 
 def advance(running: Any, to: str) -> None:
@@ -197,7 +197,7 @@ def test_no_handler_stays() -> None:
 @pytest.mark.parametrize("edit", [delete, rename, edit_mesh, undo])
 @pytest.mark.parametrize("at", MOMENTS)
 def test_between_the_steps_of_a_relight_too(edit: Callable[[], None], at: str) -> None:
-    for _ in run_bake(bpy.context, QUICK, None, keeping=Keeping()):
+    for _ in run_bake(bpy.context, QUICK, None, keeping=KeepOptions()):
         pass
     lamp = next(obj for obj in bpy.data.objects if obj.type == "LIGHT")
     lamp.data.energy *= 2

@@ -90,7 +90,7 @@ def test_what_it_writes_itself_starts_nothing(live: bpy.types.WindowManager) -> 
     running = live_state.state.live
     for _ in range(3):
         bpy.context.view_layer.update()
-        assert not running.step(patient=True)
+        assert not running.step(in_background=True)
 
 
 @pytest.mark.parametrize(
@@ -157,7 +157,7 @@ def test_a_slider_may_move_before_the_first_exact_light_is_there(saved: Path) ->
     bpy.context.view_layer.update()
     assert live_state.state.live._dirty
     while not live_state.state.live._exact:
-        assert live_state.state.live.step(patient=True), live_state.state.message
+        assert live_state.state.live.step(in_background=True), live_state.state.message
     followed = lightmap()
     bpy.context.window_manager.radiosity_live = False
     assert relight() == {"FINISHED"}

@@ -28,8 +28,8 @@ def registered() -> Iterator[None]:
     radiosity_addon.unregister()
 
 
-def pictures(patient: bool = False) -> list[Picture]:
-    job = run_bake(bpy.context, QUICK, None, patient=patient)
+def pictures(in_background: bool = False) -> list[Picture]:
+    job = run_bake(bpy.context, QUICK, None, in_background=in_background)
     return [progress.picture for progress in job if progress.picture is not None]
 
 
@@ -116,10 +116,12 @@ def test_instances_are_seen_where_their_instancer_is() -> None:
 
 
 @pytest.mark.parametrize("patient", [False, True])
-def test_a_bake_comes_with_pictures_that_brighten(patient: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bake_comes_with_pictures_that_brighten(
+    in_background: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("radiosity_addon.bake.pipeline.PICTURE_SECONDS", 0.0)
     build_cornell_box()
-    came = pictures(patient)
+    came = pictures(in_background)
     # Before it begins, direct light, after each of the shots, at the end.
     assert len(came) >= QUICK.max_iterations + 3
     # The walls emit nothing; afterwards no element ever gets darker, and most inside brighten.

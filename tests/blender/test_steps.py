@@ -76,7 +76,7 @@ def of_blender(monkeypatch: pytest.MonkeyPatch) -> Iterator[Timed]:
 
 
 def _times_of_steps(of_blender: Timed) -> tuple[list[float], Export]:
-    steps = export_steps(bpy.context, BakeSettings(resolution=128), patient=True)
+    steps = export_steps(bpy.context, BakeSettings(resolution=128), in_background=True)
     taken = []
     while True:
         start, of_blender.seconds = time.thread_time(), 0.0
@@ -110,7 +110,7 @@ def test_moments_change_nothing_of_what_is_read(monkeypatch: pytest.MonkeyPatch)
     at_once = export_scene(bpy.context, BakeSettings(resolution=64))
     monkeypatch.setattr(collecting, "MOMENT", 0.0)
     looked = 0
-    steps = export_steps(bpy.context, BakeSettings(resolution=64), patient=True)
+    steps = export_steps(bpy.context, BakeSettings(resolution=64), in_background=True)
     while True:
         try:
             next(steps)

@@ -27,8 +27,8 @@ def test_first_hits_agree(seed: int) -> None:
     triangles = soup(seed)
     rng = np.random.default_rng(100 + seed)
     origins, directions = rng.uniform(-4, 4, (4000, 3)), unit_rows(rng, 4000)
-    expected = BruteForceCaster(triangles).first_hits(origins, directions)
-    found = EmbreeCaster(triangles).first_hits(origins, directions)
+    expected = BruteForceCaster(triangles).intersect(origins, directions)
+    found = EmbreeCaster(triangles).intersect(origins, directions)
     # Only rays that graze an edge within float32's reach may differ.
     same = found.triangle == expected.triangle
     assert same.mean() > 0.999
@@ -48,7 +48,7 @@ def test_barycentric_weights_give_the_point_on_the_ray(kind: type[RayCaster]) ->
     triangles = soup(5)
     rng = np.random.default_rng(6)
     origins, directions = rng.uniform(-4, 4, (2000, 3)), unit_rows(rng, 2000)
-    hits = kind(triangles).first_hits(origins, directions)
+    hits = kind(triangles).intersect(origins, directions)
     rows = np.flatnonzero((hits.triangle != NO_HIT) & (hits.distance > 0.05))
     corners = triangles[hits.triangle[rows]]
     second, third = (hits.barycentric[rows, k : k + 1].astype(float) for k in (0, 1))
@@ -63,7 +63,7 @@ def test_barycentric_weights_give_the_point_on_the_ray(kind: type[RayCaster]) ->
 @pytest.mark.parametrize("kind", CASTERS)
 def test_sides(kind: type[RayCaster]) -> None:
     caster = kind(rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0)))
-    hits = caster.first_hits(
+    hits = caster.intersect(
         np.array([[0.3, 0.6, 2.0], [0.3, 0.6, -2.0], [5, 5, 1]]),
         np.array([[0, 0, -1.0], [0, 0, 1], [0, 0, -1]]),
     )
@@ -78,9 +78,9 @@ def test_visible_is_a_first_hit_beyond_the_distance(kind: type[RayCaster]) -> No
     rng = np.random.default_rng(9)
     origins, directions = rng.uniform(-4, 4, (3000, 3)), unit_rows(rng, 3000)
     distances = rng.uniform(0.1, 6, 3000)
-    first = BruteForceCaster(triangles).first_hits(origins, directions).distance
+    first = BruteForceCaster(triangles).intersect(origins, directions).distance
     clear = np.abs(first - distances) > 1e-3
-    free = kind(triangles).visible(origins, directions, distances)
+    free = kind(triangles).unoccluded(origins, directions, distances)
     assert free.dtype == bool
     assert (free[clear] == (first > distances)[clear]).mean() > 0.9995
     assert 0.2 < free.mean() < 0.8
@@ -106,7 +106,7 @@ def test_segments_that_end_on_a_surface_are_free_and_behind_it_are_not(shift: fl
     def free(first: np.ndarray, last: np.ndarray) -> np.ndarray:
         along = last - first
         length = np.linalg.norm(along, axis=1)
-        return caster.visible(first, along / length[:, None], length)
+        return caster.unoccluded(first, along / length[:, None], length)
 
     inside = (np.abs(end - at - 0.5 * size)[:, :2] < 0.49 * size).all(axis=1)
     assert free(start + up, end - up).all()
@@ -121,8 +121,8 @@ def test_far_from_the_origin_nothing_changes(shift: float) -> None:
     at = shift * np.array([1.0, -0.7, 0.4])
     rng = np.random.default_rng(12)
     origins, directions = rng.uniform(-4, 4, (3000, 3)), unit_rows(rng, 3000)
-    near = EmbreeCaster(triangles).first_hits(origins, directions)
-    far = EmbreeCaster(triangles + at).first_hits(origins + at, directions)
+    near = EmbreeCaster(triangles).intersect(origins, directions)
+    far = EmbreeCaster(triangles + at).intersect(origins + at, directions)
     assert (near.triangle == far.triangle).mean() > 0.999
     assert surface_offset(triangles + at) == pytest.approx(surface_offset(triangles), rel=1e-6)
 
@@ -142,10 +142,10 @@ def test_a_closed_surface_leaks_nothing(shape: str) -> None:
     directions = targets - origins
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     caster = EmbreeCaster(triangles)
-    hits = caster.first_hits(origins, directions)
+    hits = caster.intersect(origins, directions)
     assert (hits.triangle != NO_HIT).all()
     assert hits.front.all()
-    assert not caster.visible(origins, directions, np.full(len(origins), np.inf)).any()
+    assert not caster.unoccluded(origins, directions, np.full(len(origins), np.inf)).any()
 
 
 @pytest.mark.parametrize("kind", CASTERS)
@@ -156,8 +156,8 @@ def test_arguments_are_left_alone_and_rays_counted(kind: type[RayCaster]) -> Non
     origins, directions = rng.uniform(-3, 3, (500, 3)), unit_rows(rng, 500)
     for distances in (np.full(500, np.inf), np.full(500, 2.0, dtype=np.float32)):
         given = origins.copy(), directions.copy(), distances.copy()
-        caster.visible(origins, directions, distances)
-        caster.first_hits(origins, directions)
+        caster.unoccluded(origins, directions, distances)
+        caster.intersect(origins, directions)
         for now, before in zip((origins, directions, distances), given, strict=True):
             np.testing.assert_array_equal(now, before)
     assert caster.rays == 4 * 500
@@ -169,11 +169,11 @@ def test_threads_and_chunks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> N
     origins, directions = rng.uniform(-4, 4, (5000, 3)), unit_rows(rng, 5000)
     distances = rng.uniform(0.1, 6, 5000)
     whole = EmbreeCaster(triangles, threads=1)
-    free, hits = whole.visible(origins, directions, distances), whole.first_hits(origins, directions)
+    free, hits = whole.unoccluded(origins, directions, distances), whole.intersect(origins, directions)
     monkeypatch.setattr("radiosity_addon.rays.embree.CHUNK", 333)
     pieces = EmbreeCaster(triangles, threads=3)
-    assert pieces.visible(origins, directions, distances).tobytes() == free.tobytes()
-    again = pieces.first_hits(origins, directions)
+    assert pieces.unoccluded(origins, directions, distances).tobytes() == free.tobytes()
+    again = pieces.intersect(origins, directions)
     for name in ("triangle", "barycentric", "front", "distance"):
         assert getattr(again, name).tobytes() == getattr(hits, name).tobytes()
 
@@ -181,8 +181,8 @@ def test_threads_and_chunks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> N
 def test_an_empty_scene_blocks_nothing() -> None:
     caster = EmbreeCaster(np.zeros((0, 3, 3)))
     rays = np.zeros((3, 3)), np.tile([0.0, 0, 1], (3, 1))
-    assert caster.visible(*rays, np.full(3, np.inf)).all()
-    hits = caster.first_hits(*rays)
+    assert caster.unoccluded(*rays, np.full(3, np.inf)).all()
+    hits = caster.intersect(*rays)
     assert (hits.triangle == NO_HIT).all()
     assert np.isinf(hits.distance).all()
     assert caster.surface_offset > 0
@@ -191,5 +191,5 @@ def test_an_empty_scene_blocks_nothing() -> None:
 def test_no_rays_no_answers() -> None:
     none = np.zeros((0, 3))
     caster = EmbreeCaster(soup(1))
-    assert caster.visible(none, none, np.zeros(0)).shape == (0,)
-    assert caster.first_hits(none, none).barycentric.shape == (0, 2)
+    assert caster.unoccluded(none, none, np.zeros(0)).shape == (0,)
+    assert caster.intersect(none, none).barycentric.shape == (0, 2)

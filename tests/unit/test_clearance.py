@@ -76,7 +76,7 @@ def test_probes_find_the_same_where_clear_texels_are_left_out(
     for field in dataclasses.fields(every):
         mask = getattr(every, field.name)
         np.testing.assert_array_equal(getattr(found, field.name), mask, err_msg=field.name)
-    assert all(mask.any() for mask in (every.cut, every.hooded, every.rim))
+    assert all(mask.any() for mask in (every.cut, every.occluded, every.rim))
 
 
 @pytest.mark.parametrize("n", [1, 40])

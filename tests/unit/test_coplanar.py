@@ -58,7 +58,7 @@ def test_rays_meet_the_sheet_that_faces_them(order: int, seed: int) -> None:
     first = looks @ looks[0] > 0
     for side in (1, -1):
         origins, directions, at = rays(triangles[first], side)
-        hits = caster(triangles).first_hits(origins, directions)
+        hits = caster(triangles).intersect(origins, directions)
         assert (hits.triangle != NO_HIT).all()
         assert hits.front.all()
         np.testing.assert_array_equal(first[hits.triangle], side > 0)
@@ -67,16 +67,16 @@ def test_rays_meet_the_sheet_that_faces_them(order: int, seed: int) -> None:
         second, third = hits.barycentric.T[..., None]
         off = np.linalg.norm(a + second * (b - a) + third * (c - a) - at, axis=1)
         assert np.median(off) < 1e-5
-        assert not caster(triangles).visible(origins, directions, np.full(len(at), 10.0)).any()
+        assert not caster(triangles).unoccluded(origins, directions, np.full(len(at), 10.0)).any()
 
 
 def test_without_facing_copies_many_would_not() -> None:
     """Embree alone reports either sheet: the test above can fail."""
     triangles = turned(two_sheets(1), 0)
     origins, directions, _ = rays(triangles[:LOWER], 1)
-    assert EmbreeCaster(triangles).first_hits(origins, directions).front.mean() < 0.9
+    assert EmbreeCaster(triangles).intersect(origins, directions).front.mean() < 0.9
     # Two-sided sheets in the air count by their fronts.
-    assert caster(triangles, two_sided=True).first_hits(origins, directions).front.all()
+    assert caster(triangles, two_sided=True).intersect(origins, directions).front.all()
 
 
 def test_a_two_sided_sheet_hides_the_black_back_in_it() -> None:
@@ -84,7 +84,7 @@ def test_a_two_sided_sheet_hides_the_black_back_in_it() -> None:
     triangles = turned(np.concatenate([two_sheets(1)[:LOWER]] * 2), 1)
     two_sided = np.arange(2 * LOWER) >= LOWER
     origins, directions, _ = rays(triangles[:LOWER], -1)
-    hits = caster(triangles, two_sided).first_hits(origins, directions)
+    hits = caster(triangles, two_sided).intersect(origins, directions)
     assert (hits.triangle >= LOWER).all()
     assert not hits.front.any()
 
@@ -112,11 +112,11 @@ def test_nothing_opens_between_boxes_that_touch() -> None:
     towards[:, 2] = 1.0 + rng.normal(size=len(towards)) * 0.5 * surface_offset(boxes)
     way = rng.normal(size=(len(towards), 3))
     way /= np.linalg.norm(way, axis=1, keepdims=True)
-    outside = cast.first_hits(towards + 4.0 * way, -way)
+    outside = cast.intersect(towards + 4.0 * way, -way)
     assert (outside.triangle != NO_HIT).all()
     assert outside.front.all()
     within = np.linspace(0.2, 0.8, 50)[:, None] * np.ones(3)
-    inside = cast.first_hits(np.repeat(within, 4000, axis=0), way)
+    inside = cast.intersect(np.repeat(within, 4000, axis=0), way)
     assert (inside.triangle != NO_HIT).all()
     met = np.repeat(within, 4000, axis=0) + inside.distance[:, None] * way
     assert (np.abs(met - 0.5) < 0.5 + 2 * surface_offset(boxes)).all()
@@ -129,6 +129,6 @@ def test_a_caster_of_some_triangles_still_knows_their_rows() -> None:
     in_bounces = np.arange(2 * count) >= count
     scene = Scene(both, grey(2 * count, 0.5), grey(2 * count, 0.0), in_bounces=in_bounces)
     origins, directions, _ = rays(sheets[:LOWER], 1, 500)
-    hits = ray_caster(scene).first_hits(origins, directions)
+    hits = ray_caster(scene).intersect(origins, directions)
     assert hits.front.all()
     assert ((hits.triangle >= count) & (hits.triangle < count + LOWER)).all()

@@ -95,7 +95,7 @@ def test_more_copies_than_are_compared_glow_once() -> None:
     scene = scene_of(*[UNIT] * 300, UNIT[:, [1, 2, 0]], emission=(1.0,) * 301)
     assert len(scene.layers.covers) <= 4 * 301
     assert fronts(scene) @ scene.areas == pytest.approx(1.0)
-    hits = ray_caster(scene).first_hits(POINT, -Z[None])
+    hits = ray_caster(scene).intersect(POINT, -Z[None])
     assert fronts(scene)[hits.triangle[0]] == 1.0
 
 
@@ -148,7 +148,7 @@ def test_hits_and_elements_agree_on_what_counts() -> None:
     for _ in range(3):
         hierarchy.subdivide(hierarchy.leaves)
     origins = np.concatenate([rng.uniform(0, 2, (40_000, 2)), np.ones((40_000, 1))], axis=1)
-    hits = ray_caster(scene).first_hits(origins, np.broadcast_to(-Z, origins.shape))
+    hits = ray_caster(scene).intersect(origins, np.broadcast_to(-Z, origins.shape))
     met = np.bincount(hits.triangle[hits.triangle >= 0], minlength=len(scene)) * (4.0 / len(origins))
     np.testing.assert_allclose(met, fronts(scene) * scene.areas, atol=0.02)
     leaves = hierarchy.leaves

@@ -64,7 +64,7 @@ def test_rays_go_to_faces_in_proportion_to_their_factors() -> None:
     targets = points[:, None] + directions * distances[..., None]
     hits = EmbreeCaster(triangles)
     start = (targets - 1e-3 * directions).reshape(-1, 3)
-    face = hits.first_hits(start, directions.reshape(-1, 3)).triangle.reshape(-1, count)
+    face = hits.intersect(start, directions.reshape(-1, 3)).triangle.reshape(-1, count)
     share = np.stack([(face == number).mean(axis=1) for number in range(len(triangles))], axis=1)
     expected = factors(triangles, points, normals)
     lit = expected.sum(axis=1) > 1e-3
@@ -127,7 +127,7 @@ def test_rays_end_just_before_the_surface_and_meet_nothing_on_the_way() -> None:
     np.testing.assert_allclose(ends[..., 2], 2 - caster.surface_offset, atol=1e-12)
     assert (weights > 0).all()
     start = np.repeat(points, 64, axis=0)
-    assert caster.visible(start, directions.reshape(-1, 3), distances.ravel()).all()
+    assert caster.unoccluded(start, directions.reshape(-1, 3), distances.ravel()).all()
 
 
 def test_points_that_see_no_face_get_no_weight() -> None:

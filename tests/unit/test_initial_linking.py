@@ -100,15 +100,11 @@ def test_links_are_few_while_the_error_asks_for_no_finer(
     shapes = NodeShapes(hierarchy)
     caster = EmbreeCaster(clutter.triangles, 1)
     monkeypatch.setattr(initial, "WANTED", 600.0)
-    links, together, faint = initial.first_links(
-        hierarchy, shapes, caster, SolverSettings(error=1e-3), 10**6
-    )
+    links, together, faint = initial.first_links(hierarchy, shapes, caster, SolverSettings(error=1e-3), 10**6)
     assert len(links) + len(together) <= initial.SLACK * 600 / 1e-3**0.5
     assert 0.0 < faint <= initial.COARSEST_FAINT * 1e-3
     monkeypatch.setattr(initial, "WANTED", 1.0)
-    links, together, faint = initial.first_links(
-        hierarchy, shapes, caster, SolverSettings(error=1e-3), 10**6
-    )
+    links, together, faint = initial.first_links(hierarchy, shapes, caster, SolverSettings(error=1e-3), 10**6)
     assert len(links) + len(together) > 1 / 1e-3**0.5
     assert 0.5 < faint / (initial.COARSEST_FAINT * 1e-3) <= 1.0
 

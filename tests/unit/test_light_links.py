@@ -126,7 +126,7 @@ def test_an_occluder_hides_its_share(name: str) -> None:
     up = np.tile([0, 0, 1.0], (40000, 1))
     directions, distances, _ = light.shadow_rays(points, up, rng.uniform(size=(40000, 1, 2)))
     start = points + np.array([0, 0, caster.surface_offset])
-    free = caster.visible(start, directions[:, 0], distances[:, 0])
+    free = caster.unoccluded(start, directions[:, 0], distances[:, 0])
     expected = 4 * (light.unit_irradiance(points, up) * free).mean()
     assert free.mean() < 0.97
     assert flux == pytest.approx(expected, rel=0.015)

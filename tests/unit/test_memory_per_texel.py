@@ -143,6 +143,6 @@ def test_states_take_a_few_bytes_a_texel() -> None:
     with bytes_taken() as taken:
         state = crossings.state
     assert taken[0] < 5 * COUNT
-    cut, touched, rim, hooded = flags
-    expected = np.where(cut | rim, 1, np.where(hooded, 2, np.where(touched, 3, 0)))
+    cut, touched, rim, occluded = flags
+    expected = np.where(cut | rim, 1, np.where(occluded, 2, np.where(touched, 3, 0)))
     np.testing.assert_array_equal(state, expected)

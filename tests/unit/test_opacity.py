@@ -65,7 +65,7 @@ def test_holes_let_pass_and_the_rest_blocks() -> None:
     for layer, x, y in crossing:
         expected[blocks[layer - 1, (y > 0.5).astype(int), (x > 0.5).astype(int)] > 0] = layer
     cast = CutOutCaster(triangles, images)
-    hits = cast.first_hits(origins, directions)
+    hits = cast.intersect(origins, directions)
     heights = origins[:, 2] + hits.distance * directions[:, 2]
     np.testing.assert_allclose(heights[clear], expected[clear], atol=1e-4)
     np.testing.assert_array_equal(hits.triangle[clear] // 2, expected[clear])
@@ -75,14 +75,14 @@ def test_holes_let_pass_and_the_rest_blocks() -> None:
     assert hits.front.all()
 
     to_floor = (LAYERS + 0.9) / -directions[:, 2]
-    free = cast.visible(origins, directions, to_floor)
+    free = cast.unoccluded(origins, directions, to_floor)
     np.testing.assert_array_equal(free[clear], expected[clear] == 0)
     np.testing.assert_array_equal(cast.passing(origins, directions, to_floor)[clear], expected[clear] == 0)
     assert 0.02 < free.mean() < 0.98
     # Only as far as asked.
     above_all = np.full(len(origins), 0.8)
-    assert cast.visible(origins, directions, above_all).all()
-    assert cast.first_hits(origins[:1], -directions[:1]).triangle[0] == NO_HIT
+    assert cast.unoccluded(origins, directions, above_all).all()
+    assert cast.intersect(origins[:1], -directions[:1]).triangle[0] == NO_HIT
 
 
 def test_veils_multiply() -> None:
@@ -94,8 +94,8 @@ def test_veils_multiply() -> None:
     to_floor = (LAYERS + 0.9) / -directions[:, 2]
     through = np.prod(1 - opacity)
     np.testing.assert_allclose(cast.passing(origins, directions, to_floor), through, rtol=1e-5)
-    assert cast.visible(origins, directions, to_floor).mean() == pytest.approx(through, abs=0.005)
-    layer = cast.first_hits(origins, directions).triangle // 2
+    assert cast.unoccluded(origins, directions, to_floor).mean() == pytest.approx(through, abs=0.005)
+    layer = cast.intersect(origins, directions).triangle // 2
     # From above: the fifth stops 0.6, the third 0.3 of the rest, …
     left = 1.0
     for number in range(LAYERS, 0, -1):
@@ -109,10 +109,10 @@ def test_veils_multiply() -> None:
 def test_rays_are_stopped_alike_however_they_are_divided() -> None:
     triangles, images = stack(np.random.default_rng(2).random((LAYERS, 8, 8)))
     origins, directions = downward(1000)
-    whole = CutOutCaster(triangles, images, threads=2).first_hits(origins, directions)
+    whole = CutOutCaster(triangles, images, threads=2).intersect(origins, directions)
     cast = CutOutCaster(triangles, images, threads=1)
     for rows in (slice(0, 300), slice(300, 1000)):
-        part = cast.first_hits(origins[rows], directions[rows])
+        part = cast.intersect(origins[rows], directions[rows])
         np.testing.assert_array_equal(part.triangle, whole.triangle[rows])
         assert part.distance.tobytes() == whole.distance[rows].tobytes()
 
@@ -126,7 +126,7 @@ def test_grazing_rays_meet_each_veil_once() -> None:
     origins = np.tile([0.51, 0.47, LAYERS + 3e-4], (5000, 1))
     share = CutOutCaster(triangles, images).passing(origins, directions, np.full(5000, 0.4))
     assert set(np.unique(share)) <= {0.5, 1.0}
-    met = BruteForceCaster(triangles).visible(origins, directions, np.full(5000, 0.4))
+    met = BruteForceCaster(triangles).unoccluded(origins, directions, np.full(5000, 0.4))
     assert (share[~met] == 0.5).mean() > 0.95
 
 
@@ -147,7 +147,7 @@ def test_veils_in_one_place_multiply_too(apart: float, from_above: str, from_bel
     far = np.full(len(origins), 9.0)
     np.testing.assert_allclose(cast.passing(origins, directions, far), np.prod(1 - opacity), rtol=1e-5)
     for order, sign in ((from_above, 1), (from_below, -1)):
-        hits = cast.first_hits(origins * (1, 1, sign) + (0, 0, 1 - sign), directions * (1, 1, sign))
+        hits = cast.intersect(origins * (1, 1, sign) + (0, 0, 1 - sign), directions * (1, 1, sign))
         left = 1.0
         for number in map(int, order):
             met = hits.triangle // 2 == number

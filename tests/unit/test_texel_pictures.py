@@ -13,7 +13,7 @@ from radiosity_addon.bake.result import texel_pictures
 from radiosity_addon.bake.result.progress import Progress, TexelPicture
 from radiosity_addon.bake.result.result import BakeResult
 from radiosity_addon.bake.result.texel_pictures import TexelPictures, coarser
-from radiosity_addon.lightmap.texels.states import NO_TEXEL_HERE, SHUT_IN
+from radiosity_addon.lightmap.texels.states import ENCLOSED, NO_TEXEL_HERE
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import PointLight, Scene
@@ -122,7 +122,7 @@ def test_the_report_and_the_details_agree(watched: tuple[BakeResult, list[TexelP
     floor, box = result.light
     page = result.details.pages[0]
     # What the box stands on is shut in, and does not count: nothing else in the room is so dark.
-    assert (page.state == SHUT_IN).sum() > 10
+    assert (page.state == ENCLOSED).sum() > 10
     assert floor["irradiance_W_m2"]["minimum"] > 0.05 * floor["irradiance_W_m2"]["mean"]
     for light in (floor, box):
         watts, lux = light["irradiance_W_m2"], light["illuminance_lx"]

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from .kept_bake import (
     DAMAGED,
+    HierarchyReport,
+    IncrementalState,
     KeptBake,
-    Moves,
-    Solved,
     damaged,
     differs_in_strength_alone,
     relight,
@@ -23,10 +23,10 @@ from .source_strengths import strengths_in
 
 __all__ = [
     "DAMAGED",
+    "HierarchyReport",
+    "IncrementalState",
     "KeptBake",
-    "Moves",
     "Responses",
-    "Solved",
     "are_wanted",
     "as_fingerprint",
     "check_groups",

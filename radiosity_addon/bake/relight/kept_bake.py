@@ -16,7 +16,7 @@ import numpy as np
 
 from ...base import BakeError, BakeWarning, SceneError
 from ...lightmap.images import LightmapPage, Seams, presentable, texel_pages, to_quantity
-from ...lightmap.lighting import LitTexels, TexelLight, TracedTexels, kept_bytes, relight_steps
+from ...lightmap.lighting import LightingRecord, LitTexels, TexelLight, kept_bytes, relight_steps
 from ...lightmap.texels import TexelGeometry
 from ...lightmap.unwrap import Atlas
 from ...lights import Light
@@ -41,7 +41,7 @@ SAME = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
-class Solved:
+class HierarchyReport:
     """What a bake tells of its hierarchy: the solver's part of the report, and warnings."""
 
     report: dict[str, Any]
@@ -49,22 +49,22 @@ class Solved:
 
 
 @dataclass(frozen=True, eq=False)
-class Moves:
+class IncrementalState:
     """What baking anew needs of a kept bake after some objects moved (`rebaking.py`).
 
     Attributes
     ----------
     atlas : Atlas
         Where charts lie.
-    traced : TracedTexels
+    traced : LightingRecord
         How texels were lit.
-    solved : Solved
+    solved : HierarchyReport
         Of the bake that the hierarchy was solved for.
     """
 
     atlas: Atlas
-    traced: TracedTexels
-    solved: Solved
+    traced: LightingRecord
+    solved: HierarchyReport
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +81,7 @@ class KeptBake:
         The texels, what is stitched, and how far pages are dilated [texels].
     reflectance, emission : (n, 3) float64
         Of the texels as they show; emission [W/m²] as it was baked.
-    moves : Moves or None
+    moves : IncrementalState or None
         Without it nothing can be moved.
     origin : str
         The sidecar that it was read from, if it was.
@@ -96,7 +96,7 @@ class KeptBake:
     rings: int
     reflectance: Array
     emission: Array
-    moves: Moves | None = None
+    moves: IncrementalState | None = None
     origin: str = ""
 
     @property

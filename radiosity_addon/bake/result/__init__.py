@@ -6,7 +6,7 @@ Plain records and files, nothing that bakes.
 from __future__ import annotations
 
 from .details import MEANS, More, more_of, statistics
-from .progress import LitSurfaces, Picture, Progress, TexelPicture
+from .progress import Picture, Progress, TexelPicture, TexelSurfaces
 from .report import BakeReport, LightmapFile, solver_part
 from .result import BakeDetails, BakedObject, BakeResult, LightGroup, PageDetails
 from .texel_pictures import TexelPictures
@@ -19,13 +19,13 @@ __all__ = [
     "BakedObject",
     "LightGroup",
     "LightmapFile",
-    "LitSurfaces",
     "More",
     "PageDetails",
     "Picture",
     "Progress",
     "TexelPicture",
     "TexelPictures",
+    "TexelSurfaces",
     "more_of",
     "solver_part",
     "statistics",

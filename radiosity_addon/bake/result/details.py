@@ -10,7 +10,7 @@ import numpy as np
 
 from ...lightmap.images import light_statistics, told_texels
 from ...lightmap.lighting import TexelLight
-from ...lightmap.texels import NO_TEXEL_HERE, SHUT_IN, TOUCHED, TexelGeometry
+from ...lightmap.texels import ENCLOSED, NO_TEXEL_HERE, TOUCHED, TexelGeometry
 from ...numerics import Array, luminous, tiles
 from ...options import EFFICACY
 from ...scene import BakeObject
@@ -80,7 +80,7 @@ def texel_state(light: TexelLight) -> Array:
     state = np.zeros(len(light.direct), dtype=np.uint8) if light.state is None else light.state.copy()
     for rows in tiles(len(state)):
         lit = (light.direct[rows] + light.indirect[rows]).any(axis=1)
-        state[rows][((state[rows] == 0) | (state[rows] == TOUCHED)) & ~lit] = SHUT_IN
+        state[rows][((state[rows] == 0) | (state[rows] == TOUCHED)) & ~lit] = ENCLOSED
     return state
 
 

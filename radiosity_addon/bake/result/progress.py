@@ -38,7 +38,7 @@ class Picture:
 
 
 @dataclass(frozen=True, eq=False)
-class LitSurfaces:
+class TexelSurfaces:
     """Triangles with a lightmap, and the texels on them.
 
     Parameters
@@ -59,7 +59,7 @@ class LitSurfaces:
     triangle: Array
     texels: tuple[Array, ...]
 
-    def only(self, triangles: Array) -> LitSurfaces:
+    def only(self, triangles: Array) -> TexelSurfaces:
         """Return those of the scene's triangles that are marked in a (scene triangles,) mask."""
         mine = triangles[self.triangle]
         return replace(
@@ -77,13 +77,13 @@ class TexelPicture:
 
     Parameters
     ----------
-    surfaces : LitSurfaces
+    surfaces : TexelSurfaces
         The same for all pictures of a bake.
     radiosity : (n, 3) float32 [W/m²]
         Of the texels.
     """
 
-    surfaces: LitSurfaces
+    surfaces: TexelSurfaces
     radiosity: Array
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from ...lightmap.lighting import LightSoFar
 from ...lightmap.texels import NO_TEXEL, TexelGeometry
 from ...numerics import Array
-from .progress import LitSurfaces, TexelPicture
+from .progress import TexelPicture, TexelSurfaces
 
 SECONDS = 0.25
 """Between two pictures, at least."""
@@ -32,7 +32,7 @@ class TexelPictures:
     def __init__(self, so_far: LightSoFar) -> None:
         self._so_far = so_far
         self._shown, self._next = 0, 0.0
-        self._surfaces: LitSurfaces | None = None
+        self._surfaces: TexelSurfaces | None = None
 
     def next(self) -> TexelPicture | None:
         """Return a picture if there is something new and it is time."""
@@ -49,13 +49,13 @@ class TexelPictures:
         return picture
 
 
-def lit_surfaces(geometry: TexelGeometry) -> LitSurfaces:
+def lit_surfaces(geometry: TexelGeometry) -> TexelSurfaces:
     """Return the triangles with a lightmap, and which texels lie on them."""
     triangle = np.flatnonzero(geometry.page_of_triangle >= 0).astype(np.int32)
     page = geometry.page_of_triangle[triangle]
     pages = [coarser(index, WIDEST) for index in geometry.index]
     stretch = np.array([stretch for _, stretch in pages], dtype=np.float32)
-    return LitSurfaces(
+    return TexelSurfaces(
         geometry.triangles[triangle].astype(np.float32),
         geometry.uv[triangle] * stretch[page][:, None, None],
         page,

@@ -69,7 +69,7 @@ def _short_print(bake_scene: BakeScene, item: BakeObject) -> str:
     return fingerprint(bake_scene, item)[:16]
 
 
-def narrow(
+def restrict_to_changed(
     scene: bpy.types.Scene, export: Export, settings: BakeSettings
 ) -> tuple[Export, BakeSettings, int]:
     """Leave lightmaps to what has changed since the last bake; to all where the light has.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import bpy
 
-from ...bake import Keeping
+from ...bake import KeepOptions
 from ...bake.relight import strengths_in
 from ...bake.result import BakeReport, Progress
 from ...bake.sidecar import StoredBake, check_belongs, read_sidecar
@@ -131,7 +131,7 @@ def relight_into(
         output.expect(page_file_names(result, stored.settings))
         output.expect(name for of in group_file_names(result, stored.settings) for name in of)
         yield Progress("apply", APPLY)
-        keeping = Keeping(sidecar=True, mark=stored.mark)
+        keeping = KeepOptions(sidecar=True, mark=stored.mark)
         made = export, result, output, seconds, keeping
         samples = QUICK_SAMPLES if preview else None
         return (yield from deliver(context, stored.settings, *made, samples))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import bpy
 
-from ...bake import Keeping
+from ...bake import KeepOptions
 from ...base import BakeWarning, SceneError, UsageError
 from ...cli import Console, Interrupts, summary
 from ...options import BakeSettings, Permissions
@@ -73,7 +73,7 @@ def bake(
         console.progress("open", 0.0)
         notes = open_or_build(scene, loaded, allowed)
         folder = output_of(output, source, allowed, report_copy, plot)
-        keeping = Keeping(sidecar=True) if keep else None
+        keeping = KeepOptions(sidecar=True) if keep else None
         job = run_bake(
             bpy.context,
             settings,

@@ -37,7 +37,7 @@ def evaluate_surfaces(
     surfaces: Sequence[Surface],
     materials: Sequence[MaterialSource | None],
     settings: BakeSettings,
-    patient: bool = False,
+    in_background: bool = False,
 ) -> Generator[float, None, SurfaceImages | None]:
     """Evaluate the materials that vary, on all pieces at once.
 
@@ -53,7 +53,7 @@ def evaluate_surfaces(
         Parallel to `surfaces`: the file's own, not evaluated ones.
     settings : BakeSettings
         `resolution` and `threads` matter here.
-    patient : bool
+    in_background : bool
         Whether a window waits.
 
     Returns
@@ -73,7 +73,7 @@ def evaluate_surfaces(
     rows = np.flatnonzero(~plain[surface])
     if not len(rows):
         return None
-    corners, inputs = yield from elsewhere(lambda: _gather(pieces, rows), patient)
+    corners, inputs = yield from elsewhere(lambda: _gather(pieces, rows), in_background)
     own = surface[rows]
     varies = np.array([one.varies for one in surfaces])[own]
     needed = {row: materials[row] for row in sorted(set(own[varies].tolist()))}
@@ -93,7 +93,7 @@ def evaluate_surfaces(
         divided = batches(tiles, corners, inputs, own, facts) if varying else []
         return tiles, _terms_of_constants(tiles, surfaces, own), divided
 
-    tiles, terms, divided = yield from elsewhere(laid_out, patient)
+    tiles, terms, divided = yield from elsewhere(laid_out, in_background)
     for number, batch in enumerate(divided):
         materials_here = {row: needed[row] for row in np.unique(batch.drawn.surface).tolist()}
         for channel in varying:
@@ -101,8 +101,8 @@ def evaluate_surfaces(
             with closing(SurfaceBake(context, settings, materials_here, tuple(inputs))) as bake:
                 bake.draw(batch.drawn)
                 seen = bake.channel(channel)
-            yield from elsewhere(partial(batch.put, seen, terms[channel]), patient)
-    return (yield from elsewhere(lambda: _images(tiles, terms, rows, len(surface)), patient))
+            yield from elsewhere(partial(batch.put, seen, terms[channel]), in_background)
+    return (yield from elsewhere(lambda: _images(tiles, terms, rows, len(surface)), in_background))
 
 
 def _side(settings: BakeSettings, cut_out: bool) -> int:

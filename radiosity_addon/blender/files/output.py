@@ -335,5 +335,3 @@ def is_same_file(one: Path, other: Path) -> bool:
         return one.samefile(other)
     except (OSError, ValueError):
         return one.parent == other.parent and folded(one.name) == folded(other.name)
-
-

@@ -9,10 +9,7 @@ from pathlib import Path
 import bpy
 
 from ...base import BakeError
-from ...files import (
-    BLEND_NAME,
-    replacing,
-)
+from ...files import BLEND_NAME, replacing
 from ..datablocks.bake_record import is_made
 from .output import OutputFolder
 
@@ -40,7 +37,6 @@ def save_copy(output: OutputFolder) -> None:
         raise BakeError(f"cannot write '{place}': {error.strerror}") from error
 
 
-
 def save_restored(path: Path) -> None:
     """Save the open file as a compressed copy that replaces `path` once it is whole.
 
@@ -58,7 +54,6 @@ def save_restored(path: Path) -> None:
         raise BakeError(f"cannot write '{path}': {error.strerror}") from error
 
 
-
 def _save(aside: Path, place: Path) -> None:
     """Save a copy of the open file, to be moved to its place in the same folder."""
     try:
@@ -70,7 +65,6 @@ def _save(aside: Path, place: Path) -> None:
         raise BakeError(f"cannot write '{place}': {reason}") from error
     if not aside.is_file():
         raise BakeError(f"cannot write '{place}'")
-
 
 
 @contextmanager

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import bpy
 
-from ...bake import Keeping, bake_steps, moves_alone, pages_of, refuse_too_large
+from ...bake import KeepOptions, bake_steps, moves_alone, pages_of, refuse_too_large
 from ...bake.relight import KeptBake
 from ...bake.result import BakeReport, BakeResult, Progress
 from ...bake.sidecar import sidecar_entry
@@ -18,7 +18,7 @@ from ...files import BLEND_NAME, KEPT, PLAIN_NAMES, PREVIEW_NAME
 from ...numerics import Array
 from ...options import BakeSettings
 from ..apply.apply import apply_steps, check_targets
-from ..apply.only_changed import gone_objects, kept_warning, narrow, remember
+from ..apply.only_changed import gone_objects, kept_warning, remember, restrict_to_changed
 from ..apply.rebake import EarlierBake, Originals, replacing_earlier
 from ..apply.restore import restore
 from ..apply.scopes import files_shown_by, keeping_theirs, of_scene, shared_warnings
@@ -84,8 +84,8 @@ def run_bake(
     settings: BakeSettings,
     output: OutputFolder | None,
     with_copy: bool = False,
-    patient: bool = False,
-    keeping: Keeping | None = None,
+    in_background: bool = False,
+    keeping: KeepOptions | None = None,
     only_changed: bool = False,
     notes: tuple[BakeWarning, ...] = (),
     with_preview: bool = True,
@@ -105,10 +105,10 @@ def run_bake(
         None packs the lightmaps into the file and writes nothing.
     with_copy : bool
         Write `baked.blend` and `preview.png` into the output folder as well.
-    patient : bool
+    in_background : bool
         Return from every `next` within a moment, for a window: the steps between the
         export and the lightmaps, which know nothing of Blender, run in a thread.
-    keeping : Keeping or None
+    keeping : KeepOptions or None
         If given, the bake is kept for relighting: in memory, and in a sidecar if that is asked for.
     only_changed : bool
         Give new lightmaps to what has changed since the last bake, see `only_changed.py`, which cannot be
@@ -150,7 +150,7 @@ def run_bake(
                 yield Progress("export", 0.0)
         originals = Originals(context)
         with timed(seconds, "export"):
-            steps = export_steps(context, settings, keeping is not None, patient, originals)
+            steps = export_steps(context, settings, keeping is not None, in_background, originals)
             export = yield from exporting(steps)
             yield Progress("export", 0.0)
             with originals():
@@ -159,7 +159,7 @@ def run_bake(
                 seen = seen_triangles(context, export)
         unchanged = 0
         if only_changed and not moves_alone(export.bake_scene, settings, keeping):
-            export, settings, unchanged = narrow(context.scene, export, settings)
+            export, settings, unchanged = restrict_to_changed(context.scene, export, settings)
         scope = Scope.of(context.scene, export, is_partial=settings.objects is not None or unchanged > 0)
         remarks = [*notes, *originals.warnings, *shared_warnings(context.scene, export)]
         if unchanged:
@@ -175,7 +175,7 @@ def run_bake(
         solved = APPLY if with_copy else APPLY_ALONE
         sidecar = output.staging / output.names.sidecar if output and keeping and keeping.sidecar else None
         baking = bake_steps(export.bake_scene, settings, keeping, sidecar)
-        result, kept = yield from _solve(baking, seen, patient, solved)
+        result, kept = yield from _solve(baking, seen, in_background, solved)
         result = replace(result, warnings=(*remarks, *result.warnings))
         seconds.update(result.seconds)
         yield Progress("apply", solved)
@@ -206,11 +206,11 @@ def run_bake(
 def _solve(
     baking: Generator[Progress, None, tuple[BakeResult, KeptBake | None]],
     seen: Array,
-    patient: bool,
+    in_background: bool,
     end: float,
 ) -> Generator[Progress, None, tuple[BakeResult, KeptBake | None]]:
     """Run the pipeline, its progress scaled to its share of the whole, its pictures to what is `seen`."""
-    steps = in_thread(baking) if patient else baking
+    steps = in_thread(baking) if in_background else baking
     shown, only = Progress("unwrap", SOLVE), Seen(seen)
     try:
         while True:
@@ -228,7 +228,7 @@ def _solve(
         steps.close()
 
 
-def _remember_kept(scene: bpy.types.Scene, keeping: Keeping | None, kept: KeptBake | None) -> None:
+def _remember_kept(scene: bpy.types.Scene, keeping: KeepOptions | None, kept: KeptBake | None) -> None:
     """Keep the bake with its scene; the one before it is gone whether this one is kept or not."""
     kept_bakes.drop(scene)
     if keeping is not None:
@@ -244,7 +244,7 @@ def deliver(
     result: BakeResult,
     output: OutputFolder,
     seconds: dict[str, float],
-    keeping: Keeping | None,
+    keeping: KeepOptions | None,
     samples: int | None = SAMPLES,
     scope: Scope | None = None,
 ) -> BakeJob:
@@ -284,7 +284,7 @@ def _show(
     export: Export,
     result: BakeResult,
     output: OutputFolder | None,
-    keeping: Keeping | None,
+    keeping: KeepOptions | None,
     earlier: EarlierBake,
 ) -> Generator[float, None, Shown]:
     """Make the images, also those of light groups, and put them on the objects; yields the fraction done."""
@@ -334,7 +334,7 @@ def _report(
     return BakeReport.of(result, lightmap_files(images, settings), seconds, shares)
 
 
-def keeping_sidecar(report: BakeReport, output: OutputFolder, keeping: Keeping | None) -> BakeReport:
+def keeping_sidecar(report: BakeReport, output: OutputFolder, keeping: KeepOptions | None) -> BakeReport:
     """Return the report with what proves that a sidecar, if the bake is kept in one, belongs to it."""
     if keeping is None or not keeping.sidecar:
         return report

@@ -8,7 +8,7 @@ from functools import lru_cache
 import bpy
 import numpy as np
 
-from ...bake.result import LitSurfaces, Picture, TexelPicture
+from ...bake.result import Picture, TexelPicture, TexelSurfaces
 from ...numerics import Array, radiance_of_radiosity
 from ..scene_records.export_sources import Export, ExportSource
 
@@ -51,7 +51,7 @@ class Seen:
 
     def __init__(self, triangles: Array) -> None:
         self._triangles = triangles
-        self._surfaces: tuple[LitSurfaces, LitSurfaces] | None = None
+        self._surfaces: tuple[TexelSurfaces, TexelSurfaces] | None = None
 
     def of_elements(self, picture: Picture | None) -> Picture | None:
         """Return the picture of the elements that are seen."""
@@ -66,7 +66,7 @@ class Seen:
         return replace(picture, surfaces=self._surfaces[1])
 
 
-def beside(picture: Picture, surfaces: LitSurfaces) -> Picture:
+def beside(picture: Picture, surfaces: TexelSurfaces) -> Picture:
     """Return the picture of what texels do not show: backs, and surfaces without a lightmap."""
     lit = np.isin(picture.triangle, surfaces.triangle) & picture.front
     return picture.only(~lit)

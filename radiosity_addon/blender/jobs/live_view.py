@@ -18,7 +18,7 @@ from ..overlays.drawing import PagedSurfaces, over_the_objects
 from ..session.redraw import redraw_viewports as _redraw
 
 if TYPE_CHECKING:
-    from ...bake.result import LitSurfaces, Picture, TexelPicture
+    from ...bake.result import Picture, TexelPicture, TexelSurfaces
 
 WHITE = 16.0
 """Radiance that view transforms with soft highlights (AgX, Filmic) show white, at exposure 0 [W/m²/sr]."""
@@ -37,7 +37,7 @@ class _LiveView:
         self._white = 1.0 if scene.view_settings.view_transform in _HARD else WHITE
         self._picture: Picture | None = None
         self._texels: TexelPicture | None = None
-        self._lit: tuple[LitSurfaces, PagedSurfaces] | None = None
+        self._lit: tuple[TexelSurfaces, PagedSurfaces] | None = None
         self._painted: tuple[TexelPicture, float] | None = None
         self._batches: dict[float, list[tuple[bool, Any]]] = {}
         self._shader: Any = None

@@ -188,5 +188,3 @@ class WindowJob:
                     context.workspace.status_text_set(None)
                 self._timer = None
             redraw_sidebars(context)
-
-

@@ -20,7 +20,7 @@ from ..settings.properties import settings_of
 from .checks import look_first
 
 if TYPE_CHECKING:
-    from ...bake import Keeping
+    from ...bake import KeepOptions
     from ...options import BakeSettings
 
 
@@ -70,18 +70,20 @@ class RADIOSITY_OT_bake(WindowJob, bpy.types.Operator):
         keeping = self._keeping(context.scene, settings)
         if in_window and context.scene.radiosity.show_while_solving:
             live_view.begin(context.scene)
-        return run_bake(context, settings, output, patient=in_window, keeping=keeping, only_changed=changed)
+        return run_bake(
+            context, settings, output, in_background=in_window, keeping=keeping, only_changed=changed
+        )
 
     @staticmethod
-    def _keeping(scene: bpy.types.Scene, settings: BakeSettings) -> Keeping | None:
+    def _keeping(scene: bpy.types.Scene, settings: BakeSettings) -> KeepOptions | None:
         """Return how the bake is to be kept for relighting; None if it is not."""
-        from ...bake import Keeping
+        from ...bake import KeepOptions
 
         if not keeps(scene, settings):
             return None
         chosen = relight_of(scene)
         held = kept_bakes.find(scene) if chosen.only_moved else None
-        return Keeping(chosen.sidecar, earlier=None if held is None else held.bake)
+        return KeepOptions(chosen.sidecar, earlier=None if held is None else held.bake)
 
     def _follow(self, progress: Any) -> None:
         if progress.picture is not None:

@@ -38,7 +38,7 @@ class RADIOSITY_OT_relight(WindowJob, bpy.types.Operator):
         from ..relight.relight_scene import run_relight
 
         live_state.stop()
-        return run_relight(context, patient=in_window)
+        return run_relight(context, in_background=in_window)
 
     def _succeeded(self, _context: bpy.types.Context, _in_window: bool) -> None:
         self.report({"INFO"}, rpt_("Relit in {:.2f} s").format(self._report.seconds))

@@ -139,5 +139,3 @@ def over_the_objects(culled: bool = True, nearer: float = NEARER) -> Iterator[No
         gpu.state.face_culling_set("NONE")
         gpu.state.depth_mask_set(depth_mask)
         gpu.state.depth_test_set(depth_test)
-
-

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ...lightmap.texels import DIVIDED, HOODED, NO_TEXEL_HERE, SHUT_IN, TOUCHED
+from ...lightmap.texels import DIVIDED, ENCLOSED, NO_TEXEL_HERE, OCCLUDED, TOUCHED
 from ...numerics import Array
 from ...solver.state import leaves_on, nearest_leaf
 from ..session.kept_details import STAND_IN_SUFFIX, KeptDetails, details_of
@@ -26,9 +26,9 @@ from .overlay_properties import overlay_of
 
 STATE_COLORS = {
     DIVIDED: ((0.90, 0.25, 0.15), "Divided: geometry stands on them"),
-    HOODED: ((0.95, 0.60, 0.10), "Hidden: something is close above"),
+    OCCLUDED: ((0.95, 0.60, 0.10), "Hidden: something is close above"),
     TOUCHED: ((0.95, 0.90, 0.30), "Touched: they end at geometry"),
-    SHUT_IN: ((0.55, 0.25, 0.75), "Shut in: no light reaches them"),
+    ENCLOSED: ((0.55, 0.25, 0.75), "Shut in: no light reaches them"),
 }
 """Display colours of the texels that are told apart, and what they are."""
 

@@ -84,7 +84,7 @@ class LiveRelight:
 
     def settle(self) -> None:
         """Do at one go what the timer would do: for scripts, where no timer fires."""
-        while live_state.state.live is self and self.step(patient=False):
+        while live_state.state.live is self and self.step(in_background=False):
             pass
 
     def look_again(self) -> None:
@@ -105,17 +105,17 @@ class LiveRelight:
                 self._dirty, self._noticed = True, time.perf_counter()
             _wake()
 
-    def step(self, patient: bool) -> bool:
+    def step(self, in_background: bool) -> bool:
         """Do the next thing; False if there is nothing left to do."""
         try:
             if self._reader is None:
                 self._begin()
             if self._dirty:
                 self.read()
-            if self._work is None and not self._choose_work(patient):
+            if self._work is None and not self._choose_work(in_background):
                 return not self._exact
             if self._work is not None:
-                self._carry_on(patient)
+                self._carry_on(in_background)
             return True
         except RadiosityError as error:
             live_state.stop(f"Live is off: {' '.join(str(error).split())}")
@@ -175,7 +175,7 @@ class LiveRelight:
         self.changes += 1
         _redraw()
 
-    def _choose_work(self, patient: bool) -> bool:
+    def _choose_work(self, in_background: bool) -> bool:
         """Begin what is most wanted; False if all is done, or it is too early."""
         if self._responses is None:
             return False
@@ -183,7 +183,7 @@ class LiveRelight:
         if missing:
             self._start(missing[0], self._responses.steps(missing[0]))
             return True
-        resting = time.perf_counter() - self._noticed > REST or not patient
+        resting = time.perf_counter() - self._noticed > REST or not in_background
         if not self._exact and resting:
             self._start(None, lit(self._held().bake, self._strengths))
             return True
@@ -201,13 +201,13 @@ class LiveRelight:
         """Find out a source's response in the thread, or exact pages if it is None."""
         self._work, self._doing, self._lit_by = in_thread(steps), source, self._strengths
 
-    def _carry_on(self, patient: bool) -> None:
+    def _carry_on(self, in_background: bool) -> None:
         """Go on with what runs in the thread; take its result once it is there."""
         assert self._work is not None
         try:
             while True:
                 next(self._work)
-                if patient:
+                if in_background:
                     return
         except StopIteration as done:
             exact, self._work, self._doing = self._doing is None, None, None
@@ -277,7 +277,7 @@ def _tick() -> float | None:
     """Carry on, as long as there is something to do; nothing may be raised."""
     try:
         live = live_state.state.live
-        return TICK if live is not None and live.step(patient=True) else None
+        return TICK if live is not None and live.step(in_background=True) else None
     except Exception as error:  # noqa: BLE001 (as above)
         live_state.stop(f"Live is off: {type(error).__name__}: {error}")
         return None

@@ -41,7 +41,7 @@ class RelightReport:
 
 
 def run_relight(
-    context: bpy.types.Context, patient: bool = False
+    context: bpy.types.Context, in_background: bool = False
 ) -> Generator[Progress, None, RelightReport]:
     """Light the scene's kept bake as its lights are now, and rewrite its lightmaps.
 
@@ -55,10 +55,10 @@ def run_relight(
     started = time.perf_counter()
     lightmap_versions.flush()
     yield Progress("export", 0.0)
-    held, strengths = yield from exporting(strengths_steps(context, patient))
+    held, strengths = yield from exporting(strengths_steps(context, in_background))
     same = np.array_equal(strengths, held.shown)
     steps = lit(held.bake, strengths)
-    pages, groups = yield from _shown(in_thread(steps) if patient else steps)
+    pages, groups = yield from _shown(in_thread(steps) if in_background else steps)
     yield Progress("write", LIT)
     mark = kept_bakes.mark_of(context.scene)
     taken = time.perf_counter() - started
@@ -78,14 +78,14 @@ def read_strengths(context: bpy.types.Context) -> tuple[InMemory, Array]:
 
 
 def strengths_steps(
-    context: bpy.types.Context, patient: bool = False
+    context: bpy.types.Context, in_background: bool = False
 ) -> Generator[float, None, tuple[InMemory, Array]]:
     """Read strengths as `read_strengths`, in steps as those of an export."""
     scene = context.scene
     held = kept_bakes.find(scene)
     stored: KeptBake | StoredBake = stored_bake(scene) if held is None else held.bake
     shown = Originals(context)
-    export = yield from export_steps(context, stored.settings, True, patient, shown)
+    export = yield from export_steps(context, stored.settings, True, in_background, shown)
     if isinstance(stored, StoredBake):
         held = kept_bakes.put(scene, kept_bakes.mark_of(scene), stored.kept(export.bake_scene))
     assert held is not None

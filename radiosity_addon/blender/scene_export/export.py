@@ -43,7 +43,7 @@ def export_steps(
     context: bpy.types.Context,
     settings: BakeSettings,
     dark: bool = False,
-    patient: bool = False,
+    in_background: bool = False,
     shown: Callable[[], AbstractContextManager[object]] = nullcontext,
 ) -> Generator[float, None, Export]:
     """Read the context's view layer as a render would see it, in steps that a window can wait for.
@@ -59,7 +59,7 @@ def export_steps(
         `objects`, `light_only`, `ignore`, `sky` and `keep_uvs` matter here.
     dark : bool
         Whether lamps without power and a black world are lights too, for a bake that is kept.
-    patient : bool
+    in_background : bool
         Whether a window waits: work on arrays is then done in a thread.
     shown : callable
         Shows the originals, within a step.
@@ -92,7 +92,7 @@ def export_steps(
             options[:] = option_warnings(context)
 
     sorted_out = yield from collect_steps(view, factors, settings, dark)
-    collected = yield from elsewhere(sorted_out, patient)
+    collected = yield from elsewhere(sorted_out, in_background)
     collected.warnings.extend(options)
     # Before anything is rendered.
     check_names(context, collected.pieces, settings)
@@ -108,7 +108,7 @@ def export_steps(
     collected.groups.extend([group] * len(world))
     collected.warnings.extend(warnings)
     names = {piece.source.name for piece in chosen}
-    return (yield from _assemble(context, collected, names, settings, patient))
+    return (yield from _assemble(context, collected, names, settings, in_background))
 
 
 def exporting(steps: Generator[float, None, T]) -> Generator[Progress, None, T]:
@@ -188,10 +188,14 @@ def _triangles(pieces: list[Piece], chosen: set[str], settings: BakeSettings) ->
 
 
 def _assemble(
-    context: bpy.types.Context, collected: Collected, chosen: set[str], settings: BakeSettings, patient: bool
+    context: bpy.types.Context,
+    collected: Collected,
+    chosen: set[str],
+    settings: BakeSettings,
+    in_background: bool,
 ) -> Generator[float, None, Export]:
     """Make one scene of all that was collected."""
-    triangles = yield from elsewhere(lambda: _triangles(collected.pieces, chosen, settings), patient)
+    triangles = yield from elsewhere(lambda: _triangles(collected.pieces, chosen, settings), in_background)
     if not triangles.area_to_bake:
         raise SceneError(_nothing_to_bake(context))
     images = yield from evaluate_surfaces(
@@ -200,10 +204,12 @@ def _assemble(
         collected.surfaces,
         collected.materials,
         settings,
-        patient,
+        in_background,
     )
     name = context.scene.name
-    return (yield from elsewhere(lambda: _export(name, collected, triangles, images, settings), patient))
+    return (
+        yield from elsewhere(lambda: _export(name, collected, triangles, images, settings), in_background)
+    )
 
 
 def _export(

@@ -64,9 +64,9 @@ def in_thread(steps: Generator[T, None, R]) -> Generator[T | None, None, R]:
         thread.shutdown(wait=False)
 
 
-def elsewhere(work: Callable[[], R], patient: bool) -> Generator[float, None, R]:
+def elsewhere(work: Callable[[], R], in_background: bool) -> Generator[float, None, R]:
     """Do work on plain arrays: in a thread, with a step now and then, if somebody waits, else at once."""
-    if not patient:
+    if not in_background:
         return work()
     steps = in_thread(_once(work))
     try:

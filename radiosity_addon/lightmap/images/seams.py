@@ -233,4 +233,4 @@ def _open(geometry: TexelGeometry, caster: RayCaster, numbers: Array, weight: Ar
     at = at + lift[:, None, None] * normal
     along = at[:, 1] - at[:, 0]
     length = np.linalg.norm(along, axis=1)
-    return np.asarray(caster.visible(at[:, 0], along / np.maximum(length, 1e-300)[:, None], length))
+    return np.asarray(caster.unoccluded(at[:, 0], along / np.maximum(length, 1e-300)[:, None], length))

@@ -9,29 +9,29 @@ from .accuracy import light_within
 from .error_picture import summary, texel_residual
 from .gather_links import StoredLinks
 from .gather_settings import GatherSettings
-from .part_links import HitNumbers, KnownParts, PartLinks, Parts, gather_parts, lit_footprints
+from .part_links import HitNumbers, PartHits, PartLinks, Parts, gather_parts, lit_footprints
 from .partial_light import LightSoFar
 from .reconstruction import STARTS, gather_at, gather_footprints, on_lattice, reconstruct, resolver, sample_of
 from .relight_texels import kept_bytes, relight_steps
 from .sweeps import LitTexels, TexelLight, TexelTransport, sweep_steps
-from .traced_texels import KeptPoints, TracedTexels
+from .traced_texels import GatherPointLayout, LightingRecord
 from .warm_start import EarlierLight
 
 __all__ = [
     "STARTS",
     "EarlierLight",
+    "GatherPointLayout",
     "GatherSettings",
     "HitNumbers",
-    "KeptPoints",
-    "KnownParts",
     "LightSoFar",
+    "LightingRecord",
     "LitTexels",
+    "PartHits",
     "PartLinks",
     "Parts",
     "StoredLinks",
     "TexelLight",
     "TexelTransport",
-    "TracedTexels",
     "gather_at",
     "gather_footprints",
     "gather_parts",

@@ -107,7 +107,7 @@ class HitNumbers:
 
 
 @dataclass(frozen=True)
-class KnownParts:
+class PartHits:
     """Parts of one kind that have looked already.
 
     Attributes
@@ -137,10 +137,10 @@ class KnownParts:
         """Of each to every lamp."""
         return SHADOW_RAYS * self.rays // RAYS
 
-    def take(self, chosen: Array) -> KnownParts:
+    def take(self, chosen: Array) -> PartHits:
         """Return those of some parts, row numbers or a mask."""
         gains = None if self.gains is None else self.gains.take(chosen)
-        return KnownParts(self.is_leaf, self.part[chosen], self.sources[chosen], gains)
+        return PartHits(self.is_leaf, self.part[chosen], self.sources[chosen], gains)
 
 
 def gather_parts(
@@ -149,7 +149,7 @@ def gather_parts(
     resolve: Resolver,
     element: Array,
     reflectance: Array,
-    known: Sequence[KnownParts] = (),
+    known: Sequence[PartHits] = (),
 ) -> Generator[float, None, tuple[StoredLinks, Parts]]:
     """Look from the parts that links met, and from those that these met; yields the fraction done.
 
@@ -162,7 +162,7 @@ def gather_parts(
         Of the texels: the leaf elements below them, or NOTHING.
     reflectance : (n, 3)
         Theirs.
-    known : sequence of KnownParts
+    known : sequence of PartHits
         Those that need not be asked. Those that nothing meets are left out.
 
     Returns
@@ -185,7 +185,7 @@ def gather_parts(
     return links, Parts(start, made, of, gathering.small)
 
 
-def lit_footprints(numbers: HitNumbers, parts: KnownParts) -> Footprints:
+def lit_footprints(numbers: HitNumbers, parts: PartHits) -> Footprints:
     """Return where parts ask for lamps' light."""
     if parts.is_leaf:
         return numbers.local.lit_parts(parts.part)
@@ -199,15 +199,15 @@ class _Gathering:
     ----------
     numbers : HitNumbers
     resolve : callable
-    known : sequence of KnownParts
+    known : sequence of PartHits
     """
 
-    def __init__(self, numbers: HitNumbers, resolve: Resolver, known: Sequence[KnownParts] = ()) -> None:
+    def __init__(self, numbers: HitNumbers, resolve: Resolver, known: Sequence[PartHits] = ()) -> None:
         self._numbers, self._resolve = numbers, resolve
         self._local, self._cells = numbers.local, numbers.cells
         self._met = np.zeros(numbers.end - numbers.texel_count, dtype=np.int32)
         self._asked = np.zeros(len(self._met), dtype=bool)
-        self._found: list[KnownParts] = []
+        self._found: list[PartHits] = []
         self._known = [(some, np.zeros(len(some.part), dtype=bool)) for some in known]
 
     def count(self, sources: Array) -> None:
@@ -247,7 +247,7 @@ class _Gathering:
             steps = self._gather(is_leaf, rays, part)
             sources = yield from scaled(steps, turn / len(groups), (turn + 1) / len(groups))
             self.count(sources)
-            self._found.append(KnownParts(is_leaf, part, sources))
+            self._found.append(PartHits(is_leaf, part, sources))
 
     def _gather(self, is_leaf: bool, rays: int, part: Array) -> Generator[float, None, Array]:
         if is_leaf:

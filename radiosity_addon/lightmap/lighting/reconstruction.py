@@ -37,7 +37,7 @@ from .gather_settings import GatherSettings
 from .part_links import HitNumbers, gather_parts
 from .partial_light import LightSoFar
 from .sweeps import LitTexels, TexelLight, TexelTransport, sweep_steps
-from .traced_texels import KeptPoints, TracedTexels
+from .traced_texels import GatherPointLayout, LightingRecord
 from .warm_start import EarlierLight
 
 DIRECT, CROSSED, GATHERED, PARTS = 0.25, 0.3, 0.8, 0.9
@@ -86,7 +86,7 @@ def reconstruct(
     met = None if so_far is None else partial(so_far.met, numbers)
     stored = gather_texels(local, geometry, settings, crossings, resolve, met)
     links, points = yield from scaled(stored, CROSSED, GATHERED)
-    chosen = KeptPoints.of(points) if gains is not None else None
+    chosen = GatherPointLayout.of(points) if gains is not None else None
     # How points are found takes more than what they met says.
     del points, stored
     further = gather_parts(numbers, links, resolve, element, reflectance)
@@ -107,7 +107,7 @@ def reconstruct(
         return light
     earlier = EarlierLight(local.sources.strengths, light.table)
     lit = LitTexels(transport, gains, element, *limits, earlier)
-    traced = TracedTexels(settings, crossings, numbers, chosen, parts.small, local.bright, light.error)
+    traced = LightingRecord(settings, crossings, numbers, chosen, parts.small, local.bright, light.error)
     return replace(light, kept=lit, traced=traced)
 
 

@@ -16,7 +16,7 @@ from ...solver.gather import LightGains
 from .gather_links import StoredLinks
 from .part_links import Parts, PartSweeps
 from .source_means import CHUNK_HITS, Means, by_channel, mean_steps
-from .traced_texels import TracedTexels
+from .traced_texels import LightingRecord
 from .warm_start import EarlierLight
 
 TOLERANCE = 2e-4
@@ -46,7 +46,7 @@ class TexelLight:
         What texels and parts reflected in the end.
     kept : LitTexels or None
         What lights them anew, if it is kept, …
-    traced : TracedTexels or None
+    traced : LightingRecord or None
         … and how they were lit.
     noise : (n,) float32 or None [W/m²]
         What `error` is the mean of: the estimated error of each texel.
@@ -59,7 +59,7 @@ class TexelLight:
     error: float = 0.0
     table: Array | None = None
     kept: LitTexels | None = None
-    traced: TracedTexels | None = None
+    traced: LightingRecord | None = None
     noise: Array | None = None
     state: Array | None = None
 

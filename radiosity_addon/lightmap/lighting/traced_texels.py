@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class KeptPoints:
+class GatherPointLayout:
     """Where g gather points were chosen, level by level (see `GatherPoints`).
 
     Attributes
@@ -33,13 +33,13 @@ class KeptPoints:
     farthest: Array
 
     @staticmethod
-    def of(points: GatherPoints) -> KeptPoints:
+    def of(points: GatherPoints) -> GatherPointLayout:
         """Keep what was chosen."""
-        return KeptPoints(points.texel, points.level, points.closeness, points.farthest)
+        return GatherPointLayout(points.texel, points.level, points.closeness, points.farthest)
 
 
 @dataclass(frozen=True, eq=False)
-class TracedTexels:
+class LightingRecord:
     """How n texels were lit.
 
     Attributes
@@ -48,7 +48,7 @@ class TracedTexels:
     crossings : Crossings
     numbers : HitNumbers
         What hits were numbered by.
-    points : KeptPoints
+    points : GatherPointLayout
         Parallel to the stored links' rows.
     small : (s,) int64
         The parts that the table's last rows are, see `Parts`.
@@ -61,7 +61,7 @@ class TracedTexels:
     settings: GatherSettings
     crossings: Crossings
     numbers: HitNumbers
-    points: KeptPoints
+    points: GatherPointLayout
     small: Array
     bright: Array
     error: float

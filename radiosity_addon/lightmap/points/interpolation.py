@@ -125,7 +125,7 @@ class GatherPoints:
         length = np.sqrt(np.einsum("pk,pk->p", directions, directions))
         directions /= np.maximum(length, 1e-300)[:, None]
         heard = spoken > 0
-        weight[row[heard]] = spoken[heard] * self._caster.visible(
+        weight[row[heard]] = spoken[heard] * self._caster.unoccluded(
             begin[heard], directions[heard], length[heard]
         )
         return np.asarray(weight)

@@ -9,19 +9,19 @@ from .cells import TexelCells
 from .nearest_uncut import whole_neighbour
 from .occlusion import LIFT, Crossings, below_hood, crossing_steps
 from .rasterize import FOOTPRINT, coverage_sum, overlapping_pairs, rasterise
-from .states import DIVIDED, HOODED, NO_TEXEL_HERE, SHUT_IN, TOUCHED
+from .states import DIVIDED, ENCLOSED, NO_TEXEL_HERE, OCCLUDED, TOUCHED
 from .surface_materials import texel_materials
 from .terminator import SmoothLift
 from .texel_geometry import NO_TEXEL, TexelGeometry
 
 __all__ = [
     "DIVIDED",
+    "ENCLOSED",
     "FOOTPRINT",
-    "HOODED",
     "LIFT",
     "NO_TEXEL",
     "NO_TEXEL_HERE",
-    "SHUT_IN",
+    "OCCLUDED",
     "TOUCHED",
     "Crossings",
     "SmoothLift",

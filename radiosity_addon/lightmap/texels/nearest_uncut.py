@@ -43,7 +43,7 @@ def whole_neighbour(
         near = numbers[np.clip(row, 0, last), np.clip(column, 0, last)]
         around[mine] = np.where(inside, near, NO_TEXEL)
     whole = (around != NO_TEXEL) & ~crossings.crossed[around]
-    whole &= crossings.hooded[around] == below[:, None]
+    whole &= crossings.occluded[around] == below[:, None]
     normal = geometry.surface_normal[texel]
     along = geometry.position[around] - position[:, None]
     distance = np.linalg.norm(along, axis=2)

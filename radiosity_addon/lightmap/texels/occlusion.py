@@ -20,7 +20,7 @@ import numpy as np
 from ...numerics import Array, chunk_steps, row_numbers
 from ...rays import RayCaster
 from .clearance import clear_texels
-from .states import DIVIDED, HOODED, TOUCHED
+from .states import DIVIDED, OCCLUDED, TOUCHED
 from .texel_geometry import TexelGeometry
 
 CHUNK = 1 << 14
@@ -55,14 +55,14 @@ class Crossings:
     cut : geometry stands on them
     touched : they end at geometry; neither cut nor at a rim
     rim : a hood's rim is above them
-    hooded : all of them is below a hood; neither cut nor at a rim
+    occluded : all of them is below a hood; neither cut nor at a rim
     """
 
     geometry: TexelGeometry
     cut: Array
     touched: Array
     rim: Array
-    hooded: Array
+    occluded: Array
 
     @cached_property
     def crossed(self) -> Array:
@@ -74,14 +74,14 @@ class Crossings:
         """(n,) uint8: see `TEXEL_STATES`."""
         state = np.zeros(len(self.cut), dtype=np.uint8)
         # The last one that holds counts.
-        for of, value in ((self.touched, TOUCHED), (self.hooded, HOODED), (self.crossed, DIVIDED)):
+        for of, value in ((self.touched, TOUCHED), (self.occluded, OCCLUDED), (self.crossed, DIVIDED)):
             state[of] = value
         return state
 
     @cached_property
     def alone(self) -> Array:
         """Texels whose light is like no neighbour's, though a line of sight may join them."""
-        return self.crossed | self.hooded
+        return self.crossed | self.occluded
 
     @cached_property
     def beside(self) -> Array:
@@ -105,7 +105,7 @@ def crossing_steps(
         clear = clear_texels(geometry, OUTSET, HOOD, LIFT * caster.surface_offset, threads)
         doubted = row_numbers(~clear)
     else:
-        were = (before.cut, before.touched, before.rim, before.hooded)
+        were = (before.cut, before.touched, before.rim, before.occluded)
         result, doubted = Crossings(geometry, *(flags.copy() for flags in were)), anew
 
     def find(part: slice) -> None:
@@ -128,7 +128,7 @@ def crossing_steps(
         spots = geometry.sample(rows, np.broadcast_to(_SPOTS, (len(rows), *_SPOTS.shape)), 1.0)
         below = below_hood(geometry, caster, rows, spots)
         result.rim[rows] = below.any(axis=1) & ~below.all(axis=1)
-        result.hooded[rows] = below.all(axis=1) & ~cut
+        result.occluded[rows] = below.all(axis=1) & ~cut
         result.cut[rows], result.touched[rows] = cut, doubtful & ~cut & ~result.rim[rows]
 
     yield from chunk_steps(find, len(doubted), CHUNK, threads)
@@ -143,7 +143,7 @@ def below_hood(geometry: TexelGeometry, caster: RayCaster, texel: Array, spots: 
     height = np.maximum(HOOD * width, 2.0 * lift)
     probes = np.broadcast_to(normal[:, None], spots.shape).reshape(-1, 3)
     start = (spots + lift * normal[:, None]).reshape(-1, 3)
-    free = caster.visible(start, probes, np.repeat(height - lift, spots.shape[1]))
+    free = caster.unoccluded(start, probes, np.repeat(height - lift, spots.shape[1]))
     return np.asarray(~free.reshape(spots.shape[:2]))
 
 
@@ -157,5 +157,5 @@ def _free(caster: RayCaster, start: Array, end: Array) -> Array:
     along = (end - start).reshape(-1, 3)
     length = np.linalg.norm(along, axis=1)
     directions = along / np.maximum(length, 1e-300)[:, None]
-    free = caster.visible(start.reshape(-1, 3), directions, length)
+    free = caster.unoccluded(start.reshape(-1, 3), directions, length)
     return free.reshape(start.shape[:2])

@@ -5,11 +5,11 @@ Everything else keeps what its rays met.
 
 from __future__ import annotations
 
-from .affected import Disturbance
-from .moved import LitBefore, moved_steps
+from .affected import AffectedTexels
+from .moved import PreviousLight, moved_steps
 
 __all__ = [
-    "Disturbance",
-    "LitBefore",
+    "AffectedTexels",
+    "PreviousLight",
     "moved_steps",
 ]

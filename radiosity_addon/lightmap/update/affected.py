@@ -13,7 +13,7 @@ import numpy as np
 from ...numerics import Array
 from ...rays import EmbreeCaster, RayCaster
 from ...solver.gather import STALE, Boxes, Moved
-from ..lighting import HitNumbers, TracedTexels
+from ..lighting import HitNumbers, LightingRecord
 from ..texels import LIFT, Crossings, SmoothLift, TexelGeometry
 
 NEAR = 1.5
@@ -24,7 +24,7 @@ MARGIN = 4.0
 
 
 @dataclass(frozen=True, eq=False)
-class Disturbance:
+class AffectedTexels:
     """Some triangles moved.
 
     Attributes
@@ -43,13 +43,15 @@ class Disturbance:
     boxes: Boxes
 
     @staticmethod
-    def of(before: TexelGeometry, geometry: TexelGeometry, parts: list[Array], offset: float) -> Disturbance:
+    def of(
+        before: TexelGeometry, geometry: TexelGeometry, parts: list[Array], offset: float
+    ) -> AffectedTexels:
         """Compare texels; `parts` are the rows of the triangles of each object that moved."""
         moved = np.zeros(len(geometry.triangles), dtype=bool)
         for rows in parts:
             moved[rows] = True
         places = [triangles[rows] for rows in parts for triangles in (before.triangles, geometry.triangles)]
-        return Disturbance(before, geometry, moved, Boxes.around(places, MARGIN * offset))
+        return AffectedTexels(before, geometry, moved, Boxes.around(places, MARGIN * offset))
 
     @cached_property
     def texels(self) -> Array:
@@ -79,10 +81,10 @@ class Disturbance:
 
     def divided(self, one: Crossings, other: Crossings) -> Array:
         """Return (n,) bool: texels that something divides or touches before or after, and that may differ."""
-        split = one.crossed | one.touched | one.hooded | other.crossed | other.touched | other.hooded
+        split = one.crossed | one.touched | one.occluded | other.crossed | other.touched | other.occluded
         return np.asarray(self.near & ~self.texels & split)
 
-    def renumbered(self, traced: TracedTexels, numbers: HitNumbers, divided: Array) -> Array:
+    def renumbered(self, traced: LightingRecord, numbers: HitNumbers, divided: Array) -> Array:
         """Return (numbers,) int32: what each hit of before is numbered now, or STALE.
 
         Stale is what moved, what is beside it, and parts of leaves that it may cut.

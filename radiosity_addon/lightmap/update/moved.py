@@ -17,21 +17,21 @@ from ...numerics import Array
 from ...solver.gather import LocalPass, values_of
 from ..lighting import (
     EarlierLight,
+    GatherPointLayout,
     HitNumbers,
-    KeptPoints,
-    KnownParts,
+    LightingRecord,
     LitTexels,
+    PartHits,
     Parts,
     StoredLinks,
     TexelLight,
     TexelTransport,
-    TracedTexels,
     gather_parts,
     resolver,
     sweep_steps,
 )
 from ..texels import TexelCells, crossing_steps
-from .affected import Disturbance
+from .affected import AffectedTexels
 from .moved_light import texel_gains
 from .moved_parts import known_parts, look_again, renumbered
 from .moved_points import MovedPoints
@@ -41,34 +41,34 @@ DIRECT, CROSSED, GATHERED, PARTS = 0.2, 0.25, 0.65, 0.85
 
 
 @dataclass(frozen=True, eq=False)
-class LitBefore:
+class PreviousLight:
     """A scene's texels before something moved.
 
     Attributes
     ----------
     lit : LitTexels
-    traced : TracedTexels
+    traced : LightingRecord
     local : LocalPass
         Of the scene as it was.
     """
 
     lit: LitTexels
-    traced: TracedTexels
+    traced: LightingRecord
     local: LocalPass
 
 
 def moved_steps(
-    before: LitBefore, local: LocalPass, disturbance: Disturbance
+    before: PreviousLight, local: LocalPass, affected: AffectedTexels
 ) -> Generator[float, None, tuple[TexelLight, LocalPass]]:
     """Light the texels of a scene in which something moved; yields the fraction done.
 
     Parameters
     ----------
-    before : LitBefore
+    before : PreviousLight
     local : LocalPass
         Of the scene as it is, by the same elements with the light they had, able to ask for every light
         apart.
-    disturbance : Disturbance
+    affected : AffectedTexels
 
     Returns
     -------
@@ -76,30 +76,30 @@ def moved_steps(
     local : LocalPass
         With elements that are lit as their texels are.
     """
-    lit, traced, geometry = before.lit, before.traced, disturbance.geometry
-    asked = texel_gains(lit.gains, local, before.local, disturbance)
+    lit, traced, geometry = before.lit, before.traced, affected.geometry
+    asked = texel_gains(lit.gains, local, before.local, affected)
     gains = yield from scaled(asked, 0.0, DIRECT)
     direct = local.lit_by(gains)
     more = direct - local.lit_by(lit.gains)
     local = _brightened(local, lit.element, more)
-    near = np.flatnonzero(disturbance.near)
+    near = np.flatnonzero(affected.near)
     found = crossing_steps(geometry, local.caster, local.threads, traced.crossings, near)
     crossings = yield from scaled(found, DIRECT, CROSSED)
     numbers = HitNumbers(local, TexelCells(local, geometry, crossings), len(geometry))
     resolve = resolver(geometry, crossings, numbers)
-    divided = disturbance.divided(traced.crossings, crossings)
-    now = disturbance.renumbered(traced, numbers, divided)
+    divided = affected.divided(traced.crossings, crossings)
+    now = affected.renumbered(traced, numbers, divided)
 
-    where = local, before.local, disturbance, traced.settings, crossings, divided, resolve
+    where = local, before.local, affected, traced.settings, crossings, divided, resolve
     bright = traced.bright | local.bright
     stored = MovedPoints(*where, bright).steps(_renumbered(lit.transport.links, traced, now), traced.points)
     links, points = yield from scaled(stored, CROSSED, GATHERED)
 
-    known: list[KnownParts] = []
+    known: list[PartHits] = []
     kept = known_parts(lit.transport.parts.links, traced, numbers, now)
     at, width = GATHERED, (PARTS - GATHERED) / (len(kept) + 1)
     for some in kept:
-        again = look_again(some, numbers, before.local, disturbance, resolve)
+        again = look_again(some, numbers, before.local, affected, resolve)
         known.append((yield from scaled(again, at, at + width)))
         at += width
     reflectance = lit.transport.reflectance
@@ -107,8 +107,8 @@ def moved_steps(
     links, parts = yield from scaled(further, at, PARTS)
 
     transport = TexelTransport(links, parts, reflectance)
-    chosen, error = KeptPoints.of(points), traced.error
-    traced = TracedTexels(traced.settings, crossings, numbers, chosen, parts.small, bright, error)
+    chosen, error = GatherPointLayout.of(points), traced.error
+    traced = LightingRecord(traced.settings, crossings, numbers, chosen, parts.small, bright, error)
     start = _start(before, traced, local, parts, now)
     of_texels = np.maximum(start[: len(geometry)] + reflectance * more, 0.0)
     transport = replace(transport, parts=replace(parts, start=start[len(geometry) :]))
@@ -123,7 +123,7 @@ def moved_steps(
     return light, _lit_as(local, lit.element, light)
 
 
-def _renumbered(links: StoredLinks, traced: TracedTexels, now: Array) -> StoredLinks:
+def _renumbered(links: StoredLinks, traced: LightingRecord, now: Array) -> StoredLinks:
     """Return stored links with sources as hits are numbered now."""
     aimed = replace(links.aimed, sources=renumbered(traced.numbered(links.aimed.sources), now))
     return replace(links, sources=renumbered(traced.numbered(links.sources), now), aimed=aimed)
@@ -149,7 +149,9 @@ def _means(local: LocalPass, element: Array, values: Array) -> tuple[Array, Arra
     return np.stack(sums, axis=1) / np.maximum(count, 1)[:, None], count
 
 
-def _start(before: LitBefore, traced: TracedTexels, local: LocalPass, parts: Parts, now: Array) -> Array:
+def _start(
+    before: PreviousLight, traced: LightingRecord, local: LocalPass, parts: Parts, now: Array
+) -> Array:
     """Return (rows, 3) what surfaces reflect to start with: what they did, or what the hierarchy says."""
     element = np.concatenate([before.lit.element, parts.element])
     start = values_of(local.reflected(), element)

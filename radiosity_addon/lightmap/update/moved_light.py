@@ -9,13 +9,13 @@ import numpy as np
 
 from ...base import scaled
 from ...numerics import Array
-from ...solver.gather import AskedLight, Boxes, Footprints, LightGains, LocalPass
-from ..lighting import HitNumbers, KnownParts, lit_footprints, sample_of
+from ...solver.gather import Boxes, Footprints, LightGains, LightQuery, LocalPass
+from ..lighting import HitNumbers, PartHits, lit_footprints, sample_of
 from ..texels import SmoothLift, TexelGeometry
-from .affected import Disturbance
+from .affected import AffectedTexels
 
 
-def changed_lights(local: LocalPass, before: LocalPass) -> list[tuple[AskedLight, bool]]:
+def changed_lights(local: LocalPass, before: LocalPass) -> list[tuple[LightQuery, bool]]:
     """Pair the lights that shine on points with whether they themselves moved."""
     old = {asked.number: asked.light for asked in before.lights()}
     result = []
@@ -27,16 +27,16 @@ def changed_lights(local: LocalPass, before: LocalPass) -> list[tuple[AskedLight
 
 
 def texel_gains(
-    kept: LightGains, local: LocalPass, before: LocalPass, disturbance: Disturbance
+    kept: LightGains, local: LocalPass, before: LocalPass, affected: AffectedTexels
 ) -> Generator[float, None, LightGains]:
     """Ask for every light where it may have changed; yields the fraction done."""
-    geometry, lights = disturbance.geometry, changed_lights(local, before)
+    geometry, lights = affected.geometry, changed_lights(local, before)
     gains = LightGains(len(geometry))
     lift = SmoothLift(geometry)
     for done, (asked, moved) in enumerate(lights):
         gain = kept.of(asked.number)
-        touched = disturbance.texels.copy()
-        touched |= moved | disturbance.boxes.between(geometry.position, asked.light, disturbance.widen)
+        touched = affected.texels.copy()
+        touched |= moved | affected.boxes.between(geometry.position, asked.light, affected.widen)
         # One texel more: a penumbra is followed from neighbour to neighbour.
         around = np.flatnonzero(geometry.neighbourhood(touched))
         steps = local.gain_steps(asked, _footprints(geometry, around, lift))
@@ -48,7 +48,7 @@ def texel_gains(
 
 
 def part_gains(
-    parts: KnownParts, numbers: HitNumbers, before: LocalPass, boxes: Boxes, at: Array, widen: Array
+    parts: PartHits, numbers: HitNumbers, before: LocalPass, boxes: Boxes, at: Array, widen: Array
 ) -> Generator[float, None, LightGains]:
     """Ask for every light at those parts, at (p, 3) anchors, where it may have changed."""
     assert parts.gains is not None  # kept parts keep them
@@ -58,7 +58,7 @@ def part_gains(
     for done, (asked, moved) in enumerate(lights):
         gain = parts.gains.of(asked.number)
         rows = np.flatnonzero(moved | boxes.between(at, asked.light, widen))
-        some = KnownParts(parts.is_leaf, parts.part[rows], parts.sources[rows])
+        some = PartHits(parts.is_leaf, parts.part[rows], parts.sources[rows])
         steps = local.gain_steps(asked, lit_footprints(numbers, some), some.shadow_rays)
         gain[rows] = yield from scaled(steps, done / len(lights), (done + 1) / len(lights))
         gains.put(asked.number, gain)

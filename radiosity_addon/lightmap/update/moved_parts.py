@@ -9,26 +9,26 @@ import numpy as np
 from ...base import scaled
 from ...numerics import Array
 from ...solver.gather import STALE, AimedRays, Before, Gathered, LightGains, LocalPass, Resolver
-from ..lighting import HitNumbers, KnownParts, PartLinks, TracedTexels
-from .affected import Disturbance
+from ..lighting import HitNumbers, LightingRecord, PartHits, PartLinks
+from .affected import AffectedTexels
 from .moved_light import part_gains
 
 
 def known_parts(
-    links: Sequence[PartLinks], traced: TracedTexels, numbers: HitNumbers, now: Array
-) -> list[KnownParts]:
+    links: Sequence[PartLinks], traced: LightingRecord, numbers: HitNumbers, now: Array
+) -> list[PartHits]:
     """Return the parts that still stand, those of one kind together.
 
     Parameters
     ----------
-    traced : TracedTexels
+    traced : LightingRecord
         How they were found.
     numbers : HitNumbers
         What hits are numbered by now, …
     now : (numbers,) int32
         … by what they were before; STALE for what does not stand any more.
     """
-    kinds: dict[tuple[bool, int], list[KnownParts]] = {}
+    kinds: dict[tuple[bool, int], list[PartHits]] = {}
     count = numbers.texel_count
     for some in links:
         part = now[traced.numbered(some.rows)]
@@ -37,15 +37,15 @@ def known_parts(
         is_leaf = part[stays] < numbers.first_cell
         gains = None if some.gains is None else some.gains.take(stays)
         assert is_leaf.all() or not is_leaf.any()  # links are of one kind
-        kept = KnownParts(bool(is_leaf.any()), part[stays] - count, sources, gains)
+        kept = PartHits(bool(is_leaf.any()), part[stays] - count, sources, gains)
         if len(kept.part):
             kinds.setdefault((kept.is_leaf, kept.rays), []).append(kept)
     return [_joined(of_kind) for of_kind in kinds.values()]
 
 
-def _joined(parts: list[KnownParts]) -> KnownParts:
+def _joined(parts: list[PartHits]) -> PartHits:
     gains = [some.gains for some in parts if some.gains is not None]
-    return KnownParts(
+    return PartHits(
         parts[0].is_leaf,
         np.concatenate([some.part for some in parts]),
         np.concatenate([some.sources for some in parts]),
@@ -59,8 +59,8 @@ def renumbered(sources: Array, now: Array) -> Array:
 
 
 def look_again(
-    parts: KnownParts, numbers: HitNumbers, before: LocalPass, disturbance: Disturbance, resolve: Resolver
-) -> Generator[float, None, KnownParts]:
+    parts: PartHits, numbers: HitNumbers, before: LocalPass, affected: AffectedTexels, resolve: Resolver
+) -> Generator[float, None, PartHits]:
     """Trace again what is touched of the rays of parts, and of those to lamps; yields the fraction done."""
     local = numbers.local
     if parts.is_leaf:
@@ -69,18 +69,18 @@ def look_again(
     else:
         cell = numbers.cell(parts.part)
         at, upright = numbers.cells.footprints(cell), numbers.cells.upright(cell)
-        widen = disturbance.widen[numbers.cells.texel_of(cell)]
+        widen = affected.widen[numbers.cells.texel_of(cell)]
     nowhere = np.zeros((0, 1, 3))
     # Parts speak for nobody: how close things are to them is not asked.
     unasked = np.full(len(parts.part), np.inf)
     gathered = Gathered(parts.sources, unasked, AimedRays.none())
     aimed = (
         np.zeros(local.hierarchy.n_elements, dtype=bool),
-        np.zeros(len(disturbance.moved), dtype=bool),
+        np.zeros(len(affected.moved), dtype=bool),
     )
-    moved = disturbance.traced(before.caster)
+    moved = affected.traced(before.caster)
     earlier = Before(gathered, (nowhere, nowhere), moved, widen, *aimed)
     found = yield from scaled(local.regather_steps(at, upright, resolve, earlier), 0.0, 0.6)
-    asked = part_gains(parts, numbers, before, disturbance.boxes, at.points, widen)
+    asked = part_gains(parts, numbers, before, affected.boxes, at.points, widen)
     gains = yield from scaled(asked, 0.6, 1.0)
-    return KnownParts(parts.is_leaf, parts.part, found.sources, gains)
+    return PartHits(parts.is_leaf, parts.part, found.sources, gains)

@@ -17,8 +17,8 @@ from ...numerics import Array, row_numbers
 from ...solver.gather import AimedRays, Before, Gathered, LocalPass, Resolver
 from ..lighting import (
     STARTS,
+    GatherPointLayout,
     GatherSettings,
-    KeptPoints,
     StoredLinks,
     gather_at,
     gather_footprints,
@@ -26,7 +26,7 @@ from ..lighting import (
 )
 from ..points import LIFT, SAGITTA, GatherPoints, Interpolation, refit
 from ..texels import Crossings
-from .affected import Disturbance
+from .affected import AffectedTexels
 
 CLOSER = 1.05
 """Points that see things closer by more than this factor speak for fewer texels than before."""
@@ -45,11 +45,11 @@ class MovedPoints:
     ----------
     local, before : LocalPass
         Of the scene as it is, and was.
-    disturbance : Disturbance
+    affected : AffectedTexels
     settings : GatherSettings
     crossings : Crossings
     divided : (n,) bool
-        See `Disturbance.divided`.
+        See `AffectedTexels.divided`.
     resolve : callable
     bright : (e,) bool
         Elements that rays are or were aimed at.
@@ -59,21 +59,21 @@ class MovedPoints:
         self,
         local: LocalPass,
         before: LocalPass,
-        disturbance: Disturbance,
+        affected: AffectedTexels,
         settings: GatherSettings,
         crossings: Crossings,
         divided: Array,
         resolve: Resolver,
         bright: Array,
     ) -> None:
-        self._local, self._before, self._disturbance = local, before, disturbance
-        self._moved = disturbance.traced(before.caster)
+        self._local, self._before, self._disturbance = local, before, affected
+        self._moved = affected.traced(before.caster)
         self._settings, self._crossings, self._resolve = settings, crossings, resolve
         self._divided, self._bright = divided, bright
-        self._geometry = disturbance.geometry
+        self._geometry = affected.geometry
 
     def steps(
-        self, links: StoredLinks, points: KeptPoints
+        self, links: StoredLinks, points: GatherPointLayout
     ) -> Generator[float, None, tuple[StoredLinks, GatherPoints]]:
         """Gather where it is needed; yields the fraction done.
 
@@ -81,7 +81,7 @@ class MovedPoints:
         ----------
         links : StoredLinks
             Of before, sources numbered as they are now, or STALE.
-        points : KeptPoints
+        points : GatherPointLayout
             Of before.
         """
         stays = ~(self._disturbance.texels | self._divided)[points.texel]
@@ -96,7 +96,9 @@ class MovedPoints:
         yield 1.0
         return StoredLinks(found.sources, spread, found.aimed), new
 
-    def _again(self, links: StoredLinks, points: KeptPoints, rows: Array) -> Generator[float, None, Gathered]:
+    def _again(
+        self, links: StoredLinks, points: GatherPointLayout, rows: Array
+    ) -> Generator[float, None, Gathered]:
         """Trace again what is touched of the rays of some points; yields the fraction done."""
         sources, closeness = links.sources[rows], points.closeness[rows].copy()
         aimed: list[AimedRays] = []
@@ -132,7 +134,7 @@ class MovedPoints:
         upright = geometry.surface_normal[texel]
         return (yield from local.regather_steps(at, upright, self._resolve, earlier, expected))
 
-    def _doubted(self, spread: Interpolation, points: KeptPoints, closer: Array) -> Array:
+    def _doubted(self, spread: Interpolation, points: GatherPointLayout, closer: Array) -> Array:
         """Return (n,) bool: the texels whose points are to be weighed again."""
         geometry, moved = self._geometry, self._disturbance
         doubted = moved.texels | geometry.neighbourhood(self._divided) | spread.any_of(closer)
@@ -154,7 +156,7 @@ class MovedPoints:
         return np.asarray(doubted)
 
     def _choose(
-        self, points: KeptPoints, rows: Array, kept: Gathered, doubted: Array
+        self, points: GatherPointLayout, rows: Array, kept: Gathered, doubted: Array
     ) -> Generator[float, None, tuple[Gathered, GatherPoints, Array]]:
         """Add points among the doubted texels, level by level; yields the fraction done.
 

@@ -138,7 +138,7 @@ class Arrivals:
             directions = to_world(cosine_hemisphere(unit).reshape(-1, 1, 3), normals)[:, 0]
             start = points.reshape(-1, 3) + self._caster.surface_offset * normals
             if has_black_backs:
-                hits = self._caster.first_hits(start, directions)
+                hits = self._caster.intersect(start, directions)
                 missed = hits.triangle < 0
                 lost = missed | (faces.of_triangle[(~hits.front).astype(np.int8), hits.triangle] < 0)
             else:

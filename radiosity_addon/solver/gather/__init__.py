@@ -10,7 +10,7 @@ from .bright_patches import AimedRays
 from .final_gather import NOTHING, Gathered, Resolver
 from .footprints import Footprints
 from .light_gains import LightGains
-from .local_pass import AskedLight, LocalPass, values_of
+from .local_pass import LightQuery, LocalPass, values_of
 from .residual import Residual
 from .retracing import STALE, Before, Moved
 
@@ -18,12 +18,12 @@ __all__ = [
     "NOTHING",
     "STALE",
     "AimedRays",
-    "AskedLight",
     "Before",
     "Boxes",
     "Footprints",
     "Gathered",
     "LightGains",
+    "LightQuery",
     "LocalPass",
     "Moved",
     "Residual",

@@ -204,10 +204,10 @@ class Gathering:
         """
         moved, before = casters
         start = self._starts_of(rows, ray)
-        missed = moved.visible(start, directions, np.full(len(rows), np.inf))
+        missed = moved.unoccluded(start, directions, np.full(len(rows), np.inf))
         asked = np.flatnonzero(~missed | stale)
         start, along = start[asked], directions[asked]
-        hits, old = self._caster.first_hits(start, along), before.first_hits(start, along)
+        hits, old = self._caster.intersect(start, along), before.intersect(start, along)
         same = (hits.triangle == old.triangle) & (hits.front == old.front) & ~stale[asked]
         same &= (np.abs(hits.barycentric - old.barycentric) < SAME_PLACE).all(axis=1)
         other = np.flatnonzero(~same)
@@ -224,7 +224,7 @@ class Gathering:
         rays = self._rays
         directions, upward = self.directions(rows)
         start = self._starts(rows, rays, self._seed + 4)
-        hits = self._caster.first_hits(start.reshape(-1, 3), directions.reshape(-1, 3))
+        hits = self._caster.intersect(start.reshape(-1, 3), directions.reshape(-1, 3))
         found = self._found(hits, directions.reshape(-1, 3)).reshape(len(rows), rays)
         found[~upward] = NOTHING
         if bright is not None and shares is not None:
@@ -253,7 +253,7 @@ class Gathering:
         start = self._starts(rows, count, self._seed + 6)
         unit = stratified_square(self._at.keys[rows], count, self._seed + 5)
         aim = bright.aim(start, self._at.normals[rows], shares, unit)
-        hits = self._caster.first_hits(start[aim.row].reshape(-1, 3), aim.directions.reshape(-1, 3))
+        hits = self._caster.intersect(start[aim.row].reshape(-1, 3), aim.directions.reshape(-1, 3))
         arrived = self._leaves_of(hits) == aim.element.ravel()
         arrived &= np.einsum("nrk,nk->nr", aim.directions, self._surface_normals[rows[aim.row]]).ravel() > 0
         sources = np.full(len(arrived), NOTHING, dtype=np.int32)

@@ -36,7 +36,7 @@ NEAR = 0.05
 
 
 @dataclass(frozen=True)
-class AskedLight:
+class LightQuery:
     """A lamp or emissive group, its number among `LightGains`, and what places its shadow rays."""
 
     light: Lamp | EmitterGroup
@@ -132,7 +132,7 @@ class LocalPass:
                 tell()
         return total
 
-    def lights(self, dark: bool = True) -> list[AskedLight]:
+    def lights(self, dark: bool = True) -> list[LightQuery]:
         """Return the lamps, if they are `dark` as well, and the emissive groups that shine on points."""
         lamps = [
             (number, lit)
@@ -140,19 +140,19 @@ class LocalPass:
             if isinstance(lit, Lamp) and (dark or lit.strength.any())
         ]
         first, seed = len(self._state.scene.lights), self._seed
-        asked = [AskedLight(lit, row, seed + 31 + 7 * place) for place, (row, lit) in enumerate(lamps)]
+        asked = [LightQuery(lit, row, seed + 31 + 7 * place) for place, (row, lit) in enumerate(lamps)]
         groups = enumerate(self.emitters)
-        return asked + [AskedLight(lit, first + place, seed + 17 + 7 * place) for place, lit in groups]
+        return asked + [LightQuery(lit, first + place, seed + 17 + 7 * place) for place, lit in groups]
 
     def gain_steps(
-        self, asked: AskedLight, at: Footprints, rays: int | None = None
+        self, asked: LightQuery, at: Footprints, rays: int | None = None
     ) -> Generator[float, None, Array]:
         """Compute (n,) what one light adds per unit of its strength, as if it were the only one."""
         spread = SpreadPoints(replace(at, expected=None), self._seed + 2, self.threads)
         return (yield from self._arriving(asked, spread, rays))
 
     def _arriving(
-        self, asked: AskedLight, spread: SpreadPoints, rays: int | None
+        self, asked: LightQuery, spread: SpreadPoints, rays: int | None
     ) -> Generator[float, None, Array]:
         """Compute (n,) unoccluded irradiance per unit of a light's strength times visibility."""
         light, shadow_rays = asked.light, rays or self._state.settings.shadow_rays

@@ -77,7 +77,7 @@ def _across_faces(hierarchy: Hierarchy, caster: RayCaster, leaf: Array, points: 
     faces = hierarchy.faces
     normal = hierarchy.normal[leaf]
     rise = RISE * caster.surface_offset
-    hits = caster.first_hits(points + rise * normal, -normal)
+    hits = caster.intersect(points + rise * normal, -normal)
     face = faces.of_triangle[(~hits.front).astype(np.int8), hits.triangle]
     level = np.abs(hits.distance - rise) < 0.5 * rise
     found = (hits.triangle >= 0) & (face >= 0) & level
@@ -92,4 +92,4 @@ def _open(hierarchy: Hierarchy, caster: RayCaster, leaf: Array, inside: Array, b
     lift = caster.surface_offset * hierarchy.normal[leaf]
     along = beyond - inside
     distance = np.linalg.norm(along, axis=1)
-    return caster.visible(inside + lift, along / np.maximum(distance, 1e-300)[:, None], distance)
+    return caster.unoccluded(inside + lift, along / np.maximum(distance, 1e-300)[:, None], distance)

@@ -201,5 +201,3 @@ def node_opacity(hierarchy: Hierarchy) -> Array:
         return np.ones(hierarchy.n_clusters + hierarchy.n_elements)
     of_clusters = clusters.average(faces.opacity[:, None], faces.area)[:, 0]
     return np.concatenate([of_clusters, hierarchy.opacity])
-
-

@@ -38,7 +38,7 @@ def is_stopped(light: Light) -> TypeGuard[Emitter]:
 
 def fate(hierarchy: Hierarchy, caster: RayCaster, origins: Array, directions: Array) -> tuple[Array, Array]:
     """Return (n,) whether rays end on a black back, and whether they leave the scene."""
-    hits = caster.first_hits(origins, directions)
+    hits = caster.intersect(origins, directions)
     escaped = hits.triangle < 0
     face = hierarchy.faces.of_triangle[(~hits.front).astype(int), hits.triangle]
     return ~escaped & (face < 0), escaped
@@ -68,7 +68,7 @@ def lost_by_lamp(
 def _off_surfaces(scene: Scene, caster: RayCaster, origins: Array, directions: Array) -> Array:
     """Return (n, 3) where rays of lamps start: a surface that a lamp lies in does not shade it."""
     near = LYING * caster.surface_offset
-    hits = caster.for_lamps.first_hits(origins, directions)
+    hits = caster.for_lamps.intersect(origins, directions)
     height = np.abs(np.einsum("nk,nk->n", directions, scene.face_normals[hits.triangle]))
     met = (hits.triangle != NO_HIT) & (height * np.where(height > 0, hits.distance, 0.0) < near)
     beyond = np.where(met, hits.distance + near, 0.0)
