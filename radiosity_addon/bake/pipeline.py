@@ -159,9 +159,11 @@ def _bake(
         lit = yield from staged(steps, "light", LIGHT, ENCODE, pictures)
         del so_far, pictures
     report = solver_part(solution.final_report(), used_settings(quality.solver), bake_scene.objects)
-    sides = solution.triangle_irradiance, solution.back_irradiance
-    of_light = (*turned_away(baked, bake_scene.scene.areas, *sides), *of_solution(solution, quality.solver))
-    solved = HierarchyReport(report, (*atlas.warnings, *of_light))
+    from_behind = turned_away(
+        baked, bake_scene.scene.areas, fronts=solution.triangle_irradiance, backs=solution.back_irradiance
+    )
+    warnings = (*atlas.warnings, *from_behind, *of_solution(solution, quality.solver))
+    solved = HierarchyReport(report, warnings)
     more = more_of(solution, baked, geometry, lit.light, settings.light)
     return (yield from finish(bake_scene, settings, atlas, geometry, solved, lit, more, seconds))
 
@@ -186,9 +188,20 @@ def finish(
         _check(solved.report, pages)
     kept = None
     if lit.relightable and lit.materials and lit.light is not None and lit.light.kept is not None:
-        lighting = lit.relightable, lit.light.kept
+        reflectance, emission = lit.materials
         moves = None if lit.light.traced is None else IncrementalState(atlas, lit.light.traced, solved)
-        kept = KeptBake(bake_scene, settings, *lighting, geometry, seams, rings, *lit.materials, moves)
+        kept = KeptBake(
+            bake_scene,
+            settings,
+            solved=lit.relightable,
+            lit=lit.light.kept,
+            geometry=geometry,
+            seams=seams,
+            rings=rings,
+            reflectance=reflectance,
+            emission=emission,
+            moves=moves,
+        )
     groups: tuple[LightGroup, ...] = ()
     if kept is not None and are_wanted(bake_scene, settings):
         with timed(seconds, "groups"):
@@ -204,8 +217,19 @@ def finish(
     objects = tuple(
         BakedObject(item, placed.uv, placed.page) for item, placed in zip(baked, atlas.objects, strict=True)
     )
-    told = _told(atlas, pages)
-    return BakeResult(pages, objects, report, warnings, seconds, told, groups, *more), kept
+    light, details = more
+    result = BakeResult(
+        pages,
+        objects,
+        solver=report,
+        warnings=warnings,
+        seconds=seconds,
+        atlas=_told(atlas, pages),
+        groups=groups,
+        light=light,
+        details=details,
+    )
+    return result, kept
 
 
 def baked_objects(bake_scene: BakeScene) -> list[BakeObject]:
@@ -324,18 +348,23 @@ def _texel_values(
         return TexelValues(residual, solution.local_pass.caster)
     relightable = solution.relightable(bake_scene.emitter) if keep else None
     local = solution.local_pass if relightable is None else relightable.local
-    where = bake_scene.scene, local, geometry
     if settings.relative_error is None:
-        light = yield from reconstruct(*where, gather, so_far)
+        light = yield from reconstruct(bake_scene.scene, local, geometry, gather, so_far)
     else:
-        within = settings.relative_error, so_far
-        light = yield from light_within(*where, lambda e: for_error(e).gather, *within)
+        light = yield from light_within(
+            bake_scene.scene,
+            local,
+            geometry,
+            settings_for=lambda error: for_error(error).gather,
+            error=settings.relative_error,
+            so_far=so_far,
+        )
     if not keep:
         # Hits were looked up in it: it is large, and stays in memory.
         light = replace(light, table=None)
-    materials = texel_materials(bake_scene.scene, geometry, FOOTPRINT)
-    values = shown(light, *materials, settings, geometry.scratch)
-    return TexelValues(values, local.caster, light, relightable, materials)
+    reflectance, emission = texel_materials(bake_scene.scene, geometry, FOOTPRINT)
+    values = shown(light, reflectance, emission, settings, geometry.scratch)
+    return TexelValues(values, local.caster, light, relightable, (reflectance, emission))
 
 
 def _seams(

@@ -87,8 +87,8 @@ def bake_moved(
         before = PreviousLight(kept.lit, moves.traced, kept.solved.local)
         steps = moved_steps(before, solved.local, affected)
         light, local = yield from staged(steps, "light", 0.0, LIT)
+    values = shown(light, kept.reflectance, kept.emission, settings, geometry.scratch)
     materials = kept.reflectance, kept.emission
-    values = shown(light, *materials, settings, geometry.scratch)
     lit = TexelValues(values, local.caster, light, replace(solved, local=local), materials)
     report = moves.solved.report
     names = dict.fromkeys([*report.get("moved", ()), *(item.name for item in moved)])

@@ -104,8 +104,12 @@ def _chunk_factors(
         turn[rows] = _closed_turn(corners.take(rows, axis=2), normal.take(rows, axis=1))
     rows = np.flatnonzero(cut)
     if len(rows):
-        picked = (array.take(rows, axis=-1) for array in (corners, heights, normal, area_vector))
-        turn[rows] = _cut_turn(*picked)
+        turn[rows] = _cut_turn(
+            corners.take(rows, axis=-1),
+            heights.take(rows, axis=-1),
+            normal.take(rows, axis=-1),
+            area_vector.take(rows, axis=-1),
+        )
     rows = np.flatnonzero(~off_plane & (area > 0.0) & contact)
     if len(rows):
         facing = area_vector[:, rows] / area[rows]

@@ -99,11 +99,10 @@ class ElementTransport:
         links, scale, received = state.links, None, None
         if state.balance is not None:
             links, scale, received = state.balance.links, state.balance.sent, state.balance.received
-        linked = links, lights, scale, relit.cluster_links, relit.top, received
         least, mixer = emission[leaves], Anderson(area)
         for _ in range(ITERATIONS):
             before = relit.radiosity[leaves]
-            bounce(relit, *linked)
+            bounce(relit, links, lights, scale, relit.cluster_links, relit.top, received)
             if relit.residual < state.settings.tolerance:
                 break
             relit.radiosity[leaves] = np.maximum(mixer.next(before, relit.radiosity[leaves]), least)

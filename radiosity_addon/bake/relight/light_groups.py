@@ -56,7 +56,7 @@ def check_groups(bake_scene: BakeScene, settings: BakeSettings) -> None:
         *(bake_scene.light_groups or ("",) * len(lights)),
         *(bake_scene.emitter_groups or ("",) * len(emitters)),
     )
-    found = {group_of(*of, settings) for of in zip(names, given, strict=True)}
+    found = {group_of(name, own, settings) for name, own in zip(names, given, strict=True)}
     if len(found) > MAX_GROUPS:
         raise UsageError(
             f"{len(found)} light groups are more than the {MAX_GROUPS} that materials can mix: join some"
@@ -159,7 +159,8 @@ def members(
         If a member is no source.
     """
     _check_members(settings, names)
-    label = np.array([group_of(*of, settings) for of in zip(names, of_scene, strict=True)], dtype=object)
+    groups = [group_of(name, own, settings) for name, own in zip(names, of_scene, strict=True)]
+    label = np.array(groups, dtype=object)
     asked = [name for name, _ in settings.groups]
     rest = sorted(set(label) - {*asked, OTHERS})
     found = [(name, label == name) for name in (*asked, *rest)]

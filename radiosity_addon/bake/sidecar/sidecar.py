@@ -133,9 +133,18 @@ class StoredBake:
         scene = copy(bake_scene.scene)
         scene.emission, scene.lights = stored["emission"], stored["solved"].sources.lights
         before = replace(bake_scene, scene=scene, **stored["of_sources"])
-        texels = stored["texel_reflectance"], stored["texel_emission"]
-        solved, laid = stored["solved"], (stored["geometry"], stored["seams"], stored["rings"])
-        return KeptBake(before, self.settings, solved, stored["lit"], *laid, *texels, origin=str(self.path))
+        return KeptBake(
+            before,
+            self.settings,
+            solved=stored["solved"],
+            lit=stored["lit"],
+            geometry=stored["geometry"],
+            seams=stored["seams"],
+            rings=stored["rings"],
+            reflectance=stored["texel_reflectance"],
+            emission=stored["texel_emission"],
+            origin=str(self.path),
+        )
 
     def result(self, bake_scene: BakeScene, pages: tuple[LightmapPage, ...]) -> BakeResult:
         """Return other pages as the result of a bake, laid out as it was."""

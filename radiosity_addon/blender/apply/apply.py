@@ -162,7 +162,9 @@ def _prepare(
         for mesh in evaluated.values():
             mark_made(mesh)
         own = _meshes_of_one_object([source for source, _, stand_in in shown if not stand_in])
-        replacements = [_replacement(*each, evaluated, own) for each in shown]
+        replacements = [
+            _replacement(source, baked, stand_in, evaluated, own) for source, baked, stand_in in shown
+        ]
         with _mixers_aside():
             shares = LightShares(context.scene, images, groups, settings) if groups else None
     return replacements, shares, baked_at

@@ -85,13 +85,31 @@ def _run(
             if settings is not None and request.relight:
                 from .relight_verb import relight
 
-                folder = request.output, settings, request.report, allowed
-                preview = not request.no_preview
-                relight(request.scene, loaded, *folder, console, interrupts, preview=preview)
+                relight(
+                    request.scene,
+                    loaded,
+                    request.output,
+                    settings,
+                    request.report,
+                    allowed,
+                    console,
+                    interrupts,
+                    preview=not request.no_preview,
+                )
             elif settings is not None:
-                given = request.output, settings, request.report, request.plot, request.keep, allowed
-                preview = not request.no_preview
-                verbs.bake(request.scene, loaded, *given, console, interrupts, preview=preview)
+                verbs.bake(
+                    request.scene,
+                    loaded,
+                    request.output,
+                    settings,
+                    request.report,
+                    request.plot,
+                    request.keep,
+                    allowed,
+                    console,
+                    interrupts,
+                    preview=not request.no_preview,
+                )
             else:
                 verbs.restore(request.scene, loaded, request.output, allowed, console)
     except KeyboardInterrupt:

@@ -49,7 +49,8 @@ def render_plot(report: dict[str, Any], path: Path) -> None:
         If it could not be rendered or written.
     """
     solver = report["solver"]
-    render_drawing(draw_history(*_titles(solver), solver.get("history", ())), path)
+    title, subtitle = _titles(solver)
+    render_drawing(draw_history(title, subtitle, solver.get("history", ())), path)
 
 
 def render_drawing(drawing: Drawing, path: Path) -> None:

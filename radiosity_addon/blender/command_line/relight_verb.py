@@ -132,6 +132,14 @@ def relight_into(
         output.expect(name for of in group_file_names(result, stored.settings) for name in of)
         yield Progress("apply", APPLY)
         keeping = KeepOptions(sidecar=True, mark=stored.mark)
-        made = export, result, output, seconds, keeping
-        samples = QUICK_SAMPLES if preview else None
-        return (yield from deliver(context, stored.settings, *made, samples))
+        delivered = deliver(
+            context,
+            stored.settings,
+            export,
+            result,
+            output,
+            seconds=seconds,
+            keeping=keeping,
+            samples=QUICK_SAMPLES if preview else None,
+        )
+        return (yield from delivered)

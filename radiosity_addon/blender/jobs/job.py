@@ -180,9 +180,18 @@ def run_bake(
         seconds.update(result.seconds)
         yield Progress("apply", solved)
         if with_copy and output is not None:
-            made = export, result, output, seconds, keeping
-            samples = SAMPLES if with_preview else None
-            return (yield from deliver(context, settings, *made, samples, scope=scope))
+            delivered = deliver(
+                context,
+                settings,
+                export,
+                result,
+                output,
+                seconds=seconds,
+                keeping=keeping,
+                samples=SAMPLES if with_preview else None,
+                scope=scope,
+            )
+            return (yield from delivered)
         with scope.replacing_earlier(context) as earlier, timed(seconds, "apply"):
             result = replace(result, warnings=(*earlier.warnings, *result.warnings))
             showing = _show(context, settings, export, result, output, keeping, earlier)

@@ -212,7 +212,8 @@ class LiveRelight:
         except StopIteration as done:
             exact, self._work, self._doing = self._doing is None, None, None
             if exact:
-                self._take_exact(self._lit_by, *done.value)
+                pages, groups = done.value
+                self._take_exact(self._lit_by, pages, groups)
             self._show()
 
     def _take_exact(

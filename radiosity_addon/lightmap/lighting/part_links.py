@@ -294,8 +294,8 @@ class _Gathering:
                 lamps = yield from scaled(direct, done / len(asked), (done + 1) / len(asked))
             else:
                 gains, lamps = found.gains, local.lit_by(found.gains)
-            rows = self.rows(first + part), self.rows(found.sources)
-            made.append(PartLinks(*rows, share, lamps, gains))
+            rows, sources = self.rows(first + part), self.rows(found.sources)
+            made.append(PartLinks(rows, sources, reflectance=share, lamps=lamps, gains=gains))
         return made, np.concatenate(start)
 
 

@@ -92,13 +92,20 @@ def reconstruct(
     further = gather_parts(numbers, links, resolve, element, reflectance)
     links, parts = yield from scaled(further, GATHERED, PARTS)
     transport = TexelTransport(links, parts, reflectance)
-    limits = settings.sweeps, settings.tolerance
     start, reflected = scratch.empty((len(geometry), 3), np.float32), local.reflected()
     for tile in tiles(len(geometry)):
         start[tile] = values_of(reflected, element[tile])
     seen = None if so_far is None else so_far.swept
     swept = sweep_steps(
-        transport, start, lamps, local.beyond(), *limits, local.threads, seen=seen, scratch=scratch
+        transport,
+        start,
+        lamps,
+        local.beyond(),
+        sweeps=settings.sweeps,
+        tolerance=settings.tolerance,
+        threads=local.threads,
+        seen=seen,
+        scratch=scratch,
     )
     light = yield from scaled(swept, PARTS, 1.0)
     light = replace(light, state=crossings.state)
@@ -106,7 +113,7 @@ def reconstruct(
     if gains is None or chosen is None or local.sources is None or light.table is None:
         return light
     earlier = EarlierLight(local.sources.strengths, light.table)
-    lit = LitTexels(transport, gains, element, *limits, earlier)
+    lit = LitTexels(transport, gains, element, settings.sweeps, settings.tolerance, earlier)
     traced = LightingRecord(settings, crossings, numbers, chosen, parts.small, local.bright, light.error)
     return replace(light, kept=lit, traced=traced)
 

@@ -64,8 +64,17 @@ def relight_steps(
     transport = replace(kept.transport, parts=replace(parts, start=of_parts, links=links))
     lamps = kept.gains.irradiance(given)
     beyond = local.beyond(sources.sky(strengths))
-    limits = kept.sweeps, kept.tolerance, local.threads, False
-    swept = sweep_steps(transport, start, lamps, beyond, *limits, scratch=scratch)
+    swept = sweep_steps(
+        transport,
+        start,
+        lamps,
+        beyond,
+        sweeps=kept.sweeps,
+        tolerance=kept.tolerance,
+        threads=local.threads,
+        estimate=False,
+        scratch=scratch,
+    )
     light = yield from scaled(swept, SOLVED, 1.0)
     if known is None and light.table is not None:
         kept.earlier.add(strengths, light.table)

@@ -77,8 +77,8 @@ class GatherPoints:
         geometry = self._geometry
         numbers = len(self) + np.arange(len(texel), dtype=np.int32)
         size = max(stride, 1.5) * geometry.texel_size
-        where = geometry.position, geometry.normal, texel
-        self._grids.append(PointGrid(*where, len(self), size, geometry.scratch))
+        grid = PointGrid(geometry.position, geometry.normal, texel, len(self), size, geometry.scratch)
+        self._grids.append(grid)
         self._number[texel] = numbers
         level = np.full(len(texel), len(self._grids) - 1, dtype=np.int8)
         self.level = np.concatenate([self.level, level])

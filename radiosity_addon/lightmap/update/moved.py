@@ -90,9 +90,18 @@ def moved_steps(
     divided = affected.divided(traced.crossings, crossings)
     now = affected.renumbered(traced, numbers, divided)
 
-    where = local, before.local, affected, traced.settings, crossings, divided, resolve
     bright = traced.bright | local.bright
-    stored = MovedPoints(*where, bright).steps(_renumbered(lit.transport.links, traced, now), traced.points)
+    moved_points = MovedPoints(
+        local,
+        before=before.local,
+        affected=affected,
+        settings=traced.settings,
+        crossings=crossings,
+        divided=divided,
+        resolve=resolve,
+        bright=bright,
+    )
+    stored = moved_points.steps(_renumbered(lit.transport.links, traced, now), traced.points)
     links, points = yield from scaled(stored, CROSSED, GATHERED)
 
     known: list[PartHits] = []
@@ -112,8 +121,17 @@ def moved_steps(
     start = _start(before, traced, local, parts, now)
     of_texels = np.maximum(start[: len(geometry)] + reflectance * more, 0.0)
     transport = replace(transport, parts=replace(parts, start=start[len(geometry) :]))
-    limits = lit.sweeps, lit.tolerance, local.threads, False
-    swept = sweep_steps(transport, of_texels, direct, local.beyond(), *limits, scratch=geometry.scratch)
+    swept = sweep_steps(
+        transport,
+        of_texels,
+        direct,
+        local.beyond(),
+        sweeps=lit.sweeps,
+        tolerance=lit.tolerance,
+        threads=local.threads,
+        estimate=False,
+        scratch=geometry.scratch,
+    )
     light = yield from scaled(swept, PARTS, 1.0)
     assert local.sources is not None  # it asks for lights apart
     assert light.table is not None

@@ -74,12 +74,14 @@ def look_again(
     # Parts speak for nobody: how close things are to them is not asked.
     unasked = np.full(len(parts.part), np.inf)
     gathered = Gathered(parts.sources, unasked, AimedRays.none())
-    aimed = (
-        np.zeros(local.hierarchy.n_elements, dtype=bool),
-        np.zeros(len(affected.moved), dtype=bool),
+    earlier = Before(
+        gathered,
+        aimed_at=(nowhere, nowhere),
+        moved=affected.traced(before.caster),
+        widen=widen,
+        bright=np.zeros(local.hierarchy.n_elements, dtype=bool),
+        hosts=np.zeros(len(affected.moved), dtype=bool),
     )
-    moved = affected.traced(before.caster)
-    earlier = Before(gathered, (nowhere, nowhere), moved, widen, *aimed)
     found = yield from scaled(local.regather_steps(at, upright, resolve, earlier), 0.0, 0.6)
     asked = part_gains(parts, numbers, before, affected.boxes, at.points, widen)
     gains = yield from scaled(asked, 0.6, 1.0)

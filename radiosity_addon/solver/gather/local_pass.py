@@ -247,8 +247,17 @@ class LocalPass:
         return (yield from retracing.steps(self._bright, irradiance))
 
     def _gathering(self, at: Footprints, surface_normals: Array, rays: int, resolve: Resolver) -> Gathering:
-        chance = self._seed, self.threads
-        return Gathering(self.caster, at, surface_normals, rays, resolve, self.leaves_of, *chance, self._sky)
+        return Gathering(
+            self.caster,
+            at,
+            surface_normals,
+            rays,
+            resolve,
+            self.leaves_of,
+            seed=self._seed,
+            threads=self.threads,
+            sky=self._sky,
+        )
 
     @cached_property
     def _bright(self) -> BrightElements:

@@ -99,7 +99,8 @@ class Retracing:
             rows = np.arange(part.start, part.stop)
             stale = before.gathered.sources[rows] == STALE
             asked = stale.any(axis=1) | aims_past[rows]
-            asked |= before.moved.boxes.above(*gathering.planes(rows), before.widen[rows])
+            points, normals = gathering.planes(rows)
+            asked |= before.moved.boxes.above(points, normals, before.widen[rows])
             rows, stale = rows[asked], stale[asked]
             if len(rows) == 0:
                 return
@@ -110,9 +111,13 @@ class Retracing:
             past = aims_past[rows]
             touched[past] = False
             row, ray = np.nonzero(touched)
-            asked = rows[row], ray, directions[row, ray], stale[row, ray]
-            moved = before.moved
-            changed, hits, nearer = gathering.trace_again(*asked, (moved.alone, moved.before))
+            changed, hits, nearer = gathering.trace_again(
+                rows[row],
+                ray,
+                directions=directions[row, ray],
+                stale=stale[row, ray],
+                casters=(before.moved.alone, before.moved.before),
+            )
             past[row[changed[gathering.on_any(before.bright, before.hosts, hits)]]] = True
             closer = np.bincount(row[changed], nearer, minlength=len(rows))
             renewed = -closer > RENEWED * before.gathered.closeness[rows]

@@ -99,9 +99,9 @@ def first_links(
         limits = limits.looser()
     count, (to, of) = hierarchy.n_clusters, pairs
     single = to >= count
-    chance = settings.seed, settings.threads
-    to_faces = measure_links(hierarchy, caster, to[single] - count, of[single], *chance)
-    to_clusters = measure_cluster_links(hierarchy, shapes, caster, to[~single], of[~single], *chance)
+    seed, threads = settings.seed, settings.threads
+    to_faces = measure_links(hierarchy, caster, to[single] - count, of[single], seed, threads)
+    to_clusters = measure_cluster_links(hierarchy, shapes, caster, to[~single], of[~single], seed, threads)
     return to_faces.sorted_by_receiver(), to_clusters, limits.faint
 
 

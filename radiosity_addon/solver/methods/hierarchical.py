@@ -182,7 +182,7 @@ def refine(state: HierarchicalState, shapes: NodeShapes, threshold: float, min_a
     Links to clusters come first, as theirs may become links to elements.
     """
     hierarchy, settings = state.hierarchy, state.settings
-    chance = settings.seed, settings.threads
+    seed, threads = settings.seed, settings.threads
     chosen = _over(
         state, misplaced_at_clusters(hierarchy, state.cluster_links, state.radiosity, state.top), threshold
     )
@@ -192,9 +192,9 @@ def refine(state: HierarchicalState, shapes: NodeShapes, threshold: float, min_a
         receiver, source = children_of_cluster_links(hierarchy, state.cluster_links.take(chosen))
         single = receiver >= hierarchy.n_clusters
         to_element = receiver[single] - hierarchy.n_clusters
-        new.append(measure_links(hierarchy, state.caster, to_element, source[single], *chance))
+        new.append(measure_links(hierarchy, state.caster, to_element, source[single], seed, threads))
         others = measure_cluster_links(
-            hierarchy, shapes, state.caster, receiver[~single], source[~single], *chance
+            hierarchy, shapes, state.caster, receiver[~single], source[~single], seed, threads
         )
         kept = np.delete(np.arange(len(state.cluster_links)), chosen)
         state.cluster_links = join_cluster_links([state.cluster_links.take(kept), others])
@@ -204,7 +204,7 @@ def refine(state: HierarchicalState, shapes: NodeShapes, threshold: float, min_a
     if len(chosen):
         before = hierarchy.n_elements
         receiver, source, replaced = children_of_links(hierarchy, state.links.take(chosen), min_area)
-        new.append(measure_links(hierarchy, state.caster, receiver, source, *chance))
+        new.append(measure_links(hierarchy, state.caster, receiver, source, seed, threads))
         kept = np.delete(np.arange(len(state.links)), chosen[replaced])
         state.links = state.links.take(kept)
         refined += int(replaced.sum())
