@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from radiosity_addon.bake.pipeline import bake, bake_and_keep
-from radiosity_addon.bake.relight.kept_bake import KeptBake, relight
+from radiosity_addon.bake.relight.kept_bake import KeptBake, relight_pages
 from radiosity_addon.bake.relight.responses import Responses
 from radiosity_addon.bake.sidecar.sidecar import read_sidecar, write_sidecar
 from radiosity_addon.base.progress import drain
@@ -70,8 +70,8 @@ def measure(
     told["sidecar"] = _sidecar(kept, result, scene(strengths[0][1]), told["texels"])
     rays = kept.solved.local.caster.rays
     for change, wanted in strengths:
-        first, once = _timed(relight(kept, wanted))
-        _, again = _timed(relight(kept, wanted))
+        first, once = _timed(relight_pages(kept, wanted))
+        _, again = _timed(relight_pages(kept, wanted))
         full = drain(bake(scene(wanted), chosen)).pages
         other = drain(bake(scene(wanted), BakeSettings(threads=1, seed=7, **settings))).pages
         entry = {

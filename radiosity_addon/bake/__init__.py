@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from .estimate import Estimate, LightmappedObject, estimate_bake
 from .keep import KeepOptions, bake_steps, can_keep, moves_alone
+from .stages import timed
 from .texel_memory import pages_of, refuse_too_large
 
 __all__ = [
@@ -19,4 +20,5 @@ __all__ = [
     "moves_alone",
     "pages_of",
     "refuse_too_large",
+    "timed",
 ]

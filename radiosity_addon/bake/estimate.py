@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..lightmap.unwrap import least_pages, padding_for, shared_out
+from ..lightmap.unwrap import assign_pages, least_pages, padding_for
 from ..numerics import thread_count
 from ..options import BakeSettings
 from ..scene import BakeScene
@@ -167,12 +167,12 @@ def _pages(objects: Sequence[LightmappedObject], settings: BakeSettings) -> tupl
     if settings.atlas == "per-object":
         groups = [[number] for number in range(len(objects))]
     elif density is None:
-        groups = shared_out(surfaces, settings.pages)
+        groups = assign_pages(surfaces, settings.pages)
     else:
         taken = sum(_taken(item, density, padding) for item in objects) / FILLED
         count = max(least_pages(sum(surfaces), density, settings.max_resolution), 1)
         count = max(count, math.ceil(taken / settings.max_resolution**2))
-        groups = shared_out(surfaces, count)
+        groups = assign_pages(surfaces, count)
     pages, texels = [], [0.0] * len(objects)
     for group in groups:
         of_page = [objects[number] for number in group]

@@ -7,10 +7,9 @@ window may advance it between two redraws. Closing it cancels; nothing outside w
 from __future__ import annotations
 
 import time
-from collections.abc import Generator, Iterator
-from contextlib import contextmanager
+from collections.abc import Generator
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +21,7 @@ from ..lightmap.lighting import (
     TexelLight,
     light_within,
     reconstruct,
-    summary,
+    residual_summary,
     texel_residual,
 )
 from ..lightmap.texels import FOOTPRINT, TexelGeometry, rasterise, texel_materials
@@ -48,9 +47,8 @@ from .result import (
     more_of,
     solver_part,
 )
+from .stages import staged, timed
 from .texel_memory import refuse_too_large, share_out_memory, texel_scratch
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +147,7 @@ def _bake(
         geometry = _texels(bake_scene, baked, atlas, scratch)
     yield Progress("solve", SOLVE)
     with timed(seconds, "solve"):
-        solution = yield from solve(bake_scene, quality.solver)
+        solution = yield from solve_scene(bake_scene, quality.solver)
     yield Progress("light", LIGHT)
     is_shown = share_out_memory(geometry, settings, keep)
     with timed(seconds, "light"):
@@ -211,7 +209,7 @@ def finish(
     if lit.light is not None:
         report["estimated_error"] = lit.light.error
     if settings.quantity == "residual":
-        report["error_picture"] = summary(lit.values)
+        report["error_picture"] = residual_summary(lit.values)
     of_texels = small_objects(bake_scene, baked, geometry)
     warnings = (*bake_scene.warnings, *of_texels, *solved.warnings)
     objects = tuple(
@@ -280,7 +278,7 @@ def _texels(bake_scene: BakeScene, baked: list[BakeObject], atlas: Atlas, scratc
     return TexelGeometry(bake_scene.scene, uv, page_of_triangle, texels, rows, scratch)
 
 
-def solve(bake_scene: BakeScene, settings: SolverSettings) -> Generator[Progress, None, Solution]:
+def solve_scene(bake_scene: BakeScene, settings: SolverSettings) -> Generator[Progress, None, Solution]:
     """Solve, with a picture of the solution at first, now and then, and at the end."""
     steps = solve_progress(bake_scene.scene, settings)
     state: SolverState | None = None
@@ -313,24 +311,6 @@ def _picture(state: SolverState) -> Picture | None:
         hierarchy.faces.triangle[face],
         hierarchy.faces.front[face],
     )
-
-
-def staged(
-    steps: Generator[float, None, T],
-    stage: str,
-    begin: float,
-    end: float,
-    pictures: TexelPictures | None = None,
-) -> Generator[Progress, None, T]:
-    """Run steps that yield the fraction they have done as one stage, from `begin` to `end` of the whole."""
-    while True:
-        try:
-            fraction = next(steps)
-        except StopIteration as done:
-            result: T = done.value
-            return result
-        texels = None if pictures is None else pictures.next()
-        yield Progress(stage, begin + (end - begin) * fraction, texels=texels)
 
 
 def _texel_values(
@@ -400,13 +380,3 @@ def _told(atlas: Atlas, pages: tuple[LightmapPage, ...]) -> tuple[dict[str, floa
         }
         for number, (laid, page) in enumerate(zip(atlas.pages, pages, strict=True))
     )
-
-
-@contextmanager
-def timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
-    """Note how long a stage took."""
-    started = time.perf_counter()
-    try:
-        yield
-    finally:
-        seconds[stage] = time.perf_counter() - started

@@ -18,9 +18,10 @@ from ..options import BakeSettings
 from ..scene import BakeObject, BakeScene, Scene, SurfaceImages
 from ..solver.emitters import NO_SOURCE
 from ..solver.moved_elements import carried
-from .pipeline import TexelValues, baked_objects, finish, staged, timed
+from .pipeline import TexelValues, baked_objects, finish
 from .relight import HierarchyReport, KeptBake, same_light, shown
 from .result import BakeResult, Progress, statistics
+from .stages import staged, timed
 
 RIGID = 1e-4
 """Edges that differ by no more than this part have kept their length."""

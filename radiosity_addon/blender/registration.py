@@ -10,14 +10,7 @@ import bpy
 
 from .datablocks import bake_record
 from .files import ownership
-from .operators import (
-    bake_operators,
-    checks,
-    cleaning,
-    edit_guard,
-    light_group_operators,
-    relight_operators,
-)
+from .operators import bake_operators, checks, cleaning, edit_guard, light_group_operators, relight_operators
 from .overlays import overlay_properties, overlay_view
 from .panels import bake_panel, check_panel, light_group_panels, object_panel
 from .relight import kept_bakes, lightmap_versions, live_switch, relight_properties

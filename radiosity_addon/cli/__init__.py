@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from .console import Console, summary
 from .interrupts import Interrupts
-from .parser import bake_output, build_parser, check_keeping, check_plot, settings_of
+from .parser import bake_output, build_parser, check_keeping, check_plot, requested_settings
 
 __all__ = [
     "Console",
@@ -16,6 +16,6 @@ __all__ = [
     "build_parser",
     "check_keeping",
     "check_plot",
-    "settings_of",
+    "requested_settings",
     "summary",
 ]

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from ..base import UsageError
-from ..files import folder_of, name_of, path_of
+from ..files import checked_folder, checked_name, checked_path
 from ..options import (
     ATLASES,
     FORMATS,
@@ -43,7 +43,7 @@ def build_parser(prog: str) -> argparse.ArgumentParser:
     return parser
 
 
-def settings_of(request: argparse.Namespace) -> BakeSettings:
+def requested_settings(request: argparse.Namespace) -> BakeSettings:
     """Return the validated settings of a parsed `bake`."""
     given: dict[str, Any] = {name: getattr(request, name) for name in SHARED_FIELDS}
     if request.resolution is not None:
@@ -111,13 +111,13 @@ def _add_bake(parser: argparse.ArgumentParser) -> None:
     add(
         "scene",
         nargs="?",
-        type=path_of,
+        type=checked_path,
         metavar="SCENE",
         help=".blend, .glb, .gltf or .obj; without it the file Blender has open, or the bundled Cornell box",
     )
     add(
         "--output",
-        type=folder_of,
+        type=checked_folder,
         metavar="DIR",
         help=f"where everything goes (default for the bundled scene: {BUNDLED_OUTPUT})",
     )
@@ -183,18 +183,24 @@ def _add_bake(parser: argparse.ArgumentParser) -> None:
     add(
         "--objects",
         nargs="+",
-        type=name_of,
+        type=checked_name,
         metavar="NAME",
         help="what gets a lightmap; the rest still lights and blocks (default: every rendered mesh)",
     )
     add(
         "--light-only",
         nargs="+",
-        type=name_of,
+        type=checked_name,
         metavar="NAME",
         help="what lights and blocks but gets no lightmap",
     )
-    add("--ignore", nargs="+", type=name_of, metavar="NAME", help="what is left out as if it were not there")
+    add(
+        "--ignore",
+        nargs="+",
+        type=checked_name,
+        metavar="NAME",
+        help="what is left out as if it were not there",
+    )
     add(
         "--sky", action="store_true", help="add a white sky of strength 1 where the scene has no light at all"
     )
@@ -204,7 +210,7 @@ def _add_bake(parser: argparse.ArgumentParser) -> None:
         "--light-group",
         dest="groups",
         action="append",
-        type=name_of,
+        type=checked_name,
         metavar="NAME=MEMBER,…",
         help="a lightmap also for these lamps, emissive materials or the world (may be repeated)",
     )
@@ -222,8 +228,13 @@ def _add_bake(parser: argparse.ArgumentParser) -> None:
     )
     _add_common(parser)
     add("--no-preview", action="store_true", help="write no preview.png; an earlier one stays")
-    add("--report", type=path_of, metavar="FILE", help="second copy of report.json")
-    add("--plot", type=path_of, metavar="FILE.png", help="draw the history of residual, elements and links")
+    add("--report", type=checked_path, metavar="FILE", help="second copy of report.json")
+    add(
+        "--plot",
+        type=checked_path,
+        metavar="FILE.png",
+        help="draw the history of residual, elements and links",
+    )
     _add_method(parser)
 
 
@@ -254,12 +265,12 @@ def _add_restore(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "scene",
         nargs="?",
-        type=path_of,
+        type=checked_path,
         metavar="SCENE",
         help="a baked .blend; without it the file Blender has open",
     )
     parser.add_argument(
-        "--output", type=path_of, required=True, metavar="FILE", help="the restored .blend to write"
+        "--output", type=checked_path, required=True, metavar="FILE", help="the restored .blend to write"
     )
     _add_common(parser)
 

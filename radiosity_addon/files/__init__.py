@@ -6,11 +6,11 @@ Needs nothing but Python.
 from __future__ import annotations
 
 from .baked_files import (
-    FILES,
+    LISTED,
     OWNER,
     NoReportError,
     Owner,
-    digest,
+    digest_of_file,
     entries,
     is_as_written,
     is_as_written_steps,
@@ -34,7 +34,7 @@ from .file_names import (
 )
 from .file_versions import MOST_FILES, HeldFiles
 from .gltf_check import gltf_fault
-from .path_checks import check_folder, escaped, folder_of, name_of, path_of, printable
+from .path_checks import check_folder, checked_folder, checked_name, checked_path, escaped, printable
 from .publish import Staging, clean_up, is_interrupted, replacing
 from .sidecar_names import BAKE, DIGEST, FILE, KEPT
 from .temporary_folder import TemporaryFolder
@@ -44,9 +44,9 @@ __all__ = [
     "BLEND_NAME",
     "DIGEST",
     "FILE",
-    "FILES",
     "KEPT",
     "LIGHTMAPS",
+    "LISTED",
     "MOST_FILES",
     "OWNER",
     "PLAIN_NAMES",
@@ -60,19 +60,19 @@ __all__ = [
     "Staging",
     "TemporaryFolder",
     "check_folder",
+    "checked_folder",
+    "checked_name",
+    "checked_path",
     "clean_up",
-    "digest",
+    "digest_of_file",
     "entries",
     "escaped",
     "folded",
-    "folder_of",
     "gltf_fault",
     "highest_page",
     "is_as_written",
     "is_as_written_steps",
     "is_interrupted",
-    "name_of",
-    "path_of",
     "printable",
     "read_report",
     "replacing",

@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 
 from .file_names import BLEND_NAME, REPORT_NAME, is_bake_name
 
-FILES, OWNER, SEAL = "files", "baked", "seal"
+LISTED, OWNER, SEAL = "files", "baked", "seal"
 """Keys of a report."""
 
 T = TypeVar("T")
@@ -60,7 +60,7 @@ class Owner:
         mine = self.told(folder)["file"]
         if _is_same_path(folder, said["file"], mine):
             return True
-        return BLEND_NAME in report[FILES] and _is_same_path(folder, BLEND_NAME, mine)
+        return BLEND_NAME in report[LISTED] and _is_same_path(folder, BLEND_NAME, mine)
 
 
 class NoReportError(Exception):
@@ -91,7 +91,7 @@ def read_report(path: Path) -> dict[str, Any]:
         for key in ("file", "scene"):
             if not isinstance(report[OWNER][key], str):
                 raise TypeError
-        report[FILES] = _checked(report[FILES])
+        report[LISTED] = _checked(report[LISTED])
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise NoReportError("was not written by a bake") from None
     return report
@@ -126,10 +126,10 @@ def reports_in(folder: Path, belongs: Callable[[Report, Path], bool]) -> dict[st
 
 def entry(path: Path) -> dict[str, Any]:
     """Describe a file as a report lists it."""
-    return {"bytes": path.stat().st_size, "sha256": digest(path)}
+    return {"bytes": path.stat().st_size, "sha256": digest_of_file(path)}
 
 
-def digest(path: Path) -> str:
+def digest_of_file(path: Path) -> str:
     """Return a file's SHA-256."""
     return _drained(digest_steps(path))
 
@@ -155,7 +155,7 @@ def entries(new: Iterable[Path], folder: Path, earlier: Report | None) -> dict[s
     earlier : mapping or None
         The report to be replaced.
     """
-    before = {} if earlier is None else earlier[FILES]
+    before = {} if earlier is None else earlier[LISTED]
     kept = {name: told for name, told in before.items() if (folder / name).is_file()}
     return {**kept, **{path.name: entry(path) for path in new}}
 
@@ -179,7 +179,9 @@ def is_as_written_steps(path: Path, told: Mapping[str, Any]) -> Generator[None, 
 def without(report: Report, names: Iterable[str]) -> dict[str, Any]:
     """Return a report that does not list these files any more."""
     gone = set(names)
-    return sealed({**report, FILES: {name: told for name, told in report[FILES].items() if name not in gone}})
+    return sealed(
+        {**report, LISTED: {name: told for name, told in report[LISTED].items() if name not in gone}}
+    )
 
 
 def _drained(steps: Generator[None, None, T]) -> T:

@@ -21,7 +21,7 @@ SHOWN = 60
 """Characters of a refused word that are repeated in the error."""
 
 
-def path_of(word: str) -> Path:
+def checked_path(word: str) -> Path:
     """Return the path that a word names, `~` expanded.
 
     Raises
@@ -48,7 +48,7 @@ def path_of(word: str) -> Path:
     return path
 
 
-def folder_of(word: str) -> Path:
+def checked_folder(word: str) -> Path:
     """Return the path of an output folder that a word names; our files in it must have paths too.
 
     Raises
@@ -56,7 +56,7 @@ def folder_of(word: str) -> Path:
     ArgumentTypeError
         If no folder can have this path.
     """
-    path = path_of(word)
+    path = checked_path(word)
     if len(os.fsencode(path.absolute())) > MAX_PATH - OWN_NAMES:
         raise ArgumentTypeError(
             f"{quoted(word)} is longer than {MAX_PATH - OWN_NAMES} bytes; give a shorter path"
@@ -72,12 +72,12 @@ def check_folder(path: Path) -> None:
     BakeError
     """
     try:
-        folder_of(str(path))
+        checked_folder(str(path))
     except ArgumentTypeError as error:
         raise BakeError(f"cannot write to the output folder {error}") from error
 
 
-def name_of(word: str) -> str:
+def checked_name(word: str) -> str:
     """Return a word that names an object, a lamp, a material or a light group.
 
     Raises

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..base import BakeError
-from .baked_files import digest
+from .baked_files import digest_of_file
 from .file_names import is_bake_name
 from .marked_folders import MarkedFolder, abandoned, clean_up_folders, is_own
 
@@ -90,7 +90,7 @@ class Staging(MarkedFolder):
                 found[name] = _regular(self.target / name)
                 old = None if found[name] is None else _kept(self.target / name, earlier / name)
                 check(name, old)
-                files[name] = _Replaced((known or {}).get(name) or digest(self.path / name), old)
+                files[name] = _Replaced((known or {}).get(name) or digest_of_file(self.path / name), old)
             _sync_folder(earlier)
             _write_journal(self.path, files)
             for name in names:
@@ -282,7 +282,7 @@ def _kept(path: Path, kept: Path) -> str:
     except (OSError, NotImplementedError):
         shutil.copy2(path, kept, follow_symlinks=False)
         _sync(kept)
-    return digest(kept)
+    return digest_of_file(kept)
 
 
 def _rename(source: Path, target: Path) -> None:
@@ -312,7 +312,7 @@ def _regular(path: Path) -> os.stat_result | None:
 def _digest_of(path: Path) -> str | None:
     """Return a regular file's digest; None if there is nothing, "" if it is no regular file."""
     try:
-        return None if _regular(path) is None else digest(path)
+        return None if _regular(path) is None else digest_of_file(path)
     except OSError:
         return ""
 

@@ -5,7 +5,7 @@ Points, polygons, triangles, discs and spheres; no visibility.
 
 from __future__ import annotations
 
-from .geometry_kernel import LEAST, kernel, ray_geometry_term, sees, throughput
+from .geometry_kernel import LEAST, kernel, ray_geometry_term, throughput, visibility_of
 from .polygon import point_to_polygon
 from .round_shapes import cap_cosine, point_to_ellipse
 from .triangle_pairs import triangle_to_triangle, weighted_sums
@@ -17,8 +17,8 @@ __all__ = [
     "point_to_ellipse",
     "point_to_polygon",
     "ray_geometry_term",
-    "sees",
     "throughput",
     "triangle_to_triangle",
+    "visibility_of",
     "weighted_sums",
 ]

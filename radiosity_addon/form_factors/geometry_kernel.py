@@ -87,7 +87,7 @@ def throughput(geometry: Array, area: Array | float, other_area: Array | float) 
     return np.asarray(geometry * area * other_area)
 
 
-def sees(
+def visibility_of(
     caster: RayCaster, points: Array, normals: Array, other_points: Array, other_normals: Array
 ) -> Array:
     """Return V of pairs of points on surfaces: whether nothing lies between them, or how much passes.

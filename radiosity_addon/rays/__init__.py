@@ -5,15 +5,17 @@ Embree does the work; only `embree.py` imports it.
 
 from __future__ import annotations
 
-from .caster import NO_HIT, Hits, RayCaster, sees, surface_offset
+from .caster import NO_HIT, SAGITTA, SIGHT_LIFT, Hits, RayCaster, free_segment, surface_offset
 from .embree import TARGET_SLACK, EmbreeCaster
 
 __all__ = [
     "NO_HIT",
+    "SAGITTA",
+    "SIGHT_LIFT",
     "TARGET_SLACK",
     "EmbreeCaster",
     "Hits",
     "RayCaster",
-    "sees",
+    "free_segment",
     "surface_offset",
 ]

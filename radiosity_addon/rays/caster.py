@@ -19,6 +19,13 @@ OFFSET_STEPS = 64
 
 NO_HIT = -1
 
+SIGHT_LIFT = 2.0
+"""Lines of sight between points of surfaces run this many surface offsets above them, …"""
+
+SAGITTA = 0.6
+"""… and, where a surface bends, this part of length · √(1 − cos of the turn) more: what a sphere of few
+facets needs."""
+
 
 @dataclass(frozen=True)
 class Hits:
@@ -88,7 +95,7 @@ def surface_offset(triangles: Array) -> float:
     return max(OFFSET_STEPS * float(np.finfo(np.float32).eps) * extent, 1e-12)
 
 
-def sees(caster: RayCaster, start: Array, end: Array) -> Array:
+def free_segment(caster: RayCaster, start: Array, end: Array) -> Array:
     """Return (n,) whether nothing lies between (n, 3) points."""
     along = end - start
     length = np.linalg.norm(along, axis=1)

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..numerics import Array, hash_keys
 
-LIFT = 0.25
+COPY_LIFT = 0.25
 """How far copies lie off their triangles, in units of the offset that rays start with: beyond the rounding of
 hits, below the start of rays."""
 
@@ -60,7 +60,7 @@ def facing_copies(triangles: Array, two_sided: Array, offset: float) -> tuple[Ar
         black = np.unique(backs_key[~backs])
         in_black[0] |= np.isin(fronts_key, black)
         in_black[1] |= backs & np.isin(backs_key, black)
-    out = LIFT * offset * normal[:, None]
+    out = COPY_LIFT * offset * normal[:, None]
     front, back = (np.flatnonzero(side) for side in in_black)
     corners = np.concatenate([triangles[solid[front]] + out[front], triangles[solid[back]] - out[back]])
     return np.concatenate([solid[front], solid[back]]), corners

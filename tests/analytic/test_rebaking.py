@@ -9,7 +9,7 @@ import pytest
 
 from radiosity_addon.bake.pipeline import bake, bake_and_keep
 from radiosity_addon.bake.rebaking import bake_moved, can_move, moved_objects
-from radiosity_addon.bake.relight.kept_bake import KeptBake, relight
+from radiosity_addon.bake.relight.kept_bake import KeptBake, relight_pages
 from radiosity_addon.bake.result.result import BakeResult
 from radiosity_addon.base.errors import SceneError
 from radiosity_addon.base.progress import drain
@@ -100,11 +100,11 @@ def test_what_moved_can_move_back(
 def test_it_can_be_lit_anew(moved: tuple[BakeResult, KeptBake], fresh: tuple[BakeResult, KeptBake]) -> None:
     """As a full bake of the moved scene can."""
     strengths = moved[1].strengths
-    same = pixels(replace(moved[0], pages=drain(relight(moved[1], strengths))))
+    same = pixels(replace(moved[0], pages=drain(relight_pages(moved[1], strengths))))
     assert relative(same, pixels(moved[0])) < moved[1].lit.tolerance
     strengths = strengths * np.array([2.0, 0.5, 0.0, 1.0, 1.5])[:, None]
     found, expected = (
-        pixels(replace(of[0], pages=drain(relight(of[1], strengths)))) for of in (moved, fresh)
+        pixels(replace(of[0], pages=drain(relight_pages(of[1], strengths)))) for of in (moved, fresh)
     )
     assert relative(found, expected) < 0.01
 

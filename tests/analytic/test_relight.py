@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from radiosity_addon.bake.pipeline import bake, bake_and_keep
-from radiosity_addon.bake.relight.kept_bake import KeptBake, relight
+from radiosity_addon.bake.relight.kept_bake import KeptBake, relight_pages
 from radiosity_addon.base.errors import SceneError, UsageError
 from radiosity_addon.base.progress import drain
 from radiosity_addon.lightmap.images.page import LightmapPage
@@ -68,7 +68,7 @@ def test_other_strengths_give_what_a_full_bake_gives(room: KeptBake, strengths: 
     """Measured 0.01 to 0.6 %, where bakes of two seeds differ by 1 to 3 %."""
     caster = room.solved.local.caster
     before = caster.rays
-    found = pixels(drain(relight(room, strengths)))
+    found = pixels(drain(relight_pages(room, strengths)))
     assert caster.rays == before
     assert relative(found, full(lit_bake(strengths))) < 0.01
 
@@ -78,25 +78,25 @@ def test_a_faint_lamp_alone_has_the_noise_of_a_bake_at_most(room: KeptBake) -> N
     strengths = BAKED * only(3)
     expected = full(lit_bake(strengths))
     noise = relative(full(lit_bake(strengths), seed=7), expected)
-    assert relative(pixels(drain(relight(room, strengths))), expected) < noise
+    assert relative(pixels(drain(relight_pages(room, strengths))), expected) < noise
 
 
 def test_the_same_strengths_give_the_same_lightmap() -> None:
     """To where the sweeps end, started from what was solved or from nothing but the hierarchy."""
     result, kept = drain(bake_and_keep(lit_bake(), SETTINGS))
     expected = pixels(result.pages)
-    assert relative(pixels(drain(relight(kept, BAKED))), expected) < kept.lit.tolerance
+    assert relative(pixels(drain(relight_pages(kept, BAKED))), expected) < kept.lit.tolerance
     table = np.zeros((len(expected) + len(kept.lit.transport.parts.start), 3), dtype=np.float32)
     nothing = EarlierLight(np.zeros_like(BAKED), table)
     anew = replace(kept, lit=replace(kept.lit, earlier=nothing))
-    assert relative(pixels(drain(relight(anew, BAKED))), expected) < kept.lit.tolerance
+    assert relative(pixels(drain(relight_pages(anew, BAKED))), expected) < kept.lit.tolerance
 
 
 def test_light_is_linear_and_what_was_solved_before_is_not_solved_again(room: KeptBake) -> None:
-    first, second = drain(relight(room, CHANGED)), drain(relight(room, BAKED * only(0)))
+    first, second = drain(relight_pages(room, CHANGED)), drain(relight_pages(room, BAKED * only(0)))
     mixture = 0.5 * CHANGED + 0.25 * BAKED * only(0)
     assert room.lit.earlier.mixed(mixture) is not None
-    found = pixels(drain(relight(room, mixture)))
+    found = pixels(drain(relight_pages(room, mixture)))
     assert relative(found, 0.5 * pixels(first) + 0.25 * pixels(second)) < 1e-3
 
 
@@ -106,7 +106,7 @@ def test_the_cornell_box_in_another_colour() -> None:
     _, kept = drain(bake_and_keep(bake_scene(box, ("Box", len(box))), SETTINGS))
     before = kept.solved.local.caster.rays
     strengths = np.array([(5.0, 40.0, 30.0)])
-    found = pixels(drain(relight(kept, strengths)))
+    found = pixels(drain(relight_pages(kept, strengths)))
     assert kept.solved.local.caster.rays == before
     emission = box.emission.copy()
     emission[-2:] = strengths
@@ -122,7 +122,7 @@ def test_a_room_baked_in_the_dark_can_be_lit() -> None:
         return bake_scene(Scene(triangles, grey(12, 0.6), grey(12, 0.0), lights=[lamp]), ("Room", 12))
 
     _, kept = drain(bake_and_keep(lit(0.0), SETTINGS))
-    found = pixels(drain(relight(kept, np.full((1, 3), 12.0))))
+    found = pixels(drain(relight_pages(kept, np.full((1, 3), 12.0))))
     assert relative(found, full(lit(12.0))) < 0.01
 
 
@@ -130,7 +130,7 @@ def test_radiosity_shows_the_new_emission() -> None:
     _, kept = drain(
         bake_and_keep(lit_bake(), BakeSettings(resolution=64, quality="draft", quantity="radiosity"))
     )
-    found = pixels(drain(relight(kept, CHANGED)))
+    found = pixels(drain(relight_pages(kept, CHANGED)))
     assert relative(found, full(lit_bake(CHANGED), quantity="radiosity")) < 0.01
 
 
@@ -155,7 +155,7 @@ def test_strengths_are_read_from_a_changed_scene(room: KeptBake) -> None:
 )
 def test_impossible_strengths_are_refused(room: KeptBake, strengths: np.ndarray) -> None:
     with pytest.raises(SceneError):
-        drain(relight(room, strengths))
+        drain(relight_pages(room, strengths))
 
 
 def test_methods_without_links_are_refused() -> None:
@@ -188,8 +188,8 @@ def test_light_groups_sum_to_the_bake(light: str) -> None:
 def test_groups_add_up_before_what_sweeps_leave_is_shared_out(room: KeptBake) -> None:
     """To the sweeps' tolerance, 8e-4 of the mean at most at single texels."""
     rows = [only(0, 1), only(2, 3), only(4), only(5)]
-    total = sum(pixels(drain(relight(room, BAKED * some))) for some in rows)
-    assert relative(np.asarray(total), pixels(drain(relight(room, BAKED)))) < 8e-4
+    total = sum(pixels(drain(relight_pages(room, BAKED * some))) for some in rows)
+    assert relative(np.asarray(total), pixels(drain(relight_pages(room, BAKED)))) < 8e-4
 
 
 def test_groups_that_cannot_be_are_refused() -> None:
@@ -205,7 +205,7 @@ def test_a_textured_furnace_scales_with_its_emission() -> None:
     """E(x) = (1 − ρ(x)) c, textured: radiosity is c everywhere, in each channel as it is scaled."""
     settings = BakeSettings(resolution=48, quality="draft", quantity="radiosity")
     _, kept = drain(bake_and_keep(bake_scene(furnace(3.0), ("Room", 12)), settings))
-    found = pixels(drain(relight(kept, kept.strengths * (1.0, 2.0, 0.0))))
+    found = pixels(drain(relight_pages(kept, kept.strengths * (1.0, 2.0, 0.0))))
     np.testing.assert_allclose(found.mean(axis=0), (3.0, 6.0, 0.0), rtol=0.005)
     assert not found[:, 2].any()
     assert np.sqrt(((found[:, 1] / 6.0 - 1) ** 2).mean()) < 0.03

@@ -14,7 +14,7 @@ import radiosity_addon
 from radiosity_addon.blender.datablocks.bake_record import recorded_objects
 from radiosity_addon.blender.operators.cleaning import unused_lightmaps
 from radiosity_addon.blender.session import runtime
-from radiosity_addon.files.baked_files import digest, read_report, sealed, text_of
+from radiosity_addon.files.baked_files import digest_of_file, read_report, sealed, text_of
 from tests.blender.scenes import add_lamp, add_mesh
 
 
@@ -121,7 +121,7 @@ def test_what_a_copy_listed_with_them_shows_stays(room: Path) -> None:
     copy = room / "lightmaps" / "baked.blend"
     shutil.copy(room / "room.blend", copy)
     told = read_report(report)
-    told["files"]["baked.blend"] = {"bytes": copy.stat().st_size, "sha256": digest(copy)}
+    told["files"]["baked.blend"] = {"bytes": copy.stat().st_size, "sha256": digest_of_file(copy)}
     report.write_text(text_of(sealed(told)))
     bpy.ops.radiosity.restore()
     assert clean() == {"CANCELLED"}
@@ -196,9 +196,9 @@ def test_opening_a_file_touches_nothing_and_recover_takes_a_half_published_bake_
     staging = Staging(room / "lightmaps")
     (staging.path / EARLIER).mkdir()
     shutil.copy(floor, staging.path / EARLIER)
-    old = digest(floor)
+    old = digest_of_file(floor)
     floor.write_bytes(b"new")
-    told = {"version": 2, "files": {name: {"new": digest(floor), "old": old}}}
+    told = {"version": 2, "files": {name: {"new": digest_of_file(floor), "old": old}}}
     (staging.path / JOURNAL).write_text(json.dumps(told))
     staging.release()  # as the system does for a process that is no more
     before = {path: path.read_bytes() for path in room.rglob("*") if path.is_file()}
@@ -219,9 +219,9 @@ def test_a_bake_into_the_folder_recovers_it_too(room: Path) -> None:
     staging = Staging(room / "lightmaps")
     (staging.path / EARLIER).mkdir()
     (room / "lightmaps" / name).rename(staging.path / EARLIER / name)
-    old = digest(staging.path / EARLIER / name)
+    old = digest_of_file(staging.path / EARLIER / name)
     (room / "lightmaps" / name).write_bytes(b"new")
-    told = {"version": 2, "files": {name: {"new": digest(room / "lightmaps" / name), "old": old}}}
+    told = {"version": 2, "files": {name: {"new": digest_of_file(room / "lightmaps" / name), "old": old}}}
     (staging.path / JOURNAL).write_text(json.dumps(told))
     staging.release()
     assert bpy.ops.radiosity.bake("EXEC_DEFAULT", True) == {"FINISHED"}
@@ -240,7 +240,7 @@ def test_a_crafted_folder_is_left_as_it_is(room: Path, crafted: str) -> None:
     staging = Staging(room / "lightmaps")
     (staging.path / EARLIER).mkdir()
     name = crafted.replace("/victim.exr", str(victims[0])) if crafted.startswith("/") else crafted
-    told = {"version": 2, "names": [name], "files": {name: {"new": digest(victims[0]), "old": None}}}
+    told = {"version": 2, "names": [name], "files": {name: {"new": digest_of_file(victims[0]), "old": None}}}
     (staging.path / JOURNAL).write_text(json.dumps(told))
     staging.release()
     bpy.ops.wm.open_mainfile(filepath=str(room / "room.blend"))

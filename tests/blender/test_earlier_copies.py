@@ -11,19 +11,11 @@ import pytest
 from radiosity_addon.blender.apply.restore import restore
 from radiosity_addon.blender.datablocks.bake_record import is_made
 from radiosity_addon.blender.material_copies.copy_marks import ORIGINAL
-from radiosity_addon.blender.material_copies.material_digest import digest, links_of
-from radiosity_addon.blender.material_edits.material_edits import carry_edits
+from radiosity_addon.blender.material_copies.material_digest import digest_of_material, links_of
+from radiosity_addon.blender.material_edits.material_edits import carry_material_edits
 from radiosity_addon.blender.materials.materials import read_material
-from tests.blender.edited_copies import (
-    GREEN,
-    base_color,
-    copy_of,
-    shader,
-)
-from tests.blender.hand_bake import (
-    BASE,
-    bake_by_hand,
-)
+from tests.blender.edited_copies import GREEN, base_color, copy_of, shader
+from tests.blender.hand_bake import BASE, bake_by_hand
 
 pytestmark = pytest.mark.usefixtures("record")
 
@@ -46,12 +38,12 @@ def users_materials() -> set[str]:
 @pytest.mark.usefixtures("earlier")
 def test_unedited_copies_of_an_earlier_version_are_known() -> None:
     before = users_materials()
-    assert carry_edits() == ()
+    assert carry_material_edits() == ()
     assert users_materials() == before
     assert restore(bpy.context) > 0
     assert {m.name for m in bpy.data.materials} == before
     bake_by_hand()
-    assert carry_edits() == ()
+    assert carry_material_edits() == ()
 
 
 @pytest.mark.usefixtures("earlier")
@@ -61,7 +53,7 @@ def test_edits_on_copies_of_an_earlier_version_are_kept(name: str) -> None:
     copy = copy_of(original)
     links = links_of(original.node_tree)
     shader(copy).inputs["Sheen Weight"].default_value = 0.125
-    (warning,) = carry_edits()
+    (warning,) = carry_material_edits()
     own = copy[ORIGINAL]
     assert warning.name == own.name == f"{name}.001"
     assert not is_made(own)
@@ -70,8 +62,8 @@ def test_edits_on_copies_of_an_earlier_version_are_kept(name: str) -> None:
     assert not any(n.type == "GROUP" and is_made(n.node_tree) for n in own.node_tree.nodes)
     assert shader(own).inputs["Sheen Weight"].default_value == 0.125
     shader(own).inputs["Sheen Weight"].default_value = 0.0
-    assert digest(own) == digest(original)
-    assert carry_edits() == ()
+    assert digest_of_material(own) == digest_of_material(original)
+    assert carry_material_edits() == ()
 
 
 @pytest.mark.usefixtures("earlier")
@@ -81,7 +73,7 @@ def test_a_base_color_edited_on_a_copy_of_an_earlier_version_is_kept(name: str, 
     copy = copy_of(bpy.data.materials[name])
     node = next(n for n in copy.node_tree.nodes if n.type == "GROUP") if where == "lightmap" else shader(copy)
     node.inputs["Base Color"].default_value = GREEN
-    assert len(carry_edits()) == 1
+    assert len(carry_material_edits()) == 1
     assert base_color(copy[ORIGINAL]) == pytest.approx(GREEN)
     assert base_color(bpy.data.materials[name])[:3] == pytest.approx(BASE)
 
@@ -91,7 +83,7 @@ def test_an_original_edited_beside_a_copy_of_an_earlier_version_stays_alone() ->
     shader(bpy.data.materials["Plain"]).inputs["Base Color"].default_value = GREEN
     shader(bpy.data.materials["Glow"]).inputs["Emission Strength"].default_value = 5.0
     before = users_materials()
-    assert carry_edits() == ()
+    assert carry_material_edits() == ()
     assert users_materials() == before
 
 
@@ -100,6 +92,6 @@ def test_a_copy_of_no_material_of_an_earlier_version_becomes_one_when_edited() -
     copy = next(m for m in bpy.data.materials if m.name.startswith("No Material"))
     node = next(n for n in copy.node_tree.nodes if n.type == "GROUP")
     node.inputs["Base Color"].default_value = GREEN
-    assert carry_edits() == ()
+    assert carry_material_edits() == ()
     np.testing.assert_allclose(read_material(copy[ORIGINAL]).reflectance, GREEN[:3], rtol=1e-6)
-    assert carry_edits() == ()
+    assert carry_material_edits() == ()

@@ -17,7 +17,7 @@ import pytest
 import radiosity_addon
 from radiosity_addon.blender.datablocks.image_marks import REPORT, VERSION
 from radiosity_addon.blender.relight.relight_scene import kept_bakes, lightmap_versions
-from radiosity_addon.files.baked_files import FILES, read_report
+from radiosity_addon.files.baked_files import LISTED, read_report
 from tests.blender.scenes import add_lamp, add_mesh
 
 Array = np.ndarray[Any, Any]
@@ -98,7 +98,7 @@ def assert_files_agree() -> None:
         digest = hashlib.sha256(path.read_bytes()).hexdigest()
         assert digest == image[VERSION]
         report = read_report(path.with_name(image[REPORT]))
-        assert report[FILES][path.name]["sha256"] == digest
+        assert report[LISTED][path.name]["sha256"] == digest
         on_disk = bpy.data.images.load(str(path))
         on_disk.colorspace_settings.name = "Non-Color"
         assert np.array_equal(values_of(on_disk), values_of(image))

@@ -15,7 +15,7 @@ from radiosity_addon.blender.images.node_group import EMISSION
 from radiosity_addon.blender.relight.live_relight import _notice
 from radiosity_addon.blender.relight.relight_scene import kept_bakes, lightmap_versions
 from radiosity_addon.blender.session import live_state
-from radiosity_addon.files.baked_files import digest
+from radiosity_addon.files.baked_files import digest_of_file
 from tests.blender.scenes import shader_material
 from tests.blender.test_relight_scene import change_lights, glowing, lightmap, relative, relight, room
 
@@ -197,7 +197,7 @@ def test_files_and_pictures_agree_after_undo_and_redo(live: bpy.types.WindowMana
         step()
         settle()
         (image,) = lightmap_versions.lightmaps()
-        assert image[VERSION] == digest(Path(bpy.path.abspath(image.filepath_raw)))
+        assert image[VERSION] == digest_of_file(Path(bpy.path.abspath(image.filepath_raw)))
         shown = lightmap()
         image.reload()
         np.testing.assert_array_equal(lightmap(), shown)
@@ -206,7 +206,7 @@ def test_files_and_pictures_agree_after_undo_and_redo(live: bpy.types.WindowMana
     live.radiosity_live = False
     bpy.ops.ed.undo()
     (image,) = lightmap_versions.lightmaps()
-    assert image[VERSION] == digest(Path(bpy.path.abspath(image.filepath_raw)))
+    assert image[VERSION] == digest_of_file(Path(bpy.path.abspath(image.filepath_raw)))
 
 
 def test_nothing_is_raised_from_the_handler(

@@ -11,7 +11,7 @@ import pytest
 from radiosity_addon.blender.apply.restore import restore
 from radiosity_addon.blender.datablocks.bake_record import is_made
 from radiosity_addon.blender.material_copies.copy_marks import ORIGINAL
-from radiosity_addon.blender.material_edits.material_edits import carry_edits
+from radiosity_addon.blender.material_edits.material_edits import carry_material_edits
 from radiosity_addon.blender.materials.materials import read_material
 from tests.blender.edited_copies import (
     GREEN,
@@ -23,21 +23,14 @@ from tests.blender.edited_copies import (
     shader,
     two_copies,
 )
-from tests.blender.hand_bake import (
-    BASE,
-    TEXEL,
-    add_plane,
-    bake_by_hand,
-    principled_material,
-    seen_from_above,
-)
+from tests.blender.hand_bake import BASE, TEXEL, add_plane, bake_by_hand, principled_material, seen_from_above
 
 pytestmark = pytest.mark.usefixtures("record")
 
 
 def test_an_edit_of_the_original_alone_stays(paint: Material) -> None:
     shader(paint).inputs["Base Color"].default_value = GREEN
-    assert carry_edits() == ()
+    assert carry_material_edits() == ()
     assert base_color(paint) == pytest.approx(GREEN)
     assert [m.name for m in bpy.data.materials if not is_made(m)] == ["Paint"]
 
@@ -46,7 +39,7 @@ def test_where_both_were_edited_nobody_loses(paint: Material) -> None:
     shader(paint).inputs["Roughness"].default_value = 0.125
     copy = copy_of(paint)
     color_node(copy).default_value = GREEN
-    (warning,) = carry_edits()
+    (warning,) = carry_material_edits()
     own = copy[ORIGINAL]
     assert own.name == "Paint.001"
     assert "'Paint'" in warning.message
@@ -55,18 +48,18 @@ def test_where_both_were_edited_nobody_loses(paint: Material) -> None:
     assert base_color(paint)[:3] == pytest.approx(BASE)
     assert shader(paint).inputs["Roughness"].default_value == 0.125
     assert not is_made(own)
-    assert carry_edits() == ()
+    assert carry_material_edits() == ()
     assert len([m for m in bpy.data.materials if not is_made(m)]) == 2
 
 
 def test_an_edit_of_one_copy_reaches_the_other() -> None:
     material, one, two = two_copies()
     color_node(one).default_value = GREEN
-    assert carry_edits() == ()
+    assert carry_material_edits() == ()
     assert base_color(material) == pytest.approx(GREEN)
     assert tuple(color_node(two).default_value) == pytest.approx(GREEN)
     shader(two).inputs["Roughness"].default_value = 0.125
-    assert carry_edits() == ()
+    assert carry_material_edits() == ()
     assert shader(material).inputs["Roughness"].default_value == 0.125
     assert base_color(material) == pytest.approx(GREEN)
 
@@ -75,7 +68,7 @@ def test_two_copies_edited_alike_agree() -> None:
     material, *copies = two_copies()
     for copy in copies:
         color_node(copy).default_value = GREEN
-    assert carry_edits() == ()
+    assert carry_material_edits() == ()
     assert all(copy[ORIGINAL] == material for copy in copies)
 
 
@@ -83,10 +76,10 @@ def test_two_copies_edited_differently_become_two_materials() -> None:
     _, one, two = two_copies()
     color_node(one).default_value = GREEN
     color_node(two).default_value = (0.5, 0.5, 0.5, 1.0)
-    assert len(carry_edits()) == 1
+    assert len(carry_material_edits()) == 1
     colors = {base_color(copy[ORIGINAL])[:3] for copy in (one, two)}
     assert {tuple(np.round(color, 3)) for color in colors} == {(0.1, 0.7, 0.3), (0.5, 0.5, 0.5)}
-    assert carry_edits() == ()
+    assert carry_material_edits() == ()
 
 
 def test_a_copy_that_the_user_duplicated_becomes_a_material_of_its_own(paint: Material) -> None:
@@ -95,13 +88,13 @@ def test_a_copy_that_the_user_duplicated_becomes_a_material_of_its_own(paint: Ma
     single = copy.copy()
     bpy.data.objects["Plane"].material_slots[0].material = single
     color_node(single).default_value = GREEN
-    assert carry_edits() == ()
+    assert carry_material_edits() == ()
     own = single[ORIGINAL]
     assert own.name == "Paint.001"
     assert base_color(own) == pytest.approx(GREEN)
     assert base_color(paint)[:3] == pytest.approx(BASE)
     assert copy[ORIGINAL] == paint
-    assert carry_edits() == ()
+    assert carry_material_edits() == ()
     restore(bpy.context)
     assert "Paint.001" in bpy.data.materials
 
@@ -110,24 +103,24 @@ def test_an_edit_of_no_material_becomes_a_material(tmp_path: Path) -> None:
     add_plane()
     bake_by_hand()
     copy = copy_of(None)
-    assert carry_edits() == ()
+    assert carry_material_edits() == ()
     assert copy.get(ORIGINAL) is None
     shader(copy, "BSDF_DIFFUSE").inputs["Color"].links[0].from_node.outputs[0].default_value = GREEN
     np.testing.assert_allclose(seen_from_above(tmp_path)[0, 0], np.multiply(GREEN[:3], TEXEL), rtol=1e-4)
-    assert carry_edits() == ()
+    assert carry_material_edits() == ()
     own = copy[ORIGINAL]
     assert not is_made(own)
     np.testing.assert_allclose(read_material(own).reflectance, GREEN[:3], rtol=1e-6)
-    assert carry_edits() == ()
+    assert carry_material_edits() == ()
 
 
 def test_a_renamed_copy_renames_the_original(paint: Material) -> None:
     copy = copy_of(paint)
     copy.name = "Brick"
-    assert carry_edits() == ()
+    assert carry_material_edits() == ()
     assert paint.name == "Brick"
     copy.name = "Tile (Lightmap)"
-    assert carry_edits() == ()
+    assert carry_material_edits() == ()
     assert paint.name == "Tile"
     restore(bpy.context)
     assert [m.name for m in bpy.data.materials] == ["Tile"]
@@ -143,13 +136,13 @@ def test_an_original_from_a_library_gets_a_local_one_beside_it(tmp_path: Path) -
     add_plane(material=linked)
     bake_by_hand()
     copy = copy_of(linked)
-    assert carry_edits() == ()
+    assert carry_material_edits() == ()
     color_node(copy).default_value = GREEN
-    assert len(carry_edits()) == 1
+    assert len(carry_material_edits()) == 1
     own = copy[ORIGINAL]
     assert own.library is None
     assert base_color(own) == pytest.approx(GREEN)
-    assert carry_edits() == ()
+    assert carry_material_edits() == ()
 
 
 def test_a_node_group_edited_in_two_materials_becomes_two() -> None:
@@ -162,14 +155,14 @@ def test_a_node_group_edited_in_two_materials_becomes_two() -> None:
         inner = shader(copy_of(material), "GROUP").node_tree
         assert inner != group
         inner.nodes["Diffuse BSDF"].inputs["Color"].links[0].from_node.outputs[0].default_value = (value,) * 4
-    (warning,) = carry_edits()
+    (warning,) = carry_material_edits()
     assert warning.name.startswith("Wrapped.")
     assert "node group 'Wrapped'" in warning.message
     trees = [shader(material, "GROUP").node_tree for material in (first, second)]
     values = [tree.nodes["Diffuse BSDF"].inputs["Color"].default_value[0] for tree in trees]
     assert sorted(values) == [0.25, 0.5]
     assert not any(map(is_made, trees))
-    assert carry_edits() == ()
+    assert carry_material_edits() == ()
 
 
 def test_new_nodes_in_a_node_group_come_to_the_group() -> None:
@@ -179,7 +172,7 @@ def test_new_nodes_in_a_node_group_come_to_the_group() -> None:
     inner = shader(copy_of(material), "GROUP").node_tree
     contrast = inner.nodes.new("ShaderNodeBrightContrast")
     inner.links.new(contrast.outputs[0], inner.nodes["Diffuse BSDF"].inputs["Color"])
-    assert carry_edits() == ()
+    assert carry_material_edits() == ()
     restore(bpy.context)
     group = bpy.data.node_groups["Wrapped"]
     assert shader(bpy.data.materials["Grouped"], "GROUP").node_tree == group

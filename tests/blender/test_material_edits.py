@@ -13,8 +13,8 @@ from radiosity_addon.blender.apply.rebake import originals_shown
 from radiosity_addon.blender.apply.restore import restore
 from radiosity_addon.blender.datablocks.bake_record import is_made
 from radiosity_addon.blender.material_copies.copy_marks import ORIGINAL
-from radiosity_addon.blender.material_copies.material_digest import digest
-from radiosity_addon.blender.material_edits.material_edits import carry_edits
+from radiosity_addon.blender.material_copies.material_digest import digest_of_material
+from radiosity_addon.blender.material_edits.material_edits import carry_material_edits
 from radiosity_addon.blender.material_edits.stripping import stripped_copy
 from radiosity_addon.blender.materials.materials import read_material
 from radiosity_addon.blender.scene_export.export import export_scene
@@ -29,14 +29,7 @@ from tests.blender.edited_copies import (
     grouped_material,
     shader,
 )
-from tests.blender.hand_bake import (
-    BASE,
-    TEXEL,
-    add_plane,
-    bake_by_hand,
-    principled_material,
-    seen_from_above,
-)
+from tests.blender.hand_bake import BASE, TEXEL, add_plane, bake_by_hand, principled_material, seen_from_above
 from tests.blender.scenes import add_node, with_nodes
 
 pytestmark = pytest.mark.usefixtures("record")
@@ -142,7 +135,7 @@ def test_nodes_of_the_users_own_survive(paint: Material, tmp_path: Path) -> None
     copy = copy_of(paint)
     add_texture(copy)
     copy["other"] = "mine"
-    assert carry_edits() == ()
+    assert carry_material_edits() == ()
     paint = bpy.data.materials["Paint"]
     assert not is_made(paint)
     assert elsewhere.materials[0] == paint == copy[ORIGINAL]
@@ -186,9 +179,9 @@ def test_every_kind_of_value_is_written_in_place() -> None:
     copy["note"], copy["other"] = 4, [1.0, 2.0]
     copy.use_backface_culling = True
     edited = stripped_copy(copy)[0]
-    assert carry_edits() == ()
+    assert carry_material_edits() == ()
     assert bpy.data.materials["Paint"] == material
-    assert digest(material) == digest(edited)
+    assert digest_of_material(material) == digest_of_material(edited)
     assert len(ramp.color_ramp.elements) == 3
     assert (texture.image, texture.interpolation) == (other, "Closest")
     assert (material["note"], list(material["other"])) == (4, [1.0, 2.0])
@@ -198,7 +191,7 @@ def test_emission_sampling_that_the_user_chose_survives(paint: Material) -> None
     copy = copy_of(paint)
     assert (copy.cycles.emission_sampling, paint.cycles.emission_sampling) == ("NONE", "AUTO")
     copy.cycles.emission_sampling = "FRONT"
-    carry_edits()
+    carry_material_edits()
     assert paint.cycles.emission_sampling == "FRONT"
 
 

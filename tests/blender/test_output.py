@@ -17,7 +17,7 @@ from radiosity_addon.base.errors import BakeError
 from radiosity_addon.blender.files.output import OutputFolder
 from radiosity_addon.blender.files.saved_files import save_copy, save_restored
 from radiosity_addon.blender.images.images import set_folder, write_pages
-from radiosity_addon.files.baked_files import digest, read_report
+from radiosity_addon.files.baked_files import digest_of_file, read_report
 from radiosity_addon.files.file_names import BLEND_NAME, REPORT_NAME
 from radiosity_addon.lightmap.images.page import LightmapPage
 from radiosity_addon.options.bake_settings import BakeSettings
@@ -100,7 +100,7 @@ def test_an_interrupt_while_publishing_is_undone(tmp_path: Path, monkeypatch: py
 
 def digests(folder: Path) -> dict[str, str]:
     """The files of a folder, hidden ones too, by what they hold."""
-    return {path.name: digest(path) for path in folder.iterdir()}
+    return {path.name: digest_of_file(path) for path in folder.iterdir()}
 
 
 FOREIGN = ["one.exr", "report.json", "baked.blend", "preview.png", "lightmap.relight"]

@@ -12,13 +12,7 @@ import pytest
 from radiosity_addon.base.errors import SceneError
 from radiosity_addon.blender.scene_records.render_state import render_depsgraph
 from radiosity_addon.blender.scene_records.scene_objects import visible_objects
-from tests.blender.exporting import (
-    add_cube,
-    add_instance,
-    export_with,
-    objects_by_name,
-    scatter_nodes,
-)
+from tests.blender.exporting import add_cube, add_instance, export_with, objects_by_name, scatter_nodes
 from tests.blender.scenes import add_mesh, add_object, shader_material
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from radiosity_addon.bake.pipeline import bake_and_keep
-from radiosity_addon.bake.relight.kept_bake import relight
+from radiosity_addon.bake.relight.kept_bake import relight_pages
 from radiosity_addon.bake.sidecar.array_file import read_arrays, write_arrays
 from radiosity_addon.bake.sidecar.sidecar import MAGIC, VERSION, read_sidecar, write_sidecar
 from radiosity_addon.base.errors import RadiosityError, SceneError
@@ -42,7 +42,7 @@ def outcome(path: Path, told: Any, arrays: list[Array]) -> str:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of numbers that overflow
             stored = read_sidecar(path)
-            pages = drain(relight(stored.kept(scene), CHANGED))
+            pages = drain(relight_pages(stored.kept(scene), CHANGED))
             stored.result(scene, pages)
     except SceneError as error:
         return f"{path} is of another scene: {error}"

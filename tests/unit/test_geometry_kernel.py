@@ -10,8 +10,8 @@ from radiosity_addon.form_factors.geometry_kernel import (
     geometry_term,
     kernel,
     ray_geometry_term,
-    sees,
     throughput,
+    visibility_of,
 )
 from radiosity_addon.rays.caster import BruteForceCaster, RayCaster
 from radiosity_addon.rays.embree import EmbreeCaster
@@ -118,9 +118,9 @@ def test_points_see_each_other_unless_something_is_between(kind: type[RayCaster]
     middle = 0.5 * (below + above)[:, :2]
     depth = 0.25 - np.abs(middle - 0.5).max(axis=1)  # how far inside the screen the line passes
     clear = np.abs(depth) > 1e-3
-    seen = sees(caster, below, up, above, down)
+    seen = visibility_of(caster, below, up, above, down)
     np.testing.assert_array_equal(seen[clear], (depth < 0)[clear])
-    np.testing.assert_array_equal(sees(caster, above, down, below, up)[clear], seen[clear])
+    np.testing.assert_array_equal(visibility_of(caster, above, down, below, up)[clear], seen[clear])
 
 
 def test_nothing_sees_into_a_closed_box() -> None:
@@ -131,4 +131,4 @@ def test_nothing_sees_into_a_closed_box() -> None:
     covered = np.concatenate([rng.uniform(1.01, 1.99, (200, 2)), np.zeros((200, 1))], axis=1)
     outside = covered + np.array([0, 0, 3.0])
     up = np.tile([0.0, 0, 1], (200, 1))
-    assert not sees(caster, covered, up, outside, -up).any()
+    assert not visibility_of(caster, covered, up, outside, -up).any()

@@ -8,7 +8,14 @@ from pathlib import Path
 import pytest
 
 from radiosity_addon.blender.command_line.main import main
-from radiosity_addon.files.path_checks import MAX_PATH, escaped, folder_of, name_of, path_of, printable
+from radiosity_addon.files.path_checks import (
+    MAX_PATH,
+    checked_folder,
+    checked_name,
+    checked_path,
+    escaped,
+    printable,
+)
 from radiosity_addon.options.bake_settings import MAX_SEED, MAX_THREADS, BakeSettings
 
 IMPOSSIBLE = [
@@ -24,7 +31,7 @@ IMPOSSIBLE = [
 
 @pytest.mark.parametrize("word", IMPOSSIBLE)
 def test_impossible_paths_are_refused_and_named(word: str) -> None:
-    for read in (path_of, folder_of):
+    for read in (checked_path, checked_folder):
         with pytest.raises(ArgumentTypeError) as caught:
             read(word)
         message = str(caught.value)
@@ -36,29 +43,29 @@ def test_impossible_paths_are_refused_and_named(word: str) -> None:
 def test_a_link_that_leads_to_itself_is_refused(tmp_path: Path) -> None:
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
     with pytest.raises(ArgumentTypeError, match="link"):
-        path_of(str(tmp_path / "loop" / "scene.blend"))
+        checked_path(str(tmp_path / "loop" / "scene.blend"))
 
 
 @pytest.mark.parametrize(
     "word", ["scene.blend", "x" * 255, "é" * 127, "日本/シーン", "a b", "-", "..", "~/x"]
 )
 def test_what_files_can_be_called_is_taken(word: str) -> None:
-    assert path_of(word) == Path(word).expanduser()
+    assert checked_path(word) == Path(word).expanduser()
 
 
 def test_an_output_folder_leaves_room_for_the_names_of_its_files(tmp_path: Path) -> None:
     deep = str(tmp_path / "/".join(["d" * 99] * 8))
     assert len(deep) < MAX_PATH
-    assert path_of(deep) == Path(deep)
+    assert checked_path(deep) == Path(deep)
     with pytest.raises(ArgumentTypeError, match="shorter"):
-        folder_of(deep)
+        checked_folder(deep)
 
 
 @pytest.mark.parametrize("word", ["", "a\0b", "\udcff"])
 def test_impossible_names_are_refused(word: str) -> None:
     with pytest.raises(ArgumentTypeError):
-        name_of(word)
-    assert name_of("Wände 1") == "Wände 1"
+        checked_name(word)
+    assert checked_name("Wände 1") == "Wände 1"
 
 
 @pytest.mark.parametrize("option", ["--output", "--report", "--plot", "--objects", "--ignore"])

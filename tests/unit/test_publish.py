@@ -13,7 +13,7 @@ import pytest
 
 from radiosity_addon.base.errors import BakeError
 from radiosity_addon.files import publish as staging_module
-from radiosity_addon.files.baked_files import digest
+from radiosity_addon.files.baked_files import digest_of_file
 from radiosity_addon.files.marked_folders import MARK
 from radiosity_addon.files.publish import (
     EARLIER,
@@ -172,7 +172,7 @@ def test_a_journal_that_names_what_no_bake_writes_touches_nothing(tmp_path: Path
     ]
     for victim in victims:
         victim.write_text("years of work")
-    known = digest(victims[0])
+    known = digest_of_file(victims[0])
     made = crafted(folder, {name: {"new": known, "old": None}}, {})
     assert not is_interrupted(folder)
     assert not clean_up(folder)
@@ -185,7 +185,7 @@ def test_a_journal_touches_only_regular_files_of_known_content(tmp_path: Path) -
     victim, folder = tmp_path / "victim.exr", tmp_path / "folder"
     folder.mkdir()
     victim.write_text("years of work")
-    known = digest(victim)
+    known = digest_of_file(victim)
     (folder / "link.exr").symlink_to(victim)
     (folder / "other.exr").write_text("mine")
     crafted(folder, {"link.exr": {"new": known, "old": None}, "other.exr": {"new": known, "old": None}}, {})
@@ -203,7 +203,7 @@ def test_links_in_a_staging_folder_are_not_followed(tmp_path: Path, what: str) -
     folder.mkdir()
     (elsewhere / A).write_text("secret")
     (folder / A).write_text("new")
-    files = {A: {"new": digest(folder / A), "old": digest(elsewhere / A)}}
+    files = {A: {"new": digest_of_file(folder / A), "old": digest_of_file(elsewhere / A)}}
     made = crafted(folder, files, {A: "secret"})
     if what == "mark":
         (made / MARK).rename(elsewhere / "mark")

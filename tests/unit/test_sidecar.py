@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from radiosity_addon.bake.pipeline import bake_and_keep
-from radiosity_addon.bake.relight.kept_bake import KeptBake, relight
+from radiosity_addon.bake.relight.kept_bake import KeptBake, relight_pages
 from radiosity_addon.bake.relight.responses import Responses
-from radiosity_addon.bake.relight.scene_digest import check_same, fingerprint
+from radiosity_addon.bake.relight.scene_digest import check_same, scene_digests
 from radiosity_addon.bake.relight.source_strengths import aligned, dark, strengths_in
 from radiosity_addon.bake.result.result import BakeResult
 from radiosity_addon.bake.sidecar.array_file import read_arrays, write_arrays
@@ -54,7 +54,7 @@ def path(room: tuple[BakeResult, KeptBake], tmp_path: Path) -> Path:
 
 
 def all_pixels(kept: KeptBake, strengths: np.ndarray) -> bytes:
-    return b"".join(page.pixels.tobytes() for page in drain(relight(kept, strengths)))
+    return b"".join(page.pixels.tobytes() for page in drain(relight_pages(kept, strengths)))
 
 
 def fresh(kept: KeptBake) -> KeptBake:
@@ -153,7 +153,7 @@ def test_another_scene_is_refused_by_name(path: Path, change: object, message: s
 
 def test_an_object_that_was_not_there_is_named() -> None:
     with pytest.raises(SceneError, match="object 'Other' was not there"):
-        check_same({**fingerprint(lit_bake())}, added())
+        check_same({**scene_digests(lit_bake())}, added())
 
 
 def added() -> BakeScene:
@@ -164,7 +164,7 @@ def added() -> BakeScene:
 def test_signs_of_zero_do_not_count() -> None:
     other = lit_bake()
     other.scene.triangles[other.scene.triangles == 0.0] = -0.0
-    check_same(fingerprint(lit_bake()), other)
+    check_same(scene_digests(lit_bake()), other)
 
 
 def test_lamps_that_are_gone_are_dark_and_new_ones_refused() -> None:
@@ -216,7 +216,7 @@ def test_pages_are_sums_of_what_sources_add(room: tuple[BakeResult, KeptBake]) -
     assert responses.missing(CHANGED) == [0, 1, 2, 3, 4, 5]
     for source in responses.missing(CHANGED):
         drain(responses.steps(source))
-    (exact,) = drain(relight(kept, CHANGED))
+    (exact,) = drain(relight_pages(kept, CHANGED))
     found = responses.pages(CHANGED)[0]
     assert np.sqrt(((found - exact.pixels) ** 2).mean()) < 2e-3 * exact.pixels.mean()
     assert (found >= 0).all()

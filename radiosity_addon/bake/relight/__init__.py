@@ -12,13 +12,13 @@ from .kept_bake import (
     KeptBake,
     damaged,
     differs_in_strength_alone,
-    relight,
+    relight_pages,
     same_light,
     shown,
 )
 from .light_groups import are_wanted, check_groups, group_of, group_pages
 from .responses import Responses
-from .scene_digest import as_fingerprint, check_same, fingerprint
+from .scene_digest import as_scene_digests, check_same, scene_digests
 from .source_strengths import strengths_in
 
 __all__ = [
@@ -28,16 +28,16 @@ __all__ = [
     "KeptBake",
     "Responses",
     "are_wanted",
-    "as_fingerprint",
+    "as_scene_digests",
     "check_groups",
     "check_same",
     "damaged",
     "differs_in_strength_alone",
-    "fingerprint",
     "group_of",
     "group_pages",
-    "relight",
+    "relight_pages",
     "same_light",
+    "scene_digests",
     "shown",
     "strengths_in",
 ]

@@ -169,7 +169,7 @@ class KeptBake:
         return strengths
 
 
-def relight(kept: KeptBake, strengths: Array) -> Generator[Progress, None, tuple[LightmapPage, ...]]:
+def relight_pages(kept: KeptBake, strengths: Array) -> Generator[Progress, None, tuple[LightmapPage, ...]]:
     """Compute the lightmaps for other strengths of the sources.
 
     Parameters

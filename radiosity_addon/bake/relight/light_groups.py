@@ -12,7 +12,7 @@ from ...numerics import Array, tiles
 from ...options import MAX_GROUPS, OTHERS, BakeSettings
 from ...scene import BakeScene
 from ..result import LightGroup
-from .kept_bake import KeptBake, relight
+from .kept_bake import KeptBake, relight_pages
 
 BAND = 64
 """Rows of a page that are shared out at once."""
@@ -91,7 +91,7 @@ def group_pages(
     chosen = members(kept.settings, kept.names, kept.groups, given)
     found = []
     for number, (_, rows) in enumerate(chosen):
-        steps = relight(kept, given * rows[:, None])
+        steps = relight_pages(kept, given * rows[:, None])
         while True:
             try:
                 fraction = next(steps).fraction
@@ -111,7 +111,7 @@ def group_pages(
     )
 
 
-def shared_out(whole: Array, parts: Array) -> Array:
+def split_by_group(whole: Array, parts: Array) -> Array:
     """Return (g, …) float32 what `share_out` makes of parts."""
     result = parts.astype(np.float64)
     share_out(whole, list(result))

@@ -15,7 +15,7 @@ from ...base import SceneError
 from ...lightmap.images import LightmapPage
 from ...numerics import Array
 from ..result import Progress
-from .kept_bake import KeptBake, relight
+from .kept_bake import KeptBake, relight_pages
 
 MOST = 1 << 28
 """Bytes that responses may take when lightmaps are exact; the last ones are kept, and four in any case."""
@@ -59,7 +59,7 @@ class Responses:
         unit = self._unit(source)
         only = np.zeros_like(self.strengths)
         only[source] = unit
-        pages = yield from relight(self._kept, only)
+        pages = yield from relight_pages(self._kept, only)
         # Laid out as the pixels of images are: one after the other, each channel scaled apart.
         self._of[source] = unit, tuple(page.pixels for page in pages)
 

@@ -45,12 +45,12 @@ _SHAPE = ("triangles", "normals", "two_sided", "in_bounces", "in_shadows")
 _SURFACE = ("reflectance", "opacity")
 
 
-def fingerprint(bake_scene: BakeScene) -> dict[str, ObjectPrint]:
+def scene_digests(bake_scene: BakeScene) -> dict[str, ObjectPrint]:
     """Return what is compared of a scene's objects, in their order."""
     return {item.name: _print_of(bake_scene.scene, item) for item in bake_scene.objects}
 
 
-def as_fingerprint(stored: Any) -> dict[str, ObjectPrint]:
+def as_scene_digests(stored: Any) -> dict[str, ObjectPrint]:
     """Return a fingerprint that was read from a file.
 
     Raises
@@ -77,7 +77,7 @@ def check_same(before: Fingerprint, bake_scene: BakeScene) -> None:
     ------
     SceneError
     """
-    now = fingerprint(bake_scene)
+    now = scene_digests(bake_scene)
     for name in before:
         if name not in now:
             raise SceneError(f"object '{name}' is not there any more, or hidden from renders: bake again")

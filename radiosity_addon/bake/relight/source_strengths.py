@@ -14,7 +14,7 @@ from ...lights import Light
 from ...numerics import Array
 from ...scene import BakeScene
 from .kept_bake import STRENGTHS, KeptBake
-from .scene_digest import check_same, fingerprint
+from .scene_digest import check_same, scene_digests
 
 
 def strengths_in(kept: KeptBake, bake_scene: BakeScene) -> Array:
@@ -27,7 +27,7 @@ def strengths_in(kept: KeptBake, bake_scene: BakeScene) -> Array:
     SceneError
         If anything else differs; the message names it.
     """
-    check_same(fingerprint(kept.bake_scene), bake_scene)
+    check_same(scene_digests(kept.bake_scene), bake_scene)
     scene = copy(bake_scene.scene)
     scene.lights = aligned(kept.bake_scene.scene.lights, scene.lights)
     return kept.strengths_of(scene)

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ...base import BakeError
-from ...files import FILES, OWNER, replacing, sealed, text_of
+from ...files import LISTED, OWNER, replacing, sealed, text_of
 from ...scene import LIGHTMAP_UV_LAYER, BakeObject
 from .result import BakeResult
 
@@ -131,7 +131,7 @@ class BakeReport:
             The file and scene that were baked.
         """
         listed = {name: dict(told) for name, told in files.items()}
-        return BakeReport(sealed({**self.data, OWNER: dict(owner), FILES: listed}))
+        return BakeReport(sealed({**self.data, OWNER: dict(owner), LISTED: listed}))
 
     def write(self, path: Path) -> None:
         """Write the report as JSON.

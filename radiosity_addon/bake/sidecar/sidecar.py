@@ -30,7 +30,7 @@ from ...solver.gather import AimedRays, LightGains, LocalPass
 from ...solver.hierarchy import Clusters, Hierarchy, TreeTop
 from ...solver.links import ClusterLinks, LightLinks, Links
 from ...solver.methods import HierarchicalState
-from ..relight import DAMAGED, KeptBake, check_same, damaged, fingerprint
+from ..relight import DAMAGED, KeptBake, check_same, damaged, scene_digests
 from ..result import BakedObject, BakeResult
 from .array_file import ArrayFileError, TooLargeError, read_arrays, read_digest, write_arrays
 from .plain_objects import flatten, restore
@@ -178,7 +178,7 @@ def write_sidecar(path: Path, kept: KeptBake, result: BakeResult, mark: str) -> 
     stored = {
         "mark": mark,
         "settings": asdict(kept.settings),
-        "fingerprint": fingerprint(kept.bake_scene),
+        "fingerprint": scene_digests(kept.bake_scene),
         "emission": kept.bake_scene.scene.emission,
         "of_sources": {name: getattr(kept.bake_scene, name) for name in OF_SOURCES},
         "pages": [item.page for item in result.objects],

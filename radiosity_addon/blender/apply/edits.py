@@ -37,7 +37,7 @@ from ..material_copies.material_slots import (
     show_originals,
 )
 from ..material_edits import material_edits
-from ..stand_ins.mesh_digest import digest
+from ..stand_ins.mesh_digest import digest_of_mesh
 from ..stand_ins.stand_in_names import carry_names
 from ..stand_ins.stand_ins import (
     EVALUATED,
@@ -72,7 +72,7 @@ def carry_edits(context: bpy.types.Context) -> tuple[BakeWarning, ...]:
     leave_edit_modes(context, recorded_objects() + _stand_in_objects())
     know_earlier_versions()
     _part_duplicates()
-    warnings = [*material_edits.carry_edits(), *_carry_places(), *_deleted_stand_ins()]
+    warnings = [*material_edits.carry_material_edits(), *_carry_places(), *_deleted_stand_ins()]
     users = _objects_by_mesh()
     for mesh in [mesh for mesh in bpy.data.meshes if mesh.library is None and is_made(mesh)]:
         known = stand_in_of(mesh)
@@ -166,7 +166,7 @@ def _know(obj: bpy.types.Object, mesh: bpy.types.Mesh) -> None:
         set_stand_in(mesh, replace(known, seal=""))
     elif not modifiers and original is not None:
         # Only the copy was to be seen, so where it differs from the original, it was edited.
-        set_stand_in(mesh, replace(known, seal=digest(original)))
+        set_stand_in(mesh, replace(known, seal=digest_of_mesh(original)))
 
 
 def _old_shape(mesh: bpy.types.Mesh) -> str:
@@ -196,7 +196,7 @@ def _carry(mesh: bpy.types.Mesh, known: StandIn, users: Sequence[bpy.types.Objec
         if original is None and not is_made(users[0]):
             # The object's mesh was deleted: what the modifiers made of it is all there is.
             mesh[ORIGINAL] = released_copy(mesh, users[0].name)
-            set_stand_in(mesh, replace(known, modifiers=(), seal=digest(mesh)))
+            set_stand_in(mesh, replace(known, modifiers=(), seal=digest_of_mesh(mesh)))
             message = f"the mesh of object '{name}' is gone: it keeps what its modifiers made of it"
             return [BakeWarning(name, f"{message}; they stay switched off")]
         if not edited:
@@ -204,7 +204,7 @@ def _carry(mesh: bpy.types.Mesh, known: StandIn, users: Sequence[bpy.types.Objec
         if original is not None and known.modifiers and not is_made(users[0]) and not users[0].modifiers:
             # They were applied: what they made is the object's mesh now.
             mesh[ORIGINAL] = released_copy(mesh, original.name)
-            set_stand_in(mesh, replace(known, modifiers=(), seal=digest(mesh)))
+            set_stand_in(mesh, replace(known, modifiers=(), seal=digest_of_mesh(mesh)))
             return []
         kept = released_copy(mesh, f"{name}{EDITED}")
         kept.use_fake_user = True
@@ -257,7 +257,7 @@ def _replace_original(
     if (
         original is None
         or not fits
-        or known.seal != digest(original)
+        or known.seal != digest_of_mesh(original)
         or _has_other_slots(original, mesh, known)
     ):
         kept = released_copy(mesh, f"{original.name if original else name}{EDITED}")

@@ -66,7 +66,7 @@ def _gone_words(gone: Sequence[str]) -> str:
 
 
 def _short_print(bake_scene: BakeScene, item: BakeObject) -> str:
-    return fingerprint(bake_scene, item)[:16]
+    return object_digest(bake_scene, item)[:16]
 
 
 def restrict_to_changed(
@@ -91,7 +91,7 @@ def restrict_to_changed(
     if any(source.is_instance or source.makes_instances for source, _ in pairs):
         return everything
     kept, densities = set(), []
-    light = light_fingerprint(bake_scene, settings)
+    light = light_digest(bake_scene, settings)
     for source, target in pairs:
         obj = bpy.data.objects.get((source.object_name, None))
         if obj is None or not obj.is_property_set("radiosity_bake"):
@@ -100,7 +100,7 @@ def restrict_to_changed(
         if record.scene not in {"", scene.name} or (record.light or scene.radiosity.baked_light) != light:
             continue
         shows = record.is_baked and shows_lightmap(obj) and files_of(obj)
-        if shows and record.fingerprint == fingerprint(bake_scene, target):
+        if shows and record.object_digest == object_digest(bake_scene, target):
             kept.add(target.name)
             densities.append(record.texels_per_metre)
     if not kept:
@@ -125,13 +125,13 @@ def remember(scene: bpy.types.Scene, export: Export, result: BakeResult, setting
     sources = {
         target.name: source for source, target in zip(export.sources, export.bake_scene.objects, strict=True)
     }
-    light = light_fingerprint(export.bake_scene, settings)
+    light = light_digest(export.bake_scene, settings)
     for baked in result.objects:
         source = sources[baked.object.name]
         obj = bpy.data.objects.get((source.object_name, None))
         if obj is None or source.is_instance or not obj.is_property_set("radiosity_bake"):
             continue
-        obj.radiosity_bake.fingerprint = fingerprint(export.bake_scene, baked.object)
+        obj.radiosity_bake.object_digest = object_digest(export.bake_scene, baked.object)
         told = result.atlas[baked.page] if result.atlas else {}
         obj.radiosity_bake.texels_per_metre = told.get("texels_per_metre", 0.0)
         obj.radiosity_bake.light = light
@@ -140,7 +140,7 @@ def remember(scene: bpy.types.Scene, export: Export, result: BakeResult, setting
     scene.radiosity.baked_objects = json.dumps(prints)
 
 
-def fingerprint(bake_scene: BakeScene, item: BakeObject) -> str:
+def object_digest(bake_scene: BakeScene, item: BakeObject) -> str:
     """Return a digest of an object's shape, of how it reflects, and of its texel scale."""
     scene, rows = bake_scene.scene, item.rows
     digest = hashlib.sha256(f"{item.texel_scale:.6g}".encode())
@@ -160,7 +160,7 @@ def fingerprint(bake_scene: BakeScene, item: BakeObject) -> str:
     return digest.hexdigest()
 
 
-def light_fingerprint(bake_scene: BakeScene, settings: BakeSettings) -> str:
+def light_digest(bake_scene: BakeScene, settings: BakeSettings) -> str:
     """Return a digest of all that shines, and of the settings: what every lightmap depends on."""
     digest = hashlib.sha256()
     for light in bake_scene.scene.lights:

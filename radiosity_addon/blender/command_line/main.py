@@ -13,7 +13,15 @@ from contextlib import nullcontext, suppress
 from pathlib import Path
 
 from ...base import RadiosityError
-from ...cli import Console, Interrupts, bake_output, build_parser, check_keeping, check_plot, settings_of
+from ...cli import (
+    Console,
+    Interrupts,
+    bake_output,
+    build_parser,
+    check_keeping,
+    check_plot,
+    requested_settings,
+)
 from ...files import printable
 from ...options import BakeSettings, Permissions
 
@@ -52,7 +60,7 @@ def main(
     """
     try:
         request = build_parser(prog).parse_args(sys.argv[1:] if argv is None else list(argv))
-        settings = settings_of(request) if request.verb == "bake" else None
+        settings = requested_settings(request) if request.verb == "bake" else None
         if settings is not None and not request.check:
             request.output = bake_output(request, loaded)
             check_plot(request.plot)

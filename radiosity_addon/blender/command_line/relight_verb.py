@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import bpy
 
-from ...bake import KeepOptions
+from ...bake import KeepOptions, timed
 from ...bake.relight import strengths_in
 from ...bake.result import BakeReport, Progress
 from ...bake.sidecar import StoredBake, check_belongs, read_sidecar
@@ -109,7 +109,7 @@ def relight_into(
     """
     from ..apply.rebake import Originals
     from ..images.images import group_file_names, page_file_names
-    from ..jobs.job import deliver, timed
+    from ..jobs.job import deliver
     from ..jobs.preview import QUICK_SAMPLES
     from ..relight.relight_scene import lit
     from ..scene_export.export import export_steps, exporting

@@ -45,7 +45,7 @@ def known_means_only(means: Means | None) -> Iterator[None]:
 
 
 def image_mean(image: bpy.types.Image, equirectangular: bool = False) -> np.ndarray | None:
-    """Return the mean of an image's pixels, as `mean_steps` does; see `known_means_only`."""
+    """Return the mean of an image's pixels, as `image_mean_steps` does; see `known_means_only`."""
     if _known:
         means, wanted = _known[-1], (image.name_full, equirectangular)
         if means is None:
@@ -53,16 +53,16 @@ def image_mean(image: bpy.types.Image, equirectangular: bool = False) -> np.ndar
         if wanted not in means:
             raise UnknownMeanError(wanted)
         return means[wanted]
-    return drain(mean_steps(image, equirectangular))
+    return drain(image_mean_steps(image, equirectangular))
 
 
 def mean_of_named(wanted: Wanted) -> Generator[float, None, np.ndarray | None]:
     """Return an image's mean, found by its name; None if there is none of that name any more."""
     image = next((each for each in bpy.data.images if each.name_full == wanted[0]), None)
-    return None if image is None else (yield from mean_steps(image, wanted[1]))
+    return None if image is None else (yield from image_mean_steps(image, wanted[1]))
 
 
-def mean_steps(
+def image_mean_steps(
     image: bpy.types.Image, equirectangular: bool = False
 ) -> Generator[float, None, np.ndarray | None]:
     """Compute the mean of an image's pixels, colours made linear first; the first step alone asks the image.

@@ -10,7 +10,7 @@ from typing import Any
 
 import bpy
 
-from ...files import BAKE, FILES, KEPT, REPORT_NAME, NoReportError, read_report
+from ...files import BAKE, KEPT, LISTED, REPORT_NAME, NoReportError, read_report
 from ..datablocks.image_marks import REPORT
 
 Listed = Mapping[str, Mapping[str, Any]]
@@ -56,7 +56,7 @@ def _read(report: Path) -> _Read:
         read = _Read()
         with suppress(OSError, NoReportError):
             told = read_report(report)
-            read = _Read(told[FILES], _kept_by(told))
+            read = _Read(told[LISTED], _kept_by(told))
         known = _known[report] = stamp, read
     return known[1]
 

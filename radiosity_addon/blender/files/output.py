@@ -20,10 +20,10 @@ from ...bake.result import BakeReport
 from ...base import BakeError, RadiosityError
 from ...files import (
     BLEND_NAME,
+    LISTED,
     OWNER,
     PLAIN_NAMES,
     PREVIEW_NAME,
-    REPORT_NAME,
     FileNames,
     NoReportError,
     Owner,
@@ -35,16 +35,7 @@ from ...files import (
     is_as_written_steps,
     read_report,
 )
-from ...files import FILES as LISTED
 from .ownership import is_read, owner_of
-
-FILES = (
-    (BLEND_NAME, "the scene with its lightmaps"),
-    ("*.exr or *.png", "the lightmaps"),
-    (PREVIEW_NAME, "what it looks like"),
-    (REPORT_NAME, "objects, figures and warnings"),
-)
-"""What a finished bake leaves in the folder, for people to read."""
 
 _DISK_FAILURES = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.EIO)
 """What the system says of a disk that is full, or fails, often without naming the file."""

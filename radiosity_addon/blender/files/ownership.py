@@ -14,7 +14,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ...base import BakeError
-from ...files import FILES, REPORT_NAME, FileNames, NoReportError, Owner, read_report, reports_in
+from ...files import LISTED, REPORT_NAME, FileNames, NoReportError, Owner, read_report, reports_in
 from ..datablocks.bake_record import is_made
 
 CORNELL_BOX = "<Cornell box>"
@@ -73,7 +73,7 @@ def report_listing(path: Path, scenes: Iterable[bpy.types.Scene]) -> OwnReport:
     """
     for scene in scenes:
         for report in own_reports(path.parent, scene):
-            if path.name in report.told[FILES]:
+            if path.name in report.told[LISTED]:
                 return report
     try:
         read_report(path.with_name(REPORT_NAME))

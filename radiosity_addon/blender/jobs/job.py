@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Generator, Iterator
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from collections.abc import Generator
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, replace
 
 import bpy
 
-from ...bake import KeepOptions, bake_steps, moves_alone, pages_of, refuse_too_large
+from ...bake import KeepOptions, bake_steps, moves_alone, pages_of, refuse_too_large, timed
 from ...bake.relight import KeptBake
 from ...bake.result import BakeReport, BakeResult, Progress
 from ...bake.sidecar import sidecar_entry
@@ -350,11 +349,3 @@ def keeping_sidecar(report: BakeReport, output: OutputFolder, keeping: KeepOptio
     staged = output.staging / output.names.sidecar
     path = staged if staged.is_file() else output.path / output.names.sidecar
     return BakeReport({**report.data, KEPT: sidecar_entry(path, keeping.mark)})
-
-
-@contextmanager
-def timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
-    """Add what the block takes to a stage's time."""
-    start = time.perf_counter()
-    yield
-    seconds[stage] = seconds.get(stage, 0.0) + time.perf_counter() - start

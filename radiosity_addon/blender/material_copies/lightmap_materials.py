@@ -48,7 +48,7 @@ from .copy_marks import (
 from .copy_record import record
 from .false_colors import false_colors
 from .light_shares import LightShares
-from .surface_nodes import Surface, feed_color, feed_float, read_surface
+from .surface_nodes import SurfaceSockets, feed_color, feed_float, read_surface
 from .uv_pin import pin_uvs
 
 RADIANCE_PER_TEXEL = {
@@ -118,7 +118,7 @@ class LightmapMaterials:
         copy[COPY_NAME], copy[TOKEN] = copy.name, uuid.uuid4().hex
         constant = read_material(material)
         radiance = radiance_of_radiosity(constant.emission)
-        unknown = Surface(
+        unknown = SurfaceSockets(
             tuple(constant.reflectance.tolist()), tuple(radiance.tolist()), glows=bool(radiance.any())
         )
         if material is None or not uses_nodes(material):
@@ -150,7 +150,7 @@ class LightmapMaterials:
         self,
         tree: bpy.types.NodeTree,
         output: bpy.types.Node,
-        surface: Surface,
+        surface: SurfaceSockets,
         image: bpy.types.Image,
         light_group: str,
     ) -> None:
@@ -230,7 +230,7 @@ def _make_plain_nodes(material: bpy.types.Material, color: Any) -> None:
     material.node_tree.links.new(shader.outputs[0], output.inputs["Surface"])
 
 
-def _skip_light_sampling(material: bpy.types.Material, surface: Surface) -> None:
+def _skip_light_sampling(material: bpy.types.Material, surface: SurfaceSockets) -> None:
     """Keep Cycles from sampling baked walls as lamps: they are bright, but light nothing."""
     if not surface.glows and hasattr(material, "cycles"):
         material[SAMPLING] = material.cycles.emission_sampling

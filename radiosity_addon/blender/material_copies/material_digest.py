@@ -42,7 +42,7 @@ _NOT_CONTENT = frozenset(
 )  # fmt: skip
 
 
-def digest(material: bpy.types.Material, as_copy: bool = False) -> str:
+def digest_of_material(material: bpy.types.Material, as_copy: bool = False) -> str:
     """Return the digest of a material.
 
     Parameters
@@ -59,7 +59,7 @@ def digest(material: bpy.types.Material, as_copy: bool = False) -> str:
 
 
 def tree_digest(tree: bpy.types.NodeTree, as_copy: bool = False) -> str:
-    """Return the digest of a node group, as `digest`."""
+    """Return the digest of a node group, as `digest_of_material`."""
     return _hash([_interface(tree), _custom(tree, COPY_MARKS), _tree(tree, as_copy)])
 
 

@@ -29,7 +29,7 @@ _UNREADABLE = {"BSDF_GLASS", "BSDF_REFRACTION", "GROUP_INPUT", "HOLDOUT"}
 
 
 @dataclass(frozen=True)
-class Surface:
+class SurfaceSockets:
     """A shader seen as a diffuse, emitting and partly transparent surface.
 
     Parameters
@@ -50,7 +50,9 @@ class Surface:
     glows: bool = False
 
 
-def read_surface(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, unknown: Surface) -> Surface:
+def read_surface(
+    tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, unknown: SurfaceSockets
+) -> SurfaceSockets:
     """Read the shader that feeds `socket`, through Mix and Add Shaders.
 
     Parameters
@@ -65,19 +67,19 @@ def read_surface(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, unknown
     feed = feed_of(socket, enter_groups=False)
     node, source = feed.node, feed.socket
     if node is None:
-        return Surface(BLACK)
+        return SurfaceSockets(BLACK)
     if source.type != "SHADER" and node.type not in ("GROUP", "GROUP_INPUT"):
-        return Surface(BLACK, source, glows=True)
+        return SurfaceSockets(BLACK, source, glows=True)
     if node.type == "BSDF_PRINCIPLED":
         emission, glows = _scaled(tree, node.inputs["Emission Color"], node.inputs["Emission Strength"])
-        return Surface(_source(tree, node.inputs["Base Color"]), emission, _alpha(tree, node), glows)
+        return SurfaceSockets(_source(tree, node.inputs["Base Color"]), emission, _alpha(tree, node), glows)
     if node.type == "BSDF_DIFFUSE":
-        return Surface(_source(tree, node.inputs["Color"]))
+        return SurfaceSockets(_source(tree, node.inputs["Color"]))
     if node.type == "EMISSION":
         emission, glows = _scaled(tree, node.inputs["Color"], node.inputs["Strength"])
-        return Surface(BLACK, emission, glows=glows)
+        return SurfaceSockets(BLACK, emission, glows=glows)
     if node.type == "BSDF_TRANSPARENT":
-        return Surface(BLACK, alpha=0.0)
+        return SurfaceSockets(BLACK, alpha=0.0)
     if node.type == "GROUP" and node.node_tree is not None:
         return _grouped(node, source, unknown)
     if node.type == "MIX_SHADER":
@@ -89,7 +91,7 @@ def read_surface(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, unknown
     if node.type in _UNREADABLE:
         return unknown
     color = node.inputs.get("Color") or node.inputs.get("Base Color")
-    return unknown if color is None else Surface(_source(tree, color))
+    return unknown if color is None else SurfaceSockets(_source(tree, color))
 
 
 def feed_color(tree: bpy.types.NodeTree, target: bpy.types.NodeSocket, source: ColorSource) -> None:
@@ -108,7 +110,7 @@ def feed_float(tree: bpy.types.NodeTree, target: bpy.types.NodeSocket, source: F
         target.default_value = source
 
 
-def _grouped(node: bpy.types.Node, output: bpy.types.NodeSocket, unknown: Surface) -> Surface:
+def _grouped(node: bpy.types.Node, output: bpy.types.NodeSocket, unknown: SurfaceSockets) -> SurfaceSockets:
     """Read a shader inside a node group, through outputs added to a copy of the group."""
     identifier = output.identifier
     if not any(n.type == "GROUP_OUTPUT" and n.is_active_output for n in node.node_tree.nodes):
@@ -137,7 +139,7 @@ def _grouped(node: bpy.types.Node, output: bpy.types.NodeSocket, unknown: Surfac
         outward(inner.emission, "Emission"),
         outward(inner.alpha, "Alpha"),
     )
-    return Surface(base, emission, alpha, inner.glows)
+    return SurfaceSockets(base, emission, alpha, inner.glows)
 
 
 def _alpha(tree: bpy.types.NodeTree, node: bpy.types.Node) -> FloatSource:
@@ -188,7 +190,9 @@ def _linked(socket: bpy.types.NodeSocket) -> bool:
     return node is not None and node.get(VALUE) is None
 
 
-def _mixed(tree: bpy.types.NodeTree, factor: FloatSource, first: Surface, second: Surface) -> Surface:
+def _mixed(
+    tree: bpy.types.NodeTree, factor: FloatSource, first: SurfaceSockets, second: SurfaceSockets
+) -> SurfaceSockets:
     """Mix two surfaces; one that is wholly transparent lends no base color."""
     base = _mix_colors(tree, factor, first.base, second.base)
     if first.alpha == 0.0:
@@ -197,17 +201,17 @@ def _mixed(tree: bpy.types.NodeTree, factor: FloatSource, first: Surface, second
         base = first.base
     emission = _mix_colors(tree, factor, first.emission, second.emission)
     alpha = _mix_floats(tree, factor, first.alpha, second.alpha)
-    return Surface(base, emission, alpha, first.glows or second.glows)
+    return SurfaceSockets(base, emission, alpha, first.glows or second.glows)
 
 
-def _added(tree: bpy.types.NodeTree, first: Surface, second: Surface) -> Surface:
+def _added(tree: bpy.types.NodeTree, first: SurfaceSockets, second: SurfaceSockets) -> SurfaceSockets:
     """Add two surfaces, as a diffuse shader plus an emission; one opaque makes both opaque."""
     alpha = second.alpha if first.alpha == 0.0 else first.alpha
     base, emission = (
         _add_colors(tree, first.base, second.base),
         _add_colors(tree, first.emission, second.emission),
     )
-    return Surface(base, emission, alpha, first.glows or second.glows)
+    return SurfaceSockets(base, emission, alpha, first.glows or second.glows)
 
 
 def _mix_colors(

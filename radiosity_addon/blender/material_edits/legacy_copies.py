@@ -11,7 +11,7 @@ import numpy as np
 from ..datablocks.bake_record import is_made
 from ..images.node_group import BASE_COLOR, EMISSION, SHADER
 from ..material_copies.copy_marks import COPY_MARKS, ORIGINAL, STATE
-from ..material_copies.material_digest import digest
+from ..material_copies.material_digest import digest_of_material
 from ..materials.materials import DEFAULT_GREY
 from ..materials.shader_nodes import feed_of
 from .stripping import COLORS
@@ -49,13 +49,13 @@ def was_edited(copy: bpy.types.Material) -> tuple[bpy.types.Material, bool]:
     agrees = shown is None or own is None or _are_close(own, shown)
     if not agrees and own is not None and _are_close(own, wanted):
         _set_constants(stripped.node_tree, own, shown)  # the node was edited, which shows
-    if digest(stripped) == digest(original):
+    if digest_of_material(stripped) == digest_of_material(original):
         return stripped, False
     if not agrees or own is None or wanted is None:
         return stripped, True
     as_original = stripped.copy()
     _set_constants(as_original.node_tree, own, wanted, _main(tree))
-    only_original = digest(as_original) == digest(original)
+    only_original = digest_of_material(as_original) == digest_of_material(original)
     bpy.data.materials.remove(as_original)
     return stripped, not only_original
 

@@ -1,6 +1,6 @@
 """Carry edits of the lightmap copies of materials to the originals: what is seen is what is edited.
 
-Restore, exports and comparisons call `carry_edits` first, and treat the originals as the truth then.
+Restore, exports and comparisons call `carry_material_edits` first, and treat the originals as the truth then.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from ..material_copies.copy_marks import (
     TOKEN,
     copied_groups,
 )
-from ..material_copies.material_digest import digest, tree_digest
+from ..material_copies.material_digest import digest_of_material, tree_digest
 from ..materials.materials import uses_nodes
 from .copy_values import take_values, write_material, write_settings, write_tree
 from .legacy_copies import is_legacy, was_edited
 from .stripping import stripped_copy, stripped_group
 
 
-def carry_edits() -> tuple[BakeWarning, ...]:
+def carry_material_edits() -> tuple[BakeWarning, ...]:
     """Make every original equal to what the user made of its lightmap copy.
 
     An edit goes to the original. That stays the datablock it is if the nodes are still the same; else it is
@@ -68,7 +68,7 @@ def _carry(copy: bpy.types.Material, is_duplicate: bool) -> list[BakeWarning]:
     if is_legacy(copy):
         return _carry_legacy(copy)
     original = copy.get(ORIGINAL)
-    shown, edited = copy.name, copy[STATE] != digest(copy, as_copy=True)
+    shown, edited = copy.name, copy[STATE] != digest_of_material(copy, as_copy=True)
     if not edited and not is_duplicate and copy.name == copy[COPY_NAME]:
         take_marks(original, copy)
         return []
@@ -76,27 +76,27 @@ def _carry(copy: bpy.types.Material, is_duplicate: bool) -> list[BakeWarning]:
     warnings: list[BakeWarning] = []
     if edited or is_duplicate or (renamed and original is None):
         stripped, complete = stripped_copy(copy)
-        content = digest(stripped)
+        content = digest_of_material(stripped)
         if not complete:
             message = (
                 f"material '{shown}': its shader cannot take what feeds the lightmap's node: edit the shader"
             )
             warnings.append(BakeWarning(shown, message))
-        same = content == copy[CONTENT] or (original is not None and content == digest(original))
+        same = content == copy[CONTENT] or (original is not None and content == digest_of_material(original))
         if same and not (is_duplicate and copy.users) and not (renamed and original is None):
             bpy.data.materials.remove(stripped)
             if content != copy[CONTENT]:
-                copy[CONTENT], copy[SOURCE] = content, digest(original)
+                copy[CONTENT], copy[SOURCE] = content, digest_of_material(original)
         elif original is None or is_duplicate:
             name = _name_of_own(copy) if original is None else original.name
             original = _as_own(copy, stripped, name, content)
-        elif original.library is None and digest(original) == copy[SOURCE]:
+        elif original.library is None and digest_of_material(original) == copy[SOURCE]:
             original = _move(copy, original, stripped, content)
         else:
             own = _as_own(copy, stripped, original.name, content)
             warnings.append(_conflict("material", original, own))
             original = own
-        copy[STATE] = digest(copy, as_copy=True)
+        copy[STATE] = digest_of_material(copy, as_copy=True)
     if original is not None and original.library is None and renamed:
         name = _base_name(copy.name)
         copy.name = f"{name}{SUFFIX}"  # or the original could not have it
@@ -115,12 +115,12 @@ def _move(
     if not uses_nodes(original):
         written = _write_plain(original, stripped)
     elif write_material(original, stripped):
-        written = digest(original) == content
+        written = digest_of_material(original) == content
     if written:
         bpy.data.materials.remove(stripped)
     else:
         original = _replace(bpy.data.materials, original, stripped)
-    copy[CONTENT], copy[SOURCE] = content, digest(original)
+    copy[CONTENT], copy[SOURCE] = content, digest_of_material(original)
     for other in [block for block in bpy.data.materials if _is_copy(block) and block != copy]:
         if other.get(ORIGINAL) == original and other.get(SOURCE) == before:
             _follow(other, original)
@@ -129,13 +129,13 @@ def _move(
 
 def _follow(copy: bpy.types.Material, original: bpy.types.Material) -> None:
     """Have another copy of an original that was just edited show it, if it was not edited itself."""
-    if copy[STATE] != digest(copy, as_copy=True) or copy.get(PLAIN):
+    if copy[STATE] != digest_of_material(copy, as_copy=True) or copy.get(PLAIN):
         return
     take_values(copy.node_tree, original.node_tree)
     stripped, _ = stripped_copy(copy)
-    if digest(stripped) == digest(original):
-        copy[CONTENT] = copy[SOURCE] = digest(original)
-    copy[STATE] = digest(copy, as_copy=True)
+    if digest_of_material(stripped) == digest_of_material(original):
+        copy[CONTENT] = copy[SOURCE] = digest_of_material(original)
+    copy[STATE] = digest_of_material(copy, as_copy=True)
     bpy.data.materials.remove(stripped)
 
 
@@ -163,7 +163,7 @@ def _as_own(
     copy[ORIGINAL] = stripped
     copy[TOKEN] = uuid.uuid4().hex
     copy.pop(PLAIN, None)
-    copy[CONTENT], copy[SOURCE] = content, digest(stripped)
+    copy[CONTENT], copy[SOURCE] = content, digest_of_material(stripped)
     return stripped
 
 
@@ -200,7 +200,7 @@ def _carry_group(copy: bpy.types.NodeTree) -> list[BakeWarning]:
 
 def _carry_legacy(copy: bpy.types.Material) -> list[BakeWarning]:
     """Carry the edits of a copy that a version made which noted nothing on copies."""
-    content = digest(copy)
+    content = digest_of_material(copy)
     if copy.get(CARRIED) == content:
         return []
     copy[CARRIED] = content

@@ -44,7 +44,7 @@ class Unused:
 
 def unused_lightmaps(context: bpy.types.Context) -> Unused:
     """Find the lightmaps that bakes of the open file wrote and that it does not show."""
-    from ...files import BLEND_NAME, FILES, LIGHTMAPS, PREVIEW_NAME, is_as_written, reports_in
+    from ...files import BLEND_NAME, LIGHTMAPS, LISTED, PREVIEW_NAME, is_as_written, reports_in
     from ..files.ownership import owner_of
 
     images = [image for image in bpy.data.images if image.filepath_raw]
@@ -56,9 +56,9 @@ def unused_lightmaps(context: bpy.types.Context) -> Unused:
         for report, told in reports_in(folder, owner_of(context.scene).is_source_of).items():
             # A copy that the command line wrote shows all that is listed with it.
             copy = folder / BLEND_NAME
-            if BLEND_NAME in told[FILES] and copy.exists() and copy.resolve() != here:
+            if BLEND_NAME in told[LISTED] and copy.exists() and copy.resolve() != here:
                 continue
-            for name, of in told[FILES].items():
+            for name, of in told[LISTED].items():
                 path = folder / name
                 if path.suffix.lower() not in LIGHTMAPS or name == PREVIEW_NAME or not path.is_file():
                     continue

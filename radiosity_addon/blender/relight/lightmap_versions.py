@@ -24,7 +24,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ...base import BakeError, RadiosityError
-from ...files import FILES, KEPT, MOST_FILES, REPORT_NAME, HeldFiles, digest
+from ...files import KEPT, LISTED, MOST_FILES, REPORT_NAME, HeldFiles, digest_of_file
 from ..datablocks.bake_record import is_made
 from ..datablocks.image_marks import PAGE, REPORT, VERSION
 from ..files.lightmap_reports import forget_reports, images_described, listed_in, report_of
@@ -92,7 +92,7 @@ def mark(images: Iterable[bpy.types.Image], report: str = REPORT_NAME) -> None:
         if image.packed_file is not None:
             image[VERSION] = hashlib.sha256(image.packed_file.data).hexdigest()
         else:
-            image[VERSION] = digest(Path(bpy.path.abspath(image.filepath_raw)))
+            image[VERSION] = digest_of_file(Path(bpy.path.abspath(image.filepath_raw)))
         state.shown[image.name] = image[VERSION]
 
 
@@ -118,7 +118,7 @@ def hold(output: OutputFolder) -> None:
     told = output.earlier
     if told is None:
         return
-    listed = told[FILES]
+    listed = told[LISTED]
     names = {path.name for path in output.staging.iterdir() if path.is_file()}
     if state.held is None:
         state.held = HeldFiles(Path(bpy.app.tempdir))
@@ -263,7 +263,7 @@ def _stage_report(output: OutputFolder, wanted: Sequence[Wanted]) -> None:
 
     now = output.earlier or {}
     told = next((state.reports[one.version] for one in wanted if one.version in state.reports), now)
-    before, listed = (report.get(FILES, {}) for report in (told, now))
+    before, listed = (report.get(LISTED, {}) for report in (told, now))
     if before.get(output.names.sidecar) != listed.get(output.names.sidecar):
         # Its sidecar is not there any more.
         told = {key: value for key, value in told.items() if key != KEPT}

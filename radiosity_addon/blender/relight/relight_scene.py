@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ...bake.relight import KeptBake, are_wanted, group_pages, relight, strengths_in
+from ...bake.relight import KeptBake, are_wanted, group_pages, relight_pages, strengths_in
 from ...bake.result import LightGroup, Progress
 from ...bake.sidecar import StoredBake, read_sidecar
 from ...base import BakeError, drain
@@ -117,7 +117,7 @@ def stored_bake(scene: bpy.types.Scene) -> StoredBake:
 
 def lit(kept: KeptBake, strengths: Array) -> Generator[float, None, Relit]:
     """Compute the pages of a kept bake, and those of its light groups; yields the fraction done."""
-    steps = relight(kept, strengths)
+    steps = relight_pages(kept, strengths)
     while True:
         try:
             yield next(steps).fraction

@@ -11,7 +11,7 @@ from ..datablocks.bake_record import is_made
 from ..images.node_group import EMISSION
 from ..material_copies.copy_marks import ORIGINAL, PLAIN, STATE
 from ..material_copies.copy_record import is_untouched
-from ..material_copies.material_digest import digest
+from ..material_copies.material_digest import digest_of_material
 from ..material_edits.copy_values import take_values
 from ..material_edits.stripping import is_lightmap_node
 from ..materials.materials import read_material, uses_nodes
@@ -58,4 +58,4 @@ def _take(copy: bpy.types.Material, original: bpy.types.Material, sockets: set[s
         if is_lightmap_node(node) and not node.inputs[EMISSION].is_linked:
             node.inputs[EMISSION].default_value = (*radiance.tolist(), 1.0)
     if untouched:
-        copy[STATE] = digest(copy, as_copy=True)
+        copy[STATE] = digest_of_material(copy, as_copy=True)

@@ -20,6 +20,7 @@ from ..cycles.lamps import lamp_factors
 from ..cycles.surface_evaluation import evaluate_surfaces
 from ..cycles.world import read_world
 from ..datablocks.mesh_arrays import all_finite, degenerate, not_finite_message, world_from_object
+from ..datablocks.uv_layers import MAX_UV_LAYERS
 from ..scene_records.export_sources import Export
 from ..scene_records.light_membership import name_on
 from ..scene_records.object_roles import BAKE, BAKEABLE_TYPES, half_visible
@@ -30,8 +31,6 @@ from ..session.background import elsewhere
 from .collect import collect_steps
 
 T = TypeVar("T")
-
-MAX_UV_LAYERS = 8
 
 
 def export_scene(context: bpy.types.Context, settings: BakeSettings, dark: bool = False) -> Export:

@@ -47,7 +47,7 @@ _NOT_COUNTED = {
 }
 
 
-def digest(mesh: bpy.types.Mesh) -> str:
+def digest_of_mesh(mesh: bpy.types.Mesh) -> str:
     """Return the digest of a mesh, the same for its original and an unedited copy with our layer."""
     found = hashlib.blake2b(digest_size=16)
     record = layer_record(mesh)

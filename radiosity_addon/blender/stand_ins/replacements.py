@@ -17,7 +17,7 @@ from ..material_copies.lightmap_materials import LightmapMaterials
 from ..material_copies.material_slots import set_materials
 from ..scene_records.export_sources import ExportSource
 from .followers import nearly_equal
-from .mesh_digest import digest
+from .mesh_digest import digest_of_mesh
 from .stand_in_names import note_names
 from .stand_ins import EVALUATED, OWN, StandIn, seal, seal_object, set_stand_in, stand_in_of
 
@@ -215,7 +215,7 @@ def _new_stand_in(replacement: Replacement) -> bpy.types.Object:
         stand_in.matrix_world = mirror
         known = stand_in_of(mesh)
         if known is not None:
-            set_stand_in(mesh, replace(known, seal=digest(mesh)))
+            set_stand_in(mesh, replace(known, seal=digest_of_mesh(mesh)))
     instancer = bpy.data.objects.get((shown_by(replacement.source), None))
     seal_object(stand_in, instancer, replacement.source.name)
     return stand_in

@@ -15,7 +15,7 @@ import bpy
 from ..datablocks.bake_record import ASIDE, LAYER, MADE_MARKER, ORIGINAL, is_made, is_recorded, unmark_made
 from ..datablocks.uv_layers import take_layer_off
 from ..material_copies.material_slots import is_copy, original_of, show_originals
-from .mesh_digest import digest
+from .mesh_digest import digest_of_mesh
 
 STAND_IN = "radiosity_stand_in"
 """Custom property of a stand-in mesh: what is known of it; of a stand-in object: how it was placed."""
@@ -109,7 +109,7 @@ def seal(
     known: StandIn,
 ) -> StandIn:
     """Remember what a stand-in mesh is like, to notice edits; `stands_for` are the materials of its slots."""
-    known = replace(known, kind=kind, seal=digest(mesh), slots=len(mesh.materials))
+    known = replace(known, kind=kind, seal=digest_of_mesh(mesh), slots=len(mesh.materials))
     set_stand_in(mesh, known)
     mesh[SLOTS] = {str(slot): material for slot, material in enumerate(stands_for) if material is not None}
     return known
@@ -130,7 +130,7 @@ def has_edited_slots(mesh: bpy.types.Mesh, known: StandIn) -> bool:
 
 def is_edited(mesh: bpy.types.Mesh, known: StandIn) -> bool:
     """Whether a stand-in's geometry or layers are not as the bake made them."""
-    return known.seal != digest(mesh)
+    return known.seal != digest_of_mesh(mesh)
 
 
 def own_mesh(obj: bpy.types.Object) -> bpy.types.ID | None:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...numerics import Array
-from ...rays import RayCaster
+from ...rays import SAGITTA, SIGHT_LIFT, RayCaster
 from ...scene import Scene
 from ..texels import NO_TEXEL, TexelGeometry
 
@@ -34,10 +34,6 @@ NEAR = 3.0
 
 CHUNK = 1 << 16
 """Places tested at once; bounds the temporaries to about 40 MB."""
-
-LIFT, SAGITTA = 2.0, 0.6
-"""Lines of sight over a seam run this many ray offsets above the surface, and this part of
-length · √(1 − cos of the turn) more, for bulges."""
 
 
 @dataclass(frozen=True)
@@ -229,7 +225,7 @@ def _open(geometry: TexelGeometry, caster: RayCaster, numbers: Array, weight: Ar
     at, normal, facet = geometry.position[ends], geometry.normal[ends], geometry.surface_normal[ends]
     length = np.linalg.norm(at[:, 1] - at[:, 0], axis=1)
     turn = np.minimum(*(np.einsum("sk,sk->s", of[:, 0], of[:, 1]) for of in (normal, facet)))
-    lift = LIFT * caster.surface_offset + SAGITTA * length * np.sqrt(np.maximum(1.0 - turn, 0.0))
+    lift = SIGHT_LIFT * caster.surface_offset + SAGITTA * length * np.sqrt(np.maximum(1.0 - turn, 0.0))
     at = at + lift[:, None, None] * normal
     along = at[:, 1] - at[:, 0]
     length = np.linalg.norm(along, axis=1)

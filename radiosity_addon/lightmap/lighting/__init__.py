@@ -6,7 +6,7 @@ Needs a solved scene; traces each ray once.
 from __future__ import annotations
 
 from .accuracy import light_within
-from .error_picture import summary, texel_residual
+from .error_picture import residual_summary, texel_residual
 from .gather_links import StoredLinks
 from .gather_settings import GatherSettings
 from .part_links import HitNumbers, PartHits, PartLinks, Parts, gather_parts, lit_footprints
@@ -41,9 +41,9 @@ __all__ = [
     "on_lattice",
     "reconstruct",
     "relight_steps",
+    "residual_summary",
     "resolver",
     "sample_of",
-    "summary",
     "sweep_steps",
     "texel_residual",
 ]

@@ -47,7 +47,7 @@ def texel_residual(
     return values
 
 
-def summary(residual: Array) -> dict[str, list[float]]:
+def residual_summary(residual: Array) -> dict[str, list[float]]:
     """Sum up (n, 3) residuals, all texels alike: for the report, a number for each channel [W/m²]."""
     size = np.abs(residual)
     return {

@@ -171,7 +171,7 @@ def gather_parts(
         Their sources are rows of the table.
     parts : Parts
     """
-    gathering = _Gathering(numbers, resolve, known)
+    gathering = _SubCellGather(numbers, resolve, known)
     gathering.count(links.sources)
     gathering.count(links.aimed.sources)
     gathering.take_up()
@@ -192,7 +192,7 @@ def lit_footprints(numbers: HitNumbers, parts: PartHits) -> Footprints:
     return numbers.cells.lit(numbers.cell(parts.part))
 
 
-class _Gathering:
+class _SubCellGather:
     """Gathers round by round what parts see.
 
     Parameters

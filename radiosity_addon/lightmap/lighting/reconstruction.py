@@ -16,12 +16,11 @@ import numpy as np
 
 from ...base import scaled
 from ...numerics import Array, marked, row_numbers, tiles
-from ...rays import Hits, sees
+from ...rays import SIGHT_LIFT, Hits, free_segment
 from ...scene import Scene
 from ...solver.gather import NOTHING, AimedRays, Footprints, Gathered, LocalPass, Resolver, values_of
 from ..points import GatherPoints, fit_steps
 from ..texels import (
-    LIFT,
     NO_TEXEL,
     Crossings,
     SmoothLift,
@@ -286,5 +285,5 @@ def _beside(crossings: Crossings, local: LocalPass, texel: Array, hits: Hits) ->
 
 def _sees_centre(local: LocalPass, geometry: TexelGeometry, texel: Array, hits: Hits) -> Array:
     """Return (h,) whether nothing is between hits and the centres of their texels."""
-    lift = LIFT * local.caster.surface_offset * geometry.surface_normal[texel]
-    return sees(local.caster, geometry.positions_of(hits) + lift, geometry.position[texel] + lift)
+    lift = SIGHT_LIFT * local.caster.surface_offset * geometry.surface_normal[texel]
+    return free_segment(local.caster, geometry.positions_of(hits) + lift, geometry.position[texel] + lift)

@@ -5,11 +5,9 @@ Weights of a local linear fit in world space.
 
 from __future__ import annotations
 
-from .interpolation import LIFT, SAGITTA, GatherPoints, Interpolation, fit_steps, refit
+from .interpolation import GatherPoints, Interpolation, fit_steps, refit
 
 __all__ = [
-    "LIFT",
-    "SAGITTA",
     "GatherPoints",
     "Interpolation",
     "fit_steps",

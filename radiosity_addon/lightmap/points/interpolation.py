@@ -18,7 +18,7 @@ import numpy as np
 
 from ...base import drain
 from ...numerics import Array, Scratch, chunk_steps, for_chunks, tiles
-from ...rays import RayCaster
+from ...rays import SAGITTA, SIGHT_LIFT, RayCaster
 from ..texels import TexelGeometry
 from .point_grid import NONE, PointGrid
 from .weighed_pairs import Weighed, run_of
@@ -31,12 +31,6 @@ SLOPE_DAMPING = 0.05
 
 STEEPEST = 2.0
 """How far a slope may lower a point's weight, as a multiple of it."""
-
-LIFT = 2.0
-"""Lines of sight run this many surface offsets above the surface, …"""
-
-SAGITTA = 0.6
-"""… and this part of distance · √(1 − cos of the turn) more: what a sphere of few facets needs."""
 
 CHUNK = 1 << 13
 """Texels whose neighbours are weighed at once; bounds the temporaries to some 40 MB a thread."""
@@ -119,7 +113,7 @@ class GatherPoints:
         spoken = np.maximum(1.0 - (change[row] + bend) / REACH, 0.0) ** 2
         # Over a bulge the straight line dips below the surface, by an eighth of the distance
         # times the turn of the normal: start and end that much higher.
-        lift = LIFT * self._caster.surface_offset + SAGITTA * distance[row] * bend
+        lift = SIGHT_LIFT * self._caster.surface_offset + SAGITTA * distance[row] * bend
         begin = geometry.position.take(start, axis=0) + lift[:, None] * normal
         directions = along.take(row, axis=0) + lift[:, None] * (other - normal)
         length = np.sqrt(np.einsum("pk,pk->p", directions, directions))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from .cells import TexelCells
 from .nearest_uncut import whole_neighbour
-from .occlusion import LIFT, Crossings, below_hood, crossing_steps
+from .occlusion import Crossings, below_hood, crossing_steps
 from .rasterize import FOOTPRINT, coverage_sum, overlapping_pairs, rasterise
 from .states import DIVIDED, ENCLOSED, NO_TEXEL_HERE, OCCLUDED, TOUCHED
 from .surface_materials import texel_materials
@@ -18,7 +18,6 @@ __all__ = [
     "DIVIDED",
     "ENCLOSED",
     "FOOTPRINT",
-    "LIFT",
     "NO_TEXEL",
     "NO_TEXEL_HERE",
     "OCCLUDED",

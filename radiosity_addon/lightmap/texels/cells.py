@@ -16,7 +16,7 @@ from collections.abc import Generator
 import numpy as np
 
 from ...numerics import Array, chunk_steps
-from ...rays import Hits, sees
+from ...rays import SIGHT_LIFT, Hits, free_segment
 from ...solver.gather import NOTHING, Footprints, LocalPass, Resolver
 from .occlusion import Crossings, below_hood
 from .texel_geometry import TexelGeometry
@@ -31,9 +31,6 @@ ANCHOR = np.array([0.54, 0.47])
 
 STARTS = 4
 """Points of a cell that its gather rays start from: each costs a ray to the anchor."""
-
-LIFT = 2.0
-"""Points see each other this many surface offsets above their texel."""
 
 SAME_SURFACE = 0.9
 """Cosine between the normals of a texel's triangle and of another one that the texel lies on as well."""
@@ -111,7 +108,7 @@ class TexelCells:
             seen = self._below[rank[waiting], cell] == below[waiting]
             alike = np.flatnonzero(seen)
             asking = waiting[alike]
-            seen[alike] = sees(caster, position[asking], self._anchors[rank[asking], cell[alike]])
+            seen[alike] = free_segment(caster, position[asking], self._anchors[rank[asking], cell[alike]])
             found[waiting[seen]] = CELLS * rank[waiting[seen]] + cell[seen]
             waiting = waiting[~seen]
         return found
@@ -127,7 +124,7 @@ class TexelCells:
             points = geometry.sample(texel[rows], first[rows][:, None] + u / ALONG, 1.0)
             back = np.broadcast_to(anchor[rows][:, None], points.shape)
             above = lift[rows][:, None]
-            seen = sees(caster, (points + above).reshape(-1, 3), (back + above).reshape(-1, 3))
+            seen = free_segment(caster, (points + above).reshape(-1, 3), (back + above).reshape(-1, 3))
             # What lies behind a wall, or beyond the rim of a hood, is not of this cell.
             own = seen.reshape(points.shape[:2])
             own &= self._below_hood(texel[rows], points) == below[rows, None]
@@ -166,5 +163,5 @@ class TexelCells:
         return below
 
     def _lift(self, texel: Array) -> Array:
-        offset = LIFT * self.local.caster.surface_offset
+        offset = SIGHT_LIFT * self.local.caster.surface_offset
         return np.asarray(offset * self._geometry.surface_normal[texel])

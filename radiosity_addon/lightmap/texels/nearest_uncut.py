@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ...numerics import Array
-from ...rays import RayCaster, sees
+from ...rays import SIGHT_LIFT, RayCaster, free_segment
 from ...solver.gather import NOTHING
-from .occlusion import LIFT, Crossings
+from .occlusion import Crossings
 from .texel_geometry import NO_TEXEL
 
 SAME_PLANE = 0.1
@@ -49,10 +49,10 @@ def whole_neighbour(
     distance = np.linalg.norm(along, axis=2)
     whole &= np.abs(np.einsum("hak,hk->ha", along, normal)) <= SAME_PLANE * distance
     whole &= np.einsum("hak,hk->ha", geometry.surface_normal[around], normal) > SAME_SURFACE
-    lift = LIFT * caster.surface_offset
+    lift = SIGHT_LIFT * caster.surface_offset
     hit, which = np.nonzero(whole)
     end = geometry.position[around[hit, which]] + lift * geometry.surface_normal[around[hit, which]]
-    seen = sees(caster, position[hit] + lift * normal[hit], end)
+    seen = free_segment(caster, position[hit] + lift * normal[hit], end)
     distance = np.where(whole, distance, np.inf)
     distance[hit[~seen], which[~seen]] = np.inf
     best = distance.argmin(axis=1)

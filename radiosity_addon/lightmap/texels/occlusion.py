@@ -18,16 +18,13 @@ from functools import cached_property
 import numpy as np
 
 from ...numerics import Array, chunk_steps, row_numbers
-from ...rays import RayCaster
+from ...rays import SIGHT_LIFT, RayCaster
 from .clearance import clear_texels
 from .states import DIVIDED, OCCLUDED, TOUCHED
 from .texel_geometry import TexelGeometry
 
 CHUNK = 1 << 14
 """Texels tested at once; bounds the temporaries to about 60 MB."""
-
-LIFT = 2.0
-"""Segments run this many surface offsets above the surface."""
 
 INSET = 0.96
 """Corners are drawn in to this part: a texel that ends at a wall is not crossed by it, …"""
@@ -102,7 +99,7 @@ def crossing_steps(
     """
     if before is None or anew is None:
         result = Crossings(geometry, *np.zeros((4, len(geometry)), dtype=bool))
-        clear = clear_texels(geometry, OUTSET, HOOD, LIFT * caster.surface_offset, threads)
+        clear = clear_texels(geometry, OUTSET, HOOD, SIGHT_LIFT * caster.surface_offset, threads)
         doubted = row_numbers(~clear)
     else:
         were = (before.cut, before.touched, before.rim, before.occluded)
@@ -110,7 +107,7 @@ def crossing_steps(
 
     def find(part: slice) -> None:
         rows = doubted[part]
-        lift = LIFT * caster.surface_offset * geometry.surface_normal[rows][:, None]
+        lift = SIGHT_LIFT * caster.surface_offset * geometry.surface_normal[rows][:, None]
         # Of the texel on the page: hits land on the part outside its triangle as well.
         square = geometry.squares(rows) + lift
         middle = square.mean(axis=1, keepdims=True)
@@ -137,7 +134,7 @@ def crossing_steps(
 
 def below_hood(geometry: TexelGeometry, caster: RayCaster, texel: Array, spots: Array) -> Array:
     """Return (n, k) whether something is close above (n, k, 3) spots on texels."""
-    lift, normal = LIFT * caster.surface_offset, geometry.surface_normal[texel]
+    lift, normal = SIGHT_LIFT * caster.surface_offset, geometry.surface_normal[texel]
     square = geometry.squares(texel)
     width = np.linalg.norm(square[:, 2] - square[:, 0], axis=1) / np.sqrt(2.0)
     height = np.maximum(HOOD * width, 2.0 * lift)

@@ -108,7 +108,7 @@ class Texels:
         return _barycentric(polygon, origin).astype(np.float32)
 
 
-class _Pairs(NamedTuple):
+class _TexelPairs(NamedTuple):
     """Overlapping (triangle, texel) pairs: flat texel index, triangle, overlap, centre covered."""
 
     texel: NDArray[np.int64]
@@ -220,7 +220,7 @@ def sample_footprints(texels: Texels, u: Float, width: float = FOOTPRINT) -> Flo
     return result
 
 
-def overlapping_pairs(uv: Float32, resolution: int, centres_only: bool = False) -> Iterator[_Pairs]:
+def overlapping_pairs(uv: Float32, resolution: int, centres_only: bool = False) -> Iterator[_TexelPairs]:
     """Yield, in chunks and by ascending triangle, every pair that overlaps by a positive area.
 
     With `centres_only`, and several times as fast, those whose centre lies well inside the
@@ -242,17 +242,17 @@ def overlapping_pairs(uv: Float32, resolution: int, centres_only: bool = False) 
                 yield pairs
 
 
-def _centred(uv: Float32, resolution: int, triangle: Int32, row: Int32, column: Int32) -> _Pairs:
+def _centred(uv: Float32, resolution: int, triangle: Int32, row: Int32, column: Int32) -> _TexelPairs:
     """Return those of the candidate pairs whose centre is inside, off the triangle's sides."""
     distance, reach = _edge_distances(uv, resolution, triangle, row, column)
     keep = _all_three(distance > 1e-3 * reach)
     texel = row[keep].astype(np.int64) * resolution + column[keep]
-    return _Pairs(texel, triangle[keep], np.ones(len(texel)), np.ones(len(texel), dtype=np.bool_))
+    return _TexelPairs(texel, triangle[keep], np.ones(len(texel)), np.ones(len(texel), dtype=np.bool_))
 
 
 def _overlaps(
     uv: Float32, resolution: int, triangle: Int32, row: Int32, column: Int32, double_area: Float
-) -> _Pairs:
+) -> _TexelPairs:
     """Return those of the candidate pairs that overlap, with the exact area."""
     distance, reach = _edge_distances(uv, resolution, triangle, row, column)
     centre = _all_three(distance >= 0)
@@ -265,7 +265,7 @@ def _overlaps(
     least = np.minimum(UNRESOLVED * resolution, 0.125 * np.abs(double_area[triangle]))
     keep = touches & (area > 0) & (centre | (area >= least))
     texel = row[keep].astype(np.int64) * resolution + column[keep]
-    return _Pairs(texel, triangle[keep], area[keep], centre[keep])
+    return _TexelPairs(texel, triangle[keep], area[keep], centre[keep])
 
 
 def _rows(corners: Float, usable: NDArray[np.intp], resolution: int) -> Iterator[tuple[Int32, Int32]]:

@@ -19,7 +19,7 @@ from ..charts import Charts, PatientGrower, rescale_to_area, signed_double_area,
 from ..texels import coverage_sum
 from .dominant_object import greedy_object, share_of
 from .packing import Limits, Packing, pack
-from .page_assignment import least_pages, shared_out
+from .page_assignment import assign_pages, least_pages
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -204,7 +204,7 @@ def _lay_on_pages(layouts: list[_Layout], options: AtlasOptions) -> Iterator[_La
         if density is not None:
             count = least_pages(sum(surfaces), density, options.limits.largest)
     while True:
-        groups = shared_out(surfaces, count) if options.shared else [[each] for each in range(count)]
+        groups = assign_pages(surfaces, count) if options.shared else [[each] for each in range(count)]
         laid: _Laid = []
         try:
             for group in groups:

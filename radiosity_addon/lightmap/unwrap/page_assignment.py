@@ -9,7 +9,7 @@ FULL = 0.75
 """How much of a page charts fill in general; the rest is padding and odd corners."""
 
 
-def shared_out(surfaces: Sequence[float], pages: int) -> list[list[int]]:
+def assign_pages(surfaces: Sequence[float], pages: int) -> list[list[int]]:
     """Share objects out over pages so that all are about equally full.
 
     The largest first, each to the emptiest page. Objects of a page keep their order.

@@ -11,10 +11,10 @@ from functools import cached_property
 import numpy as np
 
 from ...numerics import Array
-from ...rays import EmbreeCaster, RayCaster
+from ...rays import SIGHT_LIFT, EmbreeCaster, RayCaster
 from ...solver.gather import STALE, Boxes, Moved
 from ..lighting import HitNumbers, LightingRecord
-from ..texels import LIFT, Crossings, SmoothLift, TexelGeometry
+from ..texels import Crossings, SmoothLift, TexelGeometry
 
 NEAR = 1.5
 """What is farther from a texel than this many times its size neither touches nor hoods it."""
@@ -109,7 +109,7 @@ class AffectedTexels:
     def _parts_near(self, numbers: HitNumbers) -> Array:
         """Return (parts,) bool: those of leaves that moved, or that a box touches."""
         local = numbers.local
-        hierarchy, offset = local.hierarchy, LIFT * local.caster.surface_offset
+        hierarchy, offset = local.hierarchy, SIGHT_LIFT * local.caster.surface_offset
         elements = np.arange(hierarchy.n_elements)
         low, high = local.parts.bounds(elements)
         touched = self.boxes.touching(low - offset, high + offset)

@@ -14,6 +14,7 @@ import numpy as np
 
 from ...base import scaled
 from ...numerics import Array, row_numbers
+from ...rays import SAGITTA, SIGHT_LIFT
 from ...solver.gather import AimedRays, Before, Gathered, LocalPass, Resolver
 from ..lighting import (
     STARTS,
@@ -24,7 +25,7 @@ from ..lighting import (
     gather_footprints,
     on_lattice,
 )
-from ..points import LIFT, SAGITTA, GatherPoints, Interpolation, refit
+from ..points import GatherPoints, Interpolation, refit
 from ..texels import Crossings
 from .affected import AffectedTexels
 
@@ -149,7 +150,7 @@ class MovedPoints:
         start, normal = geometry.position[texel], geometry.normal[texel]
         along = geometry.position[point] - start
         bend = np.sqrt(np.maximum(1.0 - np.einsum("pk,pk->p", normal, geometry.normal[point]), 0.0))
-        rise = LIFT * self._local.caster.surface_offset + SAGITTA * np.linalg.norm(along, axis=1) * bend
+        rise = SIGHT_LIFT * self._local.caster.surface_offset + SAGITTA * np.linalg.norm(along, axis=1) * bend
         crosses = moved.boxes.met_by(start, along[:, None], rise, 1.0)[:, 0]
         if len(some):
             doubted[some] |= np.logical_or.reduceat(crosses, first)

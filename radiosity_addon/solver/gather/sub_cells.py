@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...numerics import Array, points_on_triangles, split_in_sixteen
-from ...rays import Hits, RayCaster, sees
+from ...rays import SIGHT_LIFT, Hits, RayCaster, free_segment
 from ..hierarchy import Hierarchy
 from .final_gather import NOTHING
 from .footprints import Footprints
@@ -24,9 +24,6 @@ ANCHOR = np.array([0.3595, 0.3218, 0.3187])
 
 STARTS = 16
 """Points of a part that its gather rays start from: each costs a ray to the anchor."""
-
-LIFT = 2.0
-"""Points see each other this many surface offsets above their element."""
 
 
 class LeafParts:
@@ -60,7 +57,7 @@ class LeafParts:
         normal = self._hierarchy.normal_of(leaf[rows])
         position = self._positions(hits.take(rows)) + self._lift(normal)
         anchor = ANCHOR @ self._hierarchy.corners[leaf[rows]] + self._lift(normal)
-        apart = np.flatnonzero(~sees(self._caster, position, anchor))
+        apart = np.flatnonzero(~free_segment(self._caster, position, anchor))
         part[rows[apart]] = self._cells_at(leaf[rows[apart]], position[apart], normal[apart])
         return part
 
@@ -73,7 +70,7 @@ class LeafParts:
             points = points_on_triangles(corners[rows], u)
             back = np.broadcast_to(anchor[rows][:, None], points.shape)
             above = lift[rows][:, None]
-            seen = sees(self._caster, (points + above).reshape(-1, 3), (back + above).reshape(-1, 3))
+            seen = free_segment(self._caster, (points + above).reshape(-1, 3), (back + above).reshape(-1, 3))
             # What lies behind a wall is not of this part.
             return np.asarray(np.where(seen.reshape(*points.shape[:2], 1), points, back))
 
@@ -99,7 +96,7 @@ class LeafParts:
         waiting = np.arange(len(leaf))
         for turn in range(CELLS):
             cell = order[waiting, turn]
-            seen = sees(self._caster, position[waiting], anchors[waiting, cell])
+            seen = free_segment(self._caster, position[waiting], anchors[waiting, cell])
             some = waiting[seen]
             found[some] = self._hierarchy.n_elements + CELLS * leaf[some] + cell[seen]
             waiting = waiting[~seen]
@@ -122,4 +119,4 @@ class LeafParts:
         return np.asarray(corners[:, 0] + np.einsum("hk,hkx->hx", hits.barycentric.astype(np.float64), along))
 
     def _lift(self, normal: Array) -> Array:
-        return np.asarray(LIFT * self._caster.surface_offset * normal)
+        return np.asarray(SIGHT_LIFT * self._caster.surface_offset * normal)

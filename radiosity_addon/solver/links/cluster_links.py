@@ -102,12 +102,12 @@ def gather_at_clusters(
     if len(links) == 0:
         return np.zeros((len(hierarchy.faces), radiosity.shape[1]))
     kept = top.kept
-    if not isinstance(kept, _Gathering) or kept.links is not links:
-        kept = top.kept = _Gathering(hierarchy, top, links)
+    if not isinstance(kept, _ClusterGather) or kept.links is not links:
+        kept = top.kept = _ClusterGather(hierarchy, top, links)
     return kept(radiosity, threads)
 
 
-class _Gathering:
+class _ClusterGather:
     """Links to clusters in the order of their receivers, with all that does not change with the light."""
 
     def __init__(self, hierarchy: Hierarchy, top: TreeTop, links: ClusterLinks) -> None:

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...form_factors import point_to_polygon, sees
+from ...form_factors import point_to_polygon, visibility_of
 from ...numerics import Array, for_chunks, hash_keys
 from ...rays import RayCaster
 from ..hierarchy import Hierarchy, NodeShapes
@@ -80,7 +80,7 @@ def measure_cluster_links(
             parts: dict[int, ClusterLinks] = parts,
         ) -> None:
             of = rows[piece]
-            pairs = _Pairs(hierarchy, receiver[of], source[of], samples, seed)
+            pairs = _ClusterPairs(hierarchy, receiver[of], source[of], samples, seed)
             parts[piece.start] = pairs.links(caster, kind)
 
         for_chunks(measure, len(rows), CHUNK_SAMPLES // samples, threads)
@@ -96,7 +96,7 @@ LEAST_SQUARE = 0.01
 """Of a mean normal: faces that look different ways may have next to none to go by."""
 
 
-class _Pairs:
+class _ClusterPairs:
     """Stratified point pairs of n pairs of a cluster and a node, those that face each other."""
 
     def __init__(self, hierarchy: Hierarchy, receiver: Array, source: Array, samples: int, seed: int) -> None:
@@ -223,7 +223,7 @@ class _Pairs:
             chosen = np.zeros(transfer.shape, dtype=bool)
             chosen[rows, columns] = transfer[rows, columns] > 0
             at = np.nonzero(chosen)
-            free[at] = sees(caster, self.x[at], self.n_x[at], self.y[at], self.n_y[at])
+            free[at] = visibility_of(caster, self.x[at], self.n_x[at], self.y[at], self.n_y[at])
             traced |= chosen
             seen, tried = free.sum(axis=1), traced.sum(axis=1)
             # Nothing traced yet: the first samples face away from each other, others do not.

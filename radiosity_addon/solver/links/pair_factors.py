@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...form_factors import kernel, point_to_polygon, sees, triangle_to_triangle, weighted_sums
+from ...form_factors import kernel, point_to_polygon, triangle_to_triangle, visibility_of, weighted_sums
 from ...numerics import Array, hash_keys, points_on_triangles, split_in_four, stratified_square
 from ...rays import RayCaster
 from ..hierarchy import Hierarchy
@@ -106,7 +106,7 @@ def _trace(
     chosen = np.zeros(traced.shape, dtype=bool)
     chosen[rows, columns] = samples.transfer[rows, columns] > 0
     link, sample = np.nonzero(chosen)
-    free[link, sample] = sees(
+    free[link, sample] = visibility_of(
         caster,
         samples.receiver_points[link, sample],
         samples.receiver_normals[link],

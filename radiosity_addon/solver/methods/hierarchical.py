@@ -47,7 +47,7 @@ from ..state import (
     most_light_elements,
     refinable,
     reflect,
-    refuse_too_large,
+    refuse_large_scene,
     relative_residual,
 )
 
@@ -113,7 +113,7 @@ def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float,
     UsageError
         If the scene does not fit into the memory limit; nothing is allocated then.
     """
-    refuse_too_large(scene, settings)
+    refuse_large_scene(scene, settings)
     state = begin(scene, settings, HierarchicalState)
     hierarchy, caster = state.hierarchy, state.caster
     min_area = settings.min_area * float(hierarchy.faces.area.sum())

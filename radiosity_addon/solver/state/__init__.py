@@ -8,7 +8,7 @@ from __future__ import annotations
 from .anderson import Anderson
 from .iteration import bounce, reflect, relative_residual
 from .link_record import LinkRecord, leaves_on, nearest_leaf, record_links
-from .memory import link_budget, most_light_elements, refinable, refuse_too_large
+from .memory import link_budget, most_light_elements, refinable, refuse_large_scene
 from .power import link_closure, power_balance
 from .state import SolverState, begin
 
@@ -27,6 +27,6 @@ __all__ = [
     "record_links",
     "refinable",
     "reflect",
-    "refuse_too_large",
+    "refuse_large_scene",
     "relative_residual",
 ]

@@ -40,7 +40,7 @@ LEAST_ROOM = 0.01
 """Room for so small a share of the links is left: to fill it bit by bit would take many gathers."""
 
 
-def refuse_too_large(scene: Scene, settings: SolverSettings) -> None:
+def refuse_large_scene(scene: Scene, settings: SolverSettings) -> None:
     """Refuse a scene whose faces and coarsest first links do not fit into the memory limit.
 
     Raises
