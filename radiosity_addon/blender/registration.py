@@ -8,12 +8,12 @@ from functools import partial
 
 import bpy
 
+from . import handlers
 from .datablocks import bake_record
-from .files import ownership
-from .operators import bake_operators, checks, cleaning, edit_guard, light_group_operators, relight_operators
+from .operators import bake_operators, checks, cleaning, light_group_operators, relight_operators
 from .overlays import overlay_properties, overlay_view
 from .panels import bake_panel, check_panel, light_group_panels, object_panel
-from .relight import kept_bakes, lightmap_versions, live_switch, relight_properties
+from .relight import live_switch, relight_properties
 from .scene_records import object_roles
 from .session import runtime
 from .settings import light_group_properties, preferences, preset_menu, properties
@@ -41,17 +41,15 @@ def register() -> None:
     try:
         for module in (
             *(bake_record, object_roles, light_group_properties, properties),
-            *(kept_bakes, lightmap_versions, relight_properties, live_switch),
-            *(overlay_properties, overlay_view, edit_guard),
+            *(relight_properties, live_switch, overlay_properties, overlay_view, handlers),
         ):
             module.register()
             _undo.append(module.unregister)
         for cls in CLASSES:
             bpy.utils.register_class(cls)
             _undo.append(partial(bpy.utils.unregister_class, cls))
-        for module in (preset_menu, ownership, cleaning):
-            module.register()
-            _undo.append(module.unregister)
+        preset_menu.register()
+        _undo.append(preset_menu.unregister)
         _undo.append(checks.forget_checks)
         _undo.append(runtime.stop_running)
     except BaseException:

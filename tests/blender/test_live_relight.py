@@ -12,7 +12,6 @@ import pytest
 import radiosity_addon
 from radiosity_addon.blender.datablocks.image_marks import VERSION
 from radiosity_addon.blender.images.node_group import EMISSION
-from radiosity_addon.blender.relight.live_relight import _notice
 from radiosity_addon.blender.relight.relight_scene import kept_bakes, lightmap_versions
 from radiosity_addon.blender.session import live_state
 from radiosity_addon.files.baked_files import digest_of_file
@@ -220,7 +219,6 @@ def test_nothing_is_raised_from_the_handler(
     bpy.context.view_layer.update()
     assert live_state.state.message == "Live is off: ZeroDivisionError: by zero"
     assert not live.radiosity_live
-    assert _notice not in bpy.app.handlers.depsgraph_update_post
 
 
 def test_it_cannot_be_switched_on_without_a_bake(saved: Path) -> None:
@@ -232,11 +230,8 @@ def test_it_cannot_be_switched_on_without_a_bake(saved: Path) -> None:
 
 
 def test_it_ends_with_the_file(live: bpy.types.WindowManager) -> None:
-    handlers = bpy.app.handlers.depsgraph_update_post
-    assert _notice in handlers
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     assert live_state.state.live is None
-    assert _notice not in handlers
     assert not bpy.context.window_manager.radiosity_live
 
 

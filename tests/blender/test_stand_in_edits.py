@@ -360,7 +360,7 @@ def test_edits_that_cannot_be_taken_over_are_refused_at_once() -> None:
     bake_by_hand()
     stand_in = bpy.data.objects[STAND_IN]
     place = stand_in.matrix_basis.copy()
-    bpy.app.handlers.depsgraph_update_post.append(edit_guard._note)
+    bpy.app.handlers.depsgraph_update_post.append(edit_guard.note)
     try:
         stand_in.location.x += 3
         bpy.context.view_layer.objects.active = modified
@@ -368,8 +368,8 @@ def test_edits_that_cannot_be_taken_over_are_refused_at_once() -> None:
         bpy.context.view_layer.update()
         messages = edit_guard.refuse(bpy.context)
     finally:
-        bpy.app.handlers.depsgraph_update_post.remove(edit_guard._note)
-        edit_guard.unregister()
+        bpy.app.handlers.depsgraph_update_post.remove(edit_guard.note)
+        edit_guard.forget()
     assert sorted(message.split("'")[1] for message in messages) == [STAND_IN, "Modified"]
     assert stand_in.matrix_basis == place
     assert modified.mode == "OBJECT"

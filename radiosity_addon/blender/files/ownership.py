@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.app.handlers import persistent
 
 from ...base import BakeError
 from ...files import LISTED, REPORT_NAME, FileNames, NoReportError, Owner, read_report, reports_in
@@ -124,19 +123,7 @@ def _is_same(path: Path, read: Path) -> bool:
         return False
 
 
-@persistent
-def _another_file(*_: object) -> None:
-    """Another file is being opened."""
+def forget_unsaved(*_: object) -> None:
+    """Another file is being opened: know one unsaved file from the next."""
     global _unsaved
     _unsaved = f"<unsaved {uuid.uuid4().hex}>"
-
-
-def register() -> None:
-    """Know one unsaved file from the next."""
-    bpy.app.handlers.load_pre.append(_another_file)
-
-
-def unregister() -> None:
-    """Stop that."""
-    if _another_file in bpy.app.handlers.load_pre:
-        bpy.app.handlers.load_pre.remove(_another_file)

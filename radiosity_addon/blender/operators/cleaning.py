@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import bpy
-from bpy.app.handlers import persistent
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...base import BakeError
@@ -197,8 +196,7 @@ def look_for_interrupted(context: bpy.types.Context) -> None:
     redraw_sidebars(context)
 
 
-@persistent
-def _look(*_: object) -> None:
+def look_at_file(*_: object) -> None:
     """Another file was opened."""
     look_for_interrupted(bpy.context)
 
@@ -208,17 +206,6 @@ def _last_folder(scene: bpy.types.Scene) -> Path | None:
     if last is None or not last.folder:
         return None
     return Path(bpy.path.abspath(last.folder))
-
-
-def register() -> None:
-    """Look at each file that is opened."""
-    bpy.app.handlers.load_post.append(_look)
-
-
-def unregister() -> None:
-    """Stop that."""
-    if _look in bpy.app.handlers.load_post:
-        bpy.app.handlers.load_post.remove(_look)
 
 
 CLASSES = (RADIOSITY_OT_clean, RADIOSITY_OT_recover)

@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-from bpy.app.handlers import persistent
 from bpy.app.translations import pgettext_rpt as rpt_
 from mathutils import Matrix
 
@@ -23,8 +22,7 @@ DELAY = 0.05
 _noted: set[str] = set()
 
 
-@persistent
-def _note(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+def note(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Note which stand-ins an update is of."""
     for update in depsgraph.updates:
         block = update.id
@@ -83,26 +81,8 @@ def _drawn(messages: list[str]) -> Any:
     return draw
 
 
-@persistent
-def _forget(*_: Any) -> None:
-    _noted.clear()
-
-
-def register() -> None:
-    """Look after stand-ins; without a window nobody could be told."""
-    if not bpy.app.background:
-        bpy.app.handlers.depsgraph_update_post.append(_note)
-        bpy.app.handlers.load_pre.append(_forget)
-
-
-def unregister() -> None:
-    """Stop that."""
-    for handlers, ours in (
-        (bpy.app.handlers.depsgraph_update_post, _note),
-        (bpy.app.handlers.load_pre, _forget),
-    ):
-        if ours in handlers:
-            handlers.remove(ours)
+def forget(*_: Any) -> None:
+    """Look after nothing that was noted: another file is being opened, or the extension is switched off."""
     if bpy.app.timers.is_registered(_look):
         bpy.app.timers.unregister(_look)
     _noted.clear()

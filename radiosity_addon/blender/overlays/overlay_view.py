@@ -6,7 +6,6 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 import bpy
-from bpy.app.handlers import persistent
 
 from ..session import kept_details, lightmap_changes, runtime
 from ..session.redraw import redraw_viewports
@@ -36,12 +35,13 @@ _handlers: list[tuple[Any, str]] = []
 
 def changed() -> None:
     """Make the overlay anew: lightmaps or objects have changed."""
-    _forget()
+    forget()
     redraw_viewports()
 
 
-def _forget() -> None:
-    """Forget what was read and made; pixels are only read by a module that is imported when first needed."""
+def forget(*_: object) -> None:
+    """Forget what was read and made: after an undo or redo anything may be different."""
+    # Pixels are only read by a module that is imported when first needed.
     values = sys.modules.get(f"{__package__}.lightmap_values")
     if values is not None:
         values.forget()
@@ -138,21 +138,13 @@ def _draw_lines(context: bpy.types.Context, lines: Lines, batch: Any) -> None:
         batch.draw(shader)
 
 
-@persistent
-def _forget_the_file(*_: object) -> None:
+def forget_the_file(*_: object) -> None:
     """Another file is being opened: what is kept belongs to this one."""
     kept_details.drop_all()
-    _forget()
+    forget()
 
 
-@persistent
-def _all_changed(*_: object) -> None:
-    """After an undo or redo anything may be different."""
-    _forget()
-
-
-@persistent
-def _some_changed(_scene: bpy.types.Scene, graph: bpy.types.Depsgraph) -> None:
+def note_change(_scene: bpy.types.Scene, graph: bpy.types.Depsgraph) -> None:
     """An object has moved, or its mesh or visibility has changed."""
     if _drawn.key is not None and any(
         graph.id_type_updated(kind) for kind in ("OBJECT", "MESH", "COLLECTION")
@@ -163,13 +155,8 @@ def _some_changed(_scene: bpy.types.Scene, graph: bpy.types.Depsgraph) -> None:
 def register() -> None:
     """Begin to draw; without a window there is nothing to draw to."""
     lightmap_changes.listeners.append(changed)
-    handlers = bpy.app.handlers
-    handlers.load_pre.append(_forget_the_file)
-    handlers.undo_post.append(_all_changed)
-    handlers.redo_post.append(_all_changed)
     if bpy.app.background:
         return
-    handlers.depsgraph_update_post.append(_some_changed)
     view = bpy.types.SpaceView3D
     for draw, when in ((_draw_over_objects, "POST_VIEW"), (_draw_legend, "POST_PIXEL")):
         _handlers.append((view.draw_handler_add(draw, (), "WINDOW", when), "WINDOW"))
@@ -181,14 +168,5 @@ def unregister() -> None:
         bpy.types.SpaceView3D.draw_handler_remove(*_handlers.pop())
     if changed in lightmap_changes.listeners:
         lightmap_changes.listeners.remove(changed)
-    handlers = bpy.app.handlers
-    for listed, handler in (
-        (handlers.load_pre, _forget_the_file),
-        (handlers.undo_post, _all_changed),
-        (handlers.redo_post, _all_changed),
-        (handlers.depsgraph_update_post, _some_changed),
-    ):
-        if handler in listed:
-            listed.remove(handler)
     kept_details.drop_all()
-    _forget()
+    forget()

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import bpy
-from bpy.app.handlers import persistent
 
 from ..datablocks.bake_record import is_made
 from ..datablocks.image_marks import GROUP, MARK, PAGE
@@ -91,8 +90,8 @@ def drop(scene: bpy.types.Scene) -> None:
     _make_room()
 
 
-def drop_all() -> None:
-    """Forget all bakes in memory."""
+def drop_all(*_: object) -> None:
+    """Forget all bakes in memory: another file is being opened, or the extension is switched off."""
     _kept.clear()
 
 
@@ -119,21 +118,3 @@ def group_images_of(mark: str) -> dict[str, list[bpy.types.Image]]:
 def _marked(mark: str) -> list[bpy.types.Image]:
     own = [image for image in bpy.data.images if image.library is None and is_made(image)]
     return [image for image in own if image.get(MARK) == mark]
-
-
-@persistent
-def _drop_with_the_file(*_: Any) -> None:
-    """Another file is being opened: what is kept belongs to this one."""
-    drop_all()
-
-
-def register() -> None:
-    """Forget what is kept when another file is opened."""
-    bpy.app.handlers.load_pre.append(_drop_with_the_file)
-
-
-def unregister() -> None:
-    """Forget everything."""
-    if _drop_with_the_file in bpy.app.handlers.load_pre:
-        bpy.app.handlers.load_pre.remove(_drop_with_the_file)
-    drop_all()

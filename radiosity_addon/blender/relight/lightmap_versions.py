@@ -21,7 +21,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import bpy
-from bpy.app.handlers import persistent
 
 from ...base import BakeError, RadiosityError
 from ...files import KEPT, LISTED, MOST_FILES, REPORT_NAME, HeldFiles, digest_of_file
@@ -159,6 +158,12 @@ def flush() -> None:
         _finish()
 
 
+def follow_undo(*_: Any) -> None:
+    """Undo and redo bring images back, but neither pixels nor files."""
+    state.message = ""
+    follow()
+
+
 def follow() -> None:
     """Begin to bring back what undo or redo wants to see: other files, other pixels."""
     stale = any(_is_stale(image) for image in lightmaps())
@@ -174,7 +179,7 @@ def follow() -> None:
         bpy.app.timers.register(_tick, first_interval=0.0, persistent=True)
 
 
-def check() -> None:
+def check(*_: Any) -> None:
     """Say so where the open file shows other bakes than are on the disk; touches nothing."""
     state.message = FOREIGN if differing() else ""
 
@@ -315,34 +320,17 @@ def _tick() -> float | None:
         return None
 
 
-@persistent
-def _follow(*_: Any) -> None:
-    """Undo and redo bring images back, but neither pixels nor files."""
-    state.message = ""
-    follow()
-
-
-@persistent
-def _before_saving(*_: Any) -> None:
+def before_saving(*_: Any) -> None:
     """What is saved must agree with the files next to it."""
     if state.swap is None and not bpy.app.background and differing():
         _begin(differing())
     flush()
 
 
-@persistent
-def _forget(*_: Any) -> None:
-    """Another file is being opened: what is held belongs to this one."""
-    forget()
-
-
-@persistent
-def _opened(*_: Any) -> None:
-    check()
-
-
-def forget() -> None:
-    """Hold nothing any more."""
+def forget(*_: Any) -> None:
+    """Hold nothing any more: another file is being opened, or the extension is switched off."""
+    if bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.unregister(_tick)
     _cancel()
     if state.held is not None:
         state.held.close()
@@ -350,30 +338,3 @@ def forget() -> None:
     state.reports.clear()
     state.shown.clear()
     forget_reports()
-
-
-def _handlers() -> tuple[tuple[list[Any], Any], ...]:
-    on = bpy.app.handlers
-    return (
-        (on.undo_post, _follow),
-        (on.redo_post, _follow),
-        (on.save_pre, _before_saving),
-        (on.load_pre, _forget),
-        (on.load_post, _opened),
-    )
-
-
-def register() -> None:
-    """Follow undo, redo, saving and opening."""
-    for handlers, ours in _handlers():
-        handlers.append(ours)
-
-
-def unregister() -> None:
-    """Follow nothing any more, and hold nothing."""
-    for handlers, ours in _handlers():
-        if ours in handlers:
-            handlers.remove(ours)
-    if bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.unregister(_tick)
-    forget()

@@ -15,7 +15,6 @@ from typing import Any
 
 import bpy
 import numpy as np
-from bpy.app.handlers import persistent
 
 from ...bake.relight import Responses, are_wanted
 from ...bake.result import LightGroup
@@ -68,16 +67,10 @@ class LiveRelight:
         self._doing: int | None = None
         """The source whose response is found out; None for exact pages."""
         self._lit_by = self._strengths
-        for handlers, ours in _handlers():
-            if ours not in handlers:
-                handlers.append(ours)
         _wake()
 
     def close(self) -> None:
         """Follow nothing any more."""
-        for handlers, ours in _handlers():
-            if ours in handlers:
-                handlers.remove(ours)
         if bpy.app.timers.is_registered(_tick):
             bpy.app.timers.unregister(_tick)
         self._end_work()
@@ -251,27 +244,10 @@ class LiveRelight:
         return held
 
 
-def _handlers() -> tuple[tuple[list[Any], Any], ...]:
-    return (
-        (bpy.app.handlers.depsgraph_update_post, _notice),
-        (bpy.app.handlers.load_pre, _stop_with_the_file),
-    )
-
-
 def _wake() -> None:
     """Have the timer carry on. Persistent, for undo takes other timers away."""
     if not bpy.app.timers.is_registered(_tick):
         bpy.app.timers.register(_tick, first_interval=0.0, persistent=True)
-
-
-@persistent
-def _notice(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    """Blender says that something has changed; nothing may be raised."""
-    try:
-        if live_state.state.live is not None:
-            live_state.state.live.note(scene, depsgraph)
-    except Exception as error:  # noqa: BLE001 (Blender would print it at every change)
-        live_state.stop(f"Live is off: {type(error).__name__}: {error}")
 
 
 def _tick() -> float | None:
@@ -291,9 +267,3 @@ def _redraw() -> None:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
                 area.tag_redraw()
-
-
-@persistent
-def _stop_with_the_file(*_: object) -> None:
-    """Another file is being opened."""
-    live_state.stop()

@@ -37,3 +37,17 @@ def stop(message: str = "") -> None:
     manager = bpy.context.window_manager
     if manager is not None and getattr(manager, "radiosity_live", False):
         manager.radiosity_live = False
+
+
+def note(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    """Tell Live, if it is on, that something has changed; nothing may be raised."""
+    try:
+        if state.live is not None:
+            state.live.note(scene, depsgraph)
+    except Exception as error:  # noqa: BLE001 (Blender would print it at every change)
+        stop(f"Live is off: {type(error).__name__}: {error}")
+
+
+def stop_with_the_file(*_: Any) -> None:
+    """Another file is being opened."""
+    stop()

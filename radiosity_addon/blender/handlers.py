@@ -1,0 +1,63 @@
+"""What happens to the open file, and who acts on it: all handlers that are there while the extension is.
+
+A running job has two more, which come and go with it (`file_watch.py`, `live_view.py`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+from bpy.app.handlers import persistent
+
+from .files import ownership
+from .operators import cleaning, edit_guard
+from .overlays import overlay_view
+from .relight import kept_bakes, lightmap_versions
+from .session import live_state
+
+ALWAYS: tuple[tuple[str, Callable[..., None]], ...] = (
+    ("load_pre", ownership.forget_unsaved),
+    ("load_pre", kept_bakes.drop_all),
+    ("load_pre", lightmap_versions.forget),
+    ("load_pre", overlay_view.forget_the_file),
+    ("load_pre", live_state.stop_with_the_file),
+    ("load_post", lightmap_versions.check),
+    ("load_post", cleaning.look_at_file),
+    ("save_pre", lightmap_versions.before_saving),
+    ("undo_post", lightmap_versions.follow_undo),
+    ("undo_post", overlay_view.forget),
+    ("redo_post", lightmap_versions.follow_undo),
+    ("redo_post", overlay_view.forget),
+    ("depsgraph_update_post", live_state.note),
+)
+"""Which function is called at which event, in this order."""
+
+WITH_A_WINDOW: tuple[tuple[str, Callable[..., None]], ...] = (
+    ("load_pre", edit_guard.forget),
+    ("depsgraph_update_post", overlay_view.note_change),
+    ("depsgraph_update_post", edit_guard.note),
+)
+"""In the background nothing is drawn, and nobody could be told."""
+
+
+def register() -> None:
+    """Listen to the file's events."""
+    for event, function in (*ALWAYS, *(() if bpy.app.background else WITH_A_WINDOW)):
+        _listeners(event).append(persistent(function))
+
+
+def unregister() -> None:
+    """Listen to nothing any more, and forget what belongs to the open file."""
+    for event, function in (*ALWAYS, *WITH_A_WINDOW):
+        if function in _listeners(event):
+            _listeners(event).remove(function)
+    edit_guard.forget()
+    lightmap_versions.forget()
+    kept_bakes.drop_all()
+
+
+def _listeners(event: str) -> list[Any]:
+    found: list[Any] = getattr(bpy.app.handlers, event)
+    return found
