@@ -23,7 +23,5 @@ def register() -> None:
 def unregister() -> None:
     """Take out of Blender all that `register` added."""
     from .blender import registration
-    from .blender.command_line import host
 
-    host.unregister()
     registration.unregister()

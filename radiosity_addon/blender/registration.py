@@ -62,6 +62,11 @@ def register() -> None:
         atexit.register(unregister)
 
 
+def also_undo(undo: Callable[[], None]) -> None:
+    """Have `unregister` take out first what was added after `register`."""
+    _undo.append(undo)
+
+
 def unregister() -> None:
     """Take everything out again; harmless where nothing is registered."""
     atexit.unregister(unregister)

@@ -115,7 +115,7 @@ def test_instances_are_seen_where_their_instancer_is() -> None:
     assert "Hidden/Short Block" not in names
 
 
-@pytest.mark.parametrize("patient", [False, True])
+@pytest.mark.parametrize("in_background", [False, True])
 def test_a_bake_comes_with_pictures_that_brighten(
     in_background: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -10,8 +10,9 @@ import pytest
 from radiosity_addon.base.progress import drain
 from radiosity_addon.lightmap.texels import clearance, occlusion
 from radiosity_addon.lightmap.texels.clearance import clear_texels
-from radiosity_addon.lightmap.texels.occlusion import HOOD, LIFT, OUTSET, crossing_steps
+from radiosity_addon.lightmap.texels.occlusion import HOOD, OUTSET, crossing_steps
 from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
+from radiosity_addon.rays.caster import SIGHT_LIFT
 from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.solver import Scene
 from tests.rooms import grey, rectangle, solid_box, sphere
@@ -42,7 +43,7 @@ def setting(*others: np.ndarray, n: int = 1, seed: int | None = None) -> tuple[T
 
 
 def clear(geometry: TexelGeometry, caster: EmbreeCaster) -> np.ndarray:
-    return clear_texels(geometry, OUTSET, HOOD, LIFT * caster.surface_offset)
+    return clear_texels(geometry, OUTSET, HOOD, SIGHT_LIFT * caster.surface_offset)
 
 
 def clutter(seed: int) -> list[np.ndarray]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from radiosity_addon.rays.caster import NO_HIT, RayCaster, surface_offset
-from radiosity_addon.rays.coplanar import LIFT, facing_copies
+from radiosity_addon.rays.coplanar import COPY_LIFT, facing_copies
 from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.scene.opacity import ray_caster
 from radiosity_addon.solver import Scene
@@ -94,7 +94,7 @@ def test_copies_are_made_where_a_black_back_lies_and_nowhere_else() -> None:
     count = len(sheets)
     rows, copies = facing_copies(sheets, np.zeros(count, dtype=bool), OFFSET)
     np.testing.assert_array_equal(np.sort(rows), np.arange(count))
-    np.testing.assert_allclose(np.abs(copies - sheets[rows])[..., 2], LIFT * OFFSET, rtol=1e-6)
+    np.testing.assert_allclose(np.abs(copies - sheets[rows])[..., 2], COPY_LIFT * OFFSET, rtol=1e-6)
     np.testing.assert_allclose((copies - sheets[rows])[..., :2], 0.0, atol=1e-15)
     for alone in (sheets[:LOWER], box_room()[0] - 0.5, solid_box((0, 0, 0), (1, 1, 1)) - 0.5):
         assert len(facing_copies(alone, np.zeros(len(alone), dtype=bool), OFFSET)[0]) == 0

@@ -100,7 +100,7 @@ def restrict_to_changed(
         if record.scene not in {"", scene.name} or (record.light or scene.radiosity.baked_light) != light:
             continue
         shows = record.is_baked and shows_lightmap(obj) and files_of(obj)
-        if shows and record.object_digest == object_digest(bake_scene, target):
+        if shows and record.fingerprint == object_digest(bake_scene, target):
             kept.add(target.name)
             densities.append(record.texels_per_metre)
     if not kept:
@@ -131,7 +131,7 @@ def remember(scene: bpy.types.Scene, export: Export, result: BakeResult, setting
         obj = bpy.data.objects.get((source.object_name, None))
         if obj is None or source.is_instance or not obj.is_property_set("radiosity_bake"):
             continue
-        obj.radiosity_bake.object_digest = object_digest(export.bake_scene, baked.object)
+        obj.radiosity_bake.fingerprint = object_digest(export.bake_scene, baked.object)
         told = result.atlas[baked.page] if result.atlas else {}
         obj.radiosity_bake.texels_per_metre = told.get("texels_per_metre", 0.0)
         obj.radiosity_bake.light = light

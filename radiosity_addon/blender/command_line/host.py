@@ -7,15 +7,18 @@ from typing import Any
 
 import bpy
 
+from ..registration import also_undo
+
 COMMAND = "radiosity"
 
 _handles: list[Any] = []
 
 
 def register() -> None:
-    """Offer the command to Blender, once."""
+    """Offer the command to Blender, once, until the extension is unregistered."""
     if not _handles:
         _handles.append(bpy.utils.register_cli_command(COMMAND, run))
+        also_undo(unregister)
 
 
 def unregister() -> None:
