@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..lightmap.lighting import GatherSettings
-from ..options import METHODS, BakeSettings, SolverSettings
+from ..options import BakeSettings, SolverSettings, options_of_method
 
 
 @dataclass(frozen=True)
@@ -143,4 +143,4 @@ def quality_of(settings: BakeSettings) -> Quality:
 
 def used_settings(solver: SolverSettings) -> dict[str, Any]:
     """Return the settings that the method listens to, as a bake used them."""
-    return {name: getattr(solver, name) for name in METHODS[solver.method].settings}
+    return {name: getattr(solver, name) for name in options_of_method(solver.method)}

@@ -1,55 +1,43 @@
-"""What a bake can be asked to do: the methods and their settings, and the settings of a bake.
+"""What a bake can be asked to do: one table of options, from which all front doors are made.
 
 Needs nothing but Python, so that panels and the command line can show it at once.
 """
 
 from __future__ import annotations
 
-from .bake_settings import (
-    ATLASES,
-    EFFICACY,
-    FORMATS,
-    LIGHTS,
-    MAX_ERROR,
-    MAX_GROUPS,
-    MAX_MIP_LEVELS,
-    MAX_PAGES,
-    MAX_RESOLUTION,
-    MAX_SEED,
-    MAX_THREADS,
-    MIN_ERROR,
-    OTHERS,
-    QUALITIES,
-    QUANTITIES,
-    BakeSettings,
-    GroupSetting,
-)
-from .methods import METHODS, SETTINGS, SYMMETRIC_ONLY, MethodSetting
+from .bake_settings import BY_ERROR, OPTIONS, BakeSettings, GroupSetting, options_of_method
+from .command_options import BAKE_COMMAND, EVERY_COMMAND
+from .constants import EFFICACY, MAX_GROUPS, MAX_RESOLUTION, OTHERS
+from .methods import METHODS, SYMMETRIC_ONLY
+from .option import Choice, Option, PanelRow, plain
 from .permissions import Permissions
+from .sections import ADVANCED, GROUPS, MAIN, SECTIONS, SOLVER, sections_of
 from .solver_settings import SolverSettings
 
 __all__ = [
-    "ATLASES",
+    "ADVANCED",
+    "BAKE_COMMAND",
+    "BY_ERROR",
     "EFFICACY",
-    "FORMATS",
-    "LIGHTS",
-    "MAX_ERROR",
+    "EVERY_COMMAND",
+    "GROUPS",
+    "MAIN",
     "MAX_GROUPS",
-    "MAX_MIP_LEVELS",
-    "MAX_PAGES",
     "MAX_RESOLUTION",
-    "MAX_SEED",
-    "MAX_THREADS",
     "METHODS",
-    "MIN_ERROR",
+    "OPTIONS",
     "OTHERS",
-    "QUALITIES",
-    "QUANTITIES",
-    "SETTINGS",
+    "SECTIONS",
+    "SOLVER",
     "SYMMETRIC_ONLY",
     "BakeSettings",
+    "Choice",
     "GroupSetting",
-    "MethodSetting",
+    "Option",
+    "PanelRow",
     "Permissions",
     "SolverSettings",
+    "options_of_method",
+    "plain",
+    "sections_of",
 ]

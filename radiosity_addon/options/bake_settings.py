@@ -1,218 +1,389 @@
-"""What a bake can be asked to do: one frozen, validated record for all front doors."""
+"""The table of a bake's options, and one bake's settings by it: validated, for all front doors."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
 
-from ..base import UsageError
-from .methods import SETTINGS, check_method
+from .choices import (
+    ASSEMBLIES,
+    ATLASES,
+    FORMATS,
+    LIGHTS,
+    METHOD_CHOICES,
+    QUALITIES,
+    QUANTITIES,
+)
+from .combinations import check_combinations
+from .constants import MAX_RESOLUTION
+from .methods import ALL, ITERATIVE, LINKS, MATRIX
+from .option import Choice, PanelRow, option, options_of
 
-QUALITIES = ("draft", "medium", "high")
-QUANTITIES = ("irradiance_over_pi", "irradiance", "radiosity", "residual")
-LIGHTS = ("all", "direct", "indirect")
-ATLASES = ("shared", "per-object")
-FORMATS = ("exr", "png16")
-
-MAX_RESOLUTION = 16384
-MAX_PAGES = 64
-MAX_MIP_LEVELS = 8
-MAX_PADDING = 512
-EFFICACY = 683.0
-"""Lumens a watt of green light of 555 nm; taken for all light where nothing else is said [lm/W]."""
-
-MIN_ERROR, MAX_ERROR = 0.002, 0.2
-MAX_SEED = 2**31 - 1
-"""Blender's renders take no larger one."""
-
-MAX_THREADS = 1024
-"""As in Blender."""
-
-MAX_GROUPS = 24
-"""Light groups of a bake: each is an image that its materials read, and graphics cards take 32, some 16."""
+MOST = 10_000_000
+"""Elements, patches: what no machine has room for need not be tried."""
 
 GroupSetting = tuple[str, tuple[str, ...]]
 """A light group: its name, and the names of its lamps, emissive materials and the world."""
 
-OTHERS = "others"
-"""The light group of what is in none."""
+AS_A_WHOLE = (("size_mode", "resolution"),)
+BY_DENSITY = (("size_mode", "density"),)
+BY_ERROR = "error"
+"""The panel's choice of a quality for which the error below decides."""
 
 
 @dataclass(frozen=True)
 class BakeSettings:
-    """One bake's settings, as the command line and the panel both give them.
+    """One bake's settings, as the command line and the panel both give them: each field is an option.
 
-    Parameters
-    ----------
-    resolution : int
-        Width and height of an atlas page in texels, 1 to 16384.
-    texel_density : float or None
-        Texels per metre; the page size then follows from the surface area.
-        Exclusive with an explicit resolution (the front doors see to that).
-    atlas : "shared" or "per-object"
-    pages : int
-        How many pages of that resolution the objects of a shared atlas are shared out over;
-        with a density there are as many as it takes.
-    max_resolution : int
-        Width and height that a page may have at most where a density sets its size.
-    mip_levels : int
-        Down to which mip level charts stay apart, 0 to 8.
-    padding : int or None
-        Free texels between charts; None takes what the mip levels ask for.
-    unwrap_seconds : float
-        How long one object may be unwrapped before the rest of it is cut more simply.
-    quality : "draft", "medium" or "high"
-    relative_error : float or None
-        The RMS error to reach, relative to the mean of the light, 0.002 to 0.2; replaces the
-        quality.
-    quantity : what texels hold
-        "irradiance_over_pi" H/π [W/m²/sr] as Cycles' diffuse bake without colour,
-        "irradiance" H [W/m²], "radiosity" B = E + ρH [W/m²], or "residual" r [W/m²], the error
-        picture: by how much the elements miss the radiosity equation, signed.
-    light : "all", "direct" or "indirect"
-    format : "exr" or "png16"
-    objects : names of what gets a lightmap, or None for every render-visible mesh
-        Everything else still lights and blocks.
-    light_only, ignore : tuple of str
-        Names of objects that get no lightmap, and of objects left out as if they were not
-        there; they win over the objects' own modes.
-    sky : bool
-        Add a white sky of strength 1 where the scene has no light at all.
-    keep_uvs : bool
-        Use an existing UV layer `Lightmap` instead of unwrapping anew.
-    groups : tuple of (str, tuple of str)
-        Light groups: each one's name, and the names of the lamps, emissive materials and world in it.
-        Each gets lightmaps of its own; so does what is in none of them.
-    light_groups : bool
-        Also bake the light groups that the scene itself has; `groups` win where both say something.
-    seed : int
-        0 to 2³¹ − 1.
-    threads : int
-        0 to 1024; 0 means all cores. The result does not depend on it.
-    method : str
-        How the radiosity equation is solved: a name of `methods.METHODS`.
-    elements, assembly, patches, contrast, form_factor_error, error, min_area, max_links, \
-    ambient, tolerance, max_iterations, memory_limit : optional
-        Settings of the method, see `SolverSettings`; None takes what the quality says.
+    Settings of the method that are None come from the quality. The order of fields is part of the digests in
+    users' files: new ones go last.
 
     Raises
     ------
     UsageError
-        If a value is out of its range, or a setting does not apply to the method.
+        If a value is out of its range, a setting does not apply to the method, or two of them do not go
+        together.
     """
 
-    resolution: int = 512
-    texel_density: float | None = None
-    atlas: str = "shared"
-    pages: int = 1
-    max_resolution: int = MAX_RESOLUTION
-    mip_levels: int = 0
-    padding: int | None = None
-    unwrap_seconds: float = 60.0
-    quality: str = "medium"
-    relative_error: float | None = None
-    quantity: str = "irradiance_over_pi"
-    light: str = "all"
-    format: str = "exr"
-    objects: tuple[str, ...] | None = None
-    light_only: tuple[str, ...] = ()
-    ignore: tuple[str, ...] = ()
-    sky: bool = False
-    keep_uvs: bool = False
-    groups: tuple[GroupSetting, ...] = ()
-    light_groups: bool = False
-    seed: int = 0
-    threads: int = 0
-    method: str = "hierarchical"
-    elements: int | None = None
-    assembly: str | None = None
-    patches: int | None = None
-    contrast: float | None = None
-    form_factor_error: float | None = None
-    error: float | None = None
-    min_area: float | None = None
-    max_links: int | None = None
-    ambient: bool | None = None
-    tolerance: float | None = None
-    max_iterations: int | None = None
-    memory_limit: float | None = None
+    resolution: int = option(
+        512,
+        "Width and height of a lightmap in pixels",
+        "Size",
+        low=1,
+        high=MAX_RESOLUTION,
+        unit="pixels",
+        preset=True,
+        panel=PanelRow("Resolution", soft_low=64, soft_high=4096, subtype="PIXEL", only_if=AS_A_WHOLE),
+    )
+    texel_density: float | None = option(
+        None,
+        "Lightmap pixels along one metre of surface; the size of the lightmap follows",
+        "Size",
+        metavar="PX_PER_M",
+        low=0,
+        high=1e9,
+        above=True,
+        unit="pixels a metre",
+        instead_of="resolution",
+        preset=True,
+        panel=PanelRow(
+            "Pixels per Metre",
+            default=64.0,
+            low=0.01,
+            soft_low=1.0,
+            soft_high=1024.0,
+            precision=2,
+            only_if=BY_DENSITY,
+        ),
+    )
+    atlas: str = option(
+        "shared",
+        "How objects share images",
+        "Pages",
+        choices=ATLASES,
+        panel=PanelRow("Atlas"),
+    )
+    pages: int = option(
+        1,
+        "How many images the objects of a shared atlas are distributed over; a density decides this itself",
+        "Pages",
+        low=1,
+        high=64,
+        panel=PanelRow("Pages", soft_high=16, only_if=(("atlas", "shared"), *AS_A_WHOLE)),
+    )
+    max_resolution: int = option(
+        MAX_RESOLUTION,
+        "Largest image that a density makes; what does not fit goes to more images",
+        "Layout",
+        low=4,
+        high=MAX_RESOLUTION,
+        unit="pixels",
+        preset=True,
+        panel=PanelRow("Largest Page", subtype="PIXEL", only_if=BY_DENSITY),
+    )
+    mip_levels: int = option(
+        0,
+        "Down to which mip level the lightmap's charts stay apart: each doubles the padding",
+        "Layout",
+        low=0,
+        high=8,
+        preset=True,
+        panel=PanelRow("Mip Levels"),
+    )
+    padding: int | None = option(
+        None,
+        "Free pixels between charts, in place of those that the mip levels need",
+        "Layout",
+        low=1,
+        high=512,
+        unit="pixels",
+        instead_of="mip_levels",
+    )
+    unwrap_seconds: float = option(
+        60.0,
+        "Longest time to unwrap one object well; after it the rest is laid out by face direction",
+        "Layout",
+        metavar="S",
+        low=0,
+        unit="seconds",
+    )
+    quality: str = option(
+        "medium",
+        "How fine the light is computed",
+        "Quality",
+        choices=QUALITIES,
+        preset=True,
+        panel=PanelRow(
+            "Quality",
+            other_choice=Choice(BY_ERROR, "By Error", "As fine as it takes to reach the error below"),
+        ),
+    )
+    relative_error: float | None = option(
+        None,
+        "How far the light may be off, such as 0.02: RMS, relative to its mean. Texels are lit again, with "
+        "more rays, until the estimate is below it",
+        "Quality",
+        flag="--error",
+        metavar="E",
+        low=0.002,
+        high=0.2,
+        instead_of="quality",
+        preset=True,
+        panel=PanelRow("Error", default=0.02, step=0.1, only_if=(("quality", BY_ERROR),)),
+    )
+    quantity: str = option(
+        "irradiance_over_pi",
+        "What a pixel of the lightmap holds",
+        "Image",
+        choices=QUANTITIES,
+        panel=PanelRow("Quantity"),
+    )
+    light: str = option(
+        "all",
+        "Which light goes into the lightmap",
+        "Image",
+        choices=LIGHTS,
+        panel=PanelRow("Light"),
+    )
+    format: str = option(
+        "exr",
+        "Kind of image file",
+        "Image",
+        choices=FORMATS,
+        panel=PanelRow("Format"),
+    )
+    objects: tuple[str, ...] | None = option(
+        None,
+        "What gets a lightmap, instead of every mesh that shows in renders; the rest still lights and blocks",
+        "Scene",
+        metavar="NAME",
+    )
+    light_only: tuple[str, ...] = option(
+        (),
+        "What lights and blocks but gets no lightmap, also if its own mode differs",
+        "Scene",
+        metavar="NAME",
+    )
+    ignore: tuple[str, ...] = option(
+        (), "What is left out as if it were not there, also if its own mode differs", "Scene", metavar="NAME"
+    )
+    sky: bool = option(
+        False,
+        "Add a plain white sky of strength 1 where the scene has no light at all",
+        "Scene",
+        panel=PanelRow("Sky if Dark"),
+    )
+    keep_uvs: bool = option(
+        False,
+        "Use an existing UV layer 'Lightmap' as it is instead of unwrapping",
+        "Scene",
+        panel=PanelRow("Keep Lightmap UVs"),
+    )
+    groups: tuple[GroupSetting, ...] = option(
+        (),
+        "Bake a lightmap also for these lamps, emissive materials or the world; they win over the scene's",
+        "Light Groups",
+        flag="--light-group",
+        metavar="NAME=MEMBER,…",
+        repeated=True,
+    )
+    light_groups: bool = option(
+        False,
+        "Bake a lightmap for each light group of the scene as well, which the materials mix: colors and "
+        "strengths can then be changed without baking",
+        "Light Groups",
+        panel=PanelRow("Light Groups", identifier="use_light_groups"),
+    )
+    seed: int = option(
+        0,
+        "Random seed. Same scene, same seed: the same lightmap to the last bit",
+        "Computation",
+        low=0,
+        high=2**31 - 1,  # Blender's renders take no larger one
+        panel=PanelRow("Seed"),
+    )
+    threads: int = option(
+        0,
+        "Processor threads to use; 0 uses all. The result does not depend on it",
+        "Computation",
+        low=0,
+        high=1024,  # as in Blender
+        panel=PanelRow("Threads", soft_high=64),
+    )
+    method: str = option(
+        "hierarchical",
+        "How the radiosity equation is solved. All come to the same light; Hierarchical is the fastest, the "
+        "others are for study and comparison",
+        "Solver",
+        choices=METHOD_CHOICES,
+        preset=True,
+        panel=PanelRow("Method"),
+    )
+    elements: int | None = option(
+        None,
+        "About how many elements the surfaces are divided into; a triangle is at least one",
+        "Solver",
+        low=1,
+        high=MOST,
+        methods=("two-level", "shooting", *MATRIX),
+        preset=True,
+        panel=PanelRow("Elements"),
+    )
+    assembly: str | None = option(
+        None,
+        "How the matrix is made; conjugate gradients take galerkin only",
+        "Solver",
+        choices=ASSEMBLIES,
+        methods=MATRIX,
+        preset=True,
+        panel=PanelRow("Assembly"),
+    )
+    patches: int | None = option(
+        None,
+        "About how many patches the elements are grouped into",
+        "Solver",
+        low=1,
+        high=MOST,
+        methods=("two-level",),
+        preset=True,
+        panel=PanelRow("Patches"),
+    )
+    contrast: float | None = option(
+        None,
+        "Neighboring elements are split where their light differs by more than this part of the mean",
+        "Solver",
+        metavar="C",
+        low=0,
+        high=1000,
+        above=True,
+        methods=("two-level",),
+        preset=True,
+        panel=PanelRow("Contrast"),
+    )
+    form_factor_error: float | None = option(
+        None,
+        "F_ε: a link is refined while its form factor may exceed this",
+        "Solver",
+        metavar="F",
+        low=0,
+        high=1,
+        methods=("multi-level",),
+        preset=True,
+        panel=PanelRow("Form Factor Error", precision=6),
+    )
+    error: float | None = option(
+        None,
+        "BF_ε: a link is refined while it may misplace more than this part of the light's power",
+        "Solver",
+        flag="--link-error",
+        metavar="E",
+        low=0,
+        high=1,
+        above=True,
+        methods=("hierarchical",),
+        preset=True,
+        panel=PanelRow("Link Error", precision=6),
+    )
+    min_area: float | None = option(
+        None,
+        "A_ε: no element becomes smaller than this part of the scene's lit area",
+        "Solver",
+        metavar="A",
+        low=0,
+        high=1,
+        above=True,
+        methods=LINKS,
+        preset=True,
+        panel=PanelRow("Smallest Area", precision=6),
+    )
+    max_links: int | None = option(
+        None,
+        "Refinement stops at so many links",
+        "Solver",
+        low=1,
+        high=1_000_000_000,
+        methods=LINKS,
+        preset=True,
+        panel=PanelRow("Most Links"),
+    )
+    ambient: bool | None = option(
+        None,
+        "Show the light that is not sent yet as an even, ambient light; the result does not change",
+        "Solver",
+        methods=("shooting",),
+        preset=True,
+        panel=PanelRow("Ambient Term"),
+    )
+    tolerance: float | None = option(
+        None,
+        "Residual at which the iteration stops, as a part of the light's power",
+        "Solver",
+        metavar="T",
+        low=0,
+        high=1,
+        above=True,
+        methods=ITERATIVE,
+        preset=True,
+        panel=PanelRow("Tolerance", precision=6),
+    )
+    max_iterations: int | None = option(
+        None,
+        "Iterations, or shots, after which it stops anyway",
+        "Solver",
+        low=1,
+        high=1_000_000_000,
+        methods=ITERATIVE,
+        preset=True,
+        panel=PanelRow("Most Iterations"),
+    )
+    memory_limit: float | None = option(
+        None,
+        "Memory that the bake may take, in GiB; what would need more is refused",
+        "Solver",
+        metavar="GIB",
+        low=0,
+        high=1e6,
+        above=True,
+        unit="GiB",
+        methods=ALL,
+        panel=PanelRow("Memory Limit"),
+    )
 
     def __post_init__(self) -> None:
-        if not 1 <= self.resolution <= MAX_RESOLUTION:
-            raise UsageError(f"resolution {self.resolution} is not between 1 and {MAX_RESOLUTION} pixels")
-        if self.texel_density is not None and not 0 < self.texel_density < float("inf"):
-            raise UsageError(f"texel density {self.texel_density} is not a positive number of pixels a metre")
-        self._check_atlas()
-        if self.relative_error is not None and not MIN_ERROR <= self.relative_error <= MAX_ERROR:
-            raise UsageError(f"error {self.relative_error} is not between {MIN_ERROR} and {MAX_ERROR}")
-        if self.relative_error is not None and self.quantity == "residual":
-            raise UsageError("a residual is an error picture: leave --error out, or bake another quantity")
-        if not 0 <= self.threads <= MAX_THREADS:
-            raise UsageError(f"threads {self.threads} is not between 0 and {MAX_THREADS}; 0 means all cores")
-        for name in (*self.light_only, *self.ignore):
-            if name in (self.objects or ()):
-                raise UsageError(f"object '{name}' cannot both get a lightmap and be light only or ignored")
-        if not 0 <= self.seed <= MAX_SEED:
-            raise UsageError(f"seed {self.seed} is not between 0 and {MAX_SEED}")
-        for name, value, allowed in (
-            ("atlas", self.atlas, ATLASES),
-            ("quality", self.quality, QUALITIES),
-            ("quantity", self.quantity, QUANTITIES),
-            ("light", self.light, LIGHTS),
-            ("format", self.format, FORMATS),
-        ):
-            if value not in allowed:
-                raise UsageError(f"{name} {value!r} is not one of {', '.join(allowed)}")
-        if self.quantity == "residual":
-            self._check_residual()
-        self._check_groups()
-        check_method(self.method, self.method_settings())
-
-    def _check_atlas(self) -> None:
-        """Refuse what pages cannot be."""
-        if not 1 <= self.pages <= MAX_PAGES:
-            raise UsageError(f"{self.pages} pages are not between 1 and {MAX_PAGES}")
-        if self.pages > 1 and (self.atlas != "shared" or self.texel_density is not None):
-            raise UsageError("pages are for a shared atlas of a given resolution; else they are counted")
-        if not 4 <= self.max_resolution <= MAX_RESOLUTION:
-            raise UsageError(
-                f"largest page {self.max_resolution} is not between 4 and {MAX_RESOLUTION} pixels"
-            )
-        if not 0 <= self.mip_levels <= MAX_MIP_LEVELS:
-            raise UsageError(f"mip level {self.mip_levels} is not between 0 and {MAX_MIP_LEVELS}")
-        if self.padding is not None and not 1 <= self.padding <= MAX_PADDING:
-            raise UsageError(f"padding {self.padding} is not between 1 and {MAX_PADDING} pixels")
-        if not self.unwrap_seconds >= 0:
-            raise UsageError(f"unwrapping for {self.unwrap_seconds} seconds is not possible")
-
-    def _check_residual(self) -> None:
-        """Refuse what an error picture cannot be."""
-        if self.format != "exr":
-            raise UsageError(
-                f"a residual has negative values, which format {self.format} cannot hold: take format exr"
-            )
-        if self.light != "all":
-            raise UsageError(
-                f"a residual is of the whole solution, not of its {self.light} light: take light all"
-            )
-
-    def _check_groups(self) -> None:
-        """Refuse what light groups cannot be."""
-        names = [name for name, _ in self.groups]
-        if "" in names:
-            raise UsageError("a light group has no name")
-        inside = [member for _, group in self.groups for member in group]
-        for kind, found in (("light group", names), ("member of light groups", inside)):
-            twice = next((name for name in found if found.count(name) > 1), None)
-            if twice is not None:
-                raise UsageError(f"{kind} '{twice}' is there twice")
-        wanted = bool(self.groups) or self.light_groups
-        if wanted and self.method != "hierarchical":
-            raise UsageError(f"light groups need the hierarchical method; {self.method} keeps no links")
-        if wanted and self.quantity == "residual":
-            raise UsageError("a residual is of all light together: bake another quantity for light groups")
+        for name, found in OPTIONS.items():
+            found.check(getattr(self, name))
+        check_combinations(self, OPTIONS)
 
     def method_settings(self) -> dict[str, Any]:
         """Return the settings of the method that were given, by name."""
-        values = {name: getattr(self, name) for name in SETTINGS}
+        values = {name: getattr(self, name) for name, found in OPTIONS.items() if found.methods}
         return {name: value for name, value in values.items() if value is not None}
+
+
+OPTIONS = options_of(BakeSettings)
+"""Every option of a bake by its field."""
+
+
+def options_of_method(method: str) -> tuple[str, ...]:
+    """Return the names of the options that a method has besides those of all bakes."""
+    return tuple(name for name, found in OPTIONS.items() if method in found.methods)

@@ -10,8 +10,9 @@ import pytest
 import radiosity_addon
 from radiosity_addon.blender.panels import bake_panel
 from radiosity_addon.blender.settings.properties import settings_of
-from radiosity_addon.options.bake_settings import BakeSettings
-from radiosity_addon.options.methods import METHODS, SETTINGS
+from radiosity_addon.options import METHODS, OPTIONS, BakeSettings, options_of_method
+
+SETTINGS = {name: option for name, option in OPTIONS.items() if option.methods}
 
 
 class Layout:
@@ -56,7 +57,7 @@ def test_only_what_applies_is_drawn_and_given(method: str, group: bpy.types.Prop
     group.patches = 4
     group.method = method
     applies = [
-        name for name in METHODS[method].settings if (method, name) != ("conjugate-gradient", "assembly")
+        name for name in options_of_method(method) if (method, name) != ("conjugate-gradient", "assembly")
     ]
     assert drawn() == ["method", *applies]
     settings = settings_of(bpy.context)
@@ -82,7 +83,7 @@ def test_the_panel_as_it_comes_bakes_the_defaults() -> None:
 @pytest.mark.parametrize("name", [name for name, setting in SETTINGS.items() if setting.kind in (int, float)])
 def test_a_number_keeps_to_its_range(name: str, group: bpy.types.PropertyGroup) -> None:
     setting = SETTINGS[name]
-    group.method = next(method for method in METHODS if name in METHODS[method].settings)
+    group.method = SETTINGS[name].methods[0]
     for value in (2 * setting.high, setting.high):
         setattr(group, name, min(value, 2**31 - 1) if setting.kind is int else value)
         assert settings_of(bpy.context).method_settings()[name] == pytest.approx(setting.high)

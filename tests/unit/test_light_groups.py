@@ -10,7 +10,7 @@ import pytest
 from radiosity_addon.bake.pipeline import bake
 from radiosity_addon.bake.relight.light_groups import are_wanted, check_groups, members, split_by_group
 from radiosity_addon.base.errors import UsageError
-from radiosity_addon.options.bake_settings import MAX_GROUPS, OTHERS, BakeSettings
+from radiosity_addon.options import MAX_GROUPS, OTHERS, BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
 from tests.relit_rooms import lit_bake
 

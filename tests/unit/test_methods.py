@@ -3,90 +3,53 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import fields
 from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from radiosity_addon.bake.quality import QUALITIES, SHOOTING_TOLERANCES, quality_of, used_settings
+from radiosity_addon.bake.quality import QUALITIES, quality_of, used_settings
 from radiosity_addon.base.errors import UsageError
-from radiosity_addon.options.bake_settings import BakeSettings
-from radiosity_addon.options.methods import METHODS, SETTINGS
-from radiosity_addon.options.solver_settings import SolverSettings
+from radiosity_addon.options import METHODS, OPTIONS, BakeSettings, SolverSettings, options_of_method
 
-VALUES = {
-    "elements": 700,
-    "assembly": "galerkin",
-    "patches": 30,
-    "contrast": 0.3,
-    "form_factor_error": 0.02,
-    "error": 1e-3,
-    "min_area": 1e-3,
-    "max_links": 9000,
-    "ambient": True,
-    "tolerance": 1e-6,
-    "max_iterations": 40,
-    "memory_limit": 0.25,
-}
-"""A value that each setting may have, other than its preset (but for the assembly)."""
+SETTINGS = {name: option for name, option in OPTIONS.items() if option.methods}
 
-MATRIX = {"elements", "assembly", "memory_limit"}
-ITERATED = MATRIX | {"tolerance", "max_iterations"}
-EXPECTED = {
-    "dense": MATRIX,
-    "jacobi": ITERATED,
-    "gauss-seidel": ITERATED,
-    "conjugate-gradient": ITERATED,
-    "shooting": {"elements", "ambient", "tolerance", "max_iterations", "memory_limit"},
-    "two-level": {"elements", "patches", "contrast", "memory_limit"},
-    "multi-level": {
-        *("form_factor_error", "min_area", "max_links", "tolerance", "max_iterations", "memory_limit"),
-    },
-    "hierarchical": {"error", "min_area", "max_links", "tolerance", "max_iterations", "memory_limit"},
-}
-
-
-def test_the_table_is_that_of_the_docs() -> None:
-    assert {name: set(method.settings) for name, method in METHODS.items()} == EXPECTED
-    assert set(VALUES) == set(SETTINGS)
-    assert BakeSettings().method == next(iter(METHODS)) == "hierarchical"
+VALUES = {int: 7, float: 0.01, bool: True, str: "galerkin"}
+"""A value that every setting of the kind may have, other than its preset (but for the assembly)."""
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_every_method_has_a_module_and_words_for_people(method: str) -> None:
+def test_every_method_has_a_module_and_a_default_that_is_the_first(method: str) -> None:
     assert find_spec("radiosity_addon.solver.methods." + method.replace("-", "_")) is not None
-    assert METHODS[method].label
-    assert METHODS[method].description
+    assert OPTIONS["method"].values == tuple(METHODS)
+    assert BakeSettings().method == next(iter(METHODS)) == "hierarchical"
 
 
-def test_settings_are_fields_of_the_solver_and_of_a_bake() -> None:
-    for record in (SolverSettings, BakeSettings):
-        assert set(SETTINGS) <= {field.name for field in fields(record)}
+def test_settings_of_methods_are_fields_of_the_solver() -> None:
+    names = {field.name for field in fields(SolverSettings)}
+    assert set(SETTINGS) <= names
     # What no method lists all of them have.
-    rest = {field.name for field in fields(SolverSettings)} - set(SETTINGS)
-    assert rest == {"method", "shadow_rays", "seed", "threads"}
+    assert names - set(SETTINGS) == {"method", "shadow_rays", "seed", "threads"}
 
 
 @pytest.mark.parametrize("name", SETTINGS)
 @pytest.mark.parametrize("method", METHODS)
 def test_each_pair_is_taken_or_refused_with_the_list(method: str, name: str) -> None:
-    given = {name: VALUES[name]}
-    if name in EXPECTED[method]:
-        settings = BakeSettings(method=method, **given)
-        assert settings.method_settings() == given
+    value = VALUES[SETTINGS[name].kind]
+    if name in options_of_method(method):
+        settings = BakeSettings(method=method, **{name: value})
+        assert settings.method_settings() == {name: value}
         solver = quality_of(settings).solver
         assert solver.method == method
-        assert used_settings(solver)[name] == VALUES[name]
+        assert used_settings(solver)[name] == value
         return
     with pytest.raises(UsageError) as refused:
-        BakeSettings(method=method, **given)
-    said = str(refused.value)
-    assert said.startswith(f"{SETTINGS[name].option} does not apply to --method {method}; it takes ")
-    listed = said.split("it takes ")[1].split(", ")
-    assert listed == [SETTINGS[other].option for other in METHODS[method].settings]
+        BakeSettings(method=method, **{name: value})
+    message = str(refused.value)
+    assert message.startswith(f"{SETTINGS[name].flag} does not apply to --method {method}; it takes ")
+    listed = message.split("it takes ")[1].split(", ")
+    assert listed == [SETTINGS[other].flag for other in options_of_method(method)]
 
 
 @pytest.mark.parametrize("assembly", ["collocation", "linear"])
@@ -114,9 +77,9 @@ def test_conjugate_gradients_need_the_symmetric_system(assembly: str) -> None:
     ],
 )
 def test_values_out_of_range_are_named(name: str, bad: list, good: list) -> None:
-    method = next(method for method in METHODS if name in METHODS[method].settings)
+    method = SETTINGS[name].methods[0]
     for value in bad:
-        with pytest.raises(UsageError, match=f"^{SETTINGS[name].option} "):
+        with pytest.raises(UsageError, match=f"^{SETTINGS[name].flag} "):
             BakeSettings(method=method, **{name: value})
     for value in good:
         assert BakeSettings(method=method, **{name: value}).method_settings() == {name: value}
@@ -164,39 +127,3 @@ def test_more_patches_than_elements_are_refused() -> None:
 def test_seed_and_threads_reach_the_solver() -> None:
     solver = quality_of(BakeSettings(seed=5, threads=3)).solver
     assert (solver.seed, solver.threads) == (5, 3)
-
-
-README = (Path(__file__).resolve().parents[2] / "README.md").read_text(encoding="utf-8")
-
-
-def test_the_readme_lists_the_settings_of_each_method() -> None:
-    rows = re.findall(r"^\| ((?:`[a-z-]+`(?:, )?)+) \| ((?:`--[a-z-]+` ?)+)\|$", README, re.MULTILINE)
-    listed = {
-        method: tuple(re.findall("`(.+?)`", options))
-        for methods, options in rows
-        for method in re.findall("`(.+?)`", methods)
-    }
-    assert listed == {
-        name: tuple(SETTINGS[setting].option for setting in method.settings)
-        for name, method in METHODS.items()
-    }
-
-
-def test_the_readme_tells_when_shooting_stops() -> None:
-    told = ", ".join(str(SHOOTING_TOLERANCES[name]) for name in QUALITIES)
-    assert f"`shooting` takes {told})" in README
-
-
-@pytest.mark.parametrize("name", SETTINGS)
-def test_the_readme_tells_the_presets(name: str) -> None:
-    (told,) = re.findall(rf"^\| `{SETTINGS[name].option}[` ].*\| (.+) \|$", README, re.MULTILINE)
-    presets = [getattr(quality.solver, name) for quality in QUALITIES.values()]
-    if name == "ambient":
-        assert (told, set(presets)) == ("off", {False})
-    elif name == "assembly":
-        assert {told.strip("`")} == set(presets)
-    else:
-        # Thousands have a comma without a space.
-        numbers = [float(number.replace(",", "")) for number in told.split(", ")]
-        assert numbers == (presets if len(numbers) > 1 else [presets[0]])
-        assert len(numbers) == len(set(presets))

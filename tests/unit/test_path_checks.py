@@ -16,7 +16,9 @@ from radiosity_addon.files.path_checks import (
     escaped,
     printable,
 )
-from radiosity_addon.options.bake_settings import MAX_SEED, MAX_THREADS, BakeSettings
+from radiosity_addon.options import OPTIONS, BakeSettings
+
+MAX_SEED, MAX_THREADS = int(OPTIONS["seed"].high), int(OPTIONS["threads"].high)
 
 IMPOSSIBLE = [
     "",

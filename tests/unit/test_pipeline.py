@@ -15,8 +15,7 @@ from radiosity_addon.bake.quality import QUALITIES, quality_of
 from radiosity_addon.bake.result.progress import Progress
 from radiosity_addon.bake.result.result import BakeResult
 from radiosity_addon.base.errors import SceneError
-from radiosity_addon.options.bake_settings import BakeSettings
-from radiosity_addon.options.methods import METHODS
+from radiosity_addon.options import METHODS, BakeSettings, options_of_method
 from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, solve
 from radiosity_addon.solver.links import initial
@@ -246,7 +245,7 @@ def test_pictures_tile_the_room_and_the_last_one_is_the_solution(
 ) -> None:
     monkeypatch.setattr("radiosity_addon.bake.pipeline.PICTURE_SECONDS", 0.0)
     room = lit_room(lights=[LAMP], two_sided=True)
-    given = {"elements": 60} if "elements" in METHODS[method].settings else {}
+    given = {"elements": 60} if "elements" in options_of_method(method) else {}
     settings = BakeSettings(quality="draft", resolution=16, method=method, **given)
     pictures = [step.picture for step in bake(room, settings) if step.picture is not None]
     assert len(pictures) >= 2
@@ -297,7 +296,7 @@ def test_without_light_it_is_black_and_says_so() -> None:
 @pytest.mark.parametrize("method", ["jacobi", "gauss-seidel", "shooting", "multi-level", "hierarchical"])
 def test_a_solution_short_of_its_tolerance_says_so(method: str) -> None:
     scene = lit_room(lights=[LAMP], reflectance=0.9)
-    few = {"elements": 48} if "elements" in METHODS[method].settings else {}
+    few = {"elements": 48} if "elements" in options_of_method(method) else {}
     short = run(scene, method=method, max_iterations=1, **few)
     assert [warning.name for warning in short.warnings] == ["scene"]
     assert f"{method} method stopped after 1 iteration" in short.warnings[0].message

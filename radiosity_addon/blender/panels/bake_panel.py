@@ -7,15 +7,16 @@ from typing import Any
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
+from ...options import ADVANCED, MAIN, SOLVER
 from ..jobs.progress_text import progress_text
 from ..session import runtime
-from ..settings.method_properties import AUTOMATIC, shown_settings
-from ..settings.preferences import folder_of, output_folder, preferences
+from ..settings.option_properties import AUTOMATIC
+from ..settings.preferences import folder_of, output_folder
 from ..settings.preset_menu import RADIOSITY_PT_presets
-from ..settings.properties import BY_ERROR
 from .check_panel import CheckSection
 from .light_group_panels import LightGroupSection
 from .object_panel import draw_overrides, has_role
+from .option_rows import draw_options, draw_preferred
 from .overlay_panel import OverlaySection
 from .relight_buttons import draw_relight_buttons
 from .relight_panel import RelightSection
@@ -100,19 +101,11 @@ def _draw_settings(layout: Any, context: bpy.types.Context) -> None:
 
     layout.use_property_split = True
     layout.use_property_decorate = False
-    column = layout.column()
-    column.prop(settings, "resolution" if settings.size_mode == "resolution" else "texel_density")
-    column = layout.column()
-    column.prop(settings, "quality")
-    if settings.quality == BY_ERROR[0]:
-        column.prop(settings, "relative_error")
-    column.prop(settings, "atlas")
-    if settings.atlas == "shared" and settings.size_mode == "resolution":
-        column.prop(settings, "pages")
+    draw_options(layout, MAIN, context)
     column = layout.column()
     column.prop(settings, "output_folder")
     if not settings.is_property_set("output_folder"):
-        _draw_preferred(column, folder_of(context), settings.output_folder)
+        draw_preferred(column, folder_of(context), settings.output_folder)
     if output_folder(context) is None:
         text = iface_("The file is not saved: lightmaps will be packed into it")
         draw_text(layout.box(), text, "INFO", context)
@@ -145,21 +138,7 @@ class AdvancedSection(Section):
         """Draw the settings."""
         layout.use_property_split = True
         settings = context.scene.radiosity
-        column = layout.column()
-        for name in ("quantity", "light", "format"):
-            column.prop(settings, name)
-        column = layout.column()
-        if settings.size_mode == "density":
-            column.prop(settings, "max_resolution")
-        column.prop(settings, "mip_levels")
-        column = layout.column(heading="Scene")
-        column.prop(settings, "sky")
-        column.prop(settings, "keep_uvs")
-        column = layout.column(align=True)
-        column.prop(settings, "seed")
-        column.prop(settings, "threads")
-        if not settings.is_property_set("threads"):
-            _draw_preferred(column, preferences(context).threads, settings.threads)
+        draw_options(layout, ADVANCED, context)
         column = layout.column(heading="Viewport")
         column.prop(settings, "show_while_solving")
         column.prop(settings, "show_result")
@@ -195,11 +174,7 @@ class SolverSection(Section):
     def draw(cls, layout: Any, context: bpy.types.Context) -> None:
         """Draw the method, and of the settings those that apply to it."""
         layout.use_property_split = True
-        settings = context.scene.radiosity
-        layout.prop(settings, "method")
-        column = layout.column()
-        for name in shown_settings(settings.method):
-            column.prop(settings, name)
+        draw_options(layout, SOLVER, context)
         layout.label(text=AUTOMATIC, icon="INFO")
 
 
@@ -253,12 +228,6 @@ class WarningsSection(Section):
         if hidden > 0:
             text = iface_("and {} more, in the report").format(hidden)
             layout.label(text=text, translate=False)
-
-
-def _draw_preferred(layout: Any, preferred: Any, shown: Any) -> None:
-    """Say that the preferences' value counts where the scene has none of its own."""
-    if preferred != shown:
-        layout.label(text=iface_("From the preferences: {}").format(preferred), icon="INFO", translate=False)
 
 
 SECTIONS: tuple[type[Section], ...] = (

@@ -7,7 +7,8 @@ from typing import Any
 
 import bpy
 
-from ...options import SETTINGS
+from ...options import OPTIONS
+from .option_properties import option_property
 
 DEFAULT_FOLDER = "//lightmaps/"
 
@@ -31,22 +32,14 @@ class RADIOSITY_AP_preferences(bpy.types.AddonPreferences):
         subtype="DIR_PATH",
         options=_RELATIVE_PATH,
     )
-    memory_limit: bpy.props.FloatProperty(  # type: ignore[valid-type]
-        name="Memory Limit",
-        description="Memory for elements and links in GiB, for scenes that set none; 0: as the quality says",
-        default=0.0,
-        min=0.0,
-        max=float(SETTINGS["memory_limit"].high),
-        precision=1,
+    memory_limit: option_property(  # type: ignore[valid-type]
+        OPTIONS["memory_limit"],
+        description="Memory for elements and links in GiB, for scenes that set none; 0 = set by quality",
     )
-    threads: bpy.props.IntProperty(  # type: ignore[valid-type]
-        name="Threads",
+    threads: option_property(  # type: ignore[valid-type]
+        OPTIONS["threads"],
         description="Processor threads, for scenes that set no number; 0 uses all. "
         "The result does not depend on it",
-        default=0,
-        min=0,
-        max=1024,
-        soft_max=64,
     )
     check_first: bpy.props.BoolProperty(  # type: ignore[valid-type]
         name="Check First",

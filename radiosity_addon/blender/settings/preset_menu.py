@@ -8,18 +8,16 @@ import bpy
 from bl_operators.presets import AddPresetBase
 from bl_ui.utils import PresetPanel
 
-from ...options import SETTINGS
+from ...options import OPTIONS
 
 FOLDER = "radiosity"
 """Below `presets`, here and among the user's scripts."""
 
 PRESET_PROPERTIES = (
-    *("size_mode", "resolution", "texel_density", "max_resolution", "mip_levels"),
-    *("quality", "relative_error", "method"),
-    # How much memory there is, is the machine's affair.
-    *(name for name in SETTINGS if name != "memory_limit"),
+    "size_mode",
+    *(option.identifier for option in OPTIONS.values() if option.preset),
 )
-"""What a preset sets, and all it sets: size, quality and method. See the user guide."""
+"""What a preset sets, and all it sets: size, quality and method."""
 
 
 class RADIOSITY_OT_preset_add(AddPresetBase, bpy.types.Operator):
@@ -42,6 +40,12 @@ class RADIOSITY_PT_presets(PresetPanel, bpy.types.Panel):
     preset_subdir = FOLDER
     preset_operator = "script.execute_preset"
     preset_add_operator = "radiosity.preset_add"
+
+    @staticmethod
+    def reset_cb(context: bpy.types.Context, _filepath: str) -> None:
+        """Reset what a preset sets: Blender calls this first, so presets need only name what differs."""
+        for name in PRESET_PROPERTIES:
+            context.scene.radiosity.property_unset(name)
 
 
 def register() -> None:

@@ -5,64 +5,10 @@ from __future__ import annotations
 import bpy
 
 from ...base import UsageError
-from ...options import (
-    ATLASES,
-    FORMATS,
-    LIGHTS,
-    MAX_ERROR,
-    MAX_MIP_LEVELS,
-    MAX_PAGES,
-    MAX_RESOLUTION,
-    MAX_SEED,
-    MAX_THREADS,
-    MIN_ERROR,
-    QUALITIES,
-    QUANTITIES,
-    BakeSettings,
-)
+from ...options import BakeSettings
 from ..scene_records.object_roles import BAKE, BAKEABLE_TYPES
-from .method_properties import MethodProperties, given_settings
+from .option_properties import OptionProperties, chosen_options
 from .preferences import DEFAULT_FOLDER, memory_limit_of, threads_of
-
-DEFAULTS = BakeSettings()
-
-SHARED_FIELDS = (
-    *("atlas", "quantity", "light", "format"),
-    *("max_resolution", "mip_levels", "sky", "keep_uvs", "seed"),
-)
-"""Settings of the panel that a bake takes as they are."""
-
-_LABELS = {
-    "shared": ("Shared", "One image for all objects"),
-    "per-object": ("Per Object", "An image for each object"),
-    "draft": ("Draft", "Fast: coarse elements and few rays, to judge the light"),
-    "medium": ("Medium", "Clean light at a moderate time"),
-    "high": ("High", "Fine elements and many rays, for the final bake"),
-    "irradiance_over_pi": (
-        "Irradiance / π",
-        "What Cycles' diffuse bake without color writes: the radiance of a white surface [W/m²/sr]",
-    ),
-    "irradiance": ("Irradiance", "The light that arrives [W/m²], as three.js adds it"),
-    "radiosity": ("Radiosity", "The light that leaves: own emission and what is reflected [W/m²]"),
-    "residual": (
-        "Residual",
-        "The error picture: by how much the solution misses the radiosity equation, signed [W/m²]",
-    ),
-    "all": ("All", "Direct and indirect light"),
-    "direct": ("Direct", "Only the light that comes straight from lamps, emitters and world"),
-    "indirect": ("Indirect", "Only the light that was reflected, for lamps that stay dynamic"),
-    "exr": ("OpenEXR", "Linear floating point, exact"),
-    "png16": ("PNG 16 bit", "Scaled to the brightest texel; the scale is in the report"),
-}
-
-
-BY_ERROR = ("error", "By Error", "As fine as it takes to reach the error below")
-"""The quality that is not a preset."""
-
-
-def _items(values: tuple[str, ...]) -> list[tuple[str, str, str]]:
-    return [(value, *_LABELS[value]) for value in values]
-
 
 # Blender 4.5 and later want paths that start with // declared; 4.2 refuses the word.
 _RELATIVE_PATH = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set()
@@ -74,8 +20,8 @@ def _show_lightmap_only(settings: RadiositySettings, _context: bpy.types.Context
     set_lightmap_only(settings.lightmap_only)
 
 
-class RadiositySettings(MethodProperties, bpy.types.PropertyGroup):
-    """`scene.radiosity`: what the next bake from the panel does."""
+class RadiositySettings(OptionProperties, bpy.types.PropertyGroup):
+    """`scene.radiosity`: what the next bake from the panel does; here are those that only the panel has."""
 
     scope: bpy.props.EnumProperty(  # type: ignore[valid-type]
         name="Objects",
@@ -101,112 +47,6 @@ class RadiositySettings(MethodProperties, bpy.types.PropertyGroup):
         ],
         default="resolution",
     )
-    resolution: bpy.props.IntProperty(  # type: ignore[valid-type]
-        name="Resolution",
-        description="Width and height of a lightmap in pixels",
-        default=DEFAULTS.resolution,
-        min=1,
-        max=MAX_RESOLUTION,
-        soft_min=64,
-        soft_max=4096,
-        subtype="PIXEL",
-    )
-    texel_density: bpy.props.FloatProperty(  # type: ignore[valid-type]
-        name="Pixels per Metre",
-        description="Lightmap pixels along one metre of surface",
-        default=64.0,
-        min=0.01,
-        soft_min=1.0,
-        soft_max=1024.0,
-    )
-    pages: bpy.props.IntProperty(  # type: ignore[valid-type]
-        name="Pages",
-        description="How many images the objects are shared out over",
-        default=DEFAULTS.pages,
-        min=1,
-        max=MAX_PAGES,
-        soft_max=16,
-    )
-    max_resolution: bpy.props.IntProperty(  # type: ignore[valid-type]
-        name="Largest Page",
-        description="Largest image that a density makes; what does not fit goes to more images",
-        default=DEFAULTS.max_resolution,
-        min=4,
-        max=MAX_RESOLUTION,
-        subtype="PIXEL",
-    )
-    mip_levels: bpy.props.IntProperty(  # type: ignore[valid-type]
-        name="Mip Levels",
-        description="Down to which mip level the lightmap's charts stay apart: each doubles the padding",
-        default=DEFAULTS.mip_levels,
-        min=0,
-        max=MAX_MIP_LEVELS,
-    )
-    atlas: bpy.props.EnumProperty(  # type: ignore[valid-type]
-        name="Atlas",
-        description="How objects share images",
-        items=_items(ATLASES),
-        default=DEFAULTS.atlas,
-    )
-    quality: bpy.props.EnumProperty(  # type: ignore[valid-type]
-        name="Quality",
-        description="How fine the light is computed",
-        items=[*_items(QUALITIES), BY_ERROR],
-        default=DEFAULTS.quality,
-    )
-    relative_error: bpy.props.FloatProperty(  # type: ignore[valid-type]
-        name="Error",
-        description="How far the light may be off: RMS, relative to its mean. Texels are lit again, "
-        "with more rays, until the estimate is below it",
-        default=0.02,
-        min=MIN_ERROR,
-        max=MAX_ERROR,
-        step=0.1,
-        precision=3,
-    )
-    quantity: bpy.props.EnumProperty(  # type: ignore[valid-type]
-        name="Quantity",
-        description="What a pixel of the lightmap holds",
-        items=_items(QUANTITIES),
-        default=DEFAULTS.quantity,
-    )
-    light: bpy.props.EnumProperty(  # type: ignore[valid-type]
-        name="Light",
-        description="Which light goes into the lightmap",
-        items=_items(LIGHTS),
-        default=DEFAULTS.light,
-    )
-    format: bpy.props.EnumProperty(  # type: ignore[valid-type]
-        name="Format",
-        description="Kind of image file",
-        items=_items(FORMATS),
-        default=DEFAULTS.format,
-    )
-    sky: bpy.props.BoolProperty(  # type: ignore[valid-type]
-        name="Sky if Dark",
-        description="Add a plain white sky of strength 1 where the scene has no light at all",
-        default=DEFAULTS.sky,
-    )
-    keep_uvs: bpy.props.BoolProperty(  # type: ignore[valid-type]
-        name="Keep Lightmap UVs",
-        description="Use an existing UV layer 'Lightmap' as it is instead of unwrapping anew",
-        default=DEFAULTS.keep_uvs,
-    )
-    seed: bpy.props.IntProperty(  # type: ignore[valid-type]
-        name="Seed",
-        description="Same scene, same seed: the same lightmap to the last bit",
-        default=DEFAULTS.seed,
-        min=0,
-        max=MAX_SEED,
-    )
-    threads: bpy.props.IntProperty(  # type: ignore[valid-type]
-        name="Threads",
-        description="Processor threads to use; 0 uses all. The result does not depend on it",
-        default=DEFAULTS.threads,
-        min=0,
-        max=MAX_THREADS,
-        soft_max=64,
-    )
     output_folder: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Folder",
         description="Where the lightmaps are written. A folder beside an unsaved file is not known yet: "
@@ -214,12 +54,6 @@ class RadiositySettings(MethodProperties, bpy.types.PropertyGroup):
         default=DEFAULT_FOLDER,
         subtype="DIR_PATH",
         options=_RELATIVE_PATH,
-    )
-    use_light_groups: bpy.props.BoolProperty(  # type: ignore[valid-type]
-        name="Light Groups",
-        description="Bake a lightmap for each light group as well, which the materials mix: colors and "
-        "strengths can then be changed without baking",
-        default=DEFAULTS.light_groups,
     )
     show_while_solving: bpy.props.BoolProperty(  # type: ignore[valid-type]
         name="Show While Solving",
@@ -264,22 +98,12 @@ def settings_of(context: bpy.types.Context) -> BakeSettings:
         If a value is out of range, or nothing is selected where the selection is asked for.
     """
     group = context.scene.radiosity
-    chosen = selected_meshes(context) if group.scope == "selected" else None
-    if chosen == ():
+    objects = selected_meshes(context) if group.scope == "selected" else None
+    if objects == ():
         raise UsageError("no mesh is selected: select what is to get a lightmap, or switch to All")
-    by_density, by_error = group.size_mode == "density", group.quality == BY_ERROR[0]
-    return BakeSettings(
-        resolution=group.resolution,
-        texel_density=group.texel_density if by_density else None,
-        quality=DEFAULTS.quality if by_error else group.quality,
-        relative_error=group.relative_error if by_error else None,
-        pages=group.pages if group.atlas == "shared" and not by_density else 1,
-        objects=chosen,
-        light_groups=group.use_light_groups,
-        **{name: getattr(group, name) for name in SHARED_FIELDS},
-        threads=threads_of(context),
-        **{"memory_limit": memory_limit_of(context), **given_settings(group)},
-    )
+    preferred = {"memory_limit": memory_limit_of(context)}
+    chosen = {**preferred, **chosen_options(group), "threads": threads_of(context)}
+    return BakeSettings(objects=objects, **chosen)
 
 
 def selected_meshes(context: bpy.types.Context) -> tuple[str, ...]:

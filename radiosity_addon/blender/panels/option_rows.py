@@ -1,0 +1,35 @@
+"""Rows of the panel for the options of a bake, made from the table."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+from bpy.app.translations import pgettext_iface as iface_
+
+from ...options import OPTIONS, sections_of
+from ..settings.option_properties import shown
+from ..settings.preferences import preferences
+
+
+def draw_options(layout: Any, part: str, context: bpy.types.Context) -> None:
+    """Draw the options of a part of the panel that have an effect as the others are chosen, by sections."""
+    settings = context.scene.radiosity
+    for section in sections_of(part):
+        options = [option for option in OPTIONS.values() if option.section == section]
+        rows = [option for option in options if shown(option, settings)]
+        if not rows:
+            continue
+        # Only next to a check box there is room for a heading.
+        column = layout.column(heading=section if rows[0].kind is bool else "")
+        for option in rows:
+            column.prop(settings, option.identifier)
+            preferred = getattr(preferences(context), option.name, None)
+            if preferred is not None and not settings.is_property_set(option.identifier):
+                draw_preferred(column, preferred, getattr(settings, option.identifier))
+
+
+def draw_preferred(layout: Any, preferred: Any, own: Any) -> None:
+    """Say that the preferences' value counts where the scene has none of its own."""
+    if preferred != own:
+        layout.label(text=iface_("From the preferences: {}").format(preferred), icon="INFO", translate=False)

@@ -1,0 +1,80 @@
+"""The panel's properties of a bake's options, made from the table, and what a bake gets of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from ...options import OPTIONS, SYMMETRIC_ONLY, Option
+
+AUTOMATIC = "0 = set by quality"
+
+
+def option_property(option: Option, **more: Any) -> Any:
+    """Return Blender's property of an option that the panel has; `more` replaces what follows from it."""
+    row = option.panel
+    assert row is not None
+    words: dict[str, Any] = {"name": row.label, "description": option.description}
+    if option.kind is bool:
+        return bpy.props.BoolProperty(default=bool(option.default), **{**words, **more})
+    if option.choices:
+        choices = (*option.choices, row.other_choice) if row.other_choice else option.choices
+        words["items"] = [(choice.value, choice.label, choice.description) for choice in choices]
+        words["default"] = option.default or option.values[0]
+        return bpy.props.EnumProperty(**{**words, **more})
+    words |= {"min": option.low, "max": option.high, "soft_min": row.soft_low, "soft_max": row.soft_high}
+    words |= {"default": option.default or row.default or 0, "subtype": row.subtype}
+    if option.automatic:
+        words |= {"description": f"{option.description}. {AUTOMATIC}", "min": 0}
+    elif row.low is not None:
+        words["min"] = row.low
+    words = {name: value for name, value in {**words, **more}.items() if value is not None}
+    if option.kind is int:
+        return bpy.props.IntProperty(**words)
+    return bpy.props.FloatProperty(precision=row.precision, step=row.step, **words)
+
+
+class OptionProperties:
+    """What `scene.radiosity` holds of the options; mixed into its property group."""
+
+    __annotations__ = {
+        option.identifier: option_property(option) for option in OPTIONS.values() if option.panel is not None
+    }
+
+
+def shown(option: Option, group: Any) -> bool:
+    """Tell whether the panel shows an option, and a bake listens to it, as the other ones are chosen.
+
+    Parameters
+    ----------
+    group : OptionProperties
+        `scene.radiosity`.
+    """
+    if option.panel is None or (option.methods and group.method not in option.methods):
+        return False
+    if option.name == "assembly" and group.method in SYMMETRIC_ONLY:
+        return False
+    return all(getattr(group, name) == value for name, value in option.panel.only_if)
+
+
+def chosen_options(group: Any) -> dict[str, Any]:
+    """Return the options that the panel shows and that are not left to the quality, by their names."""
+    values = {
+        name: _typed(getattr(group, option.identifier))
+        for name, option in OPTIONS.items()
+        if shown(option, group)
+    }
+    return {name: value for name, value in values.items() if _chosen(OPTIONS[name], value)}
+
+
+def _chosen(option: Option, value: Any) -> bool:
+    """Tell whether a value says something: 0 may leave it to the quality, a last choice to another option."""
+    if option.choices:
+        return value in option.values
+    return option.default is not None or bool(value)
+
+
+def _typed(value: Any) -> Any:
+    """Return what was typed: Blender keeps single precision, which makes 0.1 of it 0.10000000149."""
+    return float(f"{value:.6g}") if isinstance(value, float) else value

@@ -1,0 +1,55 @@
+"""What menus offer: the values of options that are chosen from a few."""
+
+from __future__ import annotations
+
+from .methods import METHODS
+from .option import Choice
+
+ATLASES = (
+    Choice("shared", "Shared", "One image for all objects"),
+    Choice("per-object", "Per Object", "An image for each object"),
+)
+
+QUALITIES = (
+    Choice("draft", "Draft", "Fast: coarse elements and few rays, to judge the light"),
+    Choice("medium", "Medium", "Clean light at a moderate time"),
+    Choice("high", "High", "Fine elements and many rays, for the final bake"),
+)
+
+QUANTITIES = (
+    Choice(
+        "irradiance_over_pi",
+        "Irradiance / π",
+        "What Cycles' diffuse bake without color writes: the radiance of a white surface [W/m²/sr]",
+    ),
+    Choice("irradiance", "Irradiance", "The light that arrives [W/m²], as three.js adds it"),
+    Choice(
+        "radiosity",
+        "Radiosity",
+        "The light that leaves: own emission and what is reflected [W/m²]",
+    ),
+    Choice(
+        "residual",
+        "Residual",
+        "The error picture: by how much the solution misses the radiosity equation, signed [W/m²]",
+    ),
+)
+
+LIGHTS = (
+    Choice("all", "All", "Direct and indirect light"),
+    Choice("direct", "Direct", "Only the light that comes straight from lamps, emitters and world"),
+    Choice("indirect", "Indirect", "Only the light that was reflected, for lamps that stay dynamic"),
+)
+
+FORMATS = (
+    Choice("exr", "OpenEXR", "Linear floating point, exact"),
+    Choice("png16", "PNG 16 bit", "Scaled to the brightest texel; the scale is in the report"),
+)
+
+ASSEMBLIES = (
+    Choice("galerkin", "Galerkin", "Area means over elements: keeps the exchange of light reciprocal"),
+    Choice("collocation", "Collocation", "Values at the centroids of elements"),
+    Choice("linear", "Linear", "Values at vertices, linear between them"),
+)
+
+METHOD_CHOICES = tuple(Choice(name, method.label, method.description) for name, method in METHODS.items())

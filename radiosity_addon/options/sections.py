@@ -1,0 +1,24 @@
+"""How options are grouped, in the help, on the options' page and in the panel."""
+
+from __future__ import annotations
+
+MAIN, ADVANCED, GROUPS, SOLVER = "Radiosity Lightmaps", "Advanced", "Light Groups", "Solver"
+"""Parts of the panel."""
+
+SECTIONS = {
+    "Size": MAIN,
+    "Quality": MAIN,
+    "Pages": MAIN,
+    "Image": ADVANCED,
+    "Layout": ADVANCED,
+    "Scene": ADVANCED,
+    "Computation": ADVANCED,
+    "Light Groups": GROUPS,
+    "Solver": SOLVER,
+}
+"""Every section of the table, in order, with the part of the panel that shows it."""
+
+
+def sections_of(part: str) -> tuple[str, ...]:
+    """Return the sections that a part of the panel shows."""
+    return tuple(section for section, shown_in in SECTIONS.items() if shown_in == part)
