@@ -45,6 +45,7 @@ usage: python3 build.py VERB [arguments]
   check                      lint, layer rule and types
   figures [--check] [NAME…]  compute the figures of docs/theory, or only assert their numbers
           [gallery [ROW…]]   and the pictures of docs/gallery.md, minutes of work; --check bakes none
+  options                    write docs/options.md from the table of options
   docs                       build docs/ to a static site in out/site
   package                    make the extension's zips in dist/, one a platform
   real-blender               install the Blender that the tests with a window use (root on Debian)
@@ -65,6 +66,7 @@ def main(arguments: list[str]) -> int:
         "bench": bench,
         "check": check,
         "figures": figures,
+        "options": options,
         "docs": docs,
         "package": package,
         "real-blender": prepare_real_blender,
@@ -73,7 +75,7 @@ def main(arguments: list[str]) -> int:
         print(f"build.py: error: no verb {verb!r}; there are {', '.join(verbs)}", file=sys.stderr)
         return 2
     try:
-        if rest and verb in ("docs", "package", "real-blender"):
+        if rest and verb in ("options", "docs", "package", "real-blender"):
             raise BuildError(f"{verb} takes no arguments, got {rest[0]!r}")
         return verbs[verb](rest)
     except BuildError as error:
@@ -148,6 +150,12 @@ def figures(arguments: list[str]) -> int:
         rows = arguments[1:] if only_gallery else arguments
         code = environments.main_environment(ROOT).run("-m", "tests.golden.gallery", *rows) or code
     return code
+
+
+def options(_: list[str]) -> int:
+    """Write the documentation's page of options."""
+    os.chdir(ROOT)
+    return environments.main_environment(ROOT).hand_over("-m", "build_tools.options_page")
 
 
 def docs(_: list[str]) -> int:

@@ -18,7 +18,7 @@ BAKE_COMMAND = _options(
         "output",
         Path,
         Option(
-            "Folder that everything is written to; required, but for the bundled scene",
+            "Folder that everything is written to; for the bundled scene out/cornell if it is not given",
             SECTION,
             metavar="DIR",
         ),

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 class SolverSettings:
     """Settings of the solving methods and of the local pass.
 
-    Which method listens to which setting: `radiosity_addon.options.methods.METHODS`.
+    Which method has which setting: the fields of `BakeSettings`.
 
     Parameters
     ----------

@@ -31,6 +31,9 @@ class Layout:
     def label(self, **_: object) -> None:
         pass
 
+    def operator(self, *_: object, **_more: object) -> None:
+        pass
+
 
 @pytest.fixture(autouse=True)
 def group() -> Iterator[bpy.types.PropertyGroup]:
