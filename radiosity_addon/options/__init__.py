@@ -5,11 +5,11 @@ Needs nothing but Python, so that panels and the command line can show it at onc
 
 from __future__ import annotations
 
-from .bake_settings import BY_ERROR, OPTIONS, BakeSettings, GroupSetting, options_of_method
+from .bake_settings import OPTIONS, BakeSettings, GroupSetting, options_of_method
 from .command_options import BAKE_COMMAND, EVERY_COMMAND
 from .constants import EFFICACY, MAX_GROUPS, MAX_RESOLUTION, OTHERS
 from .methods import METHODS, SYMMETRIC_ONLY
-from .option import Choice, Option, PanelRow, plain
+from .option import Option, plain
 from .permissions import Permissions
 from .sections import ADVANCED, GROUPS, MAIN, SECTIONS, SOLVER, sections_of
 from .solver_settings import SolverSettings
@@ -17,7 +17,6 @@ from .solver_settings import SolverSettings
 __all__ = [
     "ADVANCED",
     "BAKE_COMMAND",
-    "BY_ERROR",
     "EFFICACY",
     "EVERY_COMMAND",
     "GROUPS",
@@ -31,10 +30,8 @@ __all__ = [
     "SOLVER",
     "SYMMETRIC_ONLY",
     "BakeSettings",
-    "Choice",
     "GroupSetting",
     "Option",
-    "PanelRow",
     "Permissions",
     "SolverSettings",
     "options_of_method",

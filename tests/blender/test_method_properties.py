@@ -9,8 +9,9 @@ import pytest
 
 import radiosity_addon
 from radiosity_addon.blender.panels import bake_panel
+from radiosity_addon.blender.panels.option_rows import draw_options
 from radiosity_addon.blender.settings.properties import settings_of
-from radiosity_addon.options import METHODS, OPTIONS, BakeSettings, options_of_method
+from radiosity_addon.options import METHODS, OPTIONS, SECTIONS, BakeSettings, options_of_method
 
 SETTINGS = {name: option for name, option in OPTIONS.items() if option.methods}
 
@@ -77,6 +78,31 @@ def test_untouched_settings_come_from_the_quality(method: str, group: bpy.types.
     group.method = method
     given = settings_of(bpy.context).method_settings()
     assert set(given) <= {"assembly"}
+
+
+def test_a_row_that_is_not_shown_has_no_effect(group: bpy.types.PropertyGroup) -> None:
+    group.resolution, group.texel_density, group.max_resolution = 100, 12.3, 2048
+    group.pages, group.relative_error = 3, 0.1
+    assert settings_of(bpy.context) == BakeSettings(resolution=100, pages=3)
+    group.atlas = "per-object"
+    assert settings_of(bpy.context) == BakeSettings(resolution=100, atlas="per-object")
+    group.atlas, group.size_mode, group.quality = "shared", "density", "error"
+    expected = BakeSettings(texel_density=12.3, max_resolution=2048, relative_error=0.1)
+    assert settings_of(bpy.context) == expected
+
+
+def test_every_option_of_the_panel_is_drawn_where_its_section_is(group: bpy.types.PropertyGroup) -> None:
+    group.size_mode, group.quality = "density", "error"
+    expected = {
+        option.identifier
+        for option in OPTIONS.values()
+        if option.panel is not None and not option.methods and option.name not in {"resolution", "pages"}
+    }
+    layout = Layout()
+    for part in set(SECTIONS.values()):
+        draw_options(layout, part, bpy.context)
+    assert sorted(set(layout.drawn) - SETTINGS.keys()) == sorted(expected)
+    assert len(layout.drawn) == len(set(layout.drawn))
 
 
 def test_the_panel_as_it_comes_bakes_the_defaults() -> None:

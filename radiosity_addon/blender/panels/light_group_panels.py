@@ -6,10 +6,12 @@ from typing import Any
 
 import bpy
 
+from ...options import GROUPS
 from ..images.light_mixer import Sliders, mixers, sliders_of
 from ..scene_records.light_membership import NAME
 from ..scene_records.object_roles import BAKEABLE_TYPES
 from ..settings.light_group_properties import ListedGroup, listed_groups
+from .option_rows import draw_options
 from .sections import Section
 
 _COUNTS = (
@@ -36,6 +38,7 @@ class LightGroupSection(Section):
     @classmethod
     def draw(cls, layout: Any, context: bpy.types.Context) -> None:
         """Draw the list, and below it the sliders."""
+        draw_options(layout, GROUPS, context, in_header="light_groups")
         groups = listed_groups(context.scene)
         column = layout.column(align=True)
         for group in groups:

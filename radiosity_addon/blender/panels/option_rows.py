@@ -9,23 +9,29 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from ...options import OPTIONS, sections_of
 from ..settings.option_properties import shown
-from ..settings.preferences import preferences
+from ..settings.preferences import PREFERRED, preferences
 
 
-def draw_options(layout: Any, part: str, context: bpy.types.Context) -> None:
-    """Draw the options of a part of the panel that have an effect as the others are chosen, by sections."""
+def draw_options(layout: Any, part: str, context: bpy.types.Context, in_header: str = "") -> None:
+    """Draw the options of a part of the panel that have an effect as the others are chosen, by sections.
+
+    Parameters
+    ----------
+    in_header : str
+        Name of an option that the part's header shows already.
+    """
     settings = context.scene.radiosity
     for section in sections_of(part):
         options = [option for option in OPTIONS.values() if option.section == section]
-        rows = [option for option in options if shown(option, settings)]
+        rows = [option for option in options if shown(option, settings) and option.name != in_header]
         if not rows:
             continue
         # Only next to a check box there is room for a heading.
         column = layout.column(heading=section if rows[0].kind is bool else "")
         for option in rows:
             column.prop(settings, option.identifier)
-            preferred = getattr(preferences(context), option.name, None)
-            if preferred is not None and not settings.is_property_set(option.identifier):
+            if option.name in PREFERRED and not settings.is_property_set(option.identifier):
+                preferred = getattr(preferences(context), option.name)
                 draw_preferred(column, preferred, getattr(settings, option.identifier))
 
 

@@ -12,6 +12,9 @@ from .option_properties import option_property
 
 DEFAULT_FOLDER = "//lightmaps/"
 
+PREFERRED = ("memory_limit", "threads")
+"""Options that the preferences have too, for scenes that do not set them."""
+
 PACKAGE = __package__.removesuffix(".blender.settings")
 """The add-on's own module: `bl_ext.<repository>.radiosity_addon` where it is installed."""
 
