@@ -9,7 +9,7 @@ from .bake_settings import OPTIONS, BakeSettings, GroupSetting, options_of_metho
 from .command_options import BAKE_COMMAND, EVERY_COMMAND
 from .constants import EFFICACY, MAX_GROUPS, MAX_RESOLUTION, OTHERS
 from .methods import METHODS, SYMMETRIC_ONLY
-from .option import Option, plain
+from .option import UNBOUNDED, Option, plain
 from .permissions import Permissions
 from .sections import ADVANCED, GROUPS, MAIN, SECTIONS, SOLVER, sections_of
 from .solver_settings import SolverSettings
@@ -29,6 +29,7 @@ __all__ = [
     "SECTIONS",
     "SOLVER",
     "SYMMETRIC_ONLY",
+    "UNBOUNDED",
     "BakeSettings",
     "GroupSetting",
     "Option",

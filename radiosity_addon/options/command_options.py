@@ -2,79 +2,61 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
-from .option import Option, named
+from .option import option, options_of
 
 SECTION = "Command"
 
 
-def _options(*found: tuple[str, type, Option]) -> dict[str, Option]:
-    return {name: named(option, name, kind) for name, kind, option in found}
+@dataclass(frozen=True)
+class _BakeCommand:
+    output: Path | None = option(
+        None,
+        "Folder that everything is written to; for the bundled scene out/cornell if it is not given",
+        SECTION,
+        metavar="DIR",
+    )
+    keep: bool = option(
+        False, "Also write a sidecar, lightmap.relight, by which --relight updates the bake", SECTION
+    )
+    relight: bool = option(
+        False,
+        "Update the bake in DIR for changed light colors and strengths, by its sidecar and with its own "
+        "settings, without tracing rays",
+        SECTION,
+        instead_of="keep",
+    )
+    check: bool = option(
+        False,
+        "Bake nothing: show what would be baked, and problems of the scene; the exit code is 1 if a bake "
+        "would stop",
+        SECTION,
+    )
+    no_preview: bool = option(False, "Write no preview.png; that of an earlier bake stays", SECTION)
+    report: Path | None = option(None, "Second copy of report.json", SECTION, metavar="FILE")
+    plot: Path | None = option(
+        None,
+        "Draw the history of residual, elements and links, against seconds and iterations",
+        SECTION,
+        metavar="FILE.png",
+    )
 
 
-BAKE_COMMAND = _options(
-    (
-        "output",
-        Path,
-        Option(
-            "Folder that everything is written to; for the bundled scene out/cornell if it is not given",
-            SECTION,
-            metavar="DIR",
-        ),
-    ),
-    (
-        "keep",
-        bool,
-        Option("Also write a sidecar, lightmap.relight, by which --relight updates the bake", SECTION),
-    ),
-    (
-        "relight",
-        bool,
-        Option(
-            "Update the bake in DIR for changed light colors and strengths, by its sidecar and with its own "
-            "settings, without tracing rays",
-            SECTION,
-            instead_of="keep",
-        ),
-    ),
-    (
-        "check",
-        bool,
-        Option(
-            "Bake nothing: show what would be baked, and problems of the scene; the exit code is 1 if a bake "
-            "would stop",
-            SECTION,
-        ),
-    ),
-    (
-        "no_preview",
-        bool,
-        Option("Write no preview.png; that of an earlier bake stays", SECTION),
-    ),
-    ("report", Path, Option("Second copy of report.json", SECTION, metavar="FILE")),
-    (
-        "plot",
-        Path,
-        Option(
-            "Draw the history of residual, elements and links, against seconds and iterations",
-            SECTION,
-            metavar="FILE.png",
-        ),
-    ),
-)
+@dataclass(frozen=True)
+class _EveryCommand:
+    quiet: bool = option(False, "Print errors only", SECTION)
+    overwrite: bool = option(
+        False,
+        "Replace files that no bake of this scene has written, but never those that the scene reads",
+        SECTION,
+    )
+    allow_scripts: bool = option(False, "Run the scripts and drivers of the .blend", SECTION)
+
+
+BAKE_COMMAND = options_of(_BakeCommand)
 """Options of the verb `bake` by their name in the parsed request."""
 
-EVERY_COMMAND = _options(
-    ("quiet", bool, Option("Print errors only", SECTION)),
-    (
-        "overwrite",
-        bool,
-        Option(
-            "Replace files that no bake of this scene has written, but never those that the scene reads",
-            SECTION,
-        ),
-    ),
-    ("allow_scripts", bool, Option("Run the scripts and drivers of the .blend", SECTION)),
-)
+EVERY_COMMAND = options_of(_EveryCommand)
 """Options of both verbs."""

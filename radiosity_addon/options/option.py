@@ -15,6 +15,8 @@ from ..base import UsageError
 
 UNBOUNDED = float("inf")
 
+_METAVARS: dict[type, str] = {int: "N", float: "X"}
+
 
 @dataclass(frozen=True)
 class Choice:
@@ -82,11 +84,11 @@ class Option:
     flag : str
         Its name on the command line; `--name` if it is not given.
     metavar : str
-        What stands for its value in the help; N for whole numbers if it is not given.
-    low, high : float
-        Range of a number.
+        What stands for its value in the help; N for whole numbers and X for others if it is not given.
+    limits : (float, float)
+        Least and largest value of a number; the least must be finite.
     above : bool
-        `low` itself is not allowed.
+        The least value itself is not allowed.
     unit : str
     choices : tuple of Choice
     instead_of : str
@@ -108,8 +110,7 @@ class Option:
     default: Any = None
     flag: str = ""
     metavar: str = ""
-    low: float = -UNBOUNDED
-    high: float = UNBOUNDED
+    limits: tuple[float, float] = (-UNBOUNDED, UNBOUNDED)
     above: bool = False
     unit: str = ""
     choices: tuple[Choice, ...] = ()
@@ -140,8 +141,8 @@ class Option:
         """The range of a number as a message has it; empty for other kinds."""
         if self.kind not in (int, float):
             return ""
-        low, high = plain(self.low), plain(self.high)
-        if self.high == UNBOUNDED:
+        low, high = map(plain, self.limits)
+        if self.limits[1] == UNBOUNDED:
             bounds = f"at least {low}"
         else:
             bounds = f"above {low} and at most {high}" if self.above else f"between {low} and {high}"
@@ -156,7 +157,8 @@ class Option:
         if self.kind not in (int, float):
             return
         # NaN compares as neither.
-        if not self.low <= value <= self.high or (self.above and value == self.low):
+        low, high = self.limits
+        if not low <= value <= high or (self.above and value == low):
             raise UsageError(f"{self.flag} {value} is not {self.range}")
 
 
@@ -169,21 +171,21 @@ def options_of(record: type) -> dict[str, Option]:
     """Return the options that a dataclass declares, by name, with what name and type of the field say."""
     hints = get_type_hints(record)
     return {
-        entry.name: named(entry.metadata["option"], entry.name, _kind(hints[entry.name]))
+        entry.name: _named(entry.metadata["option"], entry.name, _kind(hints[entry.name]))
         for entry in fields(record)
     }
-
-
-def named(found: Option, name: str, kind: type) -> Option:
-    """Return an option with its name and kind, and with the flag and metavar that follow from them."""
-    flag = found.flag or "--" + name.replace("_", "-")
-    metavar = found.metavar or ("N" if kind is int else "")
-    return replace(found, name=name, kind=kind, flag=flag, metavar=metavar)
 
 
 def plain(number: float) -> str:
     """Return a bound as people write it."""
     return f"{number:,.0f}" if number >= 100_000 else f"{number:g}"
+
+
+def _named(found: Option, name: str, kind: type) -> Option:
+    """Return an option with its name and kind, and with the flag and metavar that follow from them."""
+    flag = found.flag or "--" + name.replace("_", "-")
+    metavar = found.metavar or _METAVARS.get(kind, "")
+    return replace(found, name=name, kind=kind, flag=flag, metavar=metavar)
 
 
 def _kind(hint: Any) -> type:

@@ -113,9 +113,9 @@ def test_the_panel_as_it_comes_bakes_the_defaults() -> None:
 def test_a_number_keeps_to_its_range(name: str, group: bpy.types.PropertyGroup) -> None:
     setting = SETTINGS[name]
     group.method = SETTINGS[name].methods[0]
-    for value in (2 * setting.high, setting.high):
+    for value in (2 * setting.limits[1], setting.limits[1]):
         setattr(group, name, min(value, 2**31 - 1) if setting.kind is int else value)
-        assert settings_of(bpy.context).method_settings()[name] == pytest.approx(setting.high)
+        assert settings_of(bpy.context).method_settings()[name] == pytest.approx(setting.limits[1])
     setattr(group, name, -1)
     assert name not in settings_of(bpy.context).method_settings()
 

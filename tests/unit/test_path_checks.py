@@ -18,7 +18,7 @@ from radiosity_addon.files.path_checks import (
 )
 from radiosity_addon.options import OPTIONS, BakeSettings
 
-MAX_SEED, MAX_THREADS = int(OPTIONS["seed"].high), int(OPTIONS["threads"].high)
+MAX_SEED, MAX_THREADS = (int(OPTIONS[name].limits[1]) for name in ("seed", "threads"))
 
 IMPOSSIBLE = [
     "",

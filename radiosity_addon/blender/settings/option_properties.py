@@ -6,7 +6,7 @@ from typing import Any
 
 import bpy
 
-from ...options import OPTIONS, SYMMETRIC_ONLY, Option
+from ...options import OPTIONS, SYMMETRIC_ONLY, UNBOUNDED, Option
 
 AUTOMATIC = "0 = set by quality"
 
@@ -23,7 +23,13 @@ def option_property(option: Option, **more: Any) -> Any:
         words["items"] = [(choice.value, choice.label, choice.description) for choice in choices]
         words["default"] = option.default or option.values[0]
         return bpy.props.EnumProperty(**{**words, **more})
-    words |= {"min": option.low, "max": option.high, "soft_min": row.soft_low, "soft_max": row.soft_high}
+    low, high = option.limits
+    words |= {
+        "min": low,
+        "max": None if high == UNBOUNDED else high,
+        "soft_min": row.soft_low,
+        "soft_max": row.soft_high,
+    }
     words |= {"default": option.default or row.default or 0, "subtype": row.subtype}
     if option.automatic:
         words |= {"description": f"{option.description}. {AUTOMATIC}", "min": 0}
