@@ -56,8 +56,8 @@ def not_relighting():
 
 def resting():
     """Live has nothing left to do."""
-    live = module("live_state").state.live
-    return live is not None and not bpy.app.timers.is_registered(module("live_relight")._tick)
+    live = module("session.live_state").state.live
+    return live is not None and not bpy.app.timers.is_registered(module("relight.live_relight")._tick)
 
 
 def note_drawing():
@@ -105,7 +105,7 @@ def script():
 
     yield from follow()
     yield from events.until(resting, 60)
-    seen["message"] = module("live_state").state.message
+    seen["message"] = module("session.live_state").state.message
     yield 1.0
     seen["still_resting"] = resting()
 
@@ -152,7 +152,7 @@ def drag():
 
 def follow():
     """Change the power step by step; note how long the image takes, and how long until it is drawn."""
-    live = module("live_state").state.live
+    live = module("session.live_state").state.live
     latencies, frames = [], []
     for step in range(STEPS):
         shown = live.changes
