@@ -6,9 +6,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from radiosity_addon.bake.quality import QUALITIES, quality_of
+from radiosity_addon.cli.command_options import BAKE_COMMAND, EVERY_COMMAND
 from radiosity_addon.options import (
-    BAKE_COMMAND,
-    EVERY_COMMAND,
     MAIN,
     METHODS,
     OPTIONS,

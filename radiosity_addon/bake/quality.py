@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..lightmap.lighting import GatherSettings
-from ..options import BakeSettings, SolverSettings, options_of_method
+from ..options import BakeSettings, options_of_method
+from ..solver.settings import SolverSettings
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,8 @@ from pathlib import Path
 from ..base import UsageError
 from ..lightmap.texels import TexelGeometry
 from ..numerics import Scratch, thread_count
-from ..options import BakeSettings, SolverSettings
+from ..options import BakeSettings
+from ..solver.settings import SolverSettings
 
 LIT_BYTES = 48.0
 """Of every texel while it is lit: its number, its light, what geometry does to it, which rays it needs."""

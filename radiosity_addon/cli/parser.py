@@ -12,17 +12,8 @@ from typing import Any, NoReturn
 
 from ..base import UsageError
 from ..files import checked_folder, checked_name, checked_path
-from ..options import (
-    BAKE_COMMAND,
-    EVERY_COMMAND,
-    METHODS,
-    OPTIONS,
-    SECTIONS,
-    BakeSettings,
-    GroupSetting,
-    Option,
-    plain,
-)
+from ..options import METHODS, OPTIONS, SECTIONS, BakeSettings, GroupSetting, Option, plain
+from .command_options import BAKE_COMMAND, EVERY_COMMAND
 
 BUNDLED_OUTPUT = Path("out/cornell")
 """Where the bundled scene goes when no --output is given."""

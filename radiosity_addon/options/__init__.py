@@ -6,19 +6,15 @@ Needs nothing but Python, so that panels and the command line can show it at onc
 from __future__ import annotations
 
 from .bake_settings import OPTIONS, BakeSettings, GroupSetting, options_of_method
-from .command_options import BAKE_COMMAND, EVERY_COMMAND
 from .constants import EFFICACY, MAX_GROUPS, MAX_RESOLUTION, OTHERS
 from .methods import METHODS, SYMMETRIC_ONLY
-from .option import UNBOUNDED, Option, plain
+from .option_record import UNBOUNDED, Option, option, options_of, plain
 from .permissions import Permissions
 from .sections import ADVANCED, GROUPS, MAIN, SECTIONS, SOLVER, sections_of
-from .solver_settings import SolverSettings
 
 __all__ = [
     "ADVANCED",
-    "BAKE_COMMAND",
     "EFFICACY",
-    "EVERY_COMMAND",
     "GROUPS",
     "MAIN",
     "MAX_GROUPS",
@@ -34,7 +30,8 @@ __all__ = [
     "GroupSetting",
     "Option",
     "Permissions",
-    "SolverSettings",
+    "option",
+    "options_of",
     "options_of_method",
     "plain",
     "sections_of",

@@ -5,19 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from .choices import (
-    ASSEMBLIES,
-    ATLASES,
-    FORMATS,
-    LIGHTS,
-    METHOD_CHOICES,
-    QUALITIES,
-    QUANTITIES,
-)
+from .choices import ASSEMBLIES, ATLASES, FORMATS, LIGHTS, METHOD_CHOICES, QUALITIES, QUANTITIES
 from .combinations import check_combinations
 from .constants import MAX_RESOLUTION
 from .methods import ALL, ITERATIVE, LINKS, MATRIX
-from .option import UNBOUNDED, Choice, PanelRow, option, options_of
+from .option_record import UNBOUNDED, Choice, PanelRow, option, options_of
 
 MOST = 10_000_000
 """Elements, patches: what no machine has room for need not be tried."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .methods import METHODS
-from .option import Choice
+from .option_record import Choice
 
 ATLASES = (
     Choice("shared", "Shared", "One image for all objects"),

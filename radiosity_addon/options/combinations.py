@@ -8,7 +8,7 @@ from typing import Any
 
 from ..base import UsageError
 from .methods import SYMMETRIC_ONLY
-from .option import Option
+from .option_record import Option
 
 
 def check_combinations(settings: Any, options: Mapping[str, Option]) -> None:

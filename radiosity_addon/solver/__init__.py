@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Generator
 
 from ..lights import AreaLight, EnvironmentLight, PointLight, SpotLight, SunLight
-from ..options import SolverSettings
 from ..scene import Scene
 from .methods import steps_of
+from .settings import SolverSettings
 from .solution import Solution
 from .state import SolverState
 

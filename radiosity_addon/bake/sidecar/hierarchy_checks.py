@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from ...numerics import Array
-from ...options import SolverSettings
 from ...scene import Faces
 from ...solver.balance import Balance
 from ...solver.element_transport import ElementTransport
@@ -16,6 +15,7 @@ from ...solver.emitters import LightSources
 from ...solver.hierarchy import LEAF, Clusters, Hierarchy, TreeTop
 from ...solver.links import ClusterLinks, LightLinks, Links
 from ...solver.methods import HierarchicalState
+from ...solver.settings import SolverSettings
 from .value_checks import LARGE, SLACK, instance, integers, number, numbers, require, whole
 
 MOST_THREADS, MOST_LEVELS = 4096, 64

@@ -21,7 +21,7 @@ from ...lightmap.lighting import EarlierLight, LitTexels, PartLinks, Parts, Stor
 from ...lightmap.points import Interpolation
 from ...lightmap.texels import TexelGeometry
 from ...lights import AreaLight, EnvironmentImage, EnvironmentLight, PointLight, SkyPatch, SpotLight, SunLight
-from ...options import BakeSettings, SolverSettings
+from ...options import BakeSettings
 from ...scene import BakeScene, Faces
 from ...solver.balance import Balance
 from ...solver.element_transport import ElementTransport, Relightable
@@ -30,6 +30,7 @@ from ...solver.gather import AimedRays, LightGains, LocalPass
 from ...solver.hierarchy import Clusters, Hierarchy, TreeTop
 from ...solver.links import ClusterLinks, LightLinks, Links
 from ...solver.methods import HierarchicalState
+from ...solver.settings import SolverSettings
 from ..relight import DAMAGED, KeptBake, check_same, damaged, scene_digests
 from ..result import BakedObject, BakeResult
 from .array_file import ArrayFileError, TooLargeError, read_arrays, read_digest, write_arrays

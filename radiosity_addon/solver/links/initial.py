@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...numerics import Array
-from ...options import SolverSettings
 from ...rays import RayCaster
 from ..hierarchy import Hierarchy, NodeShapes
+from ..settings import SolverSettings
 from .cluster_links import ClusterLinks
 from .cluster_pairs import measure_cluster_links
 from .element_links import Links, measure_links

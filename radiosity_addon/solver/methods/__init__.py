@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from importlib import import_module
 from typing import cast
 
-from ...options import SolverSettings
 from ...scene import Scene
+from ..settings import SolverSettings
 from ..state import SolverState
 from .hierarchical import HierarchicalState
 

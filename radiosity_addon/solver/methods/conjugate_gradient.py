@@ -8,9 +8,9 @@ import numpy as np
 
 from ...base import UsageError
 from ...numerics import Array
-from ...options import SolverSettings
 from ...scene import Scene
 from ..equations import LinearSystem
+from ..settings import SolverSettings
 from ..state import SolverState
 from .matrix import Iterate, solve_matrix
 

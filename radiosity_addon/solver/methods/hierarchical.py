@@ -13,7 +13,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ...numerics import Array
-from ...options import SolverSettings
 from ...scene import Scene
 from ..balance import Balance, Conservation, received_by_faces
 from ..hierarchy import NodeShapes, TreeTop
@@ -37,6 +36,7 @@ from ..links import (
     no_cluster_links,
     no_links,
 )
+from ..settings import SolverSettings
 from ..state import (
     Anderson,
     SolverState,

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ...numerics import Array
-from ...options import SolverSettings
 from ...scene import Scene
 from ..equations import LinearSystem
+from ..settings import SolverSettings
 from ..state import SolverState
 from .matrix import Iterate, solve_matrix
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from ...base import UsageError
 from ...numerics import Array
-from ...options import SolverSettings
 from ...scene import OVERLAP, Scene, arriving
 from ..equations import (
     LinearSystem,
@@ -26,6 +25,7 @@ from ..equations import (
 )
 from ..hierarchy import Basis, constant_basis
 from ..links import lamp_irradiance
+from ..settings import SolverSettings
 from ..state import SolverState, begin
 
 Iterate = tuple[Array, Array]

@@ -15,11 +15,11 @@ import numpy as np
 
 from ...base import UsageError
 from ...numerics import Array
-from ...options import SolverSettings
 from ...scene import Scene, shares
 from ..equations import RefinePatch, exchange_areas, source_factor_bounds
 from ..hierarchy import Hierarchy
 from ..links import Links, elements_by_level, leaves_by_level, links_by_level, no_links
+from ..settings import SolverSettings
 from ..state import SolverState, begin, bounce, link_closure
 
 PAIR_BYTES = 64

@@ -24,9 +24,9 @@ import numpy as np
 
 from ...base import UsageError
 from ...numerics import Array
-from ...options import SolverSettings
 from ...scene import Scene, arriving, shares
 from ..equations import exchange_areas, subdivide_evenly
+from ..settings import SolverSettings
 from ..state import SolverState, begin
 
 HISTORY_STEP = 1.1

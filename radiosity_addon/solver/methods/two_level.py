@@ -22,10 +22,10 @@ import numpy as np
 
 from ...base import UsageError
 from ...numerics import Array
-from ...options import SolverSettings
 from ...scene import Scene, arriving, shares
 from ..equations import exchange_areas, subdivide_evenly
 from ..hierarchy import LEAF, neighbours
+from ..settings import SolverSettings
 from ..state import SolverState, begin
 
 FINEST = 1.0 / 64

@@ -12,10 +12,10 @@ import os
 import numpy as np
 
 from ...base import UsageError
-from ...options import SolverSettings
 from ...scene import Scene
 from ..hierarchy import Hierarchy
 from ..links import FEWEST, SLACK
+from ..settings import SolverSettings
 
 LINK_BYTES = 200
 """Memory a link takes while links are sorted and gathered over (52 bytes at rest, 48 to a cluster), …"""

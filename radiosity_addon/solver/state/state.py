@@ -10,11 +10,11 @@ import numpy as np
 
 from ...lights import light_strengths
 from ...numerics import Array
-from ...options import SolverSettings
 from ...rays import RayCaster
 from ...scene import Scene, ray_caster
 from ..hierarchy import Basis, Hierarchy, constant_basis
 from ..links import LightLinks, link_lights, no_light_links, pull, push
+from ..settings import SolverSettings
 from .lamp_power import lamps_within_power, light_power
 
 
