@@ -1,4 +1,4 @@
-"""Arrays: threads, memory with a limit, sampling, triangles and polygons, quantities of light.
+"""Arrays: threads, memory with a limit, sampling, ragged runs, triangles and polygons, quantities of light.
 
 Knows neither scenes nor lamps.
 """
@@ -26,6 +26,7 @@ from .radiometry import (
     reflected_radiance,
     sphere_area,
 )
+from .ragged import run_chunks, run_numbers, run_starts
 from .sampling import (
     concentric_disk,
     cosine_hemisphere,
@@ -73,6 +74,9 @@ __all__ = [
     "radiosity_of_radiance",
     "reflected_radiance",
     "row_numbers",
+    "run_chunks",
+    "run_numbers",
+    "run_starts",
     "sphere_area",
     "split_in_four",
     "split_in_sixteen",

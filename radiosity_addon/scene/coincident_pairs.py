@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..numerics import Array, areas, clip_half_plane
+from ..numerics import Array, areas, clip_half_plane, run_chunks, run_numbers
 
 TOLERANCE = 1e-6
 """Faces that are no farther apart than this [m], …"""
@@ -182,17 +182,10 @@ def _near_pairs(low: Array, high: Array) -> Iterator[tuple[Array, Array]]:
         begin = np.searchsorted(key[hosts], key, side="left")
         count = np.searchsorted(key[hosts], key, side="right") - begin
         asked = np.flatnonzero(count)
-        ends = np.cumsum(count[asked])
-        start = 0
-        while start < len(asked):
-            done = ends[start - 1] if start else 0
-            stop = max(int(np.searchsorted(ends, done + CHUNK_PAIRS, side="right")), start + 1)
-            some = asked[start:stop]
-            start = stop
-            number = count[some]
-            small = np.repeat(some, number)
-            within = np.arange(len(small)) - np.repeat(np.cumsum(number) - number, number)
-            large = hosts[np.repeat(begin[some], number) + within]
+        for chunk in run_chunks(count[asked], CHUNK_PAIRS):
+            some = asked[chunk]
+            small = np.repeat(some, count[some])
+            large = hosts[run_numbers(count[some], begin[some])]
             one, other = asking[row[small]], asking[row[large]]
             keep = np.flatnonzero((level[one] > at) | (one < other))
             for axis in range(3):
@@ -214,7 +207,7 @@ def _cells(lower: Array, upper: Array) -> tuple[Array, Array]:
     size = (upper - lower + 1).T
     count = size[0] * size[1] * size[2]
     row = np.repeat(np.arange(len(lower)), count)
-    number = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
+    number = run_numbers(count)
     place = np.empty((3, len(row)), dtype=np.int64)
     for axis in (2, 1, 0):
         number, place[axis] = np.divmod(number, size[axis][row])

@@ -17,7 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..numerics import Array, cosine_hemisphere, edge_distances, stratified_square, to_world
+from ..numerics import Array, cosine_hemisphere, edge_distances, run_numbers, stratified_square, to_world
 from ..rays import NO_HIT, EmbreeCaster, Hits, surface_offset
 from .coincident_pairs import CORNERS, CoincidentPairs, coincident_pairs, tolerances
 from .surfaces import Surfaces
@@ -185,7 +185,7 @@ def holding(first: Array, parts: Array, row: Array, place: Array) -> tuple[Array
     """
     count = first[row + 1] - first[row]
     point = np.repeat(np.arange(len(row)), count)
-    part = np.arange(len(point)) - np.repeat(np.cumsum(count) - count, count) + first[row][point]
+    part = run_numbers(count, first[row])
     polygon, at = parts[part], place[point][:, None]
     inside = np.ones(len(point), dtype=bool)
     for edge in range(parts.shape[1]):

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..numerics import Array, areas, clip_half_plane, edge_distances, split_in_four
+from ..numerics import Array, areas, clip_half_plane, edge_distances, run_chunks, run_numbers, split_in_four
 from .surfaces import Surfaces
 
 NOTHING_LEFT = 1e-9
@@ -73,7 +73,7 @@ class OwnParts:
         begin, count = self._runs(side)
         whole = ~np.isin(side, self.sides)
         rows = np.repeat(np.arange(len(side)), np.where(whole, 1, count))
-        part = _within(begin, np.where(whole, 1, count))
+        part = run_numbers(np.where(whole, 1, count), begin)
         corners, level = np.empty((len(rows), 3, 2)), np.ones(len(rows))
         alone = whole[rows]
         corners[alone] = _WHOLE
@@ -86,15 +86,9 @@ class OwnParts:
         covered = np.flatnonzero(np.isin(side, self.sides))
         begin, count = self._runs(side[covered])
         result[covered] = 0.0
-        ends = np.cumsum(count)
-        start = 0
-        while start < len(covered):
-            done = ends[start - 1] if start else 0
-            stop = max(int(np.searchsorted(ends, done + CHUNK_PAIRS, side="right")), start + 1)
-            some = slice(start, stop)
-            start = stop
+        for some in run_chunks(count, CHUNK_PAIRS):
             row = np.repeat(covered[some], count[some])
-            part = _within(begin[some], count[some])
+            part = run_numbers(count[some], begin[some])
             common = _clipped(self.corners[part], corners[row])
             result += np.bincount(row, areas(common) * self.level[part], minlength=len(side))
         result[covered] /= np.maximum(areas(corners[covered]), 1e-300)
@@ -234,8 +228,3 @@ def _moved(points: Array, part: Array, in_cover: Array) -> Array:
         + one[..., None] * there[row, far][:, None]
         + other[..., None] * there[row, wide][:, None]
     )
-
-
-def _within(begin: Array, count: Array) -> Array:
-    """Return the numbers begin, begin + 1, … of runs that are so long, one run after the other."""
-    return np.asarray(np.arange(int(count.sum())) - np.repeat(np.cumsum(count) - count - begin, count))

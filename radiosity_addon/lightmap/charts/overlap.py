@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ...numerics import run_chunks, run_starts
 from ..texels import overlapping_pairs
 
 Float = NDArray[np.float64]
@@ -51,17 +52,13 @@ def _side_by_side(uv: Float, chart: Int) -> tuple[NDArray[np.float32], int]:
     size = np.ceil(extent * scale).astype(np.int64) + 1
     width = max(int(np.sqrt(size.prod(axis=1).sum())), int(size[:, 0].max()))
     order = np.argsort(-size[:, 1], kind="stable")
-    ends: Int = np.cumsum(size[order, 0])
     corner = np.empty((count, 2))
-    start, height = 0, 0
-    while start < count:
-        before = ends[start] - size[order[start], 0]
-        stop = int(np.searchsorted(ends, before + width, side="right"))
-        shelf = order[start:stop]
-        corner[shelf, 0] = ends[start:stop] - size[shelf, 0] - before
+    height = 0
+    for part in run_chunks(size[order, 0], width):
+        shelf = order[part]
+        corner[shelf, 0] = run_starts(size[shelf, 0])
         corner[shelf, 1] = height
         height += int(size[shelf[0], 1])
-        start = stop
     resolution: int = max(width, height)
     local = (uv - low[chart][:, None]) * scale + corner[chart][:, None]
     return (local / resolution).astype(np.float32), int(resolution)

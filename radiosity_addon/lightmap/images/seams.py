@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...numerics import Array
+from ...numerics import Array, run_numbers
 from ...rays import SAGITTA, SIGHT_LIFT, RayCaster
 from ...scene import Scene
 from ..texels import NO_TEXEL, TexelGeometry
@@ -93,7 +93,7 @@ def find_seams(scene: Scene, geometry: TexelGeometry, caster: RayCaster | None =
     edges = np.flatnonzero(apart & (extent.max(axis=1) > 0))
     count = np.maximum(np.ceil(SAMPLES_PER_TEXEL * extent[edges].max(axis=1)), 1).astype(np.int64)
     edge, total = np.repeat(edges, count), np.repeat(count, count)
-    along = (np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / total
+    along = (run_numbers(count) + 0.5) / total
     share = along[:, None, None]
     spots = (1 - share) * ends[edge, :, 0] + share * ends[edge, :, 1]
     texel, weight, inside = _bilinear(spots, pages[edge], [len(numbers) for numbers in geometry.index])

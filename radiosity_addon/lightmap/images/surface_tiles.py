@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...numerics import Array
+from ...numerics import Array, run_numbers
 
 MAX_LEG = 4096
 _FILLED = 0.9
@@ -87,7 +87,7 @@ class SurfaceTiles:
         values : (height, width, k) float
         """
         wide = np.flatnonzero(self.leg > 1)
-        i = _counted(self.leg[wide] - 1) + 1
+        i = run_numbers(self.leg[wide] - 1) + 1
         triangle = np.repeat(wide, self.leg[wide] - 1)
         j = self.leg[triangle] - i
         column, row = self._at(triangle, i, j)
@@ -197,14 +197,6 @@ def _steps(leg: Array) -> tuple[Array, Array, Array]:
     """Return i, j and the triangle of every texel with i + j < leg."""
     count = leg.astype(np.int64)
     row_triangle = np.repeat(np.arange(len(leg)), count)
-    row_j = _counted(count)
+    row_j = run_numbers(count)
     length = count[row_triangle] - row_j
-    return _counted(length), np.repeat(row_j, length), np.repeat(row_triangle, length)
-
-
-def _counted(count: Array) -> Array:
-    """Return 0, 1, … count − 1 for each count, one after another."""
-    count = count.astype(np.int64)
-    ends = np.cumsum(count)
-    total = int(ends[-1]) if len(ends) else 0
-    return np.asarray(np.arange(total) - np.repeat(ends - count, count))
+    return run_numbers(length), np.repeat(row_j, length), np.repeat(row_triangle, length)

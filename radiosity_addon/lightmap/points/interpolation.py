@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base import drain
-from ...numerics import Array, Scratch, chunk_steps, for_chunks, tiles
+from ...numerics import Array, Scratch, chunk_steps, for_chunks, run_starts, tiles
 from ...rays import SAGITTA, SIGHT_LIFT, RayCaster
 from ..texels import TexelGeometry
 from .point_grid import NONE, PointGrid
@@ -289,7 +289,7 @@ def fit_steps(points: GatherPoints, geometry: TexelGeometry) -> Generator[float,
     steps = chunk_steps(weigh, len(geometry), CHUNK, points.threads)
     for start, fraction in zip(range(0, len(geometry), CHUNK), steps, strict=True):
         count, numbers, weights = parts.pop(start)
-        first[start : start + len(count)] = total + np.cumsum(count) - count
+        first[start : start + len(count)] = total + run_starts(count)
         total += len(numbers)
         point.extend(numbers)
         weight.extend(weights)
@@ -339,7 +339,7 @@ def _linear_weights(along: Array, kernel: Array, count: Array) -> Array:
     count : (n,) int
         How many pairs, one after the other, each texel has.
     """
-    first = np.cumsum(count) - count
+    first = run_starts(count)
     share = kernel / np.repeat(np.add.reduceat(kernel, first), count)
     mean = np.add.reduceat(share[:, None] * along, first, axis=0)
     offset = along - np.repeat(mean, count, axis=0)

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...numerics import Scratch, tiles
+from ...numerics import Scratch, run_chunks, run_numbers, tiles
 from .clip import area_in_unit_square, clip_to_unit_square, polygon_area_centroid, sample_polygons
 
 Float = NDArray[np.float64]
@@ -231,9 +231,9 @@ def overlapping_pairs(uv: Float32, resolution: int, centres_only: bool = False) 
     usable = np.flatnonzero(np.isfinite(corners).all(axis=(1, 2)) & (double_area != 0))
     for triangle, row in _rows(corners, usable, resolution):
         first, count = _columns(corners[triangle], row, resolution)
-        for part in _chunks(count):
+        for part in run_chunks(count, CHUNK):
             repeat = np.repeat(np.arange(part.start, part.stop), count[part])
-            column = first[repeat] + _ramp(count[part])
+            column = run_numbers(count[part], first[part]).astype(np.int32)
             if centres_only:
                 pairs = _centred(uv, resolution, triangle[repeat], row[repeat], column)
             else:
@@ -274,9 +274,9 @@ def _rows(corners: Float, usable: NDArray[np.intp], resolution: int) -> Iterator
     first = np.clip(np.floor(v.min(axis=1)), 0, resolution).astype(np.int64)
     last = np.clip(np.ceil(v.max(axis=1)), 0, resolution).astype(np.int64)
     count = np.maximum(last - first, 0)
-    for part in _chunks(count):
+    for part in run_chunks(count, CHUNK):
         repeat = np.repeat(np.arange(part.start, part.stop), count[part])
-        row = first[repeat] + _ramp(count[part])
+        row = run_numbers(count[part], first[part])
         yield usable[repeat].astype(np.int32), row.astype(np.int32)
 
 
@@ -368,20 +368,3 @@ def _double_area(corners: Float) -> Float:
     """Return twice the signed area of (t, 3, 2) triangles."""
     edge_1, edge_2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     return np.asarray(edge_1[:, 0] * edge_2[:, 1] - edge_1[:, 1] * edge_2[:, 0])
-
-
-def _chunks(count: NDArray[np.int64]) -> Iterator[slice]:
-    """Cut a list of counts into runs of at most `CHUNK` in sum (or a single larger one)."""
-    total = np.cumsum(count)
-    start = 0
-    while start < len(count):
-        limit = CHUNK + (total[start - 1] if start else 0)
-        stop = max(start + 1, int(np.searchsorted(total, limit, side="right")))
-        yield slice(start, stop)
-        start = stop
-
-
-def _ramp(count: NDArray[np.int64]) -> Int32:
-    """Return 0 … count[0]-1, 0 … count[1]-1, … as one array."""
-    ends = np.cumsum(count)
-    return (np.arange(ends[-1] if len(ends) else 0) - np.repeat(ends - count, count)).astype(np.int32)

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...numerics import run_numbers
+
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
@@ -113,7 +115,7 @@ def _profile(start: Float, end: Float, owner: Int, columns: Int, height: Int) ->
     last = np.clip(np.ceil(far - _ROUNDING).astype(np.int64), first + 1, columns[owner])
     count = last - first
     edge = np.repeat(np.arange(len(start)), count)
-    column = first[edge] + np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)
+    column = run_numbers(count, first)
     run = end[edge, 0] - start[edge, 0]
     steep = np.abs(run) < 1e-12
     slope = np.where(steep, 1.0, run)

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...base import scaled
-from ...numerics import Array, row_numbers
+from ...numerics import Array, row_numbers, run_numbers, run_starts
 from ...rays import SAGITTA, SIGHT_LIFT
 from ...solver.gather import AimedRays, Before, Gathered, LocalPass, Resolver
 from ..lighting import (
@@ -144,16 +144,14 @@ class MovedPoints:
         some = np.flatnonzero(moved.boxes.near(geometry.position, np.full(len(geometry), farthest)))
         ends = np.append(spread.first, len(spread.point))
         count = ends[some + 1] - ends[some]
-        first = np.cumsum(count) - count
-        entry = np.arange(int(count.sum())) + np.repeat(ends[some] - first, count)
-        texel, point = np.repeat(some, count), points.texel[spread.point[entry]]
+        texel, point = np.repeat(some, count), points.texel[spread.point[run_numbers(count, ends[some])]]
         start, normal = geometry.position[texel], geometry.normal[texel]
         along = geometry.position[point] - start
         bend = np.sqrt(np.maximum(1.0 - np.einsum("pk,pk->p", normal, geometry.normal[point]), 0.0))
         rise = SIGHT_LIFT * self._local.caster.surface_offset + SAGITTA * np.linalg.norm(along, axis=1) * bend
         crosses = moved.boxes.met_by(start, along[:, None], rise, 1.0)[:, 0]
         if len(some):
-            doubted[some] |= np.logical_or.reduceat(crosses, first)
+            doubted[some] |= np.logical_or.reduceat(crosses, run_starts(count))
         return np.asarray(doubted)
 
     def _choose(
@@ -215,15 +213,14 @@ def _merged(before: Interpolation, number: Array, anew: Array, entries: Entries)
     count = old_count.copy()
     new_count, new_point, new_weight = entries
     count[anew] = new_count
-    first = np.cumsum(count) - count
+    first = run_starts(count)
     point = np.empty(int(count.sum()), dtype=np.int32)
     weight = np.empty(len(point), dtype=np.float32)
     for some, counts, points, weights in (
         (~anew, old_count[~anew], *_entries_of(before, ~anew, old_count, number)),
         (anew, new_count, new_point, new_weight),
     ):
-        rank = np.arange(len(points)) - np.repeat(np.cumsum(counts) - counts, counts)
-        place = np.repeat(first[some], counts) + rank
+        place = run_numbers(counts, first[some])
         point[place], weight[place] = points, weights
     return Interpolation(first, point, weight)
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...numerics import Array
+from ...numerics import Array, run_numbers, run_starts
 from ...scene import Faces
 
 NORMAL_WEIGHT = 0.25
@@ -190,8 +190,7 @@ def _sort_runs(order: Array, position: Array, area: Array, start: Array, end: Ar
     """Sort each run of `order` along the widest axis of position and weighed normal, in place."""
     length = end - start
     run = np.repeat(np.arange(len(start)), length)
-    first = np.cumsum(length) - length
-    slots = np.arange(len(run)) - first[run] + start[run]
+    first, slots = run_starts(length), run_numbers(length, start)
     local = position[order[slots]]
     least = np.minimum.reduceat(local, first, axis=0)
     extent = np.maximum.reduceat(local, first, axis=0) - least

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...form_factors import point_to_polygon, visibility_of
-from ...numerics import Array, for_chunks, hash_keys
+from ...numerics import Array, for_chunks, hash_keys, run_numbers
 from ...rays import RayCaster
 from ..hierarchy import Hierarchy, NodeShapes
 from .cluster_links import ClusterLinks, join_cluster_links
@@ -205,8 +205,7 @@ class _ClusterPairs:
         cluster = np.where(single, 0, self.source)
         held = _held(hierarchy, self.source)
         row = np.repeat(np.arange(len(self.source)), held)
-        number = np.arange(len(row)) - np.repeat(np.cumsum(held) - held, held)
-        slot = clusters.start[cluster][row] + number
+        slot = run_numbers(held, clusters.start[cluster])
         corners = hierarchy.faces.corners[clusters.order[np.minimum(slot, len(clusters.order) - 1)]]
         corners[single[row]] = hierarchy.corners[self.source[row[single[row]]] - count]
         values = np.empty(points.shape[:2])
