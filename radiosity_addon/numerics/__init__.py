@@ -1,4 +1,4 @@
-"""Arrays: threads, memory with a limit, sampling, ragged runs, triangles and polygons, quantities of light.
+"""Arrays: threads, memory with a limit, sampling, runs, meshes, triangles, polygons, quantities of light.
 
 Knows neither scenes nor lamps.
 """
@@ -6,6 +6,7 @@ Knows neither scenes nor lamps.
 from __future__ import annotations
 
 from .arrays import Array
+from .meshes import connected_components, connected_faces, numbered, weld
 from .parallel import chunk_steps, for_chunks, thread_count
 from .polygons import areas, clip_half_plane, edge_distances
 from .radiometry import (
@@ -55,6 +56,8 @@ __all__ = [
     "concentric_disk",
     "cone_projected_solid_angle",
     "cone_solid_angle",
+    "connected_components",
+    "connected_faces",
     "cosine_hemisphere",
     "edge_distances",
     "flux_of_radiance",
@@ -66,6 +69,7 @@ __all__ = [
     "irradiance_under_sky",
     "luminous",
     "marked",
+    "numbered",
     "orthonormal_basis",
     "points_on_triangles",
     "radiance_of_disc",
@@ -86,4 +90,5 @@ __all__ = [
     "to_world",
     "trim",
     "uniform_cone",
+    "weld",
 ]

@@ -17,7 +17,15 @@ from functools import cached_property
 
 import numpy as np
 
-from ..numerics import Array, cosine_hemisphere, edge_distances, run_numbers, stratified_square, to_world
+from ..numerics import (
+    Array,
+    connected_components,
+    cosine_hemisphere,
+    edge_distances,
+    run_numbers,
+    stratified_square,
+    to_world,
+)
 from ..rays import NO_HIT, EmbreeCaster, Hits, surface_offset
 from .coincident_pairs import CORNERS, CoincidentPairs, coincident_pairs, tolerances
 from .surfaces import Surfaces
@@ -350,16 +358,7 @@ def _heights(scene: Surfaces, pairs: CoincidentPairs, tolerance: Array) -> tuple
     Along the normal of the largest of each group, in small steps: an order without circles.
     """
     count = len(scene)
-    group = np.arange(count)
-    while True:
-        low = np.minimum(group[pairs.first], group[pairs.second])
-        before = group.copy()
-        np.minimum.at(group, before[pairs.first], low)
-        np.minimum.at(group, before[pairs.second], low)
-        while not np.array_equal(group, group[group]):
-            group = group[group]
-        if np.array_equal(group, before):
-            break
+    group = connected_components(count, pairs.first, pairs.second)
     order = np.lexsort((np.arange(count), -scene.areas, group))
     _, start, number = np.unique(group[order], return_index=True, return_inverse=True)
     reference = np.empty(count, dtype=np.int64)

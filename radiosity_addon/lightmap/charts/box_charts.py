@@ -9,6 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ...numerics import connected_faces, numbered
+
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
@@ -36,21 +38,6 @@ def box_charts(vertices: Float, faces: Int) -> tuple[Float, Int]:
     first, second = (axis + 1) % 3, (axis + 2) % 3
     u = np.take_along_axis(corners, np.where(ahead, first, second)[:, None, None], axis=2)[..., 0]
     v = np.take_along_axis(corners, np.where(ahead, second, first)[:, None, None], axis=2)[..., 0]
-    return np.stack((u, v), axis=-1), _connected(2 * axis + ahead, faces)
-
-
-def _connected(kind: Int, faces: Int) -> Int:
-    """Number the sets of faces (n, 3) of one kind (n,) that hang together by vertices."""
-    keys = kind[:, None] * (int(faces.max(initial=0)) + 1) + faces
-    corner = np.unique(keys, return_inverse=True)[1].reshape(-1, 3)
-    label = np.arange(int(corner.max(initial=-1)) + 1)
-    while True:
-        lowest = label.copy()
-        np.minimum.at(lowest, corner.reshape(-1), np.repeat(label[corner].min(axis=1), 3))
-        # A set's label also pulls down the label that stands for it: few rounds for long sets.
-        np.minimum.at(lowest, label, lowest)
-        lowest = lowest[lowest]
-        if (lowest == label).all():
-            break
-        label = lowest
-    return np.asarray(np.unique(label[corner[:, 0]], return_inverse=True)[1].reshape(-1))
+    kind = 2 * axis + ahead
+    corner = numbered((kind[:, None] * (int(faces.max(initial=0)) + 1) + faces).ravel())
+    return np.stack((u, v), axis=-1), connected_faces(corner.reshape(-1, 3))

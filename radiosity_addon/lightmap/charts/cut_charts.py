@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...numerics import connected_faces, numbered
 from .flatten import project, project_polygons, rescale_to_area, signed_double_area, undo_stretch
 from .overlap import overlapping_triangles
 
@@ -66,7 +67,7 @@ def unwrap(triangles: Float, polygon: Int, grow: GrowCharts | None) -> Iterator[
     Charts
         Of all the triangles, with those pieces done so far; the last one is the result.
     """
-    polygon = np.unique(polygon, return_inverse=True)[1].reshape(-1)
+    polygon = numbered(polygon)
     uv = np.zeros((len(triangles), 3, 2))
     chart = np.full(len(triangles), -1, dtype=np.int64)
     count = 0
@@ -104,7 +105,7 @@ def _unwrap_piece(
     grower, at last polygon by polygon.
     """
     count = len(triangles)
-    polygon = np.unique(polygon, return_inverse=True)[1].reshape(-1)
+    polygon = numbered(polygon)
     corners, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     faces = index.reshape(count, 3)
     solid = _has_area(triangles)
@@ -116,13 +117,13 @@ def _unwrap_piece(
     own = torn[polygon]
     if own.any():
         chart = _split_parts(uv, np.where(own, -1, chart))
-        number = np.unique(polygon[own], return_inverse=True)[1].reshape(-1)
+        number = numbered(polygon[own])
         uv[own] = project_polygons(triangles[own], number)
         chart[own] = chart.max() + 1 + number
     used = np.flatnonzero(chart >= 0)
     if not len(used):
         return uv, chart
-    chart[used] = np.unique(chart[used], return_inverse=True)[1].reshape(-1)
+    chart[used] = numbered(chart[used])
     uv[used] = _to_scale(uv[used], triangles[used], chart[used], own[used])
     # Own charts were looked at already.
     over = _overlapping_polygons(uv, np.where(own, -1, chart), polygon)
@@ -132,7 +133,7 @@ def _unwrap_piece(
     chart[over] = -1
     chart = _split_parts(uv, chart)
     uv[over], chart[over] = redone[0], redone[1] + chart.max() + 1
-    chart[used] = np.unique(chart[used], return_inverse=True)[1].reshape(-1)
+    chart[used] = numbered(chart[used])
     uv[used] = rescale_to_area(uv[used], triangles[used], chart[used], int(chart.max()) + 1)
     return uv, chart
 
@@ -156,17 +157,8 @@ def _split_parts(uv: Float, chart: Int) -> Int:
     if not len(used):
         return chart
     keys = np.column_stack((np.repeat(chart[used], 3), uv[used].reshape(-1, 2)))
-    corner = np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1, 3)
-    label = np.arange(int(corner.max()) + 1)
-    while True:
-        lowest = label.copy()
-        np.minimum.at(lowest, corner.reshape(-1), np.repeat(label[corner].min(axis=1), 3))
-        lowest = lowest[lowest]
-        if (lowest == label).all():
-            break
-        label = lowest
     parts = np.full(len(chart), -1, dtype=np.int64)
-    parts[used] = np.unique(label[corner[:, 0]], return_inverse=True)[1].reshape(-1)
+    parts[used] = connected_faces(numbered(keys).reshape(-1, 3))
     return parts
 
 

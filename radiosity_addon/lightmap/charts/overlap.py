@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...numerics import run_chunks, run_starts
+from ...numerics import numbered, run_chunks, run_starts
 from ..texels import overlapping_pairs
 
 Float = NDArray[np.float64]
@@ -27,7 +27,7 @@ def overlapping_triangles(uv: Float, chart: Int) -> NDArray[np.intp]:
     """
     if not len(uv):
         return np.zeros(0, dtype=np.intp)
-    chart = np.unique(chart, return_inverse=True)[1].reshape(-1)
+    chart = numbered(chart)
     page, resolution = _side_by_side(uv, chart)
     pairs = list(overlapping_pairs(page, resolution, centres_only=True))
     if not pairs:

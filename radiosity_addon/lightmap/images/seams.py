@@ -12,10 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...numerics import Array, run_numbers
+from ...numerics import Array, run_numbers, weld
 from ...rays import SAGITTA, SIGHT_LIFT, RayCaster
 from ...scene import Scene
 from ..texels import NO_TEXEL, TexelGeometry
+
+WELD = 1e-6
+"""Corners are one if they are no farther apart than this part of the scene's extent."""
 
 SAME_NORMAL = 0.99
 """Least cosine between the shading normals of the two sides, …"""
@@ -141,7 +144,7 @@ def _shared_edges(scene: Scene, geometry: TexelGeometry) -> tuple[Array, Array]:
         Which of the triangle's corners are the edge's ends, in the same order on both sides.
     """
     every = np.flatnonzero(scene.areas > 0)
-    vertex = _weld(scene.triangles[every])
+    vertex = weld(scene.triangles[every].reshape(-1, 3), WELD).reshape(-1, 3)
     corners = np.array([[0, 1], [1, 2], [2, 0]])
     ends = vertex[:, corners].reshape(-1, 2)
     flip = ends[:, 0] > ends[:, 1]
@@ -165,20 +168,6 @@ def _shared_edges(scene: Scene, geometry: TexelGeometry) -> tuple[Array, Array]:
     shading = shading / np.maximum(np.linalg.norm(shading, axis=3, keepdims=True), 1e-12)
     kept &= (np.einsum("pek,pek->pe", shading[:, 0], shading[:, 1]) > SAME_NORMAL).all(axis=1)
     return triangle[kept], corner[kept]
-
-
-def _weld(triangles: Array) -> Array:
-    """Return (t, 3) int64: the number of each corner's place; equal for corners a hair apart at most."""
-    points = triangles.reshape(-1, 3)
-    if not len(points):
-        return np.zeros((0, 3), dtype=np.int64)
-    low = points.min(axis=0)
-    hair = 1e-6 * max(float((points.max(axis=0) - low).max()), 1e-30)
-    cell = np.rint((points - low) / hair).astype(np.int64)
-    # 21 bits an axis: 10⁶ cells fit.
-    key = (cell[:, 0] << 42) | (cell[:, 1] << 21) | cell[:, 2]
-    number = np.unique(key, return_inverse=True)[1]
-    return np.asarray(number.reshape(-1, 3), dtype=np.int64)
 
 
 def _bilinear(spots: Array, pages: Array, sizes: Sequence[int]) -> tuple[Array, Array, Array]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...numerics import run_numbers
+from ...numerics import numbered, run_numbers
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -70,7 +70,7 @@ def outline(uv: Float, chart: Int) -> tuple[Float, Int]:
     edges = np.stack((uv, np.roll(uv, -1, axis=1)), axis=2).reshape(-1, 2, 2)
     owner = np.repeat(chart, 3)
     corners = np.column_stack((np.repeat(chart, 3), uv.reshape(-1, 2)))
-    corner = np.unique(corners, axis=0, return_inverse=True)[1].reshape(-1, 3)
+    corner = numbered(corners).reshape(-1, 3)
     ends = np.sort(np.stack((corner, np.roll(corner, -1, axis=1)), axis=-1).reshape(-1, 2), axis=1)
     key = ends[:, 0] * (int(corner.max()) + 1) + ends[:, 1]
     _, first, times = np.unique(key, return_index=True, return_counts=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...form_factors import point_to_polygon, ray_geometry_term, throughput
-from ...numerics import Array, points_on_triangles, radiance_of_radiosity
+from ...numerics import Array, numbered, points_on_triangles, radiance_of_radiosity
 from ...rays import RayCaster
 from ...scene import Faces
 from .emitter_tree import EmitterTree
@@ -262,7 +262,6 @@ def _box_distance(points: Array, low: Array, high: Array) -> Array:
 def _balanced(weights: Array, face: Array, faces: int) -> Array:
     """Scale (n, k) weights so that in every row the rays to one face have 1 on average."""
     keys = (np.arange(len(face))[:, None] * faces + face).ravel()
-    _, number = np.unique(keys, return_inverse=True)
-    number = number.reshape(-1)
+    number = numbered(keys)
     mean = np.bincount(number, weights.ravel()) / np.bincount(number)
     return np.asarray(weights / np.maximum(mean[number].reshape(weights.shape), 1e-300))

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...base import SceneError
 from ...lights import Light, SkyTable, light_strengths
-from ...numerics import Array
+from ...numerics import Array, numbered
 from ...rays import RayCaster
 from ...scene import Faces, Scene
 from .emitters import EmitterGroup
@@ -133,10 +133,9 @@ class LightSources:
 
 def _by_colour(scene: Scene) -> Array:
     """Return (t,) a number for each colour of emission, and the last one for all textures."""
-    _, number = np.unique(scene.emission, axis=0, return_inverse=True)
-    number = number.reshape(-1).astype(np.int32)
+    number = numbered(scene.emission).astype(np.int32)
     if scene.images is not None:
         number[scene.images.textured] = number.max(initial=-1) + 1
     shines = scene.emission.max(axis=1, initial=0.0) > 0
-    _, number[shines] = np.unique(number[shines], return_inverse=True)
+    number[shines] = numbered(number[shines])
     return number

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...numerics import Array
+from ...numerics import Array, connected_components, numbered, weld
 
 FLAT = 1e-6
 """Faces lie in one plane if their normals agree to this, and their corners to this part of their extent."""
@@ -51,11 +51,14 @@ def merge_flat(corners: Array) -> tuple[Array, Array]:
     twice = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = 0.5 * np.linalg.norm(twice, axis=1)
     normal = twice / (2.0 * area[:, None])
-    points, index = _welded(corners.reshape(-1, 3), np.repeat(normal @ _ASIDE > 0, 3))
+    points = corners.reshape(-1, 3)
+    # A surface's two sides share no corners.
+    place = numbered(np.stack([weld(points, WELD), np.repeat(normal @ _ASIDE > 0, 3)], axis=1))
+    points, index = points[np.unique(place, return_index=True)[1]], place.reshape(-1, 3)
     start, end, twin = _edges(index, len(points))
     one, other = np.flatnonzero(twin >= 0) // 3, twin[twin >= 0] // 3
     alike = (np.abs(normal[one] - normal[other]) <= FLAT).all(axis=1)
-    label = _components(len(corners), one[alike], other[alike])
+    label = connected_components(len(corners), one[alike], other[alike])
     inner = twin >= 0
     inner[inner] = label[one] == label[other]
     size = np.bincount(label, minlength=len(corners))
@@ -82,19 +85,6 @@ def merge_flat(corners: Array) -> tuple[Array, Array]:
     return np.concatenate([corners[kept], *parts]), np.concatenate([everything[kept], *firsts])
 
 
-def _welded(points: Array, side: Array) -> tuple[Array, Array]:
-    """Return (p, 3) distinct points and (m, 3) their numbers for (3 m, 3) corners; rounding joins them.
-
-    Corners of different sides, (3 m,) bool, are apart: a surface's two sides share none.
-    """
-    low = points.min(axis=0)
-    # Places on a lattice are the likely ones: cells do not end there.
-    cell = np.floor((points - low) / (WELD * np.ptp(points, axis=0).max()) + 0.382)
-    cell = np.concatenate([cell, side[:, None]], axis=1)
-    _, first, index = np.unique(cell, axis=0, return_index=True, return_inverse=True)
-    return points[first], index.reshape(-1, 3)
-
-
 def _edges(index: Array, points: int) -> tuple[Array, Array, Array]:
     """Return starts, ends and twins of the (3 m,) directed edges of (m, 3) triangles.
 
@@ -107,21 +97,6 @@ def _edges(index: Array, points: int) -> tuple[Array, Array, Array]:
     own = count[np.searchsorted(keys, forth)]
     single = (keys[found] == back) & (count[found] == 1) & (own == 1)
     return start, end, np.where(single, first[found], -1)
-
-
-def _components(count: int, one: Array, other: Array) -> Array:
-    """Return (count,) int: the lowest number of the set each is in, joined by pairs of numbers."""
-    label = np.arange(count)
-    while True:
-        low = np.minimum(label[one], label[other])
-        before = label.copy()
-        # Whole sets move to the lower number: their roots do, and all follow their roots.
-        np.minimum.at(label, before[one], low)
-        np.minimum.at(label, before[other], low)
-        while not np.array_equal(label, label[label]):
-            label = label[label]
-        if np.array_equal(label, before):
-            return label
 
 
 def _in_plane(corners: Array, normal: Array) -> bool:

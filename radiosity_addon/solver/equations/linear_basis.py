@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...numerics import Array
+from ...numerics import Array, connected_components, numbered
 from ...scene import Faces
 from ..hierarchy import Basis, Hierarchy
 
@@ -31,9 +31,9 @@ def vertex_basis(hierarchy: Hierarchy) -> Basis:
     """
     leaf = hierarchy.leaves
     corners = hierarchy.corners[leaf]
-    position = _same_rows(corners.reshape(-1, 3) + 0.0)
+    position = numbered(corners.reshape(-1, 3) + 0.0)
     # First every face's own vertices, then those across smooth edges become one.
-    node = _same_rows(np.stack([np.repeat(hierarchy.face[leaf], 3), position], axis=1))
+    node = numbered(np.stack([np.repeat(hierarchy.face[leaf], 3), position], axis=1))
     joined, at_crease = _across_edges(hierarchy, node, position)
     node, at_crease = joined[node], at_crease[node]
 
@@ -86,12 +86,11 @@ def _across_edges(hierarchy: Hierarchy, node: Array, position: Array) -> tuple[A
         shared = on_edge[smooth[face[on_edge], side]]
         keys.append(np.stack([edge[face[shared], side], position[some[shared]]], axis=1))
         nodes.append(shared)
-    key, rows = _same_rows(np.concatenate(keys)), np.concatenate(nodes)
+    key, rows = numbered(np.concatenate(keys)), np.concatenate(nodes)
     order = np.argsort(key, kind="stable")
     pairs = np.flatnonzero(np.diff(key[order]) == 0)
-    label = _labels(count, rows[order[pairs]], rows[order[pairs + 1]])
-    _, joined = np.unique(label, return_inverse=True)
-    return joined.reshape(-1), at_crease
+    label = connected_components(count, rows[order[pairs]], rows[order[pairs + 1]])
+    return numbered(label), at_crease
 
 
 def _smooth_edges(faces: Faces) -> tuple[Array, Array]:
@@ -104,9 +103,9 @@ def _smooth_edges(faces: Faces) -> tuple[Array, Array]:
     smooth : (f, 3) bool
     """
     count = len(faces)
-    ends = _same_rows(faces.corners.reshape(-1, 3) + 0.0).reshape(count, 3)
+    ends = numbered(faces.corners.reshape(-1, 3) + 0.0).reshape(count, 3)
     ends = np.sort(np.stack([ends, np.roll(ends, -1, axis=1)], axis=-1), axis=-1)
-    line = _same_rows(ends.reshape(-1, 2))
+    line = numbered(ends.reshape(-1, 2))
     owner = np.repeat(np.arange(count), 3)
     # Every triangle has a front: these tell how many triangles meet at an edge.
     triangles = np.bincount(line, faces.front[owner], minlength=int(line.max(initial=-1)) + 1)
@@ -116,33 +115,11 @@ def _smooth_edges(faces: Faces) -> tuple[Array, Array]:
     cosine = np.einsum("nk,nk->n", faces.normal[owner], faces.normal[first[line]])
     sheet = np.where(cosine > 1.0 - COPLANAR, 0, np.where(cosine < COPLANAR - 1.0, 1, 2))
     look = np.concatenate([faces.reflectance, faces.emission], axis=1)
-    material = _same_rows(look)[owner]
-    edge = _same_rows(np.stack([line, sheet, material], axis=1))
+    material = numbered(look)[owner]
+    edge = numbered(np.stack([line, sheet, material], axis=1))
     meeting = np.bincount(edge)[edge]
     smooth = (triangles[line] == 2) & (sheet < 2) & (meeting == 2)
     return edge.reshape(count, 3), smooth.reshape(count, 3)
-
-
-def _labels(count: int, one: Array, other: Array) -> Array:
-    """Return (count,) the smallest number that pairs (one, other) connect each number to."""
-    label = np.arange(count)
-    while True:
-        low = np.minimum(label[one], label[other])
-        following = label.copy()
-        np.minimum.at(following, one, low)
-        np.minimum.at(following, other, low)
-        following = following[following]
-        if (following == label).all():
-            return label
-        label = following
-
-
-def _same_rows(rows: Array) -> Array:
-    """Number the distinct rows of (n, k) and return each row's number."""
-    if len(rows) == 0:
-        return np.zeros(0, dtype=np.int64)
-    _, number = np.unique(rows, axis=0, return_inverse=True)
-    return np.asarray(number.reshape(-1))
 
 
 def _angles(corners: Array) -> Array:
