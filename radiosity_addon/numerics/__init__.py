@@ -39,7 +39,17 @@ from .sampling import (
     uniform_cone,
 )
 from .scratch import TILE, Rows, Scratch, folder, marked, row_numbers, tiles, trim
-from .triangles import WHOLE_TRIANGLE, split_in_four, split_in_sixteen
+from .triangles import (
+    WHOLE_TRIANGLE,
+    double_area_vectors,
+    plane_weights_at,
+    points_at,
+    signed_double_areas,
+    split_in_four,
+    split_in_sixteen,
+    triangle_areas,
+    weights_at,
+)
 
 __all__ = [
     "HEMISPHERE",
@@ -59,6 +69,7 @@ __all__ = [
     "connected_components",
     "connected_faces",
     "cosine_hemisphere",
+    "double_area_vectors",
     "edge_distances",
     "flux_of_radiance",
     "folder",
@@ -71,6 +82,8 @@ __all__ = [
     "marked",
     "numbered",
     "orthonormal_basis",
+    "plane_weights_at",
+    "points_at",
     "points_on_triangles",
     "radiance_of_disc",
     "radiance_of_flux",
@@ -81,6 +94,7 @@ __all__ = [
     "run_chunks",
     "run_numbers",
     "run_starts",
+    "signed_double_areas",
     "sphere_area",
     "split_in_four",
     "split_in_sixteen",
@@ -88,7 +102,9 @@ __all__ = [
     "thread_count",
     "tiles",
     "to_world",
+    "triangle_areas",
     "trim",
     "uniform_cone",
+    "weights_at",
     "weld",
 ]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..numerics import Array, hash_keys
+from ..numerics import Array, double_area_vectors, hash_keys
 
 COPY_LIFT = 0.25
 """How far copies lie off their triangles, in units of the offset that rays start with: beyond the rounding of
@@ -45,8 +45,7 @@ def facing_copies(triangles: Array, two_sided: Array, offset: float) -> tuple[Ar
         Whose copies they are.
     corners : (c, 3, 3) float64
     """
-    edges = triangles[:, 1:] - triangles[:, :1]
-    cross = np.cross(edges[:, 0], edges[:, 1])
+    cross = double_area_vectors(triangles)
     double_area = np.linalg.norm(cross, axis=1)
     solid = np.flatnonzero(double_area > 0)
     normal = cross[solid] / double_area[solid, None]

@@ -11,7 +11,7 @@ from threading import Lock
 
 import numpy as np
 
-from ..numerics import Array, for_chunks
+from ..numerics import Array, double_area_vectors, for_chunks
 from .caster import NO_HIT, Hits, RayCaster, surface_offset
 from .coplanar import facing_copies
 
@@ -74,8 +74,7 @@ class EmbreeCaster:
         local = np.ascontiguousarray(triangles, dtype=np.float32)
         self._scene = EmbreeScene()
         self._mesh = TriangleMesh(self._scene, local)
-        edges = local[:, 1:] - local[:, :1]
-        self._normals = np.cross(edges[:, 0], edges[:, 1])
+        self._normals = double_area_vectors(local)
         # The first query builds the hierarchy; it must not race with another thread's.
         self._scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32), query="OCCLUDED")
 

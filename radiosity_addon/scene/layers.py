@@ -22,9 +22,11 @@ from ..numerics import (
     connected_components,
     cosine_hemisphere,
     edge_distances,
+    points_at,
     run_numbers,
     stratified_square,
     to_world,
+    weights_at,
 )
 from ..rays import NO_HIT, EmbreeCaster, Hits, surface_offset
 from .coincident_pairs import CORNERS, CoincidentPairs, coincident_pairs, tolerances
@@ -163,21 +165,12 @@ class Layers:
 
     def points(self, side: Array, place: Array) -> Array:
         """Return (n, 3) the points of sides at weights (n, 2) of their triangles' corners [m]."""
-        corners = self._scene.triangles[side // 2]
-        return np.asarray(corners[:, 0] + np.einsum("nw,nwk->nk", place, corners[:, 1:] - corners[:, :1]))
+        return points_at(self._scene.triangles[side // 2], place)
 
     def weights(self, side: Array, points: Array) -> Array:
         """Return (n, 2) the weights of points in sides' triangles, drawn into them."""
-        corners = self._scene.triangles[side // 2]
-        edges = corners[:, 1:] - corners[:, :1]
-        normal = np.cross(edges[:, 0], edges[:, 1])
-        square = np.maximum(np.einsum("nk,nk->n", normal, normal), 1e-300)
-        apart = points - corners[:, 0]
-        second = np.einsum("nk,nk->n", np.cross(apart, edges[:, 1]), normal) / square
-        third = np.einsum("nk,nk->n", np.cross(edges[:, 0], apart), normal) / square
-        second, third = np.maximum(second, 0.0), np.maximum(third, 0.0)
-        over = np.maximum(second + third, 1.0)
-        return np.stack([second / over, third / over], axis=1)
+        weights = np.maximum(weights_at(self._scene.triangles[side // 2], points[:, None])[:, 0, 1:], 0.0)
+        return np.asarray(weights / np.maximum(weights.sum(axis=1, keepdims=True), 1.0))
 
 
 def holding(first: Array, parts: Array, row: Array, place: Array) -> tuple[Array, Array]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base import SceneError
 from ..lights import Light
-from ..numerics import MAX_REFLECTANCE, WHOLE_TRIANGLE, Array
+from ..numerics import MAX_REFLECTANCE, WHOLE_TRIANGLE, Array, double_area_vectors
 from .layers import Layers
 from .textures import SurfaceImages
 
@@ -70,9 +70,7 @@ class Scene:
             row = int(np.flatnonzero(~np.isfinite(self.triangles).all(axis=(1, 2)))[0])
             raise SceneError(f"triangle {row} has a corner that is NaN or infinite")
 
-        edge_1 = self.triangles[:, 1] - self.triangles[:, 0]
-        edge_2 = self.triangles[:, 2] - self.triangles[:, 0]
-        cross = np.cross(edge_1, edge_2)
+        cross = double_area_vectors(self.triangles)
         double_area = np.linalg.norm(cross, axis=1)
         self.areas = 0.5 * double_area
         """(t,) float64 [m²]"""

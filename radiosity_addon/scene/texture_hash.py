@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ..numerics import Array
+from ..numerics import Array, plane_weights_at, signed_double_areas
 from .textures import SurfaceImages
 
 LOOKS, GLOWS = (0, 1, 2, 6), (3, 4, 5)
@@ -118,17 +118,12 @@ def _texels(images: SurfaceImages, rows: Array) -> Iterator[tuple[Array, Array]]
 
 def _on_triangles(corners: Array, at: Array) -> tuple[Array, Array]:
     """Return which places (n, k, 2) lie on triangles (n, 3, 2), and their order by the corners' weights."""
-    edges = corners[:, 1:] - corners[:, :1]
-    area = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
-    along = at - corners[:, :1]
-    safe = np.where(area == 0.0, 1.0, area)[:, None]
-    second = (along[..., 0] * edges[:, None, 1, 1] - along[..., 1] * edges[:, None, 1, 0]) / safe
-    third = (edges[:, None, 0, 0] * along[..., 1] - edges[:, None, 0, 1] * along[..., 0]) / safe
+    _, second, third = np.moveaxis(plane_weights_at(corners, at), -1, 0)
     hair = 0.25 / _STEPS
     inside = (second >= -hair) & (third >= -hair) & (second + third <= 1.0 + hair)
     # What has no area in the image is its first corner's texel.
-    point = area == 0.0
-    nearest = np.abs(along).sum(axis=2).argmin(axis=1)
+    point = signed_double_areas(corners) == 0.0
+    nearest = np.abs(at - corners[:, :1]).sum(axis=2).argmin(axis=1)
     inside[point] = np.arange(at.shape[1]) == nearest[point, None]
     second[point[:, None] & np.ones_like(inside)] = 0.0
     third[point[:, None] & np.ones_like(inside)] = 0.0

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from ..base import SceneError
-from ..numerics import MAX_REFLECTANCE, Array, split_in_four
+from ..numerics import MAX_REFLECTANCE, Array, points_at, split_in_four
 
 CHANNELS = 7
 """Reflectance RGB, emission RGB, opacity."""
@@ -151,9 +151,7 @@ class SurfaceImages:
     def _place(self, triangle: Array, barycentric: Array) -> Array:
         """Return (n, 2) where points of triangles are in the image [texels]."""
         height, width = self.values.shape[:2]
-        corners = self.image_uv[triangle].astype(np.float64)
-        weights = np.asarray(barycentric, dtype=np.float64)
-        uv = corners[:, 0] + np.einsum("nc,nck->nk", weights, corners[:, 1:] - corners[:, :1])
+        uv = points_at(self.image_uv[triangle].astype(np.float64), barycentric)
         return np.asarray(uv * (width, height))
 
     def _check(self) -> None:

@@ -7,7 +7,16 @@ from functools import cached_property
 
 import numpy as np
 
-from ..numerics import Array, areas, clip_half_plane, edge_distances, run_chunks, run_numbers, split_in_four
+from ..numerics import (
+    Array,
+    areas,
+    clip_half_plane,
+    edge_distances,
+    plane_weights_at,
+    run_chunks,
+    run_numbers,
+    split_in_four,
+)
 from .surfaces import Surfaces
 
 NOTHING_LEFT = 1e-9
@@ -216,15 +225,7 @@ def _moved(points: Array, part: Array, in_cover: Array) -> Array:
     far = np.einsum("nkc,nkc->nk", apart, apart).argmax(axis=1)
     along = apart[row, far]
     wide = np.abs(along[:, None, 0] * apart[..., 1] - along[:, None, 1] * apart[..., 0]).argmax(axis=1)
-    across = apart[row, wide]
-    whole = along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]
-    whole = np.where(whole == 0.0, 1.0, whole)[:, None]
-    off = points - part[:, :1]
-    one = (off[..., 0] * across[:, None, 1] - off[..., 1] * across[:, None, 0]) / whole
-    other = (along[:, None, 0] * off[..., 1] - along[:, None, 1] * off[..., 0]) / whole
-    there = in_cover - in_cover[:, :1]
-    return np.asarray(
-        in_cover[:, :1]
-        + one[..., None] * there[row, far][:, None]
-        + other[..., None] * there[row, wide][:, None]
-    )
+    chosen = np.stack([np.zeros_like(far), far, wide], axis=1)
+    weights = plane_weights_at(part[row[:, None], chosen], points)
+    there = (in_cover - in_cover[:, :1])[row[:, None], chosen]
+    return np.asarray(in_cover[:, :1] + weights @ there)

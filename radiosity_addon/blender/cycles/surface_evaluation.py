@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 
 from ...lightmap.images import SurfaceTiles, lay_out_surfaces
-from ...numerics import MAX_REFLECTANCE, radiance_of_radiosity, radiosity_of_radiance
+from ...numerics import MAX_REFLECTANCE, radiance_of_radiosity, radiosity_of_radiance, triangle_areas
 from ...options import BakeSettings
 from ...scene import SurfaceImages
 from ..datablocks.mesh_arrays import normal_matrix, world_from_object
@@ -88,7 +88,7 @@ def evaluate_surfaces(
     yield 0.1
 
     def laid_out() -> tuple[SurfaceTiles, dict[str, np.ndarray], list[Batch]]:
-        area = np.where(varies, _areas(corners), 0.0)
+        area = np.where(varies, triangle_areas(corners), 0.0)
         tiles = lay_out_surfaces(area, np.array(cut_out)[own].astype(int), _side(settings, any(cut_out)))
         divided = batches(tiles, corners, inputs, own, facts) if varying else []
         return tiles, _terms_of_constants(tiles, surfaces, own), divided
@@ -114,11 +114,6 @@ def _side(settings: BakeSettings, cut_out: bool) -> int:
         return MAX_SIDE
     wanted = (4 if cut_out else 2) * settings.resolution
     return min(max(wanted, MIN_CUT_OUT_SIDE if cut_out else MIN_SIDE), MAX_SIDE)
-
-
-def _areas(corners: np.ndarray) -> np.ndarray:
-    edges = corners[:, 1:] - corners[:, :1]
-    return np.asarray(0.5 * np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1))
 
 
 def _gather(pieces: Sequence[Piece], rows: np.ndarray) -> tuple[np.ndarray, dict[str, np.ndarray]]:

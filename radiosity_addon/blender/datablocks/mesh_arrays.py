@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from ...numerics import double_area_vectors
 from ...scene import LIGHTMAP_UV_LAYER
 
 _INFINITE = 1e18
@@ -205,7 +206,7 @@ def degenerate(corners: np.ndarray) -> np.ndarray:
 
 
 def _unit_normals(normals: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, None, :]
+    faces = double_area_vectors(corners)[:, None, :]
     length = np.linalg.norm(normals, axis=2, keepdims=True)
     vanished = ~(length > 0)
     normals = np.where(vanished, faces, normals)

@@ -19,6 +19,7 @@ import numpy as np
 from ...bake import Estimate, LightmappedObject, estimate_bake, refuse_too_large
 from ...base import RadiosityError
 from ...lightmap.unwrap import greedy_object, share_of
+from ...numerics import double_area_vectors
 from ...numerics import folder as scratch_folder
 from ...options import BakeSettings
 from ...scene import LIGHTMAP_UV_LAYER
@@ -186,7 +187,7 @@ def _shape(piece: Piece) -> _Shape:
     flat = corners.reshape(-1, 3)
     box = np.stack([flat.min(axis=0), flat.max(axis=0)])
     local = corners - box.mean(axis=0)
-    vectors = 0.5 * np.cross(local[:, 1] - local[:, 0], local[:, 2] - local[:, 0])
+    vectors = 0.5 * double_area_vectors(local)
     area = float(np.linalg.norm(vectors, axis=1).sum())
     closed = area > 0 and np.linalg.norm(vectors.sum(axis=0)) < CLOSED * area
     volume = float(np.einsum("tk,tk->t", local[:, 0], vectors).sum() / 3.0) if closed else None

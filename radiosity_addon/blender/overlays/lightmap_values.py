@@ -11,7 +11,7 @@ import numpy as np
 from ...bake.result import MEANS
 from ...lightmap.images import LightStatistics, light_statistics, told_texels
 from ...lightmap.texels import NO_TEXEL_HERE, rasterise
-from ...numerics import Array, irradiance_under_sky, luminous
+from ...numerics import Array, irradiance_under_sky, luminous, triangle_areas
 from ...scene import LIGHTMAP_UV_LAYER
 from ..datablocks.bake_record import is_made
 from ..datablocks.image_marks import QUANTITY_PROPERTY
@@ -42,9 +42,7 @@ class ShownLightmap:
     @property
     def areas(self) -> Array:
         """(t,) float64 [m²]"""
-        corners = self.corners.astype(np.float64)
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        return np.asarray(0.5 * np.linalg.norm(normal, axis=1))
+        return triangle_areas(self.corners.astype(np.float64))
 
     @property
     def uv_areas(self) -> Array:

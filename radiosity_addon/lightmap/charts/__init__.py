@@ -6,13 +6,12 @@ xatlas does the cutting; only `xatlas_worker.py` imports it.
 from __future__ import annotations
 
 from .cut_charts import Charts, unwrap
-from .flatten import rescale_to_area, signed_double_area
+from .flatten import rescale_to_area
 from .growers import PatientGrower
 
 __all__ = [
     "Charts",
     "PatientGrower",
     "rescale_to_area",
-    "signed_double_area",
     "unwrap",
 ]

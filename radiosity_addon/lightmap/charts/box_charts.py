@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...numerics import connected_faces, numbered
+from ...numerics import connected_faces, double_area_vectors, numbered
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -31,7 +31,7 @@ def box_charts(vertices: Float, faces: Int) -> tuple[Float, Int]:
         Faces of one axis that share vertices share a chart.
     """
     corners = vertices[faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = double_area_vectors(corners)
     axis = np.abs(normal).argmax(axis=1)
     ahead = normal[np.arange(len(faces)), axis] > 0
     # Two other axes, in the order that keeps fronts counter-clockwise.

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...numerics import connected_faces, numbered
-from .flatten import project, project_polygons, rescale_to_area, signed_double_area, undo_stretch
+from ...numerics import connected_faces, double_area_vectors, numbered, signed_double_areas
+from .flatten import project, project_polygons, rescale_to_area, undo_stretch
 from .overlap import overlapping_triangles
 
 Float = NDArray[np.float64]
@@ -166,13 +166,13 @@ def _has_area(triangles: Float) -> NDArray[np.bool_]:
     """Return which triangles are more than a line or a point."""
     sides = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
     longest = sides.max(axis=1)
-    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    cross = double_area_vectors(triangles)
     return np.asarray((longest > 0) & (np.linalg.norm(cross, axis=1) > _FLAT * longest**2))
 
 
 def _normalised(corners: Float, triangles: Float) -> Float:
     """Move to the origin and scale to a mean triangle of area 1: the grower's epsilons are absolute."""
-    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    cross = double_area_vectors(triangles)
     size = np.sqrt(0.5 * np.linalg.norm(cross, axis=1).mean())
     return np.asarray((corners - 0.5 * (corners.min(axis=0) + corners.max(axis=0))) / size)
 
@@ -193,7 +193,7 @@ def _torn_polygons(
 
     placed = np.flatnonzero(chart >= 0)
     if len(placed):
-        area = signed_double_area(uv[placed])
+        area = signed_double_areas(uv[placed])
         total = np.bincount(chart[placed], area)
         torn[polygon[placed[area * total[chart[placed]] <= 0]]] = True
         first = np.full(count, -1, dtype=np.int64)
@@ -211,11 +211,11 @@ def _torn_polygons(
 def _to_scale(uv: Float, triangles: Float, chart: Int, projected: NDArray[np.bool_]) -> Float:
     """Bring charts to world scale and front side up; planar ones exactly, by projection."""
     count = int(chart.max()) + 1
-    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    cross = double_area_vectors(triangles)
     mean = np.stack([np.bincount(chart, cross[:, k], count) for k in range(3)], axis=-1)
     grown = np.flatnonzero(~projected)
     if len(grown):
-        turned = np.bincount(chart[grown], signed_double_area(uv[grown]), count) < 0
+        turned = np.bincount(chart[grown], signed_double_areas(uv[grown]), count) < 0
         uv = uv.copy()
         uv[grown, :, 0] *= np.where(turned, -1.0, 1.0)[chart[grown], None]
         uv[grown] = undo_stretch(uv[grown], triangles[grown], chart[grown], count)

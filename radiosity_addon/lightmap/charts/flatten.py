@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ...numerics import double_area_vectors, signed_double_areas
+
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
@@ -32,14 +34,14 @@ def project_polygons(triangles: Float, group: Int) -> Float:
         share a UV. The plane of a non-planar polygon shortens what is steep in it: see
         `rescale_to_area`.
     """
-    cross = _cross(triangles)
+    cross = double_area_vectors(triangles)
     count = int(group.max()) + 1 if len(group) else 0
     normal = np.zeros((count, 3))
     np.add.at(normal, group, cross)
     uv = project(triangles, normal[group])
     # Measured against the polygon, so that the rounding of a sliver is not taken for a fold.
     size = np.bincount(group, np.linalg.norm(cross, axis=1), count)[group]
-    folded = signed_double_area(uv) < _UPRIGHT * np.linalg.norm(cross, axis=1) - 1e-9 * size
+    folded = signed_double_areas(uv) < _UPRIGHT * np.linalg.norm(cross, axis=1) - 1e-9 * size
     unit = cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), np.finfo(float).tiny)
     axis = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
     uneven = np.zeros(count, dtype=np.bool_)
@@ -66,16 +68,10 @@ def project(triangles: Float, normal: Float) -> Float:
     return np.asarray(triangles @ basis)
 
 
-def signed_double_area(uv: Float) -> Float:
-    """Return twice the signed area of (n, 3, 2) triangles."""
-    edge_1, edge_2 = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
-    return np.asarray(edge_1[:, 0] * edge_2[:, 1] - edge_1[:, 1] * edge_2[:, 0])
-
-
 def rescale_to_area(uv: Float, triangles: Float, chart: Int, count: int) -> Float:
     """Scale each chart, the same in all directions, to the area it has in the scene."""
-    flat = np.bincount(chart, np.abs(signed_double_area(uv)), count)
-    true = np.bincount(chart, np.linalg.norm(_cross(triangles), axis=1), count)
+    flat = np.bincount(chart, np.abs(signed_double_areas(uv)), count)
+    true = np.bincount(chart, np.linalg.norm(double_area_vectors(triangles), axis=1), count)
     scale = np.sqrt(true / np.where(flat > 0, flat, 1.0))
     return np.asarray(uv * np.where(flat > 0, scale, 1.0)[chart, None, None])
 
@@ -88,7 +84,7 @@ def undo_stretch(uv: Float, triangles: Float, chart: Int, count: int) -> Float:
     """
     edge_1, edge_2 = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     flat_1, flat_2 = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
-    area = signed_double_area(uv)
+    area = signed_double_areas(uv)
     weight = np.linalg.norm(np.cross(edge_1, edge_2), axis=1)
     mean = np.bincount(chart, np.abs(area), count) / np.maximum(np.bincount(chart, minlength=count), 1)
     usable = np.abs(area) > 1e-3 * mean[chart]
@@ -124,10 +120,6 @@ def _separated(one: Float, other: Float) -> NDArray[np.bool_]:
     inward = side[:, :, None, 0] * offset[..., 1] - side[:, :, None, 1] * offset[..., 0]
     tolerance = 1e-9 * (side**2).sum(axis=(1, 2))
     return np.asarray((inward <= tolerance[:, None, None]).all(axis=2).any(axis=1))
-
-
-def _cross(triangles: Float) -> Float:
-    return np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
 
 
 def _convex_layout(triangles: Float) -> Float | None:

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...numerics import Scratch, run_chunks, run_numbers, tiles
+from ...numerics import Scratch, plane_weights_at, run_chunks, run_numbers, signed_double_areas, tiles
 from .clip import area_in_unit_square, clip_to_unit_square, polygon_area_centroid, sample_polygons
 
 Float = NDArray[np.float64]
@@ -105,7 +105,7 @@ class Texels:
         a few hundred thousand at a time (`take`).
         """
         polygon, origin, _ = _clip(self.uv, self.resolution, self.triangle, self.row, self.column)
-        return _barycentric(polygon, origin).astype(np.float32)
+        return _weights_inside(polygon, origin).astype(np.float32)
 
 
 class _TexelPairs(NamedTuple):
@@ -162,14 +162,14 @@ def rasterise(uv: Float32, resolution: int, scratch: Scratch | None = None) -> T
         some = tile.start + np.flatnonzero(~whole)
         polygon, origin, _ = _clip(uv, resolution, triangle[some], row[some], column[some])
         area[some], middle = polygon_area_centroid(polygon)
-        centroid[some] = _barycentric(middle[:, None], origin)[:, 0]
+        centroid[some] = _weights_inside(middle[:, None], origin)[:, 0]
     return Texels(resolution, uv, row, column, triangle, area, centroid, centre_inside)
 
 
 def centre_weights(uv: Float32, resolution: int, triangle: Int32, row: Int32, column: Int32) -> Float:
     """Return (p, 3) the barycentric coordinates, each in its triangle, of texels' centres."""
     origin = _around_texels(uv, resolution, triangle, row, column)
-    return _barycentric(np.full((len(triangle), 1, 2), 0.5), origin)[:, 0]
+    return _weights_inside(np.full((len(triangle), 1, 2), 0.5), origin)[:, 0]
 
 
 def overlap_areas(uv: Float32, resolution: int, triangle: Int32, row: Int32, column: Int32) -> Float:
@@ -216,7 +216,7 @@ def sample_footprints(texels: Texels, u: Float, width: float = FOOTPRINT) -> Flo
         cut = np.flatnonzero(~whole)
         points[cut] = sample_polygons(polygon[cut], points[cut])
         points[whole] = 0.5 + (points[whole] - 0.5) * widths[whole, None, None]
-        result[start : start + CHUNK] = _barycentric(points, origin)
+        result[start : start + CHUNK] = _weights_inside(points, origin)
     return result
 
 
@@ -227,7 +227,7 @@ def overlapping_pairs(uv: Float32, resolution: int, centres_only: bool = False) 
     triangle; their area is given as 1.
     """
     corners = uv.astype(np.float64) * resolution
-    double_area = _double_area(corners)
+    double_area = signed_double_areas(corners)
     usable = np.flatnonzero(np.isfinite(corners).all(axis=(1, 2)) & (double_area != 0))
     for triangle, row in _rows(corners, usable, resolution):
         first, count = _columns(corners[triangle], row, resolution)
@@ -314,7 +314,7 @@ def _edge_distances(
     edge = np.roll(corners, -1, axis=1) - corners
     x = column[:, None] + 0.5 - corners[..., 0]
     y = row[:, None] + 0.5 - corners[..., 1]
-    side = np.sign(_double_area(corners))[:, None]
+    side = np.sign(signed_double_areas(corners))[:, None]
     distance = side * (edge[..., 0] * y - edge[..., 1] * x)
     return distance, 0.5 * np.abs(edge).sum(axis=2)
 
@@ -346,25 +346,12 @@ def _around_texels(uv: Float32, resolution: int, triangle: Int32, row: Int32, co
     return corners
 
 
-def _barycentric(points: Float, corners: Float) -> Float:
-    """Return (t, k, 3) barycentric coordinates of (t, k, 2) points in (t, 3, 2) triangles."""
-    edge_1 = corners[:, None, 1] - corners[:, None, 0]
-    edge_2 = corners[:, None, 2] - corners[:, None, 0]
-    offset = points - corners[:, None, 0]
-    whole = edge_1[..., 0] * edge_2[..., 1] - edge_1[..., 1] * edge_2[..., 0]
-    second = (offset[..., 0] * edge_2[..., 1] - offset[..., 1] * edge_2[..., 0]) / whole
-    third = (edge_1[..., 0] * offset[..., 1] - edge_1[..., 1] * offset[..., 0]) / whole
-    # Rounding must not put a point outside its triangle.
-    weights = np.maximum(np.stack((1 - second - third, second, third), axis=-1), 0)
+def _weights_inside(points: Float, corners: Float) -> Float:
+    """Return (t, k, 3) weights of (t, 3, 2) triangles' corners at (t, k, 2) points; none is negative."""
+    weights = np.maximum(plane_weights_at(corners, points), 0)
     return np.asarray(weights / weights.sum(axis=-1, keepdims=True))
 
 
 def _all_three(sides: Bool) -> Bool:
     """Return (p,) whether all sides say so, (p, 3); several times as fast as `all` along an axis."""
     return np.asarray(sides[:, 0] & sides[:, 1] & sides[:, 2])
-
-
-def _double_area(corners: Float) -> Float:
-    """Return twice the signed area of (t, 3, 2) triangles."""
-    edge_1, edge_2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    return np.asarray(edge_1[:, 0] * edge_2[:, 1] - edge_1[:, 1] * edge_2[:, 0])

@@ -11,7 +11,7 @@ from copy import copy
 
 import numpy as np
 
-from ...numerics import Array
+from ...numerics import Array, weights_at
 from .texel_geometry import TexelGeometry
 
 CUTOFF = 0.1
@@ -65,7 +65,7 @@ class SmoothLift:
             return starts
         texel = texels[rows]
         triangle = self._geometry.triangle[texel]
-        weights = _weights(self._geometry.triangles[triangle], starts[rows])
+        weights = np.clip(weights_at(self._geometry.triangles[triangle], starts[rows]), 0.0, 1.0)
         first, second, third = weights[..., 0], weights[..., 1], weights[..., 2]
         over = self._opening[triangle]
         height = over[:, :1] * first * third + over[:, 1:2] * second * third + over[:, 2:] * first * second
@@ -83,15 +83,3 @@ class SmoothLift:
 
 
 _EDGES = ((2, 0), (2, 1), (1, 0))
-
-
-def _weights(corners: Array, points: Array) -> Array:
-    """Return (r, k, 3) barycentric weights of points (r, k, 3) in the planes of (r, 3, 3) triangles."""
-    one, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    normal = np.cross(one, other)
-    scale = np.maximum(np.einsum("rk,rk->r", normal, normal), 1e-300)
-    from_first = points - corners[:, :1]
-    # Each weight is an area; the cross products with the normal turn edges inwards.
-    second = np.einsum("rkd,rd->rk", from_first, np.cross(other, normal)) / scale[:, None]
-    third = np.einsum("rkd,rd->rk", from_first, np.cross(normal, one)) / scale[:, None]
-    return np.asarray(np.clip(np.stack([1.0 - second - third, second, third], axis=-1), 0.0, 1.0))

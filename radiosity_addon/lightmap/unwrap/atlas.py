@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base import BakeError, BakeWarning
-from ..charts import Charts, PatientGrower, rescale_to_area, signed_double_area, unwrap
+from ...numerics import signed_double_areas, triangle_areas
+from ..charts import Charts, PatientGrower, rescale_to_area, unwrap
 from ..texels import coverage_sum
 from .dominant_object import greedy_object, share_of
 from .packing import Limits, Packing, pack
@@ -293,7 +294,7 @@ def _kept_charts(
 
 def _has_area(uv: Float) -> bool:
     """Whether (n, 3, 2) UVs cover more than rounding leaves of a line or a point."""
-    area = np.abs(signed_double_area(uv)).sum()
+    area = np.abs(signed_double_areas(uv)).sum()
     return bool(area > _COLLAPSED * (np.ptp(uv.reshape(-1, 2), axis=0) ** 2).sum())
 
 
@@ -308,7 +309,7 @@ def _kept_as_they_are(
     if len(group) > 1 and not _apart(kept, min(resolution, _PROBE)):
         return None
     surface = _surface(group)
-    flat = float(0.5 * np.abs(signed_double_area(uv.astype(np.float64))).sum())
+    flat = float(0.5 * np.abs(signed_double_areas(uv.astype(np.float64))).sum())
     if density is not None:
         size = density * np.sqrt(surface / flat)
         if not size <= largest:
@@ -369,15 +370,14 @@ def _park(uv: Float32, chart: Int, lengths: list[int]) -> None:
 
 
 def _page(packing: Packing) -> AtlasPage:
-    area = 0.5 * np.abs(signed_double_area(packing.uv.astype(np.float64))).sum()
+    area = 0.5 * np.abs(signed_double_areas(packing.uv.astype(np.float64))).sum()
     return AtlasPage(packing.resolution, packing.density, min(float(area), 1.0))
 
 
 def _surface(group: list[_Layout]) -> float:
     """Return the area of all triangles [m²]."""
     corners = np.concatenate([np.asarray(layout.source.triangles, dtype=np.float64) for layout in group])
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return float(0.5 * np.linalg.norm(cross, axis=1).sum())
+    return float(triangle_areas(corners).sum())
 
 
 def _crowded(group: list[_Layout], resolution: int) -> BakeWarning:

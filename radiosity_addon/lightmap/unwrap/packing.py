@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base import BakeError
+from ...numerics import signed_double_areas
 from ...options import MAX_RESOLUTION
-from ..charts import signed_double_area
 from .chart_profiles import Shapes, align, measure, outline
 from .skyline import Placement, place
 
@@ -162,7 +162,7 @@ def _job(uv: Float, chart: Int, limits: Limits) -> _Job:
     if count <= FEW:
         orders.append(np.lexsort((np.arange(count), -long, -extent.prod(axis=1))))
         orders.append(np.lexsort((np.arange(count), -long, -short)))
-    area = float(0.5 * np.abs(signed_double_area(aligned)).sum())
+    area = float(0.5 * np.abs(signed_double_areas(aligned)).sum())
     return _Job(aligned, chart, *outline(aligned, chart), extent, tuple(orders), area, limits)
 
 

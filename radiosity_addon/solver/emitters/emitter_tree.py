@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...form_factors import point_to_polygon
-from ...numerics import Array
+from ...numerics import Array, triangle_areas
 
 NEAREST = 3.0
 """A flat group is asked as one from this many times its radius on, …"""
@@ -103,10 +103,7 @@ class EmitterTree:
         of = self.begin[single]
         # A repeated corner is an edge of no length.
         self.polygon[single] = corners[of][:, [0, 1, 2, 2]]
-        area = 0.5 * np.linalg.norm(
-            np.cross(local[of, 1] - local[of, 0], local[of, 2] - local[of, 0]), axis=1
-        )
-        self._scale[single] = weight[of] / np.maximum(area, 1e-300)
+        self._scale[single] = weight[of] / np.maximum(triangle_areas(local[of]), 1e-300)
         self.facing = facing
         self.radius, self._slant = self._extremes(corners, normals)
         flat, coherent = self._slant <= FLAT, self._slant <= MOST_SLANT

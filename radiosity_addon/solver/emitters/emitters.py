@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...form_factors import point_to_polygon, ray_geometry_term, throughput
-from ...numerics import Array, numbered, points_on_triangles, radiance_of_radiosity
+from ...numerics import Array, numbered, points_on_triangles, radiance_of_radiosity, triangle_areas
 from ...rays import RayCaster
 from ...scene import Faces
 from .emitter_tree import EmitterTree
@@ -48,8 +48,7 @@ class EmitterGroup:
         self, corners: Array, normals: Array, strength: Array, offset: float, level: Array | None = None
     ) -> None:
         self._corners, self._normals, self._offset = corners, normals, offset
-        edges = corners[:, 1:] - corners[:, :1]
-        self._areas = 0.5 * np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+        self._areas = triangle_areas(corners)
         self.strength = strength
         self._level = np.ones(len(corners)) if level is None else level
         # From a corner of theirs: heights over planes far from the origin would be rounded off.

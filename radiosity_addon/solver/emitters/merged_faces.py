@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...numerics import Array, connected_components, numbered, weld
+from ...numerics import Array, connected_components, double_area_vectors, numbered, weld
 
 FLAT = 1e-6
 """Faces lie in one plane if their normals agree to this, and their corners to this part of their extent."""
@@ -48,7 +48,7 @@ def merge_flat(corners: Array) -> tuple[Array, Array]:
     everything = np.arange(len(corners))
     if len(corners) < 3:
         return corners, everything
-    twice = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    twice = double_area_vectors(corners)
     area = 0.5 * np.linalg.norm(twice, axis=1)
     normal = twice / (2.0 * area[:, None])
     points = corners.reshape(-1, 3)
@@ -140,7 +140,7 @@ def _triangulated(loop: Array, normal: Array, area: float, most: int) -> Array |
     if len(ears) < len(loop) - 2:
         return None
     found = loop[np.array(ears)]
-    twice = np.cross(found[:, 1] - found[:, 0], found[:, 2] - found[:, 0])
+    twice = double_area_vectors(found)
     if not (twice @ normal > 0).all() or abs(0.5 * (twice @ normal).sum() - area) > SAME_AREA * area:
         return None
     return np.asarray(found)

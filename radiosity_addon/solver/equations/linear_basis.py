@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...numerics import Array, connected_components, numbered
+from ...numerics import Array, connected_components, numbered, weights_at
 from ...scene import Faces
 from ..hierarchy import Basis, Hierarchy
 
@@ -74,7 +74,8 @@ def _across_edges(hierarchy: Hierarchy, node: Array, position: Array) -> tuple[A
     some = np.zeros(count, dtype=np.int64)
     some[node] = np.arange(len(node))
     leaf, face = hierarchy.leaves[some // 3], hierarchy.face[hierarchy.leaves[some // 3]]
-    weights = _barycentric(hierarchy.faces.corners[face], hierarchy.corners[leaf, some % 3])
+    vertices = hierarchy.corners[leaf, some % 3]
+    weights = weights_at(hierarchy.faces.corners[face], vertices[:, None])[:, 0]
     edge, smooth = _smooth_edges(hierarchy.faces)
 
     at_crease = np.zeros(count, dtype=bool)
@@ -128,12 +129,3 @@ def _angles(corners: Array) -> Array:
     back = np.roll(corners, 1, axis=1) - corners
     across = np.linalg.norm(np.cross(onward, back), axis=2)
     return np.asarray(np.arctan2(across, np.einsum("lck,lck->lc", onward, back)))
-
-
-def _barycentric(triangles: Array, points: Array) -> Array:
-    """Return (n, 3) the weights of triangles' corners at points in their planes."""
-    arms = triangles - points[:, None]
-    whole = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    square = np.einsum("nk,nk->n", whole, whole)
-    parts = np.cross(np.roll(arms, -1, axis=1), np.roll(arms, -2, axis=1))
-    return np.asarray(np.einsum("nck,nk->nc", parts, whole) / square[:, None])

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...form_factors import point_to_polygon
-from ...numerics import Array, for_chunks, split_in_four
+from ...numerics import Array, for_chunks, points_at, split_in_four, weights_at
 from ..equations import corner_factors, visible_share
 from ..links import lamp_irradiance
 from ..state import SolverState
@@ -54,7 +54,7 @@ class Residual:
     def _at_leaves(self, leaf: Array, face: Array, barycentric: Array) -> Array:
         """Return the same, for known leaves."""
         corners = self._hierarchy.corners[leaf]
-        weights = _weights(corners, self.position(face, barycentric))
+        weights = weights_at(corners, self.position(face, barycentric)[:, None])[:, 0]
         return self._basis.evaluate(self._values, self._row[leaf], weights)
 
     def front_of(self, triangle: Array) -> Array:
@@ -63,9 +63,7 @@ class Residual:
 
     def position(self, face: Array, barycentric: Array) -> Array:
         """Return where points of faces lie, (n, 3)."""
-        corners = self._state.scene.triangles[self._hierarchy.faces.triangle[face]]
-        weights = np.asarray(barycentric, dtype=np.float64)
-        return np.asarray(corners[:, 0] + np.einsum("nc,nck->nk", weights, corners[:, 1:] - corners[:, :1]))
+        return points_at(self._state.scene.triangles[self._hierarchy.faces.triangle[face]], barycentric)
 
     def at(self, face: Array, barycentric: Array) -> Array:
         """Return r at points of faces, the integral as a sum over all elements.
@@ -158,7 +156,8 @@ class Residual:
 
     def _barycentric(self, face: Array, points: Array) -> Array:
         """Return (n, 2) weights of the second and third corner of the faces' triangles."""
-        return _weights(self._state.scene.triangles[self._hierarchy.faces.triangle[face]], points)[:, 1:]
+        triangles = self._state.scene.triangles[self._hierarchy.faces.triangle[face]]
+        return weights_at(triangles, points[:, None])[:, 0, 1:]
 
     def _from_surfaces(self, points: Array, normals: Array) -> Array:
         """Return (n, 3) ∫ B̂ κ V dA' as a sum over the elements that send light."""
@@ -201,12 +200,3 @@ class Residual:
         if self._basis.is_constant:
             return np.repeat(point_to_polygon(points, normals, corners)[:, None] / 3.0, 3, axis=1)
         return corner_factors(points, normals, corners, leaf_normals)
-
-
-def _weights(corners: Array, points: Array) -> Array:
-    """Return (n, 3) barycentric weights of triangles' corners at points in their planes."""
-    arms = corners - points[:, None]
-    whole = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    parts = np.cross(np.roll(arms, -1, axis=1), np.roll(arms, -2, axis=1))
-    weights = np.einsum("nck,nk->nc", parts, whole) / np.einsum("nk,nk->n", whole, whole)[:, None]
-    return np.asarray(weights)

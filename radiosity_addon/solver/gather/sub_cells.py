@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...numerics import Array, points_on_triangles, split_in_sixteen
+from ...numerics import Array, points_at, points_on_triangles, split_in_sixteen
 from ...rays import SIGHT_LIFT, Hits, RayCaster, free_segment
 from ..hierarchy import Hierarchy
 from .final_gather import NOTHING
@@ -115,8 +115,7 @@ class LeafParts:
         """Return (h, 3) where rays hit."""
         faces = self._hierarchy.faces
         corners = faces.corners[faces.of_triangle[0, hits.triangle]]
-        along = corners[:, 1:] - corners[:, :1]
-        return np.asarray(corners[:, 0] + np.einsum("hk,hkx->hx", hits.barycentric.astype(np.float64), along))
+        return points_at(corners, hits.barycentric)
 
     def _lift(self, normal: Array) -> Array:
         return np.asarray(SIGHT_LIFT * self._caster.surface_offset * normal)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...numerics import Array
+from ...numerics import Array, weights_at
 from ...rays import RayCaster
 from .nodes import Hierarchy
 
@@ -30,7 +30,7 @@ def neighbours(hierarchy: Hierarchy, caster: RayCaster) -> Array:
     """
     leaves = hierarchy.leaves
     leaf, inside, beyond = _probes(hierarchy, leaves)
-    weights = _barycentric(hierarchy, hierarchy.face[leaf], beyond)
+    weights = weights_at(hierarchy.faces.corners[hierarchy.face[leaf]], beyond[:, None])[:, 0]
     found = np.full(len(leaf), -1, dtype=np.int64)
     same = weights.min(axis=1) >= 0
     found[same] = hierarchy.leaf_at(hierarchy.face[leaf[same]], _of_triangle(hierarchy, leaf, weights, same))
@@ -50,19 +50,6 @@ def _probes(hierarchy: Hierarchy, leaves: Array) -> tuple[Array, Array, Array]:
     outward = ACROSS * (middle - corners)
     shape = (-1, 3)
     return np.repeat(leaves, 3), (middle - outward).reshape(shape), (middle + outward).reshape(shape)
-
-
-def _barycentric(hierarchy: Hierarchy, face: Array, points: Array) -> Array:
-    """Return (n, 3) weights of the faces' own corners at points of their planes; sum 1."""
-    corners = hierarchy.faces.corners[face]
-    edge_1, edge_2, along = (x - corners[:, 0] for x in (corners[:, 1], corners[:, 2], points))
-    g11, g12, g22 = (
-        np.einsum("nk,nk->n", a, b) for a, b in ((edge_1, edge_1), (edge_1, edge_2), (edge_2, edge_2))
-    )
-    p1, p2 = np.einsum("nk,nk->n", along, edge_1), np.einsum("nk,nk->n", along, edge_2)
-    area = g11 * g22 - g12 * g12
-    second, third = (g22 * p1 - g12 * p2) / area, (g11 * p2 - g12 * p1) / area
-    return np.stack([1.0 - second - third, second, third], axis=1)
 
 
 def _of_triangle(hierarchy: Hierarchy, leaf: Array, weights: Array, rows: Array) -> Array:
