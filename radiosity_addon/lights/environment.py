@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from ..numerics import irradiance_under_sky
+from ..numerics import irradiance_under_sky, pick_in_runs, running_sums
 from .light import Float64Array, Lamp, Light, Rays, Samples, row_cosines
 from .sun_and_sky import EnvironmentLight
 
@@ -140,11 +140,7 @@ class SkyPatch(Lamp):
 
     def shadow_rays(self, points: Float64Array, normals: Float64Array, u: Samples) -> Rays:  # noqa: ARG002
         """Return rays to the pixels in proportion to their shares (see `Lamp.shadow_rays`)."""
-        running = np.cumsum(np.asarray(self.share))
-        pick = np.asarray(u[..., 0], dtype=np.float64) * running[-1]
-        pixel = np.minimum(np.searchsorted(running, pick, side="right"), len(running) - 1)
-        share = np.asarray(self.share)[pixel]
-        within = np.clip((pick - (running[pixel] - share)) / np.maximum(share, 1e-300), 0.0, 1.0)
+        pixel, within = pick_in_runs(running_sums(np.asarray(self.share)), u[..., 0])
         low, high, left, right = np.moveaxis(np.asarray(self.bounds)[pixel], -1, 0)
         sine = np.sin(low) + u[..., 1] * (np.sin(high) - np.sin(low))
         directions = _directions(sine, left + within * (right - left))

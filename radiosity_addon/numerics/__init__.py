@@ -6,6 +6,7 @@ Knows neither scenes nor lamps.
 from __future__ import annotations
 
 from .arrays import Array
+from .discrete import pick_in_rows, pick_in_runs, running_sums
 from .meshes import connected_components, connected_faces, numbered, weld
 from .parallel import chunk_steps, for_chunks, thread_count
 from .polygons import areas, clip_half_plane, edge_distances
@@ -82,6 +83,8 @@ __all__ = [
     "marked",
     "numbered",
     "orthonormal_basis",
+    "pick_in_rows",
+    "pick_in_runs",
     "plane_weights_at",
     "points_at",
     "points_on_triangles",
@@ -94,6 +97,7 @@ __all__ = [
     "run_chunks",
     "run_numbers",
     "run_starts",
+    "running_sums",
     "signed_double_areas",
     "sphere_area",
     "split_in_four",

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...numerics import clip_half_plane
+from ...numerics import clip_half_plane, pick_in_rows
 
 Float = NDArray[np.float64]
 
@@ -77,13 +77,9 @@ def sample_polygons(polygon: Float, u: Float) -> Float:
     offset = polygon[:, 1:] - polygon[:, :1]
     cross = offset[:, :-1, 0] * offset[:, 1:, 1] - offset[:, :-1, 1] * offset[:, 1:, 0]
     area = np.maximum(cross, 0)
-    bound = np.cumsum(area, axis=1)
-    aim = u[..., 0] * bound[:, -1:]
-    part = (aim[..., None] >= bound[:, None, :-1]).sum(axis=2)
-    size = np.take_along_axis(area, part, axis=1)
-    stretched = (aim - np.take_along_axis(bound - area, part, axis=1)) / np.where(size > 0, size, 1.0)
+    part, along = pick_in_rows(area, u[..., 0])
     root = np.sqrt(u[..., 1])[..., None]
     second = np.take_along_axis(offset, part[..., None], axis=1)
     third = np.take_along_axis(offset, part[..., None] + 1, axis=1)
-    along = np.clip(stretched, 0, 1)[..., None]
-    return np.asarray(polygon[:, :1] + root * ((1 - along) * second + along * third))
+    share = along[..., None]
+    return np.asarray(polygon[:, :1] + root * ((1 - share) * second + share * third))

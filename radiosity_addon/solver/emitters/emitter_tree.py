@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...form_factors import point_to_polygon
-from ...numerics import Array, triangle_areas
+from ...numerics import Array, running_sums, triangle_areas
 
 NEAREST = 3.0
 """A flat group is asked as one from this many times its radius on, …"""
@@ -70,7 +70,7 @@ class EmitterTree:
         depth = np.repeat(np.arange(len(levels)), np.diff(self._levels))
         self._child = self._levels[1:][depth] + 2 * (np.arange(len(depth)) - self._levels[depth])
         self._single = self.end - self.begin == 1
-        self.running = np.concatenate([[0.0], np.cumsum(weight)])
+        self.running = running_sums(weight)
         """(m + 1,) float64: summed weights along the order"""
         self._describe(corners, normals, weight)
 

@@ -5,7 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from ...form_factors import point_to_polygon, ray_geometry_term, throughput
-from ...numerics import Array, numbered, points_on_triangles, radiance_of_radiosity, triangle_areas
+from ...numerics import (
+    Array,
+    numbered,
+    pick_in_rows,
+    pick_in_runs,
+    points_on_triangles,
+    radiance_of_radiosity,
+    run_starts,
+    running_sums,
+    triangle_areas,
+)
 from ...rays import RayCaster
 from ...scene import Faces
 from .emitter_tree import EmitterTree
@@ -136,19 +146,13 @@ class EmitterGroup:
         if self._tree is not None:
             return self._rays_by_tree(self._tree, points, normals, u)
         factors = self._factors(points, normals)
-        running = np.cumsum(factors, axis=1)
-        total = running[:, -1:]
-        rows = np.arange(len(points))[:, None]
-        pick = u[..., 0] * total
-        face = np.minimum((running[:, None, :] <= pick[..., None]).sum(axis=2), len(self._corners) - 1)
-        # What is left of the first coordinate within the chosen face places the point on it.
-        below = np.where(face > 0, running[rows, face - 1], 0.0)
-        width = np.maximum(factors[rows, face], 1e-300)
-        inside = np.stack([np.clip((pick - below) / width, 0.0, 1.0), u[..., 1]], axis=-1)
+        face, along = pick_in_rows(factors, u[..., 0])
+        chosen = np.take_along_axis(factors, face, axis=1)
+        inside = np.stack([along, u[..., 1]], axis=-1)
         directions, distances, thrown = self._rays_to(points, normals, face, inside)
         # A uniform point of a face stands for what the whole face would send, were it all there.
         thrown *= self._level[face] * self._areas[face]
-        weights = np.where(total > 0, radiance_of_radiosity(thrown) / width, 0.0)
+        weights = np.where(chosen > 0, radiance_of_radiosity(thrown) / np.maximum(chosen, 1e-300), 0.0)
         return directions, distances, _balanced(weights, face, len(self._corners))
 
     def _rays_by_tree(
@@ -156,36 +160,24 @@ class EmitterGroup:
     ) -> tuple[Array, Array, Array]:
         """Aim (n, k) rays at nodes by what they send, and at faces of a node by their weights."""
         asked = tree.ask(points, normals)
-        total = np.bincount(asked.row, asked.factor, minlength=len(points))
-        lit = np.flatnonzero(total > 0)
+        count = np.bincount(asked.row, minlength=len(points))
+        lit = np.flatnonzero(count)
         directions, (distances, weights) = np.zeros((*u.shape[:2], 3)), np.zeros((2, *u.shape[:2]))
         directions[..., 2] = 1.0
         if len(lit) == 0:
             return directions, distances, weights
-        number = np.cumsum(total > 0) - 1
-        # One search for all points: those of the i-th lit one lie in (i, i + 1].
-        running = np.cumsum(asked.factor)
-        last = np.cumsum(np.bincount(asked.row, minlength=len(points)))[lit] - 1
-        first = np.append(0, last[:-1] + 1)
-        before = running[first] - asked.factor[first]
-        flat = (running - before[number[asked.row]]) / total[asked.row]
-        pick = np.clip(u[lit, :, 0].astype(np.float64), 0.0, 1.0 - 1e-12)
-        which = np.searchsorted(flat + number[asked.row], pick + np.arange(len(lit))[:, None], side="right")
-        which = np.clip(which, first[:, None], last[:, None])
-        share = asked.factor[which] / total[lit, None]
-        within = np.clip((pick - (flat[which] - share)) / share, 0.0, 1.0 - 1e-12)
+        first = run_starts(count)[lit, None]
+        running = running_sums(asked.factor)
+        which, along = pick_in_runs(running, u[lit, :, 0], first, first + count[lit, None])
         node = asked.node[which]
-        low, high = tree.running[tree.begin[node]], tree.running[tree.end[node]]
-        wanted = low + within * (high - low)
-        slot = np.searchsorted(tree.running, wanted, side="right") - 1
-        slot = np.clip(slot, tree.begin[node], tree.end[node] - 1)
-        width = np.maximum(tree.running[slot + 1] - tree.running[slot], 1e-300)
-        inside = np.stack([np.clip((wanted - tree.running[slot]) / width, 0.0, 1.0), u[lit, :, 1]], axis=-1)
+        begin, end = tree.begin[node], tree.end[node]
+        slot, along = pick_in_runs(tree.running, along, begin, end)
+        inside = np.stack([along, u[lit, :, 1]], axis=-1)
         directions[lit], distances[lit], thrown = self._rays_to(
             points[lit], normals[lit], tree.order[slot], inside
         )
         # A point of a node's faces stands for what the whole node would send, were it all there.
-        sent = radiance_of_radiosity(thrown * (high - low))
+        sent = radiance_of_radiosity(thrown * (tree.running[end] - tree.running[begin]))
         weights[lit] = _balanced(sent / np.maximum(asked.factor[which], 1e-300), which, len(asked.row))
         return directions, distances, weights
 

@@ -18,8 +18,11 @@ from ...numerics import (
     Array,
     Rows,
     Scratch,
+    pick_in_rows,
+    pick_in_runs,
     points_on_triangles,
     radiance_of_radiosity,
+    running_sums,
     split_in_four,
     split_in_sixteen,
     tiles,
@@ -250,35 +253,22 @@ class BrightElements:
             Rows without any are left out.
         u : (n, k, 2) float
         """
-        running = np.cumsum(shares, axis=1)
-        row = np.flatnonzero(running[:, -1] > 0)
-        running, shares = running[row], shares[row]
-        total = running[:, -1:]
-        # One search for all rows: row i's running shares lie in (i, i + 1].
-        flat = (running / total + np.arange(len(row))[:, None]).ravel()
-        wanted = np.asarray(u[row, :, 0], dtype=np.float64)
-        found = np.searchsorted(flat, wanted + np.arange(len(row))[:, None], side="right")
-        pick = np.minimum(found - running.shape[1] * np.arange(len(row))[:, None], running.shape[1] - 1)
+        row = np.flatnonzero(shares.any(axis=1))
+        shares = shares[row]
+        pick, within = pick_in_rows(shares, u[row, :, 0])
         share = np.take_along_axis(shares, pick, axis=1)
-        below = (np.take_along_axis(running, pick, axis=1) - share) / total
-        part = np.maximum(share / total, 1e-300)
-        within = np.clip((wanted - below) / part, 0.0, 1.0)
+        part = np.maximum(share / shares.sum(axis=1, keepdims=True), 1e-300)
         # The same once more, for the sixteenths of the element.
-        running = np.cumsum(self._chance, axis=1)
-        flat = (running / running[:, -1:] + np.arange(len(self))[:, None]).ravel()
-        found = np.searchsorted(flat, np.minimum(within, 1.0 - 1e-12) + pick, side="right")
-        cell = np.clip(found - 16 * pick, 0, 15)
-        chance = self._chance[pick, cell]
-        along_cell = np.clip((within - (running[pick, cell] - chance)) / chance, 0.0, 1.0)
-        inside = np.stack([along_cell, u[row, :, 1]], axis=-1)
-        corners = self._cells[pick, cell].reshape(-1, 3, 3)
+        cell, within = pick_in_runs(running_sums(self._chance.ravel()), within, 16 * pick, 16 * pick + 16)
+        inside = np.stack([within, u[row, :, 1]], axis=-1)
+        corners = self._cells.reshape(-1, 3, 3)[cell.ravel()]
         targets = points_on_triangles(corners, inside.reshape(-1, 1, 2)).reshape(*pick.shape, 3)
         along = targets - points[row]
         distance = np.linalg.norm(along, axis=2)
         directions = along / np.maximum(distance, 1e-300)[..., None]
         cos_r = np.einsum("nkc,nc->nk", directions, normals[row])
         cos_s = -np.einsum("nkc,nkc->nk", directions, self._normals[pick])
-        area = self._area[pick] / (16.0 * chance)
+        area = self._area[pick] / (16.0 * self._chance.ravel()[cell])
         thrown = throughput(ray_geometry_term(cos_r, cos_s, distance), 1.0, area)
         weights = radiance_of_radiosity(thrown) / (part * u.shape[1])
         return Aim(row, directions, self.element[pick], np.where(share > 0, weights, 0.0))

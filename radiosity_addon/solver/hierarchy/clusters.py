@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...numerics import Array, run_numbers, run_starts
+from ...numerics import Array, run_numbers, run_starts, running_sums
 from ...scene import Faces
 
 NORMAL_WEIGHT = 0.25
@@ -75,7 +75,7 @@ class Clusters:
 
     def measure(self, faces: Faces) -> None:
         """Fill in areas and boxes."""
-        self.area_before = np.concatenate([[0.0], np.cumsum(faces.area[self.order])])
+        self.area_before = running_sums(faces.area[self.order])
         self.area = self.sums(faces.area)
         if len(self) == 0:
             return

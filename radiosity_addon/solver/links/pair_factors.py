@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...form_factors import kernel, point_to_polygon, triangle_to_triangle, visibility_of, weighted_sums
-from ...numerics import Array, hash_keys, points_on_triangles, split_in_four, stratified_square
+from ...numerics import Array, hash_keys, pick_in_runs, points_on_triangles, split_in_four, stratified_square
 from ...rays import RayCaster
 from ..hierarchy import Hierarchy
 
@@ -190,10 +190,8 @@ def _one_in_each(corners: Array, unit: Array) -> Array:
 def sample_clusters(hierarchy: Hierarchy, cluster: Array, share: Array) -> Array:
     """Return the faces at (n, k) shares in [0, 1) of n clusters' areas."""
     clusters = hierarchy.clusters
-    low = clusters.area_before[clusters.start[cluster]][:, None]
-    at = low + share * clusters.area[cluster][:, None]
-    slot = np.searchsorted(clusters.area_before, at, side="right") - 1
-    slot = np.clip(slot, clusters.start[cluster][:, None], clusters.end[cluster][:, None] - 1)
+    begin, end = clusters.start[cluster][:, None], clusters.end[cluster][:, None]
+    slot, _ = pick_in_runs(clusters.area_before, share, begin, end)
     return np.asarray(clusters.order[slot])
 
 

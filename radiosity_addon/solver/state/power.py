@@ -9,7 +9,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...numerics import Array, cosine_hemisphere, points_on_triangles, stratified_square, to_world
+from ...numerics import (
+    Array,
+    cosine_hemisphere,
+    pick_in_runs,
+    points_on_triangles,
+    running_sums,
+    stratified_square,
+    to_world,
+)
 from ..hierarchy import LEAF, Hierarchy, TreeTop, node_opacity
 from ..links import ClusterLinks, Links, gather_at_clusters
 from .lamp_power import fate, is_stopped, lost_by_lamp
@@ -62,7 +70,7 @@ def _follow_surfaces(state: SolverState) -> tuple[float, float]:
     # Stratified by power: the rays are shared out along the running sum.
     number = np.arange(ESCAPE_RAYS)
     along = (number + 0.5) / ESCAPE_RAYS
-    leaf = leaves[np.minimum(np.searchsorted(np.cumsum(power) / total, along), len(leaves) - 1)]
+    leaf = leaves[pick_in_runs(running_sums(power), along)[0]]
     seed = state.settings.seed
     points = points_on_triangles(hierarchy.corners[leaf], stratified_square(number, 1, seed + 11))[:, 0]
     normals = hierarchy.normal[leaf]
