@@ -16,6 +16,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from ..numerics import clip_half_plane, double_area_vectors
 from .polygon import CONTACT, IN_PLANE, Float64Array, point_to_polygon
 
 FAR = 0.4
@@ -152,8 +153,8 @@ def _chunk_factors(receivers: Float64Array, sources: Float64Array) -> Float64Arr
         mutual[rows] = _outline_factor(outer[rows], inner[rows], outer_area[rows])
     rows = np.flatnonzero(facing & ~whole & ~needle)
     if len(rows):
-        outer_part = _clip(outer[rows], outer_height[rows])
-        inner_part = _clip(inner[rows], inner_height[rows])
+        outer_part = clip_half_plane(outer[rows], outer_height[rows])
+        inner_part = clip_half_plane(inner[rows], inner_height[rows])
         mutual[rows] = _outline_factor(outer_part, inner_part, outer_area[rows])
     rows = np.flatnonzero(touching)
     if len(rows):
@@ -165,7 +166,7 @@ def _chunk_factors(receivers: Float64Array, sources: Float64Array) -> Float64Arr
 
 def _normals(triangles: Float64Array) -> tuple[Float64Array, Float64Array]:
     """Return unit normals (m, 3), zero where there is no area, and areas (m,)."""
-    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    cross = double_area_vectors(triangles)
     double = np.sqrt(np.einsum("ij,ij->i", cross, cross))
     return cross / np.where(double > 0.0, double, 1.0)[:, None], 0.5 * double
 
@@ -234,32 +235,12 @@ def weighted_sums(values: Float64Array, weights: Float64Array) -> Float64Array:
     return total
 
 
-def _clip(polygons: Float64Array, heights: Float64Array) -> Float64Array:
-    """Cut convex polygons (m, k, 3) down to where their corners' heights (m, k) are not negative.
-
-    Sutherland and Hodgman 1974. Returns (m, k + 1, 3); spare corners repeat the last one, and
-    a polygon wholly below becomes a point.
-    """
-    count, corners = heights.shape
-    following, high = np.roll(polygons, -1, axis=1), np.roll(heights, -1, axis=1)
-    crosses = (heights < 0.0) != (high < 0.0)
-    where = np.where(crosses, heights / np.where(crosses, heights - high, 1.0), 0.0)[..., None]
-    # Each corner in turn gives itself, if it is above, and the crossing on the edge after it.
-    candidates = np.stack([polygons, polygons + where * (following - polygons)], axis=2).reshape(count, -1, 3)
-    kept = np.stack([heights >= 0.0, crosses], axis=2).reshape(count, -1)
-    order = np.argsort(~kept, axis=1, kind="stable")[:, : corners + 1]
-    last = np.maximum(np.minimum(np.arange(corners + 1), kept.sum(axis=1)[:, None] - 1), 0)
-    order = np.take_along_axis(order, last, axis=1)
-    clipped: Float64Array = np.take_along_axis(candidates, order[..., None], axis=1)
-    return clipped
-
-
 def _overlap_area(polygons: Float64Array, triangles: Float64Array, normals: Float64Array) -> Float64Array:
     """Return the area (m,) that coplanar polygons and triangles with given normals share."""
     for corner in range(3):
         start = triangles[:, corner]
         inward = np.cross(normals, triangles[:, (corner + 1) % 3] - start)
-        polygons = _clip(polygons, np.einsum("ijk,ik->ij", polygons - start[:, None], inward))
+        polygons = clip_half_plane(polygons, np.einsum("ijk,ik->ij", polygons - start[:, None], inward))
     arms = polygons[:, 1:] - polygons[:, :1]
     total = np.cross(arms[:, :-1], arms[:, 1:]).sum(axis=1)
     area: Float64Array = 0.5 * np.sqrt(np.einsum("ij,ij->i", total, total))
