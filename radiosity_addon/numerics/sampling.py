@@ -157,6 +157,12 @@ def points_on_triangles(triangles: FloatArray, u: FloatArray) -> FloatArray:
     return points
 
 
+def point_on_each_triangle(triangles: FloatArray, u: FloatArray) -> FloatArray:
+    """Carry a point of the unit square, (..., 2), onto each of (..., 3, 3) triangles: (..., 3) float64."""
+    points = points_on_triangles(triangles.reshape(-1, 3, 3), u.reshape(-1, 1, 2))
+    return points.reshape(*triangles.shape[:-2], 3)
+
+
 def concentric_disk(u: FloatArray) -> FloatArray:
     """Carry points of the unit square onto the unit disk, keeping them uniform.
 

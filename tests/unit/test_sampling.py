@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.numerics import sampling
+from radiosity_addon.numerics import point_on_each_triangle, points_on_triangles, sampling
 
 
 @pytest.mark.parametrize("first", [0, 16, 65536 - 16, 65536, 1 << 20])
@@ -118,3 +118,12 @@ def test_the_basis_is_right_handed_also_at_the_poles() -> None:
     local = rng.normal(size=(len(normals), 4, 3))
     world = sampling.to_world(local, normals)
     np.testing.assert_allclose(np.einsum("ikj,ij->ik", world, normals), local[..., 2], atol=1e-12)
+
+
+def test_a_point_on_each_triangle_is_the_first_of_many_there() -> None:
+    generator = np.random.default_rng(8)
+    triangles, u = generator.random((6, 4, 3, 3)), generator.random((6, 4, 2))
+    expected = [points_on_triangles(triangles[row], u[row][:, None])[:, 0] for row in range(6)]
+    np.testing.assert_array_equal(point_on_each_triangle(triangles, u), expected)
+    np.testing.assert_array_equal(point_on_each_triangle(triangles[:, 0], u[:, 0]), np.array(expected)[:, 0])
+    assert point_on_each_triangle(triangles[:0], u[:0]).shape == (0, 4, 3)

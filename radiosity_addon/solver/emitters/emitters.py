@@ -10,7 +10,7 @@ from ...numerics import (
     numbered,
     pick_in_rows,
     pick_in_runs,
-    points_on_triangles,
+    point_on_each_triangle,
     radiance_of_radiosity,
     run_starts,
     running_sums,
@@ -186,8 +186,7 @@ class EmitterGroup:
     ) -> tuple[Array, Array, Array]:
         """Return directions, distances and throughput per area of rays to places on faces (n, k)."""
         corners = self._corners[face]
-        targets = points_on_triangles(corners.reshape(-1, 3, 3), inside.reshape(-1, 1, 2))
-        targets = targets.reshape(*face.shape, 3)
+        targets = point_on_each_triangle(corners, inside)
         along = targets + self._offset * self._normals[face] - points[:, None]
         distances = np.linalg.norm(along, axis=2)
         directions = along / np.maximum(distances, 1e-300)[..., None]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...form_factors import LEAST, kernel, point_to_polygon
-from ...numerics import Array, points_on_triangles, split_in_four, stratified_square
+from ...numerics import Array, point_on_each_triangle, split_in_four, stratified_square
 from ...rays import RayCaster
 
 NEAR = ((1.21, 4), (2.07, 2), (4.13, 1))
@@ -51,7 +51,7 @@ def visible_share(
         # Column k lies in quarter k mod 4.
         quarters = np.tile(split_in_four(corners[rows]), (1, count // 4, 1, 1))
         unit = stratified_square(keys[rows], count, seed, first)
-        ends = points_on_triangles(quarters.reshape(-1, 3, 3), unit.reshape(-1, 1, 2)).reshape(-1, count, 3)
+        ends = point_on_each_triangle(quarters, unit)
         facing, back = normals[rows, None], source_normals[rows, None]
         weight = kernel(points[rows, None], facing, ends, back)
         pair, sample = np.nonzero(weight > 0)

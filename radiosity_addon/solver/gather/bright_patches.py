@@ -20,7 +20,7 @@ from ...numerics import (
     Scratch,
     pick_in_rows,
     pick_in_runs,
-    points_on_triangles,
+    point_on_each_triangle,
     radiance_of_radiosity,
     running_sums,
     split_in_four,
@@ -261,8 +261,7 @@ class BrightElements:
         # The same once more, for the sixteenths of the element.
         cell, within = pick_in_runs(running_sums(self._chance.ravel()), within, 16 * pick, 16 * pick + 16)
         inside = np.stack([within, u[row, :, 1]], axis=-1)
-        corners = self._cells.reshape(-1, 3, 3)[cell.ravel()]
-        targets = points_on_triangles(corners, inside.reshape(-1, 1, 2)).reshape(*pick.shape, 3)
+        targets = point_on_each_triangle(self._cells.reshape(-1, 3, 3)[cell], inside)
         along = targets - points[row]
         distance = np.linalg.norm(along, axis=2)
         directions = along / np.maximum(distance, 1e-300)[..., None]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...numerics import Array, points_on_triangles, split_in_four, stratified_square
+from ...numerics import Array, point_on_each_triangle, split_in_four, stratified_square
 from ..hierarchy import Hierarchy
 from .pair_factors import sample_clusters
 
@@ -41,17 +41,11 @@ def node_samples(
     single = np.flatnonzero(node >= hierarchy.n_clusters)
     element = node[single] - hierarchy.n_clusters
     corners = split_in_four(hierarchy.corners[element])[np.arange(len(single))[:, None], quarter[single]]
-    points[single] = _one_in_each(corners, jitter[single])
+    points[single] = point_on_each_triangle(corners, jitter[single])
     normals[single] = hierarchy.faces.normal[hierarchy.face[element]][:, None]
     grouped = np.flatnonzero(node < hierarchy.n_clusters)
     along = stratified_square(keys[grouped], samples, seed + 1)[..., 0]
     face = sample_clusters(hierarchy, node[grouped], (quarter[grouped] + along) / 4.0)
-    points[grouped] = _one_in_each(hierarchy.faces.corners[face], jitter[grouped])
+    points[grouped] = point_on_each_triangle(hierarchy.faces.corners[face], jitter[grouped])
     normals[grouped] = hierarchy.faces.normal[face]
     return points, normals
-
-
-def _one_in_each(corners: Array, unit: Array) -> Array:
-    """Return (n, k, 3): a point in each of (n, k, 3, 3) triangles, placed by (n, k, 2)."""
-    points = points_on_triangles(corners.reshape(-1, 3, 3), unit.reshape(-1, 1, 2))
-    return points.reshape(*unit.shape[:2], 3)

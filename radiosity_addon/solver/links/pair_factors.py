@@ -9,7 +9,14 @@ from __future__ import annotations
 import numpy as np
 
 from ...form_factors import kernel, point_to_polygon, triangle_to_triangle, visibility_of, weighted_sums
-from ...numerics import Array, hash_keys, pick_in_runs, points_on_triangles, split_in_four, stratified_square
+from ...numerics import (
+    Array,
+    hash_keys,
+    pick_in_runs,
+    point_on_each_triangle,
+    split_in_four,
+    stratified_square,
+)
 from ...rays import RayCaster
 from ..hierarchy import Hierarchy
 
@@ -141,7 +148,7 @@ class PairSamples:
         source_quarter = receiver_quarter[None] ^ (turned % 4)
         quarters = split_in_four(hierarchy.corners[receiver])
         jitter = stratified_square(pair, samples, seed + 1)
-        self.receiver_points = _one_in_each(quarters[:, receiver_quarter], jitter)
+        self.receiver_points = point_on_each_triangle(quarters[:, receiver_quarter], jitter)
         self.receiver_normals = hierarchy.faces.normal[hierarchy.face[receiver]]
 
         self.source_points = np.empty((count, samples, 3))
@@ -152,14 +159,14 @@ class PairSamples:
         single = np.flatnonzero(~is_cluster)
         element = source[single] - hierarchy.n_clusters
         quarters = split_in_four(hierarchy.corners[element])
-        self.source_points[single] = _one_in_each(
+        self.source_points[single] = point_on_each_triangle(
             quarters[np.arange(len(single))[:, None], source_quarter[single]], jitter[single]
         )
         self.source_normals[single] = hierarchy.faces.normal[hierarchy.face[element]][:, None]
         grouped = np.flatnonzero(is_cluster)
         share = (source_quarter[grouped] + along[grouped]) / 4.0
         face = sample_clusters(hierarchy, source[grouped], share)
-        self.source_points[grouped] = _one_in_each(hierarchy.faces.corners[face], jitter[grouped])
+        self.source_points[grouped] = point_on_each_triangle(hierarchy.faces.corners[face], jitter[grouped])
         self.source_normals[grouped] = hierarchy.faces.normal[face]
 
         area = np.empty(count)
@@ -179,12 +186,6 @@ class PairSamples:
         to = values.reshape(-1, 4, 4).mean(axis=1)
         of = [np.where(self._source_quarter == q, values, 0.0).sum(axis=1) / 4.0 for q in range(4)]
         return to, np.stack(of, axis=1)
-
-
-def _one_in_each(corners: Array, unit: Array) -> Array:
-    """Return (n, k, 3): a point in each of (n, k, 3, 3) triangles, placed by (n, k, 2)."""
-    points = points_on_triangles(corners.reshape(-1, 3, 3), unit.reshape(-1, 1, 2))
-    return points.reshape(*unit.shape[:2], 3)
 
 
 def sample_clusters(hierarchy: Hierarchy, cluster: Array, share: Array) -> Array:
