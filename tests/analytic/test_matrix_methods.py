@@ -356,7 +356,7 @@ def test_too_large_a_system_is_refused_before_it_is_made(method: str) -> None:
     """A million elements would take terabytes; nothing of them is allocated."""
     with pytest.raises(
         UsageError,
-        match=rf"{method} with 1000000 unknowns needs .* GiB .*limit of 4 GiB.*hierarchical, or shooting",
+        match=rf"{method} with 1000000 unknowns needs .* GiB.*limit of 4 GiB.*hierarchical, or shooting",
     ):
         solved(cornell_box(), method, elements=1_000_000)
 

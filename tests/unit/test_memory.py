@@ -90,7 +90,7 @@ def test_a_solution_takes_no_more_than_the_limit() -> None:
 def test_what_does_not_fit_is_refused_before_anything_is_allocated(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = lit_room(20)
     monkeypatch.setattr(hierarchical, "begin", None)
-    with pytest.raises(UsageError, match=r"at least 0\.2\d GiB for 4,800 faces.*limit of 0\.1 GiB: raise"):
+    with pytest.raises(UsageError, match=r"4,800 faces.*at least 0\.2\d* GiB.*limit of 0\.1 GiB: raise"):
         next(hierarchical.solve_steps(scene, SolverSettings(memory_limit=0.1, threads=1)))
 
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...base import UsageError
 from ...numerics import Array
 from ...scene import OVERLAP, Scene, arriving
 from ..equations import (
@@ -26,7 +25,7 @@ from ..equations import (
 from ..hierarchy import Basis, constant_basis
 from ..links import lamp_irradiance
 from ..settings import SolverSettings
-from ..state import SolverState, begin
+from ..state import SolverState, begin, refuse_beyond
 
 Iterate = tuple[Array, Array]
 """Radiosity (n, 3) [W/m²], and its residual power Σ A |E − K B| (3,) [W]."""
@@ -141,15 +140,11 @@ def check_memory(unknowns: int, copies: int, settings: SolverSettings, faces: in
     UsageError
         Names the size, what it would need, the limit and the methods that do without.
     """
-    needed = copies * 8.0 * float(unknowns) ** 2 / GIB
-    if needed > settings.memory_limit:
-        fewer = "ask for fewer elements, or " if settings.elements > faces else ""
-        raise UsageError(
-            f"{settings.method} with {unknowns} unknowns needs {needed:.3g} GiB for its matrix, more than "
-            f"the memory limit of {settings.memory_limit:g} GiB: {fewer}take the method hierarchical, or "
-            "shooting, which needs no matrix"
-        )
-    return needed
+    needed = copies * 8.0 * float(unknowns) ** 2
+    fewer = "ask for fewer elements, or " if settings.elements > faces else ""
+    advice = f"{fewer}take the method hierarchical, or shooting, which needs no matrix"
+    refuse_beyond(settings.memory_limit, needed, f"{settings.method} with {unknowns} unknowns", advice)
+    return needed / GIB
 
 
 def _assemble(

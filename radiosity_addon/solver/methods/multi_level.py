@@ -13,14 +13,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...base import UsageError
 from ...numerics import Array
 from ...scene import Scene, shares
 from ..equations import RefinePatch, exchange_areas, source_factor_bounds
 from ..hierarchy import Hierarchy
 from ..links import Links, elements_by_level, leaves_by_level, links_by_level, no_links
 from ..settings import SolverSettings
-from ..state import SolverState, begin, bounce, link_closure
+from ..state import SolverState, begin, bounce, link_closure, refuse_beyond
 
 PAIR_BYTES = 64
 """Memory a pair takes while it is refined, measured and sorted."""
@@ -96,12 +95,9 @@ def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float,
 def refuse_too_many_faces(count: int, memory_limit: float) -> None:
     """Refuse scenes whose first pairs, O(k²) of k faces, do not fit into `memory_limit` GiB."""
     pairs = count * (count - 1)
-    need = pairs * PAIR_BYTES / 2**30
-    if need > memory_limit:
-        raise UsageError(
-            f"multi-level begins with {pairs:,} pairs of {count:,} faces and would need {need:.1f} GiB; "
-            f"the memory limit is {memory_limit:g} GiB: use the method hierarchical, or raise the limit"
-        )
+    what = f"multi-level, which begins with {pairs:,} pairs of {count:,} faces,"
+    advice = "use the method hierarchical, or raise the limit"
+    refuse_beyond(memory_limit, pairs * PAIR_BYTES, what, advice)
 
 
 def distinct_pairs(receiver: Array, source: Array, count: int) -> tuple[Array, Array]:

@@ -22,12 +22,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...base import UsageError
 from ...numerics import Array
 from ...scene import Scene, arriving, shares
 from ..equations import exchange_areas, subdivide_evenly
 from ..settings import SolverSettings
-from ..state import SolverState, begin
+from ..state import SolverState, begin, refuse_beyond
 
 HISTORY_STEP = 1.1
 """Shots are noted in the history when their number has grown by this factor: thousands make 100 entries."""
@@ -221,9 +220,6 @@ def _fraction(first: float, state: ShootingState) -> float:
 def refuse_too_many(faces: int, settings: SolverSettings) -> None:
     """Refuse what would exceed the memory limit by its elements alone; faces are the least there are."""
     count = max(faces, settings.elements)
-    needed = count * BYTES_AN_ELEMENT / 2**30
-    if needed > settings.memory_limit:
-        raise UsageError(
-            f"shooting between {count} elements needs {needed:.3g} GiB, more than the memory limit of "
-            f"{settings.memory_limit:g} GiB: ask for fewer elements, raise the limit, or bake fewer objects"
-        )
+    what = f"shooting between {count} elements"
+    advice = "ask for fewer elements, raise the limit, or bake fewer objects"
+    refuse_beyond(settings.memory_limit, count * BYTES_AN_ELEMENT, what, advice)

@@ -20,13 +20,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...base import UsageError
 from ...numerics import Array
 from ...scene import Scene, arriving, shares
 from ..equations import exchange_areas, subdivide_evenly
 from ..hierarchy import LEAF, neighbours
 from ..settings import SolverSettings
-from ..state import SolverState, begin
+from ..state import SolverState, begin, refuse_beyond
 
 FINEST = 1.0 / 64
 """Adaptive subdivision makes no element smaller than this part of the mean of step 1: three levels."""
@@ -292,11 +291,7 @@ def refuse_too_large(faces: int, settings: SolverSettings) -> None:
     """
     elements = max(faces, settings.elements)
     patches = max(faces, min(settings.patches, settings.elements))
-    if elements <= _most_elements(patches, settings.memory_limit):
-        return
-    needed = 8 * (2 * elements * patches + 3 * patches**2) / 2**30
-    raise UsageError(
-        f"two-level with {elements} elements and {patches} patches needs {needed:.3g} GiB for its matrix, "
-        f"more than the memory limit of {settings.memory_limit:g} GiB: ask for fewer elements or patches, or "
-        "take the method hierarchical, or shooting, which needs no matrix"
-    )
+    what = f"two-level with {elements} elements and {patches} patches"
+    instead = "the method hierarchical, or shooting, which needs no matrix"
+    advice = f"ask for fewer elements or patches, or take {instead}"
+    refuse_beyond(settings.memory_limit, 8 * (2 * elements * patches + 3 * patches**2), what, advice)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from .anderson import Anderson
 from .iteration import bounce, reflect, relative_residual
 from .link_record import LinkRecord, leaves_on, nearest_leaf, record_links
-from .memory import link_budget, most_light_elements, refinable, refuse_large_scene
+from .memory import link_budget, most_light_elements, refinable, refuse_beyond, refuse_large_scene
 from .power import link_closure, power_balance
 from .state import SolverState, begin
 
@@ -27,6 +27,7 @@ __all__ = [
     "record_links",
     "refinable",
     "reflect",
+    "refuse_beyond",
     "refuse_large_scene",
     "relative_residual",
 ]

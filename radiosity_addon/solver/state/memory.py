@@ -40,6 +40,21 @@ LEAST_ROOM = 0.01
 """Room for so small a share of the links is left: to fill it bit by bit would take many gathers."""
 
 
+def refuse_beyond(limit: float, needed: float, what: str, advice: str) -> None:
+    """Refuse what needs more bytes than the memory limit [GiB] allows.
+
+    Raises
+    ------
+    UsageError
+        Says what it is, what it needs, the limit, and what helps.
+    """
+    if needed > limit * 2**30:
+        raise UsageError(
+            f"{what} needs at least {needed / 2**30:.3g} GiB, more than the memory limit of {limit:g} GiB: "
+            f"{advice}"
+        )
+
+
 def refuse_large_scene(scene: Scene, settings: SolverSettings) -> None:
     """Refuse a scene whose faces and coarsest first links do not fit into the memory limit.
 
@@ -55,12 +70,9 @@ def refuse_large_scene(scene: Scene, settings: SolverSettings) -> None:
     threads = settings.threads or os.cpu_count() or 1
     # A thread measures a chunk of pairs at most; small scenes have no more.
     working = (WORKING_BYTES + threads * THREAD_BYTES) * min(1.0, pairs / FEWEST)
-    needed = (faces * FACE_BYTES + links * LINK_BYTES + working) / 2**30
-    if needed > settings.memory_limit:
-        raise UsageError(
-            f"the hierarchical method would need at least {needed:.2f} GiB for {faces:,} faces, more than "
-            f"the memory limit of {settings.memory_limit:g} GiB: raise the limit, or bake fewer objects"
-        )
+    needed = faces * FACE_BYTES + links * LINK_BYTES + working
+    what = f"the hierarchical method with {faces:,} faces"
+    refuse_beyond(settings.memory_limit, needed, what, "raise the limit, or bake fewer objects")
 
 
 def free_bytes(hierarchy: Hierarchy, settings: SolverSettings, light_links: int = 0) -> float:
