@@ -6,6 +6,7 @@ Knows neither scenes nor lamps.
 from __future__ import annotations
 
 from .arrays import Array
+from .bilinear import texels_around
 from .discrete import pick_in_rows, pick_in_runs, running_sums
 from .meshes import connected_components, connected_faces, numbered, weld
 from .parallel import chunk_steps, for_chunks, thread_count
@@ -105,6 +106,7 @@ __all__ = [
     "split_in_four",
     "split_in_sixteen",
     "stratified_square",
+    "texels_around",
     "thread_count",
     "tiles",
     "to_world",

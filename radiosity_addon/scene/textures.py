@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from ..base import SceneError
-from ..numerics import MAX_REFLECTANCE, Array, points_at, split_in_four
+from ..numerics import MAX_REFLECTANCE, Array, points_at, split_in_four, texels_around
 
 CHANNELS = 7
 """Reflectance RGB, emission RGB, opacity."""
@@ -202,14 +202,11 @@ def _bilinear(image: Array, place: Array) -> Array:
     """Look (h, w, k) up at (n, 2) places in texels, (n, k); beyond the middles of the rim its own values."""
     height, width = image.shape[:2]
     texels = image.reshape(height * width, -1)
-    place = np.clip(place - 0.5, 0.0, (width - 1.0, height - 1.0))
-    low = np.minimum(place.astype(np.int64), (max(width - 2, 0), max(height - 2, 0)))
-    part = (place - low).astype(np.float32)
-    right, up = int(width > 1), width * int(height > 1)
-    first = low[:, 1] * width + low[:, 0]
-    along, across = part[:, :1], part[:, 1:]
-    lower = texels[first] * (1 - along) + texels[first + right] * along
-    upper = texels[first + up] * (1 - along) + texels[first + up + right] * along
+    around, share = texels_around(place, width, height)
+    left, right, upper_left, upper_right = around.T
+    along, across = np.split(share.astype(np.float32), 2, axis=1)
+    lower = texels[left] * (1 - along) + texels[right] * along
+    upper = texels[upper_left] * (1 - along) + texels[upper_right] * along
     return np.asarray(lower * (1 - across) + upper * across)
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...numerics import Array, run_numbers, weld
+from ...numerics import Array, run_numbers, run_starts, texels_around, weld
 from ...rays import SAGITTA, SIGHT_LIFT, RayCaster
 from ...scene import Scene
 from ..texels import NO_TEXEL, TexelGeometry
@@ -173,22 +173,12 @@ def _shared_edges(scene: Scene, geometry: TexelGeometry) -> tuple[Array, Array]:
 def _bilinear(spots: Array, pages: Array, sizes: Sequence[int]) -> tuple[Array, Array, Array]:
     """Return (s, 2, 4) texels and weights at (s, 2, 2) places in texels, and (s,) whether on the page."""
     size = np.asarray(sizes, dtype=np.int64)
-    first = np.concatenate([[0], np.cumsum(size * size)])[:-1][pages]
-    width = size[pages]
+    first, width = run_starts(size * size)[pages], size[pages]
     inside = ((spots >= 0) & (spots <= width[..., None])).all(axis=(1, 2))
-    corner = np.floor(spots - 0.5)
-    share = spots - 0.5 - corner
-    low = corner.astype(np.int64)
-    texels, weights = [], []
-    for up in (0, 1):
-        for right in (0, 1):
-            column = np.clip(low[..., 0] + right, 0, width - 1)
-            row = np.clip(low[..., 1] + up, 0, width - 1)
-            texels.append(first + row * width + column)
-            weights.append(
-                (share[..., 0] if right else 1 - share[..., 0]) * (share[..., 1] if up else 1 - share[..., 1])
-            )
-    return np.stack(texels, axis=2), np.stack(weights, axis=2), inside
+    texels, share = texels_around(spots, width, width)
+    (left, below), (right, above) = np.moveaxis(1 - share, -1, 0), np.moveaxis(share, -1, 0)
+    weights = np.stack([left * below, right * below, left * above, right * above], axis=2)
+    return first[..., None] + texels, weights, inside
 
 
 def _own_texels_only(geometry: TexelGeometry, numbers: Array, weight: Array, at: Array, size: Array) -> Array:
