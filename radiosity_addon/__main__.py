@@ -6,8 +6,7 @@ import os
 import sys
 from typing import NoReturn
 
-from .cli import Interrupts
-from .files import TemporaryFolder
+from .cli import Interrupts, TemporaryFolder
 
 
 def leave(code: int, temporary: TemporaryFolder) -> NoReturn:

@@ -8,7 +8,6 @@ from __future__ import annotations
 from .bake_warning import BakeWarning
 from .errors import BakeError, NothingToDoError, RadiosityError, SceneError, UsageError
 from .progress import drain, scaled
-from .quiet_output import silenced
 from .similar_warnings import one_of_each
 from .time_left import RemainingTime, duration
 
@@ -24,5 +23,4 @@ __all__ = [
     "duration",
     "one_of_each",
     "scaled",
-    "silenced",
 ]

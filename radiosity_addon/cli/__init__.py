@@ -8,14 +8,21 @@ from __future__ import annotations
 from .console import Console, summary
 from .interrupts import Interrupts
 from .parser import bake_output, build_parser, check_keeping, check_plot, requested_settings
+from .path_checks import check_folder, printable
+from .permissions import Permissions
+from .temporary_folder import TemporaryFolder
 
 __all__ = [
     "Console",
     "Interrupts",
+    "Permissions",
+    "TemporaryFolder",
     "bake_output",
     "build_parser",
+    "check_folder",
     "check_keeping",
     "check_plot",
+    "printable",
     "requested_settings",
     "summary",
 ]

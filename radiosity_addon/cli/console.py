@@ -10,7 +10,7 @@ from contextlib import suppress
 from typing import Any, TextIO
 
 from ..base import RemainingTime, duration, one_of_each
-from ..files import escaped
+from .path_checks import escaped
 
 STEP = 10
 """Without a terminal a stage prints a line again after this many per cent."""

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from ..base import UsageError
-from ..files import checked_folder, checked_name, checked_path
 from ..options import METHODS, OPTIONS, SECTIONS, BakeSettings, GroupSetting, Option, plain
 from .command_options import BAKE_COMMAND, EVERY_COMMAND
+from .path_checks import checked_folder, checked_name, checked_path
 
 BUNDLED_OUTPUT = Path("out/cornell")
 """Where the bundled scene goes when no --output is given."""

@@ -1,4 +1,4 @@
-"""Files of a bake: their names, proof that they are ours, publishing a result as a whole.
+"""Files of a bake: their names, and proof that they are ours.
 
 Needs nothing but Python.
 """
@@ -30,14 +30,10 @@ from .file_names import (
     FileNames,
     folded,
     highest_page,
+    is_bake_name,
     unique_names,
 )
-from .file_versions import MOST_FILES, HeldFiles
-from .gltf_check import gltf_fault
-from .path_checks import check_folder, checked_folder, checked_name, checked_path, escaped, printable
-from .publish import Staging, clean_up, is_interrupted, replacing
 from .sidecar_names import BAKE, DIGEST, FILE, KEPT
-from .temporary_folder import TemporaryFolder
 
 __all__ = [
     "BAKE",
@@ -47,35 +43,22 @@ __all__ = [
     "KEPT",
     "LIGHTMAPS",
     "LISTED",
-    "MOST_FILES",
     "OWNER",
     "PLAIN_NAMES",
     "PREVIEW_NAME",
     "REPORT_NAME",
     "SIDECAR_NAME",
     "FileNames",
-    "HeldFiles",
     "NoReportError",
     "Owner",
-    "Staging",
-    "TemporaryFolder",
-    "check_folder",
-    "checked_folder",
-    "checked_name",
-    "checked_path",
-    "clean_up",
     "digest_of_file",
     "entries",
-    "escaped",
     "folded",
-    "gltf_fault",
     "highest_page",
     "is_as_written",
     "is_as_written_steps",
-    "is_interrupted",
-    "printable",
+    "is_bake_name",
     "read_report",
-    "replacing",
     "reports_in",
     "sealed",
     "text_of",

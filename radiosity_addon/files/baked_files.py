@@ -28,7 +28,7 @@ _MAX_REPORT = 256 * 2**20
 Report = Mapping[str, Any]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Owner:
     """Whose files they are.
 

@@ -1,4 +1,4 @@
-"""Arrays: threads, memory with a limit, sampling, runs, meshes, triangles, polygons, quantities of light.
+"""Arrays: threads, memory with a limit, sampling, triangles and polygons, quantities of light.
 
 Knows neither scenes nor lamps.
 """

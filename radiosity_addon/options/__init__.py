@@ -9,7 +9,6 @@ from .bake_settings import OPTIONS, BakeSettings, GroupSetting, options_of_metho
 from .constants import EFFICACY, MAX_GROUPS, MAX_RESOLUTION, OTHERS
 from .methods import METHODS, SYMMETRIC_ONLY
 from .option_record import UNBOUNDED, Option, option, options_of, plain
-from .permissions import Permissions
 from .sections import ADVANCED, GROUPS, MAIN, SECTIONS, SOLVER, sections_of
 
 __all__ = [
@@ -29,7 +28,6 @@ __all__ = [
     "BakeSettings",
     "GroupSetting",
     "Option",
-    "Permissions",
     "option",
     "options_of",
     "options_of_method",

@@ -23,7 +23,7 @@ BY_ERROR = "error"
 """The panel's choice of a quality for which the error below decides."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class BakeSettings:
     """One bake's settings, as the command line and the panel both give them: each field is an option.
 

@@ -8,8 +8,8 @@ page `docs/options.md` are made from these records.
 from __future__ import annotations
 
 import types
-from dataclasses import dataclass, field, fields, replace
-from typing import Any, get_args, get_origin, get_type_hints
+from dataclasses import field, fields
+from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
 
 from ..base import UsageError
 
@@ -18,8 +18,7 @@ UNBOUNDED = float("inf")
 _METAVARS: dict[type, str] = {int: "N", float: "X"}
 
 
-@dataclass(frozen=True)
-class Choice:
+class Choice(NamedTuple):
     """One of the values that an option may have."""
 
     value: str
@@ -27,8 +26,7 @@ class Choice:
     description: str
 
 
-@dataclass(frozen=True)
-class PanelRow:
+class PanelRow(NamedTuple):
     """An option's property and its row in the panel.
 
     Parameters
@@ -66,8 +64,7 @@ class PanelRow:
     other_choice: Choice | None = None
 
 
-@dataclass(frozen=True)
-class Option:
+class Option(NamedTuple):
     """An option of a bake or of a command.
 
     Parameters
@@ -185,7 +182,7 @@ def _named(found: Option, name: str, kind: type) -> Option:
     """Return an option with its name and kind, and with the flag and metavar that follow from them."""
     flag = found.flag or "--" + name.replace("_", "-")
     metavar = found.metavar or _METAVARS.get(kind, "")
-    return replace(found, name=name, kind=kind, flag=flag, metavar=metavar)
+    return found._replace(name=name, kind=kind, flag=flag, metavar=metavar)
 
 
 def _kind(hint: Any) -> type:

@@ -188,7 +188,7 @@ def test_a_linked_object_shows_its_bake_and_is_left_alone(room: Path, tmp_path: 
 
 def test_opening_a_file_touches_nothing_and_recover_takes_a_half_published_bake_back(room: Path) -> None:
     """As a bake leaves it that is killed between two renamings."""
-    from radiosity_addon.files.publish import EARLIER, JOURNAL, Staging
+    from radiosity_addon.publishing.publish import EARLIER, JOURNAL, Staging
 
     name = "room_Scene_Floor_lightmap.exr"
     floor = room / "lightmaps" / name
@@ -213,7 +213,7 @@ def test_opening_a_file_touches_nothing_and_recover_takes_a_half_published_bake_
 
 
 def test_a_bake_into_the_folder_recovers_it_too(room: Path) -> None:
-    from radiosity_addon.files.publish import EARLIER, JOURNAL, Staging
+    from radiosity_addon.publishing.publish import EARLIER, JOURNAL, Staging
 
     name = "room_Scene_Floor_lightmap.exr"
     staging = Staging(room / "lightmaps")
@@ -232,7 +232,7 @@ def test_a_bake_into_the_folder_recovers_it_too(room: Path) -> None:
 @pytest.mark.parametrize("crafted", ["../../victim.exr", "/victim.exr", "victim.txt"])
 def test_a_crafted_folder_is_left_as_it_is(room: Path, crafted: str) -> None:
     """Opening a received project, and baking in it, must not reach outside its folder of lightmaps."""
-    from radiosity_addon.files.publish import EARLIER, JOURNAL, Staging
+    from radiosity_addon.publishing.publish import EARLIER, JOURNAL, Staging
 
     victims = [room.parent / "victim.exr", room / "lightmaps" / "victim.txt"]
     for victim in victims:

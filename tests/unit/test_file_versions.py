@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from radiosity_addon.base.errors import BakeError
-from radiosity_addon.files.file_versions import HeldFiles
+from radiosity_addon.blender.relight.file_versions import HeldFiles
 
 
 def write(path: Path, content: bytes) -> str:

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from radiosity_addon.files.gltf_check import gltf_fault
+from radiosity_addon.blender.files.gltf_check import gltf_fault
 
 
 def triangle() -> dict[str, Any]:

@@ -10,7 +10,8 @@ import pytest
 
 from radiosity_addon.bake.quality import QUALITIES, quality_of, used_settings
 from radiosity_addon.base.errors import UsageError
-from radiosity_addon.options import METHODS, OPTIONS, BakeSettings, SolverSettings, options_of_method
+from radiosity_addon.options import METHODS, OPTIONS, BakeSettings, options_of_method
+from radiosity_addon.solver import SolverSettings
 
 SETTINGS = {name: option for name, option in OPTIONS.items() if option.methods}
 

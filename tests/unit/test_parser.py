@@ -14,8 +14,8 @@ import pytest
 from radiosity_addon.base.errors import BakeError, SceneError, UsageError
 from radiosity_addon.blender import command_line
 from radiosity_addon.blender.command_line.main import main
+from radiosity_addon.cli.permissions import Permissions
 from radiosity_addon.options.bake_settings import BakeSettings
-from radiosity_addon.options.permissions import Permissions
 
 ROOT = Path(__file__).resolve().parents[2]
 VERBS = "radiosity_addon.blender.command_line.verbs"

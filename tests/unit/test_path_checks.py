@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from radiosity_addon.blender.command_line.main import main
-from radiosity_addon.files.path_checks import (
+from radiosity_addon.cli.path_checks import (
     MAX_PATH,
     checked_folder,
     checked_name,

@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 
 from radiosity_addon.base.errors import BakeError
-from radiosity_addon.files import publish as staging_module
 from radiosity_addon.files.baked_files import digest_of_file
-from radiosity_addon.files.marked_folders import MARK
-from radiosity_addon.files.publish import (
+from radiosity_addon.publishing import publish as staging_module
+from radiosity_addon.publishing.marked_folders import MARK
+from radiosity_addon.publishing.publish import (
     EARLIER,
     JOURNAL,
     PREFIX,
@@ -31,7 +31,7 @@ A, B, C = "a.exr", "b.exr", "c.exr"
 KILLED = """
 import os, sys
 from pathlib import Path
-from radiosity_addon.files.publish import Staging
+from radiosity_addon.publishing.publish import Staging
 
 target, after = Path(sys.argv[1]), int(sys.argv[2])
 staging = Staging(target)

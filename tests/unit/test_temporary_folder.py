@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from radiosity_addon.files.marked_folders import MARK, MarkedFolder
+from radiosity_addon.publishing.marked_folders import MARK, MarkedFolder
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -34,7 +34,7 @@ runpy.run_module("radiosity_addon", run_name="__main__")
 KILLED = """
 import os
 from pathlib import Path
-from radiosity_addon.files.temporary_folder import TemporaryFolder
+from radiosity_addon.cli.temporary_folder import TemporaryFolder
 folder = TemporaryFolder()
 assert os.environ["TMPDIR"] == os.environ["TEMP"] == str(folder.path)
 (folder.path / "blender_abc").mkdir()
@@ -103,7 +103,7 @@ def test_the_folder_of_a_living_process_is_left_alone(
 ) -> None:
     import tempfile
 
-    from radiosity_addon.files.temporary_folder import TemporaryFolder
+    from radiosity_addon.cli.temporary_folder import TemporaryFolder
 
     for name in ("TMPDIR", "TEMP", "TMP"):
         monkeypatch.setenv(name, str(tmp_path))

@@ -12,7 +12,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ...base import BakeError
-from ...files import LISTED, OWNER, replacing, sealed, text_of
+from ...files import LISTED, OWNER, sealed, text_of
+from ...publishing import replacing
 from ...scene import LIGHTMAP_UV_LAYER, BakeObject
 from .result import BakeResult
 

@@ -16,14 +16,15 @@ from ...base import RadiosityError
 from ...cli import (
     Console,
     Interrupts,
+    Permissions,
     bake_output,
     build_parser,
     check_keeping,
     check_plot,
+    printable,
     requested_settings,
 )
-from ...files import printable
-from ...options import BakeSettings, Permissions
+from ...options import BakeSettings
 
 EXIT_DONE = 0
 EXIT_FAILED = 1

@@ -14,9 +14,9 @@ from ...bake.relight import strengths_in
 from ...bake.result import BakeReport, Progress
 from ...bake.sidecar import StoredBake, check_belongs, read_sidecar
 from ...base import BakeWarning, UsageError, drain
-from ...cli import Console, Interrupts, summary
+from ...cli import Console, Interrupts, Permissions, summary
 from ...files import BLEND_NAME, PREVIEW_NAME, SIDECAR_NAME
-from ...options import BakeSettings, Permissions
+from ...options import BakeSettings
 from ..files.single_files import check_places, make_folder_of
 from .verbs import open_or_build, output_of, registered, same_file, written_files
 

@@ -11,8 +11,8 @@ import bpy
 
 from ...bake import KeepOptions
 from ...base import BakeWarning, SceneError, UsageError
-from ...cli import Console, Interrupts, summary
-from ...options import BakeSettings, Permissions
+from ...cli import Console, Interrupts, Permissions, summary
+from ...options import BakeSettings
 from ..files.single_files import check_existing, check_places, make_folder_of, owner_told
 from ..registration import register, unregister
 from ..relight import kept_bakes

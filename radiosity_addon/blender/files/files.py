@@ -8,8 +8,9 @@ from pathlib import Path
 import addon_utils  # type: ignore[import-not-found]
 import bpy
 
-from ...base import BakeWarning, SceneError, silenced
-from ...files import gltf_fault
+from ...base import BakeWarning, SceneError
+from ..datablocks.quiet_output import silenced
+from .gltf_check import gltf_fault
 
 
 def open_scene(path: str | Path, scripts: bool = False) -> tuple[BakeWarning, ...]:

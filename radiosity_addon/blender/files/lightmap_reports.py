@@ -16,7 +16,7 @@ from ..datablocks.image_marks import REPORT
 Listed = Mapping[str, Mapping[str, Any]]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class _Read:
     """What is asked of a report: the files that it lists, and the mark of the bake in its sidecar."""
 

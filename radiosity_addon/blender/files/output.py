@@ -18,6 +18,7 @@ import bpy
 
 from ...bake.result import BakeReport
 from ...base import BakeError, RadiosityError
+from ...cli import check_folder
 from ...files import (
     BLEND_NAME,
     LISTED,
@@ -27,14 +28,12 @@ from ...files import (
     FileNames,
     NoReportError,
     Owner,
-    Staging,
-    check_folder,
-    clean_up,
     entries,
     folded,
     is_as_written_steps,
     read_report,
 )
+from ...publishing import Staging, clean_up
 from .ownership import is_read, owner_of
 
 _DISK_FAILURES = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.EIO)

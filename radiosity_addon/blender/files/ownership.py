@@ -40,7 +40,7 @@ def panel_names(scene: bpy.types.Scene) -> FileNames:
     return FileNames.of_scene(bpy.data.filepath, scene.name)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class OwnReport:
     """A report of a scene of the open file, and the names and the owner that go with it."""
 

@@ -9,7 +9,8 @@ from pathlib import Path
 import bpy
 
 from ...base import BakeError
-from ...files import BLEND_NAME, replacing
+from ...files import BLEND_NAME
+from ...publishing import replacing
 from ..datablocks.bake_record import is_made
 from .output import OutputFolder
 

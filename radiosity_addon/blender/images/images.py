@@ -15,7 +15,7 @@ import numpy as np
 
 from ...bake.relight import are_wanted
 from ...bake.result import BakeResult, LightmapFile
-from ...base import BakeError, silenced
+from ...base import BakeError
 from ...files import PLAIN_NAMES, FileNames, highest_page, unique_names
 from ...lightmap.images import LightmapPage, encode_png16, png16_scale, presentable
 from ...numerics import tiles
@@ -24,6 +24,7 @@ from ...scene import BakeScene
 from ..datablocks.bake_record import mark_made, remove_datablocks
 from ..datablocks.image_marks import GROUP, PAGE, QUANTITY_PROPERTY, SCALE_PROPERTY
 from ..datablocks.png import check_whole
+from ..datablocks.quiet_output import silenced
 
 BAND = 64
 """Rows of a page that are encoded at once."""

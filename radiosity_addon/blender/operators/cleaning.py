@@ -78,7 +78,8 @@ def delete(unused: Unused) -> int:
     OSError
         If one cannot be deleted; those before it are gone.
     """
-    from ...files import read_report, replacing, text_of, without
+    from ...files import read_report, text_of, without
+    from ...publishing import replacing
 
     for report, names in unused.files.items():
         told = read_report(report)
@@ -91,7 +92,7 @@ def delete(unused: Unused) -> int:
 
 def interrupted_folders(context: bpy.types.Context) -> list[Path]:
     """Return the folders of this file's bakes in which one was killed while it published; only looks."""
-    from ...files import is_interrupted
+    from ...publishing import is_interrupted
 
     return [folder for folder in _folders(context) if is_interrupted(folder)]
 
@@ -170,7 +171,7 @@ class RADIOSITY_OT_recover(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Put them back, and have the open file show them."""
-        from ...files import clean_up
+        from ...publishing import clean_up
 
         done: list[Path] = []
         try:

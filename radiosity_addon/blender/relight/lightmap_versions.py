@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 import bpy
 
 from ...base import BakeError, RadiosityError
-from ...files import KEPT, LISTED, MOST_FILES, REPORT_NAME, HeldFiles, digest_of_file
+from ...files import KEPT, LISTED, REPORT_NAME, digest_of_file
 from ..datablocks.bake_record import is_made
 from ..datablocks.image_marks import PAGE, REPORT, VERSION
 from ..files.lightmap_reports import forget_reports, images_described, listed_in, report_of
@@ -33,6 +33,7 @@ from ..session.redraw import redraw_sidebars, redraw_viewports
 
 if TYPE_CHECKING:
     from ..files.output import OutputFolder
+    from .file_versions import HeldFiles
 
 TICK = 0.02
 """Seconds between two looks at whether files have been copied."""
@@ -59,7 +60,7 @@ class State:
     swap: _Swap | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Wanted:
     """An image whose file has other bytes than it should.
 
@@ -114,6 +115,8 @@ def _open(report: Path) -> OutputFolder:
 
 def hold(output: OutputFolder) -> None:
     """Hold what is about to be replaced in a folder, with what its report says of it."""
+    from .file_versions import MOST_FILES, HeldFiles  # needed when something is replaced
+
     told = output.earlier
     if told is None:
         return

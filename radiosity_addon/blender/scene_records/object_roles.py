@@ -30,7 +30,7 @@ BAKEABLE_TYPES = frozenset({"MESH", "CURVE", "SURFACE", "FONT", "META"})
 """All but a mesh are shown as a mesh copy once they are baked."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Role:
     """What one object, or one instance of it, is there for.
 

@@ -33,7 +33,7 @@ class Running:
     """Ends it from outside its operator."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class LastBake:
     """Figures and warnings of the last bake of a scene."""
 

@@ -19,7 +19,7 @@ ANSWER = Path(sys.argv[sys.argv.index("--") + 1])
 MODULE = "bl_ext.user_default.radiosity_addon"
 
 cleaning = importlib.import_module(f"{MODULE}.blender.operators.cleaning")
-staging = importlib.import_module(f"{MODULE}.files.publish")
+staging = importlib.import_module(f"{MODULE}.publishing.publish")
 runtime = importlib.import_module(f"{MODULE}.blender.session.runtime")
 window_job = importlib.import_module(f"{MODULE}.blender.jobs.window_job")
 

@@ -9,7 +9,7 @@ import tempfile
 from collections import OrderedDict
 from pathlib import Path
 
-from ..base import BakeError
+from ...base import BakeError
 
 MOST_FILES, MOST_BYTES = 128, 2 << 30
 """So many files and bytes are held; the oldest are dropped first."""

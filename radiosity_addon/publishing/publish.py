@@ -18,8 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..base import BakeError
-from .baked_files import digest_of_file
-from .file_names import is_bake_name
+from ..files import digest_of_file, is_bake_name
 from .marked_folders import MarkedFolder, abandoned, clean_up_folders, is_own
 
 PREFIX = ".radiosity-"
@@ -34,7 +33,7 @@ Check = Callable[[str, str | None], None]
 """Called with a name and the digest of the file of that name, None if there is none; may refuse it."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class _Replaced:
     """Digests of a file that is published, and of the file that it replaces, if there is one."""
 

@@ -13,7 +13,7 @@ import tempfile
 from contextlib import suppress
 from pathlib import Path
 
-from .marked_folders import MarkedFolder, clean_up_folders
+from ..publishing import MarkedFolder, clean_up_folders
 
 PREFIX = "radiosity-"
 _OF_BLENDER = r"blender_\w{6}"
