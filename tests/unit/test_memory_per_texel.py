@@ -95,7 +95,8 @@ def test_sweeps_take_no_memory_for_each_ray(in_files: Scratch, monkeypatch: pyte
     whole = swept(Scratch())
     for name in ("direct", "indirect", "table", "noise"):
         assert getattr(tiled, name).tobytes() == getattr(whole, name).tobytes()
-    assert tiled.error == whole.error
+    # Summed tile by tile: the last digits depend on how many tiles there are.
+    assert tiled.error == pytest.approx(whole.error, rel=1e-12)
 
 
 def test_aimed_rays_are_kept_in_files(in_files: Scratch) -> None:
