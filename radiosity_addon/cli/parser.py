@@ -40,10 +40,7 @@ def requested_settings(request: argparse.Namespace) -> BakeSettings:
 def light_group(text: str) -> GroupSetting:
     """Read a light group as the command line has it: NAME=MEMBER,MEMBER…
 
-    Raises
-    ------
-    UsageError
-        If it is not of this form.
+    Raises UsageError if it is not of this form.
     """
     name, _, members = text.partition("=")
     wanted = tuple(filter(None, (member.strip() for member in members.split(","))))

@@ -9,12 +9,8 @@ from dataclasses import dataclass
 class Permissions:
     """What is allowed.
 
-    Attributes
-    ----------
-    overwrite : bool
-        Replace files that no earlier bake of this scene has written.
-    scripts : bool
-        Run the scripts and script expressions of a scene file that is opened.
+    overwrite: Replace files that no earlier bake of this scene has written.
+    scripts: Run the scripts and script expressions of a scene file that is opened.
     """
 
     overwrite: bool = False

@@ -87,20 +87,10 @@ def triangle_to_triangle(receivers: npt.ArrayLike, sources: npt.ArrayLike) -> Fl
     give their overlap over the receiver's area, the limit of a vanishing gap. Triangles
     without area give 0.
 
-    Parameters
-    ----------
-    receivers, sources : (n, 3, 3) float
-        Corners, counter-clockwise from the front.
-
-    Returns
-    -------
-    factors : (n,) float64 in [0, 1]
-        Within 3e-5 for touching and crossing pairs, 1e-6 for far ones (see `FAR`).
-
-    Raises
-    ------
-    ValueError
-        If shapes do not match.
+    receivers, sources (n, 3, 3): Corners, counter-clockwise from the front.
+    Returns factors (n,) float64 in [0, 1]: Within 3e-5 for touching and crossing pairs, 1e-6 for far ones
+        (see `FAR`).
+    Raises ValueError if shapes do not match.
     """
     receivers, sources = np.asarray(receivers, dtype=np.float64), np.asarray(sources, dtype=np.float64)
     if receivers.ndim != 3 or receivers.shape[1:] != (3, 3) or receivers.shape != sources.shape:
@@ -172,7 +162,7 @@ def _normals(triangles: Float64Array) -> tuple[Float64Array, Float64Array]:
 
 
 def _radius(triangles: Float64Array, centres: Float64Array) -> Float64Array:
-    """Return the distance (m,) from each centre to its triangle's farthest corner."""
+    """Return the distance (m,) from each center to its triangle's farthest corner."""
     arms = triangles - centres[:, None]
     radius: Float64Array = np.sqrt(np.einsum("ijk,ijk->ij", arms, arms).max(axis=1))
     return radius

@@ -35,19 +35,10 @@ __all__ = [
 class SunLight(Lamp):
     """Parallel light, or light from a round patch of the sky.
 
-    Parameters
-    ----------
-    direction : (3,) float
-        The way the light travels.
-    irradiance : float or (3,) float [W/m²]
-        On a surface that faces it, whatever the angle.
-    angle : float [rad]
-        The full angle the sun's disk spans, 0 to π.
-
-    Raises
-    ------
-    SceneError
-        If a value is out of range.
+    direction (3,): The way the light travels.
+    irradiance float or (3,) float [W/m²]: On a surface that faces it, whatever the angle.
+    angle float [rad]: The full angle the sun's disk spans, 0 to π.
+    Raises SceneError if a value is out of range.
     """
 
     direction: npt.ArrayLike
@@ -87,14 +78,8 @@ class SunLight(Lamp):
 class EnvironmentLight(Light):
     """A sky of constant radiance around the scene, as seen by whatever is not covered.
 
-    Parameters
-    ----------
-    radiance : float or (3,) float [W/m²/sr]
-
-    Raises
-    ------
-    SceneError
-        If it is negative, NaN or infinite.
+    radiance float or (3,) float [W/m²/sr].
+    Raises SceneError if it is negative, NaN or infinite.
     """
 
     radiance: npt.ArrayLike

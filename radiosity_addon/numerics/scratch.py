@@ -42,10 +42,7 @@ _lock = threading.Lock()
 class Scratch:
     """Makes arrays: in memory as long as the budget lasts, then in files.
 
-    Parameters
-    ----------
-    budget : float
-        What the arrays may take of memory together [bytes].
+    budget: What the arrays may take of memory together [bytes].
     """
 
     def __init__(self, budget: float = math.inf) -> None:

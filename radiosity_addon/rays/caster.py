@@ -31,16 +31,10 @@ facets needs."""
 class Hits:
     """The first surfaces that n rays met.
 
-    Parameters
-    ----------
-    triangle : (n,) int32
-        Row of the scene's triangles, or NO_HIT.
-    barycentric : (n, 2) float32
-        Weights of the triangle's second and third corner.
-    front : (n,) bool
-        Whether the ray came from the triangle's front.
-    distance : (n,) float32
-        Along the unit direction [m]; infinite without a hit.
+    triangle (n,) int32: Row of the scene's triangles, or NO_HIT.
+    barycentric (n, 2) float32: Weights of the triangle's second and third corner.
+    front (n,) bool: Whether the ray came from the triangle's front.
+    distance (n,) float32: Along the unit direction [m]; infinite without a hit.
     """
 
     triangle: Array

@@ -2,7 +2,7 @@
 
 The back of a one-sided triangle is black. Where another surface lies in it and faces the ray, that
 one is in front, but Embree reports either, as rounding has it. So sides of which a black back may lie
-in the same plane get a copy, moved out towards where they look: seen from there it comes first. The
+in the same plane get a copy, moved out toward where they look: seen from there it comes first. The
 triangle itself stays, so nothing opens beside it.
 """
 
@@ -20,7 +20,7 @@ TURN = 0.01
 """Normals of one plane differ by less than this, rounded corners of small triangles included, …"""
 
 APART = 128.0
-"""… and their planes' distances from the scene's centre by less than this, in units of the offset: about a
+"""… and their planes' distances from the scene's center by less than this, in units of the offset: about a
 thousandth of the extent. Both are wide: what is only near a black back gets a copy that changes nothing."""
 
 SHIFTS = (0.23, 0.71)
@@ -30,20 +30,11 @@ SHIFTS = (0.23, 0.71)
 def facing_copies(triangles: Array, two_sided: Array, offset: float) -> tuple[Array, Array]:
     """Return copies of triangles that look away from black backs in their plane.
 
-    Parameters
-    ----------
-    triangles : (t, 3, 3) float64
-        Corners [m], the scene's centre at the origin.
-    two_sided : (t,) bool
-        The others' backs are black.
-    offset : float
-        How far above a surface its rays start [m].
-
-    Returns
-    -------
-    rows : (c,) int
-        Whose copies they are.
-    corners : (c, 3, 3) float64
+    triangles (t, 3, 3): Corners [m], the scene's center at the origin.
+    two_sided (t,) bool: The others' backs are black.
+    offset: How far above a surface its rays start [m].
+    Returns rows (c,) int: Whose copies they are.
+    Returns corners (c, 3, 3).
     """
     cross = double_area_vectors(triangles)
     double_area = np.linalg.norm(cross, axis=1)

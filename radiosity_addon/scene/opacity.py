@@ -81,22 +81,13 @@ class LayeredCaster:
 class CutOutCaster:
     """Visibility among triangles of which some are partly there.
 
-    Parameters
-    ----------
-    triangles : (t, 3, 3) float64
-        World-space corners [m].
-    images : SurfaceImages
-        Of the same triangles.
-    threads : int
-        0 means all cores. Results do not depend on it.
-    only : (t,) bool or None
-        The triangles that rays meet, where it is not all of them.
-    for_lamps : RayCaster or None
-        What stops the light of lamps, where that is something else.
-    two_sided : (t,) bool or None
-        The others' backs are black; None if that does not matter.
-    stacks : Stacks or None
-        The cut-outs that lie in one another, if there are any.
+    triangles (t, 3, 3): World-space corners [m].
+    images: Of the same triangles.
+    threads: 0 means all cores. Results do not depend on it.
+    only (t,) bool: The triangles that rays meet, where it is not all of them.
+    for_lamps: What stops the light of lamps, where that is something else.
+    two_sided (t,) bool: The others' backs are black; None if that does not matter.
+    stacks: The cut-outs that lie in one another, if there are any.
     """
 
     def __init__(
@@ -202,24 +193,13 @@ class CutOutCaster:
 class _Ways:
     """Rays among cut-outs, from one to the next.
 
-    Parameters
-    ----------
-    cut : RayCaster
-        Of the cut-outs alone.
-    rows : (c + 1,) int32
-        The scene's triangle for each of its, and NO_HIT.
-    offset : float
-        How far beyond a cut-out rays go on [m].
-    stacks : Stacks or None
-    ray : (w,) int
-        Which of the n rays are on their way.
-    origins, directions : (n, 3) float
-    reach : (n,) float
-
-    Attributes
-    ----------
-    ray : (w,) int
-        Those still on their way.
+    cut: Of the cut-outs alone.
+    rows (c + 1,) int32: The scene's triangle for each of its, and NO_HIT.
+    offset: How far beyond a cut-out rays go on [m].
+    ray (w,) int: Which of the n rays are on their way.
+    origins, directions (n, 3).
+    reach (n,).
+    ray (w,) int: Those still on their way.
     """
 
     def __init__(
@@ -244,13 +224,9 @@ class _Ways:
     def meet(self) -> tuple[Array, Hits]:
         """Take rays to the next cut-outs in their way; rays that meet none within reach end here.
 
-        Returns
-        -------
-        at : (h,) int
-            Which of the rays on their way meets it, sorted.
-        hits : Hits
-            h of them: none for a ray that met again what it has just passed, several where cut-outs lie in
-            one another, the outermost first.
+        Returns at (h,) int: Which of the rays on their way meets it, sorted.
+        Returns hits: h of them: none for a ray that met again what it has just passed, several where cut-outs
+            lie in one another, the outermost first.
         """
         start = self._origins[self.ray] + self._gone[:, None] * self._directions[self.ray]
         hits = self._cut.intersect(start, self._directions[self.ray])

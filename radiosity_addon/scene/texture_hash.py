@@ -38,12 +38,8 @@ def texture_digest(images: SurfaceImages, rows: Array, step: float | None = None
 
     It takes every texel, and does not depend on where in the image the triangles lie.
 
-    Parameters
-    ----------
-    rows : (n,) int
-        Triangles in their order; those without texture do not count.
-    step : float or None
-        Values are rounded to multiples of it; None takes them to the last bit.
+    rows (n,) int: Triangles in their order; those without texture do not count.
+    step: Values are rounded to multiples of it; None takes them to the last bit.
     """
     digest, first = hashlib.blake2b(digest_size=16), None
     varies = False

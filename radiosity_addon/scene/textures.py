@@ -41,23 +41,14 @@ ROUNDING = 1e-4
 class SurfaceImages:
     """Reflectance, emission and opacity of triangles as one image.
 
-    Parameters
-    ----------
-    values : (h, w, 7) float
-        Reflectance RGB in [0, 1], clamped like a scene's; exitance RGB of each emitting side
-        [W/m²]; opacity in [0, 1]. Linear, row 0 is v = 0. Reflectance and emission are those of
-        the surface where it is there, not yet multiplied by opacity.
-    image_uv : (t, 3, 2) float
-        The corners of every scene triangle in the image, in [0, 1]; texel (r, c) covers
-        [c/w, (c+1)/w] × [r/h, (r+1)/h]. Look-ups are bilinear and reach half a texel beyond the
-        triangle: neighbours in the image need a border of their own texels.
-    textured : (t,) bool
-        Rows that are not take the scene's constants, and are opaque.
-
-    Raises
-    ------
-    SceneError
-        If shapes do not match, or a textured triangle meets a value out of range.
+    values (h, w, 7): Reflectance RGB in [0, 1], clamped like a scene's; exitance RGB of each emitting side
+        [W/m²]; opacity in [0, 1]. Linear, row 0 is v = 0. Reflectance and emission are those of the surface
+        where it is there, not yet multiplied by opacity.
+    image_uv (t, 3, 2): The corners of every scene triangle in the image, in [0, 1]; texel (r, c) covers [c/w,
+        (c+1)/w] × [r/h, (r+1)/h]. Look-ups are bilinear and reach half a texel beyond the triangle:
+        neighbors in the image need a border of their own texels.
+    textured (t,) bool: Rows that are not take the scene's constants, and are opaque.
+    Raises SceneError if shapes do not match, or a textured triangle meets a value out of range.
     """
 
     def __init__(self, values: Array, image_uv: Array, textured: Array) -> None:
@@ -99,16 +90,9 @@ class SurfaceImages:
     def at(self, triangle: Array, barycentric: Array) -> Array:
         """Look up points of textured triangles, bilinearly.
 
-        Parameters
-        ----------
-        triangle : (n,) int
-        barycentric : (n, 2) float
-            Weights of the triangle's second and third corner.
-
-        Returns
-        -------
-        weighed : (n, 7) float32
-            Reflectance and emission, each multiplied by opacity, and opacity.
+        triangle (n,) int.
+        barycentric (n, 2): Weights of the triangle's second and third corner.
+        Returns weighed (n, 7) float32: Reflectance and emission, each multiplied by opacity, and opacity.
         """
         return _bilinear(self._weighed, self._place(triangle, barycentric))
 
@@ -123,16 +107,9 @@ class SurfaceImages:
         or of 4^`MAX_DEPTH`, each of the texel it lies in. Nothing is interpolated: of a bright texel's
         light none then lies on a dark part next to it, which nobody would think to divide.
 
-        Parameters
-        ----------
-        triangle : (n,) int
-        corners : (n, 3, 2) float
-            Each part's corners, as weights of its triangle's second and third corner.
-
-        Returns
-        -------
-        weighed : (n, 7) float64
-            As from `at`.
+        triangle (n,) int.
+        corners (n, 3, 2): Each part's corners, as weights of its triangle's second and third corner.
+        Returns weighed (n, 7): As from `at`.
         """
         means = np.empty((len(triangle), CHANNELS))
         place = self._place(np.repeat(triangle, 3), corners.reshape(-1, 2)).reshape(-1, 3, 2)
@@ -182,10 +159,7 @@ class SurfaceImages:
 def where_there(weighed: Array) -> tuple[Array, Array]:
     """Return the reflectance and emission (n, 3) of surfaces where they are there.
 
-    Parameters
-    ----------
-    weighed : (n, 7) float
-        From look-ups: reflectance and emission multiplied by opacity, and opacity.
+    weighed (n, 7): From look-ups: reflectance and emission multiplied by opacity, and opacity.
     """
     opacity = weighed[:, 6:]
     there = np.where(opacity > 0, opacity, 1.0)

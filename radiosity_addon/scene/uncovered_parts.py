@@ -42,16 +42,10 @@ _WHOLE = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 class OwnParts:
     """The m parts that are left of s sides.
 
-    Attributes
-    ----------
-    sides : (s,) int
-        The sides of which something is covered, sorted; front 2 t and back 2 t + 1 of triangle t.
-    side : (m,) int
-        Whose part it is, sorted.
-    corners : (m, 3, 2) float64
-        In weights of the triangle's second and third corner, counter-clockwise.
-    level : (m,) float64
-        What shows of it through covers that are cut out; else 1.
+    sides (s,) int: The sides of which something is covered, sorted; front 2 t and back 2 t + 1 of triangle t.
+    side (m,) int: Whose part it is, sorted.
+    corners (m, 3, 2): In weights of the triangle's second and third corner, counter-clockwise.
+    level (m,): What shows of it through covers that are cut out; else 1.
     """
 
     sides: Array
@@ -111,16 +105,10 @@ class OwnParts:
 def own_parts(side: Array, part: Array, by: Array, in_cover: Array, scene: Surfaces) -> OwnParts:
     """Return what covers leave of sides.
 
-    Parameters
-    ----------
-    side : (c,) int
-        What is covered; sorted.
-    part : (c, k, 2) float64
-        Where: convex, counter-clockwise.
-    by : (c,) int
-        The side that covers it.
-    in_cover : (c, k, 2) float64
-        Where on the cover's triangle, corner by corner the same.
+    side (c,) int: What is covered; sorted.
+    part (c, k, 2): Where: convex, counter-clockwise.
+    by (c,) int: The side that covers it.
+    in_cover (c, k, 2): Where on the cover's triangle, corner by corner the same.
     """
     sides, first, count = np.unique(side, return_index=True, return_counts=True)
     own = np.arange(len(sides))

@@ -15,8 +15,8 @@ RECORD = Path(__file__).parent / "gallery.json"
 INTRODUCTION = """\
 # Gallery
 
-The Blender features that bakes support, row by row. Each row is a small scene, baked at medium quality and compared with
-Cycles texel by texel, on the same layout. From left to right:
+The Blender features that bakes support, row by row. Each row is a small scene, baked at medium quality and
+compared with Cycles texel by texel, on the same layout. From left to right:
 
 1. the scene with our lightmaps (objects without a lightmap are lit by Cycles);
 2. our lightmap (H/π);

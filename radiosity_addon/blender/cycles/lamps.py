@@ -55,25 +55,12 @@ def read_lamp(
 ) -> tuple[Light | None, tuple[BakeWarning, ...]]:
     """Return the light that a lamp object, or an instance of one, is.
 
-    Parameters
-    ----------
-    lamp : bpy.types.Object of type LIGHT, evaluated
-    matrix_world : (4, 4) float64
-    factors : dict
-        Of `lamp_factors`.
-    dark : bool
-        Whether a lamp without power is a light as well: it may get some later.
-
-    Returns
-    -------
-    light : Light or None
-        None where it gives no light.
-    warnings : tuple of BakeWarning
-
-    Raises
-    ------
-    SceneError
-        If its position or power is NaN or infinite.
+    lamp bpy.types.Object of type LIGHT, evaluated.
+    matrix_world (4, 4).
+    factors: Of `lamp_factors`.
+    dark: Whether a lamp without power is a light as well: it may get some later.
+    Returns light: None where it gives no light.
+    Raises SceneError if its position or power is NaN or infinite.
     """
     data = lamp.data
     name = lamp.name
@@ -96,7 +83,7 @@ def read_lamp(
 
 
 def _strength(name: str, data: bpy.types.Light, factors: LampFactors) -> tuple[np.ndarray, list[BakeWarning]]:
-    """Return energy × colour of all that scales it, (3,) RGB [W, or W/m² of a sun]."""
+    """Return energy × color of all that scales it, (3,) RGB [W, or W/m² of a sun]."""
     strength = data.energy * np.array(data.color[:3], dtype=np.float64)
     if getattr(data, "use_temperature", False):
         strength = strength * np.array(data.temperature_color[:3], dtype=np.float64)
@@ -198,7 +185,7 @@ def _backward(matrix: np.ndarray) -> np.ndarray:
 
 
 def _sphere_area(data: bpy.types.Light) -> float:
-    """Return what an unnormalised point or spot lamp's power is multiplied by (measured)."""
+    """Return what an unnormalized point or spot lamp's power is multiplied by (measured)."""
     if getattr(data, "normalize", True):
         return 1.0
     return sphere_area(data.shadow_soft_size)

@@ -35,16 +35,11 @@ def can_evaluate() -> bool:
 class DrawnSurfaces:
     """The mesh of the triangles that vary, n of them.
 
-    Parameters
-    ----------
-    size : (int, int)
-        Width and height of the image.
-    corners : (n, 3, 3) float32
-    uv : (n, 3, 2) float32
-        In the image, their tiles.
-    inputs : dict of str to (n, 3, 4) float32
-        What nodes ask for.
-    surface : (n,) int
+    size (int, int): Width and height of the image.
+    corners (n, 3, 3) float32.
+    uv (n, 3, 2) float32: In the image, their tiles.
+    inputs dict of str to (n, 3, 4) float32: What nodes ask for.
+    surface (n,) int.
     """
 
     size: tuple[int, int]
@@ -75,12 +70,8 @@ def drawn_surfaces(
 class SurfaceBake:
     """A scene of one mesh and copies of materials, for the time of a bake.
 
-    Parameters
-    ----------
-    materials : mapping of int to MaterialSource or None
-        Those to evaluate, by their surface.
-    inputs : sequence of str
-        What their nodes ask for.
+    materials mapping of int to MaterialSource or None: Those to evaluate, by their surface.
+    inputs: What their nodes ask for.
     """
 
     def __init__(

@@ -36,12 +36,8 @@ CHANNELS = ("reflected", "radiance", "passed")
 class RewiredMaterial:
     """A copy of a material whose output can be switched between the three expressions.
 
-    Parameters
-    ----------
-    original : bpy.types.Material
-        One with nodes.
-    attributes : mapping of str to str
-        The names of the mesh attributes that hold the inputs nodes ask for.
+    original: One with nodes.
+    attributes mapping of str to str: The names of the mesh attributes that hold the inputs nodes ask for.
     """
 
     def __init__(self, original: bpy.types.Material, attributes: Mapping[str, str]) -> None:

@@ -38,17 +38,9 @@ def read_world(world: bpy.types.World | None, dark: bool = False) -> Generator[f
 
     Each time that Cycles renders it is a step; the world is found by its name again after each.
 
-    Parameters
-    ----------
-    world : World or None
-        As the file has it, not evaluated: it may be rendered.
-    dark : bool
-        Whether a black one is a light as well: it may shine later.
-
-    Raises
-    ------
-    BakeError
-        If its nodes vary with direction, and Cycles could not render them.
+    world: As the file has it, not evaluated: it may be rendered.
+    dark: Whether a black one is a light as well: it may shine later.
+    Raises BakeError if its nodes vary with direction, and Cycles could not render them.
     """
     if world is None or not _lights_surfaces(world):
         return [], ()
@@ -83,10 +75,7 @@ def _limited(world: bpy.types.World) -> tuple[BakeWarning, ...]:
 def _named(name: str) -> bpy.types.World:
     """Return the world of a full name.
 
-    Raises
-    ------
-    SceneError
-        If it was removed between two steps.
+    Raises SceneError if it was removed between two steps.
     """
     world = next((each for each in bpy.data.worlds if each.name_full == name), None)
     if world is None:

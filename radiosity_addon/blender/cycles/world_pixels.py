@@ -27,24 +27,12 @@ def world_pixels(
 ) -> np.ndarray:
     """Return the radiance of a world by direction.
 
-    Parameters
-    ----------
-    world : World
-        As the file has it, not evaluated.
-    window : (4,) float [rad]
-        Latitudes and azimuths to look at (see `solver.environment`).
-    size : (h, w)
-
-    Returns
-    -------
-    (h, w, 3) float64
-        [W/m²/sr]; row 0 is the lowest latitude, azimuths fall from left to right. NaN and
+    world: As the file has it, not evaluated.
+    window (4,) [rad]: Latitudes and azimuths to look at (see `solver.environment`).
+    size (h, w).
+    Returns (h, w, 3): [W/m²/sr]; row 0 is the lowest latitude, azimuths fall from left to right. NaN and
         negative values are 0.
-
-    Raises
-    ------
-    BakeError
-        If Cycles could not render it.
+    Raises BakeError if Cycles could not render it.
     """
     with only_for_now():
         copy = world.copy()
@@ -82,10 +70,7 @@ def panorama_scene(world: bpy.types.World | None, window: Bounds = WHOLE) -> bpy
 def look_around(scene: bpy.types.Scene, size: tuple[int, int], what: str) -> np.ndarray:
     """Render a `panorama_scene`: (h, w, 3) float64 radiance, as `world_pixels` returns it.
 
-    Raises
-    ------
-    BakeError
-        If Cycles could not render `what`.
+    Raises BakeError if Cycles could not render `what`.
     """
     with tempfile.TemporaryDirectory(prefix="radiosity-") as folder:
         path = Path(folder) / "seen.exr"

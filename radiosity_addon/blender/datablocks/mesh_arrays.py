@@ -19,21 +19,13 @@ and squares of lengths above this overflow single precision."""
 class MeshArrays:
     """A mesh, triangulated, in its own space.
 
-    Parameters
-    ----------
-    corners : (t, 3, 3) float64
-        Positions of the triangles' corners.
-    normals : (t, 3, 3) float64
-        Unit shading normals there, as Cycles has them (see `_flat`); 0 for a flat triangle without area.
-    loops : (t, 3) int32
-        The mesh corners (loops) they are.
-    polygon : (t,) int32
-        The polygon each triangle is part of.
-    material : (t,) int32
-        The slot of each triangle's polygon.
-    lightmap_uv : (t, 3, 2) float32 or None
-        The UVs of the layer `Lightmap`, where there is one.
-    uv_layers : int
+    corners (t, 3, 3): Positions of the triangles' corners.
+    normals (t, 3, 3): Unit shading normals there, as Cycles has them (see `_flat`); 0 for a flat triangle
+        without area.
+    loops (t, 3) int32: The mesh corners (loops) they are.
+    polygon (t,) int32: The polygon each triangle is part of.
+    material (t,) int32: The slot of each triangle's polygon.
+    lightmap_uv (t, 3, 2) float32: The UVs of the layer `Lightmap`, where there is one.
     """
 
     corners: np.ndarray
@@ -52,20 +44,15 @@ class MeshArrays:
 class RawMesh:
     """What a mesh stores, copied as it is: to be worked on when the mesh may be gone.
 
-    Parameters
-    ----------
-    positions : (v, 3) float32
-    vertex : (l,) int32
-        Of each loop.
-    loops : (t, 3) int32
-    polygon : (t,) int32
-    material : (p,) int32
-    normals : (l, 3) float32
-    smooth : (p,) bool
-    by_corner : bool
-        Normals of corners count for flat polygons too; see `_flat`.
-    lightmap_uv : (l, 2) float32 or None
-    uv_layers : int
+    positions (v, 3) float32.
+    vertex (l,) int32: Of each loop.
+    loops (t, 3) int32.
+    polygon (t,) int32.
+    material (p,) int32.
+    normals (l, 3) float32.
+    smooth (p,) bool.
+    by_corner: Normals of corners count for flat polygons too; see `_flat`.
+    lightmap_uv (l, 2) float32.
     """
 
     positions: np.ndarray
@@ -165,19 +152,11 @@ def world_from_object(mesh: MeshArrays, matrix: np.ndarray) -> tuple[np.ndarray,
     A mirroring matrix turns counter-clockwise triangles clockwise; Blender swaps them
     back, so that the side its normals show stays the front.
 
-    Parameters
-    ----------
-    mesh : MeshArrays
-    matrix : (4, 4) float64
-
-    Returns
-    -------
-    corners : (t, 3, 3) float64
-    normals : (t, 3, 3) float64, unit
-        In the corners' order. A normal that vanishes becomes the face's, or 0.
-    mirrored : bool
-        Whether the order of the corners was reversed: index what belongs to them
-        with [:, ::-1].
+    matrix (4, 4).
+    Returns corners (t, 3, 3).
+    Returns normals (t, 3, 3), unit: In the corners' order. A normal that vanishes becomes the face's, or 0.
+    Returns mirrored: Whether the order of the corners was reversed: index what belongs to them with [:,
+        ::-1].
     """
     linear = matrix[:3, :3]
     corners = mesh.corners @ linear.T + matrix[:3, 3]

@@ -36,13 +36,8 @@ _COPLANAR = 1e-5
 class Charts:
     """One object's charts.
 
-    Parameters
-    ----------
-    uv : (n, 3, 2) float64
-        1 unit is 1 m; every chart has its own origin.
-    chart : (n,) int64
-        0 … count − 1, or −1 for triangles of polygons without area.
-    count : int
+    uv (n, 3, 2): 1 unit is 1 m; every chart has its own origin.
+    chart (n,) int64: 0 … count − 1, or −1 for triangles of polygons without area.
     """
 
     uv: Float
@@ -53,19 +48,10 @@ class Charts:
 def unwrap(triangles: Float, polygon: Int, grow: GrowCharts | None) -> Iterator[Charts]:
     """Cut an object into charts, piece by piece.
 
-    Parameters
-    ----------
-    triangles : (n, 3, 3) float64
-        Corners in world space [m].
-    polygon : (n,) int
-        The polygon of each triangle.
-    grow : callable or None
-        The chart grower; None gives every polygon a chart of its own.
-
-    Yields
-    ------
-    Charts
-        Of all the triangles, with those pieces done so far; the last one is the result.
+    triangles (n, 3, 3): Corners in world space [m].
+    polygon (n,) int: The polygon of each triangle.
+    grow: The chart grower; None gives every polygon a chart of its own.
+    Yields of all the triangles, with those pieces done so far; the last one is the result.
     """
     polygon = numbered(polygon)
     uv = np.zeros((len(triangles), 3, 2))

@@ -16,14 +16,11 @@ def overlapping_triangles(uv: Float, chart: Int) -> NDArray[np.intp]:
     """Return the triangles that share ground with another one of their chart.
 
     The charts are drawn side by side at some two hundred texels a triangle, on a page of
-    1448² at most; a texel's centre inside two triangles gives them away. Smaller overlaps
+    1448² at most; a texel's center inside two triangles gives them away. Smaller overlaps
     go unseen.
 
-    Parameters
-    ----------
-    uv : (n, 3, 2) float64
-        Every chart in its own place; charts may lie over each other.
-    chart : (n,) int64
+    uv (n, 3, 2): Every chart in its own place; charts may lie over each other.
+    chart (n,) int64.
     """
     if not len(uv):
         return np.zeros(0, dtype=np.intp)

@@ -39,20 +39,11 @@ of no consequence, as charts are brought to their own scale later.
 def run_xatlas(vertices: Float, faces: Int) -> tuple[Any, Float, Int]:
     """Cut a mesh into charts in this process.
 
-    Parameters
-    ----------
-    vertices : (v, 3) float64
-        At a scale where triangles are about 1 in area, welded.
-    faces : (n, 3) int64
-
-    Returns
-    -------
-    atlas
-        To be kept a while: destroyed right after its work it may hang.
-    uv : (n, 3, 2) float64
-        Stretched along u and v, each chart otherwise; charts may lie over each other.
-    chart : (n,) int64
-        −1 for faces that xatlas left out.
+    vertices (v, 3): At a scale where triangles are about 1 in area, welded.
+    faces (n, 3) int64.
+    Returns to be kept a while: destroyed right after its work it may hang.
+    Returns uv (n, 3, 2): Stretched along u and v, each chart otherwise; charts may lie over each other.
+    Returns chart (n,) int64: −1 for faces that xatlas left out.
     """
     import xatlas
 

@@ -14,10 +14,7 @@ from ..texels import TOUCHED
 class LightStatistics:
     """Of one surface.
 
-    Attributes
-    ----------
-    minimum, mean, maximum : float
-        In the unit of what was given; the mean is by area.
+    minimum, mean, maximum: In the unit of what was given; the mean is by area.
     """
 
     minimum: float

@@ -43,16 +43,10 @@ CHUNK = 1 << 16
 class Seams:
     """s places on seams, and the texels a bilinear look-up of either side reads there.
 
-    Attributes
-    ----------
-    texel : (s, 2, 4) int64
-        One side's four texels, then the other's, numbered row by row and page after page.
-    weight : (s, 2, 4) float64
-        Of the texels; either side's sum to 1.
-    length : (s,) float64
-        Of the seam that the place stands for, in texels, at most 1.
-    triangle : (s, 2) int64
-        The scene's triangles on either side.
+    texel (s, 2, 4) int64: One side's four texels, then the other's, numbered row by row and page after page.
+    weight (s, 2, 4): Of the texels; either side's sum to 1.
+    length (s,): Of the seam that the place stands for, in texels, at most 1.
+    triangle (s, 2) int64: The scene's triangles on either side.
     """
 
     texel: Array
@@ -84,10 +78,7 @@ class Seams:
 def find_seams(scene: Scene, geometry: TexelGeometry, caster: RayCaster | None = None) -> Seams:
     """Find the seams of all charts on all pages.
 
-    Parameters
-    ----------
-    caster : RayCaster or None
-        Tells which seams have something standing on them; None takes it that none has.
+    caster: Tells which seams have something standing on them; None takes it that none has.
     """
     triangle, corner = _shared_edges(scene, geometry)
     ends, pages = _on_pages(geometry, triangle, corner)
@@ -137,11 +128,9 @@ def _in_one(geometry: TexelGeometry) -> Array:
 def _shared_edges(scene: Scene, geometry: TexelGeometry) -> tuple[Array, Array]:
     """Return the edges of exactly two triangles that go on in each other.
 
-    Returns
-    -------
-    triangle : (p, 2) int
-    corner : (p, 2, 2) int
-        Which of the triangle's corners are the edge's ends, in the same order on both sides.
+    Returns triangle (p, 2) int.
+    Returns corner (p, 2, 2) int: Which of the triangle's corners are the edge's ends, in the same order on
+        both sides.
     """
     every = np.flatnonzero(scene.areas > 0)
     vertex = weld(scene.triangles[every].reshape(-1, 3), WELD).reshape(-1, 3)
@@ -184,12 +173,8 @@ def _bilinear(spots: Array, pages: Array, sizes: Sequence[int]) -> tuple[Array, 
 def _own_texels_only(geometry: TexelGeometry, numbers: Array, weight: Array, at: Array, size: Array) -> Array:
     """Return (s,) which places read no other surface's texels, but their own on both sides.
 
-    Parameters
-    ----------
-    numbers : (s, 2, 4) int
-        The covered texels among those read, or NO_TEXEL.
-    at, size : (s, 3), (s,) float64
-        Where the places are, and the width of a texel there [m].
+    numbers (s, 2, 4) int: The covered texels among those read, or NO_TEXEL.
+    at, size (s, 3), (s,): Where the places are, and the width of a texel there [m].
     """
     covered = (numbers != NO_TEXEL) & (weight > 0)
     distance = np.linalg.norm(geometry.position[numbers] - at[:, None, None], axis=3)

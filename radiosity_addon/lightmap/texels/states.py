@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 NO_TEXEL_HERE = 255
-"""The state of a pixel that shows no surface: it was filled from its neighbours."""
+"""The state of a pixel that shows no surface: it was filled from its neighbors."""
 
 
 DIVIDED, OCCLUDED, TOUCHED, ENCLOSED = 1, 2, 3, 4

@@ -30,38 +30,22 @@ _SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 class TexelGeometry:
     """The n covered texels of all pages, numbered page by page.
 
-    Parameters
-    ----------
-    scene : Scene
-    uv : (t, 3, 2) float32
-        Lightmap coordinates of every scene triangle; rows without a lightmap are ignored.
-    page_of_triangle : (t,) int32
-        −1 where a triangle has no lightmap.
-    texels : sequence of Texels
-        One per page.
-    rows : sequence of (p,) int
-        Per page, the scene triangle of each of the page's triangles.
-    scratch : Scratch or None
-        Makes the texels' arrays; None keeps them in memory.
-
-    Attributes
-    ----------
-    scratch : Scratch
-        Makes arrays of what else there is of each texel.
-    uv, page_of_triangle, triangles, face_normals, normals
-        Of every scene triangle, as given.
-    page : (n,) int16, or int32 where there are more pages
-    row, column, triangle : (n,) int32
-    share : (n,) float32
-        What part of the texel its triangle covers.
-    centre_inside : (n,) bool
-        Whether the texel's centre is on its triangle.
-    whole : (n,) bool
-        Whether all of the texel is.
-    barycentric : (n, 2) float32
-        Weights of the triangle's second and third corner at the centre of the footprint.
-    position, normal, surface_normal : (n, 3) float64
-        Centre of the footprint; interpolated shading normal; the triangle's own normal.
+    uv (t, 3, 2) float32: Lightmap coordinates of every scene triangle; rows without a lightmap are ignored.
+    page_of_triangle (t,) int32: −1 where a triangle has no lightmap.
+    texels: One per page.
+    rows sequence of (p,) int: Per page, the scene triangle of each of the page's triangles.
+    scratch: Makes the texels' arrays; None keeps them in memory.
+    scratch: Makes arrays of what else there is of each texel.
+    uv, page_of_triangle, triangles, face_normals, normals: Of every scene triangle, as given.
+    page (n,) int16, or int32 where there are more pages.
+    row, column, triangle (n,) int32.
+    share (n,) float32: What part of the texel its triangle covers.
+    centre_inside (n,) bool: Whether the texel's center is on its triangle.
+    whole (n,) bool: Whether all of the texel is.
+    barycentric (n, 2) float32: Weights of the triangle's second and third corner at the center of the
+        footprint.
+    position, normal, surface_normal (n, 3): Center of the footprint; interpolated shading normal; the
+        triangle's own normal.
     """
 
     scratch = Scratch()
