@@ -94,7 +94,7 @@ class Console:
             self._stream.write(text)
             self._stream.flush()
         except (OSError, ValueError):
-            self.quiet = True  # nobody reads it, such as `| head`; the bake goes on
+            self.quiet = True  # the reader has closed the pipe, as `| head` does; the bake continues
 
     def _end_line(self) -> None:
         if self._open_line:

@@ -62,7 +62,7 @@ def bake_output(request: argparse.Namespace, loaded: Path | None) -> Path:
 
 
 def check_keeping(request: argparse.Namespace, settings: BakeSettings) -> None:
-    """Refuse to keep what cannot be lit anew, and to relight otherwise than it was baked."""
+    """Refuse to keep bakes that cannot be relit, and to relight with settings other than the bake's."""
     if request.keep and settings.method != "hierarchical":
         raise UsageError(f"--keep needs the hierarchical method; {settings.method} keeps no links")
     if request.keep and settings.quantity == "residual":

@@ -1,4 +1,4 @@
-"""What the command line may do beyond what is safe, because its user says so."""
+"""Permissions that users grant on the command line for actions that are not safe."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ from ..numerics import Array
 from ..rays import RayCaster
 
 LEAST = 1e-6
-"""Of what a cut-out lets pass, and of what it stops, as far as `sees` tells."""
+"""Lower bound of the shares that cut-outs pass and stop, in results of `visibility_of`."""
 
 _TINY = 1e-150
 """Least square of a distance: keeps a point and itself from 0/0, and its own square above 0."""
@@ -81,7 +81,7 @@ def visibility_of(
     """Return V of pairs of points on surfaces: whether nothing lies between them, or how much passes.
 
     Both ends leave their surfaces by the caster's offset, so that no surface hides itself.
-    Facing away is the geometry term's affair and is not asked here.
+    The geometry term handles pairs that face away from each other.
 
     points, normals, other_points, other_normals (n, 3).
     Returns visible (n,) bool or: Never 0 or 1 where a cut-out was met: others may find what few rays between

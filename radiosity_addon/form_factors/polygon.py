@@ -42,8 +42,8 @@ def point_to_polygon(
     normals (n, 3): Unit normals of the receiver at the points.
     polygons (n, k, 3): May be a broadcast view: rows are copied by chunks of `CHUNK_CORNERS` corners.
     both_sides: Count the polygon's back as well.
-    contact: Whether faces in contact see each other. A surface's own back lies in its plane and faces the
-        other way just like one in contact, so callers that cannot tell them apart say no.
+    contact: Whether faces in contact see each other. A surface's own back also lies in its plane and faces
+        the other way, so callers that cannot distinguish the two pass False.
     Returns factors (n,) float64 in [0, 1].
     Raises ValueError if shapes do not match.
     """

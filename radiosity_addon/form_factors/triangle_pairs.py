@@ -26,7 +26,7 @@ TOLERANCE = 2e-5
 """Error allowed to each interval of the outline, as a factor from the smaller triangle."""
 
 BLIND_ERROR = 1e-3
-"""What quadrature may miss between its nodes beside an edge, in squares of the interval (measured)."""
+"""Quadrature error between nodes next to an edge, in squares of the interval (measured)."""
 
 BLIND_BISECTIONS = 6
 """Bisections on that suspicion alone; it would cut a needle's edges to dust."""
@@ -35,7 +35,7 @@ MAX_BISECTIONS = 24
 """Ends the bisection at singular points; intervals there are below 1e-7 of their edge."""
 
 NEEDLE = 1e-8
-"""Outlines around less than this part of their length squared cancel: points along the triangle are asked."""
+"""Outlines around less than this part of their length squared cancel: points are evaluated instead."""
 
 NEEDLE_POINTS = 32
 
@@ -214,10 +214,10 @@ def _along_needles(outer: Float64Array, outer_normal: Float64Array, inner: Float
 
 
 def weighted_sums(values: Float64Array, weights: Float64Array) -> Float64Array:
-    """Return (m,) Σ_k values_mk weights_k, the same bits for a row whatever rows stand beside it.
+    """Return (m,) Σ_k values_mk weights_k, the same bits for a row regardless of the other rows.
 
     A matrix product promises no such thing: it treats the last rows of an array differently,
-    and a pair's factor must not depend on what it was asked together with.
+    and a pair's factor must not depend on the other pairs of the call.
     """
     total: Float64Array = values[:, 0] * weights[0]
     for column in range(1, len(weights)):

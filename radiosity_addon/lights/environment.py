@@ -29,7 +29,7 @@ PATCH_RADIUS = np.radians(15.0)
 has about one color."""
 
 MAX_PATCHES = 12
-"""What is bright beyond so many patches stays in the even part."""
+"""The maximum number of patches; further bright pixels stay in the uniform part."""
 
 _CHUNK = 1 << 20
 """Points times pixels evaluated at once; bounds the temporaries to 8 MB."""
@@ -55,7 +55,7 @@ class EnvironmentImage(EnvironmentLight):
         super().__post_init__()
         image = np.asarray(self.image, dtype=np.float64)
         if image.ndim != 2 or not (np.isfinite(image).all() and (image >= 0.0).all()):
-            raise self._fail("its image has negative, NaN or infinite pixels", "mend its node tree")
+            raise self._fail("its image has negative, NaN or infinite pixels", "fix its node tree")
         self._store("image", image)
 
     @property

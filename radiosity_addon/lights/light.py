@@ -1,4 +1,4 @@
-"""What every light can be asked, and how its values are checked."""
+"""The interface of all lights, and checks of their values."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ class Light:
         """(3,) RGB: a lamp's power [W], a sun's irradiance [W/m²], a sky's radiance [W/m²/sr]."""
         raise NotImplementedError
 
-    def _fail(self, what: str, mend: str) -> SceneError:
+    def _fail(self, what: str, fix: str) -> SceneError:
         kind = type(self).__name__.removesuffix("Light").lower()
-        return SceneError(f"{kind} light{f' {self.name!r}' if self.name else ''}: {what}; {mend}")
+        return SceneError(f"{kind} light{f' {self.name!r}' if self.name else ''}: {what}; {fix}")
 
     def _set_rgb(self, field: str) -> None:
         """Replace the field, a number or RGB triple, by a read-only (3,) float64."""
@@ -46,7 +46,7 @@ class Light:
         """Replace the field by a read-only (3,) float64, normalized if `unit`."""
         value = np.asarray(getattr(self, field), dtype=np.float64)
         if value.shape != (3,) or not np.isfinite(value).all():
-            raise self._fail(f"{field} {value.tolist()} is not finite and (3,)", "set its transform anew")
+            raise self._fail(f"{field} {value.tolist()} is not finite and (3,)", "reset its transform")
         if unit:
             length = np.linalg.norm(value)
             if length == 0.0:
@@ -55,7 +55,7 @@ class Light:
         self._store(field, value)
 
     def _set_number(self, field: str, low: float, high: float, above: bool = False) -> None:
-        """Replace the field by a float, refusing what is not in [low, high], or (low, high] if `above`."""
+        """Replace the field by a float, refusing values outside [low, high], or (low, high] if `above`."""
         value = float(getattr(self, field))
         if not (np.isfinite(value) and low <= value <= high and not (above and value == low)):
             allowed = f"{'above' if above else 'from'} {low:g}" + (f" to {high:g}" if high < 1e300 else "")

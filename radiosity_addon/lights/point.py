@@ -28,10 +28,10 @@ _EDGE_SAMPLES = 16
 """Samples across a spot's disk, each way, that average the cone's edge over it."""
 
 _RIM_SAMPLES = 256
-"""Directions around a stretched cone that tell how wide and how narrow it is."""
+"""Directions around a stretched cone, sampled for its largest and smallest width."""
 
 _CONE_SAMPLES = 256
-"""Samples over a stretched cone, each way, that tell its power."""
+"""Samples over a stretched cone, along each axis, for its power."""
 
 _EDGE_CHUNK = 1 << 10
 """Points whose edge samples are taken at a time; temporaries stay below 64 MB."""
@@ -129,7 +129,7 @@ class _Bulb(Emitter):
 
 @dataclass(frozen=True, eq=False)
 class PointLight(_Bulb):
-    """A lamp that shines alike in all directions.
+    """A lamp that shines equally in all directions.
 
     position (3,) [m].
     power float or (3,) float [W]: Emitted power; the intensity is power / 4π.
@@ -276,7 +276,8 @@ class SpotLight(_Bulb):
         half = 0.5 * self.angle
         plateau = np.arccos(np.clip(np.cos(half) + self.blend * self._opening, -1.0, 1.0))
         if self.round_from_world is not None:
-            # Anywhere between the narrowest plateau and the widest edge; asked in vain it is the same.
+            # Anywhere between the narrowest plateau and the widest edge; where it finds none, the result is
+            # the same.
             narrow, half = self.half_angles
             plateau = 0.0 if self.blend > 0.0 else narrow
         off_axis = np.arccos(np.clip(-(toward @ np.asarray(self.direction)), -1.0, 1.0))

@@ -1,4 +1,4 @@
-"""Lamps and the sky: what each sends to a point, in closed form, and rays that ask what is in the way.
+"""Suns and uniform skies: irradiance in closed form, and shadow rays.
 
 Cycles' lamps are the model. A lamp's irradiance on an unoccluded point is
 `strength × unit_irradiance`; `shadow_rays` sample the same integral, so that a visibility is a
@@ -76,7 +76,7 @@ class SunLight(Lamp):
 
 @dataclass(frozen=True, eq=False)
 class EnvironmentLight(Light):
-    """A sky of constant radiance around the scene, as seen by whatever is not covered.
+    """A sky of constant radiance around the scene.
 
     radiance float or (3,) float [W/m²/sr].
     Raises SceneError if it is negative, NaN or infinite.

@@ -8,7 +8,7 @@ from .arrays import Array
 
 
 def texels_around(place: Array, width: Array | int, height: Array | int) -> tuple[Array, Array]:
-    """Find the texels that bilinear look-ups read; beyond the middles of the rim the image goes on evenly.
+    """Find the texels that bilinear look-ups read; beyond the centers of border texels the image is constant.
 
     place (…, 2): In texels; a texel's middle is at a half.
     width, height int or (…,) int: Of the image of each.

@@ -28,7 +28,7 @@ SHIFTS = (0.23, 0.71)
 
 
 def facing_copies(triangles: Array, two_sided: Array, offset: float) -> tuple[Array, Array]:
-    """Return copies of triangles that look away from black backs in their plane.
+    """Return copies of triangles that face away from black backs in their plane.
 
     triangles (t, 3, 3): Corners [m], the scene's center at the origin.
     two_sided (t,) bool: The others' backs are black.
@@ -57,7 +57,7 @@ def facing_copies(triangles: Array, two_sided: Array, offset: float) -> tuple[Ar
 
 
 def _keys(values: Array) -> Array:
-    """Return (n,) one number for each row of (n, 4), the same for rows alike when rounded."""
+    """Return (n,) one number for each row of (n, 4), the same for rows that are equal after rounding."""
     key: Array = np.zeros(len(values), dtype=np.uint32)
     for column in np.floor(values).astype(np.int64).T:
         key = hash_keys(column.astype(np.uint64) << np.uint64(32) | key, 71)

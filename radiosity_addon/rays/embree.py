@@ -27,8 +27,8 @@ class EmbreeCaster:
 
     triangles (t, 3, 3): World-space corners [m].
     threads: 0 means all cores. Results do not depend on it.
-    only (t,) bool: The triangles that rays meet, where it is not all of them.
-    for_lamps: What stops the light of lamps, where that is something else.
+    only (t,) bool: The triangles that rays meet; None for all.
+    for_lamps: The caster for the light of lamps, if it differs.
     two_sided (t,) bool: The others' backs are black; None if that does not matter.
     """
 
@@ -73,7 +73,7 @@ class EmbreeCaster:
 
     @property
     def for_lamps(self) -> RayCaster:
-        """The caster that knows what stops the light of lamps; most often this one."""
+        """The caster for the light of lamps; usually this one."""
         return self if self._for_lamps is None else self._for_lamps
 
     @property

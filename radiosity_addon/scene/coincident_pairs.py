@@ -16,7 +16,7 @@ SPACINGS = 8.0
 """… or than so many float32 spacings of their coordinates, are in one place."""
 
 SLACK = 1.25
-"""The tolerance is exceeded by this factor: what is a micrometer apart in float32 may be a little more."""
+"""Factor on the tolerance: a distance of a micrometer may be slightly more in float32."""
 
 PARALLEL = 0.9998
 """Cosine between the normals of coplanar triangles, at least: small ones have rounded normals."""
@@ -87,7 +87,7 @@ def coincident_pairs(triangles: Array, rows: Array, tolerance: Array, reach: Arr
 
 
 class _Planes:
-    """Some triangles with what tests of pairs ask of them."""
+    """Triangles with the data that tests of pairs need."""
 
     def __init__(self, triangles: Array, rows: Array, tolerance: Array, reach: Array) -> None:
         self._rows = rows

@@ -37,13 +37,13 @@ NEAR_EMITTERS = 3.0
 """What emits is covered by what is this many surface offsets in front of it: shadow rays pass that by."""
 
 ONE_PLANE = 0.5
-"""So much of their tolerance apart, faces count as in one plane: rounding decides no more."""
+"""Faces closer than this part of their tolerance count as coplanar: their order is lost in rounding."""
 
 FINE = 1.0 / 64.0
 """Heights that round to the same multiple of this part of the tolerance are equal."""
 
 PROBES = 32
-"""Rays that tell whether what is behind a face is solid."""
+"""Rays that decide whether a face belongs to a solid."""
 
 MANY_COPIES = 4
 """More exact copies of one triangle than these are not compared pair by pair."""
@@ -78,7 +78,7 @@ class Covers:
 
 
 class Layers:
-    """What of a scene's sides is covered."""
+    """The covered parts of a scene's sides."""
 
     def __init__(self, scene: Surfaces) -> None:
         self._scene = scene
@@ -254,7 +254,7 @@ def _covers(
         one, other = 2 * first[rows] + one_is_back[rows], 2 * second[rows] + other_is_back[rows]
         won = wins[rows]
         mine, theirs = pairs.in_first[rows], pairs.in_second[rows]
-        # Corner by corner the same, whichever way round that is for the cover.
+        # The same corner by corner, in either orientation of the cover.
         turn = ~pairs.same[rows, None, None]
         which = won[:, None, None]
         found.append(
@@ -289,7 +289,7 @@ def _many_copies(scene: Surfaces, solid: Array, emits: Array) -> tuple[Array, Ar
     none = np.zeros(0, dtype=np.int64)
     opaque = solid if scene.images is None else solid[~scene.images.cut_out[solid]]
     bits = np.ascontiguousarray(scene.triangles[opaque] + 0.0).view(np.uint64)
-    # A number for each triangle, whichever corner comes first.
+    # A number for each triangle that does not depend on its first corner.
     mixed = bits * _ODD
     number = (mixed[..., 0] ^ (mixed[..., 1] >> np.uint64(7)) ^ (mixed[..., 2] >> np.uint64(13))).sum(axis=1)
     _, group, count = np.unique(number, return_inverse=True, return_counts=True)

@@ -26,7 +26,7 @@ def shares(sums: Array, limit: float = OVERLAP) -> Array:
 
 
 def arriving(exchange: Array, opacity: Array) -> Array:
-    """Return (n,) Σ_j T_ij α_j [m²]: how much of what rows exchange finds a surface there.
+    """Return (n,) Σ_j T_ij α_j [m²]: the part of each row's exchange that meets an existing surface.
 
     exchange (n, m): Exchange areas T.
     opacity (m,): α of each column's surface: a link sees all of a surface's area, holes included.

@@ -15,7 +15,7 @@ from .scene import Scene
 
 
 class Stacks:
-    """Which cut-outs lie in one another.
+    """Coincident cut-outs.
 
     scene: With images.
     met (t,) bool: The triangles that rays meet.

@@ -25,7 +25,7 @@ ALL_BOUNCES = 1024
 """A lamp's own limit in Cycles, unless it is set."""
 
 LampFactors = dict[str, tuple[np.ndarray, float]]
-"""By a lamp's full name, what its nodes make of its light (see `lamp_factor`)."""
+"""The factor of each lamp's nodes (see `lamp_factor`), by its full name."""
 
 
 def lamp_factors() -> Generator[float, None, LampFactors]:
@@ -71,7 +71,7 @@ def read_lamp(
     warnings += notes
     if not (all_finite(matrix_world) and np.isfinite(strength).all()):
         raise SceneError(
-            f"lamp '{name}' has a NaN or infinite position or power; mend its transform and strength"
+            f"lamp '{name}' has a NaN or infinite position or power; fix its transform and strength"
         )
     if (strength < 0).any():
         warnings.append(BakeWarning(name, f"lamp '{name}': negative power is not possible; 0 is used"))
@@ -192,7 +192,7 @@ def _sphere_area(data: bpy.types.Light) -> float:
 
 
 def _casts_shadow(data: bpy.types.Light) -> bool:
-    """Tell what Cycles asks: its own switch, or where it has none (later on) that of all engines."""
+    """Return the setting that Cycles uses: its own or, in later versions, that of all engines."""
     return bool(getattr(data.cycles, "cast_shadow", data.use_shadow))
 
 
@@ -201,7 +201,7 @@ def _is_portal(data: bpy.types.Light) -> bool:
 
 
 def _asks_for_distance(tree: bpy.types.NodeTree) -> bool:
-    """Tell whether nodes make light fall off otherwise than with the square of the distance."""
+    """Return whether nodes change the falloff of light from the square of the distance."""
     for node in tree.nodes:
         if node.type == "LIGHT_FALLOFF":
             linked = {output.name for output in node.outputs if output.is_linked}

@@ -28,7 +28,7 @@ MAX_TEXELS = 1024 * 1024
 """Texels of a batch; Cycles takes 0.3–0.9 s for them."""
 
 TEXELS_OF_MESH = 8
-"""A triangle's share of a batch's mesh takes as long as so many texels."""
+"""Cost of a triangle in a batch's mesh, in texels."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ def material_facts(
     """Rewire each material for a moment, as many a step as fit into one.
 
     materials mapping of int to MaterialSource or None: By their surface.
-    inputs: What their nodes ask for.
+    inputs: Inputs of their nodes.
     """
     facts: dict[int, MaterialFacts] = {}
     until = time.perf_counter() + MOMENT

@@ -47,7 +47,7 @@ def evaluate_surfaces(
     materials: Parallel to `surfaces`: the file's own, not evaluated ones.
     settings: `resolution` and `threads` matter here.
     in_background: Whether a window waits.
-    Returns none where constants say it all.
+    Returns none where constants suffice.
     Raises BakeError if Cycles did not bake.
     Raises SceneError if a material is gone.
     """
@@ -100,7 +100,7 @@ def _side(settings: BakeSettings, cut_out: bool) -> int:
 
 
 def _gather(pieces: Sequence[Piece], rows: np.ndarray) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Return world corners (n, 3, 3) of some triangles, and what nodes ask there, (n, 3, 4) by name."""
+    """Return world corners (n, 3, 3) of triangles, and inputs of the nodes there, (n, 3, 4) by name."""
     names = sorted({name for piece in pieces for name in piece.asked})
     corners = np.empty((len(rows), 3, 3))
     inputs = {name: np.zeros((len(rows), 3, 4), dtype=np.float32) for name in names}

@@ -47,9 +47,9 @@ def read_world(world: bpy.types.World | None, dark: bool = False) -> Generator[f
     limited = _limited(world)
     if not uses_nodes(world):
         return _constant(np.array(world.color[:3], dtype=np.float64), world.name, dark), limited
-    with known_means_only(None):  # an image is not constant, whatever its mean
+    with known_means_only(None):  # an image is not constant
         radiance, warnings = read_radiance(world, "world")
-    # The walk through the nodes warns of whatever is not constant: then Cycles knows better.
+    # The walk through the nodes warns of values that are not constant; Cycles evaluates those.
     beside = tuple(warning for warning in warnings if "volume" in warning.message)
     if len(beside) == len(warnings):
         return _constant(radiance, world.name, dark), beside + limited

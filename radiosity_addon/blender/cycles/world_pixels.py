@@ -19,7 +19,7 @@ SAMPLES = 16
 """Of each pixel, spread over all of it."""
 
 _AS_DIFFUSE_RAYS = {"Is Diffuse Ray": 1.0, "Is Reflection Ray": 1.0, "Ray Length": 1e5, "Ray Depth": 1.0}
-"""What a Light Path node says of rays that light a surface; all else it says of them is 0."""
+"""Outputs of a Light Path node for rays that light a surface; all others are 0."""
 
 
 def world_pixels(
@@ -110,7 +110,7 @@ def _set_up(scene: bpy.types.Scene, size: tuple[int, int], path: Path) -> None:
 
 
 def _answer_light_paths(tree: bpy.types.NodeTree, copies: dict[str, bpy.types.NodeTree]) -> None:
-    """Have every Light Path node of a tree, and of copies of its groups, answer as for diffuse rays."""
+    """Make every Light Path node of a tree, and of copies of its groups, act as for diffuse rays."""
     for node in list(tree.nodes):
         if node.type == "GROUP" and node.node_tree is not None:
             name = node.node_tree.name_full
@@ -134,7 +134,7 @@ def _replace(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, answer: flo
 
 @contextmanager
 def only_for_now() -> Iterator[None]:
-    """Remove whatever datablock the block makes, the render result included."""
+    """Remove all datablocks that the block creates, including the render result."""
     kinds = (
         "scenes", "objects", "meshes", "materials", "lights", "cameras", "worlds", "node_groups",
         "images", "actions",

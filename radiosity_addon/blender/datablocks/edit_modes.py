@@ -1,4 +1,4 @@
-"""Objects taken out of Edit Mode and other modes, in whatever scene they are being edited."""
+"""Take objects out of Edit Mode and other modes, in any scene."""
 
 from __future__ import annotations
 

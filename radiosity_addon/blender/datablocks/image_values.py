@@ -65,7 +65,7 @@ def mean_of_named(wanted: Wanted) -> Generator[float, None, np.ndarray | None]:
 def image_mean_steps(
     image: bpy.types.Image, equirectangular: bool = False
 ) -> Generator[float, None, np.ndarray | None]:
-    """Compute the mean of an image's pixels, colors made linear first; the first step alone asks the image.
+    """Compute the mean of an image's pixels, converted to linear first; only the first step reads the image.
 
     equirectangular: Weight each row by the solid angle it covers on the sphere.
     Returns (4,), linear RGB and alpha, not weighted by alpha; None for an image without pixels..

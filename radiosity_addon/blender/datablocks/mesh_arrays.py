@@ -124,17 +124,17 @@ def no_triangles() -> MeshArrays:
 
 
 def all_finite(values: np.ndarray) -> bool:
-    """Tell whether positions of any shape are neither NaN nor infinite."""
+    """Return whether positions of any shape are finite."""
     return bool((np.abs(values) < _INFINITE).all())
 
 
 def not_finite_message(name: str) -> str:
-    """Say whose coordinates are no numbers, and the mend."""
-    return f"object '{name}' has NaN or infinite coordinates; mend its mesh or transform"
+    """Return the error message for an object with invalid coordinates."""
+    return f"object '{name}' has NaN or infinite coordinates; fix its mesh or transform"
 
 
 def same_polygons(first: bpy.types.Mesh, second: bpy.types.Mesh) -> bool:
-    """Tell whether two meshes have the same polygons over the same vertices, corner by corner."""
+    """Return whether two meshes have the same polygons over the same vertices, corner by corner."""
     sizes = [(len(mesh.vertices), len(mesh.polygons), len(mesh.loops)) for mesh in (first, second)]
     if sizes[0] != sizes[1]:
         return False
@@ -177,7 +177,7 @@ def normal_matrix(linear: np.ndarray) -> np.ndarray:
 
 
 def degenerate(corners: np.ndarray) -> np.ndarray:
-    """Tell which triangles (t, 3, 3) have no area, within the rounding of single precision: (t,) bool."""
+    """Return (t,) which triangles (t, 3, 3) have no area, within single precision."""
     edges = corners - np.roll(corners, 1, axis=1)
     longest = np.einsum("tci,tci->tc", edges, edges).max(axis=1, initial=0.0)
     double_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)

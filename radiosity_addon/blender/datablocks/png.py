@@ -66,7 +66,7 @@ def _still_image(render: bpy.types.RenderSettings, path: Path) -> None:
 
 
 def _without_notes(png: bytes) -> bytes:
-    """Drop a PNG's text chunks: Blender's tell dates and render times, so no two files are the same."""
+    """Drop a PNG's text chunks: Blender's contain dates and render times, so no two files would be equal."""
     kept, start = [png[:8]], 8
     while start < len(png):
         length = int.from_bytes(png[start : start + 4], "big") + 12  # size, type and checksum

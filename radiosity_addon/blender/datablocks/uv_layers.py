@@ -45,7 +45,7 @@ class LayerRecord:
 
 
 def layer_record(mesh: bpy.types.Mesh) -> LayerRecord | None:
-    """Return what a mesh says of our layer; None if it has none."""
+    """Return a mesh's record of our UV layer; None if it has none."""
     text = mesh.get(LAYER)
     if text is None:
         return None

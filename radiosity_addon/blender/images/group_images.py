@@ -72,7 +72,7 @@ def update_images(
     group_images: GroupImages,
     groups: Sequence[LightGroup] = (),
 ) -> None:
-    """Put new light into the images that are shown, in memory: whoever calls saves or packs them.
+    """Put new light into the images that are shown, in memory; the caller saves or packs them.
 
     Materials follow where an image holds scaled values and the scale changes. Images are only touched
     once all are known to fit.

@@ -187,7 +187,7 @@ def image_scale(image: bpy.types.Image) -> float:
 
 
 def lightmap_files(images: Sequence[bpy.types.Image], settings: BakeSettings) -> list[LightmapFile]:
-    """What the report says of the images: file names, and the scale where there is one."""
+    """Entries of the images in the report: file names, and the scale where there is one."""
     scaled = settings.format == "png16"
     return [
         LightmapFile(

@@ -150,7 +150,7 @@ def _set_tree(node: bpy.types.Node, sliders: bpy.types.NodeTree) -> None:
 
 
 def _sliders_tree() -> bpy.types.NodeTree:
-    """Return the node group of one light group, made anew where the file has none of ours."""
+    """Return the node group of one light group, created if the file has none of ours."""
     for tree in bpy.data.node_groups:
         mine = is_made(tree) and tree.library is None and tree.get(KIND) is None
         # The mixer's name begins with the same words.

@@ -169,7 +169,7 @@ def _torn_polygons(
     """Return which polygons need a chart of their own.
 
     Those cut by the grower, left out by it, turned over against the rest of their chart, or
-    with a triangle without area beside one that has some (the grower never saw it).
+    with a triangle without area next to one that has some (the grower never saw it).
     """
     count = int(polygon.max()) + 1
     torn = np.zeros(count, dtype=np.bool_)

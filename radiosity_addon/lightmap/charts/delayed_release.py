@@ -26,7 +26,7 @@ class Resting:
 
     rest: Seconds that each is kept at least.
     most: With more than this, `keep` waits for the oldest.
-    clock, sleep: The time [s], and waiting for so many seconds.
+    clock, sleep: Return the time [s]; wait for a number of seconds.
     """
 
     def __init__(

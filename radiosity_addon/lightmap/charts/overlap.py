@@ -37,7 +37,7 @@ def overlapping_triangles(uv: Float, chart: Int) -> NDArray[np.intp]:
 
 
 def _side_by_side(uv: Float, chart: Int) -> tuple[NDArray[np.float32], int]:
-    """Place charts in shelves, a texel apart; returns uv in [0, 1] and the page's resolution."""
+    """Place charts in shelves, one texel apart; return uv in [0, 1] and the page's resolution."""
     count = int(chart.max()) + 1
     low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
     np.minimum.at(low, chart, uv.min(axis=1))

@@ -1,4 +1,4 @@
-"""xatlas, which only this module imports: in this process, or in one of its own beside a window.
+"""xatlas, imported only here: runs in this process, or in a separate one while a window is open.
 
 xatlas keeps Python's lock for as long as it works, 2.6 s for 16,000 triangles: called from a thread it would
 freeze the window all the same. Run as a script this file is the other process; it must import nothing
@@ -64,7 +64,7 @@ def run_xatlas(vertices: Float, faces: Int) -> tuple[Any, Float, Int]:
 
 
 def beside_a_window(faces: Int) -> bool:
-    """Tell whether this is the thread of a bake in a window, and the work long enough to be seen in it."""
+    """Return whether this is the thread of a bake in a window and the work is long enough to block it."""
     return threading.current_thread() is not threading.main_thread() and len(faces) > WORTH_A_PROCESS
 
 
@@ -105,7 +105,7 @@ def _unpacked(data: bytes) -> tuple[NDArray[Any], NDArray[Any]]:
 def _answer() -> None:
     """Read a mesh from standard input and write its charts to standard output."""
     answer = os.dup(1)
-    os.dup2(2, 1)  # whatever else is printed is no part of it
+    os.dup2(2, 1)  # other output must not be mixed with it
     atlas, uv, chart = run_xatlas(*_unpacked(sys.stdin.buffer.read()))
     with os.fdopen(answer, "wb") as file:
         file.write(_packed(uv, chart))

@@ -21,7 +21,7 @@ class SeamSteps:
 
     across (s,): At places on seams, between bilinear look-ups on either side.
     inside (p,): Between texels side by side in one chart, everywhere.
-    beside (q,): The same, of those that a look-up on a seam reads.
+    beside (q,): The same, for texels that a look-up on a seam reads.
     """
 
     across: Array

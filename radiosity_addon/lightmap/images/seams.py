@@ -18,7 +18,7 @@ from ...scene import Scene
 from ..texels import NO_TEXEL, TexelGeometry
 
 WELD = 1e-6
-"""Corners are one if they are no farther apart than this part of the scene's extent."""
+"""Corners are merged if their distance is at most this part of the scene's extent."""
 
 SAME_NORMAL = 0.99
 """Least cosine between the shading normals of the two sides, …"""
@@ -62,7 +62,7 @@ class Seams:
         return Seams(self.texel[rows], self.weight[rows], self.length[rows], self.triangle[rows])
 
     def of_one_material(self, scene: Scene) -> Seams:
-        """Return the places whose two sides reflect and emit alike, which images do not tell."""
+        """Return the places whose two sides have equal reflectance and emission and no textures."""
         alike = np.ones(len(self), dtype=bool)
         for values in (scene.reflectance, scene.emission):
             alike &= (values[self.triangle[:, 0]] == values[self.triangle[:, 1]]).all(axis=1)
@@ -78,7 +78,7 @@ class Seams:
 def find_seams(scene: Scene, geometry: TexelGeometry, caster: RayCaster | None = None) -> Seams:
     """Find the seams of all charts on all pages.
 
-    caster: Tells which seams have something standing on them; None takes it that none has.
+    caster: Detects geometry that stands on seams; None assumes there is none.
     """
     triangle, corner = _shared_edges(scene, geometry)
     ends, pages = _on_pages(geometry, triangle, corner)
@@ -149,7 +149,7 @@ def _shared_edges(scene: Scene, geometry: TexelGeometry) -> tuple[Array, Array]:
     triangle = np.stack([every[first // 3], every[second // 3]], axis=1)
     corner = np.stack([corner[first], corner[second]], axis=1)
     kept = (geometry.page_of_triangle[triangle] >= 0).all(axis=1)
-    # Front beside front: seen from the other side the edge runs the other way.
+    # Both fronts face the same way: from the other side, the edge runs in the other direction.
     kept &= flip[first] != flip[second]
     normal = scene.face_normals[triangle]
     kept &= np.einsum("pk,pk->p", normal[:, 0], normal[:, 1]) > NO_FOLD

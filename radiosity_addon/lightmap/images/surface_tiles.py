@@ -67,7 +67,7 @@ class SurfaceTiles:
         return self._corners(along, across), weights
 
     def fill_diagonals(self, values: Array) -> None:
-        """Give the texels beyond the diagonals the mean of those beside them, in place.
+        """Set the texels beyond the diagonals to the mean of their neighbors, in place.
 
         values (height, width, k).
         """

@@ -1,4 +1,4 @@
-"""Sixteenths of texels that geometry divides: what answers rays that hit such a texel.
+"""Cells: sixteenths of divided texels, which answer rays that hit such a texel.
 
 A texel that a wall stands on, or that a window's frame covers in part, shows the mean of what it
 holds, as it should. Light that comes back from it must not be the mean: a ray from inside a closed
@@ -139,14 +139,14 @@ class TexelCells:
         return gathered.sources
 
     def lit(self, cell: Array) -> Footprints:
-        """Return cells as footprints that ask for lamps: their anchors alone."""
+        """Return cells as footprints for the light of lamps: their anchors alone."""
         texel, geometry = self.texel_of(cell), self._geometry
         expected = self.local.irradiance_at(geometry.triangle[texel], geometry.barycentric[texel])
         anchor = self._anchors[cell // CELLS, cell % CELLS] - self._lift(texel)
         return Footprints(anchor, geometry.normal[texel], self._keys(cell), expected=expected)
 
     def _keys(self, cell: Array) -> Array:
-        """Return (p,) int64 what cells' rays are drawn by: the same whichever other texels are divided."""
+        """Return (p,) int64 sampling keys of cells, which do not depend on other divided texels."""
         texel = self.texel_of(cell).astype(np.int64)
         return np.asarray(len(self._geometry) + CELLS * texel + cell % CELLS)
 

@@ -45,11 +45,11 @@ def clear_texels(
 ) -> Array:
     """Find texels around which nothing rises off their plane.
 
-    outset: What is around a texel in its plane: its square, so many times as large.
+    outset: Size of the square around a texel in its plane, relative to the texel.
     height: And how far up that reaches, in widths of the texel.
     clearance: What rises less than this off the plane does not count [m].
     threads: 0 means all cores.
-    Returns clear (n,) bool: Certain where true; where false, who knows.
+    Returns clear (n,) bool: Certain where true; unknown where false.
     """
     clear = np.zeros(len(geometry), dtype=bool)
     if len(geometry) == 0:
@@ -181,7 +181,7 @@ def _pieces(triangles: Array, cells: _Cells, most: int, scratch: Scratch) -> tup
     Left out is what lies where there are no cells. Also returns each piece's triangle, (p,).
     """
     corners, triangle = triangles, np.arange(len(triangles), dtype=np.int32)
-    # A hair narrower: a piece's bounds are widened by what rounding may take.
+    # Slightly narrower, because a piece's bounds are widened by the rounding error.
     widest = cells.size * 0.999
     done = scratch.rows(9, np.float64), scratch.rows(1, np.int32)
     count = 0

@@ -1,4 +1,4 @@
-"""Whole texels next to a divided one: what answers a hit in a strip too narrow for a cell of its own."""
+"""The nearest uncut texels of a divided one; they answer hits in strips too narrow for a cell."""
 
 from __future__ import annotations
 

@@ -74,7 +74,7 @@ class Crossings:
 
     @cached_property
     def alone(self) -> Array:
-        """Texels whose light is like no neighbor's, though a line of sight may join them."""
+        """Texels whose light differs from their neighbors' even where they see each other."""
         return self.crossed | self.occluded
 
     @cached_property

@@ -326,5 +326,5 @@ def _weights_inside(points: Float, corners: Float) -> Float:
 
 
 def _all_three(sides: Bool) -> Bool:
-    """Return (p,) whether all sides say so, (p, 3); several times as fast as `all` along an axis."""
+    """Return (p,) whether all of (p, 3) are true; several times as fast as `all` along an axis."""
     return np.asarray(sides[:, 0] & sides[:, 1] & sides[:, 2])

@@ -10,4 +10,4 @@ DIVIDED, OCCLUDED, TOUCHED, ENCLOSED = 1, 2, 3, 4
 
 TEXEL_STATES = (0, DIVIDED, OCCLUDED, TOUCHED, ENCLOSED)
 """0: nothing is the matter. Geometry stands on the texel or a close rim is above it; something is close above
-all of it; it ends at geometry; no light at all reaches it, for it is inside of something or behind it."""
+all of it; it ends at geometry; no light reaches it because it is inside or behind something."""

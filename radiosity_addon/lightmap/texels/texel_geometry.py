@@ -19,7 +19,7 @@ EDGE_OFFSETS = 4.0
 """Points keep this many ray offsets from the edges of their triangles."""
 
 SINK = 2.0
-"""Points that lie against another surface are so many ray offsets behind their own."""
+"""Points that touch another surface lie this many ray offsets behind their own."""
 
 CHUNK = 1 << 16
 """Texels placed at once; bounds the temporaries to about 40 MB."""
@@ -118,13 +118,13 @@ class TexelGeometry:
         ]
 
     def _put(self, rows: slice, weights: Array) -> None:
-        """Put texels where barycentric weights (r, 3) of their triangles say."""
+        """Move texels to barycentric weights (r, 3) of their triangles."""
         triangle, upright = self.triangle[rows], self.surface_normal[rows]
         self.barycentric[rows] = weights[:, 1:]
         self.position[rows] = self._sunk(rows, _at(self.triangles[triangle], weights[:, None]))[:, 0]
         shading = np.einsum("nc,nck->nk", weights, self.normals[triangle])
         length = np.linalg.norm(shading, axis=1, keepdims=True)
-        # A shading normal that vanished or turned behind the surface says nothing.
+        # A shading normal that vanished or points behind the surface is not usable.
         sane = (length[:, 0] > 1e-6) & (np.einsum("nk,nk->n", shading, upright) > 0)
         self.normal[rows] = np.where(sane[:, None], shading / np.maximum(length, 1e-6), upright)
 
@@ -243,7 +243,7 @@ class TexelGeometry:
         return weights
 
     def _drawn_in(self, weights: Array, triangle: Array) -> Array:
-        """Move (n, k, 3) barycentric points that lie on an edge of their triangle off it by a hair."""
+        """Move (n, k, 3) barycentric points that lie on an edge of their triangle slightly off it."""
         inside = np.maximum(weights, self._inset[triangle][:, None])
         moved = (inside != weights).any(axis=2, keepdims=True)
         return np.asarray(np.where(moved, inside / inside.sum(axis=2, keepdims=True), weights))
