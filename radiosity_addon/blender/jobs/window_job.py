@@ -6,7 +6,6 @@ import time
 from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
 
 from ...base import NothingToDoError, RadiosityError, RemainingTime
 from ..session import runtime
@@ -156,7 +155,7 @@ class WindowJob:
 
     def _show_progress(self, context: bpy.types.Context) -> None:
         context.window_manager.progress_update(int(100 * runtime.running.fraction))
-        context.workspace.status_text_set(f"{progress_text(runtime.running)}    {iface_('Esc cancels')}")
+        context.workspace.status_text_set(f"{progress_text(runtime.running)}    {'Esc cancels'}")
         redraw_sidebars(context)
 
     def _finish(self, context: bpy.types.Context) -> set[str]:

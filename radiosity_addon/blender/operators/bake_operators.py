@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import bpy
-from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...base import RadiosityError, one_of_each
 from ..jobs import live_view
@@ -108,14 +107,12 @@ class RADIOSITY_OT_bake(WindowJob, bpy.types.Operator):
         if context.scene.radiosity.lightmap_only:
             set_lightmap_only(True)
         taken = sum(report["seconds"].values())
-        message = rpt_("Baked {} objects in {:.1f} s")
-        self.report({"INFO"}, message.format(len(report["objects"]), taken))
+        self.report({"INFO"}, f"Baked {len(report['objects'])} objects in {taken:.1f} s")
         warnings = one_of_each(report["warnings"])
         for warning in warnings[:3]:
             self.report({"WARNING"}, f"{warning['name']}: {warning['message']}")
         if len(warnings) > 3:
-            message = rpt_("and {} more warnings, listed in the panel")
-            self.report({"WARNING"}, message.format(len(warnings) - 3))
+            self.report({"WARNING"}, f"and {len(warnings) - 3} more warnings, listed in the panel")
 
 
 class RADIOSITY_OT_restore(bpy.types.Operator):
@@ -149,7 +146,7 @@ class RADIOSITY_OT_restore(bpy.types.Operator):
         if not restored.count:
             self.report({"INFO"}, "Nothing to restore: no object of this scene shows a lightmap")
             return {"CANCELLED"}
-        self.report({"INFO"}, rpt_("Restored {} objects").format(restored.count))
+        self.report({"INFO"}, f"Restored {restored.count} objects")
         for warning in restored.warnings:
             self.report({"WARNING"}, warning.message)
         return {"FINISHED"}
@@ -200,11 +197,10 @@ class RADIOSITY_OT_open_folder(bpy.types.Operator):
         last = runtime.last_bake(context.scene)
         folder = bpy.path.abspath(last.folder) if last is not None else ""
         if not Path(folder).is_dir():
-            self.report({"ERROR"}, rpt_("The folder '{}' is not there any more").format(folder))
+            self.report({"ERROR"}, f"The folder '{folder}' is not there any more")
             return {"CANCELLED"}
         if not own_reports(Path(folder), context.scene):
-            message = rpt_("The folder '{}' holds no bake of this scene")
-            self.report({"ERROR"}, message.format(folder))
+            self.report({"ERROR"}, f"The folder '{folder}' holds no bake of this scene")
             return {"CANCELLED"}
         _open(folder)
         return {"FINISHED"}

@@ -1,11 +1,10 @@
-"""What *Check* found of each scene, and its figures in the user's language."""
+"""What *Check* found of each scene, and its figures."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
 
 from ...base import duration
 from ..relight.relight_properties import keeps, relight_of
@@ -56,23 +55,21 @@ def forget_checks() -> None:
 
 
 def figures(found: Any) -> list[tuple[str, str]]:
-    """Return what a bake will be as pairs of a name and a value, in the user's language."""
+    """Return what a bake will be as pairs of a name and a value."""
     plan = found.estimate
     sizes: dict[int, int] = {}
     for page in plan.pages:
         sizes[page] = sizes.get(page, 0) + 1
     pages = ", ".join(f"{count} × {size}²" for size, count in sizes.items())
     return [
-        (iface_("Objects"), f"{found.objects:,}"),
-        (iface_("Triangles"), f"{found.triangles:,} / {found.scene_triangles:,}"),
-        (iface_("Images"), pages or "0"),
-        (iface_("Texels"), iface_("about {}").format(f"{_rounded(found.texels):,}")),
-        (iface_("Memory"), iface_("about {}").format(_bytes(plan.memory))),
+        ("Objects", f"{found.objects:,}"),
+        ("Triangles", f"{found.triangles:,} / {found.scene_triangles:,}"),
+        ("Images", pages or "0"),
+        ("Texels", f"about {_rounded(found.texels):,}"),
+        ("Memory", f"about {_bytes(plan.memory)}"),
         (
-            iface_("Time"),
-            iface_("until the error is reached")
-            if plan.seconds is None
-            else iface_("roughly {}").format(duration(plan.seconds)),
+            "Time",
+            "until the error is reached" if plan.seconds is None else f"roughly {duration(plan.seconds)}",
         ),
     ]
 

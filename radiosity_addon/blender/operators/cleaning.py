@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import bpy
-from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...base import BakeError
 from ..session import runtime
@@ -131,26 +130,23 @@ class RADIOSITY_OT_clean(bpy.types.Operator):
         found = unused_lightmaps(context)
         if not found.count or bpy.app.background:
             return self.execute(context)
-        message = rpt_("Delete {} lightmap files that nothing shows any more? Undo does not bring them back")
-        return context.window_manager.invoke_confirm(
-            self, event, title="Clean Up Lightmaps", message=message.format(found.count)
-        )
+        message = f"Delete {found.count} unused lightmap files? This cannot be undone"
+        return context.window_manager.invoke_confirm(self, event, title="Clean Up Lightmaps", message=message)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Delete them."""
         found = unused_lightmaps(context)
         for path in found.changed:
-            message = rpt_("'{}' was changed since it was baked: it is left alone")
-            self.report({"WARNING"}, message.format(path.name))
+            self.report({"WARNING"}, f"'{path.name}' was changed since it was baked; it is kept")
         try:
             count = delete(found)
         except OSError as error:
-            self.report({"ERROR"}, rpt_("Cannot delete '{}': {}").format(error.filename, error.strerror))
+            self.report({"ERROR"}, f"Cannot delete '{error.filename}': {error.strerror}")
             return {"CANCELLED"}
         if not count:
             self.report({"INFO"}, "Nothing to clean: every lightmap of this file is shown")
             return {"CANCELLED"}
-        self.report({"INFO"}, rpt_("Deleted {} lightmap files").format(count))
+        self.report({"INFO"}, f"Deleted {count} lightmap files")
         return {"FINISHED"}
 
 

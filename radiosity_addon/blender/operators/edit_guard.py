@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_rpt as rpt_
 from mathutils import Matrix
 
 from ..datablocks.bake_record import is_made
@@ -48,7 +47,7 @@ def _look() -> None:
     messages = refuse(bpy.context)
     if messages:
         with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
-            bpy.context.window_manager.popup_menu(_drawn(messages), title=rpt_("Lightmap"), icon="INFO")
+            bpy.context.window_manager.popup_menu(_drawn(messages), title="Lightmap", icon="INFO")
 
 
 def refuse(context: bpy.types.Context) -> list[str]:
@@ -63,13 +62,13 @@ def refuse(context: bpy.types.Context) -> list[str]:
             continue
         if obj.mode != "OBJECT":
             leave_edit_mode_of(context, obj)
-            reason = rpt_("'{}' shows a lightmap on what its modifiers or instances make")
-            messages.append(f"{reason.format(name)}: {rpt_('press Restore before editing it')}")
+            messages.append(
+                f"'{name}' shows modifiers or instances as baked: press Restore before editing it"
+            )
         place = placed(obj)
         if is_made(obj) and place is not None and moved_place(obj) is not None:
             obj.matrix_basis = Matrix(place)
-            reason = rpt_("'{}' stands in for an instance and cannot be moved")
-            messages.append(f"{reason.format(name)}: {rpt_('press Restore before moving it')}")
+            messages.append(f"'{name}' stands in for an instance: press Restore before moving it")
     return messages
 
 

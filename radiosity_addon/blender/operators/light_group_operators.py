@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import bpy
-from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..images.light_mixer import WHITE, mixers, sliders_of
 from ..scene_records.light_membership import NAME, Membership, name_on
@@ -57,8 +56,7 @@ class RADIOSITY_OT_light_group_assign(bpy.types.Operator):
         if changed is None:
             self.report({"ERROR"}, "Linked objects cannot be changed: make them local or library overrides")
             return {"CANCELLED"}
-        message = rpt_("{} objects are in light group '{}'")
-        self.report({"INFO"}, message.format(changed, name))
+        self.report({"INFO"}, f"{changed} objects are in light group '{name}'")
         return {"FINISHED"}
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..jobs.window_job import WindowJob
 from ..relight import kept_bakes
@@ -41,7 +40,7 @@ class RADIOSITY_OT_relight(WindowJob, bpy.types.Operator):
         return run_relight(context, in_background=in_window)
 
     def _succeeded(self, _context: bpy.types.Context, _in_window: bool) -> None:
-        self.report({"INFO"}, rpt_("Relit in {:.2f} s").format(self._report.seconds))
+        self.report({"INFO"}, f"Relit in {self._report.seconds:.2f} s")
 
 
 CLASSES = (RADIOSITY_OT_relight,)

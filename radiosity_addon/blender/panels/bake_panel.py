@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
 
 from ...options import ADVANCED, MAIN, SOLVER
 from ..jobs.progress_text import progress_text
@@ -85,12 +84,12 @@ def _draw_buttons(layout: Any, context: bpy.types.Context) -> None:
     layout.operator("radiosity.restore", icon="LOOP_BACK")
     if runtime.interrupted:
         box = layout.box()
-        draw_text(box, iface_("A bake was interrupted while it replaced its files"), "ERROR", context)
+        draw_text(box, "A bake was interrupted while it replaced its files", "ERROR", context)
         box.operator("radiosity.recover", icon="RECOVER_LAST")
     draw_relight_buttons(layout, context)
     hint = unseen_hint(context)
     if hint is not None:
-        draw_text(layout.box(), iface_(hint), "INFO", context)
+        draw_text(layout.box(), hint, "INFO", context)
 
 
 def _draw_settings(layout: Any, context: bpy.types.Context) -> None:
@@ -107,7 +106,7 @@ def _draw_settings(layout: Any, context: bpy.types.Context) -> None:
     if not settings.is_property_set("output_folder"):
         draw_preferred(column, folder_of(context), settings.output_folder)
     if output_folder(context) is None:
-        text = iface_("The file is not saved: lightmaps will be packed into it")
+        text = "The file is not saved: lightmaps will be packed into it"
         draw_text(layout.box(), text, "INFO", context)
     if not any(obj.type == "MESH" for obj in context.scene.objects):
         layout.operator("radiosity.add_cornell_box", icon="CUBE")
@@ -226,7 +225,7 @@ class WarningsSection(Section):
             draw_text(layout.box(), f"{name}: {message}", "ERROR", context)
         hidden = last.warning_count - len(last.warnings[:SHOWN_WARNINGS])
         if hidden > 0:
-            text = iface_("and {} more, in the report").format(hidden)
+            text = f"and {hidden} more, in the report"
             layout.label(text=text, translate=False)
 
 

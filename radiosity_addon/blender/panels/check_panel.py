@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
 
 from ...base import RadiosityError
 from ..operators.checks import figures, last_check, look
@@ -106,7 +105,7 @@ def draw_inspection(layout: Any, found: Any, context: bpy.types.Context, width: 
         draw_text(layout.box(), finding.message, _ICONS[finding.level], context, width)
     hidden = len(found.findings) - SHOWN_FINDINGS
     if hidden > 0:
-        layout.label(text=iface_("and {} more").format(hidden), translate=False)
+        layout.label(text=f"and {hidden} more", translate=False)
 
 
 CLASSES = (RADIOSITY_OT_check,)

@@ -70,8 +70,7 @@ class RADIOSITY_OT_copy_overrides(bpy.types.Operator):
                     setattr(obj, name, getattr(source, name))
                 else:
                     obj.property_unset(name)
-        message = "Copied mode and texel scale to {} objects"
-        self.report({"INFO"}, bpy.app.translations.pgettext_rpt(message).format(len(others)))
+        self.report({"INFO"}, f"Copied mode and texel scale to {len(others)} objects")
         return {"FINISHED"}
 
 

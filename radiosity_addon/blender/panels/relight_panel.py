@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
 
 from ..relight import kept_bakes, lightmap_versions
 from ..session import live_state
@@ -66,7 +65,7 @@ class RelightLightsSection(Section):
             row.label(text=name, icon=inputs.icon if inputs else "ERROR", translate=False)
             _draw_inputs(row, inputs)
         if len(named) > SHOWN_LIGHTS:
-            layout.label(text=iface_("and {} more").format(len(named) - SHOWN_LIGHTS))
+            layout.label(text=f"and {len(named) - SHOWN_LIGHTS} more")
 
 
 def _draw_inputs(row: Any, inputs: Any) -> None:
