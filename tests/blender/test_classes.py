@@ -13,7 +13,7 @@ from radiosity_addon.blender import registration
 from radiosity_addon.blender.files.cornell import build_cornell_box
 from radiosity_addon.blender.panels import bake_panel
 from radiosity_addon.blender.panels.sections import Section
-from radiosity_addon.blender.session import runtime
+from radiosity_addon.blender.session.state import session
 
 OPERATORS = [cls for cls in registration.CLASSES if issubclass(cls, bpy.types.Operator)]
 PANELS = [cls for cls in registration.CLASSES if issubclass(cls, bpy.types.Panel)]
@@ -23,7 +23,7 @@ PANELS = [cls for cls in registration.CLASSES if issubclass(cls, bpy.types.Panel
 def registered() -> Iterator[None]:
     radiosity_addon.register()
     yield
-    runtime.running.active = False
+    session.running.active = False
     radiosity_addon.unregister()
 
 
@@ -125,9 +125,9 @@ def situations() -> Iterator[str]:
     bpy.ops.object.mode_set(mode="EDIT")
     yield "a mesh is edited"
     bpy.ops.object.mode_set(mode="OBJECT")
-    runtime.running.active = True
+    session.running.active = True
     yield "a bake runs"
-    runtime.running.active = False
+    session.running.active = False
 
 
 def test_every_operator_that_refuses_says_why() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...base import duration
-from ..session.runtime import Running
+from ..session.state import Running
 
 STAGES = {
     "export": "Reading the scene",

@@ -8,12 +8,10 @@ import bpy
 
 from ...base import duration
 from ..relight.relight_properties import keeps, relight_of
-from ..session import runtime
+from ..session import last_bake
+from ..session.state import session
 from ..settings.preferences import output_folder, preferences
 from ..settings.properties import settings_of
-
-_checked: dict[tuple[str, str], Any] = {}
-"""(file, scene) → its last Inspection: what the panel draws, and whether the first bake was looked at."""
 
 
 def look(context: bpy.types.Context) -> Any:
@@ -31,27 +29,22 @@ def look(context: bpy.types.Context) -> Any:
     finally:
         if editing and context.mode == "OBJECT" and bpy.ops.object.mode_set.poll():
             bpy.ops.object.mode_set(mode="EDIT")
-    _checked[_key(context.scene)] = found
+    session.checks[context.scene.name_full] = found
     return found
 
 
 def last_check(scene: bpy.types.Scene) -> Any:
     """Return what was found of a scene when somebody last looked; None if nobody did."""
-    return _checked.get(_key(scene))
+    return session.checks.get(scene.name_full)
 
 
 def look_first(context: bpy.types.Context) -> bool:
     """Tell whether a scene that was neither baked nor checked is odd, so that the user should look first."""
     scene = context.scene
-    known = runtime.last_bake(scene) is not None or last_check(scene) is not None
+    known = last_bake.read(scene) is not None or last_check(scene) is not None
     if known or not preferences(context).check_first:
         return False
     return bool(look(context).is_odd)
-
-
-def forget_checks() -> None:
-    """Drop what was found, as the extension is switched off."""
-    _checked.clear()
 
 
 def figures(found: Any) -> list[tuple[str, str]]:
@@ -72,10 +65,6 @@ def figures(found: Any) -> list[tuple[str, str]]:
             "until the error is reached" if plan.seconds is None else f"roughly {duration(plan.seconds)}",
         ),
     ]
-
-
-def _key(scene: bpy.types.Scene) -> tuple[str, str]:
-    return bpy.data.filepath, scene.name_full
 
 
 def _rounded(count: int) -> int:

@@ -14,8 +14,9 @@ from pathlib import Path
 import bpy
 
 from ...base import BakeError
-from ..session import runtime
+from ..session import last_bake
 from ..session.redraw import redraw_sidebars
+from ..session.state import session
 from ..settings.preferences import output_folder
 
 
@@ -120,7 +121,7 @@ class RADIOSITY_OT_clean(bpy.types.Operator):
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
         """Offer it unless a bake is running."""
-        if runtime.running.active:
+        if session.running.active:
             cls.poll_message_set("A bake is running; press Esc to cancel it")
             return False
         return True
@@ -160,7 +161,7 @@ class RADIOSITY_OT_recover(bpy.types.Operator):
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
         """Offer it where a bake was interrupted, unless one is running."""
-        if runtime.running.active:
+        if session.running.active:
             cls.poll_message_set("A bake is running; press Esc to cancel it")
             return False
         return True
@@ -189,8 +190,8 @@ class RADIOSITY_OT_recover(bpy.types.Operator):
 
 def look_for_interrupted(context: bpy.types.Context) -> None:
     """Have the panel say whether a bake of the open file was interrupted; files are only looked at."""
-    runtime.interrupted = bool(interrupted_folders(context))
-    redraw_sidebars(context)
+    session.interrupted = bool(interrupted_folders(context))
+    redraw_sidebars()
 
 
 def look_at_file(*_: object) -> None:
@@ -199,7 +200,7 @@ def look_at_file(*_: object) -> None:
 
 
 def _last_folder(scene: bpy.types.Scene) -> Path | None:
-    last = runtime.last_bake(scene) if scene.is_property_set("radiosity") else None
+    last = last_bake.read(scene) if scene.is_property_set("radiosity") else None
     if last is None or not last.folder:
         return None
     return Path(bpy.path.abspath(last.folder))

@@ -13,12 +13,10 @@ from mathutils import Matrix
 
 from ..datablocks.bake_record import is_made
 from ..datablocks.edit_modes import leave_edit_mode_of
-from ..session import runtime
+from ..session.state import session
 
 DELAY = 0.05
 """Seconds after a change until it is looked at."""
-
-_noted: set[str] = set()
 
 
 def note(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
@@ -26,8 +24,8 @@ def note(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     for update in depsgraph.updates:
         block = update.id
         if isinstance(block, bpy.types.Object) and block.library is None and _is_guarded(block.original):
-            _noted.add(block.name)
-    if _noted and not bpy.app.timers.is_registered(_look):
+            session.edited.add(block.name)
+    if session.edited and not bpy.app.timers.is_registered(_look):
         bpy.app.timers.register(_look, first_interval=DELAY)
 
 
@@ -42,7 +40,7 @@ def _is_guarded(obj: bpy.types.Object) -> bool:
 
 def _look() -> None:
     """Undo what was noted, and say so in the window."""
-    if runtime.running.active:
+    if session.running.active:
         return
     messages = refuse(bpy.context)
     if messages:
@@ -54,8 +52,8 @@ def refuse(context: bpy.types.Context) -> list[str]:
     """Put stand-ins back that were noted as changed; returns what to say of each."""
     from ..stand_ins.stand_ins import moved_place, placed
 
-    names, messages = sorted(_noted), []
-    _noted.clear()
+    names, messages = sorted(session.edited), []
+    session.edited.clear()
     for name in names:
         obj = bpy.data.objects.get((name, None))
         if obj is None or not _is_guarded(obj):
@@ -84,4 +82,4 @@ def forget(*_: Any) -> None:
     """Look after nothing that was noted: another file is being opened, or the extension is switched off."""
     if bpy.app.timers.is_registered(_look):
         bpy.app.timers.unregister(_look)
-    _noted.clear()
+    session.edited.clear()

@@ -6,13 +6,13 @@ import bpy
 
 from ..images.light_mixer import WHITE, mixers, sliders_of
 from ..scene_records.light_membership import NAME, Membership, name_on
-from ..session import runtime
+from ..session.state import session
 from ..settings.light_group_properties import LONGEST_NAME, outdate
 
 
 def _on_selection(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """Poll of what needs selected objects, and no bake that is running."""
-    if runtime.running.active:
+    if session.running.active:
         cls.poll_message_set("A bake is running; press Esc to cancel it")
         return False
     if not context.view_layer.objects.selected:

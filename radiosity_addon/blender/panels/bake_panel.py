@@ -8,7 +8,8 @@ import bpy
 
 from ...options import ADVANCED, MAIN, SOLVER
 from ..jobs.progress_text import progress_text
-from ..session import runtime
+from ..session import last_bake
+from ..session.state import session
 from ..settings.option_properties import AUTOMATIC
 from ..settings.preferences import folder_of, output_folder
 from ..settings.preset_menu import RADIOSITY_PT_presets
@@ -46,11 +47,11 @@ class RADIOSITY_PT_progress(_Panel, bpy.types.Panel):
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
         """Show it while a bake runs."""
-        return runtime.running.active
+        return session.running.active
 
     def draw(self, _context: bpy.types.Context) -> None:
         """Draw the progress bar."""
-        running = runtime.running
+        running = session.running
         self.layout.progress(factor=running.fraction, text=progress_text(running), type="BAR")
         self.layout.label(text="Esc cancels", icon="CANCEL")
 
@@ -63,7 +64,7 @@ class RADIOSITY_PT_main(_Panel, bpy.types.Panel):
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
         """Show it unless a bake runs."""
-        return not runtime.running.active
+        return not session.running.active
 
     def draw_header_preset(self, _context: bpy.types.Context) -> None:
         """Draw the button of the presets."""
@@ -82,7 +83,7 @@ def _draw_buttons(layout: Any, context: bpy.types.Context) -> None:
     column.scale_y = 1.5
     column.operator("radiosity.bake", text="Bake Radiosity", icon="LIGHT_AREA")
     layout.operator("radiosity.restore", icon="LOOP_BACK")
-    if runtime.interrupted:
+    if session.interrupted:
         box = layout.box()
         draw_text(box, "A bake was interrupted while it replaced its files", "ERROR", context)
         box.operator("radiosity.recover", icon="RECOVER_LAST")
@@ -118,7 +119,7 @@ SOLID = "Solid and wireframe views show no lightmaps: switch to Material Preview
 
 def unseen_hint(context: bpy.types.Context) -> str | None:
     """Say why the lightmaps of a baked scene are not seen; None where they are, or there are none."""
-    if runtime.last_bake(context.scene) is None:
+    if last_bake.read(context.scene) is None:
         return None
     shading = getattr(getattr(context.space_data, "shading", None), "type", "MATERIAL")
     if context.scene.render.engine == "BLENDER_WORKBENCH" and shading != "MATERIAL":
@@ -187,12 +188,12 @@ class LastBakeSection(Section):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Show it once there was a bake."""
-        return runtime.last_bake(context.scene) is not None
+        return last_bake.read(context.scene) is not None
 
     @classmethod
     def draw(cls, layout: Any, context: bpy.types.Context) -> None:
         """Draw the figures."""
-        last = runtime.last_bake(context.scene) or runtime.LastBake()
+        last = last_bake.read(context.scene) or last_bake.LastBake()
         column = layout.column(align=True)
         for name, value in last.figures:
             split = column.split(factor=0.45)
@@ -214,13 +215,13 @@ class WarningsSection(Section):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Show it only where there is something to say."""
-        last = runtime.last_bake(context.scene)
+        last = last_bake.read(context.scene)
         return last is not None and bool(last.warnings)
 
     @classmethod
     def draw(cls, layout: Any, context: bpy.types.Context) -> None:
         """Draw the warnings, the first ones of many."""
-        last = runtime.last_bake(context.scene) or runtime.LastBake()
+        last = last_bake.read(context.scene) or last_bake.LastBake()
         for name, message in last.warnings[:SHOWN_WARNINGS]:
             draw_text(layout.box(), f"{name}: {message}", "ERROR", context)
         hidden = last.warning_count - len(last.warnings[:SHOWN_WARNINGS])

@@ -8,7 +8,7 @@ import bpy
 
 from ...base import RadiosityError
 from ..operators.checks import figures, last_check, look
-from ..session import runtime
+from ..session.state import session
 from .sections import Section
 from .wrapped_text import draw_text
 
@@ -31,7 +31,7 @@ class RADIOSITY_OT_check(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Offer it unless a bake is running."""
-        if runtime.running.active:
+        if session.running.active:
             cls.poll_message_set("A bake is running; press Esc to cancel it")
             return False
         if context.scene is None:

@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 
 from ..relight import kept_bakes, lightmap_versions
-from ..session import live_state
+from ..session.state import session
 from .sections import Section, draw_sections
 from .wrapped_text import draw_text
 
@@ -25,8 +25,8 @@ class RelightSection(Section):
     def draw(cls, layout: Any, context: bpy.types.Context) -> None:
         """Draw what Live has to say, and what is kept of the next bake."""
         chosen = context.scene.radiosity_relight
-        if live_state.state.message:
-            draw_text(layout.box(), live_state.state.message, "ERROR", context)
+        if session.live_message:
+            draw_text(layout.box(), session.live_message, "ERROR", context)
         if lightmap_versions.state.message:
             draw_text(layout.box(), lightmap_versions.state.message, "ERROR", context)
         layout.use_property_split = True
