@@ -16,7 +16,7 @@ from ...options import BakeSettings
 from ..files.single_files import check_existing, check_places, make_folder_of, owner_told
 from ..registration import register, unregister
 from ..relight import kept_bakes
-from ..session import runtime
+from ..session import last_bake
 
 if TYPE_CHECKING:
     from ..files.output import OutputFolder
@@ -204,7 +204,7 @@ def restore(
         if not count:
             raise SceneError(f"'{scene or loaded}' shows no bake; there is nothing to restore")
         for each in bpy.data.scenes:
-            runtime.forget(each)
+            last_bake.forget(each)
             kept_bakes.drop(each)
         make_folder_of(output)
         save_restored(output)
