@@ -73,8 +73,8 @@ def check_keeping(request: argparse.Namespace, settings: BakeSettings) -> None:
 
 def check_plot(plot: Path | None) -> None:
     """Refuse to draw the history into a file of another kind."""
-    if plot is not None and plot.suffix.lower() != ".png":
-        raise UsageError(f"--plot {plot} is not a .png file")
+    if plot is not None and plot.suffix.lower() != ".svg":
+        raise UsageError(f"--plot {plot}: the plot is an SVG picture; choose a name that ends in .svg")
 
 
 class _Parser(argparse.ArgumentParser):

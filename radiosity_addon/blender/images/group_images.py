@@ -15,7 +15,7 @@ from ...lightmap.images import LightmapPage, png16_scale, presentable
 from ...options import BakeSettings
 from ..datablocks.bake_record import is_made, remove_datablocks
 from ..datablocks.image_marks import GROUP, PAGE, SCALE_PROPERTY
-from ..session import lightmap_changes
+from ..session.state import session
 from .images import group_file_names, image_scale, set_pixels, write_images
 from .light_mixer import KIND, set_scale
 from .node_group import SCALE
@@ -98,7 +98,7 @@ def update_images(
             if scale is not None:
                 rescale_materials(image, scale)
             set_pixels(image, page, scale)
-    lightmap_changes.announce()
+    session.lightmaps_changed()
 
 
 def _check_fit(images: Sequence[bpy.types.Image], pages: Sequence[LightmapPage]) -> None:
