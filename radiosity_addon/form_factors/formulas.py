@@ -52,5 +52,4 @@ def disk_factor(
     # The two cosines' lengths go into one division by d².
     weight = np.maximum(cosine_r, 0) * np.maximum(-cosine_s, 0) * areas
     divisor = square * (np.pi * square + areas)
-    factors: FloatArray = weight / np.where(divisor > 0, divisor, 1)
-    return factors
+    return weight / np.where(divisor > 0, divisor, 1)

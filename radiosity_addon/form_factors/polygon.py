@@ -123,8 +123,7 @@ def edge_turn(start: Float64Array, end: Float64Array, normal: Float64Array) -> F
     length = np.sqrt(cross_x * cross_x + cross_y * cross_y + cross_z * cross_z)
     angle = np.arctan2(length, _dot(start, end))
     along = cross_x * normal[0] + cross_y * normal[1] + cross_z * normal[2]
-    turn: Float64Array = along * (angle / np.where(length > 0.0, length, 1.0))
-    return turn
+    return along * (angle / np.where(length > 0.0, length, 1.0))
 
 
 def _cut_turn(

@@ -130,15 +130,13 @@ def _arc_factor(
         ends = summit + np.array([[-1.0], [1.0]]) * half
         rim = offset + np.cos(ends)[..., None] * u + np.sin(ends)[..., None] * v
         total += _horizon_turn(rim[1], rim[0], normals)
-    factor: Float64Array = -total / (2.0 * np.pi)
-    return factor
+    return -total / (2.0 * np.pi)
 
 
 def _horizon_turn(start: Float64Array, end: Float64Array, normals: Float64Array) -> Float64Array:
     """Return the angle about the normal from one direction in the horizon to another, within ±π."""
     sine = np.einsum("ij,ij->i", np.cross(start, end), normals)
-    angle: Float64Array = np.arctan2(sine, np.einsum("ij,ij->i", start, end))
-    return angle
+    return np.arctan2(sine, np.einsum("ij,ij->i", start, end))
 
 
 @lru_cache(maxsize=16)

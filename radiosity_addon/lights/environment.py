@@ -66,8 +66,7 @@ class EnvironmentImage(EnvironmentLight):
 
     def relative(self, directions: Float64Array) -> Float64Array:
         """Return (...) radiance by directions (..., 3), relative to `radiance`."""
-        values: Float64Array = np.asarray(self.image).ravel()[cell_of(directions, self.shape)]
-        return values
+        return np.asarray(self.image).ravel()[cell_of(directions, self.shape)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,8 +98,7 @@ class SkyPatch(Lamp):
     def direction(self) -> Float64Array:
         """(3,) the way its light travels, in the mean, of length 1."""
         mean = -(np.asarray(self.share) @ self._toward())
-        unit: Float64Array = mean / np.linalg.norm(mean)
-        return unit
+        return mean / np.linalg.norm(mean)
 
     @property
     def half_angle(self) -> float:
@@ -143,8 +141,7 @@ def cell_of(directions: Float64Array, shape: tuple[int, int]) -> npt.NDArray[np.
     azimuth = np.arctan2(directions[..., 1], directions[..., 0])
     row = np.clip(((0.5 + latitude / np.pi) * height).astype(np.int64), 0, height - 1)
     column = np.clip(((0.5 - azimuth / (2.0 * np.pi)) * width).astype(np.int64), 0, width - 1)
-    cells: npt.NDArray[np.int64] = row * width + column
-    return cells
+    return row * width + column
 
 
 def cell_directions(shape: tuple[int, int]) -> Float64Array:
@@ -165,8 +162,7 @@ def pixel_bounds(shape: tuple[int, int], window: Bounds = WHOLE) -> Float64Array
 def solid_angles(bounds: Float64Array) -> Float64Array:
     """Return (m,) [sr] of pixels' bounds."""
     low, high, left, right = bounds.T
-    angles: Float64Array = (np.sin(high) - np.sin(low)) * (right - left)
-    return angles
+    return (np.sin(high) - np.sin(low)) * (right - left)
 
 
 def bright_patches(pixels: Float64Array) -> tuple[Float64Array, list[npt.NDArray[np.int64]]]:

@@ -252,8 +252,7 @@ class SpotLight(_Bulb):
         if self.blend == 0.0:
             return np.where(above > 0.0, 1.0, 0.0)
         step = np.clip(above / (self.blend * self._opening), 0.0, 1.0)
-        smooth: Float64Array = step * step * (3.0 - 2.0 * step)
-        return smooth
+        return step * step * (3.0 - 2.0 * step)
 
     def unit_irradiance(self, points: Float64Array, normals: Float64Array) -> Float64Array:
         """Return the irradiance per power; where the cone's edge crosses the lamp, averaged over it."""

@@ -32,8 +32,7 @@ def overlapping_triangles(uv: Float, chart: Int) -> NDArray[np.intp]:
     texel = np.concatenate([part.texel for part in pairs])
     triangle = np.concatenate([part.triangle for part in pairs])
     crowded = np.bincount(texel, minlength=resolution**2)[texel] > 1
-    found: NDArray[np.intp] = np.unique(triangle[crowded]).astype(np.intp)
-    return found
+    return np.unique(triangle[crowded]).astype(np.intp)
 
 
 def _side_by_side(uv: Float, chart: Int) -> tuple[NDArray[np.float32], int]:
