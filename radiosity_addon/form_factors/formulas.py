@@ -1,4 +1,4 @@
-"""Form factors, one formula a function: the fraction of what leaves a receiver that meets a source.
+"""Form factors, one function per formula: the fraction of light leaving a receiver that meets a source.
 
 | function | from | to | how |
 |---|---|---|---|

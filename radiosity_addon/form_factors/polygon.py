@@ -1,4 +1,4 @@
-"""What share of a point's hemisphere a shape fills, weighted by the cosine: closed forms.
+"""Closed forms for the cosine-weighted share of a point's hemisphere that a polygon fills.
 
 The form factor from an oriented point to a shape is its projected solid angle over π. By
 Stokes it is an integral along the outline, F = 1/(2π) n · ∮ ω × dω (Lambert 1760; handout
@@ -85,7 +85,7 @@ def _chunk_factors(
     turn = np.zeros(corners.shape[2], dtype=corners.dtype)
     rows = np.flatnonzero(whole)
     if 2 * len(rows) > len(turn):
-        # Copying half the rows out costs more than working on the others in vain.
+        # Copying half of the rows costs more than processing the others needlessly.
         turn = np.where(whole, _closed_turn(corners, normal), 0.0)
     elif len(rows):
         turn[rows] = _closed_turn(corners.take(rows, axis=2), normal.take(rows, axis=1))

@@ -16,7 +16,7 @@ PANEL = 16
 """Gauss nodes a panel of an ellipse's arc; also the first number of nodes on a whole one."""
 
 MAX_NODES = 4096
-"""Nodes on an ellipse before a point is taken as it is: it lies within 1/500 of the rim."""
+"""Nodes on an ellipse at most; points within 1/500 of the rim reach this limit."""
 
 ELLIPSE_TOLERANCE = 1e-8
 """Change of an ellipse's factor between a number of nodes and its double that ends the doubling."""
@@ -26,7 +26,7 @@ _CHUNK_NODES = 1 << 18
 
 
 def cap_cosine(cosine: npt.ArrayLike, sine_half: npt.ArrayLike) -> Float64Array:
-    """Return what stands for cosθ where a lamp is a round cap instead of a point.
+    """Return the factor that replaces cosθ where a lamp is a round cap instead of a point.
 
     The projected solid angle of a spherical cap of half angle α about a direction at θ from
     the normal, clipped to the horizon, divided by π sin²α. It is cosθ while the whole cap is
@@ -104,7 +104,7 @@ def point_to_ellipse(
 def _arc_factor(
     offset: Float64Array, normals: Float64Array, u: Float64Array, v: Float64Array, nodes: int, cut: bool
 ) -> Float64Array:
-    """Return (m,) factors from the arc above the horizon, or the whole ellipse, with so many nodes."""
+    """Return (m,) factors from the arc above the horizon, or the whole ellipse, with a number of nodes."""
     height, rise_u, rise_v = np.einsum("ij,ij->i", offset, normals), normals @ u, normals @ v
     summit = np.arctan2(rise_v, rise_u)
     if cut:

@@ -29,7 +29,7 @@ BLIND_ERROR = 1e-3
 """Quadrature error between nodes next to an edge, in squares of the interval (measured)."""
 
 BLIND_BISECTIONS = 6
-"""Bisections on that suspicion alone; it would cut a needle's edges to dust."""
+"""Limit of bisections for that reason alone, which would otherwise cut a needle's edges into many parts."""
 
 MAX_BISECTIONS = 24
 """Ends the bisection at singular points; intervals there are below 1e-7 of their edge."""
@@ -116,7 +116,7 @@ def _chunk_factors(receivers: Float64Array, sources: Float64Array) -> Float64Arr
     apart = np.linalg.norm(inner.mean(axis=1) - centre, axis=1)
     outer_radius = _radius(outer, centre)
     inner_radius = _radius(inner, inner.mean(axis=1))
-    # Distances to the other's plane; what is within rounding of it lies in it.
+    # Distances to the other's plane; corners within rounding of it lie in it.
     noise = IN_PLANE * (apart + outer_radius + inner_radius)[:, None]
     outer_height = _heights(outer, inner[:, 0], inner_normal, noise)
     inner_height = _heights(inner, outer[:, 0], outer_normal, noise)

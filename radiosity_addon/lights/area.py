@@ -14,10 +14,10 @@ from .light import Emitter, Float64Array, Rays, Samples, directions_to, row_cosi
 AREA_SHAPES = ("rectangle", "ellipse")
 
 _NODES = 10
-"""Of Gauss and Legendre, each way over the part of a lamp that a point sees through the soft-box."""
+"""Gauss-Legendre nodes, along each axis, over the part of a lamp that a point sees through the soft-box."""
 
 _NARROWEST = 1e-3
-"""Spreads [rad] below this shine as it does, all but in parallel: a millimeter of blur at a meter."""
+"""Smallest spread [rad], nearly parallel light: a millimeter of blur at a meter."""
 
 _NODES_CHUNK = 1 << 9
 """Points integrated at a time; temporaries stay in the processor's cache."""
@@ -68,7 +68,7 @@ class AreaLight(Emitter):
 
     @property
     def _facing(self) -> Float64Array:
-        """A vector along the side it shines to."""
+        """A vector toward the side that it lights."""
         return np.cross(np.asarray(self.edge_u), np.asarray(self.edge_v))
 
     @property
@@ -101,7 +101,7 @@ class AreaLight(Emitter):
         return point_to_polygon(points, normals, np.broadcast_to(corners, (len(points), 4, 3))) / self.area
 
     def shadow_rays(self, points: Float64Array, normals: Float64Array, u: Samples) -> Rays:
-        """Return rays to samples uniform over what shines of the lamp (see `Lamp.shadow_rays`)."""
+        """Return rays to samples uniform over the emitting area of the lamp (see `Lamp.shadow_rays`)."""
         if not self._is_open:
             directions, distances, weights = self._narrow_rays(points, normals, np.asarray(u, np.float64))
             return directions, distances, weights / u.shape[1]
@@ -129,7 +129,7 @@ class AreaLight(Emitter):
         return self._facing / np.linalg.norm(self._facing)
 
     def _through_slats(self, across: Float64Array, ahead: Float64Array) -> Float64Array:
-        """Return the share of radiance sent `across` for so much `ahead`; over all angles its power is 1."""
+        """Return the share of radiance by `across` and `ahead`; its power over all angles is 1."""
         half = 0.5 * self.spread
         # tan α − α, whose terms cancel for a small α.
         excess = np.tan(half) - half if half > 0.05 else half**3 / 3.0 * (1.0 + 0.4 * half * half)

@@ -22,10 +22,10 @@ CELLS = (64, 128)
 """Rows and columns of the even part: cells of 2.8°."""
 
 BRIGHT = 4.0
-"""Radiance above this many times the sphere's mean is a patch's."""
+"""Pixels above this many times the sphere's mean belong to patches."""
 
 PATCH_RADIUS = np.radians(15.0)
-"""A patch reaches so far around its brightest pixel: its light comes from about one direction and
+"""A patch reaches this far around its brightest pixel: its light comes from about one direction and
 has about one color."""
 
 MAX_PATCHES = 12
@@ -102,7 +102,7 @@ class SkyPatch(Lamp):
 
     @property
     def half_angle(self) -> float:
-        """How far its farthest corner is from `direction` [rad]."""
+        """Angle between its farthest corner and `direction` [rad]."""
         low, high, left, right = np.asarray(self.bounds).T
         corners = np.concatenate(
             [_directions(np.sin(up), azimuth) for up in (low, high) for azimuth in (left, right)]
@@ -166,7 +166,7 @@ def solid_angles(bounds: Float64Array) -> Float64Array:
 
 
 def bright_patches(pixels: Float64Array) -> tuple[Float64Array, list[npt.NDArray[np.int64]]]:
-    """Split off what is far brighter than the mean.
+    """Split off pixels that are far brighter than the mean.
 
     pixels (h, w, 3): Radiance of the whole sphere.
     Returns excess (h w, 3): What of each pixel's radiance is a patch's.
@@ -218,7 +218,7 @@ def even_part(pixels: Float64Array, name: str = "") -> list[EnvironmentLight]:
 
 
 class SkyTable:
-    """What rays that leave the scene find, by cell.
+    """The light that rays leaving the scene meet, by cell.
 
     strengths (l, 3) or None [W/m²/sr]: What the lights have instead of their own strengths.
     """

@@ -20,7 +20,7 @@ Samples = npt.NDArray[np.floating[Any]]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Light:
-    """What lights a scene from outside its surfaces; `name` is for messages only."""
+    """A light other than the scene's surfaces; `name` is for messages only."""
 
     name: str = ""
 

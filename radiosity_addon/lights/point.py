@@ -38,7 +38,7 @@ _EDGE_CHUNK = 1 << 10
 
 
 class _Bulb(Emitter):
-    """What point and spot lamps share: intensity power/4π, a radius and an attenuation by direction.
+    """Common part of point and spot lamps: intensity power/4π, a radius and an attenuation by direction.
 
     With soft falloff the lamp is a disk of that radius facing the receiver, of radiance
     I/(π r²): H = I cosθ / (d² + r²) while all of it is up. Without, a sphere of the same

@@ -1,4 +1,4 @@
-"""The quantities of light, and how one follows from another (handout §1 and §2.1.2).
+"""The quantities of light and their conversions (handout §1 and §2.1.2).
 
 | quantity | symbol | unit | is |
 |---|---|---|---|
@@ -110,7 +110,7 @@ def reflected_radiance(brdf: Value | float, irradiance: Value) -> Value:
 
 
 LUMINANCE = (0.2126, 0.7152, 0.0722)
-"""How bright the channels of linear Rec. 709 look (ITU-R BT.709)."""
+"""Luminance weights of the channels of linear Rec. 709 (ITU-R BT.709)."""
 
 
 def luminous(radiant: npt.NDArray[Any], efficacy: float) -> npt.NDArray[Any]:

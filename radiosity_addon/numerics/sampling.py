@@ -1,4 +1,4 @@
-"""Where samples lie: low-discrepancy points and the maps that carry them onto shapes.
+"""Samples: low-discrepancy points, and maps that carry them onto shapes.
 
 Counter-based: a point depends on its row's key, its own index and the seed alone, never on
 what was drawn before, so neither chunks nor threads change a result.

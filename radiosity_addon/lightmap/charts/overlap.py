@@ -13,7 +13,7 @@ Int = NDArray[np.int64]
 
 
 def overlapping_triangles(uv: Float, chart: Int) -> NDArray[np.intp]:
-    """Return the triangles that share ground with another one of their chart.
+    """Return the triangles that overlap another one of their chart.
 
     The charts are drawn side by side at some two hundred texels a triangle, on a page of
     1448² at most; a texel's center inside two triangles gives them away. Smaller overlaps
