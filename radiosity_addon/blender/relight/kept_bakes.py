@@ -50,9 +50,10 @@ def mark_of(scene: bpy.types.Scene) -> str:
     return str(relight_of(scene).mark)
 
 
-def set_mark(scene: bpy.types.Scene, mark: str) -> None:
-    """Remember the mark of a scene's bake; "" for one that is not kept."""
-    if mark or mark_of(scene):
+def note(scene: bpy.types.Scene, mark: str) -> None:
+    """Remember the mark of a scene's new bake; "" for one that is not kept."""
+    _forget(scene)
+    if mark:
         scene.radiosity_relight.mark = mark
 
 
@@ -65,11 +66,11 @@ def put(scene: bpy.types.Scene, mark: str, bake: KeptBake) -> InMemory:
     """Keep a scene's bake; earlier ones stay for undo, as far as there is room."""
     _kept.pop(mark, None)
     _kept[mark] = InMemory(bake, scene.name_full, bake.strengths)
-    _make_room(mark)
+    make_room(mark)
     return _kept[mark]
 
 
-def _make_room(newest: str = "") -> None:
+def make_room(newest: str = "") -> None:
     """Forget the oldest of the bakes that no scene shows, but for what `MOST_EARLIER` has room for."""
     shown = {newest, *map(mark_of, bpy.data.scenes)}
     earlier = [mark for mark in _kept if mark not in shown]
@@ -79,6 +80,12 @@ def _make_room(newest: str = "") -> None:
 
 def drop(scene: bpy.types.Scene) -> None:
     """Have the scene show no bake any more; in memory it stays for undo, if there is room."""
+    _forget(scene)
+    make_room()
+
+
+def _forget(scene: bpy.types.Scene) -> None:
+    """Have the scene remember no bake."""
     if not scene.is_property_set("radiosity_relight"):
         return
     group = scene.radiosity_relight
@@ -87,7 +94,6 @@ def drop(scene: bpy.types.Scene) -> None:
     names = [prop.identifier for prop in group.bl_rna.properties if not prop.is_readonly]
     if not any(map(group.is_property_set, names)):
         scene.property_unset("radiosity_relight")
-    _make_room()
 
 
 def drop_all(*_: object) -> None:
