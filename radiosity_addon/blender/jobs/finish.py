@@ -31,7 +31,7 @@ from ..images.images import lightmap_files, relative_path, set_folder, write_pag
 from ..material_copies.light_shares import crowded_materials
 from ..relight import kept_bakes, lightmap_versions
 from ..scene_records.export_sources import Export
-from ..session import kept_details, runtime
+from ..session import kept_details, last_bake
 from .preview import SAMPLES, render_preview
 
 BakeJob = Generator[Progress, None, BakeReport]
@@ -134,7 +134,7 @@ def finish(
         report = _report(result, images, groups, settings, seconds)
         remember(scene, export, result, digests)
         folder = "" if output is None else "//" if copies else relative_path(output.path)
-        runtime.remember(scene, report.as_dict(), folder)
+        last_bake.remember(scene, report.as_dict(), folder)
         kept_bakes.note(scene, "" if keeping is None else keeping.mark)
         if output is not None and copies is None:
             whole = report.joined(output.earlier, earlier.kept_sources)
@@ -191,7 +191,7 @@ def _restored_on_failure(context: bpy.types.Context) -> Iterator[None]:
         yield
     except BaseException:
         restore(context)
-        runtime.forget(context.scene)
+        last_bake.forget(context.scene)
         kept_bakes.drop(context.scene)
         raise
 
