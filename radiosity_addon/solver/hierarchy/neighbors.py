@@ -13,7 +13,7 @@ from ...rays import RayCaster
 from .nodes import Hierarchy
 
 ACROSS = 0.02
-"""Distance beyond an edge's midpoint at which neighbors are searched, as a part of its own height over that edge."""
+"""Distance beyond an edge's midpoint at which neighbors are searched, relative to the leaf's height."""
 
 RISE = 4.0
 """Rays down to a coplanar face start this many surface offsets above the plane."""
