@@ -64,7 +64,8 @@ def bake(
     """
     with registered():
         from ...files import BLEND_NAME
-        from ..jobs.job import WRITING_STAGES, run_bake
+        from ..jobs.finish import WRITING_STAGES
+        from ..jobs.job import run_bake
 
         source = scene or loaded
         if source is not None and same_file(source, output / BLEND_NAME):
@@ -101,11 +102,11 @@ def bake(
             report.write_copy(report_copy)
         files = written_files(report.as_dict(), preview, keep)
         if plot is not None:
-            from .plot import render_plot
+            from ...bake.result import write_history
 
             console.progress("plot", 1.0)
             make_folder_of(plot)
-            render_plot(report.as_dict(), plot.resolve())
+            write_history(report.as_dict(), plot.resolve())
             files.append((str(plot), "how it was solved"))
         console.lines(summary(str(output), files, report.as_dict()))
 
