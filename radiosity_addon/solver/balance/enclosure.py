@@ -10,7 +10,7 @@ import numpy as np
 
 from ...numerics import Array, cosine_hemisphere, for_chunks, stratified_square, to_world
 from ...rays import RayCaster
-from ..hierarchy import Hierarchy, TreeTop
+from ..hierarchy import ClusterCut, Hierarchy
 from ..links import node_samples, pull
 
 RAYS = 32
@@ -66,11 +66,11 @@ class Arrivals:
         if len(faces):
             # Neighbours that together are no larger than an element may be share their rays.
             large = np.flatnonzero(hierarchy.clusters.area > self._min_area)
-            top = TreeTop(hierarchy, large)
-            share, escapes = self._trace(hierarchy, top.tips, RAYS)
-            tip = top.tip[faces] - top.n_inner
-            self.share[faces], self.escapes[faces] = share[tip], escapes[tip]
-            apart = faces[(share[tip] > 0.0) & (share[tip] < 1.0) & (np.bincount(tip)[tip] > 1)]
+            cut = ClusterCut(hierarchy, large)
+            share, escapes = self._trace(hierarchy, cut.nodes, RAYS)
+            node = cut.row_of_face[faces] - cut.n_inner
+            self.share[faces], self.escapes[faces] = share[node], escapes[node]
+            apart = faces[(share[node] > 0.0) & (share[node] < 1.0) & (np.bincount(node)[node] > 1)]
             if len(apart) * RAYS <= MOST_RAYS:
                 self._ask(hierarchy, apart, RAYS)
         self._ask(hierarchy, new[len(faces) :], RAYS)

@@ -46,6 +46,8 @@ class Links:
         leaves below an inner element do not all inherit the same (a cluster's are all 1).
     """
 
+    STORED = ("receiver", "source", "factor", "visibility", "to_quarter", "of_quarter")
+
     receiver: Array
     source: Array
     factor: Array

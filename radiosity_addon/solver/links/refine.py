@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from ...numerics import Array
-from ..hierarchy import LEAF, Hierarchy, TreeTop
+from ..hierarchy import LEAF, ClusterCut, Hierarchy
 from .cluster_links import ClusterLinks
 from .element_links import Links
 from .transport import node_radiosity
 
 
 def misplaced_power(
-    hierarchy: Hierarchy, links: Links, radiosity: Array, top: TreeTop | None = None
+    hierarchy: Hierarchy, links: Links, radiosity: Array, cut: ClusterCut | None = None
 ) -> Array:
     """Estimate the power each link may misplace [W]: B_s · A_r · doubt, the largest channel.
 
@@ -24,15 +24,15 @@ def misplaced_power(
     ----------
     radiosity : (e, 3) float64
     """
-    brightest = node_radiosity(hierarchy, radiosity, top).max(axis=1, initial=0.0)
+    brightest = node_radiosity(hierarchy, radiosity, cut).max(axis=1, initial=0.0)
     return np.asarray(brightest[links.source] * hierarchy.area[links.receiver] * links.doubt)
 
 
 def misplaced_at_clusters(
-    hierarchy: Hierarchy, links: ClusterLinks, radiosity: Array, top: TreeTop | None = None
+    hierarchy: Hierarchy, links: ClusterLinks, radiosity: Array, cut: ClusterCut | None = None
 ) -> Array:
     """Estimate the power each link to a cluster may misplace [W] (see `misplaced_power`)."""
-    brightest = node_radiosity(hierarchy, radiosity, top).max(axis=1, initial=0.0)
+    brightest = node_radiosity(hierarchy, radiosity, cut).max(axis=1, initial=0.0)
     return np.asarray(brightest[links.source] * hierarchy.clusters.area[links.receiver] * links.doubt)
 
 

@@ -18,7 +18,7 @@ from ...numerics import (
     stratified_square,
     to_world,
 )
-from ..hierarchy import LEAF, Hierarchy, TreeTop, node_opacity
+from ..hierarchy import LEAF, ClusterCut, Hierarchy, node_opacity
 from ..links import ClusterLinks, Links, gather_at_clusters
 from .lamp_power import fate, is_stopped, lost_by_lamp
 from .state import SolverState
@@ -116,7 +116,7 @@ def link_closure(hierarchy: Hierarchy, links: Links, cluster_links: ClusterLinks
     held = np.bincount(hierarchy.face, own * hierarchy.area, minlength=len(hierarchy.faces))
     per_face = np.asarray(held / hierarchy.faces.area)
     if cluster_links is not None:
-        top = TreeTop(hierarchy, cluster_links.receiver, cluster_links.source)
-        there = gather_at_clusters(hierarchy, top, cluster_links, opacity[:, None])[:, 0]
+        cut = ClusterCut(hierarchy, cluster_links.receiver, cluster_links.source)
+        there = gather_at_clusters(hierarchy, cut, cluster_links, opacity[:, None])[:, 0]
         per_face += np.maximum(there, 0.0)
     return per_face
