@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...numerics import Array, cosine_hemisphere, for_chunks, stratified_square, to_world
+from ...numerics import Array, Stream, cosine_hemisphere, for_chunks, stratified_square, to_world
 from ...rays import RayCaster
 from ..hierarchy import ClusterCut, Hierarchy
 from ..links import node_samples, pull
@@ -132,8 +132,9 @@ class Arrivals:
         def measure(rows: slice) -> None:
             chosen = nodes[rows]
             quarter = np.broadcast_to(np.arange(rays) % 4, (len(chosen), rays))
-            points, normals = node_samples(hierarchy, chosen, quarter, chosen, self._seed + 41)
-            unit = stratified_square(chosen, rays, self._seed + 42)
+            streams = Stream.ENCLOSURE_POINTS, Stream.ENCLOSURE_FACE
+            points, normals = node_samples(hierarchy, chosen, quarter, chosen, self._seed, streams)
+            unit = stratified_square(chosen, rays, self._seed + Stream.ENCLOSURE_DIRECTIONS)
             normals = normals.reshape(-1, 3)
             directions = to_world(cosine_hemisphere(unit).reshape(-1, 1, 3), normals)[:, 0]
             start = points.reshape(-1, 3) + self._caster.surface_offset * normals

@@ -9,7 +9,9 @@ import numpy as np
 
 from ...lights import EnvironmentLight, Lamp, Light, SpotLight
 from ...numerics import (
+    LIGHT_STEP,
     Array,
+    Stream,
     cosine_hemisphere,
     for_chunks,
     irradiance_under_sky,
@@ -127,7 +129,7 @@ def link_lights(
             gain, doubt = np.zeros((len(waiting), 4)), np.zeros(len(waiting))
             seeing = np.flatnonzero(~blind)
             gain[seeing], doubt[seeing] = measure_light(
-                hierarchy, light, caster, waiting[seeing], seed + 101 * number, threads
+                hierarchy, light, caster, waiting[seeing], seed + LIGHT_STEP * number, threads
             )
             misplaced = np.where(blind, np.inf, doubt * area * strength)
             split = may_split & (misplaced > misplaced_power)
@@ -245,7 +247,8 @@ def _measure_sky(
 ) -> tuple[Array, Array]:
     """Measure the sky on pieces of elements (see `measure_light`); whole ones have a column only."""
     rays = SKY_RAYS // divisor
-    points = points_on_triangles(asked.corners, stratified_square(asked.keys, rays, seed + 1))
+    unit = stratified_square(asked.keys, rays, seed + Stream.LIGHT_POINTS)
+    points = points_on_triangles(asked.corners, unit)
     share, error = sky_share(light, points, asked.normals, rays, caster, asked.keys, seed)
     values = irradiance_under_sky(share.reshape(-1, asked.count))
     # Expected noise of a quarter's mean is not a difference between quarters.
@@ -258,8 +261,9 @@ def _measure_lamp(
 ) -> tuple[Array, Array]:
     """Measure a lamp on pieces of elements (see `measure_light`); whole ones have a column only."""
     samples = LAMP_SAMPLES // divisor
-    points = points_on_triangles(asked.corners, stratified_square(asked.keys, samples, seed + 1))
-    unit = stratified_square(asked.keys, samples, seed)
+    unit = stratified_square(asked.keys, samples, seed + Stream.LIGHT_POINTS)
+    points = points_on_triangles(asked.corners, unit)
+    unit = stratified_square(asked.keys, samples, seed + Stream.LIGHT_RAYS)
     open_gain, share = lamp_light(light, points, asked.normals, unit, caster)
     values = (open_gain.mean(axis=1) * share).reshape(-1, asked.count)
     missed = open_gain.reshape(len(values), -1).mean(axis=1) / (asked.count * samples + 2.0)
@@ -327,7 +331,7 @@ def sky_share(
     share, error = np.empty(len(points)), np.empty(len(points))
     for first in range(0, len(points), CHUNK):
         rows = slice(first, first + CHUNK)
-        unit = stratified_square(keys[rows], rays, seed)
+        unit = stratified_square(keys[rows], rays, seed + Stream.LIGHT_RAYS)
         directions = to_world(cosine_hemisphere(unit), normals[rows])
         start = points[rows] if points.ndim == 3 else points[rows, None]
         start = np.broadcast_to(start + caster.surface_offset * normals[rows, None], directions.shape)

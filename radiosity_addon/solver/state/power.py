@@ -10,7 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from ...numerics import (
+    LAMP_STEP,
     Array,
+    Stream,
     cosine_hemisphere,
     pick_in_runs,
     points_on_triangles,
@@ -72,9 +74,10 @@ def _follow_surfaces(state: SolverState) -> tuple[float, float]:
     along = (number + 0.5) / ESCAPE_RAYS
     leaf = leaves[pick_in_runs(running_sums(power), along)[0]]
     seed = state.settings.seed
-    points = points_on_triangles(hierarchy.corners[leaf], stratified_square(number, 1, seed + 11))[:, 0]
+    unit = stratified_square(number, 1, seed + Stream.ESCAPE_POINTS)
+    points = points_on_triangles(hierarchy.corners[leaf], unit)[:, 0]
     normals = hierarchy.normal[leaf]
-    unit = stratified_square(number, 1, seed + 12)
+    unit = stratified_square(number, 1, seed + Stream.ESCAPE_DIRECTIONS)
     directions = to_world(cosine_hemisphere(unit), normals)[:, 0]
     start = points + state.caster.surface_offset * normals
     black, escaped = fate(hierarchy, state.caster, start, directions)
@@ -87,7 +90,7 @@ def _follow_lamps(state: SolverState) -> tuple[float, float]:
     for number, light in enumerate(state.scene.lights):
         if not is_stopped(light) or not light.flux.any():
             continue
-        seed = state.settings.seed + 21 + 2 * number
+        seed = state.settings.seed + LAMP_STEP * number
         black, escaped, _ = lost_by_lamp(light, state.scene, state.hierarchy, state.caster, seed)
         flux = float(light.flux.mean())
         black_total += flux * black
