@@ -9,6 +9,7 @@ from .bake_warning import BakeWarning
 from .errors import BakeError, NothingToDoError, RadiosityError, SceneError, UsageError
 from .progress import drain, scaled
 from .similar_warnings import one_of_each
+from .ticks import linear_ticks, tick_label
 from .time_left import RemainingTime, duration
 
 __all__ = [
@@ -21,6 +22,8 @@ __all__ = [
     "UsageError",
     "drain",
     "duration",
+    "linear_ticks",
     "one_of_each",
     "scaled",
+    "tick_label",
 ]

@@ -40,7 +40,7 @@ class _BakeCommand:
         None,
         "Draw the history of residual, elements and links, against seconds and iterations",
         SECTION,
-        metavar="FILE.png",
+        metavar="FILE.svg",
     )
 
 

@@ -22,10 +22,7 @@ class Console:
     While entered, file descriptor 1 leads to the null device: Blender's C code writes
     a line there for every sample it renders. Our lines go to a copy of the original.
 
-    Parameters
-    ----------
-    quiet : bool
-        Print nothing at all.
+    quiet: Print nothing at all.
     """
 
     def __init__(self, quiet: bool = False) -> None:
@@ -97,7 +94,7 @@ class Console:
             self._stream.write(text)
             self._stream.flush()
         except (OSError, ValueError):
-            self.quiet = True  # nobody reads it, such as `| head`; the bake goes on
+            self.quiet = True  # the reader has closed the pipe, as `| head` does; the bake continues
 
     def _end_line(self) -> None:
         if self._open_line:
@@ -125,13 +122,9 @@ def _flush_everything() -> None:
 def summary(where: str, files: Iterable[tuple[str, str]], report: dict[str, Any]) -> list[str]:
     """Return the closing lines of a bake: where things are, how long, what to look at.
 
-    Parameters
-    ----------
-    where : str
-        The output folder as the user named it.
-    files : pairs of (name, what it is)
-    report : dict
-        The report as it is written to report.json.
+    where: The output folder as the user named it.
+    files pairs of (name, what it is).
+    report: The report as it is written to report.json.
     """
     solver = report["solver"]
     count = len(report["objects"])

@@ -40,10 +40,7 @@ def requested_settings(request: argparse.Namespace) -> BakeSettings:
 def light_group(text: str) -> GroupSetting:
     """Read a light group as the command line has it: NAME=MEMBER,MEMBER…
 
-    Raises
-    ------
-    UsageError
-        If it is not of this form.
+    Raises UsageError if it is not of this form.
     """
     name, _, members = text.partition("=")
     wanted = tuple(filter(None, (member.strip() for member in members.split(","))))
@@ -65,7 +62,7 @@ def bake_output(request: argparse.Namespace, loaded: Path | None) -> Path:
 
 
 def check_keeping(request: argparse.Namespace, settings: BakeSettings) -> None:
-    """Refuse to keep what cannot be lit anew, and to relight otherwise than it was baked."""
+    """Refuse to keep bakes that cannot be relit, and to relight with settings other than the bake's."""
     if request.keep and settings.method != "hierarchical":
         raise UsageError(f"--keep needs the hierarchical method; {settings.method} keeps no links")
     if request.keep and settings.quantity == "residual":
@@ -76,8 +73,8 @@ def check_keeping(request: argparse.Namespace, settings: BakeSettings) -> None:
 
 def check_plot(plot: Path | None) -> None:
     """Refuse to draw the history into a file of another kind."""
-    if plot is not None and plot.suffix.lower() != ".png":
-        raise UsageError(f"--plot {plot} is not a .png file")
+    if plot is not None and plot.suffix.lower() != ".svg":
+        raise UsageError(f"--plot {plot}: the plot is an SVG picture; choose a name that ends in .svg")
 
 
 class _Parser(argparse.ArgumentParser):

@@ -40,18 +40,10 @@ def disk_factor(
     0 where either faces away. The relative error is about (source radius / distance)², so
     well below 1 % beyond ten radii. Works in the precision of its arguments.
 
-    Parameters
-    ----------
-    points, normals : (n, 3) float
-        Receiver points and their unit normals.
-    centres, source_normals : (n, 3) float
-        Centroids and unit normals of the sources.
-    areas : (n,) float
-        Areas of the sources.
-
-    Returns
-    -------
-    factors : (n,) float in [0, 1), of the arguments' type
+    points, normals (n, 3): Receiver points and their unit normals.
+    centres, source_normals (n, 3): Centroids and unit normals of the sources.
+    areas (n,): Areas of the sources.
+    Returns factors (n,) float in [0, 1), of the arguments' type.
     """
     x, y, z = (centres[:, axis] - points[:, axis] for axis in range(3))
     square = x * x + y * y + z * z

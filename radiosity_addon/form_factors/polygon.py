@@ -38,27 +38,14 @@ def point_to_polygon(
     the factor is that of a vanishing gap (1 inside, 1/2 on an edge). Polygons without area
     give 0. Corners may run k ≥ 3, concave ones too, but not across each other.
 
-    Parameters
-    ----------
-    points : (n, 3) float
-    normals : (n, 3) float
-        Unit normals of the receiver at the points.
-    polygons : (n, k, 3) float
-        May be a broadcast view: rows are copied by chunks of `CHUNK_CORNERS` corners.
-    both_sides : bool
-        Count the polygon's back as well.
-    contact : bool
-        Whether faces in contact see each other. A surface's own back lies in its plane and faces the
-        other way just like one in contact, so callers that cannot tell them apart say no.
-
-    Returns
-    -------
-    factors : (n,) float64 in [0, 1]
-
-    Raises
-    ------
-    ValueError
-        If shapes do not match.
+    points (n, 3).
+    normals (n, 3): Unit normals of the receiver at the points.
+    polygons (n, k, 3): May be a broadcast view: rows are copied by chunks of `CHUNK_CORNERS` corners.
+    both_sides: Count the polygon's back as well.
+    contact: Whether faces in contact see each other. A surface's own back also lies in its plane and faces
+        the other way, so callers that cannot distinguish the two pass False.
+    Returns factors (n,) float64 in [0, 1].
+    Raises ValueError if shapes do not match.
     """
     points, normals = np.asarray(points, dtype=np.float64), np.asarray(normals, dtype=np.float64)
     polygons = np.asarray(polygons, dtype=np.float64)
@@ -128,9 +115,7 @@ def _closed_turn(corners: Float64Array, normal: Float64Array) -> Float64Array:
 def edge_turn(start: Float64Array, end: Float64Array, normal: Float64Array) -> Float64Array:
     """Return n · ∫ ω × dω along one edge, γ n · Γ̂; 0 for an edge that points at the origin.
 
-    Parameters
-    ----------
-    start, end, normal : (3, m) float64
+    start, end, normal (3, m).
     """
     cross_x = start[1] * end[2] - start[2] * end[1]
     cross_y = start[2] * end[0] - start[0] * end[2]

@@ -36,16 +36,9 @@ def cap_cosine(cosine: npt.ArrayLike, sine_half: npt.ArrayLike) -> Float64Array:
 
         atan2(sinα sinφ, cosα sinθ − sinα cosθ cosφ) + φ sin²α cosθ − sinα cosα sinθ sinφ
 
-    Parameters
-    ----------
-    cosine : (...) float
-        cosθ between the receiver's normal and the cap's axis.
-    sine_half : (...) float in [0, 1]
-        sinα; α ≤ π/2.
-
-    Returns
-    -------
-    effective : (...) float64 in [0, 1]
+    cosine (...) float: cosθ between the receiver's normal and the cap's axis.
+    sine_half (...) float in [0, 1]: sinα; α ≤ π/2.
+    Returns effective (...) float64 in [0, 1].
     """
     cosine, sine_half = np.broadcast_arrays(np.asarray(cosine, np.float64), np.asarray(sine_half, np.float64))
     effective = np.array(np.maximum(cosine, 0.0))
@@ -78,17 +71,11 @@ def point_to_ellipse(
     changes by less than `ELLIPSE_TOLERANCE`. Points closer to the rim than about 1/500 of
     the radius stop at `MAX_NODES` and may be off by some 1e-3.
 
-    Parameters
-    ----------
-    points, normals : (n, 3) float
-    centre : (3,) float
-    axis_u, axis_v : (3,) float
-        Conjugate half axes; the outline is centre + u cosφ + v sinφ and the front is where
-        u × v points.
-
-    Returns
-    -------
-    factors : (n,) float64 in [0, 1]
+    points, normals (n, 3).
+    centre (3,).
+    axis_u, axis_v (3,): Conjugate half axes; the outline is center + u cosφ + v sinφ and the front is where u
+        × v points.
+    Returns factors (n,) float64 in [0, 1].
     """
     points, normals = np.asarray(points, dtype=np.float64), np.asarray(normals, dtype=np.float64)
     u, v = np.asarray(axis_u, dtype=np.float64), np.asarray(axis_v, dtype=np.float64)

@@ -26,7 +26,7 @@ TOLERANCE = 2e-5
 """Error allowed to each interval of the outline, as a factor from the smaller triangle."""
 
 BLIND_ERROR = 1e-3
-"""What quadrature may miss between its nodes beside an edge, in squares of the interval (measured)."""
+"""Quadrature error between nodes next to an edge, in squares of the interval (measured)."""
 
 BLIND_BISECTIONS = 6
 """Bisections on that suspicion alone; it would cut a needle's edges to dust."""
@@ -35,7 +35,7 @@ MAX_BISECTIONS = 24
 """Ends the bisection at singular points; intervals there are below 1e-7 of their edge."""
 
 NEEDLE = 1e-8
-"""Outlines around less than this part of their length squared cancel: points along the triangle are asked."""
+"""Outlines around less than this part of their length squared cancel: points are evaluated instead."""
 
 NEEDLE_POINTS = 32
 
@@ -87,20 +87,10 @@ def triangle_to_triangle(receivers: npt.ArrayLike, sources: npt.ArrayLike) -> Fl
     give their overlap over the receiver's area, the limit of a vanishing gap. Triangles
     without area give 0.
 
-    Parameters
-    ----------
-    receivers, sources : (n, 3, 3) float
-        Corners, counter-clockwise from the front.
-
-    Returns
-    -------
-    factors : (n,) float64 in [0, 1]
-        Within 3e-5 for touching and crossing pairs, 1e-6 for far ones (see `FAR`).
-
-    Raises
-    ------
-    ValueError
-        If shapes do not match.
+    receivers, sources (n, 3, 3): Corners, counter-clockwise from the front.
+    Returns factors (n,) float64 in [0, 1]: Within 3e-5 for touching and crossing pairs, 1e-6 for far ones
+        (see `FAR`).
+    Raises ValueError if shapes do not match.
     """
     receivers, sources = np.asarray(receivers, dtype=np.float64), np.asarray(sources, dtype=np.float64)
     if receivers.ndim != 3 or receivers.shape[1:] != (3, 3) or receivers.shape != sources.shape:
@@ -172,7 +162,7 @@ def _normals(triangles: Float64Array) -> tuple[Float64Array, Float64Array]:
 
 
 def _radius(triangles: Float64Array, centres: Float64Array) -> Float64Array:
-    """Return the distance (m,) from each centre to its triangle's farthest corner."""
+    """Return the distance (m,) from each center to its triangle's farthest corner."""
     arms = triangles - centres[:, None]
     radius: Float64Array = np.sqrt(np.einsum("ijk,ijk->ij", arms, arms).max(axis=1))
     return radius
@@ -224,10 +214,10 @@ def _along_needles(outer: Float64Array, outer_normal: Float64Array, inner: Float
 
 
 def weighted_sums(values: Float64Array, weights: Float64Array) -> Float64Array:
-    """Return (m,) Σ_k values_mk weights_k, the same bits for a row whatever rows stand beside it.
+    """Return (m,) Σ_k values_mk weights_k, the same bits for a row regardless of the other rows.
 
     A matrix product promises no such thing: it treats the last rows of an array differently,
-    and a pair's factor must not depend on what it was asked together with.
+    and a pair's factor must not depend on the other pairs of the call.
     """
     total: Float64Array = values[:, 0] * weights[0]
     for column in range(1, len(weights)):

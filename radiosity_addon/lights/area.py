@@ -17,7 +17,7 @@ _NODES = 10
 """Of Gauss and Legendre, each way over the part of a lamp that a point sees through the soft-box."""
 
 _NARROWEST = 1e-3
-"""Spreads [rad] below this shine as it does, all but in parallel: a millimetre of blur at a metre."""
+"""Spreads [rad] below this shine as it does, all but in parallel: a millimeter of blur at a meter."""
 
 _NODES_CHUNK = 1 << 9
 """Points integrated at a time; temporaries stay in the processor's cache."""
@@ -27,23 +27,14 @@ _NODES_CHUNK = 1 << 9
 class AreaLight(Emitter):
     """A flat lamp of uniform radiance power/(π area) on one side.
 
-    Parameters
-    ----------
-    position : (3,) float [m]
-        Its centre.
-    edge_u, edge_v : (3,) float [m]
-        Full edge vectors, or full conjugate axes of an ellipse; it shines to the side that
-        edge_u × edge_v points to.
-    power : float or (3,) float [W]
-    shape : "rectangle" or "ellipse"
-    spread : float [rad]
-        The full angle of the cone that each point of the lamp shines into, 0 to π: as through
+    position (3,) [m]: Its center.
+    edge_u, edge_v (3,) [m]: Full edge vectors, or full conjugate axes of an ellipse; it shines to the side
+        that edge_u × edge_v points to.
+    power float or (3,) float [W].
+    shape "rectangle" or "ellipse".
+    spread float [rad]: The full angle of the cone that each point of the lamp shines into, 0 to π: as through
         the slats of a soft-box, radiance falls as 1 − tan θ / tan(spread/2), and the power is kept.
-
-    Raises
-    ------
-    SceneError
-        If a value is out of range or the lamp has no area.
+    Raises SceneError if a value is out of range or the lamp has no area.
     """
 
     position: npt.ArrayLike
@@ -119,7 +110,7 @@ class AreaLight(Emitter):
         directions, distances = directions_to(samples - points[:, None])
         facing = -(directions @ self._normal)
         geometry = ray_geometry_term(row_cosines(directions, normals), facing, distances)
-        # Each ray stands for a k-th of the lamp: radiance times what it throws on a square metre.
+        # Each ray stands for a k-th of the lamp: radiance times what it throws on a square meter.
         thrown = throughput(geometry, 1.0, self.area / directions.shape[1])
         return directions, distances, radiance_of_flux(1.0, self.area) * thrown
 
@@ -204,7 +195,7 @@ class AreaLight(Emitter):
         cosines, facing = row_cosines(directions, normals), -(directions @ self._normal)
         across = np.sqrt(np.maximum(1.0 - facing * facing, 0.0))
         radiance = radiance_of_flux(1.0, self.area) * self._through_slats(across, facing)
-        # A square metre of the plane is this many of the unit square.
+        # A square meter of the plane is this many of the unit square.
         sampled = width * length * np.sqrt(determinant)
         return (
             directions,

@@ -47,12 +47,12 @@ def irradiance_under_sky(radiance: Value) -> Value:
 
 
 def intensity_of_flux(flux: Value) -> Value:
-    """Return I = Φ/4π [W/sr] of a point lamp that shines alike all around (handout (1.9))."""
+    """Return I = Φ/4π [W/sr] of a uniform point lamp (handout (1.9))."""
     return flux / SPHERE
 
 
 def flux_of_intensity(intensity: Value) -> Value:
-    """Return Φ = 4πI [W] of a point lamp that shines alike all around (handout (1.8))."""
+    """Return Φ = 4πI [W] of a uniform point lamp (handout (1.8))."""
     flux: Value = SPHERE * intensity
     return flux
 

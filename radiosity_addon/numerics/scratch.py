@@ -42,16 +42,13 @@ _lock = threading.Lock()
 class Scratch:
     """Makes arrays: in memory as long as the budget lasts, then in files.
 
-    Parameters
-    ----------
-    budget : float
-        What the arrays may take of memory together [bytes].
+    budget: What the arrays may take of memory together [bytes].
     """
 
     def __init__(self, budget: float = math.inf) -> None:
         self.budget = budget
         self.free: Callable[[], float] | None = None
-        """Tells what all that the process does leaves for them, if somebody knows [bytes]."""
+        """Returns the memory that the rest of the process leaves for arrays, if known [bytes]."""
         self.in_memory = 0
         """What the arrays take of memory now [bytes]."""
         self.in_files = 0
@@ -166,7 +163,7 @@ def tiles(count: int, size: int = 0) -> Iterator[slice]:
 
 
 def marked(count: int, of: Callable[[slice], Array]) -> Array:
-    """Return (count,) bool from what a function says of rows, tile by tile."""
+    """Return (count,) bool from a function of rows, evaluated tile by tile."""
     result = np.empty(count, dtype=bool)
     for rows in tiles(count):
         result[rows] = of(rows)
@@ -180,7 +177,7 @@ def row_numbers(mask: Array) -> Array:
 
 
 def is_in_file(array: Array) -> bool:
-    """Tell whether an array, or what it is a view of, lives in a file."""
+    """Return whether an array, or its base, is stored in a file."""
     base: Any = array
     while isinstance(base, np.ndarray):
         base = base.base

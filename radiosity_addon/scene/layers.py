@@ -38,13 +38,13 @@ NEAR_EMITTERS = 3.0
 """What emits is covered by what is this many surface offsets in front of it: shadow rays pass that by."""
 
 ONE_PLANE = 0.5
-"""So much of their tolerance apart, faces count as in one plane: rounding decides no more."""
+"""Faces closer than this part of their tolerance count as coplanar: their order is lost in rounding."""
 
 FINE = 1.0 / 64.0
 """Heights that round to the same multiple of this part of the tolerance are equal."""
 
 PROBES = 32
-"""Rays that tell whether what is behind a face is solid."""
+"""Rays that decide whether a face belongs to a solid."""
 
 MANY_COPIES = 4
 """More exact copies of one triangle than these are not compared pair by pair."""
@@ -60,14 +60,9 @@ INSIDE = -1e-9
 class Covers:
     """c covered parts, sorted by side; side 2 t is the front of triangle t, 2 t + 1 its back.
 
-    Attributes
-    ----------
-    side, by : (c,) int
-        What is covered, and what covers it.
-    part : (c, 8, 2) float64
-        A convex polygon, in weights of the triangle's second and third corner, counter-clockwise.
-    in_cover : (c, 8, 2) float64
-        The same in weights of the cover's triangle.
+    side, by (c,) int: What is covered, and what covers it.
+    part (c, 8, 2): A convex polygon, in weights of the triangle's second and third corner, counter-clockwise.
+    in_cover (c, 8, 2): The same in weights of the cover's triangle.
     """
 
     side: Array
@@ -84,12 +79,7 @@ class Covers:
 
 
 class Layers:
-    """What of a scene's sides is covered.
-
-    Parameters
-    ----------
-    scene : Surfaces
-    """
+    """The covered parts of a scene's sides."""
 
     def __init__(self, scene: Surfaces) -> None:
         self._scene = scene
@@ -177,13 +167,10 @@ class Layers:
 def holding(first: Array, parts: Array, row: Array, place: Array) -> tuple[Array, Array]:
     """Return the pairs of points (n,) and parts that they lie in.
 
-    Parameters
-    ----------
-    first : (r + 1,) int
-        The run of parts of each row.
-    parts : (c, k, 2) float64
-    row : (n,) int
-    place : (n, 2) float64
+    first (r + 1,) int: The run of parts of each row.
+    parts (c, k, 2).
+    row (n,) int.
+    place (n, 2).
     """
     count = first[row + 1] - first[row]
     point = np.repeat(np.arange(len(row)), count)
@@ -198,11 +185,8 @@ def holding(first: Array, parts: Array, row: Array, place: Array) -> tuple[Array
 def _contacts(scene: Surfaces, pairs: CoincidentPairs, tolerance: Array) -> tuple[Array, Covers]:
     """Find the pairs whose fronts touch.
 
-    Returns
-    -------
-    contact : (p,) bool
-    pressed : Covers
-        Of fronts with something solid behind them, where they touch; sorted by side.
+    Returns contact (p,) bool.
+    Returns pressed: Of fronts with something solid behind them, where they touch; sorted by side.
     """
     both = scene.two_sided[pairs.first] & scene.two_sided[pairs.second] & ~pairs.same
     near = np.abs(pairs.height) <= np.maximum(tolerance[pairs.first], tolerance[pairs.second])
@@ -271,7 +255,7 @@ def _covers(
         one, other = 2 * first[rows] + one_is_back[rows], 2 * second[rows] + other_is_back[rows]
         won = wins[rows]
         mine, theirs = pairs.in_first[rows], pairs.in_second[rows]
-        # Corner by corner the same, whichever way round that is for the cover.
+        # The same corner by corner, in either orientation of the cover.
         turn = ~pairs.same[rows, None, None]
         which = won[:, None, None]
         found.append(
@@ -301,14 +285,12 @@ def _many_copies(scene: Surfaces, solid: Array, emits: Array) -> tuple[Array, Ar
 
     Pairs of a thousand copies would be a million: all are covered by the one that counts.
 
-    Returns
-    -------
-    copy, original : (c,) int
+    Returns copy, original (c,) int.
     """
     none = np.zeros(0, dtype=np.int64)
     opaque = solid if scene.images is None else solid[~scene.images.cut_out[solid]]
     bits = np.ascontiguousarray(scene.triangles[opaque] + 0.0).view(np.uint64)
-    # A number for each triangle, whichever corner comes first.
+    # A number for each triangle that does not depend on its first corner.
     mixed = bits * _ODD
     number = (mixed[..., 0] ^ (mixed[..., 1] >> np.uint64(7)) ^ (mixed[..., 2] >> np.uint64(13))).sum(axis=1)
     _, group, count = np.unique(number, return_inverse=True, return_counts=True)

@@ -15,14 +15,10 @@ from .scene import Scene
 
 
 class Stacks:
-    """Which cut-outs lie in one another.
+    """Coincident cut-outs.
 
-    Parameters
-    ----------
-    scene : Scene
-        With images.
-    met : (t,) bool
-        The triangles that rays meet.
+    scene: With images.
+    met (t,) bool: The triangles that rays meet.
     """
 
     def __init__(self, scene: Scene, met: Array) -> None:

@@ -40,18 +40,12 @@ _WHOLE = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 
 @dataclass(frozen=True)
 class OwnParts:
-    """The m parts that are left of s sides.
+    """The m uncovered parts of s sides.
 
-    Attributes
-    ----------
-    sides : (s,) int
-        The sides of which something is covered, sorted; front 2 t and back 2 t + 1 of triangle t.
-    side : (m,) int
-        Whose part it is, sorted.
-    corners : (m, 3, 2) float64
-        In weights of the triangle's second and third corner, counter-clockwise.
-    level : (m,) float64
-        What shows of it through covers that are cut out; else 1.
+    sides (s,) int: The partly covered sides, sorted; front 2 t and back 2 t + 1 of triangle t.
+    side (m,) int: Whose part it is, sorted.
+    corners (m, 3, 2): In weights of the triangle's second and third corner, counter-clockwise.
+    level (m,): The share visible through covers with cut-outs; else 1.
     """
 
     sides: Array
@@ -109,18 +103,12 @@ class OwnParts:
 
 
 def own_parts(side: Array, part: Array, by: Array, in_cover: Array, scene: Surfaces) -> OwnParts:
-    """Return what covers leave of sides.
+    """Return the uncovered parts of sides.
 
-    Parameters
-    ----------
-    side : (c,) int
-        What is covered; sorted.
-    part : (c, k, 2) float64
-        Where: convex, counter-clockwise.
-    by : (c,) int
-        The side that covers it.
-    in_cover : (c, k, 2) float64
-        Where on the cover's triangle, corner by corner the same.
+    side (c,) int: What is covered; sorted.
+    part (c, k, 2): Where: convex, counter-clockwise.
+    by (c,) int: The side that covers it.
+    in_cover (c, k, 2): Where on the cover's triangle, corner by corner the same.
     """
     sides, first, count = np.unique(side, return_index=True, return_counts=True)
     own = np.arange(len(sides))
@@ -220,7 +208,7 @@ def _shining_through(
 def _moved(points: Array, part: Array, in_cover: Array) -> Array:
     """Return points (n, p, 2), given along with polygons (n, k, 2), where the same polygons are elsewhere."""
     row = np.arange(len(part))
-    # The map is affine: three corners that span the most say all.
+    # The map is affine: the three corners that span the most determine it.
     apart = part - part[:, :1]
     far = np.einsum("nkc,nkc->nk", apart, apart).argmax(axis=1)
     along = apart[row, far]

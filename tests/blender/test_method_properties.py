@@ -128,7 +128,7 @@ def test_the_assembly_is_given_as_chosen(group: bpy.types.PropertyGroup) -> None
 
 
 def test_the_last_bake_tells_how_it_was_solved() -> None:
-    from radiosity_addon.blender.session import runtime
+    from radiosity_addon.blender.session import last_bake
 
     solver = {
         "method": "gauss-seidel",
@@ -141,9 +141,9 @@ def test_the_last_bake_tells_how_it_was_solved() -> None:
         "history": [{"seconds": 0.1}] * 100,
     }
     report = {"objects": [], "solver": solver, "seconds": {"solve": 1.0}, "warnings": []}
-    runtime.remember(bpy.context.scene, report, "")
+    last_bake.remember(bpy.context.scene, report, "")
     assert "history" not in bpy.context.scene.radiosity.last_bake
-    figures = dict(runtime.last_bake(bpy.context.scene).figures)
+    figures = dict(last_bake.read(bpy.context.scene).figures)
     assert figures["Method"] == "Gauss-Seidel"
     assert figures["Iterations"] == "17"
     assert figures["Residual"] == "2.5e-05"

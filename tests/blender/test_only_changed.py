@@ -14,7 +14,7 @@ import pytest
 import radiosity_addon
 from radiosity_addon.blender.datablocks.bake_record import mark_made, recorded_objects
 from radiosity_addon.blender.material_copies.copy_marks import ADDED
-from radiosity_addon.blender.session import runtime
+from radiosity_addon.blender.session import last_bake
 from tests.blender.scenes import add_lamp, add_mesh, shader_material
 
 
@@ -105,7 +105,7 @@ def test_a_moved_object_gets_a_new_lightmap_and_others_keep_theirs(room: Path) -
         "Floor": 1,
         "Shelf": 1,
     }
-    last = runtime.last_bake(bpy.context.scene)
+    last = last_bake.read(bpy.context.scene)
     assert any("2 unchanged objects kept their lightmaps" in message for _, message in last.warnings)
     # About as fine as before.
     densities = [page["texels_per_metre"] for page in report["pages"]]
@@ -203,7 +203,7 @@ def test_an_object_that_is_gone_is_named(room: Path, capfd: pytest.CaptureFixtur
     assert "gone since the last bake: 'Shelf'" in capfd.readouterr().out
     bpy.data.objects["Box"].location.x -= 0.5
     assert bake() == {"FINISHED"}
-    last = runtime.last_bake(bpy.context.scene)
+    last = last_bake.read(bpy.context.scene)
     assert any("gone since the last bake: 'Shelf'" in message for _, message in last.warnings)
 
 

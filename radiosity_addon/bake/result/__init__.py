@@ -6,6 +6,7 @@ Plain records and files, nothing that bakes.
 from __future__ import annotations
 
 from .details import MEANS, More, more_of, statistics
+from .history_plot import write_history
 from .progress import Picture, Progress, TexelPicture, TexelSurfaces
 from .report import BakeReport, LightmapFile, solver_part
 from .result import BakeDetails, BakedObject, BakeResult, LightGroup, PageDetails
@@ -29,4 +30,5 @@ __all__ = [
     "more_of",
     "solver_part",
     "statistics",
+    "write_history",
 ]

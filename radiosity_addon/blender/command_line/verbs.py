@@ -16,7 +16,7 @@ from ...options import BakeSettings
 from ..files.single_files import check_existing, check_places, make_folder_of, owner_told
 from ..registration import register, unregister
 from ..relight import kept_bakes
-from ..session import runtime
+from ..session import last_bake
 
 if TYPE_CHECKING:
     from ..files.output import OutputFolder
@@ -101,11 +101,11 @@ def bake(
             report.write_copy(report_copy)
         files = written_files(report.as_dict(), preview, keep)
         if plot is not None:
-            from .plot import render_plot
+            from ...bake.result import write_history
 
             console.progress("plot", 1.0)
             make_folder_of(plot)
-            render_plot(report.as_dict(), plot.resolve())
+            write_history(report.as_dict(), plot.resolve())
             files.append((str(plot), "how it was solved"))
         console.lines(summary(str(output), files, report.as_dict()))
 
@@ -204,7 +204,7 @@ def restore(
         if not count:
             raise SceneError(f"'{scene or loaded}' shows no bake; there is nothing to restore")
         for each in bpy.data.scenes:
-            runtime.forget(each)
+            last_bake.forget(each)
             kept_bakes.drop(each)
         make_folder_of(output)
         save_restored(output)

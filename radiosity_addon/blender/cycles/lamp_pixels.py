@@ -1,4 +1,4 @@
-"""Look at what a lamp's own nodes make of its light: Cycles renders the inside of a sphere around it."""
+"""Evaluate a lamp's nodes: Cycles renders the inside of a sphere around it."""
 
 from __future__ import annotations
 
@@ -19,22 +19,10 @@ _REFLECTANCE = 0.5
 def lamp_factor(lamp: bpy.types.Light) -> tuple[np.ndarray, float]:
     """Return what a lamp's nodes multiply its light with, and by how much that varies with direction.
 
-    Parameters
-    ----------
-    lamp : Light
-        With a node tree, not evaluated. What its nodes know of its shape or place is lost.
-
-    Returns
-    -------
-    factor : (3,) float64
-        The mean over directions.
-    variation : float
-        The standard deviation over directions, relative to the mean.
-
-    Raises
-    ------
-    BakeError
-        If Cycles could not render it.
+    lamp: With a node tree, not evaluated. Inputs of its nodes that depend on its shape or position are lost.
+    Returns factor (3,): The mean over directions.
+    Returns variation: The standard deviation over directions, relative to the mean.
+    Raises BakeError if Cycles could not render it.
     """
     with only_for_now():
         scene = panorama_scene(None)

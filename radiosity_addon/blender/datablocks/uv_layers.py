@@ -31,16 +31,10 @@ KEPT_VALUES = "radiosity_kept_uv"
 class LayerRecord:
     """What a bake did to the layers and slots of a mesh.
 
-    Attributes
-    ----------
-    ours : bool
-        The layer `Lightmap` is ours; False where the user's own was kept as it is.
-    kept : str
-        The present name of the user's layer `Lightmap`; "" if there was none.
-    active, rendered : str
-        The layers that had these roles; "" for none.
-    slots : int
-        Material slots that were added.
+    ours: The layer `Lightmap` is ours; False where the user's own was kept as it is.
+    kept: The present name of the user's layer `Lightmap`; "" if there was none.
+    active, rendered: The layers that had these roles; "" for none.
+    slots: Material slots that were added.
     """
 
     ours: bool = True
@@ -51,7 +45,7 @@ class LayerRecord:
 
 
 def layer_record(mesh: bpy.types.Mesh) -> LayerRecord | None:
-    """Return what a mesh says of our layer; None if it has none."""
+    """Return a mesh's record of our UV layer; None if it has none."""
     text = mesh.get(LAYER)
     if text is None:
         return None
@@ -69,10 +63,7 @@ def set_record(mesh: bpy.types.Mesh, record: LayerRecord) -> None:
 def check_room(mesh: bpy.types.Mesh, object_name: str) -> None:
     """Refuse a mesh that cannot take the layer.
 
-    Raises
-    ------
-    SceneError
-        If it has eight other UV layers, or something else of the layer's name.
+    Raises SceneError if it has eight other UV layers, or something else of the layer's name.
     """
     if LIGHTMAP_UV_LAYER in mesh.uv_layers:
         return
@@ -90,21 +81,11 @@ def check_room(mesh: bpy.types.Mesh, object_name: str) -> None:
 def put_layer_on(mesh: bpy.types.Mesh, loops: np.ndarray, uv: np.ndarray, object_name: str) -> None:
     """Put the layer `Lightmap` on, and remember what was there; which layers are active stays.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        `check_room` has passed it.
-    loops : (n, 3) int32
-        The mesh corner of each triangle corner.
-    uv : (n, 3, 2) float32
-        Its coordinates; corners of no triangle get (0, 0).
-    object_name : str
-        For the error.
-
-    Raises
-    ------
-    BakeError
-        If the mesh has fewer corners than `loops` names.
+    mesh: `check_room` has passed it.
+    loops (n, 3) int32: The mesh corner of each triangle corner.
+    uv (n, 3, 2) float32: Its coordinates; corners of no triangle get (0, 0).
+    object_name: For the error.
+    Raises BakeError if the mesh has fewer corners than `loops` names.
     """
     if loops.size and int(loops.max()) >= len(mesh.loops):
         raise BakeError(f"object '{object_name}' changed while it was being baked: bake again")

@@ -52,11 +52,7 @@ def _all_mixers() -> list[bpy.types.NodeTree]:
 def new_mixer(names: Sequence[str], scales: Sequence[float]) -> bpy.types.NodeTree:
     """Make the mixer of some groups; one that was set aside lends the sliders they have in common.
 
-    Parameters
-    ----------
-    names : sequence of str
-    scales : sequence of float
-        What the groups' texels must be multiplied by to get the quantity.
+    scales: What the groups' texels must be multiplied by to get the quantity.
     """
     earlier = next((tree for tree in _all_mixers() if not is_made(tree)), None)
     # A copy has its values, its keyframes and its drivers.
@@ -154,7 +150,7 @@ def _set_tree(node: bpy.types.Node, sliders: bpy.types.NodeTree) -> None:
 
 
 def _sliders_tree() -> bpy.types.NodeTree:
-    """Return the node group of one light group, made anew where the file has none of ours."""
+    """Return the node group of one light group, created if the file has none of ours."""
     for tree in bpy.data.node_groups:
         mine = is_made(tree) and tree.library is None and tree.get(KIND) is None
         # The mixer's name begins with the same words.

@@ -21,7 +21,7 @@ SHADER = "Shader"
 
 
 def lightmap_group() -> bpy.types.NodeTree:
-    """Return the node group, made anew where this file has none of ours yet.
+    """Return the node group, created if this file has none of ours.
 
     radiance = Scale · Lightmap · (Base Color, or white if Lightmap Only)
                + Emission · Emission Factor · (1 − Lightmap Only)

@@ -30,7 +30,7 @@ from ..material_copies.light_shares import crowded_materials
 from ..relight import kept_bakes, lightmap_versions
 from ..scene_export.export import export_steps, exporting
 from ..scene_records.export_sources import Export
-from ..session import kept_details, runtime
+from ..session import kept_details, last_bake
 from ..session.background import in_thread
 from .live_picture import Seen, seen_triangles
 from .preview import SAMPLES, render_preview
@@ -204,7 +204,7 @@ def run_bake(
                 output.publish()
             remember(context.scene, export, result, wanted)
         folder = "" if output is None else relative_path(output.path)
-        runtime.remember(context.scene, report.as_dict(), folder)
+        last_bake.remember(context.scene, report.as_dict(), folder)
         _remember_kept(context.scene, keeping, kept)
         lightmap_versions.check()
         kept_details.keep(context.scene, result, [image.name for image in images])
@@ -265,7 +265,7 @@ def deliver(
     try:
         # The copy tells of its bake too; what is left to do is not in its times.
         so_far = _report(result, images, groups, settings, seconds)
-        runtime.remember(context.scene, so_far.as_dict(), "//")
+        last_bake.remember(context.scene, so_far.as_dict(), "//")
         _remember_kept(context.scene, keeping, None)
         yield Progress("save", SAVE)
         with timed(seconds, "save"):
@@ -280,7 +280,7 @@ def deliver(
         output.publish()
     except BaseException:
         restore(context)
-        runtime.forget(context.scene)
+        last_bake.forget(context.scene)
         kept_bakes.drop(context.scene)
         raise
     return report

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import bpy
-from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..images.light_mixer import WHITE, mixers, sliders_of
 from ..scene_records.light_membership import NAME, Membership, name_on
-from ..session import runtime
+from ..session.state import session
 from ..settings.light_group_properties import LONGEST_NAME, outdate
 
 
 def _on_selection(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """Poll of what needs selected objects, and no bake that is running."""
-    if runtime.running.active:
+    if session.running.active:
         cls.poll_message_set("A bake is running; press Esc to cancel it")
         return False
     if not context.view_layer.objects.selected:
@@ -57,8 +56,7 @@ class RADIOSITY_OT_light_group_assign(bpy.types.Operator):
         if changed is None:
             self.report({"ERROR"}, "Linked objects cannot be changed: make them local or library overrides")
             return {"CANCELLED"}
-        message = rpt_("{} objects are in light group '{}'")
-        self.report({"INFO"}, message.format(changed, name))
+        self.report({"INFO"}, f"{changed} objects are in light group '{name}'")
         return {"FINISHED"}
 
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..jobs.window_job import WindowJob
 from ..relight import kept_bakes
 from ..relight.kept_sidecars import can_relight
-from ..session import live_state, runtime
+from ..session.state import session
 
 
 class RADIOSITY_OT_relight(WindowJob, bpy.types.Operator):
@@ -23,7 +22,7 @@ class RADIOSITY_OT_relight(WindowJob, bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Offer it where a bake was kept."""
-        if runtime.running.active:
+        if session.running.active:
             cls.poll_message_set("A bake is running; press Esc to cancel it")
             return False
         if context.scene is None or not kept_bakes.mark_of(context.scene):
@@ -37,11 +36,11 @@ class RADIOSITY_OT_relight(WindowJob, bpy.types.Operator):
     def _start(self, context: bpy.types.Context, in_window: bool) -> Any:
         from ..relight.relight_scene import run_relight
 
-        live_state.stop()
+        session.stop_live()
         return run_relight(context, in_background=in_window)
 
     def _succeeded(self, _context: bpy.types.Context, _in_window: bool) -> None:
-        self.report({"INFO"}, rpt_("Relit in {:.2f} s").format(self._report.seconds))
+        self.report({"INFO"}, f"Relit in {self._report.seconds:.2f} s")
 
 
 CLASSES = (RADIOSITY_OT_relight,)

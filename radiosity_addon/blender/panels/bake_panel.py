@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
 
 from ...options import ADVANCED, MAIN, SOLVER
 from ..jobs.progress_text import progress_text
-from ..session import runtime
+from ..session import last_bake
+from ..session.state import session
 from ..settings.option_properties import AUTOMATIC
 from ..settings.preferences import folder_of, output_folder
 from ..settings.preset_menu import RADIOSITY_PT_presets
@@ -47,11 +47,11 @@ class RADIOSITY_PT_progress(_Panel, bpy.types.Panel):
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
         """Show it while a bake runs."""
-        return runtime.running.active
+        return session.running.active
 
     def draw(self, _context: bpy.types.Context) -> None:
         """Draw the progress bar."""
-        running = runtime.running
+        running = session.running
         self.layout.progress(factor=running.fraction, text=progress_text(running), type="BAR")
         self.layout.label(text="Esc cancels", icon="CANCEL")
 
@@ -64,7 +64,7 @@ class RADIOSITY_PT_main(_Panel, bpy.types.Panel):
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
         """Show it unless a bake runs."""
-        return not runtime.running.active
+        return not session.running.active
 
     def draw_header_preset(self, _context: bpy.types.Context) -> None:
         """Draw the button of the presets."""
@@ -83,14 +83,14 @@ def _draw_buttons(layout: Any, context: bpy.types.Context) -> None:
     column.scale_y = 1.5
     column.operator("radiosity.bake", text="Bake Radiosity", icon="LIGHT_AREA")
     layout.operator("radiosity.restore", icon="LOOP_BACK")
-    if runtime.interrupted:
+    if session.interrupted:
         box = layout.box()
-        draw_text(box, iface_("A bake was interrupted while it replaced its files"), "ERROR", context)
+        draw_text(box, "A bake was interrupted while it replaced its files", "ERROR", context)
         box.operator("radiosity.recover", icon="RECOVER_LAST")
     draw_relight_buttons(layout, context)
     hint = unseen_hint(context)
     if hint is not None:
-        draw_text(layout.box(), iface_(hint), "INFO", context)
+        draw_text(layout.box(), hint, "INFO", context)
 
 
 def _draw_settings(layout: Any, context: bpy.types.Context) -> None:
@@ -107,7 +107,7 @@ def _draw_settings(layout: Any, context: bpy.types.Context) -> None:
     if not settings.is_property_set("output_folder"):
         draw_preferred(column, folder_of(context), settings.output_folder)
     if output_folder(context) is None:
-        text = iface_("The file is not saved: lightmaps will be packed into it")
+        text = "The file is not saved: lightmaps will be packed into it"
         draw_text(layout.box(), text, "INFO", context)
     if not any(obj.type == "MESH" for obj in context.scene.objects):
         layout.operator("radiosity.add_cornell_box", icon="CUBE")
@@ -119,7 +119,7 @@ SOLID = "Solid and wireframe views show no lightmaps: switch to Material Preview
 
 def unseen_hint(context: bpy.types.Context) -> str | None:
     """Say why the lightmaps of a baked scene are not seen; None where they are, or there are none."""
-    if runtime.last_bake(context.scene) is None:
+    if last_bake.read(context.scene) is None:
         return None
     shading = getattr(getattr(context.space_data, "shading", None), "type", "MATERIAL")
     if context.scene.render.engine == "BLENDER_WORKBENCH" and shading != "MATERIAL":
@@ -188,12 +188,12 @@ class LastBakeSection(Section):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Show it once there was a bake."""
-        return runtime.last_bake(context.scene) is not None
+        return last_bake.read(context.scene) is not None
 
     @classmethod
     def draw(cls, layout: Any, context: bpy.types.Context) -> None:
         """Draw the figures."""
-        last = runtime.last_bake(context.scene) or runtime.LastBake()
+        last = last_bake.read(context.scene) or last_bake.LastBake()
         column = layout.column(align=True)
         for name, value in last.figures:
             split = column.split(factor=0.45)
@@ -215,18 +215,18 @@ class WarningsSection(Section):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Show it only where there is something to say."""
-        last = runtime.last_bake(context.scene)
+        last = last_bake.read(context.scene)
         return last is not None and bool(last.warnings)
 
     @classmethod
     def draw(cls, layout: Any, context: bpy.types.Context) -> None:
         """Draw the warnings, the first ones of many."""
-        last = runtime.last_bake(context.scene) or runtime.LastBake()
+        last = last_bake.read(context.scene) or last_bake.LastBake()
         for name, message in last.warnings[:SHOWN_WARNINGS]:
             draw_text(layout.box(), f"{name}: {message}", "ERROR", context)
         hidden = last.warning_count - len(last.warnings[:SHOWN_WARNINGS])
         if hidden > 0:
-            text = iface_("and {} more, in the report").format(hidden)
+            text = f"and {hidden} more, in the report"
             layout.label(text=text, translate=False)
 
 

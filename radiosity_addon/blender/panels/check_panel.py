@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
 
 from ...base import RadiosityError
 from ..operators.checks import figures, last_check, look
-from ..session import runtime
+from ..session.state import session
 from .sections import Section
 from .wrapped_text import draw_text
 
@@ -32,7 +31,7 @@ class RADIOSITY_OT_check(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Offer it unless a bake is running."""
-        if runtime.running.active:
+        if session.running.active:
             cls.poll_message_set("A bake is running; press Esc to cancel it")
             return False
         if context.scene is None:
@@ -106,7 +105,7 @@ def draw_inspection(layout: Any, found: Any, context: bpy.types.Context, width: 
         draw_text(layout.box(), finding.message, _ICONS[finding.level], context, width)
     hidden = len(found.findings) - SHOWN_FINDINGS
     if hidden > 0:
-        layout.label(text=iface_("and {} more").format(hidden), translate=False)
+        layout.label(text=f"and {hidden} more", translate=False)
 
 
 CLASSES = (RADIOSITY_OT_check,)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..scene_records.object_roles import BAKE, BAKEABLE_TYPES
-from ..session import runtime
+from ..session.state import session
 
 OVERRIDES = ("radiosity_mode", "radiosity_texel_scale")
 """What an object has of its own."""
@@ -36,7 +36,7 @@ class RADIOSITY_PT_object_properties(bpy.types.Panel):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        layout.active = not runtime.running.active
+        layout.active = not session.running.active
         draw_overrides(layout, context.object)
 
 
@@ -50,7 +50,7 @@ class RADIOSITY_OT_copy_overrides(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Offer it where there is something to copy, and others to copy it to."""
-        if runtime.running.active:
+        if session.running.active:
             cls.poll_message_set("A bake is running; press Esc to cancel it")
             return False
         if not has_role(getattr(context, "object", None)):
@@ -70,8 +70,7 @@ class RADIOSITY_OT_copy_overrides(bpy.types.Operator):
                     setattr(obj, name, getattr(source, name))
                 else:
                     obj.property_unset(name)
-        message = "Copied mode and texel scale to {} objects"
-        self.report({"INFO"}, bpy.app.translations.pgettext_rpt(message).format(len(others)))
+        self.report({"INFO"}, f"Copied mode and texel scale to {len(others)} objects")
         return {"FINISHED"}
 
 

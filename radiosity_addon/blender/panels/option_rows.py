@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
 
 from ...options import OPTIONS, sections_of
 from ..settings.option_properties import shown
@@ -38,4 +37,4 @@ def draw_options(layout: Any, part: str, context: bpy.types.Context, in_header: 
 def draw_preferred(layout: Any, preferred: Any, own: Any) -> None:
     """Say that the preferences' value counts where the scene has none of its own."""
     if preferred != own:
-        layout.label(text=iface_("From the preferences: {}").format(preferred), icon="INFO", translate=False)
+        layout.label(text=f"From the preferences: {preferred}", icon="INFO", translate=False)

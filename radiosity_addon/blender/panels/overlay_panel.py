@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
 
 from ..overlays import overlay_properties as kinds
 from ..overlays.overlay_properties import overlay_of
@@ -53,7 +52,7 @@ class OverlaySection(Section):
             by_hand.prop(settings, "high")
         kept = details_of(context.scene)
         if settings.show in kinds.OF_THE_BAKE and kept is not None:
-            text = iface_("{} MiB in memory").format(f"{kept.details.nbytes / 2**20:.1f}")
+            text = f"{kept.details.nbytes / 2**20:.1f} MiB in memory"
             layout.label(text=text, icon="MEMORY", translate=False)
         if settings.show == kinds.FALSE_COLOR:
             _draw_statistics(layout, context)

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
 
 from ..relight import kept_bakes, lightmap_versions
-from ..session import live_state
+from ..session.state import session
 from .sections import Section, draw_sections
 from .wrapped_text import draw_text
 
@@ -26,8 +25,8 @@ class RelightSection(Section):
     def draw(cls, layout: Any, context: bpy.types.Context) -> None:
         """Draw what Live has to say, and what is kept of the next bake."""
         chosen = context.scene.radiosity_relight
-        if live_state.state.message:
-            draw_text(layout.box(), live_state.state.message, "ERROR", context)
+        if session.live_message:
+            draw_text(layout.box(), session.live_message, "ERROR", context)
         if lightmap_versions.state.message:
             draw_text(layout.box(), lightmap_versions.state.message, "ERROR", context)
         layout.use_property_split = True
@@ -66,7 +65,7 @@ class RelightLightsSection(Section):
             row.label(text=name, icon=inputs.icon if inputs else "ERROR", translate=False)
             _draw_inputs(row, inputs)
         if len(named) > SHOWN_LIGHTS:
-            layout.label(text=iface_("and {} more").format(len(named) - SHOWN_LIGHTS))
+            layout.label(text=f"and {len(named) - SHOWN_LIGHTS} more")
 
 
 def _draw_inputs(row: Any, inputs: Any) -> None:

@@ -22,8 +22,9 @@ from ...base import BakeError, RadiosityError
 from ...lightmap.images import LightmapPage
 from ...numerics import Array
 from ..images.group_images import update_images
-from ..session import live_state
 from ..session.background import in_thread
+from ..session.redraw import redraw_viewports
+from ..session.state import session
 from . import kept_bakes, lightmap_versions
 from .live_scene import LiveScene
 from .live_strengths import StrengthReader
@@ -77,7 +78,7 @@ class LiveRelight:
 
     def settle(self) -> None:
         """Do at one go what the timer would do: for scripts, where no timer fires."""
-        while live_state.state.live is self and self.step(in_background=False):
+        while session.live is self and self.step(in_background=False):
             pass
 
     def look_again(self) -> None:
@@ -111,7 +112,7 @@ class LiveRelight:
                 self._carry_on(in_background)
             return True
         except RadiosityError as error:
-            live_state.stop(f"Live is off: {' '.join(str(error).split())}")
+            session.stop_live(f"Live is off: {' '.join(str(error).split())}")
             return False
 
     def _begin(self) -> None:
@@ -166,7 +167,7 @@ class LiveRelight:
             show_emission({held.bake.names[row] for row in np.flatnonzero(changed) if row >= lights})
         self._shown = self._strengths
         self.changes += 1
-        _redraw()
+        redraw_viewports()
 
     def _choose_work(self, in_background: bool) -> bool:
         """Begin what is most wanted; False if all is done, or it is too early."""
@@ -224,7 +225,7 @@ class LiveRelight:
         rewrite(kept_bakes.mark_of(scene), pages, groups, 0.0)
         note_shown(scene, held, strengths)
         self._shown, self._exact = strengths, True
-        _redraw()
+        redraw_viewports()
 
     def _end_work(self) -> None:
         work, self._work, self._doing = self._work, None, None
@@ -253,17 +254,8 @@ def _wake() -> None:
 def _tick() -> float | None:
     """Carry on, as long as there is something to do; nothing may be raised."""
     try:
-        live = live_state.state.live
+        live = session.live
         return TICK if live is not None and live.step(in_background=True) else None
     except Exception as error:  # noqa: BLE001 (as above)
-        live_state.stop(f"Live is off: {type(error).__name__}: {error}")
+        session.stop_live(f"Live is off: {type(error).__name__}: {error}")
         return None
-
-
-def _redraw() -> None:
-    """Have every 3D viewport drawn again."""
-    manager = bpy.context.window_manager
-    for window in manager.windows if manager is not None else ():
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()

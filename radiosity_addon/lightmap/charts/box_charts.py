@@ -18,17 +18,10 @@ Int = NDArray[np.int64]
 def box_charts(vertices: Float, faces: Int) -> tuple[Float, Int]:
     """Cut a mesh into charts by the axis that each face looks along most.
 
-    Parameters
-    ----------
-    vertices : (v, 3) float64
-    faces : (n, 3) int64
-
-    Returns
-    -------
-    uv : (n, 3, 2) float64
-        The faces' shadows on the plane across their axis, counter-clockwise from the front.
-    chart : (n,) int64
-        Faces of one axis that share vertices share a chart.
+    vertices (v, 3).
+    faces (n, 3) int64.
+    Returns uv (n, 3, 2): The faces' shadows on the plane across their axis, counter-clockwise from the front.
+    Returns chart (n,) int64: Faces of one axis that share vertices share a chart.
     """
     corners = vertices[faces]
     normal = double_area_vectors(corners)

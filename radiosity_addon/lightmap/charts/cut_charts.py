@@ -36,13 +36,8 @@ _COPLANAR = 1e-5
 class Charts:
     """One object's charts.
 
-    Parameters
-    ----------
-    uv : (n, 3, 2) float64
-        1 unit is 1 m; every chart has its own origin.
-    chart : (n,) int64
-        0 … count − 1, or −1 for triangles of polygons without area.
-    count : int
+    uv (n, 3, 2): 1 unit is 1 m; every chart has its own origin.
+    chart (n,) int64: 0 … count − 1, or −1 for triangles of polygons without area.
     """
 
     uv: Float
@@ -53,19 +48,10 @@ class Charts:
 def unwrap(triangles: Float, polygon: Int, grow: GrowCharts | None) -> Iterator[Charts]:
     """Cut an object into charts, piece by piece.
 
-    Parameters
-    ----------
-    triangles : (n, 3, 3) float64
-        Corners in world space [m].
-    polygon : (n,) int
-        The polygon of each triangle.
-    grow : callable or None
-        The chart grower; None gives every polygon a chart of its own.
-
-    Yields
-    ------
-    Charts
-        Of all the triangles, with those pieces done so far; the last one is the result.
+    triangles (n, 3, 3): Corners in world space [m].
+    polygon (n,) int: The polygon of each triangle.
+    grow: The chart grower; None gives every polygon a chart of its own.
+    Yields of all the triangles, with those pieces done so far; the last one is the result.
     """
     polygon = numbered(polygon)
     uv = np.zeros((len(triangles), 3, 2))
@@ -183,7 +169,7 @@ def _torn_polygons(
     """Return which polygons need a chart of their own.
 
     Those cut by the grower, left out by it, turned over against the rest of their chart, or
-    with a triangle without area beside one that has some (the grower never saw it).
+    with a triangle without area next to one that has some (the grower never saw it).
     """
     count = int(polygon.max()) + 1
     torn = np.zeros(count, dtype=np.bool_)

@@ -24,14 +24,9 @@ MOST = max(8, min(256, 1024 // (os.cpu_count() or 1)))
 class Resting:
     """Keeps objects alive until they have rested; older ones go whenever a new one comes.
 
-    Parameters
-    ----------
-    rest : float
-        Seconds that each is kept at least.
-    most : int
-        With more than this, `keep` waits for the oldest.
-    clock, sleep : callables
-        The time [s], and waiting for so many seconds.
+    rest: Seconds that each is kept at least.
+    most: With more than this, `keep` waits for the oldest.
+    clock, sleep: Return the time [s]; wait for a number of seconds.
     """
 
     def __init__(

@@ -21,18 +21,10 @@ _resting = Resting()
 def grow_charts(vertices: Float, faces: Int) -> tuple[Float, Int]:
     """Cut a mesh into charts with xatlas.
 
-    Parameters
-    ----------
-    vertices : (v, 3) float64
-        At a scale where triangles are about 1 in area, welded.
-    faces : (n, 3) int64
-
-    Returns
-    -------
-    uv : (n, 3, 2) float64
-        Stretched along u and v, each chart otherwise; charts may lie over each other.
-    chart : (n,) int64
-        −1 for faces that xatlas left out.
+    vertices (v, 3): At a scale where triangles are about 1 in area, welded.
+    faces (n, 3) int64.
+    Returns uv (n, 3, 2): Stretched along u and v, each chart otherwise; charts may lie over each other.
+    Returns chart (n,) int64: −1 for faces that xatlas left out.
     """
     if beside_a_window(faces):
         grown = run_apart(vertices, faces)
@@ -46,10 +38,7 @@ def grow_charts(vertices: Float, faces: Int) -> tuple[Float, Int]:
 class PatientGrower:
     """Grows charts with xatlas until an object has taken too long, and then by directions.
 
-    Attributes
-    ----------
-    gave_up : bool
-        Whether it came to that.
+    gave_up: Whether it came to that.
     """
 
     def __init__(self, seconds: float) -> None:

@@ -14,10 +14,7 @@ from ..texels import TOUCHED
 class LightStatistics:
     """Of one surface.
 
-    Attributes
-    ----------
-    minimum, mean, maximum : float
-        In the unit of what was given; the mean is by area.
+    minimum, mean, maximum: In the unit of what was given; the mean is by area.
     """
 
     minimum: float
@@ -53,9 +50,9 @@ def light_statistics(values: Array, areas: Array) -> LightStatistics | None:
 
 
 def told_texels(state: Array) -> Array:
-    """Tell which of (n,) texels are of the surface as one sees it: none that are divided, hidden or shut in.
+    """Return which of (n,) texels show the visible surface: those that are not divided, hidden or enclosed.
 
-    Those show the mean of two lights, or a dark that nobody looks at. All of them, if there are no others.
+    The others show a mean over two sides, or light that nobody sees. All texels, if there are no others.
     """
     whole = (state == 0) | (state == TOUCHED)
     return whole if whole.any() else np.ones(len(state), dtype=bool)

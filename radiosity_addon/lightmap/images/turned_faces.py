@@ -30,13 +30,9 @@ def turned_away(
 ) -> Iterator[BakeWarning]:
     """Yield a warning for each object of which much is lit from behind.
 
-    Parameters
-    ----------
-    objects : iterable of BakeObject
-        Those that get lightmaps.
-    areas : (t,) float [m²]
-    fronts, backs : (t, 3) float [W/m²]
-        Mean irradiance on both sides of every triangle.
+    objects: Those that get lightmaps.
+    areas (t,) [m²].
+    fronts, backs (t, 3) [W/m²]: Mean irradiance on both sides of every triangle.
     """
     front, back = fronts.max(axis=1), backs.max(axis=1)
     lit = np.maximum(front, back)

@@ -1,8 +1,8 @@
-"""Sixteenths of texels that geometry divides: what answers rays that hit such a texel.
+"""Cells: sixteenths of divided texels, which answer rays that hit such a texel.
 
 A texel that a wall stands on, or that a window's frame covers in part, shows the mean of what it
 holds, as it should. Light that comes back from it must not be the mean: a ray from inside a closed
-box would then bring the lit floor outside. Nor can a whole neighbour answer, for the strip beside a
+box would then bring the lit floor outside. Nor can a whole neighbor answer, for the strip beside a
 frame is darker than what lies a texel farther in the open. So a divided texel answers in cells,
 each as those of its points that see the cell's *anchor* in a straight line just above the surface;
 a hit asks the nearest cell whose anchor it sees (`solver/gather/sub_cells.py` does the same for elements).
@@ -45,12 +45,7 @@ _FIRST = np.stack(np.divmod(np.arange(CELLS), ALONG)[::-1], axis=1) / ALONG
 class TexelCells:
     """The cells of some texels, numbered texel by texel.
 
-    Parameters
-    ----------
-    local : LocalPass
-    geometry : TexelGeometry
-    crossings : Crossings
-        Those have cells that are crossed or touched.
+    crossings: Those have cells that are crossed or touched.
     """
 
     def __init__(self, local: LocalPass, geometry: TexelGeometry, crossings: Crossings) -> None:
@@ -144,14 +139,14 @@ class TexelCells:
         return gathered.sources
 
     def lit(self, cell: Array) -> Footprints:
-        """Return cells as footprints that ask for lamps: their anchors alone."""
+        """Return cells as footprints for the light of lamps: their anchors alone."""
         texel, geometry = self.texel_of(cell), self._geometry
         expected = self.local.irradiance_at(geometry.triangle[texel], geometry.barycentric[texel])
         anchor = self._anchors[cell // CELLS, cell % CELLS] - self._lift(texel)
         return Footprints(anchor, geometry.normal[texel], self._keys(cell), expected=expected)
 
     def _keys(self, cell: Array) -> Array:
-        """Return (p,) int64 what cells' rays are drawn by: the same whichever other texels are divided."""
+        """Return (p,) int64 sampling keys of cells, which do not depend on other divided texels."""
         texel = self.texel_of(cell).astype(np.int64)
         return np.asarray(len(self._geometry) + CELLS * texel + cell % CELLS)
 

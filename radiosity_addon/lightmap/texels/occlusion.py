@@ -3,7 +3,7 @@
 Such a texel shows the mean of both sides, as it should, but answers no ray with it: see
 `cells.py`.
 
-What hovers closely over a surface (a window's frame a millimetre off the wall, a door in its
+What hovers closely over a surface (a window's frame a millimeter off the wall, a door in its
 frame) parts light from dark likewise, though nothing stands on the texel, and the gap lets lines
 of sight along the surface through. Short probes along the normal tell which texels are *hooded*,
 and which only partly.
@@ -46,13 +46,10 @@ _SPOTS = np.array([[u, v] for u in (0.02, 0.5, 0.98) for v in (0.02, 0.5, 0.98)]
 class Crossings:
     """What geometry does to n texels, (n,) bool each.
 
-    Attributes
-    ----------
-    geometry : TexelGeometry
-    cut : geometry stands on them
-    touched : they end at geometry; neither cut nor at a rim
-    rim : a hood's rim is above them
-    occluded : all of them is below a hood; neither cut nor at a rim
+    cut geometry stands on them.
+    touched they end at geometry; neither cut nor at a rim.
+    rim a hood's rim is above them.
+    occluded all of them is below a hood; neither cut nor at a rim.
     """
 
     geometry: TexelGeometry
@@ -77,7 +74,7 @@ class Crossings:
 
     @cached_property
     def alone(self) -> Array:
-        """Texels whose light is like no neighbour's, though a line of sight may join them."""
+        """Texels whose light differs from their neighbors' even where they see each other."""
         return self.crossed | self.occluded
 
     @cached_property

@@ -24,10 +24,7 @@ __all__ = ["FOOTPRINT", "WHOLE", "texel_materials"]
 def texel_materials(scene: Scene, geometry: TexelGeometry, width: float = WHOLE) -> tuple[Array, Array]:
     """Average reflectance and emission over the middle `width` of every texel.
 
-    Returns
-    -------
-    reflectance, emission : (n, 3) float64
-        Of the surface where it is there; emission in W/m².
+    Returns reflectance, emission (n, 3): Of the existing part of the surface; emission in W/m².
     """
     reflectance, emission = (geometry.scratch.empty((len(geometry), 3)) for _ in range(2))
     for tile in tiles(len(geometry)):

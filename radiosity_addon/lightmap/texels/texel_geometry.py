@@ -19,7 +19,7 @@ EDGE_OFFSETS = 4.0
 """Points keep this many ray offsets from the edges of their triangles."""
 
 SINK = 2.0
-"""Points that lie against another surface are so many ray offsets behind their own."""
+"""Points that touch another surface lie this many ray offsets behind their own."""
 
 CHUNK = 1 << 16
 """Texels placed at once; bounds the temporaries to about 40 MB."""
@@ -30,40 +30,23 @@ _SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 class TexelGeometry:
     """The n covered texels of all pages, numbered page by page.
 
-    Parameters
-    ----------
-    scene : Scene
-    uv : (t, 3, 2) float32
-        Lightmap coordinates of every scene triangle; rows without a lightmap are ignored.
-    page_of_triangle : (t,) int32
-        −1 where a triangle has no lightmap.
-    texels : sequence of Texels
-        One per page.
-    rows : sequence of (p,) int
-        Per page, the scene triangle of each of the page's triangles.
-    scratch : Scratch or None
-        Makes the texels' arrays; None keeps them in memory.
-
-    Attributes
-    ----------
-    scratch : Scratch
-        Makes arrays of what else there is of each texel.
-    uv, page_of_triangle, triangles, face_normals, normals
-        Of every scene triangle, as given.
-    page : (n,) int16, or int32 where there are more pages
-    page_start : (pages + 1,) int64
-        The first texel of each page, and n.
-    row, column, triangle : (n,) int32
-    share : (n,) float32
-        What part of the texel its triangle covers.
-    centre_inside : (n,) bool
-        Whether the texel's centre is on its triangle.
-    whole : (n,) bool
-        Whether all of the texel is.
-    barycentric : (n, 2) float32
-        Weights of the triangle's second and third corner at the centre of the footprint.
-    position, normal, surface_normal : (n, 3) float64
-        Centre of the footprint; interpolated shading normal; the triangle's own normal.
+    uv (t, 3, 2) float32: Lightmap coordinates of every scene triangle; rows without a lightmap are ignored.
+    page_of_triangle (t,) int32: −1 where a triangle has no lightmap.
+    texels: One per page.
+    rows sequence of (p,) int: Per page, the scene triangle of each of the page's triangles.
+    scratch: Makes the texels' arrays; None keeps them in memory.
+    scratch: Makes arrays of what else there is of each texel.
+    uv, page_of_triangle, triangles, face_normals, normals: Of every scene triangle, as given.
+    page (n,) int16, or int32 where there are more pages.
+    page_start (pages + 1,) int64: The first texel of each page, and n.
+    row, column, triangle (n,) int32.
+    share (n,) float32: What part of the texel its triangle covers.
+    centre_inside (n,) bool: Whether the texel's center is on its triangle.
+    whole (n,) bool: Whether all of the texel is.
+    barycentric (n, 2) float32: Weights of the triangle's second and third corner at the center of the
+        footprint.
+    position, normal, surface_normal (n, 3): Center of the footprint; interpolated shading normal; the
+        triangle's own normal.
     """
 
     STORED = ("page", "page_start", "triangle", "centre_inside", "index", "uv", "page_of_triangle")
@@ -138,13 +121,13 @@ class TexelGeometry:
         ]
 
     def _put(self, rows: slice, weights: Array) -> None:
-        """Put texels where barycentric weights (r, 3) of their triangles say."""
+        """Move texels to barycentric weights (r, 3) of their triangles."""
         triangle, upright = self.triangle[rows], self.surface_normal[rows]
         self.barycentric[rows] = weights[:, 1:]
         self.position[rows] = self._sunk(rows, _at(self.triangles[triangle], weights[:, None]))[:, 0]
         shading = np.einsum("nc,nck->nk", weights, self.normals[triangle])
         length = np.linalg.norm(shading, axis=1, keepdims=True)
-        # A shading normal that vanished or turned behind the surface says nothing.
+        # A shading normal that vanished or points behind the surface is not usable.
         sane = (length[:, 0] > 1e-6) & (np.einsum("nk,nk->n", shading, upright) > 0)
         self.normal[rows] = np.where(sane[:, None], shading / np.maximum(length, 1e-6), upright)
 
@@ -259,7 +242,7 @@ class TexelGeometry:
         return weights
 
     def _drawn_in(self, weights: Array, triangle: Array) -> Array:
-        """Move (n, k, 3) barycentric points that lie on an edge of their triangle off it by a hair."""
+        """Move (n, k, 3) barycentric points that lie on an edge of their triangle slightly off it."""
         inside = np.maximum(weights, self._inset[triangle][:, None])
         moved = (inside != weights).any(axis=2, keepdims=True)
         return np.asarray(np.where(moved, inside / inside.sum(axis=2, keepdims=True), weights))
