@@ -17,7 +17,9 @@ def hierarchy_of(count: int = 9) -> Hierarchy:
     return Hierarchy(Scene(rng.normal(size=(count, 3, 3)), grey(count, 0.5), grey(count, 0.0)))
 
 
-def links_between(receiver: np.ndarray, source: np.ndarray, doubt: np.ndarray | float = 0.1) -> Links:
+def links_between(
+    receiver: np.ndarray, source: np.ndarray, error_estimate: np.ndarray | float = 0.1
+) -> Links:
     count = len(receiver)
     ones = np.ones((count, 4), dtype=np.float32)
     flat = np.full(count, 0.2, dtype=np.float32)
@@ -26,7 +28,7 @@ def links_between(receiver: np.ndarray, source: np.ndarray, doubt: np.ndarray | 
         np.asarray(source, dtype=np.int32),
         flat,
         flat,
-        np.broadcast_to(np.float32(doubt), (count,)).copy(),
+        np.broadcast_to(np.float32(error_estimate), (count,)).copy(),
         ones,
         ones,
     )

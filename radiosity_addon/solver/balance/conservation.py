@@ -46,7 +46,7 @@ AMONG_THEMSELVES = 0.65
 KNOWN = 5e-3
 """Standard error of what arrives from a face, if its sum is to count as known."""
 
-DOUBT = 3.0
+STANDARD_ERRORS = 3.0
 """Standard errors that a leaf's own links may send more than its rays say arrives."""
 
 SURE = 0.01
@@ -165,7 +165,7 @@ class Conservation:
         limit = np.where(arriving == 1.0, LIMIT_CLOSED, LIMIT)
         result[leaves] = _over_shared(arriving, own[leaves], shared[leaves], limit)
         # Own links are better than few rays: scaled down for rays' noise, and not up, they would lose power.
-        most = np.minimum(arriving + DOUBT * self.arrivals.error(leaves), 1.0)
+        most = np.minimum(arriving + STANDARD_ERRORS * self.arrivals.error(leaves), 1.0)
         result[leaves, 0] = np.minimum(1.0, most / np.maximum(own[leaves], 1e-300))
         return result
 

@@ -38,7 +38,7 @@ class ClusterLinks:
         Node: a cluster, or n_clusters + element.
     factor : (l,) float32
         Unoccluded form factor, the area mean over the cluster's faces.
-    visibility, doubt : (l,) float32
+    visibility, error_estimate : (l,) float32
         As for `Links`.
     vector : (l, 3) float32
         v, visibility included: h and the cluster's mean normal times v make factor · visibility.
@@ -55,7 +55,7 @@ class ClusterLinks:
     source: Array
     factor: Array
     visibility: Array
-    doubt: Array
+    error_estimate: Array
     vector: Array
     gradient: Array
     even: Array

@@ -126,12 +126,12 @@ def link_lights(
             # Where few samples may miss the light altogether, they are not asked.
             blind = may_split & ((area > coarse_area) | too_near(light, hierarchy, waiting))
             blind = _affordable(hierarchy, waiting, blind, area, most_elements)
-            gain, doubt = np.zeros((len(waiting), 4)), np.zeros(len(waiting))
+            gain, error = np.zeros((len(waiting), 4)), np.zeros(len(waiting))
             seeing = np.flatnonzero(~blind)
-            gain[seeing], doubt[seeing] = measure_light(
+            gain[seeing], error[seeing] = measure_light(
                 hierarchy, light, caster, waiting[seeing], seed + LIGHT_STEP * number, threads
             )
-            misplaced = np.where(blind, np.inf, doubt * area * strength)
+            misplaced = np.where(blind, np.inf, error * area * strength)
             split = may_split & (misplaced > misplaced_power)
             split = _affordable(hierarchy, waiting, split, misplaced, most_elements)
             kept = ~split & (gain.max(axis=1) > 0)
@@ -190,15 +190,15 @@ def measure_light(
     seed: int,
     threads: int = 0,
 ) -> tuple[Array, Array]:
-    """Measure one light's irradiance on the quarters of elements, per unit of strength, and its doubt.
+    """Measure one light's irradiance on the quarters of elements, per unit of strength, and its error.
 
     Returns
     -------
     gain : (n, 4) float64
         On each quarter.
-    doubt : (n,) float64
+    error_estimate : (n,) float64
     """
-    gain, doubt = np.empty((len(elements), 4)), np.empty(len(elements))
+    gain, error = np.empty((len(elements), 4)), np.empty(len(elements))
     area = hierarchy.area[elements]
     share = area / float(hierarchy.faces.area.sum())
     tiny, small = share < TINY, share < SMALL
@@ -215,12 +215,12 @@ def measure_light(
             rows = rows_of[piece]
             asked = _pieces(hierarchy, elements[rows], pieces)
             if isinstance(light, EnvironmentLight):
-                gain[rows], doubt[rows] = _measure_sky(asked, light, caster, seed, divisor)
+                gain[rows], error[rows] = _measure_sky(asked, light, caster, seed, divisor)
             else:
-                gain[rows], doubt[rows] = _measure_lamp(asked, light, caster, seed, divisor)
+                gain[rows], error[rows] = _measure_lamp(asked, light, caster, seed, divisor)
 
         for_chunks(measure, len(rows_of), CHUNK, threads)
-    return gain, doubt
+    return gain, error
 
 
 @dataclass(frozen=True)

@@ -73,7 +73,7 @@ def trace_pairs(caster: RayCaster, samples: PairSamples, empty_too: bool = False
     Parameters
     ----------
     empty_too : bool
-        All sixteen also where the four carry nothing. Not for links: their doubt is about such
+        All sixteen also where the four carry nothing. Not for links: their error estimate is about such
         pairs, and has them refined.
 
     Returns

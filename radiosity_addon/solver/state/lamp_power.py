@@ -20,7 +20,7 @@ RAYS = 1 << 17
 LEAST_RAYS, MOST_RAYS = 1 << 8, 1 << 14
 """… and of each at least and at most."""
 
-DOUBT = 3.0
+STANDARD_ERRORS = 3.0
 """Standard errors by which more may arrive than these rays say, …"""
 
 SOFT = 0.02
@@ -99,7 +99,7 @@ def lamps_within_power(
         said = arriving[number] * float(light.strength.mean())
         own_seed = seed + LAMP_STEP * number
         black, escaped, error = lost_by_lamp(light, scene, hierarchy, caster, own_seed, rays)
-        most = (1.0 + SOFT) * (1.0 - black - escaped) + DOUBT * (error + 1.0 / rays)
+        most = (1.0 + SOFT) * (1.0 - black - escaped) + STANDARD_ERRORS * (error + 1.0 / rays)
         if said > most * power:
             scale[number] = (1.0 - black - escaped) * power / said
     if (scale == 1.0).all():
