@@ -1,4 +1,4 @@
-"""The command line's words as a request: one parser for `python -m`, Blender's `--command` and build.py.
+"""The command line's parser, shared by `python -m`, Blender's `--command` and build.py.
 
 Parsing needs neither Blender nor NumPy.
 """
@@ -20,7 +20,7 @@ BUNDLED_OUTPUT = Path("out/cornell")
 
 
 def build_parser(prog: str) -> argparse.ArgumentParser:
-    """Return the parser of both verbs; it raises `UsageError` where argparse would exit."""
+    """Return the parser of both commands; it raises `UsageError` where argparse would exit."""
     parser = _Parser(prog=prog, description="Bake radiosity lightmaps.", allow_abbrev=False)
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="{bake,restore}")
     _add_bake(verbs.add_parser("bake", help="bake lightmaps", allow_abbrev=False))
@@ -113,7 +113,7 @@ def _add_restore(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_options(group: Any, options: Iterable[Option]) -> None:
-    """Add options to a parser or a group of it; of one and what replaces it only one may be given."""
+    """Add options to a parser or a group of it; of an option and its replacement only one may be given."""
     options = list(options)
     replaced = {option.instead_of for option in options}
     exclusive: dict[str, Any] = {}
@@ -144,7 +144,7 @@ def _reading(option: Option) -> dict[str, Any]:
 
 
 def _help(option: Option) -> str:
-    """Return the description as the help has it, with the default, and the methods that have the option."""
+    """Return the description for the help, with the default and the methods that have the option."""
     text = option.description
     text = text[0].lower() + text[1:] if text[1].islower() else text
     if option.methods:

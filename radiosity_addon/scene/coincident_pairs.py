@@ -1,4 +1,4 @@
-"""Pairs of triangles that lie in one another: coplanar within a tolerance, with an area in common."""
+"""Pairs of coincident triangles: coplanar within a tolerance, with a common area."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class CoincidentPairs:
         return len(self.first)
 
     def take(self, rows: Array) -> CoincidentPairs:
-        """Return some of the pairs."""
+        """Return selected pairs."""
         return CoincidentPairs(*(getattr(self, name)[rows] for name in _FIELDS))
 
 
@@ -68,7 +68,7 @@ def tolerances(triangles: Array) -> Array:
 
 
 def coincident_pairs(triangles: Array, rows: Array, tolerance: Array, reach: Array) -> CoincidentPairs:
-    """Find the pairs among some triangles.
+    """Find the pairs among triangles.
 
     triangles (t, 3, 3).
     rows (n,) int: Those that take part; they have an area.

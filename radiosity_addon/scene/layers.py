@@ -35,7 +35,7 @@ from .surfaces import Surfaces
 from .uncovered_parts import OwnParts, own_parts
 
 NEAR_EMITTERS = 3.0
-"""What emits is covered by what is this many surface offsets in front of it: shadow rays pass that by."""
+"""Emissive faces are covered by faces up to this many surface offsets in front: shadow rays miss those."""
 
 ONE_PLANE = 0.5
 """Faces closer than this part of their tolerance count as coplanar: their order is lost in rounding."""
@@ -47,7 +47,7 @@ PROBES = 32
 """Rays that decide whether a face belongs to a solid."""
 
 MANY_COPIES = 4
-"""More exact copies of one triangle than these are not compared pair by pair."""
+"""Beyond this number, exact copies of one triangle are not compared pair by pair."""
 
 MOST_COVERS = 16
 """A hit is handed on from cover to cover this often at most."""
@@ -102,13 +102,13 @@ class Layers:
 
     @cached_property
     def own(self) -> OwnParts:
-        """What is left of the covered sides."""
+        """The uncovered parts of covered sides."""
         return own_parts(
             self.covers.side, self.covers.part, self.covers.by, self.covers.in_cover, self._scene
         )
 
     def owners(self, hits: Hits) -> Hits:
-        """Return hits with those on covered sides moved to what covers them."""
+        """Return hits, with those on covered sides moved to their covers."""
         side = 2 * hits.triangle + ~hits.front
         moved = np.flatnonzero((hits.triangle != NO_HIT) & self._is_covered[side])
         if len(moved) == 0:
@@ -123,7 +123,7 @@ class Layers:
                 row, cover = row[solid], cover[solid]
             if len(row) == 0:
                 break
-            # Any cover will do: it hands on to its own.
+            # Any cover will do: it passes the hit on to its own.
             row, only = np.unique(row, return_index=True)
             cover, waiting = cover[only], waiting[row]
             points = self.points(side[waiting], place[waiting])
@@ -232,7 +232,7 @@ def _solid_behind(
 def _covers(
     scene: Surfaces, pairs: CoincidentPairs, tolerance: Array, emits: Array, contact: Array
 ) -> Covers:
-    """Return what covers what."""
+    """Return the covered parts and their covers."""
     first, second = pairs.first, pairs.second
     if len(pairs) == 0:
         return _no_covers()

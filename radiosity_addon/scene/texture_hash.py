@@ -24,7 +24,7 @@ SAME_PATTERN = 1e-4
 """Patterns that differ by no more than this part (RMS) are one: rounding is far below, an edit far above."""
 
 CHUNK = 1 << 20
-"""Texels that are looked at at a time."""
+"""Texels processed at a time."""
 
 _STEPS = 1 << 13
 """Resolution of barycentric weights when a triangle's texels are sorted."""
@@ -117,7 +117,7 @@ def _on_triangles(corners: Array, at: Array) -> tuple[Array, Array]:
     _, second, third = np.moveaxis(plane_weights_at(corners, at), -1, 0)
     hair = 0.25 / _STEPS
     inside = (second >= -hair) & (third >= -hair) & (second + third <= 1.0 + hair)
-    # What has no area in the image is its first corner's texel.
+    # A triangle without area in the image uses its first corner's texel.
     point = signed_double_areas(corners) == 0.0
     nearest = np.abs(at - corners[:, :1]).sum(axis=2).argmin(axis=1)
     inside[point] = np.arange(at.shape[1]) == nearest[point, None]

@@ -23,7 +23,7 @@ MAX_DEPTH = 8
 """An area's mean is taken over 4^8 parts at most."""
 
 LEAST_DEPTH = 2
-"""And over 4^2 at least."""
+"""An area's mean is taken over 4^2 parts at least."""
 
 SMALL = 8.0
 """Areas up to this many texels wide, whose samples often lie at the boundary, take four times as many."""
@@ -76,7 +76,7 @@ class SurfaceImages:
         return len(self.textured)
 
     def same_as(self, other: SurfaceImages) -> bool:
-        """Whether another image shows the same on the same triangles."""
+        """Whether another image has the same values on the same triangles."""
         return all(
             np.array_equal(getattr(self, name), getattr(other, name))
             for name in ("textured", "image_uv", "values")
@@ -173,7 +173,7 @@ def _refuse(bad: Array, complaint: str) -> None:
 
 
 def _bilinear(image: Array, place: Array) -> Array:
-    """Look (h, w, k) up at (n, 2) places in texels, (n, k); beyond the middles of the rim its own values."""
+    """Look (h, w, k) up at (n, 2) places in texels, (n, k); constant beyond the centers of border texels."""
     height, width = image.shape[:2]
     texels = image.reshape(height * width, -1)
     around, share = texels_around(place, width, height)

@@ -1,4 +1,4 @@
-"""What is left of sides that others cover: triangles in the weights of each side's corners."""
+"""Uncovered parts of sides: triangles in the weights of each side's corners."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ EVEN = 0.05
 """A cover whose opacity varies less over a part hides its mean, …"""
 
 FINEST = 5
-"""… or the part is split in four so often at most."""
+"""… otherwise the part is split in four, at most this many times."""
 
 CHUNK_PAIRS = 1 << 17
 """Elements and parts clipped at once; their temporaries take about 50 MB."""
@@ -55,12 +55,12 @@ class OwnParts:
 
     @cached_property
     def share(self) -> Array:
-        """(s,) float64: what part of each of `sides` is left."""
+        """(s,) float64: the uncovered share of each of `sides`."""
         left = 2.0 * areas(self.corners) * self.level
         return np.bincount(np.searchsorted(self.sides, self.side), left, minlength=len(self.sides))
 
     def share_of(self, side: Array) -> Array:
-        """Return (n,) what part of sides is left; 1 of those that nothing covers."""
+        """Return (n,) the uncovered share of sides; 1 if nothing covers them."""
         result = np.ones(len(side))
         place = np.minimum(np.searchsorted(self.sides, side), max(len(self.sides) - 1, 0))
         if len(self.sides):
@@ -84,7 +84,7 @@ class OwnParts:
         return rows, corners, level
 
     def share_of_elements(self, side: Array, corners: Array) -> Array:
-        """Return (n,) what is left of counter-clockwise triangles (n, 3, 2) within sides (n,)."""
+        """Return (n,) the uncovered share of counter-clockwise triangles (n, 3, 2) within sides (n,)."""
         result = np.ones(len(side))
         covered = np.flatnonzero(np.isin(side, self.sides))
         begin, count = self._runs(side[covered])
@@ -144,7 +144,7 @@ def own_parts(side: Array, part: Array, by: Array, in_cover: Array, scene: Surfa
 
 
 def _clipped(triangles: Array, polygons: Array) -> Array:
-    """Return (n, …, 2) what triangles (n, 3, 2) and convex polygons (n, k, 2) have in common."""
+    """Return (n, …, 2) the intersections of triangles (n, 3, 2) and convex polygons (n, k, 2)."""
     result = triangles
     for edge in range(polygons.shape[1]):
         result = clip_half_plane(result, edge_distances(result, polygons, edge))
@@ -152,7 +152,7 @@ def _clipped(triangles: Array, polygons: Array) -> Array:
 
 
 def _outside(triangles: Array, polygons: Array) -> list[tuple[Array, Array]]:
-    """Return what of triangles (n, 3, 2) lies outside of convex polygons, as triangles with their rows."""
+    """Return the parts of triangles (n, 3, 2) outside of convex polygons, as triangles with their rows."""
     found = []
     rest = triangles
     for edge in range(polygons.shape[1]):
@@ -184,7 +184,7 @@ def _shining_through(
     by: Array,
     scene: Surfaces,
 ) -> tuple[Array, Array, Array]:
-    """Return parts that lie under cut-out covers, split where the opacity varies, and what shows of them."""
+    """Return parts that lie under cut-out covers, split where the opacity varies, and their visible share."""
     assert scene.images is not None
     images = scene.images
     done = []

@@ -249,7 +249,7 @@ def test_a_failure_after_the_lightmaps_show_takes_them_off_again(
         raise BakeError("the disk is full")
 
     before = made(), showing()
-    monkeypatch.setattr("radiosity_addon.blender.jobs.job.render_preview", fail)
+    monkeypatch.setattr("radiosity_addon.blender.jobs.finish.render_preview", fail)
     with pytest.raises(BakeError, match="the disk is full"):
         list(run_bake(bpy.context, QUICK, OutputFolder(tmp_path / "out"), with_copy=True))
     assert (made(), showing()) == before

@@ -240,7 +240,7 @@ def test_sidecars_that_do_not_fit_are_refused(baked: Path, wrong: str) -> None:
     elif wrong == "damaged":
         path.write_bytes(content[:-1] + bytes([content[-1] ^ 1]))
     elif wrong == "another bake":
-        kept_bakes.set_mark(bpy.context.scene, "other")
+        kept_bakes.note(bpy.context.scene, "other")
         kept_bakes.mark_images([bpy.data.images[LIGHTMAP]], "other")
         message = "has no sidecar of its own"
     elif wrong == "missing":

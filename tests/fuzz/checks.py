@@ -7,6 +7,7 @@ from typing import Any
 import bpy
 import numpy as np
 
+from radiosity_addon.bake.plan import BakePlan
 from radiosity_addon.bake.result.result import BakeResult
 from radiosity_addon.base.errors import SceneError, UsageError
 from radiosity_addon.base.progress import drain
@@ -59,9 +60,9 @@ def _bake(settings: BakeSettings, seen: list[tuple[BakeScene, BakeResult]]) -> N
     """Bake the open scene, and keep what the pipeline was given and gave."""
     bake_steps = job.bake_steps
 
-    def watched(scene: BakeScene, *given: Any):
-        result, kept = yield from bake_steps(scene, *given)
-        seen.append((scene, result))
+    def watched(plan: BakePlan, *given: Any):
+        result, kept = yield from bake_steps(plan, *given)
+        seen.append((plan.bake_scene, result))
         return result, kept
 
     job.bake_steps = watched

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import bpy
 
-from ...bake import KeepOptions, timed
+from ...bake import BakeDigests, KeepOptions, timed
 from ...bake.relight import strengths_in
 from ...bake.result import BakeReport, Progress
 from ...bake.sidecar import StoredBake, check_belongs, read_sidecar
@@ -57,7 +57,7 @@ def relight(
     """
     with registered():
         from ...files import BLEND_NAME, REPORT_NAME
-        from ..jobs.job import WRITING_STAGES
+        from ..jobs.finish import WRITING_STAGES
 
         source = scene or loaded
         if source is not None and same_file(source, output / BLEND_NAME):
@@ -109,7 +109,7 @@ def relight_into(
     """
     from ..apply.rebake import Originals
     from ..images.images import group_file_names, page_file_names
-    from ..jobs.job import deliver
+    from ..jobs.finish import Copies, finish
     from ..jobs.preview import QUICK_SAMPLES
     from ..relight.relight_scene import lit
     from ..scene_export.export import export_steps, exporting
@@ -132,14 +132,15 @@ def relight_into(
         output.expect(name for of in group_file_names(result, stored.settings) for name in of)
         yield Progress("apply", APPLY)
         keeping = KeepOptions(sidecar=True, mark=stored.bake_id)
-        delivered = deliver(
+        finished = finish(
             context,
             stored.settings,
             export,
             result,
             output,
+            digests=BakeDigests.of(export.bake_scene, stored.settings),
             seconds=seconds,
             keeping=keeping,
-            samples=QUICK_SAMPLES if preview else None,
+            copies=Copies(QUICK_SAMPLES if preview else None),
         )
-        return (yield from delivered)
+        return (yield from finished)

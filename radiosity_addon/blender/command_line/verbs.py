@@ -64,7 +64,8 @@ def bake(
     """
     with registered():
         from ...files import BLEND_NAME
-        from ..jobs.job import WRITING_STAGES, run_bake
+        from ..jobs.finish import WRITING_STAGES
+        from ..jobs.job import run_bake
 
         source = scene or loaded
         if source is not None and same_file(source, output / BLEND_NAME):

@@ -33,7 +33,7 @@ WHITE = (1.0, 1.0, 1.0, 1.0)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Sliders:
-    """What is set of one light group."""
+    """The sliders of one light group."""
 
     name: str
     color: bpy.types.NodeSocket
@@ -50,7 +50,7 @@ def _all_mixers() -> list[bpy.types.NodeTree]:
 
 
 def new_mixer(names: Sequence[str], scales: Sequence[float]) -> bpy.types.NodeTree:
-    """Make the mixer of some groups; one that was set aside lends the sliders they have in common.
+    """Make the mixer of groups; common sliders are copied from one that was set aside.
 
     scales: What the groups' texels must be multiplied by to get the quantity.
     """
@@ -141,7 +141,7 @@ def _new_group_node(tree: bpy.types.NodeTree, name: str) -> bpy.types.Node:
 
 
 def _set_tree(node: bpy.types.Node, sliders: bpy.types.NodeTree) -> None:
-    """Have a node show the sliders, set as they were."""
+    """Make a node show the sliders with their earlier values."""
     old = node.inputs
     color, strength = (tuple(old[COLOR].default_value), old[STRENGTH].default_value) if old else (WHITE, 1.0)
     node.node_tree = sliders

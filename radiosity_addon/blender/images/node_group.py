@@ -1,4 +1,4 @@
-"""The one node group that turns a lightmap's texel into the light that a surface sends out."""
+"""The node group that converts a lightmap's texel to the light leaving a surface."""
 
 from __future__ import annotations
 

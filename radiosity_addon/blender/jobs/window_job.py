@@ -8,6 +8,7 @@ from typing import Any
 import bpy
 
 from ...base import NothingToDoError, RadiosityError, RemainingTime
+from ..session import facts
 from ..session.redraw import redraw_sidebars
 from ..session.state import session
 from . import live_view
@@ -162,6 +163,7 @@ class WindowJob:
         in_window = self._timer is not None
         self._end(context)
         self._succeeded(context, in_window)
+        facts.refresh()
         return {"FINISHED"}
 
     def _fail(self, context: bpy.types.Context, error: RadiosityError) -> set[str]:

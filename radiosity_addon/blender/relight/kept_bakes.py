@@ -49,9 +49,10 @@ def mark_of(scene: bpy.types.Scene) -> str:
     return str(relight_of(scene).mark)
 
 
-def set_mark(scene: bpy.types.Scene, mark: str) -> None:
-    """Remember the mark of a scene's bake; "" for one that is not kept."""
-    if mark or mark_of(scene):
+def note(scene: bpy.types.Scene, mark: str) -> None:
+    """Remember the mark of a scene's new bake; "" for one that is not kept."""
+    _forget(scene)
+    if mark:
         scene.radiosity_relight.mark = mark
 
 
@@ -64,11 +65,11 @@ def put(scene: bpy.types.Scene, mark: str, bake: KeptBake) -> InMemory:
     """Keep a scene's bake; earlier ones stay for undo, as far as there is room."""
     session.kept_bakes.pop(mark, None)
     session.kept_bakes[mark] = InMemory(bake, scene.name_full, bake.strengths)
-    _make_room(mark)
+    make_room(mark)
     return session.kept_bakes[mark]
 
 
-def _make_room(newest: str = "") -> None:
+def make_room(newest: str = "") -> None:
     """Forget the oldest of the bakes that no scene shows, but for what `MOST_EARLIER` has room for."""
     shown = {newest, *map(mark_of, bpy.data.scenes)}
     earlier = [mark for mark in session.kept_bakes if mark not in shown]
@@ -78,6 +79,12 @@ def _make_room(newest: str = "") -> None:
 
 def drop(scene: bpy.types.Scene) -> None:
     """Have the scene show no bake any more; in memory it stays for undo, if there is room."""
+    _forget(scene)
+    make_room()
+
+
+def _forget(scene: bpy.types.Scene) -> None:
+    """Have the scene remember no bake."""
     if not scene.is_property_set("radiosity_relight"):
         return
     group = scene.radiosity_relight
@@ -86,7 +93,6 @@ def drop(scene: bpy.types.Scene) -> None:
     names = [prop.identifier for prop in group.bl_rna.properties if not prop.is_readonly]
     if not any(map(group.is_property_set, names)):
         scene.property_unset("radiosity_relight")
-    _make_room()
 
 
 def mark_images(images: Sequence[bpy.types.Image], mark: str) -> None:

@@ -18,6 +18,7 @@ import numpy as np
 
 from ...bake.relight import Responses, are_wanted
 from ...bake.result import LightGroup
+from ...bake.scene_diff import RELIGHTABLE
 from ...base import BakeError, RadiosityError
 from ...lightmap.images import LightmapPage
 from ...numerics import Array
@@ -135,7 +136,7 @@ class LiveRelight:
         assert self._reader is not None
         assert self._fits is not None
         self._dirty, started = False, time.perf_counter()
-        self._fits.check(self._reader)
+        self._fits.diff(self._reader).refuse_all_but(RELIGHTABLE)
         strengths = self._held().bake.sources.checked(self._reader.read())
         if np.array_equal(strengths, self._strengths):
             return

@@ -111,7 +111,7 @@ def _unwrap_piece(
         return uv, chart
     chart[used] = numbered(chart[used])
     uv[used] = _to_scale(uv[used], triangles[used], chart[used], own[used])
-    # Own charts were looked at already.
+    # Separate charts were checked before.
     over = _overlapping_polygons(uv, np.where(own, -1, chart), polygon)
     if not len(over):
         return uv, chart
@@ -125,7 +125,7 @@ def _unwrap_piece(
 
 
 def _overlapping_polygons(uv: Float, chart: Int, polygon: Int) -> NDArray[np.intp]:
-    """Return the triangles to cut out until, as far as is seen, no chart overlaps itself."""
+    """Return the triangles to cut out until no overlap of a chart with itself is found."""
     # Two triangles side by side cannot overlap.
     left = np.flatnonzero(chart >= 0)
     left = left[np.bincount(chart[left])[chart[left]] > 2] if len(left) else left
@@ -138,7 +138,7 @@ def _overlapping_polygons(uv: Float, chart: Int, polygon: Int) -> NDArray[np.int
 
 
 def _split_parts(uv: Float, chart: Int) -> Int:
-    """Renumber charts so that what no longer hangs together becomes charts of their own."""
+    """Renumber charts so that disconnected parts become separate charts."""
     used = np.flatnonzero(chart >= 0)
     if not len(used):
         return chart

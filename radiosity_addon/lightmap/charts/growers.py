@@ -1,4 +1,4 @@
-"""Cutting meshes into charts: xatlas, and what stands in for it."""
+"""Cutting meshes into charts: xatlas, and its fallback."""
 
 from __future__ import annotations
 

@@ -69,7 +69,7 @@ def beside_a_window(faces: Int) -> bool:
 
 
 def run_apart(vertices: Float, faces: Int) -> tuple[Float, Int] | None:
-    """Cut a mesh into charts in a process of its own; None if none is to be had here.
+    """Cut a mesh into charts in a process of its own; None if none can be started.
 
     Parameters and results are those of `run_xatlas`, to the last bit.
     """
@@ -110,7 +110,7 @@ def _answer() -> None:
     with os.fdopen(answer, "wb") as file:
         file.write(_packed(uv, chart))
     del uv, chart
-    # Without tidying up: the atlas may hang.
+    # Without cleanup: destroying the atlas may hang.
     os._exit(0 if atlas is not None else 1)
 
 

@@ -39,7 +39,7 @@ def dilate(pixels: Float32, coverage: Bool, rings: int = 8) -> Float32:
 
 
 def fill(pixels: Float32, coverage: Bool, rings: int = 8) -> None:
-    """Fill every uncovered texel of a page where it is; they must be 0 so far."""
+    """Fill every uncovered texel of a page in place; they must be 0."""
     if not coverage.any():
         return
     filled = coverage.copy()

@@ -87,7 +87,7 @@ class TexelCells:
         geometry, caster = self._geometry, self.local.caster
         found = np.full(len(texel), NOTHING, dtype=np.int32)
         normal = geometry.surface_normal[texel]
-        # On the page a texel may reach beyond its triangle onto one that looks elsewhere.
+        # On the page a texel may extend beyond its triangle onto one with another normal.
         alike = np.einsum("hk,hk->h", geometry.face_normals[hits.triangle], normal) > SAME_SURFACE
         waiting = np.flatnonzero(alike)
         position = geometry.positions_of(hits) + self._lift(texel)
@@ -120,7 +120,7 @@ class TexelCells:
             back = np.broadcast_to(anchor[rows][:, None], points.shape)
             above = lift[rows][:, None]
             seen = free_segment(caster, (points + above).reshape(-1, 3), (back + above).reshape(-1, 3))
-            # What lies behind a wall, or beyond the rim of a hood, is not of this cell.
+            # Points behind a wall, or beyond an occluder's rim, do not belong to this cell.
             own = seen.reshape(points.shape[:2])
             own &= self._below_hood(texel[rows], points) == below[rows, None]
             return np.asarray(np.where(own[..., None], points, back))

@@ -1,4 +1,4 @@
-"""Texels that nothing but their own plane comes near: they need no probes for what crosses them.
+"""Texels near nothing but their own plane: they need no probes for crossing geometry.
 
 Space is cut into cells a few texels wide, and every cell that a piece of a triangle may reach remembers a
 plane, or that there are several. A texel whose surroundings lie in cells of its own plane, and in
@@ -72,7 +72,7 @@ def clear_texels(
 def _surroundings(
     geometry: TexelGeometry, outset: float, height: float, clearance: float, threads: int
 ) -> tuple[Array, Array]:
-    """Return (n, 3) lower and upper bounds of what is around each texel."""
+    """Return (n, 3) lower and upper bounds of the surroundings of each texel."""
     low, high = (geometry.scratch.empty((len(geometry), 3)) for _ in range(2))
 
     def bound(part: slice) -> None:
@@ -169,7 +169,7 @@ class _Cells:
             off = np.abs(np.einsum("nk,nk->n", at - geometry.triangles[of, 0], plane))
             cosine = np.einsum("nk,nk->n", normal.take(other, axis=0), plane)
             bend = np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
-            # The root of what rounding leaves of 1 − 1 is no bend.
+            # The square root of a rounding error of 1 − 1 is not a bend.
             off += reach[other] * np.where(bend < ROUNDED, 0.0, bend)
             flat[other[off > tolerance]] = False
         return flat

@@ -1,4 +1,4 @@
-"""Texels that geometry cuts in two: a wall's foot on a floor, the rim of what a box covers.
+"""Texels that geometry divides, occludes or touches.
 
 Such a texel shows the mean of both sides, as it should, but answers no ray with it: see
 `cells.py`.
@@ -44,7 +44,7 @@ _SPOTS = np.array([[u, v] for u in (0.02, 0.5, 0.98) for v in (0.02, 0.5, 0.98)]
 
 @dataclass(frozen=True)
 class Crossings:
-    """What geometry does to n texels, (n,) bool each.
+    """The effect of geometry on n texels, (n,) bool each.
 
     cut geometry stands on them.
     touched they end at geometry; neither cut nor at a rim.
@@ -79,7 +79,7 @@ class Crossings:
 
     @cached_property
     def beside(self) -> Array:
-        """Texels next to a crossed one: what stands there takes half of what they see."""
+        """Texels next to a crossed one: geometry there blocks half of their view."""
         return self.geometry.neighbourhood(self.crossed) & ~self.alone
 
 
@@ -90,7 +90,7 @@ def crossing_steps(
     before: Crossings | None = None,
     anew: Array | None = None,
 ) -> Generator[float, None, Crossings]:
-    """Find the texels that geometry cuts, touches or hoods; yields the fraction done.
+    """Find the texels that geometry divides, touches or occludes; yields the fraction done.
 
     Given how it was `before`, only some texels, row numbers, are tried `anew`.
     """

@@ -1,4 +1,4 @@
-"""Where every lightmap texel lies in the world, over all pages at once."""
+"""Positions of all lightmap texels of all pages in the world."""
 
 from __future__ import annotations
 
@@ -177,7 +177,7 @@ class TexelGeometry:
     def sample(self, rows: Array, u: Array, width: float = FOOTPRINT) -> Array:
         """Return (r, k, 3) points spread over the middle `width` of r texels by u (r, k, 2)."""
         points = np.empty((len(rows), u.shape[1], 3))
-        # What is inside a texel that is whole on its triangle needs no clipping.
+        # Texels that lie entirely on their triangle need no clipping.
         inner = self.whole[rows] & ((width < 1.0) | ((u > 0.0) & (u < 1.0)).all(axis=(1, 2)))
         plain, cut = np.flatnonzero(inner), np.flatnonzero(~inner)
         points[plain] = self._in_plane(rows[plain], 0.5 + (u[plain].astype(np.float64) - 0.5) * width)
@@ -264,7 +264,7 @@ class TexelGeometry:
 
     @cached_property
     def _framed(self) -> list[Array]:
-        """Per page, where its texels lie in a page that is one texel larger all around, row by row."""
+        """Per page, the positions of its texels in a page with a border of one texel, row by row."""
         framed = [self.scratch.empty(len(page), np.int32) for page in self.texels]
         for page, places in zip(self.texels, framed, strict=True):
             for tile in tiles(len(page)):
