@@ -156,7 +156,7 @@ def test_visibility_past_half_a_wall(edge: float) -> None:
     assert seen.mean() == pytest.approx(expected, abs=0.06)
 
 
-def test_doubt_is_larger_where_rays_disagree_and_never_nothing() -> None:
+def test_error_estimate_is_larger_where_rays_disagree_and_never_nothing() -> None:
     """Four agreeing rays are no proof."""
     free, half = occluded(), occluded(half_wall(0.45))
     assert ((half.visibility > 0) & (half.visibility < 1)).all()

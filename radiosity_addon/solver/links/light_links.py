@@ -196,7 +196,7 @@ def measure_light(
     -------
     gain : (n, 4) float64
         On each quarter.
-    error_estimate : (n,) float64
+    error : (n,) float64
     """
     gain, error = np.empty((len(elements), 4)), np.empty(len(elements))
     area = hierarchy.area[elements]
