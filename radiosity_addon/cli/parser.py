@@ -94,8 +94,9 @@ def _add_bake(parser: argparse.ArgumentParser) -> None:
     )
     _add_options(parser, (*BAKE_COMMAND.values(), *EVERY_COMMAND.values()))
     for section in SECTIONS:
-        group = parser.add_argument_group(section)
-        _add_options(group, [option for option in OPTIONS.values() if option.section == section])
+        options = [option for option in OPTIONS.values() if option.section == section]
+        if options:
+            _add_options(parser.add_argument_group(section), options)
 
 
 def _add_restore(parser: argparse.ArgumentParser) -> None:
