@@ -68,13 +68,9 @@ must not be hidden."""
 class Balance:
     """What light is exchanged with.
 
-    Attributes
-    ----------
-    links : Links
-        To elements, their visibilities corrected (see `known_sums`).
-    sent, received : (e, 2) float64
-        What leaves' radiosity and their gathered light are scaled with, over their own links and
-        over those they share with their ancestors and clusters; 1 where nothing is known.
+    links: To elements, their visibilities corrected (see `known_sums`).
+    sent, received (e, 2): What leaves' radiosity and their gathered light are scaled with, over their own
+        links and over those they share with their ancestors and clusters; 1 where nothing is known.
     """
 
     links: Links
@@ -98,10 +94,7 @@ class Conservation:
     ) -> Balance:
         """Return what to exchange light with, in place of what was measured.
 
-        Parameters
-        ----------
-        rough : bool
-            While links are still refined: only what leaves send is balanced, to keep the power.
+        rough: While links are still refined: only what leaves send is balanced, to keep the power.
         """
         self.arrivals.measure(hierarchy)
         scale, received = np.ones((2, hierarchy.n_elements, 2))
@@ -152,10 +145,7 @@ class Conservation:
     ) -> Array:
         """Return (e, 2): what to scale leaves' radiosity with, over own links and over shared ones.
 
-        Parameters
-        ----------
-        received : (e, 2) float64 or None
-            What the leaves' gathered light is scaled with, as from `balance`.
+        received (e, 2): What the leaves' gathered light is scaled with, as from `balance`.
         """
         self.arrivals.measure(hierarchy)
         leaves = hierarchy.leaves

@@ -29,7 +29,7 @@ MOST_OF_ONE = 1 << 13
 """… but no more of one leaf than these."""
 
 MOST_RAYS = 1 << 20
-"""Neighbours that share rays which disagree ask their own, unless they would be more than these."""
+"""Neighbors that share rays which disagree ask their own, unless they would be more than these."""
 
 CHUNK = 1 << 13
 """Leaves measured at once: their rays take about 30 MB a thread."""
@@ -38,14 +38,9 @@ CHUNK = 1 << 13
 class Arrivals:
     """Remembers what arrives of each leaf's light, leaf by leaf as they appear.
 
-    Attributes
-    ----------
-    share : (e,) float64
-        Of leaves, what part of their light arrives; of those that never were leaves NaN.
-    escapes : (e,) bool
-        Whether any ray left the scene.
-    rays : (e,) int32
-        How many were asked.
+    share (e,): Of leaves, what part of their light arrives; of those that never were leaves NaN.
+    escapes (e,) bool: Whether any ray left the scene.
+    rays (e,) int32: How many were asked.
     """
 
     def __init__(self, caster: RayCaster, min_area: float, seed: int, threads: int = 0) -> None:
@@ -64,7 +59,7 @@ class Arrivals:
         new = leaves[np.isnan(self.share[leaves])]
         faces = new[new < len(hierarchy.faces)]
         if len(faces):
-            # Neighbours that together are no larger than an element may be share their rays.
+            # Neighbors that together are no larger than an element may be share their rays.
             large = np.flatnonzero(hierarchy.clusters.area > self._min_area)
             cut = ClusterCut(hierarchy, large)
             share, escapes = self._trace(hierarchy, cut.nodes, RAYS)
@@ -103,11 +98,8 @@ class Arrivals:
     def of_faces(self, hierarchy: Hierarchy) -> tuple[Array, Array, Array]:
         """Return what is known of faces, after `measure`.
 
-        Returns
-        -------
-        share, error : (f,) float64
-            The part of their light that arrives, and its standard error.
-        escapes : (f,) bool
+        Returns share, error (f,): The part of their light that arrives, and its standard error.
+        Returns escapes (f,) bool.
         """
         leaves, count = hierarchy.leaves, len(hierarchy.faces)
         spread = np.zeros((hierarchy.n_elements, 2))

@@ -16,17 +16,9 @@ from ..links import ClusterLinks, Links, gather, gather_at_clusters, node_radios
 class Arriving:
     """What the receivers of links to clusters take where they are there, per unit of the source's radiosity.
 
-    Parameters
-    ----------
-    received : (e, 2) float64 or None
-        What the leaves' gathered light is scaled with.
-
-    Attributes
-    ----------
-    power : (l,) float64
-        Σ A_f a_f (n_f·v + g·(x_f − c) + h) over the receiver's faces [m²].
-    area : (l,) float64
-        Σ A_f a_f [m²]
+    received (e, 2): What the leaves' gathered light is scaled with.
+    power (l,): Σ A_f a_f (n_f·v + g·(x_f − c) + h) over the receiver's faces [m²].
+    area (l,): Σ A_f a_f [m²]
     """
 
     def __init__(
@@ -55,15 +47,8 @@ def sent_by_leaves(
 ) -> tuple[Array, Array]:
     """Return the shares of leaves' light that own links, and those of ancestors and clusters, carry.
 
-    Parameters
-    ----------
-    received : (e, 2) float64 or None
-        What the leaves' gathered light is scaled with.
-
-    Returns
-    -------
-    own, shared : (e,) float64
-        Of the leaves; other rows mean nothing.
+    received (e, 2): What the leaves' gathered light is scaled with.
+    Returns own, shared (e,): Of the leaves; other rows mean nothing.
     """
     at_links = taken_at_links(hierarchy, links, received)
     sums = sent(hierarchy, links, at_links)
@@ -79,10 +64,7 @@ def received_by_leaves(
 ) -> tuple[Array, Array]:
     """Return ΣFV over own links, and over those of ancestors and clusters, sources scaled by `scale`.
 
-    Returns
-    -------
-    own, shared : (e,) float64
-        Of the leaves; other rows mean nothing.
+    Returns own, shared (e,): Of the leaves; other rows mean nothing.
     """
     there = hierarchy.opacity[:, None]
     gathered = gather(hierarchy, links, there, scale, cut)
@@ -146,10 +128,7 @@ def sent_to_clusters(hierarchy: Hierarchy, links: ClusterLinks, arriving: Arrivi
 def taken_at_links(hierarchy: Hierarchy, links: Links, received: Array | None = None) -> Array:
     """Return (l,) A_r F_rs V_rs [m²] of links to elements, of each receiver's area A_r what is there.
 
-    Parameters
-    ----------
-    received : (e, 2) float64 or None
-        What the light that leaves gather is scaled with, as from `Conservation.balance`.
+    received (e, 2): What the light that leaves gather is scaled with, as from `Conservation.balance`.
     """
     there = hierarchy.opacity if received is None else hierarchy.opacity * received[:, 0]
     below = _taken_below(hierarchy, received)

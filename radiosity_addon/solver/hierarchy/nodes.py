@@ -22,20 +22,15 @@ LEAF = -1
 class Hierarchy:
     """Faces, the clusters above them and the elements below; grows as links ask for it.
 
-    Attributes
-    ----------
-    corners : (e, 3, 3) float64
-    face : (e,) int32
-    parent, first_child : (e,) int32
-        −1 for none. Four children are contiguous: three at the corners, one in the middle.
-    level : (e,) int32
-    area : (e,) float64 [m²]
-    reflectance, emission : (e, 3) float64
-        Area means over each element, multiplied by opacity; emission in W/m².
-    opacity : (e,) float64
-        Area means.
-    roots : (r,) int64
-        The nodes that together hold every face once; first links start from them.
+    corners (e, 3, 3).
+    face (e,) int32.
+    parent, first_child (e,) int32: −1 for none. Four children are contiguous: three at the corners, one in
+        the middle.
+    level (e,) int32.
+    area (e,) [m²].
+    reflectance, emission (e, 3): Area means over each element, multiplied by opacity; emission in W/m².
+    opacity (e,): Area means.
+    roots (r,) int64: The nodes that together hold every face once; first links start from them.
     """
 
     STORED = (
@@ -131,7 +126,7 @@ class Hierarchy:
             self._look_up(elements)
 
     def _look_up(self, elements: Array) -> None:
-        """Take the means over the new children of `elements`, and average them upwards."""
+        """Take the means over the new children of `elements`, and average them upward."""
         weights = split_in_four(self._weights[elements]).reshape(-1, 3, 2)
         self._weights = np.concatenate([self._weights, weights])
         above = elements[self._detailed[self.face[elements]]]
@@ -173,15 +168,9 @@ class Hierarchy:
     def leaf_at(self, face: Array, barycentric: Array) -> Array:
         """Find the leaf element under points of faces.
 
-        Parameters
-        ----------
-        face : (n,) int
-        barycentric : (n, 2) float
-            Weights of the *triangle's* second and third corner, as ray casting gives them.
-
-        Returns
-        -------
-        element : (n,) int32
+        face (n,) int.
+        barycentric (n, 2): Weights of the *triangle's* second and third corner, as ray casting gives them.
+        Returns element (n,) int32.
         """
         v = np.asarray(barycentric, dtype=np.float64)
         back = ~self.faces.front[face]

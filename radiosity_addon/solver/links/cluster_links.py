@@ -30,22 +30,14 @@ CHUNK = 1 << 14
 class ClusterLinks:
     """l links to clusters as arrays, in any order.
 
-    Attributes
-    ----------
-    receiver : (l,) int32
-        Cluster.
-    source : (l,) int32
-        Node: a cluster, or n_clusters + element.
-    factor : (l,) float32
-        Unoccluded form factor, the area mean over the cluster's faces.
-    visibility, error_estimate : (l,) float32
-        As for `Links`.
-    vector : (l, 3) float32
-        v, visibility included: h and the cluster's mean normal times v make factor · visibility.
-    gradient : (l, 3) float32
-        g [1/m], visibility included.
-    even : (l,) float32
-        h, visibility included: what a face receives whichever way it looks; 0 unless the
+    receiver (l,) int32: Cluster.
+    source (l,) int32: Node: a cluster, or n_clusters + element.
+    factor (l,) float32: Unoccluded form factor, the area mean over the cluster's faces.
+    visibility, error_estimate (l,) float32: As for `Links`.
+    vector (l, 3) float32: v, visibility included: h and the cluster's mean normal times v make factor ·
+        visibility.
+    gradient (l, 3) float32: g [1/m], visibility included.
+    even (l,) float32: h, visibility included: what a face receives whichever way it looks; 0 unless the
         receiver's faces look many ways.
     """
 
@@ -87,19 +79,11 @@ def gather_at_clusters(
 ) -> Array:
     """Collect what arrives over links to clusters, and push it down to the faces.
 
-    Parameters
-    ----------
-    cut : ClusterCut
-        With all clusters of the links. It keeps what the same links need again.
-    radiosity : (n_nodes, k) float64
-        Of every node, the means of clusters included [W/m²].
-    threads : int
-        0 means all cores.
-
-    Returns
-    -------
-    irradiance : (f, k) float64 [W/m²]
-        Linear in the radiosity; below 0 where a face looks past the horizon of what the others see.
+    cut: With all clusters of the links. It keeps what the same links need again.
+    radiosity (n_nodes, k): Of every node, the means of clusters included [W/m²].
+    threads: 0 means all cores.
+    Returns irradiance (f, k) [W/m²]: Linear in the radiosity; below 0 where a face looks past the horizon of
+        what the others see.
     """
     if len(links) == 0:
         return np.zeros((len(hierarchy.faces), radiosity.shape[1]))

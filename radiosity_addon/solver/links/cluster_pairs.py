@@ -47,15 +47,8 @@ def measure_cluster_links(
 ) -> ClusterLinks:
     """Compute links to clusters; pairs whose fronts do not see each other are left out.
 
-    Parameters
-    ----------
-    receiver, source : (n,) int
-        Clusters and nodes.
-
-    Returns
-    -------
-    links : ClusterLinks
-        At most n.
+    receiver, source (n,) int: Clusters and nodes.
+    Returns links: At most n.
     """
     near = shapes.looks_large(receiver, source, NEAR)
     wide = shapes.cone[receiver] > WIDE

@@ -29,21 +29,15 @@ CHUNK = 1 << 15
 class Links:
     """l links as arrays; the multi-level method's are float64, with their visibility in the factor.
 
-    Attributes
-    ----------
-    receiver : (l,) int32
-        Element.
-    source : (l,) int32
-        Node: a cluster, or n_clusters + element.
-    factor : (l,) float32
-        F_rs, the unoccluded fraction of what leaves the receiver that arrives at the source.
-    visibility : (l,) float32
-        Share of F_rs that is not blocked.
-    error_estimate : (l,) float32
-        Standard deviation of F·V over the samples and what too few rays may have missed.
-    to_quarter, of_quarter : (l, 4) float32
-        How F·V is shared out over the receiver's and the source's quarters, mean 1 each: so
-        leaves below an inner element do not all inherit the same (a cluster's are all 1).
+    receiver (l,) int32: Element.
+    source (l,) int32: Node: a cluster, or n_clusters + element.
+    factor (l,) float32: F_rs, the unoccluded fraction of what leaves the receiver that arrives at the source.
+    visibility (l,) float32: Share of F_rs that is not blocked.
+    error_estimate (l,) float32: Standard deviation of F·V over the samples and what too few rays may have
+        missed.
+    to_quarter, of_quarter (l, 4) float32: How F·V is shared out over the receiver's and the source's
+        quarters, mean 1 each: so leaves below an inner element do not all inherit the same (a cluster's are
+        all 1).
     """
 
     STORED = ("receiver", "source", "factor", "visibility", "to_quarter", "of_quarter")
@@ -108,21 +102,10 @@ def measure_links(
 ) -> Links:
     """Compute factor, visibility and error estimate of new links; pairs that face away are left out.
 
-    Parameters
-    ----------
-    hierarchy : Hierarchy
-    caster : RayCaster
-    receiver, source : (n,) int
-        Elements and nodes.
-    seed : int
-        Places the samples, together with the pair's own numbers.
-    threads : int
-        0 means all cores; the links do not depend on it.
-
-    Returns
-    -------
-    links : Links
-        At most n.
+    receiver, source (n,) int: Elements and nodes.
+    seed: Places the samples, together with the pair's own numbers.
+    threads: 0 means all cores; the links do not depend on it.
+    Returns links: At most n.
     """
     parts: dict[int, Links] = {}
 

@@ -69,19 +69,10 @@ def first_links(
 ) -> tuple[Links, ClusterLinks, float]:
     """Link all that may see each other, coarsely.
 
-    Parameters
-    ----------
-    max_links : int
-        The whole budget of links, of which these take `BUDGET`.
-
-    Returns
-    -------
-    links : Links
-        To faces, sorted by receiver.
-    cluster_links : ClusterLinks
-        To clusters.
-    faint : float
-        Pairs that exchange less than this share of all area had to be linked however large they
+    max_links: The whole budget of links, of which these take `BUDGET`.
+    Returns links: To faces, sorted by receiver.
+    Returns cluster_links: To clusters.
+    Returns faint: Pairs that exchange less than this share of all area had to be linked however large they
         look, to keep within the budget; 0 if none.
     """
     most = max(int(BUDGET * max_links), FEWEST)

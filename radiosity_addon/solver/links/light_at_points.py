@@ -27,10 +27,7 @@ def lamp_irradiance(
 
     A lamp's closed form times the share of its shadow rays that pass; the sky by rays alone.
 
-    Parameters
-    ----------
-    points, normals : (n, 3) float64
-        On surfaces; unit normals.
+    points, normals (n, 3): On surfaces; unit normals.
     """
     total = np.zeros((len(points), 3))
 

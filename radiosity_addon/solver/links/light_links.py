@@ -48,13 +48,9 @@ CHUNK = 1 << 13
 class LightLinks:
     """How strongly each light lights each linked element, per unit of its strength.
 
-    Attributes
-    ----------
-    receiver : (l,) int32
-    light : (l,) int32
-        Row of the scene's lights.
-    gain : (l, 4) float32
-        Irradiance per unit of strength on each quarter of the receiver, visibility included.
+    receiver (l,) int32.
+    light (l,) int32: Row of the scene's lights.
+    gain (l, 4) float32: Irradiance per unit of strength on each quarter of the receiver, visibility included.
     """
 
     receiver: Array
@@ -102,16 +98,10 @@ def link_lights(
 ) -> LightLinks:
     """Link every light to the elements it reaches, splitting where its light varies.
 
-    Parameters
-    ----------
-    misplaced_power : float
-        BF_ε [W]: an element is split while (spread of irradiance) × area exceeds it.
-    min_area : float
-        A_ε [m²]: no element becomes smaller.
-    most_elements : int
-        How many the hierarchy may grow to; the largest and most doubtful are split first.
-    as_if : (n_lights,) float64 or None
-        What the lights count for instead of their strengths; those at 0 get no links.
+    misplaced_power: BF_ε [W]: an element is split while (spread of irradiance) × area exceeds it.
+    min_area: A_ε [m²]: no element becomes smaller.
+    most_elements: How many the hierarchy may grow to; the largest and most doubtful are split first.
+    as_if (n_lights,): What the lights count for instead of their strengths; those at 0 get no links.
     """
     receivers, numbers, gains = [], [], []
     coarse_area = float(hierarchy.faces.area.sum()) / COARSEST
@@ -192,11 +182,8 @@ def measure_light(
 ) -> tuple[Array, Array]:
     """Measure one light's irradiance on the quarters of elements, per unit of strength, and its error.
 
-    Returns
-    -------
-    gain : (n, 4) float64
-        On each quarter.
-    error : (n,) float64
+    Returns gain (n, 4): On each quarter.
+    Returns error (n,).
     """
     gain, error = np.empty((len(elements), 4)), np.empty(len(elements))
     area = hierarchy.area[elements]
@@ -275,19 +262,11 @@ def lamp_light(
 ) -> tuple[Array, Array]:
     """Ask for a lamp's light at points, one shadow ray each.
 
-    Parameters
-    ----------
-    points : (n, k, 3) float64
-    normals : (n, 3) float64
-    unit : (n, k, 2) float
-        Places the point of the lamp each ray goes to.
-
-    Returns
-    -------
-    gain : (n, k) float64
-        Unoccluded irradiance per unit of strength.
-    share : (n,) float64
-        How much of it arrives, over the k points together.
+    points (n, k, 3).
+    normals (n, 3).
+    unit (n, k, 2): Places the point of the lamp each ray goes to.
+    Returns gain (n, k): Unoccluded irradiance per unit of strength.
+    Returns share (n,): How much of it arrives, over the k points together.
     """
     flat = points.reshape(-1, 3)
     facing = np.repeat(normals, points.shape[1], axis=0)
@@ -320,13 +299,9 @@ def sky_share(
 
     `points` are (n, 3), or (n, rays, 3) to start every ray elsewhere.
 
-    Returns
-    -------
-    share : (n,) float64
-        The cosine-weighted share of each hemisphere that meets no surface, weighted by the
+    Returns share (n,): The cosine-weighted share of each hemisphere that meets no surface, weighted by the
         relative radiance there.
-    error : (n,) float64
-        Its standard error, were the rays independent.
+    Returns error (n,): Its standard error, were the rays independent.
     """
     share, error = np.empty(len(points)), np.empty(len(points))
     for first in range(0, len(points), CHUNK):

@@ -22,7 +22,7 @@ from ...rays import RayCaster
 from ..hierarchy import Hierarchy
 
 EXACT_WITHIN = 1.0
-"""Pairs nearer than this (distance of centres over the sum of radii) get the exact factor."""
+"""Pairs nearer than this (distance of centers over the sum of radii) get the exact factor."""
 
 
 def _symmetric(weight: float) -> list[list[float]]:
@@ -70,18 +70,10 @@ def pair_visibility(
 def trace_pairs(caster: RayCaster, samples: PairSamples, empty_too: bool = False) -> tuple[Array, Array]:
     """Trace the samples of pairs: four each, all sixteen where those disagree.
 
-    Parameters
-    ----------
-    empty_too : bool
-        All sixteen also where the four carry nothing. Not for links: their error estimate is about such
-        pairs, and has them refined.
-
-    Returns
-    -------
-    traced : (n, 16) bool
-        Which samples were asked.
-    free : (n, 16) float64
-        What share of these passes: 0 or 1 where there are no cut-outs.
+    empty_too: All sixteen also where the four carry nothing. Not for links: their error estimate is about
+        such pairs, and has them refined.
+    Returns traced (n, 16) bool: Which samples were asked.
+    Returns free (n, 16): What share of these passes: 0 or 1 where there are no cut-outs.
     """
     traced = np.zeros(samples.transfer.shape, dtype=bool)
     free = np.zeros(samples.transfer.shape)
