@@ -1,4 +1,4 @@
-"""A cut through the cluster tree, as far down as links go.
+"""A cut through the cluster tree at the lowest linked clusters.
 
 Of a million faces most are never told apart: links end at clusters of hundreds. Below the nodes of
 the cut nothing need be added up cluster by cluster, so sums upward and pushes downward
@@ -27,7 +27,7 @@ class ClusterCut:
         clusters = hierarchy.clusters
         self._clusters, self._area = clusters, hierarchy.faces.area
         self.kept: object = None
-        """Whatever is prepared for links of these clusters, by whoever prepares it."""
+        """Cache for data derived from links to these clusters."""
         count, n_faces = len(clusters), len(hierarchy.faces)
         used = np.zeros(count + n_faces, dtype=bool)
         for nodes in linked:
@@ -90,7 +90,7 @@ class ClusterCut:
         return result
 
     def push(self, values: Array) -> Array:
-        """Return (n_rows, k): to every row's values those of all clusters above it added."""
+        """Return (n_rows, k): the values of every row plus those of all clusters above it."""
         total = values.copy()
         for level in self._levels:
             total[self._children[level]] += total[level][:, None]

@@ -18,12 +18,12 @@ NORMAL_WEIGHT = 0.25
 """Opposite normals count like this share of the cluster's diagonal, twice, …"""
 
 SMALL, SMALL_NORMAL_WEIGHT = 0.002, 2.0
-"""… and more in clusters below this share of all area, whose place hardly matters any more: so a
+"""… and more in clusters below this share of all area, whose position hardly matters: so a
 corner's faces fall into pieces of single walls, which may be linked as wholes."""
 
 
 WITHIN = 1.0 - 1e-9
-"""Places within a run as they are sorted: below 1 however they are rounded."""
+"""Scale of sorted positions within a run: below 1 after rounding."""
 
 
 class Clusters:

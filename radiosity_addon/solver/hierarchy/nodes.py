@@ -20,7 +20,7 @@ LEAF = -1
 
 
 class Hierarchy:
-    """Faces, the clusters above them and the elements below; grows as links ask for it.
+    """Faces, the clusters above them and the elements below; grows as links need it.
 
     corners (e, 3, 3).
     face (e,) int32.
@@ -64,7 +64,7 @@ class Hierarchy:
                 self.faces.front[:, None, None], WHOLE_TRIANGLE, WHOLE_TRIANGLE[[0, 2, 1]]
             )
         emits = self.faces.emission.max(axis=1, initial=0.0) > 0
-        # Emitters are grouped apart: averaged into a cluster of dark faces a small lamp is
+        # Emitters are grouped separately: averaged into a cluster of dark faces a small lamp is
         # missed by a few samples. So are backs: each lies where its front lies, unseen from
         # wherever the front is seen.
         self.clusters: Clusters
@@ -100,11 +100,11 @@ class Hierarchy:
 
     @property
     def opacity_where_hit(self) -> Array:
-        """(e,) float64: what to divide by for radiosity where a ray found a surface; never 0."""
+        """(e,) float64: the divisor for radiosity at ray hits; never 0."""
         return np.where(self.opacity > 0, self.opacity, 1.0)
 
     def normal_of(self, elements: Array) -> Array:
-        """Return (n, 3) float64: the unit normals of some elements."""
+        """Return (n, 3) float64: the unit normals of elements."""
         return np.asarray(self.faces.normal[self.face[elements]])
 
     def subdivide(self, elements: Array) -> None:
@@ -143,7 +143,7 @@ class Hierarchy:
             above = above[above != LEAF]
 
     def _means(self, elements: Array) -> Array:
-        """Return (n, 7) reflectance, emission and opacity of elements, less what others cover."""
+        """Return (n, 7) reflectance, emission and opacity of elements, less the parts that others cover."""
         triangle, weights = self.faces.triangle[self.face[elements]], self._weights[elements]
         if self._images is None:
             textured = np.zeros(len(elements), dtype=bool)

@@ -1,4 +1,4 @@
-"""Links to clusters: many small faces receive together, each by its own normal and place.
+"""Links to clusters: many small faces receive together, each by its own normal and position.
 
 The faces of a cluster look much the same way and see the same sources, but not equally. So
 such a link carries a vector v and a gradient g in place of one number: a face with normal n
@@ -20,10 +20,10 @@ from ...numerics import Array, for_chunks
 from ..hierarchy import ClusterCut, Hierarchy
 
 TERMS = 7
-"""What a cluster passes on is linear in a face's normal and place, and a constant."""
+"""Coefficients of a cluster's light: linear in a face's normal and position, and a constant."""
 
 CHUNK = 1 << 14
-"""Faces that take from their clusters at once: some 3 MB, in the processor's cache."""
+"""Faces processed at once: some 3 MB, in the processor's cache."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class ClusterLinks:
     vector (l, 3) float32: v, visibility included: h and the cluster's mean normal times v make factor ·
         visibility.
     gradient (l, 3) float32: g [1/m], visibility included.
-    even (l,) float32: h, visibility included: what a face receives whichever way it looks; 0 unless the
+    even (l,) float32: h, visibility included: the light that a face receives in any orientation; 0 unless the
         receiver's faces look many ways.
     """
 
@@ -77,7 +77,7 @@ def join_cluster_links(parts: list[ClusterLinks]) -> ClusterLinks:
 def gather_at_clusters(
     hierarchy: Hierarchy, cut: ClusterCut, links: ClusterLinks, radiosity: Array, threads: int = 1
 ) -> Array:
-    """Collect what arrives over links to clusters, and push it down to the faces.
+    """Collect the light that arrives over links to clusters, and push it down to the faces.
 
     cut: With all clusters of the links. It keeps what the same links need again.
     radiosity (n_nodes, k): Of every node, the means of clusters included [W/m²].
@@ -94,7 +94,7 @@ def gather_at_clusters(
 
 
 class _ClusterGather:
-    """Links to clusters in the order of their receivers, with all that does not change with the light."""
+    """Links to clusters in the order of their receivers, with all data that does not depend on the light."""
 
     def __init__(self, hierarchy: Hierarchy, cut: ClusterCut, links: ClusterLinks) -> None:
         clusters, faces = hierarchy.clusters, hierarchy.faces

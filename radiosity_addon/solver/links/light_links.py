@@ -28,14 +28,14 @@ LAMP_SAMPLES = 4
 SKY_RAYS = 16
 """Hemisphere rays of each quarter of an element."""
 COARSEST = 512
-"""An element larger than the scene's area over this is split before light is looked for on it."""
+"""An element larger than the scene's area over this is split before its light is measured."""
 
 NEAR = 0.5
 """So is one that looks larger than this (radius over distance) from the lamp, or than this part
 of a spot's cone."""
 
 SMALL, SMALL_DIVISOR = 2e-5, 4
-"""Elements below this share of all area get so many times fewer samples: there are many of them."""
+"""Elements below this share of all area get fewer samples by this divisor: there are many of them."""
 
 TINY = 2.5e-6
 """Those below this share get a quarter of that, over the whole element."""
@@ -100,7 +100,7 @@ def link_lights(
 
     misplaced_power: BF_ε [W]: an element is split while (spread of irradiance) × area exceeds it.
     min_area: A_ε [m²]: no element becomes smaller.
-    most_elements: How many the hierarchy may grow to; the largest and most doubtful are split first.
+    most_elements: Limit of the hierarchy's elements; the largest and least certain are split first.
     as_if (n_lights,): What the lights count for instead of their strengths; those at 0 get no links.
     """
     receivers, numbers, gains = [], [], []
@@ -113,7 +113,7 @@ def link_lights(
         while len(waiting):
             area = hierarchy.area[waiting]
             may_split = (hierarchy.first_child[waiting] != LEAF) | (area >= 4 * min_area)
-            # Where few samples may miss the light altogether, they are not asked.
+            # Where few samples may miss the light altogether, none are taken.
             blind = may_split & ((area > coarse_area) | too_near(light, hierarchy, waiting))
             blind = _affordable(hierarchy, waiting, blind, area, most_elements)
             gain, error = np.zeros((len(waiting), 4)), np.zeros(len(waiting))
@@ -163,7 +163,8 @@ def too_near(light: Light, hierarchy: Hierarchy, elements: Array) -> Array:
     before = np.einsum("nk,nk->n", along, hierarchy.faces.normal[hierarchy.face[elements]]) < 0
     near = radius > NEAR * distance
     if isinstance(light, SpotLight):
-        # The element's bounding sphere, as the lamp sees it, touches the cone and is not small beside it.
+        # The element's bounding sphere, as the lamp sees it, touches the cone and is not small compared with
+        # it.
         seen = np.arcsin(np.clip(radius / np.maximum(distance, 1e-300), 0.0, 1.0))
         axis = np.asarray(light.direction)
         off = np.arccos(np.clip(along @ axis / np.maximum(distance, 1e-300), -1.0, 1.0))
@@ -260,7 +261,7 @@ def _measure_lamp(
 def lamp_light(
     light: Lamp, points: Array, normals: Array, unit: Array, caster: RayCaster
 ) -> tuple[Array, Array]:
-    """Ask for a lamp's light at points, one shadow ray each.
+    """Measure a lamp's light at points, one shadow ray each.
 
     points (n, k, 3).
     normals (n, 3).
@@ -277,7 +278,7 @@ def lamp_light(
     start = flat[rows] + caster.surface_offset * facing[rows]
     lamps = caster.for_lamps
     free = lamps.passing(start, directions[:, 0], distances[:, 0]) if light.casts_shadow else True
-    # A lamp point below the horizon says nothing: the closed form has cut it off already.
+    # A lamp point below the horizon is ignored: the closed form has clipped it already.
     weights[rows] = np.where(above[:, 0] > 0, gain[rows], 0.0)
     passed[rows] = weights[rows] * free
     shape = unit.shape[:2]
@@ -295,7 +296,7 @@ def sky_share(
     keys: Array,
     seed: int,
 ) -> tuple[Array, Array]:
-    """Ask for a sky's light at points, relative to an open sky of its radiance.
+    """Measure a sky's light at points, relative to an open sky of its radiance.
 
     `points` are (n, 3), or (n, rays, 3) to start every ray elsewhere.
 

@@ -1,4 +1,4 @@
-"""Stratified points on nodes, be they clusters or elements."""
+"""Stratified points on nodes, both clusters and elements."""
 
 from __future__ import annotations
 

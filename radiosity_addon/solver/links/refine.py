@@ -1,4 +1,4 @@
-"""Which links to refine, and on which side (handout §4.2.1, Oracle2, weighed by error estimate)."""
+"""Selects links to refine, and the side (handout §4.2.1, Oracle2, weighted by error estimate)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Moving light over the links: gather, push-pull and the residual (handout §4.2)."""
+"""Transport of light over the links: gather, push-pull and the residual (handout §4.2)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def gather(
 ) -> Array:
     """Collect the irradiance that arrives over each element's own links.
 
-    H_r = Σ_s F_rs V_rs B_s over the links of receiver r (handout §4.2, Gather), shared out
+    H_r = Σ_s F_rs V_rs B_s over the links of receiver r (handout §4.2, Gather), distributed
     over the receiver's quarters. Where the source has children, B_s is the mean over its
     quarters by the link's shares.
 
@@ -64,7 +64,7 @@ def gather(
 def shared_means(
     hierarchy: Hierarchy, radiosity: Array, scale: Array | None = None, cut: ClusterCut | None = None
 ) -> tuple[Array, Array]:
-    """Return what links to coarse sources see: (e, k) the elements' means, and (n_nodes, k) all nodes'."""
+    """Return the radiosity for links to coarse sources: means of elements (e, k), of all nodes (n_nodes, k)."""
     means = pull(hierarchy, radiosity if scale is None else scale[:, 1:] * radiosity)
     return means, node_radiosity(hierarchy, means, cut)
 
