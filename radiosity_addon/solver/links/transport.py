@@ -64,7 +64,7 @@ def gather(
 def shared_means(
     hierarchy: Hierarchy, radiosity: Array, scale: Array | None = None, cut: ClusterCut | None = None
 ) -> tuple[Array, Array]:
-    """Return the radiosity for links to coarse sources: means of elements (e, k), of all nodes (n_nodes, k)."""
+    """Return radiosities for links to coarse sources: means of elements (e, k) and all nodes (n_nodes, k)."""
     means = pull(hierarchy, radiosity if scale is None else scale[:, 1:] * radiosity)
     return means, node_radiosity(hierarchy, means, cut)
 
