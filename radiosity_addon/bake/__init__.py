@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from .estimate import Estimate, LightmappedObject, estimate_bake
-from .keep import KeepOptions, bake_steps, can_keep, moves_alone
+from .keep import KeepOptions, can_keep, moves_alone, run_pipeline
 from .stages import timed
 from .texel_memory import pages_of, refuse_too_large
 
@@ -14,11 +14,11 @@ __all__ = [
     "Estimate",
     "KeepOptions",
     "LightmappedObject",
-    "bake_steps",
     "can_keep",
     "estimate_bake",
     "moves_alone",
     "pages_of",
     "refuse_too_large",
+    "run_pipeline",
     "timed",
 ]

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import uuid
-from collections.abc import Generator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from ..base import SILENT, Progress
 from ..options import BakeSettings
 from ..scene import BakeScene
 from .pipeline import bake, bake_and_keep
 from .rebaking import bake_moved, can_move
 from .relight import KeptBake
-from .result import BakeResult, Progress
+from .result import BakeResult
 from .sidecar import write_sidecar
 
 
@@ -47,9 +47,13 @@ def moves_alone(bake_scene: BakeScene, settings: BakeSettings, keeping: KeepOpti
     return earlier is not None and can_move(earlier, bake_scene, settings)
 
 
-def bake_steps(
-    bake_scene: BakeScene, settings: BakeSettings, keeping: KeepOptions | None, sidecar: Path | None
-) -> Generator[Progress, None, tuple[BakeResult, KeptBake | None]]:
+def run_pipeline(
+    bake_scene: BakeScene,
+    settings: BakeSettings,
+    keeping: KeepOptions | None,
+    sidecar: Path | None,
+    progress: Progress = SILENT,
+) -> tuple[BakeResult, KeptBake | None]:
     """Bake, and keep the bake if that is asked for.
 
     Parameters
@@ -64,12 +68,12 @@ def bake_steps(
         Those of `bake_and_keep` and `write_sidecar`.
     """
     if keeping is None:
-        return (yield from bake(bake_scene, settings)), None
+        return bake(bake_scene, settings, progress), None
     if keeping.earlier is not None and moves_alone(bake_scene, settings, keeping):
-        result, kept = yield from bake_moved(keeping.earlier, bake_scene)
+        result, kept = bake_moved(keeping.earlier, bake_scene, progress)
     else:
-        result, kept = yield from bake_and_keep(bake_scene, settings)
+        result, kept = bake_and_keep(bake_scene, settings, progress)
     if sidecar is not None:
-        yield Progress("sidecar", 1.0)
+        progress.stage("sidecar", 1.0, 1.0).at(1.0)
         write_sidecar(sidecar, kept, result, keeping.mark)
     return result, kept

@@ -1,4 +1,4 @@
-"""What a bake yields: pages, objects, details for overlays, progress, the report.
+"""What a bake yields: pages, objects, details for overlays, pictures, the report.
 
 Plain records and files, nothing that bakes.
 """
@@ -6,7 +6,7 @@ Plain records and files, nothing that bakes.
 from __future__ import annotations
 
 from .details import MEANS, More, more_of, statistics
-from .progress import Picture, Progress, TexelPicture, TexelSurfaces
+from .pictures import Picture, TexelPicture, TexelSurfaces
 from .report import BakeReport, LightmapFile, solver_part
 from .result import BakeDetails, BakedObject, BakeResult, LightGroup, PageDetails
 from .texel_pictures import TexelPictures
@@ -22,7 +22,6 @@ __all__ = [
     "More",
     "PageDetails",
     "Picture",
-    "Progress",
     "TexelPicture",
     "TexelPictures",
     "TexelSurfaces",

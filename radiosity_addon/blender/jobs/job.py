@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, replace
 
 import bpy
 
-from ...bake import KeepOptions, bake_steps, moves_alone, pages_of, refuse_too_large, timed
+from ...bake import KeepOptions, moves_alone, pages_of, refuse_too_large, run_pipeline, timed
 from ...bake.relight import KeptBake
-from ...bake.result import BakeReport, BakeResult, Progress
+from ...bake.result import BakeReport, BakeResult
 from ...bake.sidecar import sidecar_entry
-from ...base import BakeWarning
+from ...base import BakeWarning, Progress, Status, staged
 from ...files import BLEND_NAME, KEPT, PLAIN_NAMES, PREVIEW_NAME
 from ...numerics import Array
 from ...options import BakeSettings
@@ -28,14 +28,14 @@ from ..images.group_images import GroupImages, each_image, write_groups
 from ..images.images import lightmap_files, possible_names, relative_path, set_folder, write_pages
 from ..material_copies.light_shares import crowded_materials
 from ..relight import kept_bakes, lightmap_versions
-from ..scene_export.export import export_steps, exporting
+from ..scene_export.export import export_steps
 from ..scene_records.export_sources import Export
 from ..session import kept_details, runtime
 from ..session.background import in_thread
 from .live_picture import Seen, seen_triangles
 from .preview import SAMPLES, render_preview
 
-BakeJob = Generator[Progress, None, BakeReport]
+BakeJob = Generator[Status, None, BakeReport]
 Shown = tuple[list[bpy.types.Image], GroupImages, tuple[BakeWarning, ...]]
 
 # How far the whole is when each part begins; rough, from bakes at medium quality.
@@ -119,7 +119,7 @@ def run_bake(
 
     Yields
     ------
-    progress : Progress
+    status : Status
         The stage that begins or goes on. A picture holds what the viewports show as surfaces.
 
     Returns
@@ -140,18 +140,18 @@ def run_bake(
         if output is not None:
             # First: a folder that cannot be written, or holds files of others, is no news for after the work.
             stack.enter_context(output)
-        yield Progress("export", 0.0)
+        yield Status("export", 0.0)
         if output is not None:
             preview = (PREVIEW_NAME,) if with_preview else ()
             copies = (BLEND_NAME, *preview) if with_copy else ()
             sidecars = (output.names.sidecar,) if keeping and keeping.sidecar else ()
             for _ in output.expecting((*copies, *sidecars)):
-                yield Progress("export", 0.0)
+                yield Status("export", 0.0)
         originals = Originals(context)
         with timed(seconds, "export"):
             steps = export_steps(context, settings, keeping is not None, in_background, originals)
-            export = yield from exporting(steps)
-            yield Progress("export", 0.0)
+            export = yield from staged(steps, "export", 0.0, 0.0)
+            yield Status("export", 0.0)
             with originals():
                 context.view_layer.update()
                 check_targets(export)
@@ -170,14 +170,18 @@ def run_bake(
             shown = files_shown_by(scope.keep)
             lightmaps = possible_names(output.names, settings, export.bake_scene, output.path, shown)
             for _ in output.expecting(lightmaps):
-                yield Progress("export", SOLVE)
+                yield Status("export", SOLVE)
         solved = APPLY if with_copy else APPLY_ALONE
         sidecar = output.staging / output.names.sidecar if output and keeping and keeping.sidecar else None
-        baking = bake_steps(export.bake_scene, settings, keeping, sidecar)
+        scene = export.bake_scene
+
+        def baking(progress: Progress) -> tuple[BakeResult, KeptBake | None]:
+            return run_pipeline(scene, settings, keeping, sidecar, progress)
+
         result, kept = yield from _solve(baking, seen, in_background, solved)
         result = replace(result, warnings=(*remarks, *result.warnings))
         seconds.update(result.seconds)
-        yield Progress("apply", solved)
+        yield Status("apply", solved)
         if with_copy and output is not None:
             delivered = deliver(
                 context,
@@ -194,7 +198,7 @@ def run_bake(
         with scope.replacing_earlier(context) as earlier, timed(seconds, "apply"):
             result = replace(result, warnings=(*earlier.warnings, *result.warnings))
             showing = _show(context, settings, export, result, output, keeping, earlier)
-            images, groups, behind = yield from _told(showing, solved, 1.0)
+            images, groups, behind = yield from staged(showing, "apply", solved, 1.0)
             result = replace(result, warnings=(*behind, *result.warnings))
             report = _report(result, images, groups, settings, seconds)
             if output is not None:
@@ -212,26 +216,25 @@ def run_bake(
 
 
 def _solve(
-    baking: Generator[Progress, None, tuple[BakeResult, KeptBake | None]],
+    baking: Callable[[Progress], tuple[BakeResult, KeptBake | None]],
     seen: Array,
     in_background: bool,
     end: float,
-) -> Generator[Progress, None, tuple[BakeResult, KeptBake | None]]:
+) -> Generator[Status, None, tuple[BakeResult, KeptBake | None]]:
     """Run the pipeline, its progress scaled to its share of the whole, its pictures to what is `seen`."""
-    steps = in_thread(baking) if in_background else baking
-    shown, only = Progress("unwrap", SOLVE), Seen(seen)
+    steps = in_thread(lambda progress: baking(progress.part(SOLVE, end)), in_background)
+    status, only = Status("unwrap", SOLVE), Seen(seen)
     try:
         while True:
             try:
-                progress = next(steps)
+                news = next(steps)
             except StopIteration as done:
                 return done.value
-            picture = texels = None
-            if progress is not None:
-                shown = Progress(progress.stage, SOLVE + (end - SOLVE) * progress.fraction)
-                picture, texels = only.of_elements(progress.picture), only.of_texels(progress.texels)
             # Each picture comes once, however long the step after it takes.
-            yield replace(shown, picture=picture, texels=texels)
+            status = replace(status, picture=None)
+            if news is not None:
+                status = replace(news, picture=only.of(news.picture))
+            yield status
     finally:
         steps.close()
 
@@ -260,23 +263,23 @@ def deliver(
     with (scope or Scope()).replacing_earlier(context) as earlier, timed(seconds, "apply"):
         result = replace(result, warnings=(*earlier.warnings, *result.warnings))
         showing = _show(context, settings, export, result, output, keeping, earlier)
-        images, groups, behind = yield from _told(showing, APPLY, SAVE)
+        images, groups, behind = yield from staged(showing, "apply", APPLY, SAVE)
         result = replace(result, warnings=(*behind, *result.warnings))
     try:
         # The copy tells of its bake too; what is left to do is not in its times.
         so_far = _report(result, images, groups, settings, seconds)
         runtime.remember(context.scene, so_far.as_dict(), "//")
         _remember_kept(context.scene, keeping, None)
-        yield Progress("save", SAVE)
+        yield Status("save", SAVE)
         with timed(seconds, "save"):
             save_copy(output)
         if samples is not None:
-            yield Progress("preview", PREVIEW)
+            yield Status("preview", PREVIEW)
             with timed(seconds, "preview"):
                 render_preview(context, output.staging / PREVIEW_NAME, settings, samples)
         report = _report(result, images, groups, settings, seconds)
         report = output.write_report(keeping_sidecar(report, output, keeping))
-        yield Progress("write", 1.0)
+        yield Status("write", 1.0)
         output.publish()
     except BaseException:
         restore(context)
@@ -313,19 +316,6 @@ def _show(
         remove_datablocks([*images, *each_image(groups)])
         raise
     return images, groups, behind
-
-
-def _told(steps: Generator[float, None, Shown], begin: float, end: float) -> Generator[Progress, None, Shown]:
-    """Report steps of showing the lightmaps as progress between two fractions of the whole."""
-    try:
-        while True:
-            try:
-                fraction = next(steps)
-            except StopIteration as done:
-                return done.value
-            yield Progress("apply", begin + (end - begin) * fraction)
-    finally:
-        steps.close()
 
 
 def _report(
