@@ -29,6 +29,9 @@ ROOT = Path(__file__).resolve().parent
 SIDE_BY_SIDE = ("-n", "auto", "--maxprocesses", "8", "--dist", "loadfile")
 """How pytest spreads tests over the cores: those of one file share what they prepare."""
 
+WITHOUT_BLENDER = ("tests/unit", "tests/analytic")
+"""Folders of tests that need neither bpy nor a window."""
+
 LINT_IMPORTS = "from importlinter.cli import lint_imports_command; lint_imports_command()"
 """import-linter has no module to run. Its contracts are in pyproject.toml."""
 
@@ -37,7 +40,9 @@ usage: python3 build.py VERB [arguments]
 
   bake [SCENE] [options]     bake a scene, or the bundled Cornell box (bake --help lists the options)
   restore SCENE [options]    take a bake out of a .blend again
-  test [--bpy VERSION] ...   run the tests; what follows goes to pytest
+  test [WHICH] ...           run all tests but a few slow ones; what follows goes to pytest instead
+                             --quick: those that need neither bpy nor a window, in a minute, in an
+                             environment without bpy; --full: the slow ones too;
                              --bpy 4.2 or 5.2: with that bpy, in an environment of its own
   fuzz [--seeds A:B]         bake random scenes and check what must hold of each (default 0:500)
   bench [--case NAME] ...    measure against Cycles into bench/results and the README; --small tries
@@ -96,19 +101,27 @@ def restore(arguments: list[str]) -> int:
 
 
 def test(arguments: list[str]) -> int:
-    """Run pytest, in the main environment or in one with another bpy; all tests if nothing else is asked."""
-    if arguments[:1] != ["--bpy"]:
-        environment = environments.main_environment(ROOT)
-    elif len(arguments) > 1:
-        environment, arguments = environments.bpy_environment(ROOT, arguments[1]), arguments[2:]
+    """Run pytest with what follows; without that, all tests that `--quick`, `--full` or `--bpy` ask for."""
+    which = arguments[0] if arguments and arguments[0] in ("--quick", "--full", "--bpy") else ""
+    rest = arguments[1:] if which else arguments
+    folders: tuple[str, ...] = ()
+    if which == "--quick":
+        environment, folders = environments.quick_environment(ROOT), WITHOUT_BLENDER
+    elif which == "--bpy":
+        if not rest:
+            print("build.py: error: --bpy needs a version, such as 4.2", file=sys.stderr)
+            return 2
+        environment, rest = environments.bpy_environment(ROOT, rest[0]), rest[1:]
     else:
-        print("build.py: error: --bpy needs a version, such as 4.2", file=sys.stderr)
-        return 2
+        environment = environments.main_environment(ROOT)
     os.chdir(ROOT)
-    if arguments:
-        return environment.hand_over("-m", "pytest", *arguments)
-    # Side by side, but for the windows: they share one real Blender and are timed.
-    code = environment.run("-m", "pytest", *SIDE_BY_SIDE, "-m", "not real_blender")
+    if rest:
+        return environment.hand_over("-m", "pytest", *rest)
+    marks = "not real_blender" if which == "--full" else "not real_blender and not full"
+    code = environment.run("-m", "pytest", *SIDE_BY_SIDE, "-m", marks, *folders)
+    if which in ("--quick", "--bpy"):
+        return code
+    # Windows share one real Blender, of Debian's own version, and are timed: one after the other.
     return environment.run("-m", "pytest", "-m", "real_blender") or code
 
 

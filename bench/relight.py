@@ -128,8 +128,7 @@ def measure_panel(resolution: int, quality: str) -> dict[str, Any]:
 
     import radiosity_addon
     from radiosity_addon.blender.files.cornell import build_cornell_box
-    from radiosity_addon.blender.relight.relight_scene import kept_bakes
-    from radiosity_addon.blender.session import live_state
+    from radiosity_addon.blender.session.state import session
 
     say("Cornell box in Blender: the buttons, with export and files")
     radiosity_addon.register()
@@ -147,18 +146,18 @@ def measure_panel(resolution: int, quality: str) -> dict[str, Any]:
         lamp.energy *= 2.0
         lamp.color = (0.4, 0.7, 1.0)
         button = _clocked(lambda: bpy.ops.radiosity.relight("EXEC_DEFAULT"))
-        kept_bakes.drop_all()
+        session.kept_bakes.clear()
         from_sidecar = _clocked(lambda: bpy.ops.radiosity.relight("EXEC_DEFAULT"))
         bpy.context.window_manager.radiosity_live = True
-        live_state.state.live.settle()
+        session.live.settle()
         latencies = []
         for _ in range(DRAGGED):
             lamp.energy *= 1.02
             started = time.perf_counter()
             bpy.context.view_layer.update()
-            live_state.state.live.read()
+            session.live.read()
             latencies.append(time.perf_counter() - started)
-        live_state.stop()
+        session.stop_live()
     radiosity_addon.unregister()
     told = {
         "scene": "cornell",

@@ -71,6 +71,13 @@ def bpy_environment(root: Path, bpy: str) -> Environment:
     return _with_bpy(root, root / ".envs" / f"bpy-{bpy}", bpy)
 
 
+def quick_environment(root: Path) -> Environment:
+    """`.envs/quick`, which runs the tests that need neither bpy nor a window."""
+    folder = root / ".envs" / "quick"
+    version = _python_version(folder) or sys.version_info[:2]
+    return _ready(root, folder, [root / "requirements" / "quick.txt"], version, with_blender=False)
+
+
 def docs_environment(root: Path) -> Environment:
     """`.envs/docs`, which draws the figures and builds the site: the solver's packages, but no bpy."""
     folder = root / ".envs" / "docs"
@@ -125,7 +132,7 @@ def _create(folder: Path, python: str) -> None:
 
 def _install(folder: Path, pins: list[Path], *how: str) -> None:
     names = " and ".join(path.name for path in pins)
-    size = "1 GB" if any(path.name.startswith("bpy") for path in pins) else "250 MB"
+    size = "1 GB" if any(path.name.startswith("bpy") for path in pins) else "up to 250 MB"
     print(f"installing the pinned packages of {names}, about {size}", file=sys.stderr, flush=True)
     command = [str(_interpreter(folder)), "-m", "pip", "install", "--disable-pip-version-check"]
     command += ["--no-input", *how]

@@ -10,6 +10,7 @@ from .errors import BakeError, NothingToDoError, RadiosityError, SceneError, Usa
 from .progress import SILENT, Cancelled, Progress, Status
 from .similar_warnings import one_of_each
 from .steps import drain, staged
+from .ticks import linear_ticks, tick_label
 from .time_left import RemainingTime, duration
 
 __all__ = [
@@ -26,6 +27,8 @@ __all__ = [
     "UsageError",
     "drain",
     "duration",
+    "linear_ticks",
     "one_of_each",
     "staged",
+    "tick_label",
 ]

@@ -42,13 +42,8 @@ def map_chunks(
 
     Canceled, it lets the slices in hand end and leaves out the others.
 
-    Parameters
-    ----------
-    work : callable
-        Takes a slice of rows; must touch nothing another slice writes.
-    rows, chunk : int
-    threads : int
-        0 means all cores.
+    work: Takes a slice of rows; must touch nothing another slice writes.
+    threads: 0 means all cores.
     """
     slices = [slice(start, min(start + chunk, rows)) for start in range(0, rows, chunk)]
     workers = min(thread_count(threads), len(slices))

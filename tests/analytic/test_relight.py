@@ -10,6 +10,7 @@ import pytest
 
 from radiosity_addon.bake.pipeline import bake, bake_and_keep
 from radiosity_addon.bake.relight.kept_bake import KeptBake, relight_pages
+from radiosity_addon.bake.relight.source_strengths import strengths_in
 from radiosity_addon.base.errors import SceneError, UsageError
 from radiosity_addon.lightmap.images.page import LightmapPage
 from radiosity_addon.lightmap.lighting.warm_start import EarlierLight
@@ -17,7 +18,7 @@ from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import PointLight, Scene
 from tests.cornell import cornell_box
-from tests.relit_rooms import BAKED, CHANGED, NAMES, lit_bake, lit_room
+from tests.relit_rooms import BAKED, CHANGED, NAMES, lit_bake
 from tests.rooms import box_room, grey
 from tests.textured_rooms import furnace
 from tests.unit.texel_scenes import bake_scene
@@ -132,19 +133,16 @@ def test_radiosity_shows_the_new_emission() -> None:
 
 
 def test_strengths_are_read_from_a_changed_scene(room: KeptBake) -> None:
-    np.testing.assert_array_equal(room.strengths_of(lit_room(CHANGED)), CHANGED)
-    moved = lit_room(CHANGED)
-    moved.triangles[0] += 0.1
-    with pytest.raises(SceneError, match="bake again"):
-        room.strengths_of(moved)
-    painted = lit_room(CHANGED)
-    painted.emission[0] = 1.0
+    np.testing.assert_array_equal(strengths_in(room, lit_bake(CHANGED)), CHANGED)
+    painted = lit_bake(CHANGED)
+    painted.scene.emission[0] = 1.0
     with pytest.raises(SceneError, match="new somewhere"):
-        room.strengths_of(painted)
-    other = lit_room(CHANGED)
-    other.lights = (PointLight((2.2, 0.6, 1.4), 5.0, radius=0.05, name="Bulb"), *other.lights[1:])
+        strengths_in(room, painted)
+    other = lit_bake(CHANGED)
+    lights = other.scene.lights
+    other.scene.lights = (PointLight((2.2, 0.6, 1.4), 5.0, radius=0.05, name="Bulb"), *lights[1:])
     with pytest.raises(SceneError, match="'Bulb' has changed in more than its strength"):
-        room.strengths_of(other)
+        strengths_in(room, other)
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,8 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 ROOT = Path(__file__).resolve().parents[2]
-QUICK = ("--resolution", "32", "--quality", "draft")
+QUICK = ("--resolution", "32", "--quality", "draft", "--no-preview")
+"""A small bake. Previews are rendered where a test looks at one."""
 
 
 @pytest.fixture(autouse=True)
@@ -61,6 +62,44 @@ def start(*words: object, cwd: Path) -> subprocess.Popen[str]:
         text=True,
         start_new_session=True,
     )
+
+
+@dataclass(frozen=True)
+class Baked:
+    """A bake that tests of a module share: they copy what they change."""
+
+    scene: Path
+    """The room's .blend, saved and closed."""
+    folder: Path
+    """What `bake SCENE --output FOLDER` has written."""
+    scene_before: tuple[str, int]
+    """Digest and time of change of the scene's file before the bake."""
+    copy_of_report: Path
+
+    @property
+    def scene_now(self) -> tuple[str, int]:
+        """Digest and time of change of the scene's file as it is."""
+        return stamp(self.scene)
+
+
+def stamp(path: Path) -> tuple[str, int]:
+    """Digest and time of change of a file."""
+    return hashlib.sha256(path.read_bytes()).hexdigest(), path.stat().st_mtime_ns
+
+
+@pytest.fixture(scope="module")
+def baked(tmp_path_factory: pytest.TempPathFactory) -> Baked:
+    """The room, baked once with the default options."""
+    from radiosity_addon.blender.command_line.main import main
+
+    folder = tmp_path_factory.mktemp("baked")
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    build_room()
+    scene = save(folder / "scene" / "room.blend")
+    made = Baked(scene, folder / "out", stamp(scene), folder / "copies" / "r.json")
+    words = ["bake", scene, "--output", made.folder, *QUICK, "--report", made.copy_of_report]
+    assert main([str(word) for word in words]) == 0
+    return made
 
 
 @pytest.fixture

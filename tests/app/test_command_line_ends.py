@@ -15,7 +15,7 @@ from pathlib import Path
 import bpy
 import pytest
 
-from .conftest import QUICK, ROOT, add_lamp, add_quad, build_room, digest, read_report, save, start
+from .conftest import QUICK, ROOT, Baked, add_lamp, add_quad, digest, read_report, save, start
 
 Run = Callable[..., object]
 
@@ -101,13 +101,12 @@ def test_an_unknown_object_is_a_usage_error(run: Run, room: Path, tmp_path: Path
     assert done.err.count("\n") == 1
 
 
-def test_the_scene_is_never_overwritten(run: Run, room: Path, tmp_path: Path) -> None:
-    assert run("bake", room, "--output", tmp_path / "out", *QUICK).code == 0
-    before = digest(tmp_path / "out")
-    done = run("bake", tmp_path / "out" / "baked.blend", "--output", tmp_path / "out", *QUICK)
+def test_the_scene_is_never_overwritten(run: Run, baked: Baked) -> None:
+    before = digest(baked.folder)
+    done = run("bake", baked.folder / "baked.blend", "--output", baked.folder, *QUICK)
     assert done.code == 2
     assert "baked.blend" in done.err
-    assert digest(tmp_path / "out") == before
+    assert digest(baked.folder) == before
 
 
 def test_restoring_what_shows_no_bake(run: Run, room: Path, tmp_path: Path) -> None:
@@ -117,10 +116,9 @@ def test_restoring_what_shows_no_bake(run: Run, room: Path, tmp_path: Path) -> N
     assert not (tmp_path / "back.blend").exists()
 
 
-def test_a_baked_file_bakes_again_as_the_original_does(run: Run, room: Path, tmp_path: Path) -> None:
-    assert run("bake", room, "--output", tmp_path / "one", *QUICK).code == 0
-    assert run("bake", tmp_path / "one" / "baked.blend", "--output", tmp_path / "two", *QUICK).code == 0
-    first, second = ((tmp_path / name / "lightmap.exr").read_bytes() for name in ("one", "two"))
+def test_a_baked_file_bakes_again_as_the_original_does(run: Run, baked: Baked, tmp_path: Path) -> None:
+    assert run("bake", baked.folder / "baked.blend", "--output", tmp_path, *QUICK).code == 0
+    first, second = ((folder / "lightmap.exr").read_bytes() for folder in (baked.folder, tmp_path))
     assert first == second
 
 
@@ -175,32 +173,19 @@ main(sys.argv[2:])
 """
 
 
-@pytest.fixture(scope="module")
-def baked_before(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    """A scene, and the folder of a good bake of it: to be copied."""
-    folder = tmp_path_factory.mktemp("before")
-    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    build_room()
-    room = save(folder / "room.blend")
-    job = start("bake", room, "--output", folder / "out", *QUICK, "--quiet", cwd=folder)
-    assert job.wait(timeout=300) == 0
-    return room, folder / "out"
-
-
-def copied(baked: tuple[Path, Path], to: Path) -> tuple[Path, Path]:
-    """A copy of the whole project."""
-    shutil.copytree(baked[0].parent, to / "project")
-    return to / "project" / baked[0].name, to / "project" / baked[1].name
+def copied(baked: Baked, to: Path) -> tuple[Path, Path]:
+    """A copy of the whole project: the scene, and the folder of its bake."""
+    shutil.copytree(baked.scene.parents[1], to / "project")
+    return to / "project" / "scene" / baked.scene.name, to / "project" / baked.folder.name
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals are sent the POSIX way")
 @pytest.mark.parametrize("stage", ["export", "solve", "light", "preview"])
-def test_ctrl_c_leaves_the_previous_result_whole(
-    stage: str, baked_before: tuple[Path, Path], tmp_path: Path
-) -> None:
-    room, out = copied(baked_before, tmp_path)
+def test_ctrl_c_leaves_the_previous_result_whole(stage: str, baked: Baked, tmp_path: Path) -> None:
+    room, out = copied(baked, tmp_path)
     before = digest(out)
-    job = start("bake", room, "--output", out, "--resolution", "256", cwd=tmp_path)
+    words = ("--resolution", "64", "--quality", "draft")
+    job = start("bake", room, "--output", out, *words, cwd=tmp_path)
     for line in job.stdout:
         if f"] {stage}" in line:
             os.killpg(job.pid, signal.SIGINT)
@@ -213,8 +198,8 @@ def test_ctrl_c_leaves_the_previous_result_whole(
 
 
 @pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="tells by /proc how far a process is")
-def test_ctrl_c_waits_while_blender_is_imported(baked_before: tuple[Path, Path], tmp_path: Path) -> None:
-    room, out = copied(baked_before, tmp_path)
+def test_ctrl_c_waits_while_blender_is_imported(baked: Baked, tmp_path: Path) -> None:
+    room, out = copied(baked, tmp_path)
     before = digest(out)
     job = start("bake", room, "--output", out, "--quiet", cwd=tmp_path)
     maps = Path(f"/proc/{job.pid}/maps")
@@ -229,9 +214,9 @@ def test_ctrl_c_waits_while_blender_is_imported(baked_before: tuple[Path, Path],
 @pytest.mark.skipif(os.name == "nt", reason="signals are sent the POSIX way")
 @pytest.mark.parametrize("moment", ["light", "preview", "publish"])
 def test_a_killed_bake_leaves_the_previous_result_whole(
-    moment: str, baked_before: tuple[Path, Path], run: Run, tmp_path: Path
+    moment: str, baked: Baked, run: Run, tmp_path: Path
 ) -> None:
-    room, out = copied(baked_before, tmp_path)
+    room, out = copied(baked, tmp_path)
     before = digest(out)
     words = ("bake", room, "--output", out, "--resolution", "64", "--quality", "draft", "--seed", "5")
     if moment == "publish":

@@ -7,6 +7,7 @@ from typing import Any
 import bpy
 import numpy as np
 
+from radiosity_addon.bake.plan import BakePlan
 from radiosity_addon.bake.result.result import BakeResult
 from radiosity_addon.base.errors import SceneError, UsageError
 from radiosity_addon.base.steps import drain
@@ -59,9 +60,9 @@ def _bake(settings: BakeSettings, seen: list[tuple[BakeScene, BakeResult]]) -> N
     """Bake the open scene, and keep what the pipeline was given and gave."""
     run_pipeline = job.run_pipeline
 
-    def watched(scene: BakeScene, *given: Any):
-        result, kept = run_pipeline(scene, *given)
-        seen.append((scene, result))
+    def watched(plan: BakePlan, *given: Any):
+        result, kept = run_pipeline(plan, *given)
+        seen.append((plan.bake_scene, result))
         return result, kept
 
     job.run_pipeline = watched

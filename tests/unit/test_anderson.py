@@ -82,9 +82,9 @@ def test_a_bright_closed_room_needs_a_quarter_of_jacobis_gathers() -> None:
     triangles, _ = box_room((3, 2, 2), n=3)
     count = len(triangles)
     scene = Scene(triangles, grey(count, 0.95), grey(count, 0.0), lights=[PointLight((1.0, 1.2, 0.7), 10.0)])
-    state = solved(scene, error=1e-3)
+    state = solved(scene, error=3e-3)
     assert len(state.cluster_links) > 0
-    assert state.settings == SolverSettings(error=1e-3)
+    assert state.settings == SolverSettings(error=3e-3)
     measured = (state.links, state.cluster_links)
     balance = state.conservation.balance(state.hierarchy, state.top, *measured, rough=True)
     links = (balance.links, state.direct())
@@ -112,7 +112,7 @@ def test_a_bright_closed_room_needs_a_quarter_of_jacobis_gathers() -> None:
 def test_an_iteration_whose_residual_falls_no_more_ends(monkeypatch: pytest.MonkeyPatch) -> None:
     triangles, _ = box_room((1, 1, 1), n=1)
     scene = Scene(triangles, grey(len(triangles), 0.5), grey(len(triangles), 1.0))
-    state = solved(scene)
+    state = solved(scene, error=1e-2)
     state.reset()
     state.iterations = 0
     residuals = [0.9**step for step in range(20)]

@@ -56,7 +56,7 @@ def test_a_right_solution_has_a_black_picture() -> None:
 @pytest.mark.parametrize("method", ["hierarchical", "dense"])
 def test_the_cornell_box_errs_both_ways_alike(method: str) -> None:
     given = {"elements": 400} if method == "dense" else {}
-    result = run(bake_scene(cornell_box(), ("Box", 32)), resolution=96, method=method, **given)
+    result = run(bake_scene(cornell_box(), ("Box", 32)), resolution=64, method=method, **given)
     found = texels(result)
     mean, size = found.mean(axis=0), np.abs(found).mean(axis=0)
     assert (found.min(axis=0) < -5 * size).all()

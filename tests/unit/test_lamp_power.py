@@ -21,7 +21,7 @@ def scene_of(triangles: np.ndarray, lamp: Emitter, two_sided: bool = True) -> Sc
 def test_few_samples_next_to_a_lamp_make_no_light() -> None:
     """Elements that may not be divided have few samples: one near a lamp spoke for all of the element."""
     floor = rectangle((-30, -30, 0), (60, 0, 0), (0, 60, 0))
-    for seed in range(12):
+    for seed in range(4):
         place = np.random.default_rng(seed).uniform(-20, 20, 2)
         lamp = PointLight((*place, 2.0), 100.0)
         power = power_balance(solved(scene_of(floor, lamp), min_area=0.5, error=0.01, seed=seed))

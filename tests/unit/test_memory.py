@@ -71,6 +71,7 @@ def lit_room(n: int) -> Scene:
     return Scene(triangles, grey(len(triangles), 0.5), emission)
 
 
+@pytest.mark.full  # a process's peak; the budget and what a link takes are checked by the tests below
 def test_a_solution_takes_no_more_than_the_limit() -> None:
     """4,108 faces of clutter, refined until the limit stops it: what the process grows by."""
     limit = 0.25

@@ -104,6 +104,7 @@ def test_a_bake_stays_within_the_limit_by_what_is_foreseen() -> None:
     assert plans[0].memory < plans[1].memory <= 4 * 2**30 - min(process_bytes(), 2 * 2**30)
 
 
+@pytest.mark.full  # a page of a megapixel; `test_memory_per_texel` counts what each stage takes on small ones
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="no peak of a process to read")
 def test_the_peak_of_a_process_stays_within_the_limit() -> None:
     """1024² texels, for which 0.9 GB were needed once."""

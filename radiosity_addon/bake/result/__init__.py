@@ -1,4 +1,4 @@
-"""What a bake yields: pages, objects, details for overlays, pictures, the report.
+"""What a bake yields: pages, objects, details for overlays, progress, the report.
 
 Plain records and files, nothing that bakes.
 """
@@ -6,6 +6,7 @@ Plain records and files, nothing that bakes.
 from __future__ import annotations
 
 from .details import MEANS, More, more_of, statistics
+from .history_plot import write_history
 from .pictures import Picture, TexelPicture, TexelSurfaces
 from .report import BakeReport, LightmapFile, solver_part
 from .result import BakeDetails, BakedObject, BakeResult, LightGroup, PageDetails
@@ -28,4 +29,5 @@ __all__ = [
     "more_of",
     "solver_part",
     "statistics",
+    "write_history",
 ]

@@ -1,7 +1,7 @@
 """A kept bake in a file beside its lightmaps: what lights it anew when Blender was closed meanwhile.
 
 Only what relighting reads is stored. The geometry itself is not: the scene brings it again, and its
-fingerprint must be that of the bake.
+objects must be those of the bake.
 """
 
 from __future__ import annotations
@@ -31,8 +31,9 @@ from ...solver.hierarchy import Clusters, Hierarchy, TreeTop
 from ...solver.links import ClusterLinks, LightLinks, Links
 from ...solver.methods import HierarchicalState
 from ...solver.settings import SolverSettings
-from ..relight import DAMAGED, KeptBake, check_same, damaged, scene_digests
+from ..relight import DAMAGED, KeptBake, damaged
 from ..result import BakedObject, BakeResult
+from ..scene_diff import RELIGHTABLE, SceneRecord, compare, scene_record
 from .array_file import ArrayFileError, TooLargeError, read_arrays, read_digest, write_arrays
 from .plain_objects import flatten, restore
 from .sidecar_checks import check_stored, stored_layout
@@ -127,15 +128,15 @@ class StoredBake:
             If the file is not of the scene that it says it is of.
         """
         stored = self._stored
-        check_same(stored["fingerprint"], bake_scene)
+        now = scene_record(bake_scene)
+        compare(SceneRecord(stored["objects"], now.lights), now).refuse_all_but(RELIGHTABLE)
         baked = sum(item.bake and item.count > 0 for item in bake_scene.objects)
         if stored_layout(stored) != (len(bake_scene.scene), baked):
             raise damaged(self.path)
         scene = copy(bake_scene.scene)
         scene.emission, scene.lights = stored["emission"], stored["solved"].sources.lights
-        before = replace(bake_scene, scene=scene, **stored["of_sources"])
         return KeptBake(
-            before,
+            replace(bake_scene, scene=scene, **stored["of_sources"]),
             self.settings,
             solved=stored["solved"],
             lit=stored["lit"],
@@ -179,7 +180,7 @@ def write_sidecar(path: Path, kept: KeptBake, result: BakeResult, mark: str) -> 
     stored = {
         "mark": mark,
         "settings": asdict(kept.settings),
-        "fingerprint": scene_digests(kept.bake_scene),
+        "objects": kept.record.objects,
         "emission": kept.bake_scene.scene.emission,
         "of_sources": {name: getattr(kept.bake_scene, name) for name in OF_SOURCES},
         "pages": [item.page for item in result.objects],

@@ -22,7 +22,7 @@ from ...options import MAX_RESOLUTION, BakeSettings
 from ...solver.element_transport import ElementTransport, Relightable
 from ...solver.emitters import NO_SOURCE, EmitterGroup, LightSources
 from ...solver.gather import NOTHING, AimedRays, LightGains, LocalPass
-from ..relight import as_scene_digests
+from ..scene_diff import as_object_records
 from .hierarchy_checks import MOST_LEVELS, MOST_THREADS, check_elements
 from .value_checks import LARGE, SLACK, array_of, instance, integers, number, numbers, require, whole
 
@@ -47,7 +47,7 @@ def check_stored(stored: Any) -> None:
     """
     instance(stored["mark"], str)
     _check_settings(BakeSettings(**stored["settings"]))
-    stored["fingerprint"] = as_scene_digests(stored["fingerprint"])
+    stored["objects"] = as_object_records(stored["objects"])
     solved, lit, geometry = (
         instance(stored["solved"], Relightable),
         instance(stored["lit"], LitTexels),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import bpy
 
-from ...bake import KeepOptions, timed
+from ...bake import BakeDigests, KeepOptions, timed
 from ...bake.relight import strengths_in
 from ...bake.result import BakeReport
 from ...bake.sidecar import StoredBake, check_belongs, read_sidecar
@@ -96,7 +96,7 @@ def relight_into(
     """
     from ..apply.rebake import Originals
     from ..images.images import group_file_names, page_file_names
-    from ..jobs.job import deliver
+    from ..jobs.finish import Copies, finish
     from ..jobs.preview import QUICK_SAMPLES
     from ..relight.relight_scene import lit
     from ..scene_export.export import export_steps
@@ -119,14 +119,15 @@ def relight_into(
         output.expect(name for of in group_file_names(result, stored.settings) for name in of)
         yield Status("apply", APPLY)
         keeping = KeepOptions(sidecar=True, mark=stored.mark)
-        delivered = deliver(
+        finished = finish(
             context,
             stored.settings,
             export,
             result,
             output,
+            digests=BakeDigests.of(export.bake_scene, stored.settings),
             seconds=seconds,
             keeping=keeping,
-            samples=QUICK_SAMPLES if preview else None,
+            copies=Copies(QUICK_SAMPLES if preview else None),
         )
-        return (yield from delivered)
+        return (yield from finished)

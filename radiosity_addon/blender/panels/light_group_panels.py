@@ -7,11 +7,12 @@ from typing import Any
 import bpy
 
 from ...options import GROUPS
-from ..images.light_mixer import Sliders, mixers, sliders_of
+from ..operators.panel_facts import light_mixers, listed_groups
 from ..scene_records.light_membership import NAME
 from ..scene_records.object_roles import BAKEABLE_TYPES
-from ..settings.light_group_properties import ListedGroup, listed_groups
+from ..settings.light_group_properties import ListedGroup
 from .option_rows import draw_options
+from .relight_panel import draw_light
 from .sections import Section
 
 _COUNTS = (
@@ -39,7 +40,7 @@ class LightGroupSection(Section):
     def draw(cls, layout: Any, context: bpy.types.Context) -> None:
         """Draw the list, and below it the sliders."""
         draw_options(layout, GROUPS, context, in_header="light_groups")
-        groups = listed_groups(context.scene)
+        groups = listed_groups(context)
         column = layout.column(align=True)
         for group in groups:
             _draw_group(column.row(align=True), group)
@@ -50,13 +51,13 @@ class LightGroupSection(Section):
         row.operator("radiosity.light_group_remove", text="Ungroup", icon="REMOVE")
         if context.scene.world is not None:
             layout.prop(context.scene.world, NAME, text="World")
-        shown = mixers()
-        for tree in shown:
+        shown = light_mixers(context)
+        for name, rows in shown:
             box = layout.box()
             if len(shown) > 1:
-                box.label(text=tree.name, icon="NODETREE")
-            for sliders in sliders_of(tree):
-                _draw_sliders(box, sliders)
+                box.label(text=name, icon="NODETREE", translate=False)
+            for light in rows:
+                draw_light(box, light)
         if shown:
             layout.operator("radiosity.light_group_reset", text="Reset", icon="LOOP_BACK")
         elif groups and not context.scene.radiosity.use_light_groups:
@@ -163,14 +164,6 @@ def _draw_group(row: Any, group: ListedGroup) -> None:
             row.label(text=str(number), icon=icon)
     row.operator("radiosity.light_group_select", text="", icon="RESTRICT_SELECT_OFF").group = group.name
     row.operator("radiosity.light_group_assign", text="", icon="IMPORT").group = group.name
-
-
-def _draw_sliders(layout: Any, sliders: Sliders) -> None:
-    """Draw a baked group's color and strength; both can be keyframed where they are drawn."""
-    row = layout.row(align=True)
-    row.label(text=sliders.name)
-    row.prop(sliders.color, "default_value", text="")
-    row.prop(sliders.strength, "default_value", text="")
 
 
 CLASSES = (

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
 
-from ...options import OPTIONS, sections_of
+from ...options import OPTIONS, Option, sections_of
 from ..settings.option_properties import shown
 from ..settings.preferences import PREFERRED, preferences
 
@@ -29,13 +28,31 @@ def draw_options(layout: Any, part: str, context: bpy.types.Context, in_header: 
         # Only next to a check box there is room for a heading.
         column = layout.column(heading=section if rows[0].kind is bool else "")
         for option in rows:
-            column.prop(settings, option.identifier)
+            if option.automatic:
+                _draw_automatic(column, option, settings)
+            else:
+                column.prop(settings, option.identifier)
             if option.name in PREFERRED and not settings.is_property_set(option.identifier):
                 preferred = getattr(preferences(context), option.name)
                 draw_preferred(column, preferred, getattr(settings, option.identifier))
 
 
+def _draw_automatic(layout: Any, option: Option, settings: Any) -> None:
+    """Draw a number that the quality sets: a button until it has a value, then the value and a way back."""
+    if getattr(settings, option.identifier):
+        row = layout.row(align=True)
+        row.prop(settings, option.identifier)
+        row.operator("radiosity.set_option", text="", icon="LOOP_BACK").option = option.name
+        return
+    assert option.panel is not None
+    row = layout.split(factor=0.4)
+    name = row.row()
+    name.alignment = "RIGHT"
+    name.label(text=option.panel.label)
+    row.operator("radiosity.set_option", text="set by quality").option = option.name
+
+
 def draw_preferred(layout: Any, preferred: Any, own: Any) -> None:
     """Say that the preferences' value counts where the scene has none of its own."""
     if preferred != own:
-        layout.label(text=iface_("From the preferences: {}").format(preferred), icon="INFO", translate=False)
+        layout.label(text=f"From the preferences: {preferred}", icon="INFO", translate=False)

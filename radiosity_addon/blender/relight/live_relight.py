@@ -19,12 +19,14 @@ import numpy as np
 
 from ...bake.relight import Responses, are_wanted
 from ...bake.result import LightGroup
+from ...bake.scene_diff import RELIGHTABLE
 from ...base import BakeError, Progress, RadiosityError
 from ...lightmap.images import LightmapPage
 from ...numerics import Array
 from ..images.group_images import update_images
-from ..session import live_state
 from ..session.background import in_thread
+from ..session.redraw import redraw_viewports
+from ..session.state import session
 from . import kept_bakes, lightmap_versions
 from .live_scene import LiveScene
 from .live_strengths import StrengthReader
@@ -78,7 +80,7 @@ class LiveRelight:
 
     def settle(self) -> None:
         """Do at one go what the timer would do: for scripts, where no timer fires."""
-        while live_state.state.live is self and self.step(in_background=False):
+        while session.live is self and self.step(in_background=False):
             pass
 
     def look_again(self) -> None:
@@ -112,7 +114,7 @@ class LiveRelight:
                 self._carry_on(in_background)
             return True
         except RadiosityError as error:
-            live_state.stop(f"Live is off: {' '.join(str(error).split())}")
+            session.stop_live(f"Live is off: {' '.join(str(error).split())}")
             return False
 
     def _begin(self) -> None:
@@ -135,7 +137,7 @@ class LiveRelight:
         assert self._reader is not None
         assert self._fits is not None
         self._dirty, started = False, time.perf_counter()
-        self._fits.check(self._reader)
+        self._fits.diff(self._reader).refuse_all_but(RELIGHTABLE)
         strengths = self._held().bake.sources.checked(self._reader.read())
         if np.array_equal(strengths, self._strengths):
             return
@@ -167,7 +169,7 @@ class LiveRelight:
             show_emission({held.bake.names[row] for row in np.flatnonzero(changed) if row >= lights})
         self._shown = self._strengths
         self.changes += 1
-        _redraw()
+        redraw_viewports()
 
     def _choose_work(self, in_background: bool) -> bool:
         """Begin what is most wanted; False if all is done, or it is too early."""
@@ -225,7 +227,7 @@ class LiveRelight:
         rewrite(kept_bakes.mark_of(scene), pages, groups, 0.0)
         note_shown(scene, held, strengths)
         self._shown, self._exact = strengths, True
-        _redraw()
+        redraw_viewports()
 
     def _end_work(self) -> None:
         work, self._work, self._doing = self._work, None, None
@@ -254,17 +256,8 @@ def _wake() -> None:
 def _tick() -> float | None:
     """Carry on, as long as there is something to do; nothing may be raised."""
     try:
-        live = live_state.state.live
+        live = session.live
         return TICK if live is not None and live.step(in_background=True) else None
     except Exception as error:  # noqa: BLE001 (as above)
-        live_state.stop(f"Live is off: {type(error).__name__}: {error}")
+        session.stop_live(f"Live is off: {type(error).__name__}: {error}")
         return None
-
-
-def _redraw() -> None:
-    """Have every 3D viewport drawn again."""
-    manager = bpy.context.window_manager
-    for window in manager.windows if manager is not None else ():
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()

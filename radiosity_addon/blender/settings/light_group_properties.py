@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import time
-from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import bpy
 
 from ..datablocks.bake_record import is_made
 from ..scene_records.light_membership import NAME, lamps_by_group, name_on, named
+from ..session import facts
 
 LONGEST_NAME = 48
 """Characters of a group's name."""
-
-OUTDATED_AFTER = 1.0
-"""Seconds after which the list is made anew if it is drawn: collections change without telling us."""
 
 _DESCRIPTIONS = (
     (bpy.types.Object, "Light group of this lamp, or of all that this object or instance emits"),
@@ -27,9 +24,8 @@ _DESCRIPTIONS = (
 )
 
 
-@dataclass(eq=False, repr=False)
-class ListedGroup:
-    """One light group of a scene, as the panel lists it."""
+class ListedGroup(NamedTuple):
+    """One light group of a scene, as the panel lists it: how many of each kind are in it."""
 
     name: str
     lamps: int = 0
@@ -39,37 +35,13 @@ class ListedGroup:
     worlds: int = 0
 
 
-@dataclass(eq=False, repr=False)
-class _Cache:
-    """What was found last: without this text the decorator would work one out, slowly."""
-
-    scene: str = ""
-    made: float = float("-inf")
-    groups: list[ListedGroup] = field(default_factory=list)
-
-
-_cache = _Cache()
-
-
-def listed_groups(scene: bpy.types.Scene) -> list[ListedGroup]:
-    """Return the scene's light groups by name, at most a second old: `draw()` runs at every redraw."""
-    now = time.monotonic()
-    if _cache.scene != scene.name_full or now - _cache.made > OUTDATED_AFTER:
-        _cache.scene, _cache.made, _cache.groups = scene.name_full, now, _listed(scene)
-    return _cache.groups
-
-
-def outdate() -> None:
-    """Have the list made anew: a name has changed."""
-    _cache.made = float("-inf")
-
-
-def _listed(scene: bpy.types.Scene) -> list[ListedGroup]:
+def list_groups(scene: bpy.types.Scene) -> tuple[ListedGroup, ...]:
+    """Return the scene's light groups by name."""
     found: dict[str, ListedGroup] = {}
 
     def count(name: str, kind: str, number: int = 1) -> None:
-        group = found.setdefault(name, ListedGroup(name))
-        setattr(group, kind, getattr(group, kind) + number)
+        group = found.get(name) or ListedGroup(name)
+        found[name] = group._replace(**{kind: getattr(group, kind) + number})
 
     for name, lamps in lamps_by_group(scene).items():
         if name:
@@ -82,16 +54,16 @@ def _listed(scene: bpy.types.Scene) -> list[ListedGroup]:
         count(name, "collections")
     if name_on(scene.world):
         count(name_on(scene.world), "worlds")
-    return [found[name] for name in sorted(found, key=lambda name: (name.casefold(), name))]
+    return tuple(found[name] for name in sorted(found, key=lambda name: (name.casefold(), name)))
 
 
 def _changed(_owner: bpy.types.ID, _context: bpy.types.Context) -> None:
-    outdate()
+    facts.outdate()
 
 
 def _known_names(_owner: bpy.types.ID, context: bpy.types.Context, text: str) -> list[str]:
     """Suggest the groups there are while a name is typed."""
-    return [group.name for group in listed_groups(context.scene) if text.casefold() in group.name.casefold()]
+    return [group.name for group in list_groups(context.scene) if text.casefold() in group.name.casefold()]
 
 
 def register() -> None:
@@ -115,4 +87,3 @@ def unregister() -> None:
     """Take it away; what a file holds stays in the file."""
     for kind, _ in _DESCRIPTIONS:
         delattr(kind, NAME)
-    outdate()

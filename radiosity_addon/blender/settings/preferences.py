@@ -101,9 +101,11 @@ def memory_limit_of(context: bpy.types.Context) -> float | None:
 CLASSES = (RADIOSITY_AP_preferences,)
 
 
+def is_packed(context: bpy.types.Context) -> bool:
+    """Whether the panel's bake packs its lightmaps: a folder next to an unsaved file has no place yet."""
+    return folder_of(context).startswith("//") and not bpy.data.filepath
+
+
 def output_folder(context: bpy.types.Context) -> Path | None:
-    """Return where the panel's bake writes; None packs, for an unsaved file has no place."""
-    folder = folder_of(context)
-    if folder.startswith("//") and not bpy.data.filepath:
-        return None
-    return Path(bpy.path.abspath(folder)).resolve()
+    """Return where the panel's bake writes; None if it packs."""
+    return None if is_packed(context) else Path(bpy.path.abspath(folder_of(context))).resolve()

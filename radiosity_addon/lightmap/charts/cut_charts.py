@@ -37,13 +37,8 @@ _COPLANAR = 1e-5
 class Charts:
     """One object's charts.
 
-    Parameters
-    ----------
-    uv : (n, 3, 2) float64
-        1 unit is 1 m; every chart has its own origin.
-    chart : (n,) int64
-        0 … count − 1, or −1 for triangles of polygons without area.
-    count : int
+    uv (n, 3, 2): 1 unit is 1 m; every chart has its own origin.
+    chart (n,) int64: 0 … count − 1, or −1 for triangles of polygons without area.
     """
 
     uv: Float
@@ -54,14 +49,9 @@ class Charts:
 def unwrap(triangles: Float, polygon: Int, grow: GrowCharts | None, progress: Progress = SILENT) -> Charts:
     """Cut an object into charts, piece by piece.
 
-    Parameters
-    ----------
-    triangles : (n, 3, 3) float64
-        Corners in world space [m].
-    polygon : (n,) int
-        The polygon of each triangle.
-    grow : callable or None
-        The chart grower; None gives every polygon a chart of its own.
+    triangles (n, 3, 3): Corners in world space [m].
+    polygon (n,) int: The polygon of each triangle.
+    grow: The chart grower; None gives every polygon a chart of its own.
     """
     polygon = numbered(polygon)
     uv = np.zeros((len(triangles), 3, 2))
@@ -123,7 +113,7 @@ def _unwrap_piece(
         return uv, chart
     chart[used] = numbered(chart[used])
     uv[used] = _to_scale(uv[used], triangles[used], chart[used], own[used])
-    # Own charts were looked at already.
+    # Separate charts were checked before.
     over = _overlapping_polygons(uv, np.where(own, -1, chart), polygon)
     if not len(over):
         return uv, chart
@@ -137,7 +127,7 @@ def _unwrap_piece(
 
 
 def _overlapping_polygons(uv: Float, chart: Int, polygon: Int) -> NDArray[np.intp]:
-    """Return the triangles to cut out until, as far as is seen, no chart overlaps itself."""
+    """Return the triangles to cut out until no overlap of a chart with itself is found."""
     # Two triangles side by side cannot overlap.
     left = np.flatnonzero(chart >= 0)
     left = left[np.bincount(chart[left])[chart[left]] > 2] if len(left) else left
@@ -150,7 +140,7 @@ def _overlapping_polygons(uv: Float, chart: Int, polygon: Int) -> NDArray[np.int
 
 
 def _split_parts(uv: Float, chart: Int) -> Int:
-    """Renumber charts so that what no longer hangs together becomes charts of their own."""
+    """Renumber charts so that disconnected parts become separate charts."""
     used = np.flatnonzero(chart >= 0)
     if not len(used):
         return chart
@@ -181,7 +171,7 @@ def _torn_polygons(
     """Return which polygons need a chart of their own.
 
     Those cut by the grower, left out by it, turned over against the rest of their chart, or
-    with a triangle without area beside one that has some (the grower never saw it).
+    with a triangle without area next to one that has some (the grower never saw it).
     """
     count = int(polygon.max()) + 1
     torn = np.zeros(count, dtype=np.bool_)

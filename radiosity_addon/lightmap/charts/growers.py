@@ -1,4 +1,4 @@
-"""Cutting meshes into charts: xatlas, and what stands in for it."""
+"""Cutting meshes into charts: xatlas, and its fallback."""
 
 from __future__ import annotations
 
@@ -21,20 +21,11 @@ _resting = Resting()
 def grow_charts(vertices: Float, faces: Int, in_window: bool = False) -> tuple[Float, Int]:
     """Cut a mesh into charts with xatlas.
 
-    Parameters
-    ----------
-    vertices : (v, 3) float64
-        At a scale where triangles are about 1 in area, welded.
-    faces : (n, 3) int64
-    in_window : bool
-        Whether a window is drawn meanwhile: what would be seen in it is done in another process.
-
-    Returns
-    -------
-    uv : (n, 3, 2) float64
-        Stretched along u and v, each chart otherwise; charts may lie over each other.
-    chart : (n,) int64
-        −1 for faces that xatlas left out.
+    vertices (v, 3): At a scale where triangles are about 1 in area, welded.
+    faces (n, 3) int64.
+    in_window: Whether a window is drawn meanwhile; long work is then done in another process.
+    Returns uv (n, 3, 2): Stretched along u and v, each chart otherwise; charts may lie over each other.
+    Returns chart (n,) int64: −1 for faces that xatlas left out.
     """
     if in_window and len(faces) > WORTH_A_PROCESS:
         grown = run_apart(vertices, faces)
@@ -48,10 +39,7 @@ def grow_charts(vertices: Float, faces: Int, in_window: bool = False) -> tuple[F
 class PatientGrower:
     """Grows charts with xatlas until an object has taken too long, and then by directions.
 
-    Attributes
-    ----------
-    gave_up : bool
-        Whether it came to that.
+    gave_up: Whether it came to that.
     """
 
     def __init__(self, seconds: float, in_window: bool = False) -> None:

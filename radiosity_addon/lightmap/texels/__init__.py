@@ -1,4 +1,4 @@
-"""Texels: the triangle of each, its place in the world, what reflects there, what cuts it.
+"""Texels: their triangles, positions and materials, and the geometry that divides them.
 
 No light yet.
 """

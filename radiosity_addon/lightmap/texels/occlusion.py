@@ -1,9 +1,9 @@
-"""Texels that geometry cuts in two: a wall's foot on a floor, the rim of what a box covers.
+"""Texels that geometry divides, occludes or touches.
 
 Such a texel shows the mean of both sides, as it should, but answers no ray with it: see
 `cells.py`.
 
-What hovers closely over a surface (a window's frame a millimetre off the wall, a door in its
+What hovers closely over a surface (a window's frame a millimeter off the wall, a door in its
 frame) parts light from dark likewise, though nothing stands on the texel, and the gap lets lines
 of sight along the surface through. Short probes along the normal tell which texels are *hooded*,
 and which only partly.
@@ -44,15 +44,12 @@ _SPOTS = np.array([[u, v] for u in (0.02, 0.5, 0.98) for v in (0.02, 0.5, 0.98)]
 
 @dataclass(frozen=True)
 class Crossings:
-    """What geometry does to n texels, (n,) bool each.
+    """The effect of geometry on n texels, (n,) bool each.
 
-    Attributes
-    ----------
-    geometry : TexelGeometry
-    cut : geometry stands on them
-    touched : they end at geometry; neither cut nor at a rim
-    rim : a hood's rim is above them
-    occluded : all of them is below a hood; neither cut nor at a rim
+    cut geometry stands on them.
+    touched they end at geometry; neither cut nor at a rim.
+    rim a hood's rim is above them.
+    occluded all of them is below a hood; neither cut nor at a rim.
     """
 
     geometry: TexelGeometry
@@ -77,12 +74,12 @@ class Crossings:
 
     @cached_property
     def alone(self) -> Array:
-        """Texels whose light is like no neighbour's, though a line of sight may join them."""
+        """Texels whose light differs from their neighbors' even where they see each other."""
         return self.crossed | self.occluded
 
     @cached_property
     def beside(self) -> Array:
-        """Texels next to a crossed one: what stands there takes half of what they see."""
+        """Texels next to a crossed one: geometry there blocks half of their view."""
         return self.geometry.neighbourhood(self.crossed) & ~self.alone
 
 
@@ -94,7 +91,7 @@ def find_crossings(
     anew: Array | None = None,
     progress: Progress = SILENT,
 ) -> Crossings:
-    """Find the texels that geometry cuts, touches or hoods.
+    """Find the texels that geometry divides, touches or occludes.
 
     Given how it was `before`, only some texels, row numbers, are tried `anew`.
     """

@@ -1,4 +1,4 @@
-"""Where every lightmap texel lies in the world, over all pages at once."""
+"""Positions of all lightmap texels of all pages in the world."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ EDGE_OFFSETS = 4.0
 """Points keep this many ray offsets from the edges of their triangles."""
 
 SINK = 2.0
-"""Points that lie against another surface are so many ray offsets behind their own."""
+"""Points that touch another surface lie this many ray offsets behind their own."""
 
 CHUNK = 1 << 16
 """Texels placed at once; bounds the temporaries to about 40 MB."""
@@ -30,38 +30,22 @@ _SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 class TexelGeometry:
     """The n covered texels of all pages, numbered page by page.
 
-    Parameters
-    ----------
-    scene : Scene
-    uv : (t, 3, 2) float32
-        Lightmap coordinates of every scene triangle; rows without a lightmap are ignored.
-    page_of_triangle : (t,) int32
-        −1 where a triangle has no lightmap.
-    texels : sequence of Texels
-        One per page.
-    rows : sequence of (p,) int
-        Per page, the scene triangle of each of the page's triangles.
-    scratch : Scratch or None
-        Makes the texels' arrays; None keeps them in memory.
-
-    Attributes
-    ----------
-    scratch : Scratch
-        Makes arrays of what else there is of each texel.
-    uv, page_of_triangle, triangles, face_normals, normals
-        Of every scene triangle, as given.
-    page : (n,) int16, or int32 where there are more pages
-    row, column, triangle : (n,) int32
-    share : (n,) float32
-        What part of the texel its triangle covers.
-    centre_inside : (n,) bool
-        Whether the texel's centre is on its triangle.
-    whole : (n,) bool
-        Whether all of the texel is.
-    barycentric : (n, 2) float32
-        Weights of the triangle's second and third corner at the centre of the footprint.
-    position, normal, surface_normal : (n, 3) float64
-        Centre of the footprint; interpolated shading normal; the triangle's own normal.
+    uv (t, 3, 2) float32: Lightmap coordinates of every scene triangle; rows without a lightmap are ignored.
+    page_of_triangle (t,) int32: −1 where a triangle has no lightmap.
+    texels: One per page.
+    rows sequence of (p,) int: Per page, the scene triangle of each of the page's triangles.
+    scratch: Makes the texels' arrays; None keeps them in memory.
+    scratch: Makes arrays of what else there is of each texel.
+    uv, page_of_triangle, triangles, face_normals, normals: Of every scene triangle, as given.
+    page (n,) int16, or int32 where there are more pages.
+    row, column, triangle (n,) int32.
+    share (n,) float32: What part of the texel its triangle covers.
+    centre_inside (n,) bool: Whether the texel's center is on its triangle.
+    whole (n,) bool: Whether all of the texel is.
+    barycentric (n, 2) float32: Weights of the triangle's second and third corner at the center of the
+        footprint.
+    position, normal, surface_normal (n, 3): Center of the footprint; interpolated shading normal; the
+        triangle's own normal.
     """
 
     scratch = Scratch()
@@ -134,13 +118,13 @@ class TexelGeometry:
         ]
 
     def _put(self, rows: slice, weights: Array) -> None:
-        """Put texels where barycentric weights (r, 3) of their triangles say."""
+        """Move texels to barycentric weights (r, 3) of their triangles."""
         triangle, upright = self.triangle[rows], self.surface_normal[rows]
         self.barycentric[rows] = weights[:, 1:]
         self.position[rows] = self._sunk(rows, _at(self.triangles[triangle], weights[:, None]))[:, 0]
         shading = np.einsum("nc,nck->nk", weights, self.normals[triangle])
         length = np.linalg.norm(shading, axis=1, keepdims=True)
-        # A shading normal that vanished or turned behind the surface says nothing.
+        # A shading normal that vanished or points behind the surface is not usable.
         sane = (length[:, 0] > 1e-6) & (np.einsum("nk,nk->n", shading, upright) > 0)
         self.normal[rows] = np.where(sane[:, None], shading / np.maximum(length, 1e-6), upright)
 
@@ -194,7 +178,7 @@ class TexelGeometry:
     def sample(self, rows: Array, u: Array, width: float = FOOTPRINT) -> Array:
         """Return (r, k, 3) points spread over the middle `width` of r texels by u (r, k, 2)."""
         points = np.empty((len(rows), u.shape[1], 3))
-        # What is inside a texel that is whole on its triangle needs no clipping.
+        # Texels that lie entirely on their triangle need no clipping.
         inner = self.whole[rows] & ((width < 1.0) | ((u > 0.0) & (u < 1.0)).all(axis=(1, 2)))
         plain, cut = np.flatnonzero(inner), np.flatnonzero(~inner)
         points[plain] = self._in_plane(rows[plain], 0.5 + (u[plain].astype(np.float64) - 0.5) * width)
@@ -259,7 +243,7 @@ class TexelGeometry:
         return weights
 
     def _drawn_in(self, weights: Array, triangle: Array) -> Array:
-        """Move (n, k, 3) barycentric points that lie on an edge of their triangle off it by a hair."""
+        """Move (n, k, 3) barycentric points that lie on an edge of their triangle slightly off it."""
         inside = np.maximum(weights, self._inset[triangle][:, None])
         moved = (inside != weights).any(axis=2, keepdims=True)
         return np.asarray(np.where(moved, inside / inside.sum(axis=2, keepdims=True), weights))
@@ -281,7 +265,7 @@ class TexelGeometry:
 
     @cached_property
     def _framed(self) -> list[Array]:
-        """Per page, where its texels lie in a page that is one texel larger all around, row by row."""
+        """Per page, the positions of its texels in a page with a border of one texel, row by row."""
         framed = [self.scratch.empty(len(page), np.int32) for page in self.texels]
         for page, places in zip(self.texels, framed, strict=True):
             for tile in tiles(len(page)):

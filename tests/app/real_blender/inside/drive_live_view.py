@@ -26,7 +26,7 @@ FILE = bpy.data.filepath
 MODULE = "bl_ext.user_default.radiosity_addon"
 live_view = importlib.import_module(f"{MODULE}.blender.jobs.live_view")
 pipeline = importlib.import_module(f"{MODULE}.bake.pipeline")
-runtime = importlib.import_module(f"{MODULE}.blender.session.runtime")
+runtime = importlib.import_module(f"{MODULE}.blender.session.state").session
 
 seen = {"pictures": [], "shots": []}
 

@@ -22,7 +22,7 @@ live_view = importlib.import_module(f"{MODULE}.blender.jobs.live_view")
 kept_details = importlib.import_module(f"{MODULE}.blender.session.kept_details")
 overlay_pictures = importlib.import_module(f"{MODULE}.blender.overlays.overlay_pictures")
 overlay_panel = importlib.import_module(f"{MODULE}.blender.panels.overlay_panel")
-runtime = importlib.import_module(f"{MODULE}.blender.session.runtime")
+runtime = importlib.import_module(f"{MODULE}.blender.session.state").session
 texel_pictures = importlib.import_module(f"{MODULE}.bake.result.texel_pictures")
 
 OVERLAYS = ("FALSE_COLOR", "DENSITY", "CHECKER", "TEXELS", "ELEMENTS", "LINKS", "ERROR")
