@@ -16,7 +16,6 @@ from radiosity_addon.bake.relight.kept_bake import relight_pages
 from radiosity_addon.bake.sidecar.array_file import read_arrays, write_arrays
 from radiosity_addon.bake.sidecar.sidecar import FORMAT, MAGIC, read_sidecar, write_sidecar
 from radiosity_addon.base.errors import RadiosityError, SceneError
-from radiosity_addon.base.progress import drain
 from radiosity_addon.options.bake_settings import BakeSettings
 from tests.relit_rooms import CHANGED, lit_bake
 
@@ -29,7 +28,7 @@ SETTINGS = BakeSettings(resolution=8, quality="draft", threads=1)
 def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, list[Array]]:
     """What a sidecar holds."""
     path = tmp_path_factory.mktemp("whole") / "lightmap.relight"
-    result, kept = drain(bake_and_keep(lit_bake(), SETTINGS))
+    result, kept = bake_and_keep(lit_bake(), SETTINGS)
     write_sidecar(path, kept, result, "mark")
     return read_arrays(path, MAGIC, FORMAT)
 
@@ -42,7 +41,7 @@ def outcome(path: Path, told: Any, arrays: list[Array]) -> str:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of numbers that overflow
             stored = read_sidecar(path)
-            pages = drain(relight_pages(stored.kept(scene), CHANGED))
+            pages = relight_pages(stored.kept(scene), CHANGED)
             stored.result(scene, pages)
     except SceneError as error:
         return f"{path} is of another scene: {error}"

@@ -28,7 +28,6 @@ from radiosity_addon.bake.sidecar.sidecar import (
     write_sidecar,
 )
 from radiosity_addon.base.errors import BakeError, SceneError
-from radiosity_addon.base.progress import drain
 from radiosity_addon.lights.environment import EnvironmentImage
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
@@ -43,7 +42,7 @@ SETTINGS = BakeSettings(resolution=32, quality="draft")
 
 @pytest.fixture(scope="module")
 def room() -> tuple[BakeResult, KeptBake]:
-    return drain(bake_and_keep(lit_bake(), SETTINGS))
+    return bake_and_keep(lit_bake(), SETTINGS)
 
 
 @pytest.fixture
@@ -55,7 +54,7 @@ def path(room: tuple[BakeResult, KeptBake], tmp_path: Path) -> Path:
 
 
 def all_pixels(kept: KeptBake, strengths: np.ndarray) -> bytes:
-    return b"".join(page.pixels.tobytes() for page in drain(relight_pages(kept, strengths)))
+    return b"".join(page.pixels.tobytes() for page in relight_pages(kept, strengths))
 
 
 def fresh(kept: KeptBake) -> KeptBake:
@@ -95,7 +94,7 @@ def test_textures_and_darkness_are_stored_too(tmp_path: Path) -> None:
     unlit = bake_scene(Scene(triangles, grey, 0.0 * grey, lights=[lamp]), ("Room", 10))
     for scene, strength in ((bake_scene(furnace(3.0), ("Room", 12)), None), (unlit, np.full((1, 3), 9.0))):
         wanted = BakeSettings(resolution=12, quality="draft", quantity="radiosity")
-        result, kept = drain(bake_and_keep(scene, wanted))
+        result, kept = bake_and_keep(scene, wanted)
         write_sidecar(path, kept, result, "mark")
         strengths = 2.0 * kept.strengths if strength is None else strength
         found = all_pixels(read_sidecar(path).kept(scene), strengths)
@@ -222,8 +221,8 @@ def test_pages_are_sums_of_what_sources_add(room: tuple[BakeResult, KeptBake]) -
     np.testing.assert_array_equal(responses.pages(BAKED)[0], result.pages[0].pixels)
     assert responses.missing(CHANGED) == [0, 1, 2, 3, 4, 5]
     for source in responses.missing(CHANGED):
-        drain(responses.steps(source))
-    (exact,) = drain(relight_pages(kept, CHANGED))
+        responses.find(source)
+    (exact,) = relight_pages(kept, CHANGED)
     found = responses.pages(CHANGED)[0]
     assert np.sqrt(((found - exact.pixels) ** 2).mean()) < 2e-3 * exact.pixels.mean()
     assert (found >= 0).all()
@@ -264,7 +263,7 @@ def textured(change: str = "") -> BakeScene:
 def test_textures_with_the_same_means_are_told_apart(tmp_path: Path, change: str, message: str) -> None:
     """From the sidecar as well as from memory."""
     wanted = BakeSettings(resolution=12, quality="draft", quantity="radiosity")
-    result, kept = drain(bake_and_keep(textured(), wanted))
+    result, kept = bake_and_keep(textured(), wanted)
     write_sidecar(tmp_path / "lightmap.relight", kept, result, "mark")
     stored = read_sidecar(tmp_path / "lightmap.relight")
     for same in ("", "brighter", "moved"):

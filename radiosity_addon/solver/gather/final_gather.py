@@ -6,13 +6,14 @@ elements that are far brighter than the rest (`bright_patches.py`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+from ...base import SILENT, Progress
 from ...lights import SkyTable
-from ...numerics import Array, Stream, chunk_steps, cosine_hemisphere, orthonormal_basis, stratified_square
+from ...numerics import Array, Stream, cosine_hemisphere, map_chunks, orthonormal_basis, stratified_square
 from ...rays import Hits, RayCaster
 from .bright_patches import AimedRays, AimedTable, BrightElements
 from .footprints import Footprints
@@ -89,7 +90,6 @@ class Gathering:
         self._seed, self.threads, self._sky = seed, threads, sky
         self._into: Array | None = None
         self._closeness = at.scratch.empty(len(at))
-        self._aimed: dict[int, AimedRays] = {}
 
     @property
     def sources(self) -> Array:
@@ -102,8 +102,10 @@ class Gathering:
     def sources(self, into: Array) -> None:
         self._into = into
 
-    def steps(self, bright: BrightElements | None, irradiance: Array) -> Generator[float, None, Gathered]:
-        """Trace all; yields the fraction done.
+    def trace(
+        self, bright: BrightElements | None, irradiance: Array, progress: Progress = SILENT
+    ) -> Gathered:
+        """Trace all.
 
         Parameters
         ----------
@@ -114,20 +116,15 @@ class Gathering:
         """
         assert len(self.sources) == len(self._at)
 
-        def trace(part: slice) -> None:
+        def trace(part: slice) -> AimedRays | None:
             rows = np.arange(part.start, part.stop)
             shares = None if bright is None or not len(bright) else self.shares(rows, bright, irradiance)
-            aimed = self.trace_rows(rows, bright, shares)
-            if aimed is not None:
-                self._aimed[part.start] = aimed
+            return self.trace_rows(rows, bright, shares)
 
         aimed, chunk = AimedTable(self._at.scratch), max(CHUNK_RAYS // self._rays, 1)
-        steps = chunk_steps(trace, len(self._at), chunk, self.threads)
-        for start, fraction in zip(range(0, len(self._at), chunk), steps, strict=True):
-            found = self._aimed.pop(start, None)
+        for part, found in map_chunks(trace, len(self._at), chunk, self.threads, progress):
             if found is not None:
-                aimed.extend(found, start)
-            yield fraction
+                aimed.extend(found, part.start)
         return self.gathered(aimed.all())
 
     def gathered(self, aimed: AimedRays) -> Gathered:

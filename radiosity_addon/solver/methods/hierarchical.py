@@ -7,11 +7,11 @@ refined and the residual is small.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ...base import SILENT, Progress
 from ...numerics import Array
 from ...scene import Scene
 from ..balance import Balance, Conservation, received_by_faces
@@ -110,10 +110,8 @@ class HierarchicalState(SolverState):
         return received_by_faces(self.hierarchy, self.cut, self.balance, self.cluster_links)
 
 
-def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float, HierarchicalState]]:
-    """Solve step by step: yields (fraction done, state) so that a caller may show or cancel.
-
-    The last state yielded is the solution.
+def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -> HierarchicalState:
+    """Solve; `progress` is shown the state.
 
     Raises
     ------
@@ -125,10 +123,9 @@ def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float,
     hierarchy, caster = state.hierarchy, state.caster
     min_area = settings.min_area * float(hierarchy.faces.area.sum())
     state.conservation = Conservation(caster, min_area, settings.seed, settings.threads)
-    yield 0.02, state
+    progress.at(0.02, state)
     if not state.has_light:
-        yield 1.0, state
-        return
+        return state
     light_threshold = LIGHT_SHARE * settings.error * state.power
     state.light_links = link_lights(
         hierarchy,
@@ -141,13 +138,13 @@ def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float,
         most_light_elements(hierarchy, settings),
     )
     state.keep_lamps_within_power()
-    yield 0.1, state
+    progress.at(0.1, state)
     shapes = NodeShapes(hierarchy)
     state.links, state.cluster_links, state.faint = first_links(
         hierarchy, shapes, caster, settings, link_budget(hierarchy, settings, len(state.light_links))
     )
     state.reset()
-    yield 0.3, state
+    progress.at(0.3, state)
 
     rounds: list[dict[str, float]] = []
     for done, coarsening in enumerate(COARSENING):
@@ -157,13 +154,13 @@ def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float,
             iterate(state, settings.tolerance if coarsening == 1.0 else ROUGH)
             refined = 0 if exhausted(state) else settle(state, shapes, error * state.power, min_area)
             links_refined += refined
-            yield 0.3 + 0.65 * (done + 0.5) / len(COARSENING), state
+            progress.at(0.3 + 0.65 * (done + 0.5) / len(COARSENING), state)
             if not refined or (coarsening > 1.0 and refined <= FEW * state.n_links):
                 break
         rounds.append({"error": error, "links_refined": links_refined, "links": len(state.links)})
     iterate(state, settings.tolerance, last=True)
     tell(state, rounds)
-    yield 1.0, state
+    return state
 
 
 def settle(state: HierarchicalState, shapes: NodeShapes, threshold: float, min_area: float) -> int:
