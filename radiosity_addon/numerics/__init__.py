@@ -42,6 +42,7 @@ from .sampling import (
     uniform_cone,
 )
 from .scratch import TILE, Rows, Scratch, folder, marked, row_numbers, tiles, trim
+from .streams import LAMP_STEP, LIGHT_STEP, SHADOW_STEP, Stream
 from .triangles import (
     WHOLE_TRIANGLE,
     double_area_vectors,
@@ -56,12 +57,16 @@ from .triangles import (
 
 __all__ = [
     "HEMISPHERE",
+    "LAMP_STEP",
+    "LIGHT_STEP",
     "MAX_REFLECTANCE",
+    "SHADOW_STEP",
     "TILE",
     "WHOLE_TRIANGLE",
     "Array",
     "Rows",
     "Scratch",
+    "Stream",
     "areas",
     "brdf_of_reflectance",
     "clip_half_plane",

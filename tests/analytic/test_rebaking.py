@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from radiosity_addon.bake.plan import moved_objects, plan_bake
 from radiosity_addon.bake.rebaking import bake_moved
 from radiosity_addon.bake.relight.kept_bake import KeptBake, relight_pages
 from radiosity_addon.bake.result.result import BakeResult
+from radiosity_addon.bake.sidecar.sidecar import read_sidecar, write_sidecar
 from radiosity_addon.base.errors import SceneError
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
@@ -60,6 +62,19 @@ def fresh(kept: KeptBake) -> tuple[BakeResult, KeptBake]:
 @pytest.fixture(scope="module")
 def expected(fresh: tuple[BakeResult, KeptBake]) -> np.ndarray:
     return pixels(fresh[0])
+
+
+def test_a_bake_that_followed_a_move_is_relit_from_its_sidecar(
+    moved: tuple[BakeResult, KeptBake], tmp_path: Path
+) -> None:
+    result, after = moved
+    path = tmp_path / "lightmap.relight"
+    write_sidecar(path, after, result, "bake")
+    stored = read_sidecar(path).kept(laid_out_as(room(ELSEWHERE, 30.0), after.geometry.uv))
+    wanted = 2.0 * after.strengths
+    fresh = replace(after, lit=replace(after.lit, earlier=after.lit.earlier.first()))
+    pages = [relight_pages(bake, wanted)[0].pixels for bake in (stored, fresh)]
+    np.testing.assert_array_equal(*pages)
 
 
 def test_a_moved_box_gives_what_a_full_bake_gives(

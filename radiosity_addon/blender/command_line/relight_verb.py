@@ -118,7 +118,7 @@ def relight_into(
         output.expect(page_file_names(result, stored.settings))
         output.expect(name for of in group_file_names(result, stored.settings) for name in of)
         yield Status("apply", APPLY)
-        keeping = KeepOptions(sidecar=True, mark=stored.mark)
+        keeping = KeepOptions(sidecar=True, mark=stored.bake_id)
         finished = finish(
             context,
             stored.settings,

@@ -109,7 +109,7 @@ def stored_bake(scene: bpy.types.Scene) -> StoredBake:
     if path is None:
         raise BakeError("the bake is not in memory any more, and has no sidecar: bake again")
     stored = read_sidecar(path)
-    if stored.mark != mark:
+    if stored.bake_id != mark:
         raise BakeError(f"'{path}' belongs to another bake: bake again")
     return stored
 

@@ -8,7 +8,7 @@ object, then one on the innermost collection around the instance. What is dark m
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import bpy
 
@@ -21,8 +21,7 @@ def name_on(owner: bpy.types.ID | None) -> str:
     return str(getattr(owner, NAME, "")).strip()
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class PlaceGroups:
+class PlaceGroups(NamedTuple):
     """The names that hold for all that one object, or one instance of it, shows.
 
     Parameters

@@ -56,6 +56,8 @@ class PartLinks:
         The same for each light apart, if it is kept.
     """
 
+    STORED = ("rows", "sources", "reflectance", "gains")
+
     rows: Array
     sources: Array
     reflectance: Array

@@ -28,7 +28,7 @@ import numpy as np
 
 from ...numerics import Array
 from ...rays import RayCaster
-from ..hierarchy import Hierarchy, TreeTop
+from ..hierarchy import ClusterCut, Hierarchy
 from ..links import ClusterLinks, Links, pull
 from .enclosure import Arrivals
 from .link_sums import received_by_leaves, received_over_clusters, sent_by_leaves
@@ -46,7 +46,7 @@ AMONG_THEMSELVES = 0.65
 KNOWN = 5e-3
 """Standard error of what arrives from a face, if its sum is to count as known."""
 
-DOUBT = 3.0
+STANDARD_ERRORS = 3.0
 """Standard errors that a leaf's own links may send more than its rays say arrives."""
 
 SURE = 0.01
@@ -91,7 +91,7 @@ class Conservation:
     def balance(
         self,
         hierarchy: Hierarchy,
-        top: TreeTop,
+        cut: ClusterCut,
         links: Links,
         cluster_links: ClusterLinks,
         rough: bool = False,
@@ -106,12 +106,12 @@ class Conservation:
         self.arrivals.measure(hierarchy)
         scale, received = np.ones((2, hierarchy.n_elements, 2))
         if rough:
-            return Balance(links, self.factors(hierarchy, top, links, cluster_links), received)
+            return Balance(links, self.factors(hierarchy, cut, links, cluster_links), received)
         closed = self.closed(hierarchy)
-        sure = closed & (received_over_clusters(hierarchy, top, cluster_links, scale) < SURE)
+        sure = closed & (received_over_clusters(hierarchy, cut, cluster_links, scale) < SURE)
         if sure.any():
-            rows = sum(received_by_leaves(hierarchy, top, links, cluster_links, scale))
-            columns = sum(sent_by_leaves(hierarchy, top, links, cluster_links))
+            rows = sum(received_by_leaves(hierarchy, cut, links, cluster_links, scale))
+            columns = sum(sent_by_leaves(hierarchy, cut, links, cluster_links))
             sums = pull(hierarchy, np.stack([rows, columns], axis=1))[: len(closed)]
             links = corrected(hierarchy, links, sure, sums[:, 0], sums[:, 1])
         wanted, error, escapes = self.arrivals.of_faces(hierarchy)
@@ -119,21 +119,21 @@ class Conservation:
         if closed.any() and not known.all():
             # What faces get from others, whose own sums nobody knows, is not theirs to correct.
             among = np.where(known[hierarchy.face], 1.0, 0.0)[:, None] * scale
-            get = sum(received_by_leaves(hierarchy, top, links, cluster_links, scale))
-            get_from_known = sum(received_by_leaves(hierarchy, top, links, cluster_links, among))
+            get = sum(received_by_leaves(hierarchy, cut, links, cluster_links, scale))
+            get_from_known = sum(received_by_leaves(hierarchy, cut, links, cluster_links, among))
             gets = pull(hierarchy, np.stack([get, get_from_known], axis=1))[: len(known)]
             known &= gets[:, 1] > AMONG_THEMSELVES * gets[:, 0]
         if not (known & closed).any():
-            return Balance(links, self.factors(hierarchy, top, links, cluster_links), received)
+            return Balance(links, self.factors(hierarchy, cut, links, cluster_links), received)
         leaves = hierarchy.leaves[known[hierarchy.face[hierarchy.leaves]]]
         for number in range(ROUNDS):
-            own, shared = received_by_leaves(hierarchy, top, links, cluster_links, scale)
+            own, shared = received_by_leaves(hierarchy, cut, links, cluster_links, scale)
             if number > 0:
                 sums = pull(hierarchy, received * np.stack([own, shared], axis=1)).sum(axis=1)
                 if np.abs(sums[: len(known)] - wanted)[known].max() < ENOUGH:
                     break
             received[leaves] = _receive(hierarchy, leaves, own, shared, wanted, closed)
-            scale = self.factors(hierarchy, top, links, cluster_links, received)
+            scale = self.factors(hierarchy, cut, links, cluster_links, received)
         return Balance(links, scale, received)
 
     def closed(self, hierarchy: Hierarchy) -> Array:
@@ -145,7 +145,7 @@ class Conservation:
     def factors(
         self,
         hierarchy: Hierarchy,
-        top: TreeTop,
+        cut: ClusterCut,
         links: Links,
         cluster_links: ClusterLinks,
         received: Array | None = None,
@@ -159,13 +159,13 @@ class Conservation:
         """
         self.arrivals.measure(hierarchy)
         leaves = hierarchy.leaves
-        own, shared = sent_by_leaves(hierarchy, top, links, cluster_links, received)
+        own, shared = sent_by_leaves(hierarchy, cut, links, cluster_links, received)
         result = np.ones((hierarchy.n_elements, 2))
         arriving = self.arrivals.share[leaves]
         limit = np.where(arriving == 1.0, LIMIT_CLOSED, LIMIT)
         result[leaves] = _over_shared(arriving, own[leaves], shared[leaves], limit)
         # Own links are better than few rays: scaled down for rays' noise, and not up, they would lose power.
-        most = np.minimum(arriving + DOUBT * self.arrivals.error(leaves), 1.0)
+        most = np.minimum(arriving + STANDARD_ERRORS * self.arrivals.error(leaves), 1.0)
         result[leaves, 0] = np.minimum(1.0, most / np.maximum(own[leaves], 1e-300))
         return result
 
@@ -207,9 +207,9 @@ def _over_shared(wanted: Array, own: Array, shared: Array, limit: Array | float)
 
 
 def received_by_faces(
-    hierarchy: Hierarchy, top: TreeTop, balance: Balance, cluster_links: ClusterLinks
+    hierarchy: Hierarchy, cut: ClusterCut, balance: Balance, cluster_links: ClusterLinks
 ) -> Array:
     """Return (f,) ΣFV over each face's, its elements' and its clusters' links, as balanced."""
-    own, shared = received_by_leaves(hierarchy, top, balance.links, cluster_links, balance.sent)
+    own, shared = received_by_leaves(hierarchy, cut, balance.links, cluster_links, balance.sent)
     balanced = balance.received * np.stack([own, shared], axis=1)
     return np.asarray(pull(hierarchy, balanced)[: len(hierarchy.faces)].sum(axis=1))

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...numerics import Array, cosine_hemisphere, for_chunks, stratified_square, to_world
+from ...numerics import Array, Stream, cosine_hemisphere, for_chunks, stratified_square, to_world
 from ...rays import RayCaster
-from ..hierarchy import Hierarchy, TreeTop
+from ..hierarchy import ClusterCut, Hierarchy
 from ..links import node_samples, pull
 
 RAYS = 32
@@ -66,11 +66,11 @@ class Arrivals:
         if len(faces):
             # Neighbours that together are no larger than an element may be share their rays.
             large = np.flatnonzero(hierarchy.clusters.area > self._min_area)
-            top = TreeTop(hierarchy, large)
-            share, escapes = self._trace(hierarchy, top.tips, RAYS)
-            tip = top.tip[faces] - top.n_inner
-            self.share[faces], self.escapes[faces] = share[tip], escapes[tip]
-            apart = faces[(share[tip] > 0.0) & (share[tip] < 1.0) & (np.bincount(tip)[tip] > 1)]
+            cut = ClusterCut(hierarchy, large)
+            share, escapes = self._trace(hierarchy, cut.nodes, RAYS)
+            node = cut.row_of_face[faces] - cut.n_inner
+            self.share[faces], self.escapes[faces] = share[node], escapes[node]
+            apart = faces[(share[node] > 0.0) & (share[node] < 1.0) & (np.bincount(node)[node] > 1)]
             if len(apart) * RAYS <= MOST_RAYS:
                 self._ask(hierarchy, apart, RAYS)
         self._ask(hierarchy, new[len(faces) :], RAYS)
@@ -132,8 +132,9 @@ class Arrivals:
         def measure(rows: slice) -> None:
             chosen = nodes[rows]
             quarter = np.broadcast_to(np.arange(rays) % 4, (len(chosen), rays))
-            points, normals = node_samples(hierarchy, chosen, quarter, chosen, self._seed + 41)
-            unit = stratified_square(chosen, rays, self._seed + 42)
+            streams = Stream.ENCLOSURE_POINTS, Stream.ENCLOSURE_FACE
+            points, normals = node_samples(hierarchy, chosen, quarter, chosen, self._seed, streams)
+            unit = stratified_square(chosen, rays, self._seed + Stream.ENCLOSURE_DIRECTIONS)
             normals = normals.reshape(-1, 3)
             directions = to_world(cosine_hemisphere(unit).reshape(-1, 1, 3), normals)[:, 0]
             start = points.reshape(-1, 3) + self._caster.surface_offset * normals

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...numerics import Array
-from ..hierarchy import LEAF, Hierarchy, TreeTop
+from ..hierarchy import LEAF, ClusterCut, Hierarchy
 from ..links import ClusterLinks, Links, gather, gather_at_clusters, node_radiosity, pull, push, quarters_mean
 
 
@@ -30,7 +30,7 @@ class Arriving:
     """
 
     def __init__(
-        self, hierarchy: Hierarchy, top: TreeTop, links: ClusterLinks, received: Array | None
+        self, hierarchy: Hierarchy, cut: ClusterCut, links: ClusterLinks, received: Array | None
     ) -> None:
         clusters, faces = hierarchy.clusters, hierarchy.faces
         if received is None and (hierarchy.opacity == 1.0).all():
@@ -38,8 +38,8 @@ class Arriving:
             self.power = self.area * links.factor * links.visibility
             return
         weight = (_taken_below(hierarchy, received)[: len(faces)] * faces.area)[:, None]
-        sums = top.sums(np.concatenate([weight, weight * faces.normal, weight * faces.centre], axis=1))
-        at = sums[top.row[links.receiver]]
+        sums = cut.sums(np.concatenate([weight, weight * faces.normal, weight * faces.centre], axis=1))
+        at = sums[cut.row[links.receiver]]
         self.area = at[:, 0]
         offset = at[:, 4:] - at[:, :1] * clusters.centre[links.receiver]
         self.power = at[:, 0] * links.even + np.einsum("lk,lk->l", at[:, 1:4], links.vector)
@@ -48,7 +48,7 @@ class Arriving:
 
 def sent_by_leaves(
     hierarchy: Hierarchy,
-    top: TreeTop,
+    cut: ClusterCut,
     links: Links,
     cluster_links: ClusterLinks,
     received: Array | None = None,
@@ -68,14 +68,14 @@ def sent_by_leaves(
     at_links = taken_at_links(hierarchy, links, received)
     sums = sent(hierarchy, links, at_links)
     own = quarters_mean(sums)[:, 0]
-    at_clusters = Arriving(hierarchy, top, cluster_links, received)
+    at_clusters = Arriving(hierarchy, cut, cluster_links, received)
     sums = sums + sent_to_clusters(hierarchy, cluster_links, at_clusters)
-    from_clusters = _from_clusters(hierarchy, top, links, at_links, cluster_links, at_clusters)
+    from_clusters = _from_clusters(hierarchy, cut, links, at_links, cluster_links, at_clusters)
     return own, push(hierarchy, sums + from_clusters)[:, 0] - own
 
 
 def received_by_leaves(
-    hierarchy: Hierarchy, top: TreeTop, links: Links, cluster_links: ClusterLinks, scale: Array
+    hierarchy: Hierarchy, cut: ClusterCut, links: Links, cluster_links: ClusterLinks, scale: Array
 ) -> tuple[Array, Array]:
     """Return ΣFV over own links, and over those of ancestors and clusters, sources scaled by `scale`.
 
@@ -85,25 +85,25 @@ def received_by_leaves(
         Of the leaves; other rows mean nothing.
     """
     there = hierarchy.opacity[:, None]
-    gathered = gather(hierarchy, links, there, scale, top)
+    gathered = gather(hierarchy, links, there, scale, cut)
     own = quarters_mean(gathered)[:, 0]
     shared = push(hierarchy, gathered)[:, 0] - own
     if len(cluster_links):
-        shared += received_over_clusters(hierarchy, top, cluster_links, scale)[hierarchy.face]
+        shared += received_over_clusters(hierarchy, cut, cluster_links, scale)[hierarchy.face]
     return own, shared
 
 
 def received_over_clusters(
-    hierarchy: Hierarchy, top: TreeTop, cluster_links: ClusterLinks, scale: Array
+    hierarchy: Hierarchy, cut: ClusterCut, cluster_links: ClusterLinks, scale: Array
 ) -> Array:
     """Return (f,) ΣFV over links to clusters, sources scaled by `scale`."""
-    means = node_radiosity(hierarchy, pull(hierarchy, scale[:, 1:] * hierarchy.opacity[:, None]), top)
-    return np.asarray(np.maximum(gather_at_clusters(hierarchy, top, cluster_links, means)[:, 0], 0.0))
+    means = node_radiosity(hierarchy, pull(hierarchy, scale[:, 1:] * hierarchy.opacity[:, None]), cut)
+    return np.asarray(np.maximum(gather_at_clusters(hierarchy, cut, cluster_links, means)[:, 0], 0.0))
 
 
 def _from_clusters(
     hierarchy: Hierarchy,
-    top: TreeTop,
+    cut: ClusterCut,
     links: Links,
     at_links: Array,
     cluster_links: ClusterLinks,
@@ -115,22 +115,22 @@ def _from_clusters(
     if count == 0:
         return total
     # Linear in the face's place: (1, y) times four numbers a cluster, as `gather_at_clusters` sends.
-    share = np.zeros((top.n_rows, 4))
+    share = np.zeros((cut.n_rows, 4))
     grouped = np.flatnonzero(links.source < count)
     source = links.source[grouped]
-    share[:, 0] += top.spread(top.rows(source), at_links[grouped] / clusters.area[source])
+    share[:, 0] += cut.spread(cut.rows(source), at_links[grouped] / clusters.area[source])
     grouped = np.flatnonzero(cluster_links.source < count)
     source = cluster_links.source[grouped]
     slope = (arriving.area[grouped] / clusters.area[source])[:, None] * cluster_links.gradient[grouped]
-    rows = top.rows(source)
+    rows = cut.rows(source)
     evenly = arriving.power[grouped] / clusters.area[source]
     evenly += np.einsum("lk,lk->l", slope, clusters.centre[source])
-    share[:, 0] += top.spread(rows, evenly)
+    share[:, 0] += cut.spread(rows, evenly)
     for axis in range(3):
-        share[:, 1 + axis] -= top.spread(rows, slope[:, axis])
+        share[:, 1 + axis] -= cut.spread(rows, slope[:, axis])
     carried = np.zeros(len(faces))
-    for term, pushed in zip((np.ones(1), *faces.centre.T), top.push(share).T, strict=True):
-        carried += term * pushed[top.tip]
+    for term, pushed in zip((np.ones(1), *faces.centre.T), cut.push(share).T, strict=True):
+        carried += term * pushed[cut.row_of_face]
     total[: len(faces)] = np.maximum(carried, 0.0)[:, None, None]
     return total
 

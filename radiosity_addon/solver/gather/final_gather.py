@@ -13,7 +13,7 @@ import numpy as np
 
 from ...base import SILENT, Progress
 from ...lights import SkyTable
-from ...numerics import Array, cosine_hemisphere, map_chunks, orthonormal_basis, stratified_square
+from ...numerics import Array, Stream, cosine_hemisphere, map_chunks, orthonormal_basis, stratified_square
 from ...rays import Hits, RayCaster
 from .bright_patches import AimedRays, AimedTable, BrightElements
 from .footprints import Footprints
@@ -220,7 +220,7 @@ class Gathering:
         """Trace the cosine-distributed rays of some rows, and keep what they hit."""
         rays = self._rays
         directions, upward = self.directions(rows)
-        start = self._starts(rows, rays, self._seed + 4)
+        start = self._starts(rows, rays, self._seed + Stream.GATHER_STARTS)
         hits = self._caster.intersect(start.reshape(-1, 3), directions.reshape(-1, 3))
         found = self._found(hits, directions.reshape(-1, 3)).reshape(len(rows), rays)
         found[~upward] = NOTHING
@@ -233,7 +233,8 @@ class Gathering:
     def _directions(self, rows: Array) -> Array:
         """Return (r, rays, 3) float32: where the cosine-distributed rays of some rows go."""
         normals = self._at.normals[rows]
-        local = cosine_hemisphere(stratified_square(self._at.keys[rows], self._rays, self._seed + 3))
+        seed = self._seed + Stream.GATHER_DIRECTIONS
+        local = cosine_hemisphere(stratified_square(self._at.keys[rows], self._rays, seed))
         frame = np.stack([*orthonormal_basis(normals), normals], axis=1).astype(np.float32)
         return np.asarray(local @ frame)
 
@@ -247,8 +248,8 @@ class Gathering:
     def _aim(self, rows: Array, bright: BrightElements, shares: Array) -> AimedRays:
         """Trace the rays that some rows aim at bright elements."""
         count = max(self._rays // AIMED_PART, 1)
-        start = self._starts(rows, count, self._seed + 6)
-        unit = stratified_square(self._at.keys[rows], count, self._seed + 5)
+        start = self._starts(rows, count, self._seed + Stream.AIMED_STARTS)
+        unit = stratified_square(self._at.keys[rows], count, self._seed + Stream.AIMED_DIRECTIONS)
         aim = bright.aim(start, self._at.normals[rows], shares, unit)
         hits = self._caster.intersect(start[aim.row].reshape(-1, 3), aim.directions.reshape(-1, 3))
         arrived = self._leaves_of(hits) == aim.element.ravel()
@@ -277,7 +278,7 @@ class Gathering:
         some = min(at.starts or self._rays, self._rays)
         distinct, of = np.unique(rows, return_inverse=True)
         of, place = of.reshape(-1), ray * some // self._rays
-        unit = stratified_square(at.keys[distinct], some, self._seed + 4)
+        unit = stratified_square(at.keys[distinct], some, self._seed + Stream.GATHER_STARTS)
         if len(rows) < some * len(distinct):
             return np.asarray(at.sampler(rows, unit[of, place][:, None])[:, 0] + lift)
         return np.asarray(at.sampler(distinct, unit)[of, place] + lift)

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...base import SILENT, Progress
 from ...lights import Lamp, SkyTable
-from ...numerics import Array, Scratch, tiles
+from ...numerics import SHADOW_STEP, Array, Scratch, Stream, tiles
 from ...rays import Hits
 from ..emitters import EmitterGroup, LightSources, emitter_groups
 from ..hierarchy import Hierarchy
@@ -105,7 +105,7 @@ class LocalPass:
         lights = self.lights(dark=gains is not None)
         if gains is not None:
             at = replace(at, expected=None)
-        spread = SpreadPoints(at, self._seed + 2, self.threads)
+        spread = SpreadPoints(at, self._seed + Stream.FOOTPRINT, self.threads)
         for asked, part in progress.each(lights):
             arriving = self._arriving(asked, spread, rays, part)
             for rows in tiles(len(total)):
@@ -124,15 +124,17 @@ class LocalPass:
             if isinstance(lit, Lamp) and (dark or lit.strength.any())
         ]
         first, seed = len(self._state.scene.lights), self._seed
-        asked = [LightQuery(lit, row, seed + 31 + 7 * place) for place, (row, lit) in enumerate(lamps)]
+        of_lamps, of_groups = seed + Stream.LAMP_SHADOWS, seed + Stream.EMITTER_SHADOWS
+        step = SHADOW_STEP
+        asked = [LightQuery(lit, row, of_lamps + step * place) for place, (row, lit) in enumerate(lamps)]
         groups = enumerate(self.emitters)
-        return asked + [LightQuery(lit, first + place, seed + 17 + 7 * place) for place, lit in groups]
+        return asked + [LightQuery(lit, first + place, of_groups + step * place) for place, lit in groups]
 
     def gain(
         self, asked: LightQuery, at: Footprints, rays: int | None = None, progress: Progress = SILENT
     ) -> Array:
         """Return (n,) what one light adds per unit of its strength, as if it were the only one."""
-        spread = SpreadPoints(replace(at, expected=None), self._seed + 2, self.threads)
+        spread = SpreadPoints(replace(at, expected=None), self._seed + Stream.FOOTPRINT, self.threads)
         return self._arriving(asked, spread, rays, progress)
 
     def _arriving(

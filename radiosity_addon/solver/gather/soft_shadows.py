@@ -11,7 +11,7 @@ import numpy as np
 
 from ...base import SILENT, Progress
 from ...lights import Lamp
-from ...numerics import Array, for_chunks, marked, row_numbers, stratified_square, tiles
+from ...numerics import Array, Stream, for_chunks, marked, row_numbers, stratified_square, tiles
 from ...rays import RayCaster
 from ..emitters import EmitterGroup
 from .footprints import Footprints, SpreadPoints
@@ -129,7 +129,7 @@ class ShadowShare:
         def trace(part: slice) -> None:
             chunk = rows[part]
             centre, normal = at.points[chunk], at.normals[chunk]
-            unit = stratified_square(at.keys[chunk], count, self._seed + 1)
+            unit = stratified_square(at.keys[chunk], count, self._seed + Stream.SHADOW_RAYS)
             directions, distances, weights = self._light.shadow_rays(centre, normal, unit)
             # The edge of a spot's cone may cross a footprint and leave its centre dark: then all count alike.
             weights = np.where(weights.any(axis=1, keepdims=True), weights, 1.0)
@@ -163,7 +163,7 @@ class ShadowShare:
             return self._spread.points(rows)[:, :count]
         assert at.sampler is not None
         some = min(count, STARTS)
-        starts = at.sampler(rows, stratified_square(at.keys[rows], some, self._seed + 2))
+        starts = at.sampler(rows, stratified_square(at.keys[rows], some, self._seed + Stream.SHADOW_STARTS))
         return np.asarray(starts[:, np.arange(count) * some // count])
 
 

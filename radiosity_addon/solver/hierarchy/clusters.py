@@ -56,6 +56,8 @@ class Clusters:
         Clusters of each depth, the roots first; children lie one level deeper than parents.
     """
 
+    STORED = ("order", "start", "children", "area", "centre", "levels")
+
     def __init__(self, order: Array, start: Array, end: Array, children: Array) -> None:
         self.order, self.start, self.end, self.children = order, start, end, children
         self.lower = self.upper = np.zeros((0, 3))

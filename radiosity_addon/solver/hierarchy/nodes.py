@@ -34,7 +34,14 @@ class Hierarchy:
         Area means over each element, multiplied by opacity; emission in W/m².
     opacity : (e,) float64
         Area means.
+    roots : (r,) int64
+        The nodes that together hold every face once; first links start from them.
     """
+
+    STORED = (
+        *("faces", "clusters", "roots", "face", "first_child", "level"),
+        *("area", "reflectance", "emission", "opacity"),
+    )
 
     def __init__(self, scene: Scene) -> None:
         self.faces = Faces(scene)
@@ -75,7 +82,6 @@ class Hierarchy:
                 np.flatnonzero(emits),
             ],
         )
-        """roots: the nodes that together hold every face once; first links start from them"""
 
     @property
     def n_clusters(self) -> int:

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...form_factors import point_to_polygon, visibility_of
-from ...numerics import Array, for_chunks, hash_keys, run_numbers
+from ...numerics import Array, Stream, for_chunks, hash_keys, run_numbers
 from ...rays import RayCaster
 from ..hierarchy import Hierarchy, NodeShapes
 from .cluster_links import ClusterLinks, join_cluster_links
@@ -102,13 +102,15 @@ class _ClusterPairs:
     def __init__(self, hierarchy: Hierarchy, receiver: Array, source: Array, samples: int, seed: int) -> None:
         self.hierarchy = hierarchy
         pair = receiver.astype(np.int64) << 32 | source.astype(np.int64)
-        turn = hash_keys(pair, seed) & 3
+        turn = hash_keys(pair, seed + Stream.CLUSTER_PAIR_TURN) & 3
         # Column 4a + q joins the receiver's quarter q to the source's quarter q xor (turn + a).
         column = np.arange(samples)
         to_quarter = np.broadcast_to(column % 4, (len(pair), samples))
         of_quarter = to_quarter ^ ((turn[:, None] + column // 4) % 4)
-        x, n_x = node_samples(hierarchy, receiver, to_quarter, pair, seed + 1)
-        y, n_y = node_samples(hierarchy, source, of_quarter, pair, seed + 3)
+        of_receiver = Stream.CLUSTER_PAIR_RECEIVER, Stream.CLUSTER_PAIR_RECEIVER_FACE
+        of_source = Stream.CLUSTER_PAIR_SOURCE, Stream.CLUSTER_PAIR_SOURCE_FACE
+        x, n_x = node_samples(hierarchy, receiver, to_quarter, pair, seed, of_receiver)
+        y, n_y = node_samples(hierarchy, source, of_quarter, pair, seed, of_source)
         along = y - x
         rise_x = np.einsum("nsk,nsk->ns", along, n_x)
         rise_y = -np.einsum("nsk,nsk->ns", along, n_y)

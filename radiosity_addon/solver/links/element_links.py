@@ -6,7 +6,7 @@ ones Lambert's point-to-polygon formula at a few points; clusters are sampled.
 
 Rays join the quarters of the two sides: at first four, one from each quarter to each
 quarter; where they disagree all sixteen. Four agreeing rays are no proof, so every link
-also carries its *doubt*: how much its F·V may vary or be wrong.
+also carries an *error estimate*: how much its F·V may vary or be wrong.
 """
 
 from __future__ import annotations
@@ -39,18 +39,20 @@ class Links:
         F_rs, the unoccluded fraction of what leaves the receiver that arrives at the source.
     visibility : (l,) float32
         Share of F_rs that is not blocked.
-    doubt : (l,) float32
+    error_estimate : (l,) float32
         Standard deviation of F·V over the samples and what too few rays may have missed.
     to_quarter, of_quarter : (l, 4) float32
         How F·V is shared out over the receiver's and the source's quarters, mean 1 each: so
         leaves below an inner element do not all inherit the same (a cluster's are all 1).
     """
 
+    STORED = ("receiver", "source", "factor", "visibility", "to_quarter", "of_quarter")
+
     receiver: Array
     source: Array
     factor: Array
     visibility: Array
-    doubt: Array
+    error_estimate: Array
     to_quarter: Array
     of_quarter: Array
 
@@ -64,7 +66,7 @@ class Links:
             self.source[rows],
             self.factor[rows],
             self.visibility[rows],
-            self.doubt[rows],
+            self.error_estimate[rows],
             self.to_quarter[rows],
             self.of_quarter[rows],
         )
@@ -87,7 +89,7 @@ def join(parts: list[Links]) -> Links:
         ("source", np.int32, (0,)),
         ("factor", np.float32, (0,)),
         ("visibility", np.float32, (0,)),
-        ("doubt", np.float32, (0,)),
+        ("error_estimate", np.float32, (0,)),
         ("to_quarter", np.float32, (0, 4)),
         ("of_quarter", np.float32, (0, 4)),
     ):
@@ -104,7 +106,7 @@ def measure_links(
     seed: int,
     threads: int = 0,
 ) -> Links:
-    """Compute factor, visibility and doubt of new links; pairs that face away are left out.
+    """Compute factor, visibility and error estimate of new links; pairs that face away are left out.
 
     Parameters
     ----------
@@ -156,13 +158,13 @@ def _measure_chunk(
     mean = passed.sum(axis=1) / np.maximum(rays, 1)
     square = (passed**2).sum(axis=1) / np.maximum(rays, 1)
     spread = np.sqrt(np.maximum(square - mean**2, 0.0))
-    doubt = np.hypot(np.minimum(spread, 1.0), factor / (rays + 2.0))
+    estimate = np.hypot(np.minimum(spread, 1.0), factor / (rays + 2.0))
     links = Links(
         receiver.astype(np.int32),
         source.astype(np.int32),
         factor.astype(np.float32),
         visibility.astype(np.float32),
-        doubt.astype(np.float32),
+        estimate.astype(np.float32),
         *_quarter_shares(hierarchy, receiver, source, samples, transfer * np.where(traced, free, 1.0)),
     )
     return links.take(factor > 0)

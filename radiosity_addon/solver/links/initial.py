@@ -44,7 +44,8 @@ carry light, …"""
 
 COARSEST_FAINT = 8.0
 """… unless pairs that exchange more than this times BF_ε, as a share of all area, went into one link: then
-only the budget has it. A link's doubt is about an eighth of its factor, and more where it is refined."""
+only the budget has it. A link's error estimate is about an eighth of its factor, more where it is
+refined."""
 
 FAINT = 1e-7
 """Where there are more, pairs that exchange less than this share of all area are linked however large

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...lights import EnvironmentLight, Lamp, Light
-from ...numerics import Array, for_chunks, irradiance_under_sky, stratified_square
+from ...numerics import LIGHT_STEP, Array, Stream, for_chunks, irradiance_under_sky, stratified_square
 from ...rays import RayCaster
 from .light_links import lamp_light, sky_share
 
@@ -38,13 +38,13 @@ def lamp_irradiance(
         keys, facing = np.arange(rows.start, rows.stop), normals[rows]
         gain: Array
         for number, light in enumerate(lights):
-            own_seed = seed + 101 * number
+            own_seed = seed + LIGHT_STEP * number
             if isinstance(light, EnvironmentLight):
                 share, _ = sky_share(light, points[rows], facing, SKY_RAYS, caster, keys, own_seed)
                 gain = irradiance_under_sky(1.0) * share
             elif isinstance(light, Lamp):
                 repeated = np.repeat(points[rows, None], SHADOW_RAYS, axis=1)
-                unit = stratified_square(keys, SHADOW_RAYS, own_seed)
+                unit = stratified_square(keys, SHADOW_RAYS, own_seed + Stream.LIGHT_RAYS)
                 open_gain, share = lamp_light(light, repeated, facing, unit, caster)
                 gain = open_gain[:, 0] * share
             else:

@@ -9,7 +9,9 @@ import numpy as np
 
 from ...lights import EnvironmentLight, Lamp, Light, SpotLight
 from ...numerics import (
+    LIGHT_STEP,
     Array,
+    Stream,
     cosine_hemisphere,
     for_chunks,
     irradiance_under_sky,
@@ -124,12 +126,12 @@ def link_lights(
             # Where few samples may miss the light altogether, they are not asked.
             blind = may_split & ((area > coarse_area) | too_near(light, hierarchy, waiting))
             blind = _affordable(hierarchy, waiting, blind, area, most_elements)
-            gain, doubt = np.zeros((len(waiting), 4)), np.zeros(len(waiting))
+            gain, error = np.zeros((len(waiting), 4)), np.zeros(len(waiting))
             seeing = np.flatnonzero(~blind)
-            gain[seeing], doubt[seeing] = measure_light(
-                hierarchy, light, caster, waiting[seeing], seed + 101 * number, threads
+            gain[seeing], error[seeing] = measure_light(
+                hierarchy, light, caster, waiting[seeing], seed + LIGHT_STEP * number, threads
             )
-            misplaced = np.where(blind, np.inf, doubt * area * strength)
+            misplaced = np.where(blind, np.inf, error * area * strength)
             split = may_split & (misplaced > misplaced_power)
             split = _affordable(hierarchy, waiting, split, misplaced, most_elements)
             kept = ~split & (gain.max(axis=1) > 0)
@@ -188,15 +190,15 @@ def measure_light(
     seed: int,
     threads: int = 0,
 ) -> tuple[Array, Array]:
-    """Measure one light's irradiance on the quarters of elements, per unit of strength, and its doubt.
+    """Measure one light's irradiance on the quarters of elements, per unit of strength, and its error.
 
     Returns
     -------
     gain : (n, 4) float64
         On each quarter.
-    doubt : (n,) float64
+    error : (n,) float64
     """
-    gain, doubt = np.empty((len(elements), 4)), np.empty(len(elements))
+    gain, error = np.empty((len(elements), 4)), np.empty(len(elements))
     area = hierarchy.area[elements]
     share = area / float(hierarchy.faces.area.sum())
     tiny, small = share < TINY, share < SMALL
@@ -213,12 +215,12 @@ def measure_light(
             rows = rows_of[piece]
             asked = _pieces(hierarchy, elements[rows], pieces)
             if isinstance(light, EnvironmentLight):
-                gain[rows], doubt[rows] = _measure_sky(asked, light, caster, seed, divisor)
+                gain[rows], error[rows] = _measure_sky(asked, light, caster, seed, divisor)
             else:
-                gain[rows], doubt[rows] = _measure_lamp(asked, light, caster, seed, divisor)
+                gain[rows], error[rows] = _measure_lamp(asked, light, caster, seed, divisor)
 
         for_chunks(measure, len(rows_of), CHUNK, threads)
-    return gain, doubt
+    return gain, error
 
 
 @dataclass(frozen=True)
@@ -245,7 +247,8 @@ def _measure_sky(
 ) -> tuple[Array, Array]:
     """Measure the sky on pieces of elements (see `measure_light`); whole ones have a column only."""
     rays = SKY_RAYS // divisor
-    points = points_on_triangles(asked.corners, stratified_square(asked.keys, rays, seed + 1))
+    unit = stratified_square(asked.keys, rays, seed + Stream.LIGHT_POINTS)
+    points = points_on_triangles(asked.corners, unit)
     share, error = sky_share(light, points, asked.normals, rays, caster, asked.keys, seed)
     values = irradiance_under_sky(share.reshape(-1, asked.count))
     # Expected noise of a quarter's mean is not a difference between quarters.
@@ -258,8 +261,9 @@ def _measure_lamp(
 ) -> tuple[Array, Array]:
     """Measure a lamp on pieces of elements (see `measure_light`); whole ones have a column only."""
     samples = LAMP_SAMPLES // divisor
-    points = points_on_triangles(asked.corners, stratified_square(asked.keys, samples, seed + 1))
-    unit = stratified_square(asked.keys, samples, seed)
+    unit = stratified_square(asked.keys, samples, seed + Stream.LIGHT_POINTS)
+    points = points_on_triangles(asked.corners, unit)
+    unit = stratified_square(asked.keys, samples, seed + Stream.LIGHT_RAYS)
     open_gain, share = lamp_light(light, points, asked.normals, unit, caster)
     values = (open_gain.mean(axis=1) * share).reshape(-1, asked.count)
     missed = open_gain.reshape(len(values), -1).mean(axis=1) / (asked.count * samples + 2.0)
@@ -327,7 +331,7 @@ def sky_share(
     share, error = np.empty(len(points)), np.empty(len(points))
     for first in range(0, len(points), CHUNK):
         rows = slice(first, first + CHUNK)
-        unit = stratified_square(keys[rows], rays, seed)
+        unit = stratified_square(keys[rows], rays, seed + Stream.LIGHT_RAYS)
         directions = to_world(cosine_hemisphere(unit), normals[rows])
         start = points[rows] if points.ndim == 3 else points[rows, None]
         start = np.broadcast_to(start + caster.surface_offset * normals[rows, None], directions.shape)

@@ -1,39 +1,41 @@
-"""Which links to refine, and on which side (handout §4.2.1, Oracle2, weighed by doubt)."""
+"""Which links to refine, and on which side (handout §4.2.1, Oracle2, weighed by error estimate)."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ...numerics import Array
-from ..hierarchy import LEAF, Hierarchy, TreeTop
+from ..hierarchy import LEAF, ClusterCut, Hierarchy
 from .cluster_links import ClusterLinks
 from .element_links import Links
 from .transport import node_radiosity
 
 
 def misplaced_power(
-    hierarchy: Hierarchy, links: Links, radiosity: Array, top: TreeTop | None = None
+    hierarchy: Hierarchy, links: Links, radiosity: Array, cut: ClusterCut | None = None
 ) -> Array:
-    """Estimate the power each link may misplace [W]: B_s · A_r · doubt, the largest channel.
+    """Estimate the power each link may misplace [W]: B_s · A_r · error estimate, the largest channel.
 
     The handout's Oracle2 compares the whole power B_s A_r F_rs with BF_ε. Weighed by its
-    doubt, how much F·V varies or is unknown over the link, a large but certain transfer
+    error estimate, how much F·V varies or is unknown over the link, a large but certain transfer
     stays coarse. A source without radiosity gives 0 and is tested again every round.
 
     Parameters
     ----------
     radiosity : (e, 3) float64
     """
-    brightest = node_radiosity(hierarchy, radiosity, top).max(axis=1, initial=0.0)
-    return np.asarray(brightest[links.source] * hierarchy.area[links.receiver] * links.doubt)
+    brightest = node_radiosity(hierarchy, radiosity, cut).max(axis=1, initial=0.0)
+    return np.asarray(brightest[links.source] * hierarchy.area[links.receiver] * links.error_estimate)
 
 
 def misplaced_at_clusters(
-    hierarchy: Hierarchy, links: ClusterLinks, radiosity: Array, top: TreeTop | None = None
+    hierarchy: Hierarchy, links: ClusterLinks, radiosity: Array, cut: ClusterCut | None = None
 ) -> Array:
     """Estimate the power each link to a cluster may misplace [W] (see `misplaced_power`)."""
-    brightest = node_radiosity(hierarchy, radiosity, top).max(axis=1, initial=0.0)
-    return np.asarray(brightest[links.source] * hierarchy.clusters.area[links.receiver] * links.doubt)
+    brightest = node_radiosity(hierarchy, radiosity, cut).max(axis=1, initial=0.0)
+    return np.asarray(
+        brightest[links.source] * hierarchy.clusters.area[links.receiver] * links.error_estimate
+    )
 
 
 def choose_side(hierarchy: Hierarchy, links: Links, min_area: float) -> tuple[Array, Array, Array]:

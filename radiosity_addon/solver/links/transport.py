@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...numerics import Array
-from ..hierarchy import LEAF, Hierarchy, TreeTop
+from ..hierarchy import LEAF, ClusterCut, Hierarchy
 from .element_links import Links
 
 
@@ -14,7 +14,7 @@ def gather(
     links: Links,
     radiosity: Array,
     scale: Array | None = None,
-    top: TreeTop | None = None,
+    cut: ClusterCut | None = None,
     shared: tuple[Array, Array] | None = None,
 ) -> Array:
     """Collect the irradiance that arrives over each element's own links.
@@ -32,7 +32,7 @@ def gather(
     scale : (e, 2) float64 or None
         What each leaf's radiosity is multiplied with over its own links, and in its
         ancestors' means (`conservation`).
-    top : TreeTop or None
+    cut : ClusterCut or None
         With all clusters of the links, if it is at hand.
     shared : (e, k), (n_nodes, k) float64 or None
         Means by `shared_means`, if they are at hand. The second is overwritten.
@@ -49,7 +49,7 @@ def gather(
     first = np.flatnonzero(np.diff(links.receiver, prepend=-1))
     receivers = links.receiver[first]
     scale = np.ones((len(radiosity), 2)) if scale is None else scale
-    means, nodes = shared_means(hierarchy, radiosity, scale, top) if shared is None else shared
+    means, nodes = shared_means(hierarchy, radiosity, scale, cut) if shared is None else shared
     leaves = hierarchy.leaves
     nodes[hierarchy.n_clusters + leaves] = scale[leaves, :1] * radiosity[leaves]
     child = np.full(len(nodes), LEAF, dtype=np.int64)
@@ -72,11 +72,11 @@ def gather(
 
 
 def shared_means(
-    hierarchy: Hierarchy, radiosity: Array, scale: Array | None = None, top: TreeTop | None = None
+    hierarchy: Hierarchy, radiosity: Array, scale: Array | None = None, cut: ClusterCut | None = None
 ) -> tuple[Array, Array]:
     """Return what links to coarse sources see: (e, k) the elements' means, and (n_nodes, k) all nodes'."""
     means = pull(hierarchy, radiosity if scale is None else scale[:, 1:] * radiosity)
-    return means, node_radiosity(hierarchy, means, top)
+    return means, node_radiosity(hierarchy, means, cut)
 
 
 def push(hierarchy: Hierarchy, own: Array) -> Array:
@@ -158,11 +158,11 @@ def inner_by_level(hierarchy: Hierarchy) -> list[Array]:
     return [inner[level == depth] for depth in range(int(level.max(initial=-1)) + 1)]
 
 
-def node_radiosity(hierarchy: Hierarchy, radiosity: Array, top: TreeTop | None = None) -> Array:
-    """Put the clusters' area means, those in `top` at least, above the elements' radiosity: (n_nodes, 3)."""
+def node_radiosity(hierarchy: Hierarchy, radiosity: Array, cut: ClusterCut | None = None) -> Array:
+    """Put the clusters' area means, those in `cut` at least, above the elements' radiosity: (n_nodes, 3)."""
     of_faces = radiosity[: len(hierarchy.faces)]
-    if top is None:
+    if cut is None:
         clusters = hierarchy.clusters.average(of_faces, hierarchy.faces.area)
     else:
-        clusters = top.means(of_faces)
+        clusters = cut.means(of_faces)
     return np.concatenate([clusters, radiosity])

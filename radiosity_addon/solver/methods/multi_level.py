@@ -119,7 +119,7 @@ def link(hierarchy: Hierarchy, receiver: Array, source: Array, exchange: Array) 
     Returns
     -------
     links : Links
-        float64; visibility 1 and doubt 0, since F_rs V_rs is one number; equal quarters, as in
+        float64; visibility 1 and error estimate 0, since F_rs V_rs is one number; equal quarters, as in
         the handout: what an element gathers, all leaves below it get alike.
     """
     kept = exchange > 0
