@@ -1,4 +1,4 @@
-"""Conjugate gradients on the symmetrised system (Hestenes and Stiefel 1952; handout §3.4)."""
+"""Conjugate gradients on the symmetrized system (Hestenes and Stiefel 1952; handout §3.4)."""
 
 from __future__ import annotations
 
@@ -21,15 +21,8 @@ def conjugate_gradient(system: LinearSystem, start: Array | None = None) -> Iter
     Preconditioned by the diagonal A/ρ. Rows with ρ = 0 are eliminated: they have B = E and
     stand on the right side. See `jacobi.jacobi` for what is yielded.
 
-    Parameters
-    ----------
-    start : (n, 3) float or None
-        None starts from B = E.
-
-    Raises
-    ------
-    UsageError
-        If the system is not reciprocal, so that scaling does not make it symmetric.
+    start (n, 3): None starts from B = E.
+    Raises UsageError if the system is not reciprocal, so that scaling does not make it symmetric.
     """
     if system.mass is not None or not system.reciprocal:
         raise UsageError(
@@ -67,10 +60,7 @@ def _iterate(system: LinearSystem, start: Array | None) -> Iterator[Iterate]:
 def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -> SolverState:
     """Solve; `progress` is shown the state.
 
-    Raises
-    ------
-    UsageError
-        If the assembly asked for is not galerkin.
+    Raises UsageError if the assembly asked for is not galerkin.
     """
     if settings.assembly != "galerkin":
         raise UsageError(

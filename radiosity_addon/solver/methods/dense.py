@@ -18,14 +18,8 @@ from .matrix import Iterate, solve_matrix
 def dense(system: LinearSystem) -> Array:
     """Solve K B = E exactly, up to rounding.
 
-    Returns
-    -------
-    radiosity : (n, 3) float64 [W/m²]
-
-    Raises
-    ------
-    BakeError
-        If K is singular: a closed part of the scene reflects all light for ever.
+    Returns radiosity (n, 3) [W/m²].
+    Raises BakeError if K is singular: a closed part of the scene reflects all light for ever.
     """
     radiosity = np.empty((len(system), 3))
     solved = np.zeros(3, dtype=bool)

@@ -18,10 +18,7 @@ def gauss_seidel(system: LinearSystem, start: Array | None = None) -> Iterator[I
 
     One row's update is gathering light to one element. See `jacobi.jacobi` for what is yielded.
 
-    Parameters
-    ----------
-    start : (n, 3) float or None
-        None starts from B = E.
+    start (n, 3): None starts from B = E.
     """
     radiosity = (system.emission if start is None else start).copy()
     while True:

@@ -113,10 +113,7 @@ class HierarchicalState(SolverState):
 def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -> HierarchicalState:
     """Solve; `progress` is shown the state.
 
-    Raises
-    ------
-    UsageError
-        If the scene does not fit into the memory limit; nothing is allocated then.
+    Raises UsageError if the scene does not fit into the memory limit; nothing is allocated then.
     """
     refuse_large_scene(scene, settings)
     state = begin(scene, settings, HierarchicalState)
@@ -271,11 +268,8 @@ def exhausted(state: HierarchicalState) -> bool:
 def tell(state: HierarchicalState, rounds: list[dict[str, float]]) -> None:
     """Put into the report how BF_ε fell, and what lies on which level.
 
-    Parameters
-    ----------
-    rounds : list of {"error", "links_refined", "links"}
-        For each BF_ε, as a share of the light's power: how many links were refined for it, and
-        how many there were afterwards.
+    rounds list of {"error", "links_refined", "links"}: For each BF_ε, as a share of the light's power: how
+        many links were refined for it, and how many there were afterward.
     """
     hierarchy, links = state.hierarchy, state.links
     n_links = len(links) + len(state.cluster_links)

@@ -19,17 +19,9 @@ def jacobi(system: LinearSystem, start: Array | None = None) -> Iterator[Iterate
     K_ii divides the whole, E_i included (the handout's (3.35) divides the sum alone, which is
     right only where K_ii = 1). Written with the residual r = E − K B it is B ← B + r / K_ii.
 
-    Parameters
-    ----------
-    start : (n, 3) float or None
-        None starts from B = E: then iteration k holds the light of k bounces.
-
-    Yields
-    ------
-    radiosity : (n, 3) float64
-        Iteration 0 is the start; an array of its own each time.
-    residual : (3,) float64
-        Its Σ A |E − K B| [W].
+    start (n, 3): None starts from B = E: then iteration k holds the light of k bounces.
+    Yields radiosity (n, 3): Iteration 0 is the start; an array of its own each time.
+    Yields residual (3,): Its Σ A |E − K B| [W].
     """
     diagonal = system.diagonal()
     radiosity = system.emission if start is None else start

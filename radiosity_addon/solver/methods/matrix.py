@@ -74,19 +74,10 @@ def solve_matrix(
 ) -> MatrixState:
     """Assemble the system of a scene, solve it block by block, and set the state.
 
-    Parameters
-    ----------
-    progress : Progress
-        Is shown the state, the same one all along.
-    solver : callable
-        Iterates on one block.
-    copies : int
-        Matrices of n × n numbers that the method holds at once, the system's own included.
-
-    Raises
-    ------
-    UsageError
-        If the system would need more than the memory limit; nothing is allocated then.
+    progress: Is shown the state, the same one all along.
+    solver: Iterates on one block.
+    copies: Matrices of n × n numbers that the method holds at once, the system's own included.
+    Raises UsageError if the system would need more than the memory limit; nothing is allocated then.
     """
     state = begin(scene, settings, MatrixState)
     progress.at(0.0, state)
@@ -126,15 +117,8 @@ def solve_matrix(
 def check_memory(unknowns: int, copies: int, settings: SolverSettings, faces: int) -> float:
     """Return the GiB that `copies` matrices of a system take; refuse more than the limit.
 
-    Parameters
-    ----------
-    faces : int
-        The scene's; there are no fewer elements, whatever is asked for.
-
-    Raises
-    ------
-    UsageError
-        Names the size, what it would need, the limit and the methods that do without.
+    faces: The scene's; there are no fewer elements, whatever is asked for.
+    Raises UsageError: Names the size, what it would need, the limit and the methods that do without.
     """
     needed = copies * 8.0 * float(unknowns) ** 2
     fewer = "ask for fewer elements, or " if settings.elements > faces else ""

@@ -48,10 +48,7 @@ class MultiLevelState(SolverState):
 def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -> MultiLevelState:
     """Solve; `progress` is shown the state.
 
-    Raises
-    ------
-    UsageError
-        If the pairs of faces alone, before anything is refined, exceed the memory limit.
+    Raises UsageError if the pairs of faces alone, before anything is refined, exceed the memory limit.
     """
     state = begin(scene, settings, MultiLevelState)
     hierarchy = state.hierarchy
@@ -109,18 +106,10 @@ def distinct_pairs(receiver: Array, source: Array, count: int) -> tuple[Array, A
 def link(hierarchy: Hierarchy, receiver: Array, source: Array, exchange: Array) -> Links:
     """Make links of pairs (handout §4.2, Link), leaving out those that exchange nothing.
 
-    Parameters
-    ----------
-    receiver, source : (n,) int
-        Elements, sorted by receiver.
-    exchange : (n,) float64
-        A_r F_rs V_rs [m²].
-
-    Returns
-    -------
-    links : Links
-        float64; visibility 1 and error estimate 0, since F_rs V_rs is one number; equal quarters, as in
-        the handout: what an element gathers, all leaves below it get alike.
+    receiver, source (n,) int: Elements, sorted by receiver.
+    exchange (n,): A_r F_rs V_rs [m²].
+    Returns links: float64; visibility 1 and error estimate 0, since F_rs V_rs is one number; equal quarters,
+        as in the handout: what an element gathers, all leaves below it get alike.
     """
     kept = exchange > 0
     receiver, source = receiver[kept].astype(np.int32), source[kept].astype(np.int32)
@@ -173,6 +162,6 @@ def tell(state: MultiLevelState) -> None:
 
 
 def _converged(state: MultiLevelState) -> float:
-    """Return how far the residual has fallen towards the tolerance, by its logarithm."""
+    """Return how far the residual has fallen toward the tolerance, by its logarithm."""
     goal = np.log(max(state.settings.tolerance, 1e-16))
     return float(np.clip(np.log(max(state.residual, 1e-300)) / goal, 0.0, 1.0)) if goal < 0 else 1.0

@@ -106,10 +106,7 @@ def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -
     `settings.max_iterations` shots. `state.residual` is ΣAΔB / Φ, the residual of S; that of
     B is smaller, by ρ and by what leaves the scene.
 
-    Raises
-    ------
-    UsageError
-        If even the elements alone would not fit into the memory limit.
+    Raises UsageError if even the elements alone would not fit into the memory limit.
     """
     state = begin(scene, settings, ShootingState)
     progress.at(0.01, state)

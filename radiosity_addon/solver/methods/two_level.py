@@ -6,7 +6,7 @@
 3. From patch to patch by area averages, F_ij = Σ_{q∈i} F_qj A_q / A_i (4.1).
 4. Patches are solved directly, B_i = E_i + ρ_i Σ_j F_ij B_j (4.2).
 5. Elements gather once from the patches: B_q = E_q + ρ_q Σ_j F_qj B_j (4.3).
-6. Where neighbouring elements differ too much they are split; only the new elements' rows are
+6. Where neighboring elements differ too much they are split; only the new elements' rows are
    computed, and (4.3) is applied to them with the patch radiosities of step 4.
 
 E holds the lamps' light as E + ρ H_direct. Sources stay constant over each patch, so the
@@ -51,7 +51,7 @@ class TwoLevelState(SolverState):
     sends: Array = field(default_factory=lambda: np.zeros((0, 1)))
     """(m, 1) float64: the share of its radiosity that each patch sends, see `overlaps`."""
     limit: float = np.inf
-    """Difference between neighbours above which they are split [W/m²]."""
+    """Difference between neighbors above which they are split [W/m²]."""
     smallest: float = 0.0
     """Area that subdivision must leave to every element [m²]."""
 
@@ -79,10 +79,7 @@ def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -
     the elements of the last round average to: rounding at first, then how far the new rows
     speak against the patch radiosities, which are kept.
 
-    Raises
-    ------
-    UsageError
-        If the n × m matrix would not fit into the memory limit.
+    Raises UsageError if the n × m matrix would not fit into the memory limit.
     """
     state = begin(scene, settings, TwoLevelState)
     progress.at(0.01, state)
@@ -181,7 +178,7 @@ def patch_residual(state: TwoLevelState) -> float:
 
 
 def contrasts(state: TwoLevelState) -> tuple[Array, Array]:
-    """Return (k, 2) pairs of neighbouring elements and (k,) how much their light differs [W/m²].
+    """Return (k, 2) pairs of neighboring elements and (k,) how much their light differs [W/m²].
 
     Their reflected radiosity under the mean reflectance of the two, the largest channel: so
     lamps and seams between two materials, which no subdivision smooths, do not count.
@@ -193,7 +190,7 @@ def contrasts(state: TwoLevelState) -> tuple[Array, Array]:
 
 
 def split(state: TwoLevelState) -> Array:
-    """Split neighbours that differ by more than the limit, both, and return the new elements (step 6).
+    """Split neighbors that differ by more than the limit, both, and return the new elements (step 6).
 
     None that would fall below `state.smallest`, and no more than the memory limit has room
     for, the largest differences first.
