@@ -1,4 +1,4 @@
-"""Making the linear system: Galerkin or collocation, constant or linear elements (handout §3.2, §3.3).
+"""Assembly of the linear system: Galerkin or collocation, constant or linear elements (handout §3.2, §3.3).
 
 | assembly | K_ij | source |
 |---|---|---|
@@ -32,7 +32,7 @@ BLOCK_PAIRS = 1 << 18
 """Pairs between two reports of progress, about half a second's work; their numbers take 4 MB."""
 
 CHUNK_PAIRS = 1 << 16
-"""Pairs of a point and an element that one thread looks at together; about 60 MB."""
+"""Pairs of a point and an element that one thread processes together; about 60 MB."""
 
 FACING = 1e-13
 """A face rises over another's plane if by more than this part of the scene's extent."""
@@ -204,7 +204,7 @@ def _facing(faces: Faces, one: Array, other: Array) -> Array:
 
 
 def _rise(faces: Faces, base: Array, of: Array) -> Array:
-    """Return (b, o) how far the highest corner of faces `of` rises over the planes of faces `base`."""
+    """Return (b, o) the height of the highest corner of faces `of` over the planes of faces `base`."""
     normal = faces.normal[base]
     ground = np.einsum("bk,bk->b", normal, faces.corners[base, 0])
     height = normal @ faces.corners[of].reshape(-1, 3).T

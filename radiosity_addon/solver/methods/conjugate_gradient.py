@@ -16,7 +16,7 @@ from .matrix import Iterate, solve_matrix
 
 
 def conjugate_gradient(system: LinearSystem, start: Array | None = None) -> Iterator[Iterate]:
-    """Iterate on (A/ρ − A F) B = A E/ρ, one system a channel, until nothing is left to improve.
+    """Iterate on (A/ρ − A F) B = A E/ρ, one system per channel, until no improvement is possible.
 
     Preconditioned by the diagonal A/ρ. Rows with ρ = 0 are eliminated: they have B = E and
     stand on the right side. See `jacobi.jacobi` for what is yielded.
@@ -58,9 +58,9 @@ def _iterate(system: LinearSystem, start: Array | None) -> Iterator[Iterate]:
 
 
 def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -> SolverState:
-    """Solve; `progress` is shown the state.
+    """Return the solved state; `progress` receives it on the way.
 
-    Raises UsageError if the assembly asked for is not galerkin.
+    Raises UsageError if the assembly is not galerkin.
     """
     if settings.assembly != "galerkin":
         raise UsageError(

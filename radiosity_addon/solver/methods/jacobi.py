@@ -1,4 +1,4 @@
-"""Jacobi iteration: all elements gather at once from the radiosities before (handout §3.4.1, (3.35))."""
+"""Jacobi iteration: all elements gather at once from the previous radiosities (handout §3.4.1, (3.35))."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .matrix import Iterate, solve_matrix
 
 
 def jacobi(system: LinearSystem, start: Array | None = None) -> Iterator[Iterate]:
-    """Iterate B_i ← (E_i − Σ_{j≠i} K_ij B_j) / K_ii without end.
+    """Iterate B_i ← (E_i − Σ_{j≠i} K_ij B_j) / K_ii endlessly.
 
     K_ii divides the whole, E_i included (the handout's (3.35) divides the sum alone, which is
     right only where K_ii = 1). Written with the residual r = E − K B it is B ← B + r / K_ii.
@@ -32,5 +32,5 @@ def jacobi(system: LinearSystem, start: Array | None = None) -> Iterator[Iterate
 
 
 def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -> SolverState:
-    """Solve; `progress` is shown the state."""
+    """Return the solved state; `progress` receives it on the way."""
     return solve_matrix(scene, settings, progress, jacobi, copies=2)

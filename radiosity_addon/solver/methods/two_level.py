@@ -36,7 +36,7 @@ BLOCK_PAIRS = 1 << 19
 
 @dataclass
 class TwoLevelState(SolverState):
-    """What the two-level method works on: m patches, l elements."""
+    """State of the two-level method: m patches, l elements."""
 
     patches: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     """(m,) int: nodes of the hierarchy."""
@@ -72,12 +72,12 @@ class TwoLevelState(SolverState):
 
 
 def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -> TwoLevelState:
-    """Solve; `progress` is shown the state.
+    """Return the solved state; `progress` receives it on the way.
 
     About `settings.patches` patches, at most one for each of about `settings.elements`
     elements. `state.residual` is that of the patches' system (4.2), with the form factors that
     the elements of the last round average to: rounding at first, then how far the new rows
-    speak against the patch radiosities, which are kept.
+    disagree with the patch radiosities, which are kept.
 
     Raises UsageError if the n × m matrix would not fit into the memory limit.
     """
@@ -210,7 +210,7 @@ def split(state: TwoLevelState) -> Array:
     hierarchy.subdivide(chosen)
     state.factors = state.factors[kept]
     state.link_lights_to_leaves()
-    # Until they have their own, children look like their parents.
+    # Until they have their own, children have their parents' values.
     parents = hierarchy.parent[before:]
     state.radiosity = np.concatenate([state.radiosity, state.radiosity[parents]])
     state.irradiance = np.concatenate([state.irradiance, state.irradiance[parents]])
@@ -218,7 +218,7 @@ def split(state: TwoLevelState) -> Array:
 
 
 def _start_comparing(state: TwoLevelState) -> None:
-    """Fix what counts as a difference, before subdivision changes the picture it is measured by."""
+    """Fix the limit of differences before subdivision changes the light it is measured by."""
     hierarchy, leaves = state.hierarchy, state.leaves
     area = hierarchy.area[leaves]
     mean = area @ (state.reflectance[leaves] * state.irradiance[leaves]) / area.sum()
@@ -227,7 +227,7 @@ def _start_comparing(state: TwoLevelState) -> None:
 
 
 def _finish(state: TwoLevelState) -> None:
-    """Tell in the report what is left that differs."""
+    """Add the remaining differences to the report."""
     _, difference = contrasts(state)
     state.details["two_level"] |= {
         "limit_W_m2": state.limit,
@@ -268,7 +268,7 @@ def _patch_of(state: TwoLevelState) -> Array:
 
 
 def _most_elements(patches: int, memory_limit: float) -> int:
-    """Return how many elements' rows fit into the limit beside the patches' own matrices.
+    """Return how many elements' rows fit into the limit next to the patches' own matrices.
 
     Rows are held twice while others are added to them.
     """
@@ -285,5 +285,5 @@ def refuse_too_large(faces: int, settings: SolverSettings) -> None:
     patches = max(faces, min(settings.patches, settings.elements))
     what = f"two-level with {elements} elements and {patches} patches"
     instead = "the method hierarchical, or shooting, which needs no matrix"
-    advice = f"ask for fewer elements or patches, or take {instead}"
+    advice = f"use fewer elements or patches, or take {instead}"
     refuse_beyond(settings.memory_limit, 8 * (2 * elements * patches + 3 * patches**2), what, advice)
