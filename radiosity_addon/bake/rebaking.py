@@ -95,7 +95,7 @@ def _resized(moved: list[BakeObject], before: Scene, now: Scene) -> tuple[BakeWa
                 BakeWarning(
                     item.name,
                     f"object '{item.name}' has another size or shape but keeps its texels: "
-                    "bake again to share them out anew",
+                    "bake again to distribute them again",
                 )
             )
     return tuple(found)

@@ -167,7 +167,7 @@ def _check_geometry(geometry: TexelGeometry, triangles: int) -> int:
     numbers(geometry.uv, (triangles, 3, 2), -LARGE)
     integers(geometry.page_of_triangle, (triangles,), -1, pages - 1)
     shown = geometry.uv[geometry.page_of_triangle >= 0]
-    require(((shown >= -SLACK) & (shown <= 1.0 + SLACK)).all(), "UVs beside their page")
+    require(((shown >= -SLACK) & (shown <= 1.0 + SLACK)).all(), "UVs outside their page")
     integers(geometry.page_start, (pages + 1,), 0, n)
     require(geometry.page_start[0] == 0 and geometry.page_start[-1] == n, "texels of no page")
     require((np.diff(geometry.page) >= 0).all(), "pages in no order")

@@ -209,7 +209,7 @@ def _carry(mesh: bpy.types.Mesh, known: StandIn, users: Sequence[bpy.types.Objec
         kept = released_copy(mesh, f"{name}{EDITED}")
         kept.use_fake_user = True
         _seal_again(mesh, known)
-        message = f"the baked mesh of object '{name}' was edited, but its modifiers or instances make it anew"
+        message = f"the baked mesh of object '{name}' was edited, but its modifiers or instances generate it"
         return [BakeWarning(name, f"{message}: the edited mesh is kept as '{kept.name}'")]
     if not edited and original is not None:
         return []

@@ -179,7 +179,7 @@ def check(
         found = inspect(bpy.context, settings, folder, into, (BLEND_NAME, PREVIEW_NAME))
         lines = [f"  {name:<12} {value}" for name, value in figures(found)]
         odd = [f"  {finding.level.lower():<8} {finding.message}" for finding in found.findings]
-        console.lines(["a bake would be:", *lines, *(["what is odd:", *odd] if odd else ["nothing is odd"])])
+        console.lines(["a bake would be:", *lines, *(["problems:", *odd] if odd else ["no problems found"])])
         wrong = [finding.message for finding in found.findings if finding.level == ERROR]
         if wrong and console.quiet:
             raise SceneError(wrong[0])

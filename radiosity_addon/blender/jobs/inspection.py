@@ -197,7 +197,7 @@ def _shape(piece: Piece) -> _Shape:
 def _of_the_file(folder: Path | None) -> Iterator[Finding]:
     """Say where lightmaps go, where that may surprise."""
     if folder is None:
-        message = "the file is not saved: lightmaps will be packed into it; save it to have files beside it"
+        message = "the file is not saved: lightmaps will be packed into it; save it to get files next to it"
         yield Finding(INFO, "file", message)
         return
     # `Path.exists` raises for a name that is too long.
@@ -274,7 +274,7 @@ def _of_layers(chosen: Sequence[Piece], settings: BakeSettings) -> Iterator[Find
     if settings.keep_uvs:
         new = [piece.source.name for piece in chosen if not piece.has_lightmap_layer]
         if new:
-            message = f"{_names(new)} without a UV layer '{LIGHTMAP_UV_LAYER}' to keep: unwrapped anew"
+            message = f"{_names(new)} without a UV layer '{LIGHTMAP_UV_LAYER}' to keep: unwrapped again"
             yield Finding(WARNING, new[0], message)
 
 
@@ -346,7 +346,7 @@ def _of_size(shapes: dict[int, _Shape]) -> Iterator[Finding]:
         yield Finding(
             WARNING,
             "scene",
-            f"the scene is {told} large: lamps and texels count in metres, so check the unit",
+            f"the scene is {told} large: lamps and texels are measured in meters, so check the unit",
         )
 
 

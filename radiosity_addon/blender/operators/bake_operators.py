@@ -41,7 +41,7 @@ class RADIOSITY_OT_bake(Conditional, WindowJob, bpy.types.Operator):
         try:
             in_window = not bpy.app.background and context.window is not None
             if in_window and look_first(context):
-                self.report({"INFO"}, "Look at what is odd before this scene is baked for the first time")
+                self.report({"INFO"}, "Show problems before this scene is baked for the first time")
                 bpy.ops.radiosity.check("INVOKE_DEFAULT")
                 return {"CANCELLED"}
         except RadiosityError as error:

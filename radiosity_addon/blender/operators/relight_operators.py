@@ -12,7 +12,7 @@ from .polls import Conditional, can_relight, no_bake_runs
 
 
 class RADIOSITY_OT_relight(Conditional, WindowJob, bpy.types.Operator):
-    """Light the bake anew by the strengths and colors that lamps, emission and world have now"""
+    """Update the bake for changed colors and strengths of lamps, emission and world, without tracing rays"""
 
     bl_idname = "radiosity.relight"
     bl_label = "Relight"

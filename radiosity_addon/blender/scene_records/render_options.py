@@ -35,7 +35,7 @@ def option_warnings(context: bpy.types.Context) -> list[BakeWarning]:
         warnings += _culled(cycles, objects)
     space = getattr(getattr(bpy.data, "colorspace", None), "working_space", _USUAL_SPACE)
     if space != _USUAL_SPACE:
-        message = f"the file's working space is {space}: its lightmaps hold such colours, not {_USUAL_SPACE}"
+        message = f"the file's working space is {space}: its lightmaps hold such colors, not {_USUAL_SPACE}"
         warnings.append(BakeWarning(scene.name, message))
     return [*warnings, *_still_as_in_the_viewport(objects)]
 
@@ -63,7 +63,7 @@ def _still_as_in_the_viewport(objects: Iterable[bpy.types.Object]) -> Iterator[B
                 message = f"modifier '{modifier.name}' is driven in viewports, and taken as there"
                 yield BakeWarning(obj.name, f"object '{obj.name}': {message}")
             if modifier.type == "NODES" and modifier.show_render and _asks(modifier.node_group, known):
-                message = "its geometry nodes ask 'Is Viewport' and are told yes; renders may differ"
+                message = "its geometry nodes use 'Is Viewport', which is true here; renders may differ"
                 yield BakeWarning(obj.name, f"object '{obj.name}': {message}")
 
 
