@@ -53,14 +53,8 @@ UNSURE = 0.8
 class LightmappedObject:
     """An object that is to get a lightmap.
 
-    Parameters
-    ----------
-    name : str
-    triangles : int
-    area : float
-        In world space [m²].
-    scale : float
-        Its texels per metre, relative to the other objects.
+    area: In world space [m²].
+    scale: Its texels per meter, relative to the other objects.
     """
 
     name: str
@@ -83,18 +77,11 @@ class LightmappedObject:
 class Estimate:
     """What a bake will be.
 
-    Parameters
-    ----------
-    pages : tuple of int
-        Each page's width and height in texels.
-    texels : tuple of float
-        Parallel to the objects: about how many each gets.
-    memory : float
-        What it takes beside what Blender has taken already [bytes], …
-    files : float
-        … and what does not fit into the memory limit: temporary files take it [bytes].
-    seconds : float or None
-        None where it depends on what is found: an error that is asked for, and methods for study.
+    pages: Each page's width and height in texels.
+    texels: Parallel to the objects: about how many each gets.
+    memory: What it takes beside what Blender has taken already [bytes], …
+    files: … and what does not fit into the memory limit: temporary files take it [bytes].
+    seconds: None where it depends on what is found: an error that is asked for, and methods for study.
     """
 
     pages: tuple[int, ...]
@@ -107,13 +94,8 @@ class Estimate:
 def estimate_bake(objects: Sequence[LightmappedObject], triangles: int, settings: BakeSettings) -> Estimate:
     """Reckon what a bake will be.
 
-    Parameters
-    ----------
-    objects : sequence of LightmappedObject
-        Those that get a lightmap.
-    triangles : int
-        Of the whole scene, what only lights and blocks among them.
-    settings : BakeSettings
+    objects: Those that get a lightmap.
+    triangles: Of the whole scene, what only lights and blocks among them.
     """
     pages, texels = _pages(objects, settings)
     total = sum(texels)
@@ -139,10 +121,7 @@ def estimate_bake(objects: Sequence[LightmappedObject], triangles: int, settings
 def refuse_before_unwrapping(bake_scene: BakeScene, settings: BakeSettings) -> None:
     """Refuse pages that will not fit into the memory limit, as far as areas tell how large they get.
 
-    Raises
-    ------
-    UsageError
-        See `refuse_too_large`.
+    Raises UsageError: See `refuse_too_large`.
     """
     sizes = pages_of(settings)
     if sizes is None:
@@ -195,7 +174,7 @@ def _taken(item: LightmappedObject, density: float, padding: float) -> float:
 
 
 def _density(objects: Sequence[LightmappedObject], resolution: int, padding: float) -> float:
-    """Return the texels per metre at which charts fill a page: Σ c (d √(A/c) + p)² = what there is."""
+    """Return the texels per meter at which charts fill a page: Σ c (d √(A/c) + p)² = what there is."""
     square = sum(item.surface for item in objects)
     if square <= 0.0:
         return 0.0

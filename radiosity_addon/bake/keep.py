@@ -20,14 +20,9 @@ from .sidecar import write_sidecar
 class KeepOptions:
     """How a bake is kept.
 
-    Attributes
-    ----------
-    sidecar : bool
-        Whether it is written to a file beside its lightmaps.
-    mark : str
-        The bake's own name, by which its images and its sidecar are known to belong together.
-    earlier : KeptBake or None
-        A kept bake of the same scene, to be updated if only places of objects have changed since.
+    sidecar: Whether it is written to a file beside its lightmaps.
+    mark: The bake's own name, by which its images and its sidecar are known to belong together.
+    earlier: A kept bake of the same scene, to be updated if only places of objects have changed since.
     """
 
     sidecar: bool = False
@@ -45,18 +40,9 @@ def run_pipeline(
 ) -> tuple[BakeResult, KeptBake | None]:
     """Bake as planned, and keep the bake if that is asked for.
 
-    Parameters
-    ----------
-    plan : BakePlan
-        One that moves objects in a kept bake is for a bake that is kept again.
-    keeping : KeepOptions or None
-    sidecar : Path or None
-        Where its file goes, to be published with the bake; None writes none.
-
-    Raises
-    ------
-    RadiosityError
-        Those of `bake_and_keep` and `write_sidecar`.
+    plan: One that moves objects in a kept bake is for a bake that is kept again.
+    sidecar: Where its file goes, to be published with the bake; None writes none.
+    Raises RadiosityError: Those of `bake_and_keep` and `write_sidecar`.
     """
     if keeping is None:
         return bake(plan.bake_scene, plan.settings, progress), None

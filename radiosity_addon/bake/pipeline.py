@@ -1,4 +1,4 @@
-"""The bake as prose: unwrap, rasterise, solve, light the texels, encode.
+"""The bake as prose: unwrap, rasterize, solve, light the texels, encode.
 
 Canceled or failed, nothing outside was touched.
 """
@@ -76,19 +76,9 @@ PICTURE_SECONDS = 0.25
 def bake(bake_scene: BakeScene, settings: BakeSettings, progress: Progress = SILENT) -> BakeResult:
     """Bake lightmaps for a scene.
 
-    Parameters
-    ----------
-    bake_scene : BakeScene
-    settings : BakeSettings
-    progress : Progress
-        Gets stages, and pictures of what is solved and lit.
-
-    Raises
-    ------
-    SceneError
-        If no object is to get a lightmap.
-    BakeError
-        If the lightmaps cannot be laid out.
+    progress: Gets stages, and pictures of what is solved and lit.
+    Raises SceneError if no object is to get a lightmap.
+    Raises BakeError if the lightmaps cannot be laid out.
     """
     result, _ = _bake(bake_scene, settings, are_wanted(bake_scene, settings), progress)
     return result
@@ -102,10 +92,7 @@ def bake_and_keep(
     Every lamp is asked for with all its shadow rays, those that are dark now too, so that scenes of
     many lamps take longer than by `bake`. Parameters and errors are those of `bake`.
 
-    Raises
-    ------
-    UsageError
-        If the method keeps no links, or the quantity is the residual.
+    Raises UsageError if the method keeps no links, or the quantity is the residual.
     """
     result, kept = _bake(bake_scene, settings, True, progress)
     assert kept is not None

@@ -30,14 +30,9 @@ _NAMED = 5
 class ShownLightmap(NamedTuple):
     """What is remembered of an object's lightmap.
 
-    Attributes
-    ----------
-    digest, light : str
-        Those of the object and of the light it was baked in.
-    density : float
-        Texels per meter.
-    has_groups : bool
-        Whether each light group has a lightmap of its own.
+    digest, light: Those of the object and of the light it was baked in.
+    density: Texels per meter.
+    has_groups: Whether each light group has a lightmap of its own.
     """
 
     digest: str
@@ -49,12 +44,9 @@ class ShownLightmap(NamedTuple):
 class ShownBake(NamedTuple):
     """What is remembered of a scene's lightmaps.
 
-    Attributes
-    ----------
-    lightmaps : mapping of str to ShownLightmap
-        Of the objects that show one.
-    objects : mapping of str to str
-        Digest of each object that the last bake had, with a lightmap or not, cut to `SHORT`.
+    lightmaps mapping of str to ShownLightmap: Of the objects that show one.
+    objects mapping of str to str: Digest of each object that the last bake had, with a lightmap or not, cut
+        to `SHORT`.
     """
 
     lightmaps: Mapping[str, ShownLightmap]
@@ -78,22 +70,13 @@ class BakeDigests(NamedTuple):
 class BakePlan:
     """Which bake a scene needs.
 
-    Attributes
-    ----------
-    kind : str
-        *full*; *changed*: objects that did not change keep their lightmaps; *moved*: a kept bake is updated
+    kind: *full*; *changed*: objects that did not change keep their lightmaps; *moved*: a kept bake is updated
         for objects that moved; *nothing*.
-    bake_scene : BakeScene
-        Objects that keep their lightmaps are marked as not to be baked.
-    settings : BakeSettings
-    digests : BakeDigests
-        What is to be remembered of the bake.
-    kept : KeptBake or None
-        The bake to update, if *moved*.
-    unchanged : collection of str
-        The objects that keep their lightmaps.
-    gone : sequence of str
-        Objects that the last bake had, if *changed* or *nothing*.
+    bake_scene: Objects that keep their lightmaps are marked as not to be baked.
+    digests: What is to be remembered of the bake.
+    kept: The bake to update, if *moved*.
+    unchanged collection of str: The objects that keep their lightmaps.
+    gone: Objects that the last bake had, if *changed* or *nothing*.
     """
 
     kind: Literal["full", "changed", "moved", "nothing"]
@@ -134,12 +117,8 @@ def plan_bake(
 ) -> BakePlan:
     """Return which bake a scene needs.
 
-    Parameters
-    ----------
-    shown : ShownBake or None
-        If given, objects that did not change keep their lightmaps.
-    kept : KeptBake or None
-        If given, and objects have only moved since, it is updated.
+    shown: If given, objects that did not change keep their lightmaps.
+    kept: If given, and objects have only moved since, it is updated.
     """
     digests = BakeDigests.of(bake_scene, settings)
     if kept is not None and _moved_alone(kept, bake_scene, settings):
@@ -170,10 +149,7 @@ def plan_bake(
 def moved_objects(kept: KeptBake, bake_scene: BakeScene) -> tuple[str, ...]:
     """Return the names of the objects that are elsewhere than when the bake was kept.
 
-    Raises
-    ------
-    SceneError
-        If anything else differs, or the kept bake lacks what updating it needs.
+    Raises SceneError if anything else differs, or the kept bake lacks what updating it needs.
     """
     if kept.moves is None:
         raise SceneError("the kept bake can be relit, but nothing in it moved: bake again")

@@ -33,23 +33,10 @@ def bake_moved(
 ) -> tuple[BakeResult, KeptBake]:
     """Bake a scene in which some objects have moved since a bake was kept.
 
-    Parameters
-    ----------
-    kept : KeptBake
-        Stays as it is.
-    bake_scene : BakeScene
-        The scene as it is now.
-
-    Returns
-    -------
-    result : BakeResult
-    kept : KeptBake
-        Of the scene as it is now.
-
-    Raises
-    ------
-    SceneError
-        If more than places of objects has changed, or nothing has.
+    kept: Stays as it is.
+    bake_scene: The scene as it is now.
+    Returns kept: Of the scene as it is now.
+    Raises SceneError if more than places of objects has changed, or nothing has.
     """
     seconds: dict[str, float] = {}
     names = moved_objects(kept, bake_scene)

@@ -64,15 +64,8 @@ def least_bytes(pages: Sequence[int], settings: BakeSettings) -> float:
 def refuse_too_large(pages: Sequence[int], settings: BakeSettings) -> None:
     """Refuse pages that do not fit into the memory limit, even in tiles.
 
-    Parameters
-    ----------
-    pages : sequence of int
-        The width and height of each in texels.
-
-    Raises
-    ------
-    UsageError
-        Names the pages, what they need, and what helps.
+    pages: The width and height of each in texels.
+    Raises UsageError: Names the pages, what they need, and what helps.
     """
     needed, left = least_bytes(pages, settings), room(settings)
     if needed <= left:
@@ -112,10 +105,7 @@ def share_out_memory(geometry: TexelGeometry, settings: BakeSettings, keep: bool
 
     If the bake is kept, its arrays are still there when the images are made.
 
-    Returns
-    -------
-    shown : bool
-        Whether what is left suffices to show the texels while they are lit.
+    Returns shown: Whether what is left suffices to show the texels while they are lit.
     """
     scratch, pages = geometry.scratch, [len(numbers) for numbers in geometry.index]
     floor = LIT_BYTES * len(geometry) + working_bytes(settings)

@@ -17,13 +17,8 @@ class Cancelled(BaseException):
 class Status:
     """Where a job is.
 
-    Attributes
-    ----------
-    stage : str
-    fraction : float
-        Of the whole job, 0 to 1.
-    picture
-        What the result looks like so far, now and then; else None.
+    fraction: Of the whole job, 0 to 1.
+    picture: What the result looks like so far, now and then; else None.
     """
 
     stage: str
@@ -35,18 +30,11 @@ class Status:
 class Progress:
     """Tells a listener how far work is. May be used from any thread.
 
-    Attributes
-    ----------
-    listener : callable or None
-        Takes a `Status`. Raises `Cancelled` to stop the work. None: nobody listens.
-    name : str
-        The stage.
-    begin, end : float
-        The part of the whole that the work is.
-    look : callable or None
-        Makes the picture, or None, of what is shown to `at`, or of None.
-    in_window : bool
-        Whether a window is drawn meanwhile: no step may hold Python's lock for long.
+    listener: Takes a `Status`. Raises `Cancelled` to stop the work. None: nobody listens.
+    name: The stage.
+    begin, end: The part of the whole that the work is.
+    look: Makes the picture, or None, of what is shown to `at`, or of None.
+    in_window: Whether a window is drawn meanwhile: no step may hold Python's lock for long.
     """
 
     listener: Callable[[Status], None] | None = None
@@ -59,10 +47,7 @@ class Progress:
     def at(self, fraction: float, shown: object = None) -> None:
         """Say that a fraction of this part, 0 to 1, is done; `shown` is what a picture can be made of.
 
-        Raises
-        ------
-        Cancelled
-            If the job was canceled.
+        Raises Canceled if the job was canceled.
         """
         if self.listener is not None:
             picture = None if self.look is None else self.look(shown)

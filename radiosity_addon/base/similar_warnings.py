@@ -22,15 +22,9 @@ _PARTICULARS = re.compile(r"'[^']*'|\d+(?:[.,]\d+)*")
 def one_of_each(warnings: Sequence[dict[str, str]]) -> list[dict[str, str]]:
     """Return the warnings to show, in the order in which each kind first came.
 
-    Parameters
-    ----------
-    warnings : sequence of dict
-        The report's: "name", of what it is about, and "message".
-
-    Returns
-    -------
-    shown : list of dict
-        Of more than `FEW` that differ in names and numbers only, the first, which tells of the others.
+    warnings: The report's: "name", of what it is about, and "message".
+    Returns shown: Of more than `FEW` that differ in names and numbers only, the first, which tells of the
+        others.
     """
     kinds: dict[str, list[dict[str, str]]] = {}
     for warning in warnings:

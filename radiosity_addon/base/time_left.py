@@ -29,10 +29,7 @@ class RemainingTime:
     That jumps where a stage is quicker or slower than the one before, so what is shown runs down like a
     clock and follows the estimate smoothly.
 
-    Parameters
-    ----------
-    clock : callable
-        Seconds, from any start.
+    clock: Seconds, from any start.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:

@@ -32,12 +32,8 @@ Report = Mapping[str, Any]
 class Owner:
     """Whose files they are.
 
-    Attributes
-    ----------
-    source : str
-        The absolute path of the scene's file, or a word in angle brackets for a scene without one.
-    scene : str
-        The scene's name.
+    source: The absolute path of the scene's file, or a word in angle brackets for a scene without one.
+    scene: The scene's name.
     """
 
     source: str
@@ -70,12 +66,8 @@ class NoReportError(Exception):
 def read_report(path: Path) -> dict[str, Any]:
     """Return a report that proves itself.
 
-    Raises
-    ------
-    FileNotFoundError
-        If there is no file of this name.
-    NoReportError
-        If it is anything else.
+    Raises FileNotFoundError if there is no file of this name.
+    Raises NoReportError if it is anything else.
     """
     found = path.lstat()
     if not stat.S_ISREG(found.st_mode) or found.st_size > _MAX_REPORT:
@@ -147,13 +139,8 @@ def digest_steps(path: Path) -> Generator[None, None, str]:
 def entries(new: Iterable[Path], folder: Path, earlier: Report | None) -> dict[str, dict[str, Any]]:
     """Return what a new report is to list: the new files, and those the earlier one lists that are there.
 
-    Parameters
-    ----------
-    new : iterable of Path
-    folder : Path
-        Where they will be.
-    earlier : mapping or None
-        The report to be replaced.
+    folder: Where they will be.
+    earlier: The report to be replaced.
     """
     before = {} if earlier is None else earlier[LISTED]
     kept = {name: told for name, told in before.items() if (folder / name).is_file()}

@@ -38,10 +38,7 @@ _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 class FileNames:
     """The names of one bake's files.
 
-    Attributes
-    ----------
-    prefix : str
-        What they all begin with; "" for those of the command line.
+    prefix: What they all begin with; "" for those of the command line.
     """
 
     prefix: str = ""
@@ -50,11 +47,7 @@ class FileNames:
     def of_scene(cls, blend: str, scene: str) -> FileNames:
         """Return the names of a scene's files in a folder that others use too.
 
-        Parameters
-        ----------
-        blend : str
-            The .blend's path, or its name; "" if it was never saved.
-        scene : str
+        blend: The .blend's path, or its name; "" if it was never saved.
         """
         stem = PurePath(blend.replace("\\", "/")).stem or UNTITLED
         return cls(f"{sanitized(stem)}_{sanitized(scene)}_")
@@ -99,13 +92,8 @@ PLAIN_NAMES = FileNames()
 def unique_names(stems: Sequence[str], ending: str, taken: set[str]) -> list[str]:
     """Return file names that differ from each other and from the stems taken, and take theirs.
 
-    Parameters
-    ----------
-    stems : sequence of str
-    ending : str
-        Such as ".exr".
-    taken : set of str
-        Stems as `folded`; added to.
+    ending: Such as ".exr".
+    taken: Stems as `folded`; added to.
     """
     names = []
     for stem in stems:

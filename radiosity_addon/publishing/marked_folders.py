@@ -28,10 +28,7 @@ _ATTEMPTS = 3
 class MarkedFolder:
     """A new folder with our mark, locked as long as this process holds it.
 
-    Raises
-    ------
-    OSError
-        If it cannot be made; nothing is left of it then.
+    Raises OSError if it cannot be made; nothing is left of it then.
     """
 
     def __init__(self, parent: Path, prefix: str) -> None:
@@ -69,13 +66,8 @@ def clean_up_folders(
 ) -> None:
     """Remove the folders of processes that are no more.
 
-    Parameters
-    ----------
-    parent : Path
-    prefix : str
-        Of their names.
-    done_with : callable
-        Called with each, locked meanwhile; the folder stays where it returns False.
+    prefix: Of their names.
+    done_with: Called with each, locked meanwhile; the folder stays where it returns False.
     """
     for path in _candidates(parent, prefix):
         with suppress(OSError):

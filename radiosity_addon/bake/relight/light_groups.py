@@ -27,12 +27,8 @@ def are_wanted(bake_scene: BakeScene, settings: BakeSettings) -> bool:
 def group_of(name: str, of_scene: str, settings: BakeSettings) -> str:
     """Return the group of a source, `OTHERS` if it is in none.
 
-    Parameters
-    ----------
-    name : str
-        The source's.
-    of_scene : str
-        The group that the scene puts it in, or "".
+    name: The source's.
+    of_scene: The group that the scene puts it in, or "".
     """
     for group, wanted in settings.groups:
         if name in wanted:
@@ -43,10 +39,7 @@ def group_of(name: str, of_scene: str, settings: BakeSettings) -> str:
 def check_groups(bake_scene: BakeScene, settings: BakeSettings) -> None:
     """Refuse before the work what light groups cannot be.
 
-    Raises
-    ------
-    UsageError
-        If a member is no source, or there are too many groups.
+    Raises UsageError if a member is no source, or there are too many groups.
     """
     lights, emitters = bake_scene.scene.lights, bake_scene.emitter_names
     names = (*(light.name for light in lights), *emitters)
@@ -83,12 +76,8 @@ def group_pages(
     They sum to the whole: what sweeps that end, clamps at 0 and stitching leave of it, a small
     part, is shared out over the groups in proportion.
 
-    Parameters
-    ----------
-    pages : tuple of LightmapPage
-        Those of all light together.
-    strengths : (s, 3) float64 or None
-        The sources', with which `pages` were lit; None for those of the bake.
+    pages: Those of all light together.
+    strengths (s, 3): The sources', with which `pages` were lit; None for those of the bake.
     """
     given = kept.strengths if strengths is None else kept.sources.checked(strengths)
     chosen = members(kept.settings, kept.names, kept.groups, given)
@@ -135,22 +124,11 @@ def members(
 ) -> list[tuple[str, Array]]:
     """Tell which sources are in which group.
 
-    Parameters
-    ----------
-    names, of_scene : sequence of str
-        The s sources' names, and the groups that the scene puts them in.
-    strengths : (s, 3) float64
-        Theirs: `OTHERS` is there only if it was asked for, or something in it shines.
-
-    Returns
-    -------
-    members : list of (str, (s,) bool)
-        The settings' groups in their order, then the scene's by name, `OTHERS` last.
-
-    Raises
-    ------
-    UsageError
-        If a member is no source.
+    names, of_scene: The s sources' names, and the groups that the scene puts them in.
+    strengths (s, 3): Theirs: `OTHERS` is there only if it was asked for, or something in it shines.
+    Returns members list of (str, (s,) bool): The settings' groups in their order, then the scene's by name,
+        `OTHERS` last.
+    Raises UsageError if a member is no source.
     """
     _check_members(settings, names)
     groups = [group_of(name, own, settings) for name, own in zip(names, of_scene, strict=True)]

@@ -21,12 +21,8 @@ MOST = 1 << 28
 class Responses:
     """Pages of a kept bake for strengths near those of exact ones.
 
-    Parameters
-    ----------
-    kept : KeptBake
-    strengths : (s, 3) float64
-    pages : tuple of LightmapPage
-        Lit exactly by these strengths.
+    strengths (s, 3).
+    pages: Lit exactly by these strengths.
     """
 
     def __init__(self, kept: KeptBake, strengths: Array, pages: tuple[LightmapPage, ...]) -> None:

@@ -19,10 +19,7 @@ def strengths_in(kept: KeptBake, bake_scene: BakeScene) -> Array:
 
     A lamp that is not there any more, or hidden, has none; so has a world that is black.
 
-    Raises
-    ------
-    SceneError
-        If anything else differs; the message names it.
+    Raises SceneError if anything else differs; the message names it.
     """
     compare(kept.record, scene_record(bake_scene)).refuse_all_but(RELIGHTABLE)
     before, now, sources = kept.bake_scene.scene, bake_scene.scene, kept.sources

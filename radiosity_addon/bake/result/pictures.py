@@ -11,15 +11,10 @@ from ...numerics import Array
 class Picture:
     """What the solution looks like so far: its elements, to be drawn as they are.
 
-    Parameters
-    ----------
-    corners : (n, 3, 3) float32
-        World space, counter-clockwise from the side that is seen.
-    radiosity : (n, 3) float32 [W/m²]
-    triangle : (n,) int32
-        The scene's triangle that each is a part of.
-    front : (n,) bool
-        Whether it is on the triangle's front.
+    corners (n, 3, 3) float32: World space, counter-clockwise from the side that is seen.
+    radiosity (n, 3) float32 [W/m²].
+    triangle (n,) int32: The scene's triangle that each is a part of.
+    front (n,) bool: Whether it is on the triangle's front.
     """
 
     corners: Array
@@ -41,16 +36,12 @@ class Picture:
 class TexelSurfaces:
     """Triangles with a lightmap, and the texels on them.
 
-    Parameters
-    ----------
-    corners : (t, 3, 3) float32
-        World space, counter-clockwise from the front.
-    uv : (t, 3, 2) float32
-    page : (t,) int32
-    triangle : (t,) int32
-        The scene's triangle that each is.
-    texels : tuple of (height, width) int32
-        Per page, the number of the texel there, −1 for none. A large page may come coarser than it is.
+    corners (t, 3, 3) float32: World space, counter-clockwise from the front.
+    uv (t, 3, 2) float32.
+    page (t,) int32.
+    triangle (t,) int32: The scene's triangle that each is.
+    texels tuple of (height, width) int32: Per page, the number of the texel there, −1 for none. A large page
+        may come coarser than it is.
     """
 
     corners: Array
@@ -75,12 +66,8 @@ class TexelSurfaces:
 class TexelPicture:
     """What the lightmaps look like so far.
 
-    Parameters
-    ----------
-    surfaces : TexelSurfaces
-        The same for all pictures of a bake.
-    radiosity : (n, 3) float32 [W/m²]
-        Of the texels.
+    surfaces: The same for all pictures of a bake.
+    radiosity (n, 3) float32 [W/m²]: Of the texels.
     """
 
     surfaces: TexelSurfaces

@@ -16,13 +16,8 @@ from ...solver.state import LinkRecord
 class LightGroup:
     """The lightmaps of one group's light.
 
-    Parameters
-    ----------
-    name : str
-    pages : tuple of LightmapPage
-        Parallel to the bake's; over all groups they sum to them.
-    sources : tuple of str
-        The names of the lamps, emissive materials and the world in it, each once.
+    pages: Parallel to the bake's; over all groups they sum to them.
+    sources: The names of the lamps, emissive materials and the world in it, each once.
     """
 
     name: str
@@ -34,13 +29,8 @@ class LightGroup:
 class BakedObject:
     """The lightmap of one object: its UVs and the page they point into.
 
-    Parameters
-    ----------
-    object : BakeObject
-    uv : (count, 3, 2) float32
-        Per triangle corner, in [0, 1], v up.
-    page : int
-        Index into `BakeResult.pages`.
+    uv (count, 3, 2) float32: Per triangle corner, in [0, 1], v up.
+    page: Index into `BakeResult.pages`.
     """
 
     object: BakeObject
@@ -52,16 +42,11 @@ class BakedObject:
 class PageDetails:
     """What is known of a page's texels besides their light.
 
-    Parameters
-    ----------
-    state : (height, width) uint8
-        One of `TEXEL_STATES`, or `NO_TEXEL_HERE`.
-    noise : (height, width) float16
-        Estimated error of the irradiance, in units of `unit`.
-    misfit : (height, width) float16
-        Irradiance of the solver's element less that of the texel, in units of `unit`: what of the element's
-        light was wrong, or too coarse.
-    unit : float [W/m²]
+    state (height, width) uint8: One of `TEXEL_STATES`, or `NO_TEXEL_HERE`.
+    noise (height, width) float16: Estimated error of the irradiance, in units of `unit`.
+    misfit (height, width) float16: Irradiance of the solver's element less that of the texel, in units of
+        `unit`: what of the element's light was wrong, or too coarse.
+    unit float [W/m²].
     """
 
     state: Array
@@ -74,11 +59,7 @@ class PageDetails:
 class BakeDetails:
     """What overlays show of a bake.
 
-    Parameters
-    ----------
-    links : LinkRecord
-    pages : tuple of PageDetails
-        Parallel to the bake's; none for a bake of a residual.
+    pages: Parallel to the bake's; none for a bake of a residual.
     """
 
     links: LinkRecord
@@ -95,26 +76,15 @@ class BakeDetails:
 class BakeResult:
     """All that a bake yields.
 
-    Parameters
-    ----------
-    pages : tuple of LightmapPage
-    objects : tuple of BakedObject
-    solver : dict
-        What the report says of the solver: "method", its "settings", "elements", "links", "rays",
-        "iterations", "residual", "power_W", "closure_area_mean", "history", and what the method
-        itself has to tell.
-    warnings : tuple of BakeWarning
-        The scene's and the bake's own.
-    seconds : dict of str to float
-        Wall-clock time of each stage.
-    atlas : tuple of dict
-        Parallel to `pages`: "resolution", "texels_per_metre" of objects at texel scale 1,
-        "utilisation" (the share of texels that show a surface) and the number of "objects".
-    groups : tuple of LightGroup
-        Those that were asked for, and one of what is in none of them.
-    light : tuple of dict
-        Parallel to `objects`: statistics of the light on their fronts, see `bake_details.statistics`.
-    details : BakeDetails or None
+    solver: What the report says of the solver: "method", its "settings", "elements", "links", "rays",
+        "iterations", "residual", "power_W", "closure_area_mean", "history", and what the method itself has to
+        tell.
+    warnings: The scene's and the bake's own.
+    seconds: Wall-clock time of each stage.
+    atlas: Parallel to `pages`: "resolution", "texels_per_metre" of objects at texel scale 1, "utilization"
+        (the share of texels that show a surface) and the number of "objects".
+    groups: Those that were asked for, and one of what is in none of them.
+    light: Parallel to `objects`: statistics of the light on their fronts, see `bake_details.statistics`.
     """
 
     pages: tuple[LightmapPage, ...]

@@ -22,12 +22,7 @@ WIDEST = 1024
 
 
 class TexelPictures:
-    """Makes pictures of what is known so far.
-
-    Parameters
-    ----------
-    so_far : LightSoFar
-    """
+    """Makes pictures of what is known so far."""
 
     def __init__(self, so_far: LightSoFar) -> None:
         self._so_far = so_far

@@ -50,10 +50,8 @@ RELIGHTABLE = frozenset(
 class SceneDiff:
     """What differs between two exports of a scene.
 
-    Attributes
-    ----------
-    differing : mapping of Part to sequence of str
-        Names of objects or lights; a part without names does not differ.
+    differing mapping of Part to sequence of str: Names of objects or lights; a part without names does not
+        differ.
     """
 
     differing: Mapping[Part, Sequence[str]]
@@ -70,10 +68,7 @@ class SceneDiff:
     def refuse_all_but(self, allowed: Collection[Part]) -> None:
         """Refuse differences in other parts than these.
 
-        Raises
-        ------
-        SceneError
-            Naming the first object or light.
+        Raises SceneError: Naming the first object or light.
         """
         for part in Part:
             if part in self.parts - set(allowed):

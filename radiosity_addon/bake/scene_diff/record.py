@@ -31,26 +31,15 @@ _OF_NO_CONSEQUENCE = frozenset({"objects", "threads", "memory_limit", "unwrap_se
 class ObjectRecord(NamedTuple):
     """Digests of one object's parts.
 
-    Attributes
-    ----------
-    mesh : str
-        How triangles belong to polygons and loops, which have no area, and the texel scale.
-    role : str
-        Whether it gets a lightmap, bounces light, casts shadows and has two sides.
-    place : str
-        Triangles and shading normals.
-    surface : str
-        Means of reflectance and opacity over its triangles.
-    emission : str
-        Means of emission over its triangles, and the materials that emit it.
-    uv : str
-        Lightmap coordinates that it brings to be kept; "" if it brings none.
-    laid_out : str
-        Lightmap coordinates that the bake gave it; "" if they are not known.
-    texture : str
-        See `texture_digest`.
-    glow : Glow
-        See `glow_pattern`.
+    mesh: How triangles belong to polygons and loops, which have no area, and the texel scale.
+    role: Whether it gets a lightmap, bounces light, casts shadows and has two sides.
+    place: Triangles and shading normals.
+    surface: Means of reflectance and opacity over its triangles.
+    emission: Means of emission over its triangles, and the materials that emit it.
+    uv: Lightmap coordinates that it brings to be kept; "" if it brings none.
+    laid_out: Lightmap coordinates that the bake gave it; "" if they are not known.
+    texture: See `texture_digest`.
+    glow: See `glow_pattern`.
     """
 
     mesh: str
@@ -68,13 +57,8 @@ class ObjectRecord(NamedTuple):
 class SceneRecord:
     """What is compared of a scene.
 
-    Attributes
-    ----------
-    objects : mapping of str to ObjectRecord
-        By name, in their order.
-    lights : tuple of Light
-    settings : BakeSettings or None
-        None is not compared.
+    objects mapping of str to ObjectRecord: By name, in their order.
+    settings: None is not compared.
     """
 
     objects: Mapping[str, ObjectRecord]
@@ -87,10 +71,7 @@ def scene_record(
 ) -> SceneRecord:
     """Return what is compared of a scene.
 
-    Parameters
-    ----------
-    laid_out : (t, 3, 2) float32 or None
-        Lightmap coordinates that a bake gave to the scene's triangles.
+    laid_out (t, 3, 2) float32: Lightmap coordinates that a bake gave to the scene's triangles.
     """
     objects = {item.name: _record_of(bake_scene, item, laid_out) for item in bake_scene.objects}
     return SceneRecord(objects, tuple(bake_scene.scene.lights), settings)
@@ -99,10 +80,7 @@ def scene_record(
 def as_object_records(stored: Any) -> dict[str, ObjectRecord]:
     """Return digests that were read from a file.
 
-    Raises
-    ------
-    ValueError, TypeError
-        If they are none.
+    Raises ValueError, TypeError if they are none.
     """
     if not isinstance(stored, dict):
         raise ValueError("no digests of objects")

@@ -81,18 +81,10 @@ class TooLargeError(ArrayFileError):
 def write_arrays(path: Path, magic: bytes, format_number: int, description: Any, arrays: list[Array]) -> int:
     """Write a description and arrays; return the bytes that they take.
 
-    Parameters
-    ----------
-    magic : bytes
-        16 of them at most: the kind of file.
-    description : any
-        What JSON can hold.
-    arrays : list of arrays of the `KINDS`
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
+    magic: 16 of them at most: the kind of file.
+    description: What JSON can hold.
+    arrays list of arrays of the `KINDS`.
+    Raises OSError if the file cannot be written.
     """
     with ThreadPoolExecutor() as threads:
         blocks = [list(threads.map(_compressed, _blocks(array))) for array in arrays]
@@ -114,17 +106,9 @@ def write_arrays(path: Path, magic: bytes, format_number: int, description: Any,
 def read_arrays(path: Path, magic: bytes, format_number: int, most: int = MOST) -> tuple[Any, list[Array]]:
     """Read what `write_arrays` wrote.
 
-    Parameters
-    ----------
-    most : int
-        Bytes that it may take in memory; what would take more is refused before it is unpacked.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be read.
-    ArrayFileError
-        If it is of another kind or format, not as it was written, or too large.
+    most: Bytes that it may take in memory; what would take more is refused before it is unpacked.
+    Raises OSError if the file cannot be read.
+    Raises ArrayFileError if it is of another kind or format, not as it was written, or too large.
     """
     with _opened(path) as file:
         size = os.fstat(file.fileno()).st_size

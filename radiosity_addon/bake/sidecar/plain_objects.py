@@ -25,15 +25,8 @@ def stored_names(kind: Any) -> tuple[str, ...]:
 def flatten(value: Any, kinds: Collection[type]) -> tuple[Any, list[Array]]:
     """Return what JSON can hold of a value, and the arrays it refers to.
 
-    Parameters
-    ----------
-    kinds : collection of types
-        The classes that may be stored.
-
-    Raises
-    ------
-    TypeError
-        If it holds anything else.
+    kinds collection of types: The classes that may be stored.
+    Raises TypeError if it holds anything else.
     """
     arrays: list[Array] = []
 
@@ -63,10 +56,8 @@ def flatten(value: Any, kinds: Collection[type]) -> tuple[Any, list[Array]]:
 def restore(tree: Any, arrays: list[Array], kinds: Collection[type]) -> Any:
     """Return the value that `flatten` took apart; fields of dataclasses that are not stored are None.
 
-    Raises
-    ------
-    ValueError, KeyError, TypeError, IndexError, RecursionError
-        If it is not as `flatten` would write it.
+    Raises ValueError, KeyError, TypeError, IndexError, RecursionError if it is not as `flatten` would write
+        it.
     """
     class_of: Mapping[str, type] = {kind.__name__: kind for kind in kinds}
 

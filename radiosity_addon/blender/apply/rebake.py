@@ -35,10 +35,7 @@ class Originals:
     Edits made before the first moment are part of all. Later ones stay where they were made until lightmaps
     are applied, which carries them.
 
-    Attributes
-    ----------
-    warnings : tuple of BakeWarning
-        What to warn of, once the first moment came.
+    warnings: What to warn of, once the first moment came.
     """
 
     def __init__(self, context: bpy.types.Context) -> None:
@@ -82,18 +79,9 @@ class EarlierBake:
 
     While a new bake is made, the datablocks of earlier ones have names that leave theirs free.
 
-    Parameters
-    ----------
-    context : Context
-    keep : collection of str
-        Names of objects that keep what they show.
-    is_partial : bool
-        Instances that are not baked keep what they show too, where others of the same instancer are.
-
-    Attributes
-    ----------
-    warnings : tuple of BakeWarning
-        What to warn of: edits made while the new bake was computed.
+    keep collection of str: Names of objects that keep what they show.
+    is_partial: Instances that are not baked keep what they show too, where others of the same instancer are.
+    warnings: What to warn of: edits made while the new bake was computed.
     """
 
     def __init__(

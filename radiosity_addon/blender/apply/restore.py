@@ -35,11 +35,7 @@ def restore_scene(context: bpy.types.Context, scene: bpy.types.Scene | None) -> 
     Meshes, UV layers, materials, slots, modifiers and visibility are as they were, with the user's edits
     since. What the bake made is removed as far as nothing else shows or uses it. Image files on disk stay.
 
-    Parameters
-    ----------
-    context : Context
-    scene : Scene or None
-        None restores the whole file. Objects of no scene go with any of them.
+    scene: None restores the whole file. Objects of no scene go with any of them.
     """
     if next(made_datablocks(), None) is None and not recorded_objects():
         return Restored(0, ())

@@ -24,13 +24,8 @@ def shown_anew(export: Export) -> set[str]:
 def keeping_theirs(scene: bpy.types.Scene, export: Export, is_partial: bool) -> frozenset[str]:
     """Return the names of the objects that keep the lightmaps of earlier bakes.
 
-    Parameters
-    ----------
-    scene : Scene
-        The one that is baked.
-    export : Export
-    is_partial : bool
-        Only some objects of the scene are baked; otherwise other scenes' objects keep theirs.
+    scene: The one that is baked.
+    is_partial: Only some objects of the scene are baked; otherwise other scenes' objects keep theirs.
     """
     anew = shown_anew(export)
     return frozenset(

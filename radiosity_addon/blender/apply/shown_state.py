@@ -88,10 +88,7 @@ class _Data:
 class ShownState:
     """What some objects show, remembered; `take_off` and `put_back` can be called in turns.
 
-    Parameters
-    ----------
-    objects : sequence of Object
-        None of them stand-ins.
+    objects: None of them stand-ins.
     """
 
     def __init__(self, objects: Sequence[bpy.types.Object]) -> None:

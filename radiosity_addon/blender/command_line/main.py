@@ -42,22 +42,12 @@ def main(
 ) -> int:
     """Run one command and return its exit code; nothing is raised, nothing exits.
 
-    Parameters
-    ----------
-    argv : sequence of str or None
-        The words after the program's name; None takes them from the process.
-    prog : str
-        How the user started us, for the help texts.
-    loaded : Path or None
-        The scene file the host has open already (`blender -b FILE --command …`):
-        it is what a command without SCENE works on.
-    interrupts : Interrupts or None
-        Those of the caller, if it has entered some.
-
-    Returns
-    -------
-    code : int
-        0 done, 1 scene or bake error, 2 usage, 130 interrupted.
+    argv: The words after the program's name; None takes them from the process.
+    prog: How the user started us, for the help texts.
+    loaded: The scene file the host has open already (`blender -b FILE --command …`): it is what a command
+        without SCENE works on.
+    interrupts: Those of the caller, if it has entered some.
+    Returns code: 0 done, 1 scene or bake error, 2 usage, 130 interrupted.
     """
     try:
         request = build_parser(prog).parse_args(sys.argv[1:] if argv is None else list(argv))

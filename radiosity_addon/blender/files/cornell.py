@@ -1,7 +1,7 @@
 """The bundled scene: the Cornell box, from the data measured at Cornell University.
 
 Geometry: Cornell University Program of Computer Graphics, "The Cornell Box" data, in its
-own units, here at 1 unit = 1 cm: a room of 5.5 m. Reflectances and lamp colour: the
+own units, here at 1 unit = 1 cm: a room of 5.5 m. Reflectances and lamp color: the
 measured spectra integrated to linear sRGB under the box's own lamp.
 """
 
@@ -50,15 +50,7 @@ _BLOCKS = {  # height, and the footprint's corners (x, z)
 def build_cornell_box(scene: bpy.types.Scene | None = None) -> bpy.types.Scene:
     """Build the Cornell box, with its lamp, camera and a black world.
 
-    Parameters
-    ----------
-    scene : bpy.types.Scene or None
-        Where to; None takes the current scene if it is empty, else a new one that
-        becomes current.
-
-    Returns
-    -------
-    bpy.types.Scene
+    scene: Where to; None takes the current scene if it is empty, else a new one that becomes current.
     """
     scene = scene or _scene_to_fill()
     materials = {name: _diffuse(name, colour) for name, colour in REFLECTANCE.items()}
@@ -95,7 +87,7 @@ def _scene_to_fill() -> bpy.types.Scene:
 
 
 def _blender(corner: Sequence[float]) -> tuple[float, float, float]:
-    """Turn Cornell's coordinates into Blender's metres: X right, Y into the room, Z up."""
+    """Turn Cornell's coordinates into Blender's meters: X right, Y into the room, Z up."""
     x, y, z = corner
     return (_MIDDLE_X - x) * METRES_PER_UNIT, z * METRES_PER_UNIT, y * METRES_PER_UNIT
 

@@ -21,16 +21,9 @@ def refusal(
 ) -> str | None:
     """Return why a bake would stop because of a file it must not replace, if it would; changes no file.
 
-    Parameters
-    ----------
-    output : OutputFolder
-        Not entered.
-    settings : BakeSettings
-    collected : Collected
-    chosen : sequence of Piece
-        What gets lightmaps.
-    more : collection of str
-        Names of what is written besides lightmaps and the report.
+    output: Not entered.
+    chosen: What gets lightmaps.
+    more collection of str: Names of what is written besides lightmaps and the report.
     """
     objects = [piece.source.name for piece in chosen]
     groups = _light_groups(collected)

@@ -23,14 +23,7 @@ MAX_FREE_BYTES = 2**30
 def gltf_fault(path: Path) -> str | None:
     """Say what is wrong with a .gltf or .glb file; None for what its importer can judge.
 
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    fault : str or None
-        In words that follow the file's name.
+    Returns fault: In words that follow the file's name.
     """
     try:
         tree = json.loads(_json_of(path.read_bytes()))

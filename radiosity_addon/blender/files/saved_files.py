@@ -21,10 +21,7 @@ def save_copy(output: OutputFolder) -> None:
     Paths to images and other files are stored relative to where the copy will be, where
     they were relative to the open file; those of lightmaps always are.
 
-    Raises
-    ------
-    BakeError
-        If it cannot be written, or is the open file itself.
+    Raises BakeError if it cannot be written, or is the open file itself.
     """
     place = output.path / BLEND_NAME
     if bpy.data.filepath and Path(bpy.data.filepath).resolve() == place:
@@ -41,10 +38,7 @@ def save_copy(output: OutputFolder) -> None:
 def save_restored(path: Path) -> None:
     """Save the open file as a compressed copy that replaces `path` once it is whole.
 
-    Raises
-    ------
-    BakeError
-        If it cannot be written.
+    Raises BakeError if it cannot be written.
     """
     try:
         with replacing(path) as aside:

@@ -19,17 +19,9 @@ from .ownership import is_read
 def check_places(places: Mapping[str, Path], scene: Path | None) -> None:
     """Refuse places that coincide, and those that cannot be written; before the scene is opened.
 
-    Parameters
-    ----------
-    places : mapping of str to Path
-        By the option that names each.
-    scene : Path or None
-        The scene's file, if there is one.
-
-    Raises
-    ------
-    RadiosityError
-        Naming the option.
+    places mapping of str to Path: By the option that names each.
+    scene: The scene's file, if there is one.
+    Raises RadiosityError: Naming the option.
     """
     taken: dict[str, Path] = {} if scene is None else {"the scene itself": scene}
     for option, path in places.items():
@@ -44,19 +36,10 @@ def check_places(places: Mapping[str, Path], scene: Path | None) -> None:
 def check_existing(option: str, path: Path, overwrite: bool, ours: Mapping[str, str] | None = None) -> None:
     """Refuse to replace a file that is not ours; once the scene is open.
 
-    Parameters
-    ----------
-    option : str
-        That names it.
-    path : Path
-    overwrite : bool
-        Whether other files may be replaced, too, but for those the scene reads.
-    ours : mapping or None
-        The owner as the report of the bake will say, if a report of that may be replaced.
-
-    Raises
-    ------
-    BakeError
+    option: That names it.
+    overwrite: Whether other files may be replaced, too, but for those the scene reads.
+    ours: The owner as the report of the bake will say, if a report of that may be replaced.
+    Raises BakeError.
     """
     if not os.path.lexists(path):
         return
@@ -75,10 +58,7 @@ def owner_told(owner: Owner, output: Path) -> dict[str, str]:
 def check_writable(path: Path) -> None:
     """See that a file can be written later, in its folder or in the one in which that will be made.
 
-    Raises
-    ------
-    BakeError
-        If not.
+    Raises BakeError if not.
     """
     folder = next((each for each in path.absolute().parents if os.path.lexists(each)), path.parent)
     aside = folder / f".{path.name}.{os.getpid()}.part"

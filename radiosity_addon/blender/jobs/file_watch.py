@@ -25,20 +25,10 @@ OTHER_SCENE = "stopped: the scene was removed, or the window shows another one n
 def guarded(steps: Generator[T, None, R], context: bpy.types.Context) -> Generator[T, None, R]:
     """Advance steps as long as the file and the scene are those they began in.
 
-    Parameters
-    ----------
-    steps : generator
-        Closed if they are not, which must leave everything as it was.
-    context : bpy.types.Context
-
-    Yields
-    ------
-    what the steps yield
-
-    Raises
-    ------
-    BakeError
-        Instead of the next step, if something was undone, another file was opened or the scene is another.
+    steps: Closed if they are not, which must leave everything as it was.
+    Yields what the steps yield.
+    Raises BakeError: Instead of the next step, if something was undone, another file was opened or the scene
+        is another.
     """
     scene = context.scene
     found: list[str] = []

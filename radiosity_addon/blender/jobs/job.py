@@ -60,40 +60,17 @@ def run_bake(
     bake stays in place until the new one has succeeded. (Only a failure while the copy or
     the preview is written comes too late for that: it leaves the originals.)
 
-    Parameters
-    ----------
-    context : Context
-    settings : BakeSettings
-    output : OutputFolder or None
-        None packs the lightmaps into the file and writes nothing.
-    with_copy : bool
-        Write `baked.blend` and `preview.png` into the output folder as well.
-    in_background : bool
-        Return from every `next` within a moment, for a window: the steps between the
-        export and the lightmaps, which know nothing of Blender, run in a thread.
-    keeping : KeepOptions or None
-        If given, the bake is kept for relighting: in memory, and in a sidecar if that is asked for.
-    only_changed : bool
-        Give new lightmaps to objects that changed since the last bake; the bake cannot be kept then. If
-        objects have only moved since a bake that was kept, all lightmaps follow (`bake/plan.py`).
-    notes : tuple of BakeWarning
-        What is known before the bake and belongs into its report.
-    with_preview : bool
-        False leaves `preview.png` out.
-
-    Yields
-    ------
-    status : Status
-        The stage that begins or goes on. A picture holds what the viewports show as surfaces.
-
-    Returns
-    -------
-    report : BakeReport
-
-    Raises
-    ------
-    RadiosityError
-        Whatever cannot be baked or written, in one line.
+    output: None packs the lightmaps into the file and writes nothing.
+    with_copy: Write `baked.blend` and `preview.png` into the output folder as well.
+    in_background: Return from every `next` within a moment, for a window: the steps between the export and
+        the lightmaps, which know nothing of Blender, run in a thread.
+    keeping: If given, the bake is kept for relighting: in memory, and in a sidecar if that is asked for.
+    only_changed: Give new lightmaps to objects that changed since the last bake; the bake cannot be kept
+        then. If objects have only moved since a bake that was kept, all lightmaps follow (`bake/plan.py`).
+    notes: What is known before the bake and belongs into its report.
+    with_preview: False leaves `preview.png` out.
+    Yields status: The stage that begins or goes on. A picture holds what the viewports show as surfaces.
+    Raises RadiosityError: Whatever cannot be baked or written, in one line.
     """
     seconds: dict[str, float] = {}
     # Now, not after the export: large pages need much memory whatever is on them.
@@ -162,10 +139,7 @@ def _plan(
 ) -> tuple[BakePlan, Scope, tuple[BakeWarning, ...]]:
     """Return which bake the scene needs, which objects keep their lightmaps, and why it cannot be kept.
 
-    Raises
-    ------
-    NothingToDoError
-        If nothing has changed.
+    Raises NothingToDoError if nothing has changed.
     """
     scope = Scope.of(scene, export, is_partial=settings.objects is not None)
     kept = None if keeping is None or scope.in_scene else keeping.earlier

@@ -23,15 +23,8 @@ def seen_triangles(context: bpy.types.Context, export: Export) -> Array:
 
     What is hidden there, so that one can look into a room, is baked but stays hidden.
 
-    Parameters
-    ----------
-    context : bpy.types.Context
-        Its viewport, if it is one, decides, and its view layer.
-    export : Export
-
-    Returns
-    -------
-    seen : (t,) bool
+    context: Its viewport, if it is one, decides, and its view layer.
+    Returns seen (t,) bool.
     """
     seen = np.zeros(len(export.bake_scene.scene), dtype=bool)
     space = context.space_data if isinstance(context.space_data, bpy.types.SpaceView3D) else None
@@ -43,10 +36,7 @@ def seen_triangles(context: bpy.types.Context, export: Export) -> Array:
 class Seen:
     """Leaves out of pictures what the viewports do not show.
 
-    Parameters
-    ----------
-    triangles : (t,) bool
-        From `seen_triangles`.
+    triangles (t,) bool: From `seen_triangles`.
     """
 
     def __init__(self, triangles: Array) -> None:
@@ -98,18 +88,10 @@ def _is_seen(source: ExportSource, space: bpy.types.SpaceView3D | None) -> bool:
 def corner_arrays(picture: Picture, exposure: float, white: float) -> tuple[Array, Array]:
     """Return what a graphics card draws of the elements' corners.
 
-    Parameters
-    ----------
-    picture : Picture
-        Of n elements.
-    exposure, white : float
-        As `display_colors` takes them.
-
-    Returns
-    -------
-    positions : (3n, 3) float32
-    colors : (3n, 4) float32
-        Opaque, the same at the three corners of an element.
+    picture: Of n elements.
+    exposure, white: As `display_colors` takes them.
+    Returns positions (3n, 3) float32.
+    Returns colors (3n, 4) float32: Opaque, the same at the three corners of an element.
     """
     colors = np.ones((len(picture), 3, 4), dtype=np.float32)
     colors[:, :, :3] = display_colors(picture.radiosity, exposure, white)[:, None]
@@ -123,19 +105,10 @@ def display_colors(radiosity: Array, exposure: float, white: float) -> Array:
     are compressed to L (1 + L/white²)/(1 + L) (Reinhard et al., Photographic tone reproduction
     for digital images, 2002, eq. 4), which leaves them as they are if white is 1.
 
-    Parameters
-    ----------
-    radiosity : (…) float [W/m²]
-        Channels of linear RGB.
-    exposure : float
-        Factor on the radiance.
-    white : float
-        The exposed radiance that is shown as white.
-
-    Returns
-    -------
-    colors : (…) float32
-        sRGB, in [0, 1].
+    radiosity (…) float [W/m²]: Channels of linear RGB.
+    exposure: Factor on the radiance.
+    white: The exposed radiance that is shown as white.
+    Returns colors (…) float32: sRGB, in [0, 1].
     """
     radiance = np.clip(exposure * radiance_of_radiosity(radiosity), 0.0, white)
     linear = radiance * (1.0 + radiance / white**2) / (1.0 + radiance)

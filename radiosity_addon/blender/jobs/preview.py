@@ -36,20 +36,10 @@ def render_preview(
 
     The scene and its render settings stay as they are.
 
-    Parameters
-    ----------
-    context : Context
-    path : Path
-        Lightmaps that are not where their images say yet are looked for beside it.
-    settings : BakeSettings
-        Its seed and threads.
-    samples : int
-        A pixel's.
-
-    Raises
-    ------
-    BakeError
-        If the picture could not be rendered or written.
+    path: Lightmaps that are not where their images say yet are looked for beside it.
+    settings: Its seed and threads.
+    samples: A pixel's.
+    Raises BakeError if the picture could not be rendered or written.
     """
     had_result = "Render Result" in bpy.data.images
     scene = context.scene.copy()

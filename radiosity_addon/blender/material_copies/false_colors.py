@@ -8,17 +8,9 @@ import bpy
 def false_colors(tree: bpy.types.NodeTree, values: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
     """Wire nodes that turn the mean of signed RGB into red where positive, blue where negative.
 
-    Parameters
-    ----------
-    tree : NodeTree
-        Of a material; the nodes go below the one that `values` comes from.
-    values : NodeSocket
-        A color output; the channels' mean is shown.
-
-    Returns
-    -------
-    color : NodeSocket
-        (mean, 0, 0) or (0, 0, −mean), none of it negative.
+    tree: Of a material; the nodes go below the one that `values` comes from.
+    values: A color output; the channels' mean is shown.
+    Returns color: (mean, 0, 0) or (0, 0, −mean), none of it negative.
     """
     x, y = values.node.location
 

@@ -23,17 +23,10 @@ MANY_IMAGES = 14
 class LightShares:
     """The light groups of one bake, as materials mix them.
 
-    Parameters
-    ----------
-    scene : Scene
-        The one that was baked.
-    images : sequence of Image
-        The pages of all light.
-    groups : mapping of str to sequence of Image
-        Those of each group, parallel to `images`.
-    settings : BakeSettings
-    mixer : NodeTree or None
-        The one that mixes them already; None makes one.
+    scene: The one that was baked.
+    images: The pages of all light.
+    groups mapping of str to sequence of Image: Those of each group, parallel to `images`.
+    mixer: The one that mixes them already; None makes one.
     """
 
     def __init__(
@@ -73,19 +66,11 @@ class LightShares:
     ) -> bpy.types.Node:
         """Put the images of a page's groups beside the page, and the mixer after them.
 
-        Parameters
-        ----------
-        tree : NodeTree
-            Of a material.
-        page : Node
-            The Image Texture of all light; nothing reads it, which keeps it out of the shader.
-        uv : NodeSocket
-            Where the lightmap's coordinates are.
-
-        Returns
-        -------
-        mixer : Node
-            Its first output is the mixed texel; the others are the groups' factors, in their order.
+        tree: Of a material.
+        page: The Image Texture of all light; nothing reads it, which keeps it out of the shader.
+        uv: Where the lightmap's coordinates are.
+        Returns mixer: Its first output is the mixed texel; the others are the groups' factors, in their
+            order.
         """
         x, y = page.location
         node = tree.nodes.new("ShaderNodeGroup")

@@ -81,18 +81,11 @@ class LightmapMaterials:
     ) -> bpy.types.Material:
         """Return the copy of `material` that shows `image`.
 
-        Parameters
-        ----------
-        material : Material or None
-            None gives a plain grey.
-        image : Image
-            The lightmap page.
-        pinned : bool
-            The object had no UV layer of its own.
-        group : str
-            The light group whose sliders its own light follows, if it has any; "" for none.
-        empty_slot : bool
-            The material is the mesh's; the object's own slot, which the copy fills, is empty.
+        material: None gives a plain gray.
+        image: The lightmap page.
+        pinned: The object had no UV layer of its own.
+        group: The light group whose sliders its own light follows, if it has any; "" for none.
+        empty_slot: The material is the mesh's; the object's own slot, which the copy fills, is empty.
         """
         group = group if self._glows.get(material, True) else ""
         key = (material, image, pinned, group, empty_slot)

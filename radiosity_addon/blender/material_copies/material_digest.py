@@ -45,12 +45,8 @@ _NOT_CONTENT = frozenset(
 def digest_of_material(material: bpy.types.Material, as_copy: bool = False) -> str:
     """Return the digest of a material.
 
-    Parameters
-    ----------
-    material : Material
-    as_copy : bool
-        It is a lightmap copy: our copies of node groups count as those they are of, and of the nodes that we
-        added only their links and what the user can set.
+    as_copy: It is a lightmap copy: our copies of node groups count as those they are of, and of the nodes
+        that we added only their links and what the user can set.
     """
     content = [_read(material, _NOT_CONTENT), _custom(material, COPY_MARKS), _animation(material)]
     if uses_nodes(material):

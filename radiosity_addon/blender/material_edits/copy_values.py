@@ -44,12 +44,8 @@ def take_values(
 ) -> None:
     """Give the constants of a lightmap copy's tree the values that those of its original have now.
 
-    Parameters
-    ----------
-    copy, original : NodeTree
-        Of a material, or a node group.
-    sockets : set of str, optional
-        The names of the inputs that count; all of them by default.
+    copy, original: Of a material, or a node group.
+    sockets set of str, optional: The names of the inputs that count; all of them by default.
     """
     for node in original.nodes:
         twin = copy.nodes.get(node.name)

@@ -42,12 +42,9 @@ def carry_material_edits() -> tuple[BakeWarning, ...]:
     An edit goes to the original. That stays the datablock it is if the nodes are still the same; else it is
     replaced everywhere by a datablock with the new nodes. The copy's content becomes a material of its own
     where the original was edited too, where another copy of it was edited differently, and where it is linked
-    from a library. Afterwards `radiosity_original` of each copy is the material that holds what it shows.
+    from a library. Afterward `radiosity_original` of each copy is the material that holds what it shows.
 
-    Returns
-    -------
-    warnings : tuple of BakeWarning
-        Of the materials that became others' own, by name.
+    Returns warnings: Of the materials that became others' own, by name.
     """
     copies = [block for block in bpy.data.materials if _is_copy(block)]
     warnings: list[BakeWarning] = []

@@ -34,11 +34,8 @@ COLORS = {
 def stripped_copy(copy: bpy.types.Material) -> tuple[bpy.types.Material, bool]:
     """Return a new material with what a lightmap copy holds, without the lightmap.
 
-    Returns
-    -------
-    material : Material
-    complete : bool
-        False if the user fed the lightmap's node with what the shaders cannot take; it stays, unconnected.
+    Returns complete: False if the user fed the lightmap's node with what the shaders cannot take; it stays,
+        unconnected.
     """
     material = copy.copy()
     complete = strip_tree(material.node_tree)

@@ -24,13 +24,7 @@ _FAINT = 0.003
 def metal(algebra: NodeAlgebra, base: Color, roughness: Scalar, multiple: bool) -> Color:
     """Return the albedo of a metal of color `base`.
 
-    Parameters
-    ----------
-    algebra : NodeAlgebra
-    base : color
-    roughness : scalar
-    multiple : bool
-        With multiple scattering, by which a rough metal is not darker but deeper in color.
+    multiple: With multiple scattering, by which a rough metal is not darker but deeper in color.
     """
     white = _white(algebra, roughness)
     single = algebra.scale(base, white)
@@ -45,14 +39,8 @@ def metal(algebra: NodeAlgebra, base: Color, roughness: Scalar, multiple: bool) 
 def dielectric(algebra: NodeAlgebra, ior: Scalar, level: Scalar, roughness: Scalar) -> Scalar:
     """Return the albedo of what shines on a matte base.
 
-    Parameters
-    ----------
-    algebra : NodeAlgebra
-    ior : scalar
-        Index of refraction.
-    level : scalar
-        Principled's Specular IOR Level: 0.5 leaves the reflection as the index says.
-    roughness : scalar
+    ior: Index of refraction.
+    level: Principled's Specular IOR Level: 0.5 leaves the reflection as the index says.
     """
     calculate = algebra.calculate
     ratio = calculate("DIVIDE", calculate("SUBTRACT", ior, 1.0), calculate("ADD", ior, 1.0))

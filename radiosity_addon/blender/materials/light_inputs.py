@@ -36,17 +36,9 @@ class LightInputs:
 def inputs_of(scene: bpy.types.Scene, name: str, emits: bool) -> LightInputs | None:
     """Return the inputs of a source of a kept bake.
 
-    Parameters
-    ----------
-    name : str
-        The lamp object's, the world's, or the emissive material's.
-    emits : bool
-        Whether it is a material.
-
-    Returns
-    -------
-    inputs : LightInputs or None
-        None if there is no such thing any more.
+    name: The lamp object's, the world's, or the emissive material's.
+    emits: Whether it is a material.
+    Returns inputs: None if there is no such thing any more.
     """
     if emits:
         material = bpy.data.materials.get(name)

@@ -30,10 +30,7 @@ def is_socket(value: Scalar | Color) -> bool:
 class NodeAlgebra:
     """Adds and multiplies in one node tree.
 
-    Parameters
-    ----------
-    tree : NodeTree or None
-        Where nodes are added; None where all values are constants.
+    tree: Where nodes are added; None where all values are constants.
     """
 
     def __init__(self, tree: bpy.types.NodeTree | None) -> None:

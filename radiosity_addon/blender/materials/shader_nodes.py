@@ -44,11 +44,8 @@ class Feed:
 class Value:
     """A constant a socket comes to.
 
-    Parameters
-    ----------
-    rgb : (3,) float64
-    notes : tuple of str
-        The textures whose means went into it, as the user knows them.
+    rgb (3,).
+    notes: The textures whose means went into it, as the user knows them.
     """
 
     rgb: np.ndarray
@@ -56,7 +53,7 @@ class Value:
 
     @property
     def scalar(self) -> float:
-        """The value as Cycles turns a colour into a float: its luminance."""
+        """The value as Cycles turns a color into a float: its luminance."""
         return float(self.rgb @ _LUMINANCE)
 
 
@@ -116,10 +113,7 @@ def passed_through(node: bpy.types.Node, output: bpy.types.NodeSocket) -> bpy.ty
 def evaluate(socket: bpy.types.NodeSocket, stack: Stack = ()) -> Value:
     """Compute the constant an input socket comes to.
 
-    Raises
-    ------
-    NotConstantError
-        If a node on the way is not understood.
+    Raises NotConstantError if a node on the way is not understood.
     """
     feed = feed_of(socket, stack)
     if feed.node is None:

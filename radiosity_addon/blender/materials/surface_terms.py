@@ -13,16 +13,9 @@ def surface_of_terms(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Divide what a surface does to light by how much of it is there.
 
-    Parameters
-    ----------
-    reflected, radiance, passed : (..., 3) float
-        As in `Terms`.
-
-    Returns
-    -------
-    reflectance, radiance : (..., 3) float
-        Of the surface where it is there; 0 where nothing is.
-    opacity : (...,) float in [0, 1]
+    reflected, radiance, passed (..., 3): As in `Terms`.
+    Returns reflectance, radiance (..., 3): Of the surface where it is there; 0 where nothing is.
+    Returns opacity (...,) float in [0, 1].
     """
     opacity = np.clip(1.0 - np.nan_to_num(passed.mean(axis=-1)), 0.0, 1.0)
     glows = (opacity < LEAST_EMITTING) & (radiance > 0).any(axis=-1)

@@ -43,7 +43,7 @@ void main()
 
 @cache
 def page_shader() -> Any:
-    """Return the shader that shows texels as they are, none of them smoothed into its neighbours."""
+    """Return the shader that shows texels as they are, none of them smoothed into its neighbors."""
     import gpu
 
     between = gpu.types.GPUStageInterfaceInfo("radiosity_page")
@@ -63,12 +63,9 @@ def page_shader() -> Any:
 class PagedSurfaces:
     """Triangles on the graphics card, page by page, and a texture for each page.
 
-    Parameters
-    ----------
-    corners : (t, 3, 3) float32
-        World space, counter-clockwise from the front.
-    uv : (t, 3, 2) float32
-    page : (t,) int
+    corners (t, 3, 3) float32: World space, counter-clockwise from the front.
+    uv (t, 3, 2) float32.
+    page (t,) int.
     """
 
     def __init__(self, corners: Array, uv: Array, page: Array) -> None:
@@ -116,12 +113,8 @@ class PagedSurfaces:
 def over_the_objects(culled: bool = True, nearer: float = NEARER) -> Iterator[None]:
     """Draw what lies where the objects lie, in front of them.
 
-    Parameters
-    ----------
-    culled : bool
-        Whether only what is counter-clockwise is seen.
-    nearer : float
-        In what has been drawn so before, more brings it in front.
+    culled: Whether only what is counter-clockwise is seen.
+    nearer: In what has been drawn so before, more brings it in front.
     """
     import gpu
     from mathutils import Matrix

@@ -25,14 +25,9 @@ from ..session.state import session
 class ShownLightmap:
     """An object that has a lightmap layer, as the viewport shows it.
 
-    Attributes
-    ----------
-    name : str
-    image : str or None
-        Name of its lightmap; None before a bake.
-    corners : (t, 3, 3) float32
-        World space, counter-clockwise from the front.
-    uv : (t, 3, 2) float32
+    image: Name of its lightmap; None before a bake.
+    corners (t, 3, 3) float32: World space, counter-clockwise from the front.
+    uv (t, 3, 2) float32.
     """
 
     name: str
@@ -56,12 +51,8 @@ class ShownLightmap:
 class PageValues:
     """A lightmap's pixels.
 
-    Attributes
-    ----------
-    quantity : str
-        See `BakeSettings`.
-    values : (height, width, 3) float32 [W/m²]
-        Irradiance, or radiosity or residual if it holds these.
+    quantity: See `BakeSettings`.
+    values (height, width, 3) float32 [W/m²]: Irradiance, or radiosity or residual if it holds these.
     """
 
     quantity: str

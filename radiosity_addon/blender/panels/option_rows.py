@@ -14,10 +14,7 @@ from ..settings.preferences import PREFERRED, preferences
 def draw_options(layout: Any, part: str, context: bpy.types.Context, in_header: str = "") -> None:
     """Draw the options of a part of the panel that have an effect as the others are chosen, by sections.
 
-    Parameters
-    ----------
-    in_header : str
-        Name of an option that the part's header shows already.
+    in_header: Name of an option that the part's header shows already.
     """
     settings = context.scene.radiosity
     for section in sections_of(part):

@@ -20,15 +20,8 @@ def draw_text(
 ) -> None:
     """Draw a text over as many lines as the width asks for.
 
-    Parameters
-    ----------
-    layout : UILayout
-    text : str
-    icon : str
-        Before the first line.
-    context : Context
-    width : float or None
-        Of the layout [px]; None takes the region's.
+    icon: Before the first line.
+    width: Of the layout [px]; None takes the region's.
     """
     scale = context.preferences.system.ui_scale
     if width is None:

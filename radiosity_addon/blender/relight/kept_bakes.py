@@ -26,13 +26,8 @@ if TYPE_CHECKING:
 class InMemory:
     """A kept bake.
 
-    Attributes
-    ----------
-    bake : KeptBake
-    scene : str
-        The name of its scene.
-    shown : (s, 3) float64
-        The strengths that its images show.
+    scene: The name of its scene.
+    shown (s, 3): The strengths that its images show.
     """
 
     bake: KeptBake

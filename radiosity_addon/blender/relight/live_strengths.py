@@ -24,12 +24,7 @@ SAME = 1e-5
 class StrengthReader:
     """Reads the strengths of a scene's sources.
 
-    Parameters
-    ----------
-    scene : Scene
-    kept : KeptBake
-    strengths : (s, 3) float64
-        What the export of the scene as it is now found.
+    strengths (s, 3): What the export of the scene as it is now found.
     """
 
     def __init__(self, scene: bpy.types.Scene, kept: KeptBake, strengths: Array) -> None:
@@ -50,10 +45,7 @@ class StrengthReader:
     def read(self) -> Array:
         """Return (s, 3) the strengths.
 
-        Raises
-        ------
-        SceneError
-            If a source has changed in more than its strength.
+        Raises SceneError if a source has changed in more than its strength.
         """
         now = self._constants()
         known = self._first > 0

@@ -25,10 +25,7 @@ def refresh(names: Collection[str]) -> None:
     The copies hold the originals' nodes: all their values are taken over, but by a copy that the user edited
     only those of its emission.
 
-    Parameters
-    ----------
-    names : collection of str
-        Of the originals whose emission has changed.
+    names collection of str: Of the originals whose emission has changed.
     """
     for copy, original in lightmap_copies(names):
         _take(copy, original, None if is_untouched(copy) else _EMISSION_SOCKETS)

@@ -1,7 +1,7 @@
 """Collect what an evaluated scene holds into plain records, while the evaluation lives.
 
 The scene is shown as a render would show it only for moments: what is found is copied as it is, as much as
-fits into a moment, and made sense of afterwards (`_sorted_out`). Nothing that outlives a moment points into
+fits into a moment, and made sense of afterward (`_sorted_out`). Nothing that outlives a moment points into
 the file: it may be edited before the next.
 """
 
@@ -68,10 +68,7 @@ def collect(
     `settings.ignore` and `settings.light_only` name objects to leave out, or without lightmaps; `dark` takes
     lamps without power too.
 
-    Raises
-    ------
-    SceneError
-        If a coordinate is NaN or infinite.
+    Raises SceneError if a coordinate is NaN or infinite.
     """
     collector = _Collector(factors, settings or BakeSettings(), dark)
     collector.look(depsgraph, float("inf"))
@@ -83,17 +80,10 @@ def collect_steps(
 ) -> Generator[float, None, Callable[[], Collected]]:
     """Copy meshes, materials and lamps of a scene, as much a step as fits into a moment.
 
-    Parameters
-    ----------
-    view : callable
-        Shows the scene, for a step.
-    factors, settings, dark
-        As for `collect`.
-
-    Returns
-    -------
-    sorted_out : callable
-        Works on what was copied alone, in any thread; raises SceneError if a coordinate is NaN or infinite.
+    view: Shows the scene, for a step.
+    factors, settings, dark: As for `collect`.
+    Returns sorted_out: Works on what was copied alone, in any thread; raises SceneError if a coordinate is
+        NaN or infinite.
     """
     collector = _Collector(factors, settings, dark)
     means: Means = {}

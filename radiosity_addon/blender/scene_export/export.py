@@ -49,35 +49,15 @@ def export_steps(
     Between two steps the file is as the user has it, and may be edited: what was read stays as it was read,
     what is gone before it is read is not there.
 
-    Parameters
-    ----------
-    context : bpy.types.Context
-        Of a scene without lightmaps: restore an earlier bake first, or have `shown` hide it.
-    settings : BakeSettings
-        `objects`, `light_only`, `ignore`, `sky` and `keep_uvs` matter here.
-    dark : bool
-        Whether lamps without power and a black world are lights too, for a bake that is kept.
-    in_background : bool
-        Whether a window waits: work on arrays is then done in a thread.
-    shown : callable
-        Shows the originals, within a step.
-
-    Yields
-    ------
-    fraction : float
-        Of no great truth.
-
-    Returns
-    -------
-    Export
-
-    Raises
-    ------
-    UsageError
-        If settings name objects that are not there, or that cannot have a lightmap and should.
-    SceneError
-        If there is nothing to bake, a coordinate is NaN or infinite, or an object to be
-        baked has no room for another UV layer.
+    context: Of a scene without lightmaps: restore an earlier bake first, or have `shown` hide it.
+    settings: `objects`, `light_only`, `ignore`, `sky` and `keep_uvs` matter here.
+    dark: Whether lamps without power and a black world are lights too, for a bake that is kept.
+    in_background: Whether a window waits: work on arrays is then done in a thread.
+    shown: Shows the originals, within a step.
+    Yields fraction: Of no great truth.
+    Raises UsageError if settings name objects that are not there, or that cannot have a lightmap and should.
+    Raises SceneError if there is nothing to bake, a coordinate is NaN or infinite, or an object to be baked
+        has no room for another UV layer.
     """
     factors = yield from lamp_factors()
     options: list[BakeWarning] = []
@@ -258,12 +238,8 @@ def _emitters(
 ) -> tuple[np.ndarray, tuple[str, ...], tuple[str, ...]]:
     """Number the materials that emit, each once for every light group that it is in.
 
-    Returns
-    -------
-    emitter : (t,) int32
-        Whose each triangle is.
-    names, groups : tuple of str
-        The materials', and the light groups they are in.
+    Returns emitter (t,) int32: Whose each triangle is.
+    Returns names, groups: The materials', and the light groups they are in.
     """
     names: list[str] = []
     place = []
@@ -289,10 +265,7 @@ def chosen_pieces(
 ) -> list[Piece]:
     """Return the pieces that get a lightmap.
 
-    Raises
-    ------
-    SceneError, UsageError
-        If there is none, or one that was asked for by name can have none.
+    Raises SceneError, UsageError if there is none, or one that was asked for by name can have none.
     """
     if names is None:
         bakeable = [piece for piece in pieces if piece.bakeable]

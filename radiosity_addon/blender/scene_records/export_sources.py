@@ -16,30 +16,19 @@ Matrix4 = tuple[tuple[float, ...], ...]
 class ExportSource:
     """The Blender object, or instance of one, behind a `BakeObject`.
 
-    Parameters
-    ----------
-    name : str
-        The `BakeObject`'s name, unique in the export: the object's own, or
-        "Instancer/Object" of an instance.
-    object_name : str
-        Name of the object itself; of an instance, that of the object it shows.
-    library : str or None
-        File the object is linked from; None for a local one.
-    is_instance : bool
-        True where no object stands at this place: an instance of a collection, of
-        geometry nodes or of particles. Applying makes a stand-in object for it.
-    instancer : str
-        Name of the object that makes the instance, to be hidden once stand-ins are
-        there; empty for a real object.
-    persistent_id : tuple of int
-        Blender's key of the instance below its instancer; empty for a real object.
-    matrix_world : 4 rows of 4 floats
-    needs_evaluated_mesh : bool
-        The exported polygons and loops are those of the evaluated mesh, because
-        modifiers change them. False: they are those of the object's own mesh.
-        Always True for an instance.
-    makes_instances : bool
-        The object also makes instances that became stand-ins.
+    name: The `BakeObject`'s name, unique in the export: the object's own, or "Instancer/Object" of an
+        instance.
+    object_name: Name of the object itself; of an instance, that of the object it shows.
+    library: File the object is linked from; None for a local one.
+    is_instance: True where no object stands at this place: an instance of a collection, of geometry nodes or
+        of particles. Applying makes a stand-in object for it.
+    instancer: Name of the object that makes the instance, to be hidden once stand-ins are there; empty for a
+        real object.
+    persistent_id: Blender's key of the instance below its instancer; empty for a real object.
+    matrix_world 4 rows of 4 floats.
+    needs_evaluated_mesh: The exported polygons and loops are those of the evaluated mesh, because modifiers
+        change them. False: they are those of the object's own mesh. Always True for an instance.
+    makes_instances: The object also makes instances that became stand-ins.
     """
 
     name: str
@@ -57,13 +46,8 @@ class ExportSource:
 class MaterialSource:
     """A material of the file, to be found again: it may be edited or removed meanwhile.
 
-    Parameters
-    ----------
-    name : str
-    library : str or None
-        File it is linked from; None for a local one.
-    group : str
-        The light group that is named on it, or "".
+    library: File it is linked from; None for a local one.
+    group: The light group that is named on it, or "".
     """
 
     name: str
@@ -78,10 +62,7 @@ class MaterialSource:
     def find(self) -> bpy.types.Material:
         """Return the material.
 
-        Raises
-        ------
-        SceneError
-            If it is gone.
+        Raises SceneError if it is gone.
         """
         material = bpy.data.materials.get((self.name, self.library))
         if material is None:
@@ -93,11 +74,7 @@ class MaterialSource:
 class Export:
     """A scene ready to bake, and where each of its objects came from.
 
-    Parameters
-    ----------
-    bake_scene : BakeScene
-    sources : tuple of ExportSource
-        Parallel to `bake_scene.objects`.
+    sources: Parallel to `bake_scene.objects`.
     """
 
     bake_scene: BakeScene

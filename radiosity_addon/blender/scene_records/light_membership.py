@@ -38,10 +38,7 @@ def group_on(owner: bpy.types.Object | bpy.types.World | None, listed: frozenset
 class PlaceGroups(NamedTuple):
     """The names that hold for all that one object, or one instance of it, shows.
 
-    Parameters
-    ----------
-    own, around : str
-        On the object or instance itself, and on the collections around it; "" where none is.
+    own, around: On the object or instance itself, and on the collections around it; "" where none is.
     """
 
     own: str = ""
@@ -74,11 +71,8 @@ class Membership:
     def at(self, shown: bpy.types.Object, owner: bpy.types.Object) -> PlaceGroups:
         """Return the names at one place.
 
-        Parameters
-        ----------
-        shown, owner : bpy.types.Object
-            The originals: of an instance, the object it shows and the one that makes it; else twice the
-            same.
+        shown, owner: The originals: of an instance, the object it shows and the one that makes it; else twice
+            the same.
         """
         around = self._around.get(shown, "") or self._around.get(owner, "")
         return PlaceGroups(group_on(owner, self._listed) or group_on(shown, self._listed), around)

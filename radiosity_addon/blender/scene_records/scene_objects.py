@@ -151,17 +151,9 @@ def copy_evaluated_meshes(
 ) -> dict[str, bpy.types.Mesh]:
     """Make a mesh in the file of what each source was exported as.
 
-    Parameters
-    ----------
-    context : bpy.types.Context
-        Of the scene as it was when it was exported.
-    sources : sequence of ExportSource
-
-    Returns
-    -------
-    dict of str to bpy.types.Mesh
-        By `ExportSource.name`: polygons and loops in the exported order, all layers, and
-        the materials it is drawn with. Nothing uses them yet.
+    context: Of the scene as it was when it was exported.
+    Returns by `ExportSource.name`: polygons and loops in the exported order, all layers, and the materials it
+        is drawn with. Nothing uses them yet.
     """
     wanted = {
         (source.object_name, source.library, source.instancer, source.persistent_id): source.name

@@ -26,7 +26,7 @@ def in_thread(work: Callable[[Progress], R], in_window: bool = True) -> Generato
 
     Only for work on plain arrays: Blender's data must not be touched from a thread.
     The thread does not wait for the caller, who may be drawing a window: pictures that it
-    tells of must not change afterwards.
+    tells of must not change afterward.
 
     Parameters
     ----------

@@ -24,17 +24,10 @@ STAND_IN_SUFFIX = " (Lightmap)"
 class KeptDetails:
     """Of one bake.
 
-    Attributes
-    ----------
-    details : BakeDetails
-    objects : dict of str to BakeObject
-        What got a lightmap.
-    images : tuple of str
-        Names of the pages' images.
-    bake : str
-        The scene's memory of its last bake: the details count while the scene still has it.
-    megabytes : float
-        Memory of the details [MiB].
+    objects: What got a lightmap.
+    images: Names of the pages' images.
+    bake: The scene's memory of its last bake: the details count while the scene still has it.
+    megabytes: Memory of the details [MiB].
     """
 
     details: BakeDetails

@@ -14,12 +14,8 @@ import bpy
 class Running:
     """The bake or relighting in progress, if any.
 
-    Attributes
-    ----------
-    seconds_left : float or None
-        None while no estimate is possible.
-    stop : callable or None
-        Ends it from outside its operator.
+    seconds_left: None while no estimate is possible.
+    stop: Ends it from outside its operator.
     """
 
     def __init__(self) -> None:
@@ -33,17 +29,10 @@ class Running:
 class Versions:
     """Which versions of lightmap files are shown and held for undo.
 
-    Attributes
-    ----------
-    message : str
-        For panels; empty while images and files belong together.
-    held : HeldFiles or None
-    reports : dict
-        By the digest of each image that they list, the reports of files that were replaced.
-    shown : dict
-        By image, the version of its pixels in memory; empty for pixels that are in no file.
-    swap
-        Files on their way back.
+    message: For panels; empty while images and files belong together.
+    reports: By the digest of each image that they list, the reports of files that were replaced.
+    shown: By image, the version of its pixels in memory; empty for pixels that are in no file.
+    swap: Files on their way back.
     """
 
     def __init__(self) -> None:
@@ -79,33 +68,17 @@ class Drawn:
 class Session:
     """Everything that is kept in memory until another file is opened.
 
-    Attributes
-    ----------
-    running : Running
-    interrupted : bool
-        Whether a bake of the open file was killed while it replaced its lightmaps.
-    live : LiveRelight or None
-        Follows the lights now.
-    live_message : str
-        Why Live is off, unless the user switched it off.
-    kept_bakes : dict of str to InMemory
-        Bakes for relighting by their marks, oldest first.
-    kept_details : dict of str to KeptDetails
-        Of a scene's last bake, for overlays, by the scene's full name.
-    checks : dict of str to Inspection
-        The last check of a scene, by the scene's full name.
-    edited : set of str
-        Names of stand-ins that were changed and not looked at yet.
-    facts : dict
-        What panels show, by the function that works it out and the scene (`facts.py`).
-    wanted_facts : dict
-        When each was last drawn [s].
-    facts_made : float
-        When they were last worked out [s].
-    versions : Versions
-    drawn : Drawn
-    on_lightmaps_changed : list of callables
-        Called when lightmaps on objects have changed.
+    interrupted: Whether a bake of the open file was killed while it replaced its lightmaps.
+    live: Follows the lights now.
+    live_message: Why Live is off, unless the user switched it off.
+    kept_bakes: Bakes for relighting by their marks, oldest first.
+    kept_details: Of a scene's last bake, for overlays, by the scene's full name.
+    checks: The last check of a scene, by the scene's full name.
+    edited: Names of stand-ins that were changed and not looked at yet.
+    facts: What panels show, by the function that works it out and the scene (`facts.py`).
+    wanted_facts: When each was last drawn [s].
+    facts_made: When they were last worked out [s].
+    on_lightmaps_changed: Called when lightmaps on objects have changed.
     """
 
     def __init__(self) -> None:

@@ -68,10 +68,7 @@ class OptionProperties:
 def shown(option: Option, group: Any) -> bool:
     """Tell whether the panel shows an option, and a bake listens to it, as the other ones are chosen.
 
-    Parameters
-    ----------
-    group : OptionProperties
-        `scene.radiosity`.
+    group: `scene.radiosity`.
     """
     if option.panel is None or (option.methods and group.method not in option.methods):
         return False

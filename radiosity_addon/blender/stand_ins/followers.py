@@ -39,11 +39,7 @@ def places(context: bpy.types.Context) -> dict[str, Matrix]:
 def left_behind(context: bpy.types.Context, before: Mapping[str, Matrix]) -> tuple[BakeWarning, ...]:
     """Warn of objects that moved, and of drivers that broke, because stand-ins are shown.
 
-    Parameters
-    ----------
-    context : Context
-    before : mapping of str to Matrix
-        `places` without lightmaps, where the objects were baked.
+    before mapping of str to Matrix: `places` without lightmaps, where the objects were baked.
     """
     moved = {
         name

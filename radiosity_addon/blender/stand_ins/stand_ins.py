@@ -34,14 +34,9 @@ OWN, EVALUATED = "own", "evaluated"
 class Names:
     """What a stand-in mesh was called and called things when it was shown.
 
-    Attributes
-    ----------
-    mesh, shape_keys : str
-        Names of the datablocks; "" for none.
-    groups : tuple of (str, bool)
-        Vertex groups and whether they were locked.
-    roles : (str, str)
-        The user's UV layers that were active and for renders.
+    mesh, shape_keys: Names of the datablocks; "" for none.
+    groups tuple of (str, bool): Vertex groups and whether they were locked.
+    roles (str, str): The user's UV layers that were active and for renders.
     """
 
     mesh: str = ""
@@ -54,21 +49,13 @@ class Names:
 class StandIn:
     """What a stand-in mesh knows.
 
-    Attributes
-    ----------
-    kind : str
-        `OWN` or `EVALUATED`.
-    seal : str
-        The digest it was made with.
-    slots : int
-        How many material slots it was made with.
-    active_slot : int
-        The object's active material slot.
-    object_slots : tuple of int
-        Slots that were linked to the object before (in files of earlier versions).
-    modifiers : tuple of (str, bool, bool)
-        Those that were switched off: their names, and whether they showed in viewports and renders.
-    names : Names
+    kind: `OWN` or `EVALUATED`.
+    seal: The digest it was made with.
+    slots: How many material slots it was made with.
+    active_slot: The object's active material slot.
+    object_slots: Slots that were linked to the object before (in files of earlier versions).
+    modifiers tuple of (str, bool, bool): Those that were switched off: their names, and whether they showed
+        in viewports and renders.
     """
 
     kind: str = EVALUATED

@@ -31,10 +31,7 @@ def light_within(
 ) -> TexelLight:
     """Light the texels so that their estimated relative RMS error is at most `error`, if that can be had.
 
-    Parameters
-    ----------
-    settings_for : callable
-        How densely to gather for an error; at its limits it returns the same again.
+    settings_for: How densely to gather for an error; at its limits it returns the same again.
     """
     goal = error
     # How many tries there will be is not known: each takes half of what is left.

@@ -9,19 +9,12 @@ from dataclasses import dataclass
 class GatherSettings:
     """How densely indirect light is gathered.
 
-    Parameters
-    ----------
-    strides : tuple of int
-        Lattices of gather points, coarse to fine, in texels; finer ones are used only where
-        coarser points do not reach. The last is 1, so that every texel is reached.
-    support : float
-        A texel whose coarser points weigh less than this together becomes a point itself.
-    rays : int
-        A gather point.
-    sweeps : int
-        Jacobi sweeps over the texels, at most, …
-    tolerance : float
-        … or until no texel changes by more than this part of the mean.
+    strides: Lattices of gather points, coarse to fine, in texels; finer ones are used only where coarser
+        points do not reach. The last is 1, so that every texel is reached.
+    support: A texel whose coarser points weigh less than this together becomes a point itself.
+    rays: A gather point.
+    sweeps: Jacobi sweeps over the texels, at most, …
+    tolerance: … or until no texel changes by more than this part of the mean.
     """
 
     strides: tuple[int, ...] = (4, 2, 1)

@@ -17,12 +17,8 @@ MUCH = 0.1
 class Means:
     """Means over rows of sources, of which only those are made anew that see something changed.
 
-    Parameters
-    ----------
-    sources : (g, rays) int32
-    channels, threads : int
-    scratch : Scratch or None
-        Makes the array of means; None keeps it in memory.
+    sources (g, rays) int32.
+    scratch: Makes the array of means; None keeps it in memory.
     """
 
     def __init__(self, sources: Array, channels: int, threads: int, scratch: Scratch | None = None) -> None:
@@ -35,10 +31,7 @@ class Means:
     def of(self, table: Array, changed: Array, progress: Progress = SILENT) -> Array:
         """Return (g, channels) the means of the table's rows.
 
-        Parameters
-        ----------
-        changed : (table rows,) bool
-            Which rows changed since the last call; the first call asks all.
+        changed (table rows,) bool: Which rows changed since the last call; the first call asks all.
         """
         columns = _columns(table)
         # Where much changed every row sees some of it: to look for those that do not takes as long.

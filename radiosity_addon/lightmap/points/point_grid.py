@@ -22,18 +22,11 @@ _PRIMES = tuple(np.int64(8 * prime) for prime in (73856093, 19349663, 83492791))
 class PointGrid:
     """Points in cubic cells.
 
-    Parameters
-    ----------
-    position, normal : (n, 3) float64
-        Of surfaces on which the points lie.
-    rows : (p,) int
-        Which of these the points are.
-    first : int
-        What a look-up answers with for the first of them; the others follow.
-    size : float
-        Edge of the cells [m].
-    scratch : Scratch
-        Makes the arrays.
+    position, normal (n, 3): Of surfaces on which the points lie.
+    rows (p,) int: Which of these the points are.
+    first: What a look-up answers with for the first of them; the others follow.
+    size: Edge of the cells [m].
+    scratch: Makes the arrays.
     """
 
     def __init__(

@@ -13,13 +13,8 @@ from ...numerics import Array
 class Weighed:
     """What was weighed when the first `levels` levels of points were there.
 
-    Attributes
-    ----------
-    levels : int
-    texels : (n,) int
-        Ascending; they were no points themselves.
-    texel, point, weight : (p,) int, int32, float32
-        Pairs with a weight above 0, sorted by texel.
+    texels (n,) int: Ascending; they were no points themselves.
+    texel, point, weight (p,) int, int32, float32: Pairs with a weight above 0, sorted by texel.
     """
 
     levels: int

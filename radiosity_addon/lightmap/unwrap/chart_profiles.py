@@ -25,16 +25,11 @@ _ROUNDING = 1e-6
 class Shapes:
     """All charts at one scale, as ragged arrays.
 
-    Parameters
-    ----------
-    width, height : (count,) int64
-        Cells each chart's bounding box takes.
-    column_start, row_start : (count + 1,) int64
-        Where a chart's columns and rows begin in the profiles.
-    bottom, top : (columns in all,) int64
-    left, right : (rows in all,) int64
-    boxy : (count,) bool
-        Whether the chart fills its bounding box; half a turn then changes nothing.
+    width, height (count,) int64: Cells each chart's bounding box takes.
+    column_start, row_start (count + 1,) int64: Where a chart's columns and rows begin in the profiles.
+    bottom, top (columns in all,) int64.
+    left, right (rows in all,) int64.
+    boxy (count,) bool: Whether the chart fills its bounding box; half a turn then changes nothing.
     """
 
     width: Int
@@ -84,14 +79,9 @@ def outline(uv: Float, chart: Int) -> tuple[Float, Int]:
 def measure(edges: Float, owner: Int, extent: Float) -> Shapes:
     """Find the shapes of charts.
 
-    Parameters
-    ----------
-    edges : (e, 2, 2) float64
-        The charts' outlines [cells], each chart's box starting at (0, 0).
-    owner : (e,) int64
-        The chart of each edge.
-    extent : (count, 2) float64
-        Width and height of each chart's box [cells].
+    edges (e, 2, 2): The charts' outlines [cells], each chart's box starting at (0, 0).
+    owner (e,) int64: The chart of each edge.
+    extent (count, 2): Width and height of each chart's box [cells].
     """
     count = len(extent)
     size = np.maximum(np.ceil(extent - _ROUNDING).astype(np.int64), 1)

@@ -130,24 +130,13 @@ def place(
 ) -> Placement | None:
     """Pack all charts, in the given order, into a strip.
 
-    Parameters
-    ----------
-    shapes : pair of Shapes
-        As the charts are measured for an even and for an odd number of quarter turns.
-    order : (count,) int64
-    width : int
-        Of the strip [cells].
-    gap : int
-        Cells that stay free between charts.
-    limit : int or None
-        Give up above this height.
-    thrifty : bool
-        Prefer the turn that buries least rather than the one that ends lowest.
-
-    Returns
-    -------
-    Placement or None
-        None if a chart is wider than the strip or the limit is passed.
+    shapes pair of Shapes: As the charts are measured for an even and for an odd number of quarter turns.
+    order (count,) int64.
+    width: Of the strip [cells].
+    gap: Cells that stay free between charts.
+    limit: Give up above this height.
+    thrifty: Prefer the turn that buries least rather than the one that ends lowest.
+    Returns none if a chart is wider than the strip or the limit is passed.
     """
     count = len(order)
     x, y, quarter = (np.zeros(count, dtype=np.int64) for _ in range(3))

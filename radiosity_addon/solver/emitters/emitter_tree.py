@@ -36,11 +36,8 @@ THINNEST = 1e-3
 class Asked:
     """The nodes that n points ask, p pairs sorted by point.
 
-    Attributes
-    ----------
-    row, node : (p,) int
-    factor : (p,) float64
-        What the point gets from the node per unit of strength; above 0.
+    row, node (p,) int.
+    factor (p,): What the point gets from the node per unit of strength; above 0.
     """
 
     row: Array
@@ -51,12 +48,9 @@ class Asked:
 class EmitterTree:
     """Emissive faces under a balanced binary tree.
 
-    Parameters
-    ----------
-    corners : (m, 3, 3) float64
-    normals : (m, 3) float64
-    weight : (m,) float64 [m²]
-        Areas, times what part of the lamp's strength each face emits.
+    corners (m, 3, 3).
+    normals (m, 3).
+    weight (m,) [m²]: Areas, times what part of the lamp's strength each face emits.
     """
 
     def __init__(self, corners: Array, normals: Array, weight: Array) -> None:
@@ -75,7 +69,7 @@ class EmitterTree:
         self._describe(corners, normals, weight)
 
     def _describe(self, corners: Array, normals: Array, weight: Array) -> None:
-        """Find every node's centre, radius, spread of normals, and rectangle."""
+        """Find every node's center, radius, spread of normals, and rectangle."""
         origin = corners.reshape(-1, 3).mean(axis=0)
         local, centroid = corners - origin, corners.mean(axis=1) - origin
         total = self._sums(weight)
@@ -115,7 +109,7 @@ class EmitterTree:
         return np.asarray(running[self.end] - running[self.begin])
 
     def _extremes(self, corners: Array, normals: Array) -> tuple[Array, Array]:
-        """Return (k,) each centre's farthest corner, and the farthest normal's sine; 1 past 90°."""
+        """Return (k,) each center's farthest corner, and the farthest normal's sine; 1 past 90°."""
         radius, cosine = np.zeros((2, len(self.begin)))
         for first, last in zip(self._levels[:-1], self._levels[1:], strict=True):
             held = first + np.flatnonzero(self.end[first:last] > self.begin[first:last])
@@ -163,12 +157,9 @@ class EmitterTree:
 def _sorted_tree(places: Array, normals: Array) -> tuple[Array, list[Array]]:
     """Sort faces into a balanced tree by halving runs along their widest axis of six.
 
-    Returns
-    -------
-    order : (m,) int
-    levels : list of (2^l + 1,) int
-        Where the runs of each level begin, and the last one ends; the last level's hold one face each, or
-        none.
+    Returns order (m,) int.
+    Returns levels list of (2^l + 1,) int: Where the runs of each level begin, and the last one ends; the last
+        level's hold one face each, or none.
     """
     size = 0.5 * np.linalg.norm(np.ptp(places, axis=0))
     keys = np.concatenate([places, 0.5 * size * normals], axis=1)

@@ -1,7 +1,7 @@
 """The sources of a scene's light that can be changed apart: lamps, the sky, and emissive materials.
 
 Everything a bake computes is linear in their strengths, channel by channel. Shadow rays of emissive
-surfaces are asked for groups of faces that cannot be told apart by colour (`textured_emitters.py`);
+surfaces are asked for groups of faces that cannot be told apart by color (`textured_emitters.py`);
 here the groups stay within one source, so that its strength can change alone.
 """
 
@@ -24,30 +24,15 @@ NO_SOURCE = -1
 class LightSources:
     """The s sources of a scene: its lights by their number, then what emits.
 
-    Parameters
-    ----------
-    scene : Scene
-    faces : Faces
-    caster : RayCaster
-    emitter : (t,) int or None
-        Which emissive material each triangle has, numbers from 0; those of triangles that emit nothing
-        do not count. None takes every colour of emission for one, and all textures for another.
-
-    Attributes
-    ----------
-    lights : tuple of Light
-        The first sources.
-    groups : list of EmitterGroup
-        The emissive faces as lamps, each group of one source.
-    strengths : (s, 3) float64
-        As they were given: a light's own (see `Light.strength`), and of what emits its exitance
+    emitter (t,) int: Which emissive material each triangle has, numbers from 0; those of triangles that emit
+        nothing do not count. None takes every color of emission for one, and all textures for another.
+    lights: The first sources.
+    groups: The emissive faces as lamps, each group of one source.
+    strengths (s, 3): As they were given: a light's own (see `Light.strength`), and of what emits its exitance
         [W/m²], the largest of each channel where it varies.
-    emitter : (t,) int32
-        The number of each triangle's source less `len(lights)`, or NO_SOURCE.
-    owner : (g,) int64
-        The source of each group, likewise.
-    single : (s − lights,) bool
-        Whether what emits has one group, which is of one color.
+    emitter (t,) int32: The number of each triangle's source less `len(lights)`, or NO_SOURCE.
+    owner (g,) int64: The source of each group, likewise.
+    single (s − lights,) bool: Whether what emits has one group, which is of one color.
     """
 
     STORED = ("lights", "groups", "strengths", "emitter", "owner", "single")
@@ -77,11 +62,8 @@ class LightSources:
     def checked(self, strengths: Array) -> Array:
         """Return (s, 3) float64 strengths that the sources can have.
 
-        Raises
-        ------
-        SceneError
-            If they are not as many, negative or not finite, or a texture would have to emit in a
-            channel where it was dark: where it would is not known.
+        Raises SceneError if they are not as many, negative or not finite, or a texture would have to emit in
+            a channel where it was dark: where it would is not known.
         """
         wanted = np.asarray(strengths, dtype=np.float64)
         if wanted.shape != self.strengths.shape:
@@ -109,12 +91,8 @@ class LightSources:
     def emission(self, emission: Array, triangle: Array, strengths: Array) -> Array:
         """Return (n, 3) what surfaces emit now [W/m²].
 
-        Parameters
-        ----------
-        emission : (n, 3) float64 [W/m²]
-            What they emitted at the strengths that were given first.
-        triangle : (n,) int
-            Whose surfaces they are.
+        emission (n, 3) [W/m²]: What they emitted at the strengths that were given first.
+        triangle (n,) int: Whose surfaces they are.
         """
         result = emission.copy()
         of = self.emitter[triangle]
@@ -128,7 +106,7 @@ class LightSources:
         row = len(self.lights) + source
         was, is_now = self.strengths[row], strengths[row]
         known = was > 0
-        # A channel that was dark follows the brightest one: then all parts are of one colour.
+        # A channel that was dark follows the brightest one: then all parts are of one color.
         level = before.max(axis=1, initial=0.0) / was.max()
         return np.where(known, before * (is_now / np.where(known, was, 1.0)), level[:, None] * is_now)
 
@@ -138,7 +116,7 @@ class LightSources:
 
 
 def _by_colour(scene: Scene) -> Array:
-    """Return (t,) a number for each colour of emission, and the last one for all textures."""
+    """Return (t,) a number for each color of emission, and the last one for all textures."""
     number = numbered(scene.emission).astype(np.int32)
     if scene.images is not None:
         number[scene.images.textured] = number.max(initial=-1) + 1

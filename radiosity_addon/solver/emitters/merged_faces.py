@@ -33,17 +33,9 @@ MOST_CORNERS = 64
 def merge_flat(corners: Array) -> tuple[Array, Array]:
     """Replace triangles that tile a flat polygon by as few as it takes.
 
-    Parameters
-    ----------
-    corners : (m, 3, 3) float64
-        Triangles with an area.
-
-    Returns
-    -------
-    corners : (k, 3, 3) float64
-        Of the same surface, with the same sides in front; k ≤ m.
-    first : (k,) int
-        A triangle of those given that each lies in the plane of.
+    corners (m, 3, 3): Triangles with an area.
+    Returns corners (k, 3, 3): Of the same surface, with the same sides in front; k ≤ m.
+    Returns first (k,) int: A triangle of those given that each lies in the plane of.
     """
     everything = np.arange(len(corners))
     if len(corners) < 3:

@@ -1,7 +1,7 @@
 """Textured emission as lamps: faces cut up where their emission varies.
 
 A face with an image of emission becomes pieces of constant emission. Shadow rays ask what share of a
-lamp is seen, one number for all colours; so where pieces differ in colour each channel is a lamp
+lamp is seen, one number for all colors; so where pieces differ in color each channel is a lamp
 of its own, lest a red half of a screen be hidden by what stands before the green one.
 """
 
@@ -27,7 +27,7 @@ SAME_COLOUR = 1e-3
 def emitter_groups(
     scene: Scene, faces: Faces, caster: RayCaster, among: Array | None = None
 ) -> list[EmitterGroup]:
-    """Return the emissive faces, if given those of a (f,) mask, as lamps, those of one colour together."""
+    """Return the emissive faces, if given those of a (f,) mask, as lamps, those of one color together."""
     if scene.images is None:
         return EmitterGroup.of_faces(faces, caster, among)
     among = np.ones(len(faces), dtype=bool) if among is None else among
@@ -40,18 +40,10 @@ def emitter_groups(
 def emissive_pieces(faces: Faces, rows: Array, images: SurfaceImages) -> tuple[Array, Array, Array]:
     """Cut faces up where their emission varies.
 
-    Parameters
-    ----------
-    rows : (f,) int
-        Textured faces that shine.
-
-    Returns
-    -------
-    face : (m,) int
-    weights : (m, 3, 2) float64
-        Each piece's corners, as weights of its triangle's second and third corner.
-    emission : (m, 3) float64 [W/m²]
-        Area means, multiplied by opacity.
+    rows (f,) int: Textured faces that shine.
+    Returns face (m,) int.
+    Returns weights (m, 3, 2): Each piece's corners, as weights of its triangle's second and third corner.
+    Returns emission (m, 3) [W/m²]: Area means, multiplied by opacity.
     """
     if faces.own is None:
         face, level = rows, np.ones(len(rows))
@@ -93,7 +85,7 @@ def _part_emissions(faces: Faces, face: Array, weights: Array, images: SurfaceIm
 def _of_pieces(
     faces: Faces, face: Array, weights: Array, emission: Array, caster: RayCaster
 ) -> list[EmitterGroup]:
-    """Make lamps of pieces: one if all are of one colour, else one for each channel."""
+    """Make lamps of pieces: one if all are of one color, else one for each channel."""
     shines = emission.max(axis=1, initial=0.0) > 0
     face, weights, emission = face[shines], weights[shines], emission[shines]
     if len(face) == 0:

@@ -19,9 +19,7 @@ WIDEST = 1.5
 class Boxes:
     """Some boxes along the axes.
 
-    Parameters
-    ----------
-    low, high : (b, 3) float64 [m]
+    low, high (b, 3) [m].
     """
 
     def __init__(self, low: Array, high: Array) -> None:
@@ -60,17 +58,11 @@ class Boxes:
     def met_by(self, start: Array, along: Array, widen: Array, end: float = np.inf) -> Array:
         """Tell which rays meet a box that is `widen` larger on all sides.
 
-        Parameters
-        ----------
-        start : (n, 3) float
-        along : (n, k, 3) float
-        widen : (n,) float [m]
-        end : float
-            In lengths of `along`: 1 for segments.
-
-        Returns
-        -------
-        meets : (n, k) bool
+        start (n, 3).
+        along (n, k, 3).
+        widen (n,) [m].
+        end: In lengths of `along`: 1 for segments.
+        Returns meets (n, k) bool.
         """
         inverse = along.astype(np.float32)
         inverse = 1.0 / np.where(np.abs(inverse) < 1e-12, np.float32(1e-12), inverse)
@@ -91,21 +83,12 @@ class Boxes:
     def met_by_fans(self, start: Array, along: Array, grow: Array, widen: Array, end: float = 1.0) -> Array:
         """Tell which fans of rays meet a box: from a point to all of another box, or of a patch of the sky.
 
-        Parameters
-        ----------
-        start : (n, 3) float64
-        along : (n, k, 3) float64
-            To the middle of what is at the fan's end.
-        grow : (…, 3) float64, broadcast against `along`
-            How far that reaches along each axis from its middle.
-        widen : (n,) float64 [m]
-            How much larger boxes are taken.
-        end : float
-            In lengths of `along`; infinite for the sky.
-
-        Returns
-        -------
-        meets : (n, k) bool
+        start (n, 3).
+        along (n, k, 3): To the middle of what is at the fan's end.
+        grow (…, 3), broadcast against `along`: How far that reaches along each axis from its middle.
+        widen (n,) [m]: How much larger boxes are taken.
+        end: In lengths of `along`; infinite for the sky.
+        Returns meets (n, k) bool.
         """
         found = np.zeros(along.shape[:2], dtype=bool)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -157,5 +140,5 @@ def _extent(light: Lamp | EmitterGroup) -> tuple[float, Array, Array]:
 
 
 def _opening(half_angle: float) -> Array:
-    """Return (3,) how far off its axis a cone gets for each metre along it."""
+    """Return (3,) how far off its axis a cone gets for each meter along it."""
     return np.full(3, np.tan(half_angle) if half_angle < WIDEST else np.inf)

@@ -55,16 +55,11 @@ TABLE_ROWS = 1 << 14
 class AimedRays:
     """Rays from some of the gather points to bright elements.
 
-    Attributes
-    ----------
-    row : (a,) int
-        The gather points.
-    sources : (a, k) int32
-        What was hit, numbered as the hits of all other rays; NOTHING where something is in the way.
-    weights : (a, k) float32
-        What each source's radiosity counts for.
-    element : (a, k) int32
-        What each was aimed at.
+    row (a,) int: The gather points.
+    sources (a, k) int32: What was hit, numbered as the hits of all other rays; NOTHING where something is in
+        the way.
+    weights (a, k) float32: What each source's radiosity counts for.
+    element (a, k) int32: What each was aimed at.
     """
 
     row: Array
@@ -98,10 +93,7 @@ class AimedRays:
 class AimedTable:
     """Aimed rays that are put together list by list.
 
-    Parameters
-    ----------
-    scratch : Scratch or None
-        Makes the arrays; None keeps them in memory.
+    scratch: Makes the arrays; None keeps them in memory.
     """
 
     def __init__(self, scratch: Scratch | None = None) -> None:
@@ -133,13 +125,10 @@ class AimedTable:
 class Aim:
     """r rows of k rays: where to, at which element, and what each stands for.
 
-    Attributes
-    ----------
-    row : (r,) int
-        The points that aim.
-    directions : (r, k, 3) float64, unit
-    element : (r, k) int32
-    weights : (r, k) float64
+    row (r,) int: The points that aim.
+    directions (r, k, 3), unit.
+    element (r, k) int32.
+    weights (r, k).
     """
 
     row: Array
@@ -151,14 +140,9 @@ class Aim:
 class BrightElements:
     """The leaf elements whose reflected light is far above the mean, the brightest first.
 
-    Parameters
-    ----------
-    hierarchy : Hierarchy
-    reflected : (e, 3) float64
-        Every element's reflected radiosity [W/m²].
-    lit : callable or None
-        Points and normals (p, 3) → (p,): how strongly lamps light them, about. An element may be
-        larger than the bright spot on it; rays then aim at the spot. None aims evenly.
+    reflected (e, 3): Every element's reflected radiosity [W/m²].
+    lit: Points and normals (p, 3) → (p,): how strongly lamps light them, about. An element may be larger than
+        the bright spot on it; rays then aim at the spot. None aims evenly.
     """
 
     def __init__(
@@ -198,13 +182,9 @@ class BrightElements:
     def shares(self, points: Array, normals: Array, rays: int, irradiance: Array) -> Array:
         """Return (n, m) what each element would send to points [W/m²], roughly; 0 is left to chance.
 
-        Parameters
-        ----------
-        points, normals : (n, 3) float64
-        rays : int
-            Cosine-distributed ones that a point would have.
-        irradiance : (n,) float64 [W/m²]
-            What noise is measured by.
+        points, normals (n, 3).
+        rays: Cosine-distributed ones that a point would have.
+        irradiance (n,) [W/m²]: What noise is measured by.
         """
         along = self._corners.mean(axis=1)[None] - points[:, None]
         square = np.einsum("nmk,nmk->nm", along, along)
@@ -224,13 +204,9 @@ class BrightElements:
     def left_out(self, shares: Array, hits: Hits, leaves_of: Callable[[Hits], Array]) -> Array:
         """Return (n · k,) bool: which hits are on what is aimed at from their point.
 
-        Parameters
-        ----------
-        shares : (n, m) float64
-        hits : Hits
-            k of each point, one point after the other.
-        leaves_of : callable
-            Tells the leaf elements hit.
+        shares (n, m).
+        hits: k of each point, one point after the other.
+        leaves_of: Tells the leaf elements hit.
         """
         out = np.zeros(len(hits.triangle), dtype=bool)
         aims = np.repeat(shares.any(axis=1), len(out) // len(shares))
@@ -244,14 +220,10 @@ class BrightElements:
     def aim(self, points: Array, normals: Array, shares: Array, u: Array) -> Aim:
         """Aim rays from points (r, k, 3), of which row i shares `shares[i]` among the elements.
 
-        Parameters
-        ----------
-        points : (n, k, 3) float64
-            Where the rays start.
-        normals : (n, 3) float64
-        shares : (n, m) float64
-            Rows without any are left out.
-        u : (n, k, 2) float
+        points (n, k, 3): Where the rays start.
+        normals (n, 3).
+        shares (n, m): Rows without any are left out.
+        u (n, k, 2).
         """
         row = np.flatnonzero(shares.any(axis=1))
         shares = shares[row]

@@ -16,17 +16,10 @@ as 4 bytes a point."""
 class LightGains:
     """Of n points and the lights put in: unoccluded irradiance per unit of strength times visibility.
 
-    Parameters
-    ----------
-    count : int
-        n.
-    scratch : Scratch or None
-        Makes the arrays; None keeps them in memory.
-
-    Attributes
-    ----------
-    gain_of : dict of int to (rows or None, gain)
-        Of each light: (k,) float32 at the rows that it reaches, (k,) int32; None for all rows.
+    count: n.
+    scratch: Makes the arrays; None keeps them in memory.
+    gain_of dict of int to (rows or None, gain): Of each light: (k,) float32 at the rows that it reaches, (k,)
+        int32; None for all rows.
     """
 
     STORED = ("count", "gain_of")

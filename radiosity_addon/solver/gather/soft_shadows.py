@@ -33,19 +33,13 @@ STARTS = 16
 """Points of a footprint that the many rays start from, each of them a run that is stratified by itself."""
 
 PENUMBRA_STEPS = 32
-"""How far, in neighbours, a penumbra is followed from where few rays found it."""
+"""How far, in neighbors, a penumbra is followed from where few rays found it."""
 
 
 class ShadowShare:
     """The unblocked share of one lamp at footprints.
 
-    Parameters
-    ----------
-    caster : RayCaster
-    light : Lamp or EmitterGroup
-    spread : SpreadPoints
-        The footprints.
-    seed, threads : int
+    spread: The footprints.
     """
 
     def __init__(
@@ -65,16 +59,9 @@ class ShadowShare:
     def at_points(self, gain: Array, rays: int, progress: Progress = SILENT) -> Array:
         """Ask where the lamp shines.
 
-        Parameters
-        ----------
-        gain : (n,) float64
-            Unoccluded irradiance per unit of the lamp's strength.
-        rays : int
-            A point, where the lamp is most of the light there is.
-
-        Returns
-        -------
-        share : (n,) float64
+        gain (n,): Unoccluded irradiance per unit of the lamp's strength.
+        rays: A point, where the lamp is most of the light there is.
+        Returns share (n,).
         """
         if isinstance(self._light, Lamp) and not self._light.casts_shadow:
             return np.ones(len(gain))
@@ -131,7 +118,7 @@ class ShadowShare:
             centre, normal = at.points[chunk], at.normals[chunk]
             unit = stratified_square(at.keys[chunk], count, self._seed + Stream.SHADOW_RAYS)
             directions, distances, weights = self._light.shadow_rays(centre, normal, unit)
-            # The edge of a spot's cone may cross a footprint and leave its centre dark: then all count alike.
+            # The edge of a spot's cone may cross a footprint and leave its center dark: then all count alike.
             weights = np.where(weights.any(axis=1, keepdims=True), weights, 1.0)
             start = centre[:, None]
             if at.sampler is not None:

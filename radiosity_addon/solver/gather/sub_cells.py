@@ -29,11 +29,7 @@ STARTS = 16
 class LeafParts:
     """Numbers the parts of all leaves: the e elements first, then sixteen cells of each.
 
-    Parameters
-    ----------
-    hierarchy : Hierarchy
-        Is not refined any more.
-    caster : RayCaster
+    hierarchy: Is not refined any more.
     """
 
     def __init__(self, hierarchy: Hierarchy, caster: RayCaster) -> None:

@@ -22,12 +22,8 @@ GROWTH = 2.0
 class Anderson:
     """Proposes the next guess of a fixed-point iteration, each column for itself.
 
-    Parameters
-    ----------
-    weight : (n,) float64
-        How much each row's change counts: areas.
-    depth : int
-        0 is the plain iteration.
+    weight (n,): How much each row's change counts: areas.
+    depth: 0 is the plain iteration.
     """
 
     def __init__(self, weight: Array, depth: int = DEPTH) -> None:

@@ -30,32 +30,21 @@ def reflect(
 ) -> tuple[Array, Array]:
     """Gather over all links from the state's radiosity, then push and pull; the state stays.
 
-    Parameters
-    ----------
-    links : Links
-        Sorted by receiver.
-    lights : (e, 3) float64
-        What the leaves get straight from lamps [W/m²].
-    scale : (e, 2) float64 or None
-        See `transport.gather`.
-    cluster_links : ClusterLinks or None
-        What the faces of clusters receive together.
-    cut : ClusterCut or None
-        With all clusters of both sets of links; needed for the second.
-    received : (e, 2) float64 or None
-        What the light that leaves gather is scaled with, over own links and over shared ones
+    links: Sorted by receiver.
+    lights (e, 3): What the leaves get straight from lamps [W/m²].
+    scale (e, 2): See `transport.gather`.
+    cluster_links: What the faces of clusters receive together.
+    cut: With all clusters of both sets of links; needed for the second.
+    received (e, 2): What the light that leaves gather is scaled with, over own links and over shared ones
         (`conservation`).
-
-    Returns
-    -------
-    irradiance, radiosity : (e, 3) float64 [W/m²]
+    Returns irradiance, radiosity (e, 3) [W/m²].
     """
     hierarchy = state.hierarchy
     means, sent = shared_means(hierarchy, state.radiosity, scale, cut)
     shared = None
     if cluster_links is not None and len(cluster_links) and cut is not None:
         threads = state.settings.threads
-        # A face that looks past the horizon of what its neighbours see gets nothing, not less.
+        # A face that looks past the horizon of what its neighbors see gets nothing, not less.
         shared = np.maximum(gather_at_clusters(hierarchy, cut, cluster_links, sent, threads), 0.0)
     own = gather(hierarchy, links, state.radiosity, scale, cut, (means, sent))
     gathered = push(hierarchy, own)

@@ -49,10 +49,7 @@ def lost_by_lamp(
 ) -> tuple[float, float, float]:
     """Return the shares of a lamp's power that end on black backs and leave the scene, and their error.
 
-    Parameters
-    ----------
-    caster : RayCaster
-        Of surfaces; it knows the one for lamps.
+    caster: Of surfaces; it knows the one for lamps.
     """
     place = stratified_square(np.zeros(1, np.int64), rays, seed + Stream.LAMP_ORIGINS)[0]
     way = stratified_square(np.zeros(1, np.int64), rays, seed + Stream.LAMP_DIRECTIONS)[0]

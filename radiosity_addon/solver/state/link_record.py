@@ -19,28 +19,17 @@ class LinkRecord:
 
     Nodes are numbered as in `Hierarchy`: clusters, then elements; lamps come after them.
 
-    Attributes
-    ----------
-    corners : (e, 3, 3) float32
-        Of all elements, inner ones among them.
-    parent : (e,) int32
-        −1 for none.
-    leaf : (e,) bool
-    triangle : (e,) int32
-        The scene's triangle that each is a part of, …
-    front : (e,) bool
-        … and on which side.
-    cluster_centre : (c, 3) float32
-    cluster_above : (c + f,) int32
-        The cluster that every cluster and face is in; −1 for none.
-    lamp : (m, 3) float32
-        Where lamps are; of those that shine from afar, the way to them, …
-    afar : (m,) bool
-        … which these are.
-    receiver, source : (l,) int32
-        Nodes.
-    arriving : (l,) float32 [W/m²]
-        What the link brings to the receiver on average, the mean of the channels.
+    corners (e, 3, 3) float32: Of all elements, inner ones among them.
+    parent (e,) int32: −1 for none.
+    leaf (e,) bool.
+    triangle (e,) int32: The scene's triangle that each is a part of, …
+    front (e,) bool: … and on which side.
+    cluster_centre (c, 3) float32.
+    cluster_above (c + f,) int32: The cluster that every cluster and face is in; −1 for none.
+    lamp (m, 3) float32: Where lamps are; of those that shine from afar, the way to them, …
+    afar (m,) bool: … which these are.
+    receiver, source (l,) int32: Nodes.
+    arriving (l,) float32 [W/m²]: What the link brings to the receiver on average, the mean of the channels.
     """
 
     corners: Array
@@ -69,16 +58,10 @@ class LinkRecord:
     def reaching(self, elements: Array) -> tuple[Array, Array, Array]:
         """Find the links that bring light to elements, their own and their ancestors'.
 
-        Parameters
-        ----------
-        elements : (k,) int
-
-        Returns
-        -------
-        start, end : (n, 3) float32
-            The receiver's and the source's middle. Links that are shared with ancestors start where the
-            elements are.
-        arriving : (n,) float32 [W/m²]
+        elements (k,) int.
+        Returns start, end (n, 3) float32: The receiver's and the source's middle. Links that are shared with
+            ancestors start where the elements are.
+        Returns arriving (n,) float32 [W/m²].
         """
         own = np.unique(elements)
         asked = [own + self.n_clusters]

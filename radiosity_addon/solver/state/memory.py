@@ -43,10 +43,7 @@ LEAST_ROOM = 0.01
 def refuse_beyond(limit: float, needed: float, what: str, advice: str) -> None:
     """Refuse what needs more bytes than the memory limit [GiB] allows.
 
-    Raises
-    ------
-    UsageError
-        Says what it is, what it needs, the limit, and what helps.
+    Raises UsageError: Says what it is, what it needs, the limit, and what helps.
     """
     if needed > limit * 2**30:
         raise UsageError(
@@ -58,10 +55,7 @@ def refuse_beyond(limit: float, needed: float, what: str, advice: str) -> None:
 def refuse_large_scene(scene: Scene, settings: SolverSettings) -> None:
     """Refuse a scene whose faces and coarsest first links do not fit into the memory limit.
 
-    Raises
-    ------
-    UsageError
-        Names the number of faces, what they need, and what helps.
+    Raises UsageError: Names the number of faces, what they need, and what helps.
     """
     solid = scene.areas > 0
     faces = int(solid.sum() + (solid & scene.two_sided).sum())

@@ -22,16 +22,10 @@ from .lamp_power import lamps_within_power, light_power
 class HistoryEntry:
     """How far a method was at some time.
 
-    Parameters
-    ----------
-    seconds : float
-        Since the method began.
-    iteration : int
-        Iterations, or shots, so far.
-    residual : float
-        Σ A |E + ρ K B − B| over the elements, relative to the light's power.
-    elements, links : int
-        How many there were; a matrix has a link for every entry that is not zero.
+    seconds: Since the method began.
+    iteration: Iterations, or shots, so far.
+    residual: Σ A |E + ρ K B − B| over the elements, relative to the light's power.
+    elements, links: How many there were; a matrix has a link for every entry that is not zero.
     """
 
     seconds: float
@@ -115,7 +109,7 @@ class SolverState:
         return push(self.hierarchy, self.light_links.irradiance(strengths, self.hierarchy.n_elements))
 
     def set_leaves(self, irradiance: Array, radiosity: Array) -> None:
-        """Take (l, 3) values of the leaves, in their order, and average them upwards."""
+        """Take (l, 3) values of the leaves, in their order, and average them upward."""
         everywhere = np.zeros((2, self.hierarchy.n_elements, 3))
         everywhere[:, self.hierarchy.leaves] = irradiance, radiosity
         self.irradiance = pull(self.hierarchy, everywhere[0])
