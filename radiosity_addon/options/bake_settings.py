@@ -48,16 +48,16 @@ class BakeSettings:
     )
     texel_density: float | None = option(
         None,
-        "Lightmap pixels along one metre of surface; the size of the lightmap follows",
+        "Lightmap pixels along one meter of surface; the size of the lightmap follows",
         "Size",
         metavar="PX_PER_M",
         limits=(0, 1e9),
         above=True,
-        unit="pixels a metre",
+        unit="pixels a meter",
         instead_of="resolution",
         preset=True,
         panel=PanelRow(
-            "Pixels per Metre",
+            "Pixels per Meter",
             default=64.0,
             low=0.01,
             soft_low=1.0,

@@ -30,10 +30,10 @@ STATE_COLORS = {
     TOUCHED: ((0.95, 0.90, 0.30), "Touched: they end at geometry"),
     ENCLOSED: ((0.55, 0.25, 0.75), "Shut in: no light reaches them"),
 }
-"""Display colours of the texels that are told apart, and what they are."""
+"""Display colors of the texels that are told apart, and what they are."""
 
 WIDEST = 2048
-"""Pages of more pixels are drawn coarser: as colours they would take a quarter of a gigabyte at 4096."""
+"""Pages of more pixels are drawn coarser: as colors they would take a quarter of a gigabyte at 4096."""
 
 CHECKERS = ((0.25, 0.25, 0.27), (0.85, 0.85, 0.82))
 EDGE = (0.05, 0.05, 0.05, 1.0)
@@ -50,7 +50,7 @@ class Surfaces:
     uv : (t, 3, 2) float32
     page : (t,) int
     pages : sequence of (height, width, 4) float32
-        Display colours; without alpha nothing is drawn.
+        Display colors; without alpha nothing is drawn.
     """
 
     corners: Array
@@ -81,7 +81,7 @@ class Lines:
 
 @dataclass(frozen=True)
 class Legend:
-    """What the colours mean.
+    """What the colors mean.
 
     Attributes
     ----------
@@ -175,7 +175,7 @@ def _false_colors(context: bpy.types.Context, shown: list[ShownLightmap]) -> Ove
 
 
 def _density(context: bpy.types.Context, shown: list[ShownLightmap]) -> OverlayPicture:
-    """Show how dense texels are as a colour of each triangle, or the texels themselves."""
+    """Show how dense texels are as a color of each triangle, or the texels themselves."""
     settings = overlay_of(context)
     sizes = [page_size(context, found.image) for found in shown]
     if settings.show == kinds.CHECKER:
@@ -185,12 +185,12 @@ def _density(context: bpy.types.Context, shown: list[ShownLightmap]) -> OverlayP
     density = np.concatenate(
         [texels_per_metre(found, size) for found, size in zip(shown, sizes, strict=True)]
     )
-    # What most has gets the middle colour: blue is coarser, red finer.
+    # What most has gets the middle color: blue is coarser, red finer.
     usual = float(np.median(density))
     scale = (
         ColorScale(0.0, 2.0 * usual) if settings.automatic and usual > 0 else _scale(context, density, False)
     )
-    # A page of one texel a triangle: each has one colour.
+    # A page of one texel a triangle: each has one color.
     side = int(np.ceil(np.sqrt(len(density))))
     page = np.zeros((side**2, 4), dtype=np.float32)
     page[: len(density)] = _opaque(scale(density))
@@ -203,7 +203,7 @@ def _density(context: bpy.types.Context, shown: list[ShownLightmap]) -> OverlayP
 
 
 def texels_per_metre(found: ShownLightmap, size: int) -> Array:
-    """Return (t,) lightmap pixels along one metre of each triangle: the root of how many are in 1 m²."""
+    """Return (t,) lightmap pixels along one meter of each triangle: the root of how many are in 1 m²."""
     return np.asarray(np.sqrt(found.uv_areas * size**2 / np.maximum(found.areas, 1e-30)))
 
 
@@ -307,7 +307,7 @@ def _checker(size: int, squares: int) -> Array:
 
 
 def _opaque(colors: Array) -> Array:
-    """Return (…, 4) for (…, 3) colours."""
+    """Return (…, 4) for (…, 3) colors."""
     return np.concatenate([colors, np.ones((*colors.shape[:-1], 1), dtype=np.float32)], axis=-1)
 
 

@@ -31,7 +31,7 @@ class RadiosityOverlay(bpy.types.PropertyGroup):
         items=[
             (NONE, "None", "Nothing"),
             (FALSE_COLOR, "False Color", "The light that the lightmaps hold, as colors with a scale"),
-            (DENSITY, "Texel Density", "Lightmap pixels along one metre of surface, as colors with a scale"),
+            (DENSITY, "Texel Density", "Lightmap pixels along one meter of surface, as colors with a scale"),
             (CHECKER, "Texel Checker", "The lightmap's pixels themselves, light and dark in turn"),
             (
                 TEXELS,

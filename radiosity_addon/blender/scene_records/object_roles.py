@@ -39,7 +39,7 @@ class Role(NamedTuple):
     in_bounces, in_shadows : bool
         Whether light of surfaces and sky meets it, and whether it stops light of lamps.
     texel_scale : float
-        Texels per metre relative to what others get.
+        Texels per meter relative to what others get.
     warnings : tuple of BakeWarning
     """
 
@@ -57,7 +57,7 @@ def register() -> None:
     )
     bpy.types.Object.radiosity_texel_scale = bpy.props.FloatProperty(
         name="Texel Scale",
-        description="Lightmap pixels per metre, relative to the other objects",
+        description="Lightmap pixels per meter, relative to the other objects",
         default=1.0,
         min=0.01,
         soft_min=0.1,

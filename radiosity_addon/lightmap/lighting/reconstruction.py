@@ -29,7 +29,7 @@ from ..texels import (
     below_hood,
     find_crossings,
     texel_materials,
-    whole_neighbour,
+    whole_neighbor,
 )
 from .gather_links import StoredLinks
 from .gather_settings import GatherSettings
@@ -131,7 +131,7 @@ def footprints(geometry: TexelGeometry, local: LocalPass) -> Footprints:
         geometry.normal,
         keys,
         geometry.sample,
-        geometry.neighbourhood,
+        geometry.neighborhood,
         expected=expected,
         lift=SmoothLift(geometry),
         scratch=scratch,
@@ -268,7 +268,7 @@ def resolver(geometry: TexelGeometry, crossings: Crossings, numbers: HitNumbers)
         divided = np.flatnonzero((texel != NO_TEXEL) & crossings.crossed[texel])
         # What a touched texel ends at hides a corner of it: who hits that corner is not its own.
         touched = np.flatnonzero((texel != NO_TEXEL) & crossings.touched[texel])
-        apart = touched[~_sees_centre(local, geometry, texel[touched], hits.take(touched))]
+        apart = touched[~_sees_center(local, geometry, texel[touched], hits.take(touched))]
         divided = np.concatenate([divided, apart])
         cell = cells.at(texel[divided], hits.take(divided))
         found[divided] = cell + numbers.first_cell
@@ -286,18 +286,18 @@ def resolver(geometry: TexelGeometry, crossings: Crossings, numbers: HitNumbers)
 
 
 def _beside(crossings: Crossings, local: LocalPass, texel: Array, hits: Hits) -> Array:
-    """Return (h,) what answers hits on texels without a cell for them: a neighbour, or NO_TEXEL.
+    """Return (h,) what answers hits on texels without a cell for them: a neighbor, or NO_TEXEL.
 
     NOTHING below a hood: elements do not know of hoods, and their light would be that of the open.
     """
     geometry, caster = crossings.geometry, local.caster
     position = geometry.positions_of(hits)
     below = below_hood(geometry, caster, texel, position[:, None])[:, 0]
-    found = whole_neighbour(crossings, caster, texel, position, below)
+    found = whole_neighbor(crossings, caster, texel, position, below)
     return np.where((found == NOTHING) & ~below, NO_TEXEL, found)
 
 
-def _sees_centre(local: LocalPass, geometry: TexelGeometry, texel: Array, hits: Hits) -> Array:
-    """Return (h,) whether nothing is between hits and the centres of their texels."""
+def _sees_center(local: LocalPass, geometry: TexelGeometry, texel: Array, hits: Hits) -> Array:
+    """Return (h,) whether nothing is between hits and the centers of their texels."""
     lift = SIGHT_LIFT * local.caster.surface_offset * geometry.surface_normal[texel]
     return free_segment(local.caster, geometry.positions_of(hits) + lift, geometry.position[texel] + lift)

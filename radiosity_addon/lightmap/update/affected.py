@@ -96,8 +96,8 @@ class AffectedTexels:
         """
         old, count = traced.numbers, traced.numbers.texel_count
         now = np.arange(old.end, dtype=np.int32)
-        # A hit on a divided texel may have been answered by a neighbour.
-        texels = self.texels | self.geometry.neighbourhood(divided)
+        # A hit on a divided texel may have been answered by a neighbor.
+        texels = self.texels | self.geometry.neighborhood(divided)
         now[:count][texels] = STALE
         now[count : old.first_cell][self._parts_near(numbers)] = STALE
         cells = old.cells.renumbered(numbers.cells)

@@ -41,7 +41,7 @@ class LightSources:
         self.lights: tuple[Light, ...] = scene.lights
         emits = scene.emission.max(axis=1, initial=0.0) > 0
         self.emitter = np.full(len(scene), NO_SOURCE, dtype=np.int32)
-        numbers = _by_colour(scene) if emitter is None else np.asarray(emitter, dtype=np.int32)
+        numbers = _by_color(scene) if emitter is None else np.asarray(emitter, dtype=np.int32)
         self.emitter[emits] = numbers[emits]
         count = int(self.emitter.max(initial=NO_SOURCE)) + 1
         self.groups: list[EmitterGroup] = []
@@ -115,7 +115,7 @@ class LightSources:
         return SkyTable(self.lights, strengths[: len(self.lights)])
 
 
-def _by_colour(scene: Scene) -> Array:
+def _by_color(scene: Scene) -> Array:
     """Return (t,) a number for each color of emission, and the last one for all textures."""
     number = numbered(scene.emission).astype(np.int32)
     if scene.images is not None:

@@ -20,7 +20,7 @@ MOST_PIECES = 256
 SMOOTH = 0.002
 """A piece is cut no further when its emission varies by less than this share of all power."""
 
-SAME_COLOUR = 1e-3
+SAME_COLOR = 1e-3
 """Pieces whose channels are in one proportion, to this much, are one lamp."""
 
 
@@ -92,9 +92,9 @@ def _of_pieces(
         return []
     corners = corners_of_parts(faces, face, weights)
     brightest = emission.max(axis=1)
-    colour = emission.sum(axis=0) / emission.sum(axis=0).max()
-    if (np.abs(emission - brightest[:, None] * colour) <= SAME_COLOUR * brightest[:, None]).all():
-        lamps = [(brightest, colour)]
+    color = emission.sum(axis=0) / emission.sum(axis=0).max()
+    if (np.abs(emission - brightest[:, None] * color) <= SAME_COLOR * brightest[:, None]).all():
+        lamps = [(brightest, color)]
     else:
         lamps = [(emission[:, channel], np.eye(3)[channel]) for channel in range(3)]
     return [
