@@ -6,19 +6,25 @@
 from __future__ import annotations
 
 from .estimate import Estimate, LightmappedObject, estimate_bake
-from .keep import KeepOptions, bake_steps, can_keep, moves_alone
+from .keep import KeepOptions, can_keep, run_pipeline
+from .plan import SHORT, BakeDigests, BakePlan, ShownBake, ShownLightmap, plan_bake
 from .stages import timed
 from .texel_memory import pages_of, refuse_too_large
 
 __all__ = [
+    "SHORT",
+    "BakeDigests",
+    "BakePlan",
     "Estimate",
     "KeepOptions",
     "LightmappedObject",
-    "bake_steps",
+    "ShownBake",
+    "ShownLightmap",
     "can_keep",
     "estimate_bake",
-    "moves_alone",
     "pages_of",
+    "plan_bake",
     "refuse_too_large",
+    "run_pipeline",
     "timed",
 ]

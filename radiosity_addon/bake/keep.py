@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import uuid
-from collections.abc import Generator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from ..base import SILENT, Progress
 from ..options import BakeSettings
-from ..scene import BakeScene
 from .pipeline import bake, bake_and_keep
-from .rebaking import bake_moved, can_move
+from .plan import BakePlan
+from .rebaking import bake_moved
 from .relight import KeptBake
-from .result import BakeResult, Progress
+from .result import BakeResult
 from .sidecar import write_sidecar
 
 
@@ -27,8 +27,7 @@ class KeepOptions:
     mark : str
         The bake's own name, by which its images and its sidecar are known to belong together.
     earlier : KeptBake or None
-        A kept bake of the same scene: if only places of objects have changed since, just what they touch
-        is baked anew.
+        A kept bake of the same scene, to be updated if only places of objects have changed since.
     """
 
     sidecar: bool = False
@@ -41,19 +40,15 @@ def can_keep(settings: BakeSettings) -> bool:
     return settings.method == "hierarchical" and settings.quantity != "residual"
 
 
-def moves_alone(bake_scene: BakeScene, settings: BakeSettings, keeping: KeepOptions | None) -> bool:
-    """Tell whether all that a bake has to do is to follow what moved since an earlier one that was kept."""
-    earlier = None if keeping is None else keeping.earlier
-    return earlier is not None and can_move(earlier, bake_scene, settings)
-
-
-def bake_steps(
-    bake_scene: BakeScene, settings: BakeSettings, keeping: KeepOptions | None, sidecar: Path | None
-) -> Generator[Progress, None, tuple[BakeResult, KeptBake | None]]:
-    """Bake, and keep the bake if that is asked for.
+def run_pipeline(
+    plan: BakePlan, keeping: KeepOptions | None, sidecar: Path | None, progress: Progress = SILENT
+) -> tuple[BakeResult, KeptBake | None]:
+    """Bake as planned, and keep the bake if that is asked for.
 
     Parameters
     ----------
+    plan : BakePlan
+        One that moves objects in a kept bake is for a bake that is kept again.
     keeping : KeepOptions or None
     sidecar : Path or None
         Where its file goes, to be published with the bake; None writes none.
@@ -64,12 +59,12 @@ def bake_steps(
         Those of `bake_and_keep` and `write_sidecar`.
     """
     if keeping is None:
-        return (yield from bake(bake_scene, settings)), None
-    if keeping.earlier is not None and moves_alone(bake_scene, settings, keeping):
-        result, kept = yield from bake_moved(keeping.earlier, bake_scene)
+        return bake(plan.bake_scene, plan.settings, progress), None
+    if plan.kept is not None:
+        result, kept = bake_moved(plan.kept, plan.bake_scene, progress)
     else:
-        result, kept = yield from bake_and_keep(bake_scene, settings)
+        result, kept = bake_and_keep(plan.bake_scene, plan.settings, progress)
     if sidecar is not None:
-        yield Progress("sidecar", 1.0)
+        progress.stage("sidecar", 1.0, 1.0).at(1.0)
         write_sidecar(sidecar, kept, result, keeping.mark)
     return result, kept

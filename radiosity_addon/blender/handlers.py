@@ -14,15 +14,13 @@ from bpy.app.handlers import persistent
 from .files import ownership
 from .operators import cleaning, edit_guard
 from .overlays import overlay_view
-from .relight import kept_bakes, lightmap_versions
-from .session import live_state
+from .relight import lightmap_versions
+from .session import facts, state
 
 ALWAYS: tuple[tuple[str, Callable[..., None]], ...] = (
     ("load_pre", ownership.forget_unsaved),
-    ("load_pre", kept_bakes.drop_all),
     ("load_pre", lightmap_versions.forget),
-    ("load_pre", overlay_view.forget_the_file),
-    ("load_pre", live_state.stop_with_the_file),
+    ("load_pre", state.forget_file),
     ("load_post", lightmap_versions.check),
     ("load_post", cleaning.look_at_file),
     ("save_pre", lightmap_versions.before_saving),
@@ -30,12 +28,16 @@ ALWAYS: tuple[tuple[str, Callable[..., None]], ...] = (
     ("undo_post", overlay_view.forget),
     ("redo_post", lightmap_versions.follow_undo),
     ("redo_post", overlay_view.forget),
-    ("depsgraph_update_post", live_state.note),
+    ("depsgraph_update_post", state.note_change),
 )
 """Which function is called at which event, in this order."""
 
 WITH_A_WINDOW: tuple[tuple[str, Callable[..., None]], ...] = (
     ("load_pre", edit_guard.forget),
+    ("load_post", facts.outdate),
+    ("undo_post", facts.outdate),
+    ("redo_post", facts.outdate),
+    ("depsgraph_update_post", facts.outdate),
     ("depsgraph_update_post", overlay_view.note_change),
     ("depsgraph_update_post", edit_guard.note),
 )
@@ -55,7 +57,7 @@ def unregister() -> None:
             _listeners(event).remove(function)
     edit_guard.forget()
     lightmap_versions.forget()
-    kept_bakes.drop_all()
+    state.forget_file()
 
 
 def _listeners(event: str) -> list[Any]:

@@ -1,4 +1,4 @@
-"""What the command line prints: progress, where things are, warnings."""
+"""Output of the command line: progress, paths, warnings."""
 
 from __future__ import annotations
 
@@ -17,15 +17,12 @@ STEP = 10
 
 
 class Console:
-    """Our own lines on standard output, with Blender's chatter kept off it.
+    """Our own lines on standard output, without Blender's output.
 
     While entered, file descriptor 1 leads to the null device: Blender's C code writes
     a line there for every sample it renders. Our lines go to a copy of the original.
 
-    Parameters
-    ----------
-    quiet : bool
-        Print nothing at all.
+    quiet: Print nothing at all.
     """
 
     def __init__(self, quiet: bool = False) -> None:
@@ -69,7 +66,7 @@ class Console:
             self._stream = sys.stdout
 
     def progress(self, stage: str, fraction: float) -> None:
-        """Show the stage, how much of the whole is done (0 to 1), and about how long it still takes."""
+        """Show the stage, the overall progress (0 to 1), and the estimated time left."""
         if self.quiet:
             return
         seconds = self._remaining.update(fraction)
@@ -97,7 +94,7 @@ class Console:
             self._stream.write(text)
             self._stream.flush()
         except (OSError, ValueError):
-            self.quiet = True  # nobody reads it, such as `| head`; the bake goes on
+            self.quiet = True  # the reader has closed the pipe, as `| head` does; the bake continues
 
     def _end_line(self) -> None:
         if self._open_line:
@@ -123,15 +120,11 @@ def _flush_everything() -> None:
 
 
 def summary(where: str, files: Iterable[tuple[str, str]], report: dict[str, Any]) -> list[str]:
-    """Return the closing lines of a bake: where things are, how long, what to look at.
+    """Return the closing lines of a bake: paths, time, and warnings.
 
-    Parameters
-    ----------
-    where : str
-        The output folder as the user named it.
-    files : pairs of (name, what it is)
-    report : dict
-        The report as it is written to report.json.
+    where: The output folder as the user named it.
+    files pairs of (name, what it is).
+    report: The report as it is written to report.json.
     """
     solver = report["solver"]
     count = len(report["objects"])

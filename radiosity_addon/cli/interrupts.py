@@ -14,7 +14,7 @@ class Interrupts:
     render, an importer), crashes on one that is raised while it is imported, and in the
     background installs a handler of its own that never reaches Python. So the request is
     also kept in `requested`: loops call `check`, and while `deferred` is set, as it is at
-    first, nothing is raised, so that what must not be torn apart is finished first.
+    first, nothing is raised, so that work that must not be interrupted is finished first.
     """
 
     def __init__(self) -> None:

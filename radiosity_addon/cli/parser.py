@@ -1,4 +1,4 @@
-"""The command line's words as a request: one parser for `python -m`, Blender's `--command` and build.py.
+"""The command line's parser, shared by `python -m`, Blender's `--command` and build.py.
 
 Parsing needs neither Blender nor NumPy.
 """
@@ -20,7 +20,7 @@ BUNDLED_OUTPUT = Path("out/cornell")
 
 
 def build_parser(prog: str) -> argparse.ArgumentParser:
-    """Return the parser of both verbs; it raises `UsageError` where argparse would exit."""
+    """Return the parser of both commands; it raises `UsageError` where argparse would exit."""
     parser = _Parser(prog=prog, description="Bake radiosity lightmaps.", allow_abbrev=False)
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="{bake,restore}")
     _add_bake(verbs.add_parser("bake", help="bake lightmaps", allow_abbrev=False))
@@ -40,10 +40,7 @@ def requested_settings(request: argparse.Namespace) -> BakeSettings:
 def light_group(text: str) -> GroupSetting:
     """Read a light group as the command line has it: NAME=MEMBER,MEMBER…
 
-    Raises
-    ------
-    UsageError
-        If it is not of this form.
+    Raises UsageError if it is not of this form.
     """
     name, _, members = text.partition("=")
     wanted = tuple(filter(None, (member.strip() for member in members.split(","))))
@@ -65,19 +62,19 @@ def bake_output(request: argparse.Namespace, loaded: Path | None) -> Path:
 
 
 def check_keeping(request: argparse.Namespace, settings: BakeSettings) -> None:
-    """Refuse to keep what cannot be lit anew, and to relight otherwise than it was baked."""
+    """Refuse to keep bakes that cannot be relit, and to relight with settings other than the bake's."""
     if request.keep and settings.method != "hierarchical":
         raise UsageError(f"--keep needs the hierarchical method; {settings.method} keeps no links")
     if request.keep and settings.quantity == "residual":
         raise UsageError("--keep: a residual is of all light together; bake another quantity")
     if request.relight and request.plot is not None:
-        raise UsageError("--relight solves nothing whose history --plot could draw")
+        raise UsageError("--relight solves nothing, so --plot has no history to draw")
 
 
 def check_plot(plot: Path | None) -> None:
     """Refuse to draw the history into a file of another kind."""
-    if plot is not None and plot.suffix.lower() != ".png":
-        raise UsageError(f"--plot {plot} is not a .png file")
+    if plot is not None and plot.suffix.lower() != ".svg":
+        raise UsageError(f"--plot {plot}: the plot is an SVG picture; choose a name that ends in .svg")
 
 
 class _Parser(argparse.ArgumentParser):
@@ -97,8 +94,9 @@ def _add_bake(parser: argparse.ArgumentParser) -> None:
     )
     _add_options(parser, (*BAKE_COMMAND.values(), *EVERY_COMMAND.values()))
     for section in SECTIONS:
-        group = parser.add_argument_group(section)
-        _add_options(group, [option for option in OPTIONS.values() if option.section == section])
+        options = [option for option in OPTIONS.values() if option.section == section]
+        if options:
+            _add_options(parser.add_argument_group(section), options)
 
 
 def _add_restore(parser: argparse.ArgumentParser) -> None:
@@ -116,7 +114,7 @@ def _add_restore(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_options(group: Any, options: Iterable[Option]) -> None:
-    """Add options to a parser or a group of it; of one and what replaces it only one may be given."""
+    """Add options to a parser or a group of it; of an option and its replacement only one may be given."""
     options = list(options)
     replaced = {option.instead_of for option in options}
     exclusive: dict[str, Any] = {}
@@ -147,7 +145,7 @@ def _reading(option: Option) -> dict[str, Any]:
 
 
 def _help(option: Option) -> str:
-    """Return the description as the help has it, with the default, and the methods that have the option."""
+    """Return the description for the help, with the default and the methods that have the option."""
     text = option.description
     text = text[0].lower() + text[1:] if text[1].islower() else text
     if option.methods:

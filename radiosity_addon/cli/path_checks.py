@@ -1,4 +1,4 @@
-"""Words of a command line as paths and names: what no file or object can be called is refused at once."""
+"""Paths and names on the command line; impossible ones are refused at once."""
 
 from __future__ import annotations
 
@@ -24,10 +24,7 @@ SHOWN = 60
 def checked_path(word: str) -> Path:
     """Return the path that a word names, `~` expanded.
 
-    Raises
-    ------
-    ArgumentTypeError
-        If no file can have this path.
+    Raises ArgumentTypeError if no file can have this path.
     """
     shown = quoted(word)
     _check_text(word, "path")
@@ -51,10 +48,7 @@ def checked_path(word: str) -> Path:
 def checked_folder(word: str) -> Path:
     """Return the path of an output folder that a word names; our files in it must have paths too.
 
-    Raises
-    ------
-    ArgumentTypeError
-        If no folder can have this path.
+    Raises ArgumentTypeError if no folder can have this path.
     """
     path = checked_path(word)
     if len(os.fsencode(path.absolute())) > MAX_PATH - OWN_NAMES:
@@ -67,9 +61,7 @@ def checked_folder(word: str) -> Path:
 def check_folder(path: Path) -> None:
     """Refuse a path that no output folder can have, wherever it comes from.
 
-    Raises
-    ------
-    BakeError
+    Raises BakeError.
     """
     try:
         checked_folder(str(path))
@@ -80,10 +72,7 @@ def check_folder(path: Path) -> None:
 def checked_name(word: str) -> str:
     """Return a word that names an object, a lamp, a material or a light group.
 
-    Raises
-    ------
-    ArgumentTypeError
-        If nothing can have this name.
+    Raises ArgumentTypeError if nothing can have this name.
     """
     _check_text(word, "name")
     return word
@@ -105,7 +94,7 @@ def escaped(line: str) -> str:
 
 
 def _check_text(word: str, what: str) -> None:
-    """Refuse what is empty, holds a NUL or is not UTF-8."""
+    """Refuse words that are empty, contain a NUL or are not UTF-8."""
     if not word:
         raise ArgumentTypeError(f"the {what} is empty")
     if "\0" in word:

@@ -1,4 +1,4 @@
-"""What the command line may do beyond what is safe, because its user says so."""
+"""Permissions that users grant on the command line for actions that are not safe."""
 
 from __future__ import annotations
 
@@ -9,12 +9,8 @@ from dataclasses import dataclass
 class Permissions:
     """What is allowed.
 
-    Attributes
-    ----------
-    overwrite : bool
-        Replace files that no earlier bake of this scene has written.
-    scripts : bool
-        Run the scripts and script expressions of a scene file that is opened.
+    overwrite: Replace files that no earlier bake of this scene has written.
+    scripts: Run the scripts and script expressions of a scene file that is opened.
     """
 
     overwrite: bool = False

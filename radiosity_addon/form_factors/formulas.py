@@ -1,4 +1,4 @@
-"""Form factors, one formula a function: the fraction of what leaves a receiver that meets a source.
+"""Form factors, one function per formula: the fraction of light leaving a receiver that meets a source.
 
 | function | from | to | how |
 |---|---|---|---|
@@ -40,18 +40,10 @@ def disk_factor(
     0 where either faces away. The relative error is about (source radius / distance)², so
     well below 1 % beyond ten radii. Works in the precision of its arguments.
 
-    Parameters
-    ----------
-    points, normals : (n, 3) float
-        Receiver points and their unit normals.
-    centres, source_normals : (n, 3) float
-        Centroids and unit normals of the sources.
-    areas : (n,) float
-        Areas of the sources.
-
-    Returns
-    -------
-    factors : (n,) float in [0, 1), of the arguments' type
+    points, normals (n, 3): Receiver points and their unit normals.
+    centres, source_normals (n, 3): Centroids and unit normals of the sources.
+    areas (n,): Areas of the sources.
+    Returns factors (n,) float in [0, 1), of the arguments' type.
     """
     x, y, z = (centres[:, axis] - points[:, axis] for axis in range(3))
     square = x * x + y * y + z * z
@@ -60,5 +52,4 @@ def disk_factor(
     # The two cosines' lengths go into one division by d².
     weight = np.maximum(cosine_r, 0) * np.maximum(-cosine_s, 0) * areas
     divisor = square * (np.pi * square + areas)
-    factors: FloatArray = weight / np.where(divisor > 0, divisor, 1)
-    return factors
+    return weight / np.where(divisor > 0, divisor, 1)

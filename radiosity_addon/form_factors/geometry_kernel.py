@@ -1,4 +1,4 @@
-"""Two points that look at each other: geometry term, kernel, throughput, visibility.
+"""Pairs of points: geometry term, kernel, throughput, visibility.
 
 All are symmetric in the two points: what leaves one for the other finds the same way back.
 Whatever the solver samples between two surfaces is one of these.
@@ -19,7 +19,7 @@ from ..numerics import Array
 from ..rays import RayCaster
 
 LEAST = 1e-6
-"""Of what a cut-out lets pass, and of what it stops, as far as `sees` tells."""
+"""Lower bound of the shares that cut-outs pass and stop, in results of `visibility_of`."""
 
 _TINY = 1e-150
 """Least square of a distance: keeps a point and itself from 0/0, and its own square above 0."""
@@ -28,14 +28,8 @@ _TINY = 1e-150
 def geometry_term(points: Array, normals: Array, other_points: Array, other_normals: Array) -> Array:
     """Return G = cosθ cosθ' / r² [1/m²]; 0 where either faces away from the other.
 
-    Parameters
-    ----------
-    points, normals, other_points, other_normals : (..., 3) float
-        Broadcast against each other; normals are unit.
-
-    Returns
-    -------
-    geometry : (...) float
+    points, normals, other_points, other_normals (..., 3): Broadcast against each other; normals are unit.
+    Returns geometry (...) float.
     """
     along = other_points - points
     square = np.maximum(np.einsum("...k,...k->...", along, along), _TINY)
@@ -46,14 +40,11 @@ def geometry_term(points: Array, normals: Array, other_points: Array, other_norm
 
 
 def ray_geometry_term(cosine: Array, other_cosine: Array, distance: Array) -> Array:
-    """Return G [1/m²] of rays whose cosines and lengths are known already.
+    """Return G [1/m²] of rays with known cosines and lengths.
 
-    Parameters
-    ----------
-    cosine, other_cosine : (...) float
-        Between the ray and the normals at its two ends; negative ones count as 0.
-    distance : (...) float [m]
-        Where it is 0 the term is 0: a point does not light itself.
+    cosine, other_cosine (...) float: Between the ray and the normals at its two ends; negative ones count as
+        0.
+    distance (...) float [m]: Where it is 0 the term is 0: a point does not light itself.
     """
     square = distance * distance
     above = np.maximum(cosine, 0.0) * np.maximum(other_cosine, 0.0)
@@ -61,7 +52,7 @@ def ray_geometry_term(cosine: Array, other_cosine: Array, distance: Array) -> Ar
 
 
 def kernel(points: Array, normals: Array, other_points: Array, other_normals: Array) -> Array:
-    """Return κ = G/π [1/m²], the share of a matte surface's light that takes this way, per area.
+    """Return κ = G/π [1/m²], the share of a matte surface's light that travels between the points, per area.
 
     B(x) = E(x) + ρ(x) ∫ B(x') κ(x, x') V(x, x') dA' (handout (2.25)). Parameters as for
     `geometry_term`.
@@ -77,12 +68,9 @@ def throughput(geometry: Array, area: Array | float, other_area: Array | float) 
     Radiance times throughput is power, and T/π is what form factors are made of:
     A_i F_ij = ∬ κ dA dA'.
 
-    Parameters
-    ----------
-    geometry : (...) float [1/m²]
-        G of the pair.
-    area, other_area : (...) float [m²]
-        With an `area` of 1 it is what a square metre there receives per radiance.
+    geometry (...) float [1/m²]: G of the pair.
+    area, other_area (...) float [m²]: With an `area` of 1 it is what a square meter there receives per
+        radiance.
     """
     return np.asarray(geometry * area * other_area)
 
@@ -90,20 +78,14 @@ def throughput(geometry: Array, area: Array | float, other_area: Array | float) 
 def visibility_of(
     caster: RayCaster, points: Array, normals: Array, other_points: Array, other_normals: Array
 ) -> Array:
-    """Return V of pairs of points on surfaces: whether nothing lies between them, or how much passes.
+    """Return V of pairs of points on surfaces: the share of light that passes between them.
 
     Both ends leave their surfaces by the caster's offset, so that no surface hides itself.
-    Facing away is the geometry term's affair and is not asked here.
+    The geometry term handles pairs that face away from each other.
 
-    Parameters
-    ----------
-    caster : RayCaster
-    points, normals, other_points, other_normals : (n, 3) float64
-
-    Returns
-    -------
-    visible : (n,) bool or float
-        Never 0 or 1 where a cut-out was met: others may find what few rays between do not.
+    points, normals, other_points, other_normals (n, 3).
+    Returns visible (n,) bool or: Never 0 or 1 where a cut-out was met: others may find what few rays between
+        do not.
     """
     start = points + caster.surface_offset * normals
     along = other_points + caster.surface_offset * other_normals - start

@@ -1,4 +1,4 @@
-"""What share of a point's hemisphere a shape fills, weighted by the cosine: closed forms.
+"""Closed forms for the cosine-weighted share of a point's hemisphere that a polygon fills.
 
 The form factor from an oriented point to a shape is its projected solid angle over π. By
 Stokes it is an integral along the outline, F = 1/(2π) n · ∮ ω × dω (Lambert 1760; handout
@@ -38,27 +38,14 @@ def point_to_polygon(
     the factor is that of a vanishing gap (1 inside, 1/2 on an edge). Polygons without area
     give 0. Corners may run k ≥ 3, concave ones too, but not across each other.
 
-    Parameters
-    ----------
-    points : (n, 3) float
-    normals : (n, 3) float
-        Unit normals of the receiver at the points.
-    polygons : (n, k, 3) float
-        May be a broadcast view: rows are copied by chunks of `CHUNK_CORNERS` corners.
-    both_sides : bool
-        Count the polygon's back as well.
-    contact : bool
-        Whether faces in contact see each other. A surface's own back lies in its plane and faces the
-        other way just like one in contact, so callers that cannot tell them apart say no.
-
-    Returns
-    -------
-    factors : (n,) float64 in [0, 1]
-
-    Raises
-    ------
-    ValueError
-        If shapes do not match.
+    points (n, 3).
+    normals (n, 3): Unit normals of the receiver at the points.
+    polygons (n, k, 3): May be a broadcast view: rows are copied by chunks of `CHUNK_CORNERS` corners.
+    both_sides: Count the polygon's back as well.
+    contact: Whether faces in contact see each other. A surface's own back also lies in its plane and faces
+        the other way, so callers that cannot distinguish the two pass False.
+    Returns factors (n,) float64 in [0, 1].
+    Raises ValueError if shapes do not match.
     """
     points, normals = np.asarray(points, dtype=np.float64), np.asarray(normals, dtype=np.float64)
     polygons = np.asarray(polygons, dtype=np.float64)
@@ -98,7 +85,7 @@ def _chunk_factors(
     turn = np.zeros(corners.shape[2], dtype=corners.dtype)
     rows = np.flatnonzero(whole)
     if 2 * len(rows) > len(turn):
-        # Copying half the rows out costs more than working on the others in vain.
+        # Copying half of the rows costs more than processing the others needlessly.
         turn = np.where(whole, _closed_turn(corners, normal), 0.0)
     elif len(rows):
         turn[rows] = _closed_turn(corners.take(rows, axis=2), normal.take(rows, axis=1))
@@ -128,9 +115,7 @@ def _closed_turn(corners: Float64Array, normal: Float64Array) -> Float64Array:
 def edge_turn(start: Float64Array, end: Float64Array, normal: Float64Array) -> Float64Array:
     """Return n · ∫ ω × dω along one edge, γ n · Γ̂; 0 for an edge that points at the origin.
 
-    Parameters
-    ----------
-    start, end, normal : (3, m) float64
+    start, end, normal (3, m).
     """
     cross_x = start[1] * end[2] - start[2] * end[1]
     cross_y = start[2] * end[0] - start[0] * end[2]
@@ -138,8 +123,7 @@ def edge_turn(start: Float64Array, end: Float64Array, normal: Float64Array) -> F
     length = np.sqrt(cross_x * cross_x + cross_y * cross_y + cross_z * cross_z)
     angle = np.arctan2(length, _dot(start, end))
     along = cross_x * normal[0] + cross_y * normal[1] + cross_z * normal[2]
-    turn: Float64Array = along * (angle / np.where(length > 0.0, length, 1.0))
-    return turn
+    return along * (angle / np.where(length > 0.0, length, 1.0))
 
 
 def _cut_turn(

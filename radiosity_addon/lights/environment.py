@@ -22,14 +22,14 @@ CELLS = (64, 128)
 """Rows and columns of the even part: cells of 2.8°."""
 
 BRIGHT = 4.0
-"""Radiance above this many times the sphere's mean is a patch's."""
+"""Pixels above this many times the sphere's mean belong to patches."""
 
 PATCH_RADIUS = np.radians(15.0)
-"""A patch reaches so far around its brightest pixel: its light comes from about one direction and
-has about one colour."""
+"""A patch reaches this far around its brightest pixel: its light comes from about one direction and
+has about one color."""
 
 MAX_PATCHES = 12
-"""What is bright beyond so many patches stays in the even part."""
+"""The maximum number of patches; further bright pixels stay in the uniform part."""
 
 _CHUNK = 1 << 20
 """Points times pixels evaluated at once; bounds the temporaries to 8 MB."""
@@ -42,19 +42,11 @@ WHOLE: Bounds = (-0.5 * np.pi, 0.5 * np.pi, -np.pi, np.pi)
 
 @dataclass(frozen=True, eq=False)
 class EnvironmentImage(EnvironmentLight):
-    """A sky of one colour whose brightness differs by direction; a coloured one is three of them.
+    """A sky of one color whose brightness differs by direction; a colored one is three of them.
 
-    Parameters
-    ----------
-    radiance : float or (3,) float [W/m²/sr]
-        Where the image is 1.
-    image : (h, w) float
-        Relative radiance, latitudes by longitudes (see the module).
-
-    Raises
-    ------
-    SceneError
-        If a value is negative, NaN or infinite.
+    radiance float or (3,) float [W/m²/sr]: Where the image is 1.
+    image (h, w): Relative radiance, latitudes by longitudes (see the module).
+    Raises SceneError if a value is negative, NaN or infinite.
     """
 
     image: npt.ArrayLike
@@ -63,7 +55,7 @@ class EnvironmentImage(EnvironmentLight):
         super().__post_init__()
         image = np.asarray(self.image, dtype=np.float64)
         if image.ndim != 2 or not (np.isfinite(image).all() and (image >= 0.0).all()):
-            raise self._fail("its image has negative, NaN or infinite pixels", "mend its node tree")
+            raise self._fail("its image has negative, NaN or infinite pixels", "fix its node tree")
         self._store("image", image)
 
     @property
@@ -74,27 +66,17 @@ class EnvironmentImage(EnvironmentLight):
 
     def relative(self, directions: Float64Array) -> Float64Array:
         """Return (...) radiance by directions (..., 3), relative to `radiance`."""
-        values: Float64Array = np.asarray(self.image).ravel()[cell_of(directions, self.shape)]
-        return values
+        return np.asarray(self.image).ravel()[cell_of(directions, self.shape)]
 
 
 @dataclass(frozen=True, eq=False)
 class SkyPatch(Lamp):
     """A bright part of the sky, at infinity.
 
-    Parameters
-    ----------
-    irradiance : float or (3,) float [W/m²]
-        The sum over its pixels of radiance times solid angle.
-    bounds : (m, 4) float [rad]
-        Of each pixel.
-    share : (m,) float
-        Of the irradiance, by pixel.
-
-    Raises
-    ------
-    SceneError
-        If the irradiance is negative, NaN or infinite.
+    irradiance float or (3,) float [W/m²]: The sum over its pixels of radiance times solid angle.
+    bounds (m, 4) [rad]: Of each pixel.
+    share (m,): Of the irradiance, by pixel.
+    Raises SceneError if the irradiance is negative, NaN or infinite.
     """
 
     irradiance: npt.ArrayLike
@@ -116,12 +98,11 @@ class SkyPatch(Lamp):
     def direction(self) -> Float64Array:
         """(3,) the way its light travels, in the mean, of length 1."""
         mean = -(np.asarray(self.share) @ self._toward())
-        unit: Float64Array = mean / np.linalg.norm(mean)
-        return unit
+        return mean / np.linalg.norm(mean)
 
     @property
     def half_angle(self) -> float:
-        """How far its farthest corner is from `direction` [rad]."""
+        """Angle between its farthest corner and `direction` [rad]."""
         low, high, left, right = np.asarray(self.bounds).T
         corners = np.concatenate(
             [_directions(np.sin(up), azimuth) for up in (low, high) for azimuth in (left, right)]
@@ -160,8 +141,7 @@ def cell_of(directions: Float64Array, shape: tuple[int, int]) -> npt.NDArray[np.
     azimuth = np.arctan2(directions[..., 1], directions[..., 0])
     row = np.clip(((0.5 + latitude / np.pi) * height).astype(np.int64), 0, height - 1)
     column = np.clip(((0.5 - azimuth / (2.0 * np.pi)) * width).astype(np.int64), 0, width - 1)
-    cells: npt.NDArray[np.int64] = row * width + column
-    return cells
+    return row * width + column
 
 
 def cell_directions(shape: tuple[int, int]) -> Float64Array:
@@ -182,24 +162,15 @@ def pixel_bounds(shape: tuple[int, int], window: Bounds = WHOLE) -> Float64Array
 def solid_angles(bounds: Float64Array) -> Float64Array:
     """Return (m,) [sr] of pixels' bounds."""
     low, high, left, right = bounds.T
-    angles: Float64Array = (np.sin(high) - np.sin(low)) * (right - left)
-    return angles
+    return (np.sin(high) - np.sin(low)) * (right - left)
 
 
 def bright_patches(pixels: Float64Array) -> tuple[Float64Array, list[npt.NDArray[np.int64]]]:
-    """Split off what is far brighter than the mean.
+    """Split off pixels that are far brighter than the mean.
 
-    Parameters
-    ----------
-    pixels : (h, w, 3) float64
-        Radiance of the whole sphere.
-
-    Returns
-    -------
-    excess : (h w, 3) float64
-        What of each pixel's radiance is a patch's.
-    patches : list of (m,) int
-        The pixels of each.
+    pixels (h, w, 3): Radiance of the whole sphere.
+    Returns excess (h w, 3): What of each pixel's radiance is a patch's.
+    Returns patches list of (m,) int: The pixels of each.
     """
     flat = pixels.reshape(-1, 3)
     shape = pixels.shape[0], pixels.shape[1]
@@ -220,12 +191,9 @@ def bright_patches(pixels: Float64Array) -> tuple[Float64Array, list[npt.NDArray
 
 
 def even_part(pixels: Float64Array, name: str = "") -> list[EnvironmentLight]:
-    """Return a sky as lights: one if it has no colour or is the same all around, else one a channel.
+    """Return a sky as lights: one if it has no color or is the same all around, else one a channel.
 
-    Parameters
-    ----------
-    pixels : (h, w, 3) float64
-        Radiance; h and w are multiples of `CELLS`, or smaller and taken as they are.
+    pixels (h, w, 3): Radiance; h and w are multiples of `CELLS`, or smaller and taken as they are.
     """
     height, width = pixels.shape[:2]
     rows, columns = min(CELLS[0], height), min(CELLS[1], width)
@@ -250,13 +218,9 @@ def even_part(pixels: Float64Array, name: str = "") -> list[EnvironmentLight]:
 
 
 class SkyTable:
-    """What rays that leave the scene find, by cell.
+    """The light that rays leaving the scene meet, by cell.
 
-    Parameters
-    ----------
-    lights : sequence of Light
-    strengths : (l, 3) float64 or None [W/m²/sr]
-        What the lights have instead of their own strengths.
+    strengths (l, 3) or None [W/m²/sr]: What the lights have instead of their own strengths.
     """
 
     def __init__(self, lights: Sequence[Light], strengths: Float64Array | None = None) -> None:

@@ -1,4 +1,4 @@
-"""What every light can be asked, and how its values are checked."""
+"""The interface of all lights, and checks of their values."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Samples = npt.NDArray[np.floating[Any]]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Light:
-    """What lights a scene from outside its surfaces; `name` is for messages only."""
+    """A light other than the scene's surfaces; `name` is for messages only."""
 
     name: str = ""
 
@@ -29,9 +29,9 @@ class Light:
         """(3,) RGB: a lamp's power [W], a sun's irradiance [W/m²], a sky's radiance [W/m²/sr]."""
         raise NotImplementedError
 
-    def _fail(self, what: str, mend: str) -> SceneError:
+    def _fail(self, what: str, fix: str) -> SceneError:
         kind = type(self).__name__.removesuffix("Light").lower()
-        return SceneError(f"{kind} light{f' {self.name!r}' if self.name else ''}: {what}; {mend}")
+        return SceneError(f"{kind} light{f' {self.name!r}' if self.name else ''}: {what}; {fix}")
 
     def _set_rgb(self, field: str) -> None:
         """Replace the field, a number or RGB triple, by a read-only (3,) float64."""
@@ -43,10 +43,10 @@ class Light:
         self._store(field, np.broadcast_to(value, (3,)))
 
     def _set_vector(self, field: str, unit: bool = False) -> None:
-        """Replace the field by a read-only (3,) float64, normalised if `unit`."""
+        """Replace the field by a read-only (3,) float64, normalized if `unit`."""
         value = np.asarray(getattr(self, field), dtype=np.float64)
         if value.shape != (3,) or not np.isfinite(value).all():
-            raise self._fail(f"{field} {value.tolist()} is not finite and (3,)", "set its transform anew")
+            raise self._fail(f"{field} {value.tolist()} is not finite and (3,)", "reset its transform")
         if unit:
             length = np.linalg.norm(value)
             if length == 0.0:
@@ -55,7 +55,7 @@ class Light:
         self._store(field, value)
 
     def _set_number(self, field: str, low: float, high: float, above: bool = False) -> None:
-        """Replace the field by a float, refusing what is not in [low, high], or (low, high] if `above`."""
+        """Replace the field by a float, refusing values outside [low, high], or (low, high] if `above`."""
         value = float(getattr(self, field))
         if not (np.isfinite(value) and low <= value <= high and not (above and value == low)):
             allowed = f"{'above' if above else 'from'} {low:g}" + (f" to {high:g}" if high < 1e300 else "")
@@ -72,10 +72,7 @@ class Light:
 class Lamp(Light, ABC):
     """A light with a place or direction of its own: all but the environment.
 
-    Parameters
-    ----------
-    casts_shadow : bool
-        Whether what stands between it and a surface takes its light away.
+    casts_shadow: Whether what stands between it and a surface takes its light away.
     """
 
     casts_shadow: bool = True
@@ -84,35 +81,22 @@ class Lamp(Light, ABC):
     def unit_irradiance(self, points: Float64Array, normals: Float64Array) -> Float64Array:
         """Return the unoccluded irradiance per unit of strength, clipped to the receivers' horizons.
 
-        Parameters
-        ----------
-        points : (n, 3) float64
-        normals : (n, 3) float64, unit
-
-        Returns
-        -------
-        irradiance : (n,) float64
+        points (n, 3).
+        normals (n, 3), unit.
+        Returns irradiance (n,).
         """
 
     @abstractmethod
     def shadow_rays(self, points: Float64Array, normals: Float64Array, u: Samples) -> Rays:
         """Return rays to k samples of the lamp as each point sees it.
 
-        Parameters
-        ----------
-        points : (n, 3) float64
-        normals : (n, 3) float64, unit
-        u : (n, k, 2) float in [0, 1)
-            Points in the unit square, stratified in each row.
-
-        Returns
-        -------
-        directions : (n, k, 3) float64, unit
-        distances : (n, k) float64
-            To the sample [m]; infinite for the sun.
-        weights : (n, k) float64
-            Share of the irradiance each ray stands for, 0 where it adds none; their sum over a
-            row estimates `unit_irradiance`, and Σ w v / Σ w the visibility.
+        points (n, 3).
+        normals (n, 3), unit.
+        u (n, k, 2) float in [0, 1): Points in the unit square, stratified in each row.
+        Returns directions (n, k, 3), unit.
+        Returns distances (n, k): To the sample [m]; infinite for the sun.
+        Returns weights (n, k): Share of the irradiance each ray stands for, 0 where it adds none; their sum
+            over a row estimates `unit_irradiance`, and Σ w v / Σ w the visibility.
         """
 
 
@@ -128,16 +112,9 @@ class Emitter(Lamp):
     def emit(self, place: Samples, way: Samples) -> Rays:
         """Return rays that carry the lamp's light away.
 
-        Parameters
-        ----------
-        place, way : (n, 2) float in [0, 1)
-            Choose where on the lamp a ray starts, and its direction.
-
-        Returns
-        -------
-        origins, directions : (n, 3) float64
-        shares : (n,) float64
-            Proportional to the power each ray stands for.
+        place, way (n, 2) float in [0, 1): Choose where on the lamp a ray starts, and its direction.
+        Returns origins, directions (n, 3).
+        Returns shares (n,): Proportional to the power each ray stands for.
         """
 
 
@@ -149,5 +126,4 @@ def directions_to(offsets: Float64Array) -> tuple[Float64Array, Float64Array]:
 
 def row_cosines(directions: Float64Array, normals: Float64Array) -> Float64Array:
     """Return (n, k) cosines above the horizon of (n, k, 3) directions about (n, 3) normals, else 0."""
-    cosines: Float64Array = np.maximum(np.einsum("ikj,ij->ik", directions, normals), 0.0)
-    return cosines
+    return np.maximum(np.einsum("ikj,ij->ik", directions, normals), 0.0)

@@ -28,17 +28,17 @@ _EDGE_SAMPLES = 16
 """Samples across a spot's disk, each way, that average the cone's edge over it."""
 
 _RIM_SAMPLES = 256
-"""Directions around a stretched cone that tell how wide and how narrow it is."""
+"""Directions around a stretched cone, sampled for its largest and smallest width."""
 
 _CONE_SAMPLES = 256
-"""Samples over a stretched cone, each way, that tell its power."""
+"""Samples over a stretched cone, along each axis, for its power."""
 
 _EDGE_CHUNK = 1 << 10
 """Points whose edge samples are taken at a time; temporaries stay below 64 MB."""
 
 
 class _Bulb(Emitter):
-    """What point and spot lamps share: intensity power/4π, a radius and an attenuation by direction.
+    """Common part of point and spot lamps: intensity power/4π, a radius and an attenuation by direction.
 
     With soft falloff the lamp is a disk of that radius facing the receiver, of radiance
     I/(π r²): H = I cosθ / (d² + r²) while all of it is up. Without, a sphere of the same
@@ -129,22 +129,14 @@ class _Bulb(Emitter):
 
 @dataclass(frozen=True, eq=False)
 class PointLight(_Bulb):
-    """A lamp that shines alike in all directions.
+    """A lamp that shines equally in all directions.
 
-    Parameters
-    ----------
-    position : (3,) float [m]
-    power : float or (3,) float [W]
-        Emitted power; the intensity is power / 4π.
-    radius : float [m]
-    soft_falloff : bool
-        A disk facing the receiver (Blender's default) instead of a sphere. It sends slightly
-        less than its power: power · R²/(R² + r²) through a sphere of radius R around it.
-
-    Raises
-    ------
-    SceneError
-        If a value is negative, NaN or infinite.
+    position (3,) [m].
+    power float or (3,) float [W]: Emitted power; the intensity is power / 4π.
+    radius float [m].
+    soft_falloff: A disk facing the receiver (Blender's default) instead of a sphere. It sends slightly less
+        than its power: power · R²/(R² + r²) through a sphere of radius R around it.
+    Raises SceneError if a value is negative, NaN or infinite.
     """
 
     position: npt.ArrayLike
@@ -170,26 +162,16 @@ class PointLight(_Bulb):
 class SpotLight(_Bulb):
     """A point lamp that shines into a cone only, with the point lamp's intensity.
 
-    Parameters
-    ----------
-    position : (3,) float [m]
-    direction : (3,) float
-        The cone's axis, away from the lamp.
-    power : float or (3,) float [W]
-        The power an unshaded lamp of that intensity would emit: intensity = power / 4π.
-    angle : float [rad]
-        The full cone, above 0 to π.
-    blend : float
-        Share of 1 − cos(angle/2) over which the edge fades by a smoothstep in the cosine.
-    radius, soft_falloff : as for a `PointLight`
-    round_from_world : (3, 3) float or None
-        Takes directions to where the cone is round, with that angle and blend; None: it is in the world.
-        So a lamp may be stretched: the intensity inside stays.
-
-    Raises
-    ------
-    SceneError
-        If a value is out of range.
+    position (3,) [m].
+    direction (3,): The cone's axis, away from the lamp.
+    power float or (3,) float [W]: The power an unshaded lamp of that intensity would emit: intensity = power
+        / 4π.
+    angle float [rad]: The full cone, above 0 to π.
+    blend: Share of 1 − cos(angle/2) over which the edge fades by a smoothstep in the cosine.
+    radius, soft_falloff as for a `PointLight`.
+    round_from_world (3, 3): Takes directions to where the cone is round, with that angle and blend; None: it
+        is in the world. So a lamp may be stretched: the intensity inside stays.
+    Raises SceneError if a value is out of range.
     """
 
     position: npt.ArrayLike
@@ -270,8 +252,7 @@ class SpotLight(_Bulb):
         if self.blend == 0.0:
             return np.where(above > 0.0, 1.0, 0.0)
         step = np.clip(above / (self.blend * self._opening), 0.0, 1.0)
-        smooth: Float64Array = step * step * (3.0 - 2.0 * step)
-        return smooth
+        return step * step * (3.0 - 2.0 * step)
 
     def unit_irradiance(self, points: Float64Array, normals: Float64Array) -> Float64Array:
         """Return the irradiance per power; where the cone's edge crosses the lamp, averaged over it."""
@@ -294,7 +275,8 @@ class SpotLight(_Bulb):
         half = 0.5 * self.angle
         plateau = np.arccos(np.clip(np.cos(half) + self.blend * self._opening, -1.0, 1.0))
         if self.round_from_world is not None:
-            # Anywhere between the narrowest plateau and the widest edge; asked in vain it is the same.
+            # Anywhere between the narrowest plateau and the widest edge; where it finds none, the result is
+            # the same.
             narrow, half = self.half_angles
             plateau = 0.0 if self.blend > 0.0 else narrow
         off_axis = np.arccos(np.clip(-(toward @ np.asarray(self.direction)), -1.0, 1.0))

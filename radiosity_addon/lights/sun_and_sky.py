@@ -1,4 +1,4 @@
-"""Lamps and the sky: what each sends to a point, in closed form, and rays that ask what is in the way.
+"""Suns and uniform skies: irradiance in closed form, and shadow rays.
 
 Cycles' lamps are the model. A lamp's irradiance on an unoccluded point is
 `strength × unit_irradiance`; `shadow_rays` sample the same integral, so that a visibility is a
@@ -35,19 +35,10 @@ __all__ = [
 class SunLight(Lamp):
     """Parallel light, or light from a round patch of the sky.
 
-    Parameters
-    ----------
-    direction : (3,) float
-        The way the light travels.
-    irradiance : float or (3,) float [W/m²]
-        On a surface that faces it, whatever the angle.
-    angle : float [rad]
-        The full angle the sun's disk spans, 0 to π.
-
-    Raises
-    ------
-    SceneError
-        If a value is out of range.
+    direction (3,): The way the light travels.
+    irradiance float or (3,) float [W/m²]: On a surface that faces it, whatever the angle.
+    angle float [rad]: The full angle the sun's disk spans, 0 to π.
+    Raises SceneError if a value is out of range.
     """
 
     direction: npt.ArrayLike
@@ -70,7 +61,7 @@ class SunLight(Lamp):
         return np.asarray(self.irradiance, dtype=np.float64)
 
     def unit_irradiance(self, points: Float64Array, normals: Float64Array) -> Float64Array:  # noqa: ARG002
-        """Return cosθ, or what the cap keeps of it at the horizon (see `Lamp.unit_irradiance`)."""
+        """Return cosθ, reduced where the cap is cut by the horizon (see `Lamp.unit_irradiance`)."""
         return cap_cosine(-(normals @ np.asarray(self.direction)), np.sin(0.5 * self.angle))
 
     def shadow_rays(self, points: Float64Array, normals: Float64Array, u: Samples) -> Rays:
@@ -85,16 +76,10 @@ class SunLight(Lamp):
 
 @dataclass(frozen=True, eq=False)
 class EnvironmentLight(Light):
-    """A sky of constant radiance around the scene, as seen by whatever is not covered.
+    """A sky of constant radiance around the scene.
 
-    Parameters
-    ----------
-    radiance : float or (3,) float [W/m²/sr]
-
-    Raises
-    ------
-    SceneError
-        If it is negative, NaN or infinite.
+    radiance float or (3,) float [W/m²/sr].
+    Raises SceneError if it is negative, NaN or infinite.
     """
 
     radiance: npt.ArrayLike

@@ -8,21 +8,12 @@ from .arrays import Array
 
 
 def texels_around(place: Array, width: Array | int, height: Array | int) -> tuple[Array, Array]:
-    """Find the texels that bilinear look-ups read; beyond the middles of the rim the image goes on evenly.
+    """Find the texels that bilinear look-ups read; beyond the centers of border texels the image is constant.
 
-    Parameters
-    ----------
-    place : (…, 2) float
-        In texels; a texel's middle is at a half.
-    width, height : int or (…,) int
-        Of the image of each.
-
-    Returns
-    -------
-    texel : (…, 4) int
-        Row by row through the image: lower left, lower right, upper left, upper right.
-    share : (…, 2) float
-        How far between them, to the right and up.
+    place (…, 2): In texels; a texel's middle is at a half.
+    width, height int or (…,) int: Of the image of each.
+    Returns texel (…, 4) int: Row by row through the image: lower left, lower right, upper left, upper right.
+    Returns share (…, 2): How far between them, to the right and up.
     """
     size = np.stack(np.broadcast_arrays(width, height), axis=-1)
     place = np.clip(place - 0.5, 0.0, size - 1.0)

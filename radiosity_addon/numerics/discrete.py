@@ -21,18 +21,11 @@ def pick_in_runs(
 ) -> tuple[Array, Array]:
     """Pick among runs of entries.
 
-    Parameters
-    ----------
-    running : (m + 1,) float64
-        See `running_sums`.
-    u : (…,) float in [0, 1)
-    begin, end : (…,) int
-        The run that each is picked from; all entries by default.
-
-    Returns
-    -------
-    entry : (…,) int
-    within : (…,) float64 in [0, 1]
+    running (m + 1,): See `running_sums`.
+    u (…,) float in [0, 1).
+    begin, end (…,) int: The run that each is picked from; all entries by default.
+    Returns entry (…,) int.
+    Returns within (…,) float64 in [0, 1].
     """
     end = np.asarray(len(running) - 1) if end is None else end
     low = running[begin]

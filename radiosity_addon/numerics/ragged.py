@@ -1,4 +1,4 @@
-"""Runs of different length, one after the other in one array: what is known of them is their counts."""
+"""Runs of different lengths, one after the other in one array, given by their counts."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .arrays import Array
 
 
 def run_starts(count: Array) -> Array:
-    """Return (r,) where runs of so many entries, (r,) int, begin."""
+    """Return (r,) the starts of runs with the given numbers of entries, (r,) int."""
     return np.asarray(np.cumsum(count) - count)
 
 

@@ -1,4 +1,4 @@
-"""Where samples lie: low-discrepancy points and the maps that carry them onto shapes.
+"""Samples: low-discrepancy points, and maps that carry them onto shapes.
 
 Counter-based: a point depends on its row's key, its own index and the seed alone, never on
 what was drawn before, so neither chunks nor threads change a result.
@@ -22,16 +22,10 @@ def hash_keys(keys: npt.ArrayLike, seed: int = 0) -> npt.NDArray[np.uint32]:
     """Mix integers into 32 well-scattered bits each.
 
     An avalanche of xor-shifts and odd multiplications, applied to the low word, then to the
-    high word and the seed, so that keys above 2³² and neighbouring seeds stay apart.
+    high word and the seed, so that keys above 2³² and neighboring seeds stay apart.
 
-    Parameters
-    ----------
-    keys : (...,) non-negative integers
-    seed : int
-
-    Returns
-    -------
-    bits : (...,) uint32
+    keys (...,) non-negative integers.
+    Returns bits (...,) uint32.
     """
     wide = np.asarray(keys).astype(np.uint64)
     low = (wide & np.uint64(0xFFFFFFFF)).astype(np.uint32)
@@ -60,19 +54,10 @@ def stratified_square(keys: npt.ArrayLike, k: int, seed: int = 0, first: int = 0
     scrambling"), so squares of different seeds may be joined to more dimensions. Asking on
     with `first` = k continues the same row's sequence.
 
-    Parameters
-    ----------
-    keys : (n,) non-negative integers
-        What each row is for, a texel's number, say. Equal keys get equal points.
-    k : int
-        Points a row; powers of two stratify best.
-    seed : int
-    first : int
-        Index of the first point.
-
-    Returns
-    -------
-    u : (n, k, 2) float32 in [0, 1)
+    keys (n,) non-negative integers: What each row is for, a texel's number, say. Equal keys get equal points.
+    k: Points a row; powers of two stratify best.
+    first: Index of the first point.
+    Returns u (n, k, 2) float32 in [0, 1).
     """
     rows = np.asarray(keys)
     index = np.arange(first, first + k, dtype=np.uint32)
@@ -90,7 +75,7 @@ def stratified_square(keys: npt.ArrayLike, k: int, seed: int = 0, first: int = 0
 def _shuffle(reversed_index: npt.NDArray[np.uint32], salt: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:
     """Permute bit-reversed indices so that each bit flips by a hash of the bits below it only.
 
-    Multiplying by an even number carries upwards alone (Laine and Karras 2011): in plain
+    Multiplying by an even number carries upward alone (Laine and Karras 2011): in plain
     order, halves swap within halves, as in Owen's scrambling.
     """
     bits = reversed_index + salt
@@ -138,14 +123,9 @@ def points_on_triangles(triangles: FloatArray, u: FloatArray) -> FloatArray:
     The square is folded onto the triangle along its diagonal (Heitz 2019, "A low-distortion
     map between triangle and square"), which keeps strata compact.
 
-    Parameters
-    ----------
-    triangles : (n, 3, 3) float
-    u : (n, k, 2) or (k, 2) float in [0, 1]
-
-    Returns
-    -------
-    points : (n, k, 3) float64
+    triangles (n, 3, 3).
+    u (n, k, 2) or (k, 2) float in [0, 1].
+    Returns points (n, k, 3).
     """
     # In float64: weights that sum to 1 up to float32 only would lift points off a far plane.
     unit = np.asarray(u, dtype=np.float64)
@@ -153,8 +133,7 @@ def points_on_triangles(triangles: FloatArray, u: FloatArray) -> FloatArray:
     first = unit[..., 0] - smaller
     second = unit[..., 1] - smaller
     weights = np.stack([1.0 - first - second, first, second], axis=-1)
-    points: FloatArray = weights @ triangles
-    return points
+    return weights @ triangles
 
 
 def point_on_each_triangle(triangles: FloatArray, u: FloatArray) -> FloatArray:
@@ -166,16 +145,11 @@ def point_on_each_triangle(triangles: FloatArray, u: FloatArray) -> FloatArray:
 def concentric_disk(u: FloatArray) -> FloatArray:
     """Carry points of the unit square onto the unit disk, keeping them uniform.
 
-    Concentric squares become concentric circles (Shirley and Chiu 1997), so neighbours stay
-    neighbours.
+    Concentric squares become concentric circles (Shirley and Chiu 1997), so neighbors stay
+    neighbors.
 
-    Parameters
-    ----------
-    u : (..., 2) float in [0, 1]
-
-    Returns
-    -------
-    points : (..., 2) float
+    u (..., 2) float in [0, 1].
+    Returns points (..., 2).
     """
     x, y = 2.0 * u[..., 0] - 1.0, 2.0 * u[..., 1] - 1.0
     wide = np.abs(x) > np.abs(y)
@@ -189,13 +163,8 @@ def concentric_disk(u: FloatArray) -> FloatArray:
 def cosine_hemisphere(u: FloatArray) -> FloatArray:
     """Carry points of the unit square to directions with density cosθ/π about +z.
 
-    Parameters
-    ----------
-    u : (..., 2) float in [0, 1]
-
-    Returns
-    -------
-    directions : (..., 3) float, unit, z ≥ 0
+    u (..., 2) float in [0, 1].
+    Returns directions (..., 3), unit, z ≥ 0.
     """
     disk = concentric_disk(u)
     height = np.sqrt(np.maximum(1.0 - disk[..., 0] ** 2 - disk[..., 1] ** 2, 0.0))
@@ -205,15 +174,10 @@ def cosine_hemisphere(u: FloatArray) -> FloatArray:
 def uniform_cone(u: FloatArray, one_minus_cosine: FloatArray | float) -> FloatArray:
     """Carry points of the unit square to directions uniform in solid angle in a cone about +z.
 
-    Parameters
-    ----------
-    u : (..., 2) float in [0, 1]
-    one_minus_cosine : float or (...,) float
-        1 − cos of the cone's half angle; given so because it stays exact in narrow cones.
-
-    Returns
-    -------
-    directions : (..., 3) float, unit
+    u (..., 2) float in [0, 1].
+    one_minus_cosine float or (...,) float: 1 − cos of the cone's half angle; given so because it stays exact
+        in narrow cones.
+    Returns directions (..., 3), unit.
     """
     disk = concentric_disk(u)
     share = disk[..., 0] ** 2 + disk[..., 1] ** 2
@@ -228,13 +192,8 @@ def orthonormal_basis(normals: FloatArray) -> tuple[FloatArray, FloatArray]:
 
     Without a branch or a singular direction (Duff et al. 2017).
 
-    Parameters
-    ----------
-    normals : (..., 3) float, unit
-
-    Returns
-    -------
-    tangent, bitangent : (..., 3) float, unit; tangent × bitangent = normal
+    normals (..., 3), unit.
+    Returns tangent, bitangent (..., 3), unit; tangent × bitangent = normal.
     """
     x, y, z = normals[..., 0], normals[..., 1], normals[..., 2]
     sign = np.copysign(1.0, z).astype(normals.dtype, copy=False)
@@ -248,15 +207,9 @@ def orthonormal_basis(normals: FloatArray) -> tuple[FloatArray, FloatArray]:
 def to_world(local: FloatArray, normals: FloatArray) -> FloatArray:
     """Turn directions given about +z into world space about each row's normal.
 
-    Parameters
-    ----------
-    local : (n, k, 3) float
-    normals : (n, 3) float, unit
-
-    Returns
-    -------
-    directions : (n, k, 3) float
+    local (n, k, 3).
+    normals (n, 3), unit.
+    Returns directions (n, k, 3).
     """
     tangent, bitangent = orthonormal_basis(normals)
-    directions: FloatArray = local @ np.stack([tangent, bitangent, normals], axis=-2)
-    return directions
+    return local @ np.stack([tangent, bitangent, normals], axis=-2)

@@ -36,7 +36,7 @@ def weights_at(corners: Array, points: Array) -> Array:
     normal = np.cross(edge_1, edge_2)
     square = np.maximum(np.einsum("nd,nd->n", normal, normal), 1e-300)[:, None]
     apart = points - corners[:, :1]
-    # Each weight is an area; the cross products with the normal turn edges inwards.
+    # Each weight is an area; the cross products with the normal turn edges inward.
     second = np.einsum("nkd,nd->nk", apart, np.cross(edge_2, normal)) / square
     third = np.einsum("nkd,nd->nk", apart, np.cross(normal, edge_1)) / square
     return np.stack([1.0 - second - third, second, third], axis=-1)
@@ -65,10 +65,8 @@ def points_at(corners: Array, weights: Array) -> Array:
 def split_in_four(corners: Array) -> Array:
     """Join the midpoints of the edges of (n, 3, d) triangles.
 
-    Returns
-    -------
-    children : (n, 4, 3, d)
-        At corner 0, 1, 2, and the middle one; all oriented like their parent, of equal area.
+    Returns children (n, 4, 3, d): At corner 0, 1, 2, and the middle one; all oriented like their parent, of
+        equal area.
     """
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)

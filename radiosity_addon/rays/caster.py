@@ -1,4 +1,4 @@
-"""Who sees whom: what a ray caster answers, and a plain NumPy one to test against.
+"""Visibility: the interface of ray casters, and a plain NumPy reference implementation.
 
 Rays start at the surface, moved along the receiving side's normal by `surface_offset`,
 a few float32 steps of the scene's extent: far enough not to hit the surface itself, so
@@ -31,16 +31,10 @@ facets needs."""
 class Hits:
     """The first surfaces that n rays met.
 
-    Parameters
-    ----------
-    triangle : (n,) int32
-        Row of the scene's triangles, or NO_HIT.
-    barycentric : (n, 2) float32
-        Weights of the triangle's second and third corner.
-    front : (n,) bool
-        Whether the ray came from the triangle's front.
-    distance : (n,) float32
-        Along the unit direction [m]; infinite without a hit.
+    triangle (n,) int32: Row of the scene's triangles, or NO_HIT.
+    barycentric (n, 2) float32: Weights of the triangle's second and third corner.
+    front (n,) bool: Whether the ray came from the triangle's front.
+    distance (n,) float32: Along the unit direction [m]; infinite without a hit.
     """
 
     triangle: Array
@@ -66,7 +60,7 @@ class RayCaster(Protocol):
 
     @property
     def for_lamps(self) -> RayCaster:
-        """The caster that knows what stops the light of lamps; most often this one."""
+        """The caster for the light of lamps; usually this one."""
         ...
 
     def unoccluded(self, origins: Array, directions: Array, distances: Array) -> Array:
@@ -74,7 +68,7 @@ class RayCaster(Protocol):
         ...
 
     def passing(self, origins: Array, directions: Array, distances: Array, least: float = 0.0) -> Array:
-        """Return (n,) what share of light passes: `unoccluded`, but between 0 and 1 through cut-outs.
+        """Return (n,) the share of light that passes: as `unoccluded`, but between 0 and 1 through cut-outs.
 
         Their opacity counts as at least `least` and as at most 1 − `least`, for callers that judge
         by few rays: where some met a cut-out, more are needed.

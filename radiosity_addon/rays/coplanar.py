@@ -1,8 +1,8 @@
-"""Surfaces that lie back to back in one plane: which of them a ray meets.
+"""Coplanar surfaces back to back: which of them a ray meets.
 
 The back of a one-sided triangle is black. Where another surface lies in it and faces the ray, that
 one is in front, but Embree reports either, as rounding has it. So sides of which a black back may lie
-in the same plane get a copy, moved out towards where they look: seen from there it comes first. The
+in the same plane get a copy, moved out toward where they look: seen from there it comes first. The
 triangle itself stays, so nothing opens beside it.
 """
 
@@ -20,7 +20,7 @@ TURN = 0.01
 """Normals of one plane differ by less than this, rounded corners of small triangles included, …"""
 
 APART = 128.0
-"""… and their planes' distances from the scene's centre by less than this, in units of the offset: about a
+"""… and their planes' distances from the scene's center by less than this, in units of the offset: about a
 thousandth of the extent. Both are wide: what is only near a black back gets a copy that changes nothing."""
 
 SHIFTS = (0.23, 0.71)
@@ -28,22 +28,13 @@ SHIFTS = (0.23, 0.71)
 
 
 def facing_copies(triangles: Array, two_sided: Array, offset: float) -> tuple[Array, Array]:
-    """Return copies of triangles that look away from black backs in their plane.
+    """Return copies of triangles that face away from black backs in their plane.
 
-    Parameters
-    ----------
-    triangles : (t, 3, 3) float64
-        Corners [m], the scene's centre at the origin.
-    two_sided : (t,) bool
-        The others' backs are black.
-    offset : float
-        How far above a surface its rays start [m].
-
-    Returns
-    -------
-    rows : (c,) int
-        Whose copies they are.
-    corners : (c, 3, 3) float64
+    triangles (t, 3, 3): Corners [m], the scene's center at the origin.
+    two_sided (t,) bool: The others' backs are black.
+    offset: How far above a surface its rays start [m].
+    Returns rows (c,) int: Whose copies they are.
+    Returns corners (c, 3, 3).
     """
     cross = double_area_vectors(triangles)
     double_area = np.linalg.norm(cross, axis=1)
@@ -66,7 +57,7 @@ def facing_copies(triangles: Array, two_sided: Array, offset: float) -> tuple[Ar
 
 
 def _keys(values: Array) -> Array:
-    """Return (n,) one number for each row of (n, 4), the same for rows alike when rounded."""
+    """Return (n,) one number for each row of (n, 4), the same for rows that are equal after rounding."""
     key: Array = np.zeros(len(values), dtype=np.uint32)
     for column in np.floor(values).astype(np.int64).T:
         key = hash_keys(column.astype(np.uint64) << np.uint64(32) | key, 71)

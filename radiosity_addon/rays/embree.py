@@ -1,6 +1,6 @@
 """Ray casting with Embree: the only module that imports embreex.
 
-It owns what Embree needs: float32, origins moved to the scene's centre (so that a scene
+It owns what Embree needs: float32, origins moved to the scene's center (so that a scene
 far from the origin keeps its precision), batches on threads, the first query single; and copies of
 what lies back to back with a black back (`coincident`).
 """
@@ -25,18 +25,11 @@ TARGET_SLACK = 1e-5
 class EmbreeCaster:
     """Visibility by Embree 4 in its robust mode, which leaks no ray through shared edges.
 
-    Parameters
-    ----------
-    triangles : (t, 3, 3) float64
-        World-space corners [m].
-    threads : int
-        0 means all cores. Results do not depend on it.
-    only : (t,) bool or None
-        The triangles that rays meet, where it is not all of them.
-    for_lamps : RayCaster or None
-        What stops the light of lamps, where that is something else.
-    two_sided : (t,) bool or None
-        The others' backs are black; None if that does not matter.
+    triangles (t, 3, 3): World-space corners [m].
+    threads: 0 means all cores. Results do not depend on it.
+    only (t,) bool: The triangles that rays meet; None for all.
+    for_lamps: The caster for the light of lamps, if it differs.
+    two_sided (t,) bool: The others' backs are black; None if that does not matter.
     """
 
     def __init__(
@@ -80,7 +73,7 @@ class EmbreeCaster:
 
     @property
     def for_lamps(self) -> RayCaster:
-        """The caster that knows what stops the light of lamps; most often this one."""
+        """The caster for the light of lamps; usually this one."""
         return self if self._for_lamps is None else self._for_lamps
 
     @property

@@ -1,4 +1,4 @@
-"""What goes into the pipeline and what comes out: plain arrays, no bpy.
+"""The pipeline's input: plain arrays, no bpy.
 
 The Blender side fills a `BakeScene` (export) and consumes a `BakeResult` (apply); the
 pipeline between them knows nothing of Blender.
@@ -19,22 +19,13 @@ LIGHTMAP_UV_LAYER = "Lightmap"
 class BakeObject:
     """A run of consecutive triangles of the scene that came from one object.
 
-    Parameters
-    ----------
-    name : str
-        The original object's name, as the report and the user know it.
-    first, count : int
-        Its rows of `BakeScene.scene.triangles`.
-    bake : bool
-        Whether it gets a lightmap; otherwise it only lights and blocks.
-    polygon : (count,) int32
-        The mesh polygon each triangle belongs to; a polygon stays in one chart.
-    loops : (count, 3) int32
-        The mesh corner (loop) of each triangle corner: UVs go back through it.
-    uv : (count, 3, 2) float32 or None
-        The existing `Lightmap` UVs to keep; None to unwrap anew.
-    texel_scale : float
-        Its texels per metre, relative to the other objects.
+    name: The original object's name, as in the report.
+    first, count: Its rows of `BakeScene.scene.triangles`.
+    bake: Whether it gets a lightmap; otherwise it only lights and blocks.
+    polygon (count,) int32: The mesh polygon each triangle belongs to; a polygon stays in one chart.
+    loops (count, 3) int32: The mesh corner (loop) of each triangle corner: UVs go back through it.
+    uv (count, 3, 2) float32: The existing `Lightmap` UVs to keep; None to unwrap.
+    texel_scale: Its texels per meter, relative to the other objects.
     """
 
     name: str
@@ -48,30 +39,21 @@ class BakeObject:
 
     @property
     def rows(self) -> slice:
-        """Where its triangles are among the scene's."""
+        """The rows of its triangles in the scene."""
         return slice(self.first, self.first + self.count)
 
 
 @dataclass(frozen=True)
 class BakeScene:
-    """A scene ready to bake: the solver's arrays and whose triangles they are.
+    """A scene ready to bake: the solver's arrays, and the object of each triangle.
 
-    Parameters
-    ----------
-    scene : Scene
-        Triangles in world space, counter-clockwise from the front whatever the sign of
-        the object's scale.
-    objects : tuple of BakeObject
-        They partition the scene's triangles in order.
-    warnings : tuple of BakeWarning
-    emitter : (t,) int32 or None
-        Which of the emissive materials each triangle has; any number where it emits nothing. None
-        takes every colour of emission for a material.
-    emitter_names : tuple of str
-        The names of those materials; one that is in several light groups is there once for each.
-    light_groups, emitter_groups : tuple of str
-        The light groups that the scene puts its lights and those materials in, "" where in none; nothing
-        where it knows none.
+    scene: Triangles in world space, counter-clockwise from the front whatever the sign of the object's scale.
+    objects: They partition the scene's triangles in order.
+    emitter (t,) int32: Which of the emissive materials each triangle has; any number where it emits nothing.
+        None treats every color of emission as a material.
+    emitter_names: The names of those materials; one in several light groups occurs once for each.
+    light_groups, emitter_groups: The scene's light groups of its lights and of those materials, "" for none;
+        empty if the scene has no groups.
     """
 
     scene: Scene

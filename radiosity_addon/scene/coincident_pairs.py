@@ -1,4 +1,4 @@
-"""Pairs of triangles that lie in one another: coplanar within a tolerance, with an area in common."""
+"""Pairs of coincident triangles: coplanar within a tolerance, with a common area."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SPACINGS = 8.0
 """… or than so many float32 spacings of their coordinates, are in one place."""
 
 SLACK = 1.25
-"""The tolerance is exceeded by this factor: what is a micrometer apart in float32 may be a little more."""
+"""Factor on the tolerance: a distance of a micrometer may be slightly more in float32."""
 
 PARALLEL = 0.9998
 """Cosine between the normals of coplanar triangles, at least: small ones have rounded normals."""
@@ -35,17 +35,11 @@ CORNERS = 8
 class CoincidentPairs:
     """p pairs of coincident triangles.
 
-    Attributes
-    ----------
-    first, second : (p,) int
-        Rows of triangles.
-    same : (p,) bool
-        Whether both face the same way.
-    in_first, in_second : (p, 8, 2) float64
-        What they have in common, a convex polygon, as weights of each triangle's second and third corner;
-        counter-clockwise.
-    height : (p,) float64
-        How far the second lies above the first, along the first's normal, in the middle [m].
+    first, second (p,) int: Rows of triangles.
+    same (p,) bool: Whether both face the same way.
+    in_first, in_second (p, 8, 2): What they have in common, a convex polygon, as weights of each triangle's
+        second and third corner; counter-clockwise.
+    height (p,): How far the second lies above the first, along the first's normal, in the middle [m].
     """
 
     first: Array
@@ -59,7 +53,7 @@ class CoincidentPairs:
         return len(self.first)
 
     def take(self, rows: Array) -> CoincidentPairs:
-        """Return some of the pairs."""
+        """Return selected pairs."""
         return CoincidentPairs(*(getattr(self, name)[rows] for name in _FIELDS))
 
 
@@ -74,18 +68,13 @@ def tolerances(triangles: Array) -> Array:
 
 
 def coincident_pairs(triangles: Array, rows: Array, tolerance: Array, reach: Array) -> CoincidentPairs:
-    """Find the pairs among some triangles.
+    """Find the pairs among triangles.
 
-    Parameters
-    ----------
-    triangles : (t, 3, 3) float64
-    rows : (n,) int
-        Those that take part; they have an area.
-    tolerance : (t,) float64
-        See `tolerances`. A common area that is not wider than this does not count: neighbors overlap by
-        rounding.
-    reach : (t,) float64
-        A pair is no farther apart than the larger of its two values [m].
+    triangles (t, 3, 3).
+    rows (n,) int: Those that take part; they have an area.
+    tolerance (t,): See `tolerances`. A common area that is not wider than this does not count: neighbors
+        overlap by rounding.
+    reach (t,): A pair is no farther apart than the larger of its two values [m].
     """
     planes = _Planes(triangles, rows, tolerance, reach)
     found = [planes.overlapping(*pair) for pair in _near_pairs(planes.low, planes.high)]
@@ -98,7 +87,7 @@ def coincident_pairs(triangles: Array, rows: Array, tolerance: Array, reach: Arr
 
 
 class _Planes:
-    """Some triangles with what tests of pairs ask of them."""
+    """Triangles with the data that tests of pairs need."""
 
     def __init__(self, triangles: Array, rows: Array, tolerance: Array, reach: Array) -> None:
         self._rows = rows

@@ -19,6 +19,7 @@ import numpy as np
 
 from ..numerics import (
     Array,
+    Stream,
     connected_components,
     cosine_hemisphere,
     edge_distances,
@@ -34,19 +35,19 @@ from .surfaces import Surfaces
 from .uncovered_parts import OwnParts, own_parts
 
 NEAR_EMITTERS = 3.0
-"""What emits is covered by what is this many surface offsets in front of it: shadow rays pass that by."""
+"""Emissive faces are covered by faces up to this many surface offsets in front: shadow rays miss those."""
 
 ONE_PLANE = 0.5
-"""So much of their tolerance apart, faces count as in one plane: rounding decides no more."""
+"""Faces closer than this part of their tolerance count as coplanar: their order is lost in rounding."""
 
 FINE = 1.0 / 64.0
 """Heights that round to the same multiple of this part of the tolerance are equal."""
 
 PROBES = 32
-"""Rays that tell whether what is behind a face is solid."""
+"""Rays that decide whether a face belongs to a solid."""
 
 MANY_COPIES = 4
-"""More exact copies of one triangle than these are not compared pair by pair."""
+"""Beyond this number, exact copies of one triangle are not compared pair by pair."""
 
 MOST_COVERS = 16
 """A hit is handed on from cover to cover this often at most."""
@@ -59,14 +60,9 @@ INSIDE = -1e-9
 class Covers:
     """c covered parts, sorted by side; side 2 t is the front of triangle t, 2 t + 1 its back.
 
-    Attributes
-    ----------
-    side, by : (c,) int
-        What is covered, and what covers it.
-    part : (c, 8, 2) float64
-        A convex polygon, in weights of the triangle's second and third corner, counter-clockwise.
-    in_cover : (c, 8, 2) float64
-        The same in weights of the cover's triangle.
+    side, by (c,) int: What is covered, and what covers it.
+    part (c, 8, 2): A convex polygon, in weights of the triangle's second and third corner, counter-clockwise.
+    in_cover (c, 8, 2): The same in weights of the cover's triangle.
     """
 
     side: Array
@@ -83,12 +79,7 @@ class Covers:
 
 
 class Layers:
-    """What of a scene's sides is covered.
-
-    Parameters
-    ----------
-    scene : Surfaces
-    """
+    """The covered parts of a scene's sides."""
 
     def __init__(self, scene: Surfaces) -> None:
         self._scene = scene
@@ -111,13 +102,13 @@ class Layers:
 
     @cached_property
     def own(self) -> OwnParts:
-        """What is left of the covered sides."""
+        """The uncovered parts of covered sides."""
         return own_parts(
             self.covers.side, self.covers.part, self.covers.by, self.covers.in_cover, self._scene
         )
 
     def owners(self, hits: Hits) -> Hits:
-        """Return hits with those on covered sides moved to what covers them."""
+        """Return hits, with those on covered sides moved to their covers."""
         side = 2 * hits.triangle + ~hits.front
         moved = np.flatnonzero((hits.triangle != NO_HIT) & self._is_covered[side])
         if len(moved) == 0:
@@ -132,7 +123,7 @@ class Layers:
                 row, cover = row[solid], cover[solid]
             if len(row) == 0:
                 break
-            # Any cover will do: it hands on to its own.
+            # Any cover will do: it passes the hit on to its own.
             row, only = np.unique(row, return_index=True)
             cover, waiting = cover[only], waiting[row]
             points = self.points(side[waiting], place[waiting])
@@ -176,13 +167,10 @@ class Layers:
 def holding(first: Array, parts: Array, row: Array, place: Array) -> tuple[Array, Array]:
     """Return the pairs of points (n,) and parts that they lie in.
 
-    Parameters
-    ----------
-    first : (r + 1,) int
-        The run of parts of each row.
-    parts : (c, k, 2) float64
-    row : (n,) int
-    place : (n, 2) float64
+    first (r + 1,) int: The run of parts of each row.
+    parts (c, k, 2).
+    row (n,) int.
+    place (n, 2).
     """
     count = first[row + 1] - first[row]
     point = np.repeat(np.arange(len(row)), count)
@@ -197,11 +185,8 @@ def holding(first: Array, parts: Array, row: Array, place: Array) -> tuple[Array
 def _contacts(scene: Surfaces, pairs: CoincidentPairs, tolerance: Array) -> tuple[Array, Covers]:
     """Find the pairs whose fronts touch.
 
-    Returns
-    -------
-    contact : (p,) bool
-    pressed : Covers
-        Of fronts with something solid behind them, where they touch; sorted by side.
+    Returns contact (p,) bool.
+    Returns pressed: Of fronts with something solid behind them, where they touch; sorted by side.
     """
     both = scene.two_sided[pairs.first] & scene.two_sided[pairs.second] & ~pairs.same
     near = np.abs(pairs.height) <= np.maximum(tolerance[pairs.first], tolerance[pairs.second])
@@ -237,7 +222,7 @@ def _solid_behind(
     back = -scene.face_normals[triangle]
     lift = np.maximum(caster.surface_offset, 2.0 * tolerance[triangle])
     points = points + (lift[:, None] * back)[:, None]
-    unit = stratified_square(np.arange(count), PROBES, 83)
+    unit = stratified_square(np.arange(count), PROBES, Stream.BACK_PROBES)
     directions = to_world(cosine_hemisphere(unit), back)
     hits = caster.intersect(points.reshape(-1, 3), directions.reshape(-1, 3))
     inner = (hits.triangle != NO_HIT) & ~hits.front
@@ -247,7 +232,7 @@ def _solid_behind(
 def _covers(
     scene: Surfaces, pairs: CoincidentPairs, tolerance: Array, emits: Array, contact: Array
 ) -> Covers:
-    """Return what covers what."""
+    """Return the covered parts and their covers."""
     first, second = pairs.first, pairs.second
     if len(pairs) == 0:
         return _no_covers()
@@ -270,7 +255,7 @@ def _covers(
         one, other = 2 * first[rows] + one_is_back[rows], 2 * second[rows] + other_is_back[rows]
         won = wins[rows]
         mine, theirs = pairs.in_first[rows], pairs.in_second[rows]
-        # Corner by corner the same, whichever way round that is for the cover.
+        # The same corner by corner, in either orientation of the cover.
         turn = ~pairs.same[rows, None, None]
         which = won[:, None, None]
         found.append(
@@ -300,14 +285,12 @@ def _many_copies(scene: Surfaces, solid: Array, emits: Array) -> tuple[Array, Ar
 
     Pairs of a thousand copies would be a million: all are covered by the one that counts.
 
-    Returns
-    -------
-    copy, original : (c,) int
+    Returns copy, original (c,) int.
     """
     none = np.zeros(0, dtype=np.int64)
     opaque = solid if scene.images is None else solid[~scene.images.cut_out[solid]]
     bits = np.ascontiguousarray(scene.triangles[opaque] + 0.0).view(np.uint64)
-    # A number for each triangle, whichever corner comes first.
+    # A number for each triangle that does not depend on its first corner.
     mixed = bits * _ODD
     number = (mixed[..., 0] ^ (mixed[..., 1] >> np.uint64(7)) ^ (mixed[..., 2] >> np.uint64(13))).sum(axis=1)
     _, group, count = np.unique(number, return_inverse=True, return_counts=True)

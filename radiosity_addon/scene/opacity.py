@@ -22,11 +22,11 @@ from .stacks import Stacks
 from .textures import SurfaceImages
 
 MOST_LAYERS = 1000
-"""A ray that passed so many surfaces meets no other."""
+"""A ray that has passed this many surfaces meets no others."""
 
 
 def ray_caster(scene: Scene, threads: int = 0) -> RayCaster:
-    """Return what answers for the light of a scene's surfaces; it knows what answers for that of lamps."""
+    """Return the caster for light of a scene's surfaces; its `for_lamps` is the one for light of lamps."""
     lamps = None
     if (scene.in_shadows != scene.in_bounces).any():
         lamps = _caster(scene, threads, scene.in_shadows, None)
@@ -56,7 +56,7 @@ class LayeredCaster:
 
     @property
     def for_lamps(self) -> RayCaster:
-        """The caster that knows what stops the light of lamps; most often this one."""
+        """The caster for the light of lamps; usually this one."""
         found = self._caster.for_lamps
         return self if found is self._caster else found
 
@@ -79,24 +79,15 @@ class LayeredCaster:
 
 
 class CutOutCaster:
-    """Visibility among triangles of which some are partly there.
+    """Visibility among triangles of which some are partly opaque.
 
-    Parameters
-    ----------
-    triangles : (t, 3, 3) float64
-        World-space corners [m].
-    images : SurfaceImages
-        Of the same triangles.
-    threads : int
-        0 means all cores. Results do not depend on it.
-    only : (t,) bool or None
-        The triangles that rays meet, where it is not all of them.
-    for_lamps : RayCaster or None
-        What stops the light of lamps, where that is something else.
-    two_sided : (t,) bool or None
-        The others' backs are black; None if that does not matter.
-    stacks : Stacks or None
-        The cut-outs that lie in one another, if there are any.
+    triangles (t, 3, 3): World-space corners [m].
+    images: Of the same triangles.
+    threads: 0 means all cores. Results do not depend on it.
+    only (t,) bool: The triangles that rays meet; None for all.
+    for_lamps: The caster for the light of lamps, if it differs.
+    two_sided (t,) bool: The others' backs are black; None if that does not matter.
+    stacks: The coincident cut-outs, if there are any.
     """
 
     def __init__(
@@ -124,16 +115,16 @@ class CutOutCaster:
 
     @property
     def for_lamps(self) -> RayCaster:
-        """The caster that knows what stops the light of lamps; most often this one."""
+        """The caster for the light of lamps; usually this one."""
         return self if self._for_lamps is None else self._for_lamps
 
     @property
     def rays(self) -> int:
-        """Rays asked for so far, those to lamps among them; what they meet on their way does not count."""
+        """Number of rays so far, including those to lamps, each counted once despite cut-outs."""
         return self._own_rays + (0 if self._for_lamps is None else self._for_lamps.rays)
 
     def unoccluded(self, origins: Array, directions: Array, distances: Array) -> Array:
-        """Return (n,) bool: nothing that is there lies within `distances` along the unit `directions`."""
+        """Return (n,) bool: no opaque point lies within `distances` along the unit `directions`."""
         self._count(len(origins))
         free = self._whole.unoccluded(origins, directions, distances)
         rows = np.flatnonzero(free)
@@ -155,7 +146,7 @@ class CutOutCaster:
         return share
 
     def intersect(self, origins: Array, directions: Array) -> Hits:
-        """Return what each ray meets first of what is there."""
+        """Return the first opaque point that each ray meets."""
         self._count(len(origins))
         hits = self._whole.intersect(origins, directions)
         nearer = self._first_there(origins, directions, hits.distance)
@@ -202,24 +193,13 @@ class CutOutCaster:
 class _Ways:
     """Rays among cut-outs, from one to the next.
 
-    Parameters
-    ----------
-    cut : RayCaster
-        Of the cut-outs alone.
-    rows : (c + 1,) int32
-        The scene's triangle for each of its, and NO_HIT.
-    offset : float
-        How far beyond a cut-out rays go on [m].
-    stacks : Stacks or None
-    ray : (w,) int
-        Which of the n rays are on their way.
-    origins, directions : (n, 3) float
-    reach : (n,) float
-
-    Attributes
-    ----------
-    ray : (w,) int
-        Those still on their way.
+    cut: Of the cut-outs alone.
+    rows (c + 1,) int32: The scene's triangle for each of its, and NO_HIT.
+    offset: How far beyond a cut-out rays go on [m].
+    ray (w,) int: The rays that are still traced.
+    origins, directions (n, 3).
+    reach (n,).
+    ray (w,) int: The rays that are still traced.
     """
 
     def __init__(
@@ -242,15 +222,11 @@ class _Ways:
         self._layers = 0
 
     def meet(self) -> tuple[Array, Hits]:
-        """Take rays to the next cut-outs in their way; rays that meet none within reach end here.
+        """Advance rays to the next cut-out; rays that meet none within reach end here.
 
-        Returns
-        -------
-        at : (h,) int
-            Which of the rays on their way meets it, sorted.
-        hits : Hits
-            h of them: none for a ray that met again what it has just passed, several where cut-outs lie in
-            one another, the outermost first.
+        Returns at (h,) int: The ray of each hit, sorted.
+        Returns hits: h hits: none for a ray that met the cut-out it has just passed, several where cut-outs
+            coincide, the outermost first.
         """
         start = self._origins[self.ray] + self._gone[:, None] * self._directions[self.ray]
         hits = self._cut.intersect(start, self._directions[self.ray])

@@ -1,4 +1,4 @@
-"""Surfaces that lie in one another: no element sends or sees more than there is.
+"""Coincident surfaces: limits what an element sends and sees.
 
 Of coplanar surfaces in one place one counts (`layers.py`). Where others are too close for rays to
 tell which is in front, both are seen, ΣFV comes to 2, and light would grow without end. So an element
@@ -13,30 +13,23 @@ import numpy as np
 from ..numerics import Array
 
 OVERLAP = 1.1
-"""ΣFV above this is no rounding and no want of rays: something is seen twice."""
+"""ΣFV above this is not caused by rounding or few rays: a surface is counted twice."""
 
 
 def shares(sums: Array, limit: float = OVERLAP) -> Array:
     """Return (n,) the share of its light that each element exchanges: 1 / ΣFV above `limit`, else 1.
 
-    Parameters
-    ----------
-    sums : (n,) float64
-        ΣFV of each element.
+    sums (n,): ΣFV of each element.
     """
     over = sums > limit
     return np.where(over, 1.0 / np.where(over, sums, 1.0), 1.0)
 
 
 def arriving(exchange: Array, opacity: Array) -> Array:
-    """Return (n,) Σ_j T_ij α_j [m²]: how much of what rows exchange finds a surface there.
+    """Return (n,) Σ_j T_ij α_j [m²]: the part of each row's exchange that meets an existing surface.
 
-    Parameters
-    ----------
-    exchange : (n, m) float64
-        Exchange areas T.
-    opacity : (m,) float64
-        α of each column's surface: a link sees all of a surface's area, holes included.
+    exchange (n, m): Exchange areas T.
+    opacity (m,): α of each column's surface: a link sees all of a surface's area, holes included.
     """
     if (opacity == 1.0).all():
         return np.asarray(exchange.sum(axis=1))

@@ -17,31 +17,17 @@ from .textures import SurfaceImages
 class Scene:
     """Triangles that reflect, emit and block light, and the lamps that light them.
 
-    Parameters
-    ----------
-    triangles : (t, 3, 3) float
-        World-space corners [m]; counter-clockwise order is seen from the front.
-    reflectance : (t, 3) float
-        Diffuse reflectance in [0, 1], linear RGB; clamped to `MAX_REFLECTANCE`.
-    emission : (t, 3) float
-        Self-emitted exitance of each emitting side [W/m²], linear RGB.
-    two_sided : bool or (t,) bool
-        True: the back receives, reflects and emits too, apart from the front.
+    triangles (t, 3, 3): World-space corners [m]; counter-clockwise order is seen from the front.
+    reflectance (t, 3): Diffuse reflectance in [0, 1], linear RGB; clamped to `MAX_REFLECTANCE`.
+    emission (t, 3): Self-emitted exitance of each emitting side [W/m²], linear RGB.
+    two_sided bool or (t,) bool: True: the back receives, reflects and emits too, separately from the front.
         False: the back is black and blocks.
-    lights : sequence of Light
-    normals : (t, 3, 3) float or None
-        Unit shading normals at the corners; None for flat shading.
-    images : SurfaceImages or None
-        Reflectance, emission and opacity of textured triangles in detail; their rows of
-        `reflectance` and `emission` become the area means, opacity multiplied in.
-    in_bounces, in_shadows : bool or (t,) bool
-        Whether triangles meet the light that surfaces and sky send, and whether they stop that
-        of lamps. Out of bounces a triangle is lit but neither reflects nor emits.
-
-    Raises
-    ------
-    SceneError
-        If shapes do not match, or a value is NaN, infinite or negative.
+    normals (t, 3, 3): Unit shading normals at the corners; None for flat shading.
+    images: Reflectance, emission and opacity of textured triangles in detail; their rows of `reflectance` and
+        `emission` become the area means, opacity multiplied in.
+    in_bounces, in_shadows bool or (t,) bool: Whether triangles meet the light that surfaces and sky send, and
+        whether they stop that of lamps. Out of bounces a triangle is lit but neither reflects nor emits.
+    Raises SceneError if shapes do not match, or a value is NaN, infinite or negative.
     """
 
     def __init__(
@@ -93,11 +79,11 @@ class Scene:
 
     @cached_property
     def layers(self) -> Layers:
-        """Which sides are covered by others in the same place."""
+        """The sides that coincident sides cover."""
         return Layers(self)
 
     def _average(self, images: SurfaceImages) -> None:
-        """Take the images' area means for the textured triangles' constants."""
+        """Use the images' area means as constants of the textured triangles."""
         if len(images) != len(self):
             raise SceneError(f"the surface images are of {len(images)} triangles; there are {len(self)}")
         rows = np.flatnonzero(images.textured)
@@ -118,7 +104,7 @@ def _flags(name: str, values: bool | Array, count: int) -> Array:
 
 
 def _rgb_rows(name: str, values: Array, count: int) -> Array:
-    """Return `values` as (count, 3) float64, refusing what is not finite and non-negative."""
+    """Return `values` as (count, 3) float64, refusing values that are not finite and non-negative."""
     rows = np.asarray(values, dtype=np.float64)
     if rows.shape != (count, 3):
         raise SceneError(f"{name} has shape {rows.shape}; ({count}, 3) is needed")

@@ -15,14 +15,10 @@ from .scene import Scene
 
 
 class Stacks:
-    """Which cut-outs lie in one another.
+    """Coincident cut-outs.
 
-    Parameters
-    ----------
-    scene : Scene
-        With images.
-    met : (t,) bool
-        The triangles that rays meet.
+    scene: With images.
+    met (t,) bool: The triangles that rays meet.
     """
 
     def __init__(self, scene: Scene, met: Array) -> None:
@@ -46,7 +42,7 @@ class Stacks:
         return len(self._other) > 0
 
     def through(self, hits: Hits) -> tuple[Array, Hits]:
-        """Return all that n rays meet where they hit cut-outs: (m,) which ray, sorted, and m hits."""
+        """Return all cut-outs at the hits of n rays: (m,) the ray, sorted, and m hits."""
         ray = np.arange(len(hits.triangle))
         side = 2 * hits.triangle.astype(np.int64) + ~hits.front
         place = hits.barycentric.astype(np.float64)

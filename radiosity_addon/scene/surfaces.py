@@ -1,4 +1,4 @@
-"""What the search for covered surfaces needs to know of a scene."""
+"""The data of a scene that the search for covered surfaces needs."""
 
 from __future__ import annotations
 

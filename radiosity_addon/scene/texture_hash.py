@@ -1,4 +1,4 @@
-"""Textures as digests: show whether a surface still looks as it did, whatever its means over triangles.
+"""Digests of textures: detect changed surfaces even if their means over triangles are equal.
 
 Reflectance and opacity must be equal texel by texel. Emission may change its strength: of its pattern a
 few random sums are kept, scaled to length 1, whose differences estimate how far two patterns are apart.
@@ -24,26 +24,22 @@ SAME_PATTERN = 1e-4
 """Patterns that differ by no more than this part (RMS) are one: rounding is far below, an edit far above."""
 
 CHUNK = 1 << 20
-"""Texels that are looked at at a time."""
+"""Texels processed at a time."""
 
 _STEPS = 1 << 13
-"""Weights of corners are told apart this finely to put a triangle's texels in order."""
+"""Resolution of barycentric weights when a triangle's texels are sorted."""
 
 Glow = Sequence[Sequence[float]]
 """The random sums of each channel, of length 1 or all 0; nothing where emission does not vary."""
 
 
 def texture_digest(images: SurfaceImages, rows: Array, step: float | None = None) -> str:
-    """Return a digest of what textured triangles reflect and let through; "" if that is constant.
+    """Return a digest of textured triangles' reflectance and opacity; "" if both are constant.
 
     It takes every texel, and does not depend on where in the image the triangles lie.
 
-    Parameters
-    ----------
-    rows : (n,) int
-        Triangles in their order; those without texture do not count.
-    step : float or None
-        Values are rounded to multiples of it; None takes them to the last bit.
+    rows (n,) int: Triangles in their order; those without texture do not count.
+    step: Values are rounded to multiples of it; None takes them to the last bit.
     """
     digest, first = hashlib.blake2b(digest_size=16), None
     varies = False
@@ -58,7 +54,7 @@ def texture_digest(images: SurfaceImages, rows: Array, step: float | None = None
 
 
 def glow_pattern(images: SurfaceImages, rows: Array) -> list[list[float]]:
-    """Return what tells the pattern of an emission from others, whatever its strength is; see `Glow`."""
+    """Return a digest of an emission's pattern, independent of its strength; see `Glow`."""
     sums, square = np.zeros((len(GLOWS), SUMS)), np.zeros(len(GLOWS))
     low, high = np.full(len(GLOWS), np.inf), np.full(len(GLOWS), -np.inf)
     chance = np.random.default_rng(0)
@@ -78,7 +74,7 @@ def glow_pattern(images: SurfaceImages, rows: Array) -> list[list[float]]:
 def same_glow(before: Glow, now: Glow) -> bool:
     """Whether two emissions differ at most in their strength, channel by channel."""
     if not now:
-        # A texture may have been dimmed to nothing; triangles' means tell of an even one.
+        # A texture may have been dimmed to zero; the triangles' means cover a uniform one.
         return True
     if not before:
         return False
@@ -121,7 +117,7 @@ def _on_triangles(corners: Array, at: Array) -> tuple[Array, Array]:
     _, second, third = np.moveaxis(plane_weights_at(corners, at), -1, 0)
     hair = 0.25 / _STEPS
     inside = (second >= -hair) & (third >= -hair) & (second + third <= 1.0 + hair)
-    # What has no area in the image is its first corner's texel.
+    # A triangle without area in the image uses its first corner's texel.
     point = signed_double_areas(corners) == 0.0
     nearest = np.abs(at - corners[:, :1]).sum(axis=2).argmin(axis=1)
     inside[point] = np.arange(at.shape[1]) == nearest[point, None]

@@ -1,4 +1,4 @@
-"""What surfaces look like in detail: images of reflectance, emission and opacity.
+"""Textures of surfaces: images of reflectance, emission and opacity.
 
 One image holds the texels of all textured triangles, each triangle's own part of it placed
 by its corners' coordinates. Where opacity is below 1 a surface is only partly there: what is
@@ -23,13 +23,13 @@ MAX_DEPTH = 8
 """An area's mean is taken over 4^8 parts at most."""
 
 LEAST_DEPTH = 2
-"""And over 4^2 at least."""
+"""An area's mean is taken over 4^2 parts at least."""
 
 SMALL = 8.0
-"""Areas so many texels wide, at whose rims many of their samples lie, take four times as many."""
+"""Areas up to this many texels wide, whose samples often lie at the boundary, take four times as many."""
 
 THIN = 4.0
-"""Parts are at most so many texels long, however thin."""
+"""The maximum length of parts in texels, however thin they are."""
 
 CHUNK_SAMPLES = 1 << 18
 """Look-ups done at once; their temporaries take about 60 MB."""
@@ -41,23 +41,14 @@ ROUNDING = 1e-4
 class SurfaceImages:
     """Reflectance, emission and opacity of triangles as one image.
 
-    Parameters
-    ----------
-    values : (h, w, 7) float
-        Reflectance RGB in [0, 1], clamped like a scene's; exitance RGB of each emitting side
-        [W/m²]; opacity in [0, 1]. Linear, row 0 is v = 0. Reflectance and emission are those of
-        the surface where it is there, not yet multiplied by opacity.
-    image_uv : (t, 3, 2) float
-        The corners of every scene triangle in the image, in [0, 1]; texel (r, c) covers
-        [c/w, (c+1)/w] × [r/h, (r+1)/h]. Look-ups are bilinear and reach half a texel beyond the
-        triangle: neighbours in the image need a border of their own texels.
-    textured : (t,) bool
-        Rows that are not take the scene's constants, and are opaque.
-
-    Raises
-    ------
-    SceneError
-        If shapes do not match, or a textured triangle meets a value out of range.
+    values (h, w, 7): Reflectance RGB in [0, 1], clamped like a scene's; exitance RGB of each emitting side
+        [W/m²]; opacity in [0, 1]. Linear, row 0 is v = 0. Reflectance and emission are those of the
+        existing surface, not multiplied by opacity.
+    image_uv (t, 3, 2): The corners of every scene triangle in the image, in [0, 1]; texel (r, c) covers [c/w,
+        (c+1)/w] × [r/h, (r+1)/h]. Look-ups are bilinear and reach half a texel beyond the triangle:
+        neighbors in the image need a border of their own texels.
+    textured (t,) bool: Other rows use the scene's constants and are opaque.
+    Raises SceneError if shapes do not match, or a textured triangle meets a value out of range.
     """
 
     def __init__(self, values: Array, image_uv: Array, textured: Array) -> None:
@@ -85,7 +76,7 @@ class SurfaceImages:
         return len(self.textured)
 
     def same_as(self, other: SurfaceImages) -> bool:
-        """Whether another image shows the same on the same triangles."""
+        """Whether another image has the same values on the same triangles."""
         return all(
             np.array_equal(getattr(self, name), getattr(other, name))
             for name in ("textured", "image_uv", "values")
@@ -99,16 +90,9 @@ class SurfaceImages:
     def at(self, triangle: Array, barycentric: Array) -> Array:
         """Look up points of textured triangles, bilinearly.
 
-        Parameters
-        ----------
-        triangle : (n,) int
-        barycentric : (n, 2) float
-            Weights of the triangle's second and third corner.
-
-        Returns
-        -------
-        weighed : (n, 7) float32
-            Reflectance and emission, each multiplied by opacity, and opacity.
+        triangle (n,) int.
+        barycentric (n, 2): Weights of the triangle's second and third corner.
+        Returns weighed (n, 7) float32: Reflectance and emission, each multiplied by opacity, and opacity.
         """
         return _bilinear(self._weighed, self._place(triangle, barycentric))
 
@@ -119,20 +103,13 @@ class SurfaceImages:
     def area_means(self, triangle: Array, corners: Array) -> Array:
         """Average over parts of textured triangles.
 
-        The mean over the centroids of so many equal parts that a texel holds two at least,
-        or of 4^`MAX_DEPTH`, each of the texel it lies in. Nothing is interpolated: of a bright texel's
-        light none then lies on a dark part next to it, which nobody would think to divide.
+        The mean over the centroids of equal parts, at least two per texel and at most
+        4^`MAX_DEPTH`, each with the value of its texel. Nothing is interpolated, so the light of a
+        bright texel does not spread to a dark part next to it, which would then not be divided.
 
-        Parameters
-        ----------
-        triangle : (n,) int
-        corners : (n, 3, 2) float
-            Each part's corners, as weights of its triangle's second and third corner.
-
-        Returns
-        -------
-        weighed : (n, 7) float64
-            As from `at`.
+        triangle (n,) int.
+        corners (n, 3, 2): Each part's corners, as weights of its triangle's second and third corner.
+        Returns weighed (n, 7): As from `at`.
         """
         means = np.empty((len(triangle), CHANNELS))
         place = self._place(np.repeat(triangle, 3), corners.reshape(-1, 2)).reshape(-1, 3, 2)
@@ -155,7 +132,7 @@ class SurfaceImages:
         return np.asarray(uv * (width, height))
 
     def _check(self) -> None:
-        """Refuse coordinates and texels that say nothing, naming the first triangle that has some."""
+        """Refuse invalid coordinates and texels, naming the first triangle that has some."""
         outside = ~np.isfinite(self.image_uv) | (self.image_uv < -ROUNDING) | (self.image_uv > 1 + ROUNDING)
         _refuse(self.textured & outside.any(axis=(1, 2)), "has image coordinates outside [0, 1]")
         self.image_uv[~self.textured] = 0.0
@@ -180,12 +157,9 @@ class SurfaceImages:
 
 
 def where_there(weighed: Array) -> tuple[Array, Array]:
-    """Return the reflectance and emission (n, 3) of surfaces where they are there.
+    """Return the reflectance and emission (n, 3) of the existing part of surfaces.
 
-    Parameters
-    ----------
-    weighed : (n, 7) float
-        From look-ups: reflectance and emission multiplied by opacity, and opacity.
+    weighed (n, 7): From look-ups: reflectance and emission multiplied by opacity, and opacity.
     """
     opacity = weighed[:, 6:]
     there = np.where(opacity > 0, opacity, 1.0)
@@ -199,7 +173,7 @@ def _refuse(bad: Array, complaint: str) -> None:
 
 
 def _bilinear(image: Array, place: Array) -> Array:
-    """Look (h, w, k) up at (n, 2) places in texels, (n, k); beyond the middles of the rim its own values."""
+    """Look (h, w, k) up at (n, 2) places in texels, (n, k); constant beyond the centers of border texels."""
     height, width = image.shape[:2]
     texels = image.reshape(height * width, -1)
     around, share = texels_around(place, width, height)

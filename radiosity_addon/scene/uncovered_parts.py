@@ -1,4 +1,4 @@
-"""What is left of sides that others cover: triangles in the weights of each side's corners."""
+"""Uncovered parts of sides: triangles in the weights of each side's corners."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ EVEN = 0.05
 """A cover whose opacity varies less over a part hides its mean, …"""
 
 FINEST = 5
-"""… or the part is split in four so often at most."""
+"""… otherwise the part is split in four, at most this many times."""
 
 CHUNK_PAIRS = 1 << 17
 """Elements and parts clipped at once; their temporaries take about 50 MB."""
@@ -40,18 +40,12 @@ _WHOLE = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 
 @dataclass(frozen=True)
 class OwnParts:
-    """The m parts that are left of s sides.
+    """The m uncovered parts of s sides.
 
-    Attributes
-    ----------
-    sides : (s,) int
-        The sides of which something is covered, sorted; front 2 t and back 2 t + 1 of triangle t.
-    side : (m,) int
-        Whose part it is, sorted.
-    corners : (m, 3, 2) float64
-        In weights of the triangle's second and third corner, counter-clockwise.
-    level : (m,) float64
-        What shows of it through covers that are cut out; else 1.
+    sides (s,) int: The partly covered sides, sorted; front 2 t and back 2 t + 1 of triangle t.
+    side (m,) int: Whose part it is, sorted.
+    corners (m, 3, 2): In weights of the triangle's second and third corner, counter-clockwise.
+    level (m,): The share visible through covers with cut-outs; else 1.
     """
 
     sides: Array
@@ -61,12 +55,12 @@ class OwnParts:
 
     @cached_property
     def share(self) -> Array:
-        """(s,) float64: what part of each of `sides` is left."""
+        """(s,) float64: the uncovered share of each of `sides`."""
         left = 2.0 * areas(self.corners) * self.level
         return np.bincount(np.searchsorted(self.sides, self.side), left, minlength=len(self.sides))
 
     def share_of(self, side: Array) -> Array:
-        """Return (n,) what part of sides is left; 1 of those that nothing covers."""
+        """Return (n,) the uncovered share of sides; 1 if nothing covers them."""
         result = np.ones(len(side))
         place = np.minimum(np.searchsorted(self.sides, side), max(len(self.sides) - 1, 0))
         if len(self.sides):
@@ -90,7 +84,7 @@ class OwnParts:
         return rows, corners, level
 
     def share_of_elements(self, side: Array, corners: Array) -> Array:
-        """Return (n,) what is left of counter-clockwise triangles (n, 3, 2) within sides (n,)."""
+        """Return (n,) the uncovered share of counter-clockwise triangles (n, 3, 2) within sides (n,)."""
         result = np.ones(len(side))
         covered = np.flatnonzero(np.isin(side, self.sides))
         begin, count = self._runs(side[covered])
@@ -109,18 +103,12 @@ class OwnParts:
 
 
 def own_parts(side: Array, part: Array, by: Array, in_cover: Array, scene: Surfaces) -> OwnParts:
-    """Return what covers leave of sides.
+    """Return the uncovered parts of sides.
 
-    Parameters
-    ----------
-    side : (c,) int
-        What is covered; sorted.
-    part : (c, k, 2) float64
-        Where: convex, counter-clockwise.
-    by : (c,) int
-        The side that covers it.
-    in_cover : (c, k, 2) float64
-        Where on the cover's triangle, corner by corner the same.
+    side (c,) int: What is covered; sorted.
+    part (c, k, 2): Where: convex, counter-clockwise.
+    by (c,) int: The side that covers it.
+    in_cover (c, k, 2): Where on the cover's triangle, corner by corner the same.
     """
     sides, first, count = np.unique(side, return_index=True, return_counts=True)
     own = np.arange(len(sides))
@@ -156,7 +144,7 @@ def own_parts(side: Array, part: Array, by: Array, in_cover: Array, scene: Surfa
 
 
 def _clipped(triangles: Array, polygons: Array) -> Array:
-    """Return (n, …, 2) what triangles (n, 3, 2) and convex polygons (n, k, 2) have in common."""
+    """Return (n, …, 2) the intersections of triangles (n, 3, 2) and convex polygons (n, k, 2)."""
     result = triangles
     for edge in range(polygons.shape[1]):
         result = clip_half_plane(result, edge_distances(result, polygons, edge))
@@ -164,7 +152,7 @@ def _clipped(triangles: Array, polygons: Array) -> Array:
 
 
 def _outside(triangles: Array, polygons: Array) -> list[tuple[Array, Array]]:
-    """Return what of triangles (n, 3, 2) lies outside of convex polygons, as triangles with their rows."""
+    """Return the parts of triangles (n, 3, 2) outside of convex polygons, as triangles with their rows."""
     found = []
     rest = triangles
     for edge in range(polygons.shape[1]):
@@ -196,7 +184,7 @@ def _shining_through(
     by: Array,
     scene: Surfaces,
 ) -> tuple[Array, Array, Array]:
-    """Return parts that lie under cut-out covers, split where the opacity varies, and what shows of them."""
+    """Return parts that lie under cut-out covers, split where the opacity varies, and their visible share."""
     assert scene.images is not None
     images = scene.images
     done = []
@@ -220,7 +208,7 @@ def _shining_through(
 def _moved(points: Array, part: Array, in_cover: Array) -> Array:
     """Return points (n, p, 2), given along with polygons (n, k, 2), where the same polygons are elsewhere."""
     row = np.arange(len(part))
-    # The map is affine: three corners that span the most say all.
+    # The map is affine: the three corners that span the most determine it.
     apart = part - part[:, :1]
     far = np.einsum("nkc,nkc->nk", apart, apart).argmax(axis=1)
     along = apart[row, far]

@@ -186,7 +186,7 @@ def test_a_copy_of_the_report_never_replaces_what_is_not_one(run: Run, small: Pa
         refused(run(*words, notes), notes)
         for name in ("report.json", "baked.blend", "lightmap.exr", "preview.png", "lightmap.relight"):
             refused(run(*words, out / name), name)
-        refused(run(*words, tmp_path / "x.png", "--plot", tmp_path / "x.png"), "x.png", code=2)
+        refused(run(*words, tmp_path / "x.svg", "--plot", tmp_path / "x.svg"), "x.svg", code=2)
     copy = tmp_path / "r.json"
     assert run(*words, copy).code == 0
     assert run(*words, copy).code == 0
@@ -200,13 +200,13 @@ def test_a_copy_of_the_report_never_replaces_what_is_not_one(run: Run, small: Pa
 @posix
 def test_links_devices_and_folders_are_no_places(run: Run, small: Path, tmp_path: Path) -> None:
     (tmp_path / "victim").write_text("years of work")
-    link, pipe, folder = tmp_path / "link.png", tmp_path / "pipe.png", tmp_path / "folder.png"
+    link, pipe, folder = tmp_path / "link.svg", tmp_path / "pipe.svg", tmp_path / "folder.svg"
     link.symlink_to(tmp_path / "victim")
     os.mkfifo(pipe)
     folder.mkdir()
     for place in (link, pipe, folder, Path("/dev/null")):
         for option in ("--report", "--plot"):
-            if option == "--plot" and place.suffix != ".png":
+            if option == "--plot" and place.suffix != ".svg":
                 continue
             done = run("bake", small, "--output", tmp_path / "out", *TINY, option, place, "--overwrite")
             refused(done, place)
@@ -218,21 +218,19 @@ def test_links_devices_and_folders_are_no_places(run: Run, small: Path, tmp_path
 
 def test_a_plot_replaces_nothing(run: Run, tmp_path: Path) -> None:
     build_small()
-    picture = bpy.data.images.new("Picture", 2, 2)
-    picture.filepath_raw, picture.file_format = str(tmp_path / "texture.png"), "PNG"
-    picture.save()
-    picture.use_fake_user = True
-    (tmp_path / "mine.png").write_text("years of work")
+    text = bpy.data.texts.new("Picture")
+    text.filepath = str(tmp_path / "read.svg")
+    (tmp_path / "mine.svg").write_text("years of work")
+    (tmp_path / "read.svg").write_text("years of work")
     scene, out = save(tmp_path / "small.blend"), tmp_path / "out"
-    words = ("bake", scene, "--output", out, *TINY, "--format", "png16", "--plot")
+    words = ("bake", scene, "--output", out, *TINY, "--plot")
     with nothing_changed(tmp_path):
-        refused(run(*words, tmp_path / "texture.png", "--overwrite"), "texture.png", "reads")
-        refused(run(*words, tmp_path / "mine.png"), "mine.png", "--overwrite")
-        refused(run(*words, out / "preview.png"), "preview.png")
-        refused(run(*words, out / "lightmap.png"), "lightmap.png")
-    assert run(*words, out / "history.png").code == 0
-    refused(run(*words, out / "history.png"), "history.png")
-    assert run(*words, out / "history.png", "--overwrite").code == 0
+        refused(run(*words, tmp_path / "read.svg", "--overwrite"), "read.svg", "reads")
+        refused(run(*words, tmp_path / "mine.svg"), "mine.svg", "--overwrite")
+        refused(run(*words, out / "preview.png"), "preview.png", code=2)
+    assert run(*words, out / "history.svg").code == 0
+    refused(run(*words, out / "history.svg"), "history.svg")
+    assert run(*words, out / "history.svg", "--overwrite").code == 0
 
 
 def test_restore_writes_no_file_that_is_there(run: Run, small: Path, tmp_path: Path) -> None:

@@ -18,7 +18,8 @@ from radiosity_addon.blender.files.output import OutputFolder
 from radiosity_addon.blender.jobs.job import run_bake
 from radiosity_addon.blender.operators.checks import look
 from radiosity_addon.blender.operators.cleaning import interrupted_folders
-from radiosity_addon.blender.session import runtime
+from radiosity_addon.blender.session import last_bake
+from radiosity_addon.blender.session.state import session
 from radiosity_addon.options.bake_settings import BakeSettings
 
 QUICK = BakeSettings(resolution=32, quality="draft")
@@ -55,7 +56,7 @@ def test_an_unsaved_file_gets_packed_lightmaps(box: bpy.types.Scene) -> None:
     images = [image for image in bpy.data.images if image.name.startswith("lightmap")]
     assert [image.packed_file is not None for image in images] == [True]
     assert tuple(images[0].size) == (32, 32)
-    last = runtime.last_bake(bpy.context.scene)
+    last = last_bake.read(bpy.context.scene)
     assert dict(last.figures)["Objects"] == "7"
     assert last.folder == ""
 
@@ -71,7 +72,7 @@ def test_a_saved_file_gets_a_folder_beside_it(tmp_path: Path) -> None:
     ]
     image = bpy.data.images["room_Cornell Box_lightmap.exr"]
     assert image.filepath == "//lightmaps/room_Cornell Box_lightmap.exr"
-    assert Path(bpy.path.abspath(runtime.last_bake(bpy.context.scene).folder)) == folder.resolve()
+    assert Path(bpy.path.abspath(last_bake.read(bpy.context.scene).folder)) == folder.resolve()
     report = json.loads((folder / "room_Cornell Box_report.json").read_text())
     assert {entry["object"] for entry in report["objects"]} == set(showing())
 
@@ -92,7 +93,7 @@ def test_nothing_selected_is_an_error_message_and_no_change(box: bpy.types.Scene
     with pytest.raises(RuntimeError, match="select"):
         bake()
     assert made() == before
-    assert not runtime.running.active
+    assert not session.running.active
 
 
 @pytest.mark.parametrize("folder", ["//" + "x" * 300, "//" + "/".join(["x" * 200] * 4)])
@@ -129,10 +130,10 @@ def test_undo_takes_one_step_and_redo_one(box: bpy.types.Scene) -> None:
     assert is_baked()
     bpy.ops.ed.undo()
     assert made() == before
-    assert runtime.last_bake(bpy.context.scene) is None
+    assert last_bake.read(bpy.context.scene) is None
     bpy.ops.ed.redo()
     assert made() == after
-    assert dict(runtime.last_bake(bpy.context.scene).figures)["Objects"] == "7"
+    assert dict(last_bake.read(bpy.context.scene).figures)["Objects"] == "7"
 
 
 def test_a_mesh_in_edit_mode_is_flushed(box: bpy.types.Scene) -> None:
@@ -153,7 +154,7 @@ def test_restore_brings_everything_back(box: bpy.types.Scene) -> None:
     assert (made(), showing()) != before
     assert bpy.ops.radiosity.restore() == {"FINISHED"}
     assert (made(), showing()) == before
-    assert runtime.last_bake(box) is None
+    assert last_bake.read(box) is None
 
 
 def test_baking_twice_gives_the_same_pixels(box: bpy.types.Scene) -> None:
@@ -167,7 +168,7 @@ def test_baking_twice_gives_the_same_pixels(box: bpy.types.Scene) -> None:
 def test_an_edit_of_a_baked_object_is_there_after_the_next_bake(box: bpy.types.Scene) -> None:
     def warned() -> list[str]:
         # At this resolution the blocks get few texels, which is told each time.
-        return [name for name, message in runtime.last_bake(box).warnings if "texels" not in message]
+        return [name for name, message in last_bake.read(box).warnings if "texels" not in message]
 
     bake()
     bake()
@@ -248,7 +249,7 @@ def test_a_failure_after_the_lightmaps_show_takes_them_off_again(
         raise BakeError("the disk is full")
 
     before = made(), showing()
-    monkeypatch.setattr("radiosity_addon.blender.jobs.job.render_preview", fail)
+    monkeypatch.setattr("radiosity_addon.blender.jobs.finish.render_preview", fail)
     with pytest.raises(BakeError, match="the disk is full"):
         list(run_bake(bpy.context, QUICK, OutputFolder(tmp_path / "out"), with_copy=True))
     assert (made(), showing()) == before
@@ -272,7 +273,7 @@ def test_the_cornell_box_goes_into_a_scene_of_its_own_beside_other_objects(box: 
 def test_what_somebody_else_wrote_is_no_last_bake(box: bpy.types.Scene) -> None:
     for text in ("", "{}", "[1]", "not json", '{"solver": {}, "seconds": "x"}'):
         box.radiosity.last_bake = text
-        assert runtime.last_bake(box) is None
+        assert last_bake.read(box) is None
 
 
 def test_the_panel_shows_what_is_said_once_beside_many_warnings_alike(box: bpy.types.Scene) -> None:
@@ -281,7 +282,7 @@ def test_the_panel_shows_what_is_said_once_beside_many_warnings_alike(box: bpy.t
     small = {"name": "map", "message": "map: 256 px is too small"}
     solver = {"method": "hierarchical", "elements": 1, "links": 1, "rays": 1}
     report = {"objects": [], "solver": solver, "seconds": {}, "warnings": [*missing, small]}
-    runtime.remember(box, report, "")
-    last = runtime.last_bake(box)
+    last_bake.remember(box, report, "")
+    last = last_bake.read(box)
     assert last.warning_count == 2
     assert [name for name, _ in last.warnings] == ["slot0", "map"]

@@ -1,10 +1,8 @@
-"""What must hold of all that the add-on registers: tooltips, poll messages, texts that can be translated."""
+"""What must hold of all that the add-on registers: tooltips and poll messages."""
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import bpy
@@ -13,43 +11,20 @@ import pytest
 import radiosity_addon
 from radiosity_addon.blender import registration
 from radiosity_addon.blender.files.cornell import build_cornell_box
+from radiosity_addon.blender.operators.polls import Conditional
 from radiosity_addon.blender.panels import bake_panel
 from radiosity_addon.blender.panels.sections import Section
-from radiosity_addon.blender.session import runtime
-
-BLENDER = Path(radiosity_addon.__file__).parent / "blender"
-SOURCES = sorted(path for path in BLENDER.rglob("*.py") if "presets" not in path.parts)
+from radiosity_addon.blender.session.state import session
 
 OPERATORS = [cls for cls in registration.CLASSES if issubclass(cls, bpy.types.Operator)]
 PANELS = [cls for cls in registration.CLASSES if issubclass(cls, bpy.types.Panel)]
-
-UI_TEXT = {
-    "label": ("text",),
-    "operator": ("text",),
-    "operator_menu_enum": ("text",),
-    "prop": ("text",),
-    "prop_enum": ("text",),
-    "prop_search": ("text",),
-    "menu": ("text",),
-    "popover": ("text",),
-    "column": ("heading",),
-    "row": ("heading",),
-    "progress": ("text",),
-}
-"""Layout calls, and which of their arguments people read."""
-
-READ_BY_PEOPLE = {
-    **{f"{kind}Property": ("name", "description") for kind in ("Bool", "Int", "Float", "String", "Enum")},
-    **{f"{kind}Property": ("name", "description") for kind in ("FloatVector", "IntVector", "BoolVector")},
-    **{f"{kind}Property": ("name", "description") for kind in ("Collection", "Pointer")},
-}
 
 
 @pytest.fixture(autouse=True)
 def registered() -> Iterator[None]:
     radiosity_addon.register()
     yield
-    runtime.running.active = False
+    session.running.active = False
     radiosity_addon.unregister()
 
 
@@ -130,7 +105,9 @@ def test_every_operator_says_what_it_does_and_every_panel_has_a_name() -> None:
 
 def test_every_section_has_a_name_of_its_own() -> None:
     sections = Section.__subclasses__()
-    assert {section.__name__ for section in sections} > {section.__name__ for section in bake_panel.SECTIONS}
+    assert {section.__name__ for section in sections} > {
+        section.__name__ for section in (*bake_panel.NEXT_BAKE, *bake_panel.RESULT)
+    }
     assert len({section.name for section in sections}) == len(sections)
     assert all(section.label and section.name.startswith("radiosity_") for section in sections)
 
@@ -151,100 +128,22 @@ def situations() -> Iterator[str]:
     bpy.ops.object.mode_set(mode="EDIT")
     yield "a mesh is edited"
     bpy.ops.object.mode_set(mode="OBJECT")
-    runtime.running.active = True
+    session.running.active = True
     yield "a bake runs"
-    runtime.running.active = False
+    session.running.active = False
 
 
 def test_every_operator_that_refuses_says_why() -> None:
     silent, refused = [], set()
     for situation in situations():
         for cls in OPERATORS:
-            poll = cls.__dict__.get("poll")
-            if poll is None:
+            if not issubclass(cls, Conditional):
                 continue
             said: list[str] = []
-            stub = type(cls.__name__, (), {"poll_message_set": said.append, **_helpers(cls)})
-            if not poll.__func__(stub, bpy.context):
+            stub = type(cls.__name__, (), {"poll_message_set": said.append, "conditions": cls.conditions})
+            if not Conditional.poll.__func__(stub, bpy.context):
                 refused.add(cls.__name__)
                 if not said or not said[-1].strip():
                     silent.append(f"{cls.__name__}: {situation}")
     assert silent == []
     assert "RADIOSITY_OT_bake" in refused
-
-
-def _helpers(cls: type) -> dict[str, Any]:
-    """What a poll may use of its class beside Blender's own: constants and class methods."""
-    return {
-        name: value
-        for base in reversed(cls.__mro__)
-        if base.__module__.startswith("radiosity")
-        for name, value in vars(base).items()
-        if not name.startswith("__") and name != "poll"
-    }
-
-
-def is_translatable(node: ast.expr) -> bool:
-    """Tell whether Blender's translators find a text: a literal, or a value that was translated before.
-
-    What is put together on the spot, an f-string with words, a sum or the result of `format`, is never
-    found; a call of `pgettext…(literal).format(…)` is, and so are names, attributes and items: data.
-    """
-    if isinstance(node, ast.JoinedStr):
-        words = "".join(str(part.value) for part in node.values if isinstance(part, ast.Constant))
-        return not any(map(str.isalpha, words))
-    if isinstance(node, ast.BinOp):
-        return False
-    if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "format":
-        return isinstance(node.func.value, ast.Call | ast.Name | ast.Attribute)
-    if isinstance(node, ast.IfExp):
-        return is_translatable(node.body) and is_translatable(node.orelse)
-    return True
-
-
-def untranslatable(tree: ast.AST) -> Iterator[tuple[int, str]]:
-    """(line, what) of texts for people that no translation can reach."""
-    for node in ast.walk(tree):
-        if not isinstance(node, ast.Call):
-            continue
-        name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
-        words = {word.arg: word.value for word in node.keywords}
-        texts = [
-            words[argument]
-            for argument in (*UI_TEXT.get(name, ()), *READ_BY_PEOPLE.get(name, ()))
-            if argument in words
-        ]
-        as_is = isinstance(words.get("translate"), ast.Constant)
-        if name == "report" and len(node.args) == 2:
-            texts.append(node.args[1])
-        if name == "poll_message_set":
-            texts += node.args[:1]
-        for text in texts:
-            if not as_is and not is_translatable(text):
-                yield node.lineno, ast.unparse(text)
-
-
-@pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.name)
-def test_every_text_can_be_translated(path: Path) -> None:
-    assert list(untranslatable(ast.parse(path.read_text(encoding="utf-8")))) == []
-
-
-@pytest.mark.parametrize(
-    ("code", "count"),
-    [
-        ("layout.label(text='Bake')", 0),
-        ("layout.label(text=f'{n} objects')", 1),
-        ("layout.label(text=f'{name}: {value}')", 0),
-        ("layout.label(text='a' + b)", 1),
-        ("layout.label(text='{} objects'.format(n))", 1),
-        ("layout.label(text=_('{} objects').format(n))", 0),
-        ("layout.label(text=name)", 0),
-        ("layout.label(text=f'{n}', translate=False)", 0),
-        ("self.report({'INFO'}, f'Baked {n}')", 1),
-        ("self.report({'INFO'}, rpt_('Baked {}').format(n))", 0),
-        ("cls.poll_message_set(f'no {x}')", 1),
-        ("bpy.props.IntProperty(name='N' + x, description='a')", 1),
-    ],
-)
-def test_the_rule_itself(code: str, count: int) -> None:
-    assert len(list(untranslatable(ast.parse(code)))) == count

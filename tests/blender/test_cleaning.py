@@ -13,7 +13,7 @@ import pytest
 import radiosity_addon
 from radiosity_addon.blender.datablocks.bake_record import recorded_objects
 from radiosity_addon.blender.operators.cleaning import unused_lightmaps
-from radiosity_addon.blender.session import runtime
+from radiosity_addon.blender.session.state import session
 from radiosity_addon.files.baked_files import digest_of_file, read_report, sealed, text_of
 from tests.blender.scenes import add_lamp, add_mesh
 
@@ -204,11 +204,11 @@ def test_opening_a_file_touches_nothing_and_recover_takes_a_half_published_bake_
     before = {path: path.read_bytes() for path in room.rglob("*") if path.is_file()}
     bpy.ops.wm.open_mainfile(filepath=str(room / "room.blend"))
     assert {path: path.read_bytes() for path in room.rglob("*") if path.is_file()} == before
-    assert runtime.interrupted
+    assert session.interrupted
     assert bpy.ops.radiosity.recover() == {"FINISHED"}
     assert floor.read_bytes() == good
     assert files(room) == ALL
-    assert not runtime.interrupted
+    assert not session.interrupted
     assert bpy.ops.radiosity.recover() == {"CANCELLED"}
 
 
@@ -226,7 +226,7 @@ def test_a_bake_into_the_folder_recovers_it_too(room: Path) -> None:
     staging.release()
     assert bpy.ops.radiosity.bake("EXEC_DEFAULT", True) == {"FINISHED"}
     assert files(room) == ALL
-    assert not runtime.interrupted
+    assert not session.interrupted
 
 
 @pytest.mark.parametrize("crafted", ["../../victim.exr", "/victim.exr", "victim.txt"])
@@ -244,7 +244,7 @@ def test_a_crafted_folder_is_left_as_it_is(room: Path, crafted: str) -> None:
     (staging.path / JOURNAL).write_text(json.dumps(told))
     staging.release()
     bpy.ops.wm.open_mainfile(filepath=str(room / "room.blend"))
-    assert not runtime.interrupted
+    assert not session.interrupted
     assert bpy.ops.radiosity.bake("EXEC_DEFAULT", True) == {"FINISHED"}
     assert all(victim.read_text() == "years of work" for victim in victims)
 

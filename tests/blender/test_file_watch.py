@@ -19,7 +19,7 @@ from radiosity_addon.blender.jobs import window_job
 from radiosity_addon.blender.jobs.file_watch import guarded
 from radiosity_addon.blender.jobs.job import run_bake
 from radiosity_addon.blender.relight.relight_scene import run_relight
-from radiosity_addon.blender.session import runtime
+from radiosity_addon.blender.session.state import session
 from radiosity_addon.options.bake_settings import BakeSettings
 
 QUICK = BakeSettings(resolution=16, quality="draft")
@@ -256,4 +256,4 @@ def test_only_its_own_timer_carries_a_job_on(monkeypatch: pytest.MonkeyPatch) ->
     running._timer = None
     running._end(bpy.context)
     assert running.modal(bpy.context, foreign) == {"CANCELLED"}
-    assert not runtime.running.active
+    assert not session.running.active

@@ -15,13 +15,14 @@ import pytest
 
 import radiosity_addon
 from radiosity_addon.base.errors import BakeError
-from radiosity_addon.base.progress import drain
+from radiosity_addon.base.steps import drain
 from radiosity_addon.blender.files.cornell import build_cornell_box
 from radiosity_addon.blender.files.output import OutputFolder
 from radiosity_addon.blender.jobs.inspection import ERROR, INFO, WARNING, Inspection, inspect
 from radiosity_addon.blender.jobs.job import run_bake
 from radiosity_addon.blender.operators import checks
-from radiosity_addon.blender.session import runtime
+from radiosity_addon.blender.session import last_bake
+from radiosity_addon.blender.session.state import session
 from radiosity_addon.files.file_names import BLEND_NAME, PREVIEW_NAME
 from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.scenes import QUAD, add_lamp, add_mesh, set_world
@@ -245,11 +246,11 @@ def test_the_operator_tells_and_the_panel_remembers() -> None:
 def test_only_an_odd_scene_that_was_never_seen_is_looked_at_first() -> None:
     build_cornell_box()
     assert not checks.look_first(bpy.context)
-    checks.forget_checks()
+    session.checks.clear()
     bpy.data.objects["Floor"].hide_set(True)
     assert checks.look_first(bpy.context)
     assert not checks.look_first(bpy.context)
-    checks.forget_checks()
+    session.checks.clear()
     bpy.context.scene.radiosity.last_bake = json.dumps(
         {
             "objects": 1,
@@ -261,7 +262,7 @@ def test_only_an_odd_scene_that_was_never_seen_is_looked_at_first() -> None:
             "folder": "",
         }
     )
-    assert runtime.last_bake(bpy.context.scene) is not None
+    assert last_bake.read(bpy.context.scene) is not None
     assert not checks.look_first(bpy.context)
 
 

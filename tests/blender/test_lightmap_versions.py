@@ -17,6 +17,7 @@ import pytest
 import radiosity_addon
 from radiosity_addon.blender.datablocks.image_marks import REPORT, VERSION
 from radiosity_addon.blender.relight.relight_scene import kept_bakes, lightmap_versions
+from radiosity_addon.blender.session.state import session
 from radiosity_addon.files.baked_files import LISTED, read_report
 from tests.blender.scenes import add_lamp, add_mesh
 
@@ -151,7 +152,7 @@ def test_a_relight_that_would_fail_is_not_offered(room: Path) -> None:
     bake()
     restore()
     bpy.ops.ed.undo()
-    kept_bakes.drop_all()
+    session.kept_bakes.clear()
     assert not bpy.ops.radiosity.relight.poll()
 
 

@@ -13,7 +13,7 @@ import radiosity_addon
 from radiosity_addon.blender.datablocks.image_marks import VERSION
 from radiosity_addon.blender.images.node_group import EMISSION
 from radiosity_addon.blender.relight.relight_scene import kept_bakes, lightmap_versions
-from radiosity_addon.blender.session import live_state
+from radiosity_addon.blender.session.state import session
 from radiosity_addon.files.baked_files import digest_of_file
 from tests.blender.scenes import shader_material
 from tests.blender.test_relight_scene import change_lights, glowing, lightmap, relative, relight, room
@@ -41,22 +41,22 @@ def live(saved: Path) -> Iterator[bpy.types.WindowManager]:
     manager = bpy.context.window_manager
     manager.radiosity_live = True
     settle()
-    assert manager.radiosity_live, live_state.state.message
+    assert manager.radiosity_live, session.live_message
     yield manager
-    live_state.stop()
+    session.stop_live()
 
 
 def settle() -> None:
     """Let the handler see what has changed, and do what the timer would."""
     bpy.context.view_layer.update()
-    if live_state.state.live is not None:
-        live_state.state.live.settle()
+    if session.live is not None:
+        session.live.settle()
 
 
 def follow() -> None:
     """As `settle`, but stop where sums of responses are shown."""
     bpy.context.view_layer.update()
-    live = live_state.state.live
+    live = session.live
     live.read()
     assert live._dirty is False
 
@@ -86,7 +86,7 @@ def test_the_lightmap_follows_and_becomes_exact_at_rest(live: bpy.types.WindowMa
 def test_what_it_writes_itself_starts_nothing(live: bpy.types.WindowManager) -> None:
     bpy.data.objects["Bulb"].data.energy *= 1.5
     settle()
-    running = live_state.state.live
+    running = session.live
     for _ in range(3):
         bpy.context.view_layer.update()
         assert not running.step(in_background=True)
@@ -119,19 +119,19 @@ def test_it_goes_off_where_the_scene_no_longer_fits(
     elif change == "lamp":
         bpy.data.objects["Bulb"].data.shadow_soft_size = 0.5
     else:
-        kept_bakes.drop_all()
+        session.kept_bakes.clear()
         bpy.data.objects["Bulb"].data.energy = 1.0
     settle()
     assert not live.radiosity_live
-    assert message in live_state.state.message
-    assert live_state.state.live is None
+    assert message in session.live_message
+    assert session.live is None
 
 
 def test_restore_switches_it_off(live: bpy.types.WindowManager) -> None:
     assert bpy.ops.radiosity.restore("EXEC_DEFAULT") == {"FINISHED"}
-    assert live_state.state.live is None
+    assert session.live is None
     assert not live.radiosity_live
-    assert live_state.state.message == ""
+    assert session.live_message == ""
 
 
 def test_undo_takes_the_light_back_with_the_lamp(live: bpy.types.WindowManager) -> None:
@@ -151,17 +151,17 @@ def test_a_slider_may_move_before_the_first_exact_light_is_there(saved: Path) ->
     """It died of arrays that did not fit each other."""
     bpy.ops.wm.open_mainfile(filepath=str(saved))
     bpy.context.window_manager.radiosity_live = True
-    live_state.state.live._begin()
+    session.live._begin()
     change_lights()
     bpy.context.view_layer.update()
-    assert live_state.state.live._dirty
-    while not live_state.state.live._exact:
-        assert live_state.state.live.step(in_background=True), live_state.state.message
+    assert session.live._dirty
+    while not session.live._exact:
+        assert session.live.step(in_background=True), session.live_message
     followed = lightmap()
     bpy.context.window_manager.radiosity_live = False
     assert relight() == {"FINISHED"}
     np.testing.assert_allclose(followed, lightmap(), rtol=1e-3, atol=1e-4)
-    live_state.stop()
+    session.stop_live()
 
 
 def test_its_message_goes_with_what_it_is_about(live: bpy.types.WindowManager) -> None:
@@ -170,16 +170,16 @@ def test_its_message_goes_with_what_it_is_about(live: bpy.types.WindowManager) -
         settle()
         bpy.data.objects["Bulb"].location.x += 0.1
         settle()
-        assert "Live is off" in live_state.state.message
+        assert "Live is off" in session.live_message
         assert not live.radiosity_live
         bpy.data.objects["Bulb"].location.x -= 0.1
 
     fail()
     assert relight() == {"FINISHED"}
-    assert live_state.state.message == ""
+    assert session.live_message == ""
     fail()
     assert bpy.ops.radiosity.restore("EXEC_DEFAULT") == {"FINISHED"}
-    assert live_state.state.message == ""
+    assert session.live_message == ""
 
 
 def test_files_and_pictures_agree_after_undo_and_redo(live: bpy.types.WindowManager) -> None:
@@ -214,10 +214,10 @@ def test_nothing_is_raised_from_the_handler(
     def broken(*_: object) -> bool:
         raise ZeroDivisionError("by zero")
 
-    monkeypatch.setattr(live_state.state.live._fits, "note", broken)
+    monkeypatch.setattr(session.live._fits, "note", broken)
     bpy.data.objects["Bulb"].data.energy *= 2.0
     bpy.context.view_layer.update()
-    assert live_state.state.message == "Live is off: ZeroDivisionError: by zero"
+    assert session.live_message == "Live is off: ZeroDivisionError: by zero"
     assert not live.radiosity_live
 
 
@@ -226,12 +226,12 @@ def test_it_cannot_be_switched_on_without_a_bake(saved: Path) -> None:
     bpy.context.window_manager.radiosity_live = True
     settle()
     assert not bpy.context.window_manager.radiosity_live
-    assert "shows no bake that was kept" in live_state.state.message
+    assert "shows no bake that was kept" in session.live_message
 
 
 def test_it_ends_with_the_file(live: bpy.types.WindowManager) -> None:
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    assert live_state.state.live is None
+    assert session.live is None
     assert not bpy.context.window_manager.radiosity_live
 
 
@@ -248,7 +248,7 @@ def test_emission_that_varies_follows_its_slider(saved: Path, tmp_path: Path) ->
     manager = bpy.context.window_manager
     manager.radiosity_live = True
     settle()
-    assert manager.radiosity_live, live_state.state.message
+    assert manager.radiosity_live, session.live_message
     emission.inputs["Strength"].default_value = 9.0
     settle()
     shown = lightmap()

@@ -12,9 +12,11 @@ import numpy as np
 import pytest
 
 import radiosity_addon
+from radiosity_addon.base.errors import BakeError
 from radiosity_addon.blender.datablocks.bake_record import mark_made, recorded_objects
 from radiosity_addon.blender.material_copies.copy_marks import ADDED
-from radiosity_addon.blender.session import runtime
+from radiosity_addon.blender.session import last_bake
+from tests.blender.file_dump import differences_since, dump_file
 from tests.blender.scenes import add_lamp, add_mesh, shader_material
 
 
@@ -105,7 +107,7 @@ def test_a_moved_object_gets_a_new_lightmap_and_others_keep_theirs(room: Path) -
         "Floor": 1,
         "Shelf": 1,
     }
-    last = runtime.last_bake(bpy.context.scene)
+    last = last_bake.read(bpy.context.scene)
     assert any("2 unchanged objects kept their lightmaps" in message for _, message in last.warnings)
     # About as fine as before.
     densities = [page["texels_per_metre"] for page in report["pages"]]
@@ -122,6 +124,27 @@ def test_all_lightmaps_follow_what_moved_while_that_is_kept(room: Path) -> None:
     assert digests(room)["room_Scene_lightmap.exr"] != page
     np.testing.assert_array_equal(uvs("Floor"), floor)
     assert bake() == {"CANCELLED"}
+
+
+@pytest.mark.parametrize("scope", ["changed", "all"])
+def test_a_bake_that_cannot_be_published_is_not_remembered(
+    scope: str, room: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bpy.data.objects["Box"].location.x -= 0.5
+    bpy.context.scene.radiosity.scope = scope
+    bpy.context.view_layer.update()
+    before = dump_file()
+    with monkeypatch.context() as failing:
+
+        def fail(*_: object) -> None:
+            raise BakeError("the disk is full")
+
+        failing.setattr("radiosity_addon.blender.files.output.OutputFolder.publish", fail)
+        with pytest.raises(RuntimeError, match="the disk is full"):
+            bake()
+    assert differences_since(before, dump_file()) == []
+    assert bake() == {"FINISHED"}
+    assert differences_since(before, dump_file()) != []
 
 
 def test_again_and_again_and_restored(room: Path) -> None:
@@ -203,7 +226,7 @@ def test_an_object_that_is_gone_is_named(room: Path, capfd: pytest.CaptureFixtur
     assert "gone since the last bake: 'Shelf'" in capfd.readouterr().out
     bpy.data.objects["Box"].location.x -= 0.5
     assert bake() == {"FINISHED"}
-    last = runtime.last_bake(bpy.context.scene)
+    last = last_bake.read(bpy.context.scene)
     assert any("gone since the last bake: 'Shelf'" in message for _, message in last.warnings)
 
 

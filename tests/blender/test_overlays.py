@@ -12,8 +12,8 @@ import pytest
 import radiosity_addon
 from radiosity_addon.blender.files.cornell import build_cornell_box
 from radiosity_addon.blender.jobs.job import run_bake
-from radiosity_addon.blender.overlays import lightmap_values, overlay_view
 from radiosity_addon.blender.overlays import overlay_properties as kinds
+from radiosity_addon.blender.overlays import overlay_view
 from radiosity_addon.blender.overlays.color_scale import ColorScale, automatic_scale
 from radiosity_addon.blender.overlays.lightmap_values import lightmap_of, object_statistics, page_values
 from radiosity_addon.blender.overlays.overlay_pictures import (
@@ -26,8 +26,8 @@ from radiosity_addon.blender.overlays.overlay_pictures import (
     missing,
     overlay_picture,
 )
-from radiosity_addon.blender.session import kept_details
 from radiosity_addon.blender.session.kept_details import details_of
+from radiosity_addon.blender.session.state import session
 from radiosity_addon.numerics.radiometry import luminous
 from radiosity_addon.options.bake_settings import BakeSettings
 
@@ -53,7 +53,7 @@ def baked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]]:
             break
     path = tmp_path_factory.mktemp("baked") / "baked.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    yield {"path": path, "report": report, "kept": dict(kept_details._kept), "scene": scene.name}
+    yield {"path": path, "report": report, "kept": dict(session.kept_details), "scene": scene.name}
     radiosity_addon.unregister()
 
 
@@ -62,7 +62,7 @@ def opened(baked: dict[str, Any]) -> Iterator[dict[str, Any]]:
     """The baked file, open, with what the bake kept."""
     radiosity_addon.register()
     bpy.ops.wm.open_mainfile(filepath=str(baked["path"]))
-    kept_details._kept.update(baked["kept"])
+    session.kept_details.update(baked["kept"])
     yield baked
     settings = bpy.context.window_manager.radiosity_overlay
     for prop in settings.bl_rna.properties:
@@ -120,8 +120,8 @@ def test_a_range_by_hand_is_kept(opened: dict[str, Any]) -> None:
 @pytest.mark.parametrize("kept", [True, False], ids=["kept", "reloaded"])
 def test_numbers_of_an_object_are_the_reports(opened: dict[str, Any], kept: bool) -> None:
     if not kept:
-        kept_details.drop_all()
-    lightmap_values.forget()
+        session.kept_details.clear()
+    session.drawn.forget()
     for entry in opened["report"]["objects"]:
         obj = bpy.data.objects[entry["object"]]
         found = object_statistics(obj, bpy.context.scene, "WATT", 683.0)
@@ -222,7 +222,7 @@ def test_errors_are_signed_where_they_can_be(opened: dict[str, Any], of: str) ->
 
 
 def test_after_a_reload_only_what_the_file_tells_is_left(opened: dict[str, Any]) -> None:
-    kept_details.drop_all()
+    session.kept_details.clear()
     for kind in EVERY:
         settings().show = kind
         if kind in kinds.OF_THE_BAKE:
@@ -236,7 +236,7 @@ def test_opening_a_file_forgets_the_bake(opened: dict[str, Any]) -> None:
     assert details_of(bpy.context.scene) is not None
     bpy.ops.wm.open_mainfile(filepath=str(opened["path"]))
     assert details_of(bpy.context.scene) is None
-    assert not kept_details._kept
+    assert not session.kept_details
 
 
 def test_another_bake_than_the_last_is_not_shown(opened: dict[str, Any]) -> None:
@@ -250,7 +250,7 @@ def test_another_bake_than_the_last_is_not_shown(opened: dict[str, Any]) -> None
 
 def test_restore_forgets_it_and_says_so(opened: dict[str, Any]) -> None:
     assert bpy.ops.radiosity.restore() == {"FINISHED"}
-    assert not kept_details._kept
+    assert not session.kept_details
     for kind in EVERY:
         settings().show = kind
         assert "ake first" in missing(bpy.context)

@@ -18,6 +18,7 @@ from radiosity_addon.blender.images.images import image_scale
 from radiosity_addon.blender.images.node_group import EMISSION, SCALE
 from radiosity_addon.blender.materials.light_inputs import inputs_of
 from radiosity_addon.blender.relight.relight_scene import kept_bakes
+from radiosity_addon.blender.session.state import session
 from radiosity_addon.files.baked_files import is_as_written
 from tests.blender.scenes import add_lamp, add_mesh, add_object, set_world, shader_material
 
@@ -160,7 +161,7 @@ def test_a_bake_is_kept_in_memory_until_restore_or_another_file(baked: Path) -> 
     assert kept_bakes.find(bpy.context.scene) is None
     assert not bpy.ops.radiosity.relight.poll()
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    assert not kept_bakes._kept
+    assert not session.kept_bakes
 
 
 def test_what_is_not_to_be_kept_is_not(baked: Path) -> None:
@@ -239,9 +240,9 @@ def test_sidecars_that_do_not_fit_are_refused(baked: Path, wrong: str) -> None:
     elif wrong == "damaged":
         path.write_bytes(content[:-1] + bytes([content[-1] ^ 1]))
     elif wrong == "another bake":
-        kept_bakes.set_mark(bpy.context.scene, "other")
+        kept_bakes.note(bpy.context.scene, "other")
         kept_bakes.mark_images([bpy.data.images[LIGHTMAP]], "other")
-        message = "has no sidecar of its own"
+        message = "has no sidecar"
     elif wrong == "missing":
         path.unlink()
         message = "has no sidecar"

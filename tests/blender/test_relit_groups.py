@@ -12,7 +12,7 @@ import pytest
 import radiosity_addon
 from radiosity_addon.blender.images.images import image_scale
 from radiosity_addon.blender.relight.relight_scene import kept_bakes
-from radiosity_addon.blender.session import live_state
+from radiosity_addon.blender.session.state import session
 from tests.blender.test_relight_scene import lightmap, relight, room
 
 
@@ -43,7 +43,7 @@ def light(names: dict[str, str]) -> dict[str, np.ndarray]:
 def test_groups_are_lit_anew_too(names: dict[str, str], kept: str) -> None:
     assert list(names) == ["", "Glow", "Lamps", "others"]
     if kept != "in memory":
-        kept_bakes.drop_all()
+        session.kept_bakes.clear()
     before = light(names)
     bpy.data.objects["Bulb"].data.energy *= 3.0
     bpy.data.materials["Glow"].node_tree.nodes["Emission"].inputs["Strength"].default_value = 0.0
@@ -60,6 +60,6 @@ def test_groups_are_lit_anew_too(names: dict[str, str], kept: str) -> None:
 
 def test_live_leaves_groups_to_their_own_sliders(names: dict[str, str]) -> None:
     bpy.context.window_manager.radiosity_live = True
-    live_state.state.live.settle()
+    session.live.settle()
     assert not bpy.context.window_manager.radiosity_live
-    assert "light groups, whose own sliders" in live_state.state.message
+    assert "light groups, whose own sliders" in session.live_message

@@ -17,7 +17,7 @@ from radiosity_addon.blender.files.output import OutputFolder
 from radiosity_addon.blender.files.ownership import panel_names
 from radiosity_addon.blender.jobs.job import run_bake
 from radiosity_addon.blender.relight.relight_scene import kept_bakes
-from radiosity_addon.blender.session import runtime
+from radiosity_addon.blender.session import last_bake
 from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.exporting import add_instance
 from tests.blender.file_dump import differences_since, dump_file
@@ -82,8 +82,8 @@ def test_a_bake_of_another_scene_leaves_the_first(scenes, tmp_path: Path) -> Non
     assert after["B1"] == after["B2"] == after["Both"] != before["A1"]
     assert file.read_bytes() == pixels
     assert [name for name, message in warnings if "Scene" in message] == ["Both"]
-    assert runtime.last_bake(first) is not None
-    assert runtime.last_bake(second) is not None
+    assert last_bake.read(first) is not None
+    assert last_bake.read(second) is not None
     # And once more: what nothing shows any more is gone.
     bake(first, tmp_path)
     assert images()["B1"] == after["B1"]
@@ -103,11 +103,11 @@ def test_restore_is_of_the_scene_and_the_command_line_s_of_the_file(scenes) -> N
     bpy.context.window.scene = first
     assert bpy.ops.radiosity.restore() == {"FINISHED"}
     assert set(images()) == {"B1", "B2"}
-    assert runtime.last_bake(first) is None
-    assert runtime.last_bake(second) is not None
+    assert last_bake.read(first) is None
+    assert last_bake.read(second) is not None
     assert restore(bpy.context) == 2
     for scene in scenes:  # to ask leaves a trace, before Blender 5.0
-        runtime.forget(scene)
+        last_bake.forget(scene)
     assert differences_since(before, dump_file()) == []
 
 
@@ -180,7 +180,7 @@ def test_a_failed_bake_of_another_scene_changes_nothing(scenes, monkeypatch: pyt
     def fail(*_: object) -> None:
         raise BakeError("the disk is full")
 
-    monkeypatch.setattr("radiosity_addon.blender.jobs.job._report", fail)
+    monkeypatch.setattr("radiosity_addon.blender.jobs.finish._report", fail)
     with pytest.raises(BakeError, match="full"):
         list(run_bake(bpy.context, QUICK, None))
     assert differences_since(before, dump_file()) == []

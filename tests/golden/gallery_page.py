@@ -15,32 +15,32 @@ RECORD = Path(__file__).parent / "gallery.json"
 INTRODUCTION = """\
 # Gallery
 
-What is followed of Blender, row by row: a small scene each, baked at medium quality and compared with
-Cycles, texel by texel on the same layout. From left to right:
+The Blender features that bakes support, row by row. Each row is a small scene, baked at medium quality and
+compared with Cycles texel by texel, on the same layout. From left to right:
 
-1. the scene, what has a lightmap showing the one made here (other objects stand in Cycles' own light);
-2. that lightmap (H/π);
-3. the one Cycles bakes, the mean of two with different seeds;
+1. the scene with our lightmaps (objects without a lightmap are lit by Cycles);
+2. our lightmap (H/π);
+3. Cycles' lightmap, the mean of two bakes with different seeds;
 4. ten times the difference, which includes the noise of Cycles.
 
-The stage of most rows is a floor with two walls, a box that stands on it and a slab that floats. In the
+Most scenes are a floor with two walls, a box that stands on it and a slab that floats. In the
 lightmap the floor is at the lower left, the back wall above it, the left wall to its right; the six sides
 of box and slab are at the upper right.
 
-**relRMSE** is the root of the mean square error over all texels, shadows' borders included, relative to
-the mean light; two references that know nothing of each other take their own noise out of it. 3 % are
-allowed unless another limit is given. The **mean** is that of all texels, relative to Cycles'. The golden
-tests bake every row and fail if an error exceeds its limit or leaves this page's number.
+**relRMSE** is the root mean square error over all texels, including shadow borders, relative to
+the mean light; two independent references cancel their own noise. The limit is 3 % unless
+another one is given. The **mean** is that of all texels, relative to Cycles'. The golden
+tests bake every row and fail if an error exceeds its limit or differs from the number on this page.
 
-This page is written by `python3 build.py figures gallery`; the scenes are in `tests/golden/rows`, the
+`python3 build.py figures gallery` writes this page; the scenes are in `tests/golden/rows`, the
 references and the script that makes them in `tests/golden`.
 """
 
 CHAPTERS = {
-    "lights": ("Lamps", "Their shapes, their softness, their colours, and whom they light."),
+    "lights": ("Lamps", "Shapes, softness, colors, and which objects they light."),
     "world": ("Worlds", "Plain skies, images, and the Sky Texture."),
-    "materials": ("Materials", "What reflects, lets through and glows, and how much of it."),
-    "geometry": ("Geometry", "Whatever becomes a mesh when it is rendered, near and far, large and small."),
+    "materials": ("Materials", "Reflection, transparency and emission."),
+    "geometry": ("Geometry", "Everything that is rendered as a mesh, near and far, large and small."),
 }
 """Title and first line of each family's chapter."""
 

@@ -88,13 +88,13 @@ def test_every_option_arrives(verbs: list[tuple]) -> None:
     line = (
         "bake s.glb --output o --texel-density 12.5 --atlas per-object --quality high --quantity radiosity "
         "--light indirect --format png16 --objects Floor Wall --sky --keep-uvs --seed 7 --threads 2 "
-        "--quiet --report r.json --plot p.PNG --method two-level --elements 900 --patches 30 --contrast 0.25 "
+        "--quiet --report r.json --plot p.SVG --method two-level --elements 900 --patches 30 --contrast 0.25 "
         "--memory-limit 0.5 --overwrite --allow-scripts"
     )
     assert main(line.split()) == 0
     (_, scene, _, output, settings, report, plot, keep, allowed, console, _) = verbs[0]
     assert (scene, output, console.quiet) == (Path("s.glb"), Path("o"), True)
-    assert (report, plot, keep) == (Path("r.json"), Path("p.PNG"), False)
+    assert (report, plot, keep) == (Path("r.json"), Path("p.SVG"), False)
     assert allowed == Permissions(overwrite=True, scripts=True)
     assert settings == BakeSettings(
         texel_density=12.5,
@@ -130,7 +130,7 @@ def test_a_bake_is_kept_if_it_can_be(verbs: list[tuple], capsys: pytest.CaptureF
         ("--keep --method shooting", "needs the hierarchical method"),
         ("--keep --quantity residual", "a residual is of all light together"),
         ("--keep --relight", "not allowed with"),
-        ("--relight --plot p.png", "solves nothing"),
+        ("--relight --plot p.svg", "solves nothing"),
     ):
         assert main(["bake", *line.split()]) == 2
         assert message in capsys.readouterr().err

@@ -7,37 +7,30 @@ whatever moves, turns or reflects otherwise needs a new bake.
 
 from __future__ import annotations
 
-from collections.abc import Generator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...base import BakeError, BakeWarning, SceneError
+from ...base import SILENT, BakeError, BakeWarning, Progress
 from ...lightmap.images import LightmapPage, Seams, presentable, texel_pages, to_quantity
-from ...lightmap.lighting import LightingRecord, LitTexels, TexelLight, kept_bytes, relight_steps
+from ...lightmap.lighting import LightingRecord, LitTexels, TexelLight, kept_bytes, relight_texels
 from ...lightmap.texels import TexelGeometry
 from ...lightmap.unwrap import Atlas
-from ...lights import Light
 from ...numerics import Array, Scratch, tiles
 from ...options import BakeSettings
-from ...scene import BakeScene, Scene
+from ...scene import BakeScene
 from ...solver.element_transport import Relightable
 from ...solver.emitters import LightSources
-from ..result import Progress
-
-STRENGTHS = ("power", "irradiance", "radiance")
-"""The fields of lights that may change."""
+from ..scene_diff import SceneRecord, scene_record
 
 DAMAGED = (
     *(ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError),
     *(FloatingPointError, ZeroDivisionError, RecursionError, MemoryError, np.linalg.LinAlgError),
 )
 """What computing with a sidecar can raise that is not as it was written."""
-
-SAME = 1e-5
-"""Emission that differs from what its material's strength says by no more than this part is as expected."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,47 +122,13 @@ class KeptBake:
         """What the texels' part takes in memory."""
         return kept_bytes(self.lit)
 
-    def strengths_of(self, scene: Scene) -> Array:
-        """Return (s, 3) the strengths of the sources in a scene that differs in them alone.
-
-        Raises
-        ------
-        SceneError
-            If anything else differs.
-        """
-        before = self.bake_scene.scene
-        alike = len(scene) == len(before) and len(scene.lights) == len(before.lights)
-        alike = alike and all(
-            np.array_equal(getattr(scene, name), getattr(before, name))
-            for name in (
-                "triangles",
-                "normals",
-                "reflectance",
-                "opacity",
-                "two_sided",
-                "in_bounces",
-                "in_shadows",
-            )
-        )
-        if not alike:
-            raise SceneError("a surface, a reflectance or the number of lamps has changed; bake again")
-        for light, other in zip(before.lights, scene.lights, strict=True):
-            if not differs_in_strength_alone(light, other):
-                raise SceneError(f"lamp '{light.name}' has changed in more than its strength; bake again")
-        exitance = np.zeros((len(self.sources) - len(scene.lights), 3))
-        emits = self.sources.emitter >= 0
-        np.maximum.at(exitance, self.sources.emitter[emits], scene.emission[emits])
-        lamps = np.array([light.strength for light in scene.lights]).reshape(-1, 3)
-        strengths = self.sources.checked(np.concatenate([lamps, exitance]))
-        told = self.sources.emission(before.emission, np.arange(len(scene)), strengths)
-        if np.abs(told - scene.emission).max(initial=0.0) > SAME * scene.emission.max(initial=0.0):
-            raise SceneError(
-                "emission has changed in more than its strength, or is new somewhere; bake again"
-            )
-        return strengths
+    @cached_property
+    def record(self) -> SceneRecord:
+        """What is compared with other exports of the scene."""
+        return scene_record(self.bake_scene, self.settings, self.geometry.uv)
 
 
-def relight_pages(kept: KeptBake, strengths: Array) -> Generator[Progress, None, tuple[LightmapPage, ...]]:
+def relight_pages(kept: KeptBake, strengths: Array, progress: Progress = SILENT) -> tuple[LightmapPage, ...]:
     """Compute the lightmaps for other strengths of the sources.
 
     Parameters
@@ -186,9 +145,9 @@ def relight_pages(kept: KeptBake, strengths: Array) -> Generator[Progress, None,
     """
     wanted = kept.sources.checked(strengths)
     if not kept.origin:
-        return (yield from _relight(kept, wanted))
+        return _relight(kept, wanted, progress)
     try:
-        return (yield from _relight(kept, wanted))
+        return _relight(kept, wanted, progress)
     except (*DAMAGED, BakeError) as error:
         raise damaged(kept.origin) from error
 
@@ -198,20 +157,14 @@ def damaged(path: Path | str) -> BakeError:
     return BakeError(f"'{path}' is not used: it is damaged; bake again")
 
 
-def _relight(kept: KeptBake, wanted: Array) -> Generator[Progress, None, tuple[LightmapPage, ...]]:
+def _relight(kept: KeptBake, wanted: Array, progress: Progress) -> tuple[LightmapPage, ...]:
     """Compute the lightmaps for strengths that are checked."""
     scratch = kept.geometry.scratch
-    steps = relight_steps(kept.lit, kept.solved, wanted, scratch)
-    while True:
-        try:
-            yield Progress("relight", 0.95 * next(steps))
-        except StopIteration as done:
-            light: TexelLight = done.value
-            break
+    light = relight_texels(kept.lit, kept.solved, wanted, scratch, progress.part(0.0, 0.95))
     emission = kept.sources.emission(kept.emission, kept.geometry.triangle, wanted)
     values = shown(light, kept.reflectance, emission, kept.settings, scratch)
     pages = presentable(texel_pages(kept.geometry, values, kept.seams, kept.rings))
-    yield Progress("relight", 1.0)
+    progress.at(1.0)
     return pages
 
 
@@ -226,29 +179,3 @@ def shown(
         emitted = np.zeros((len(irradiance), 3)) if settings.light == "indirect" else emission[rows]
         values[rows] = to_quantity(irradiance, reflectance[rows], emitted, settings.quantity)
     return values
-
-
-def differs_in_strength_alone(one: Light, other: Light) -> bool:
-    """Tell whether two lights differ at most in colour and strength, but for rounding."""
-    if type(one) is not type(other):
-        return False
-    return all(
-        _equal(getattr(one, entry.name), getattr(other, entry.name))
-        for entry in fields(one)
-        if entry.name not in STRENGTHS
-    )
-
-
-def same_light(one: Light, other: Light) -> bool:
-    """Tell whether two lights are the same."""
-    alike = type(one) is type(other)
-    return alike and all(_equal(getattr(one, e.name), getattr(other, e.name)) for e in fields(one))
-
-
-def _equal(one: Any, other: Any) -> bool:
-    """Tell whether values are the same: of skies, whose pictures are rendered anew, but for rounding."""
-    if not isinstance(one, np.ndarray) or not isinstance(other, np.ndarray):
-        return bool(one == other)
-    if one.shape != other.shape:
-        return False
-    return bool(np.abs(one - other).max(initial=0.0) <= SAME * np.abs(one).max(initial=0.0))

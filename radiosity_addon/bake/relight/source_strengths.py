@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from copy import copy
-from dataclasses import replace
-from typing import Any
-
 import numpy as np
 
 from ...base import SceneError
-from ...lights import Light
 from ...numerics import Array
 from ...scene import BakeScene
-from .kept_bake import STRENGTHS, KeptBake
-from .scene_digest import check_same, scene_digests
+from ..scene_diff import RELIGHTABLE, aligned, compare, scene_record
+from .kept_bake import KeptBake
+
+SAME = 1e-5
+"""Emission that differs from what its material's strength says by no more than this part is as expected."""
 
 
 def strengths_in(kept: KeptBake, bake_scene: BakeScene) -> Array:
@@ -27,38 +24,15 @@ def strengths_in(kept: KeptBake, bake_scene: BakeScene) -> Array:
     SceneError
         If anything else differs; the message names it.
     """
-    check_same(scene_digests(kept.bake_scene), bake_scene)
-    scene = copy(bake_scene.scene)
-    scene.lights = aligned(kept.bake_scene.scene.lights, scene.lights)
-    return kept.strengths_of(scene)
-
-
-def aligned(before: Sequence[Light], now: Sequence[Light]) -> tuple[Light, ...]:
-    """Return the lights there are now in the order of those before, dark ones for those that are gone.
-
-    Raises
-    ------
-    SceneError
-        If there is one that was not there before.
-    """
-    names = {light.name for light in before}
-    for light in now:
-        if light.name not in names:
-            raise SceneError(f"lamp or world '{light.name}' is new: bake again")
-    given = {}
-    for name in names:
-        were = [light for light in before if light.name == name]
-        found = [light for light in now if light.name == name]
-        if len(found) not in (0, len(were)):
-            raise SceneError(
-                f"there are {len(found)} lights '{name}', and there were {len(were)} when baked: bake again"
-            )
-        given[name] = iter(found or [dark(light) for light in were])
-    return tuple(next(given[light.name]) for light in before)
-
-
-def dark(light: Light) -> Light:
-    """Return the light without strength."""
-    field = next(name for name in STRENGTHS if hasattr(light, name))
-    nothing: dict[str, Any] = {field: np.zeros(3)}
-    return replace(light, **nothing)
+    compare(kept.record, scene_record(bake_scene)).refuse_all_but(RELIGHTABLE)
+    before, now, sources = kept.bake_scene.scene, bake_scene.scene, kept.sources
+    lights = aligned(before.lights, now.lights)
+    exitance = np.zeros((len(sources) - len(lights), 3))
+    emits = sources.emitter >= 0
+    np.maximum.at(exitance, sources.emitter[emits], now.emission[emits])
+    lamps = np.array([light.strength for light in lights]).reshape(-1, 3)
+    strengths = sources.checked(np.concatenate([lamps, exitance]))
+    expected = sources.emission(before.emission, np.arange(len(now)), strengths)
+    if np.abs(expected - now.emission).max(initial=0.0) > SAME * now.emission.max(initial=0.0):
+        raise SceneError("emission has changed in more than its strength, or is new somewhere: bake again")
+    return strengths

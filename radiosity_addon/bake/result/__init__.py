@@ -6,7 +6,8 @@ Plain records and files, nothing that bakes.
 from __future__ import annotations
 
 from .details import MEANS, More, more_of, statistics
-from .progress import Picture, Progress, TexelPicture, TexelSurfaces
+from .history_plot import write_history
+from .pictures import Picture, TexelPicture, TexelSurfaces
 from .report import BakeReport, LightmapFile, solver_part
 from .result import BakeDetails, BakedObject, BakeResult, LightGroup, PageDetails
 from .texel_pictures import TexelPictures
@@ -22,11 +23,11 @@ __all__ = [
     "More",
     "PageDetails",
     "Picture",
-    "Progress",
     "TexelPicture",
     "TexelPictures",
     "TexelSurfaces",
     "more_of",
     "solver_part",
     "statistics",
+    "write_history",
 ]

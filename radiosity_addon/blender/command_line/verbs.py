@@ -16,10 +16,12 @@ from ...options import BakeSettings
 from ..files.single_files import check_existing, check_places, make_folder_of, owner_told
 from ..registration import register, unregister
 from ..relight import kept_bakes
-from ..session import runtime
+from ..session import last_bake
 
 if TYPE_CHECKING:
+    from ...bake.result import BakeReport
     from ..files.output import OutputFolder
+    from ..jobs.finish import BakeJob
 
 MAX_IMAGES = 8
 """The closing lines name so many lightmaps one by one."""
@@ -64,7 +66,7 @@ def bake(
     """
     with registered():
         from ...files import BLEND_NAME
-        from ..jobs.job import WRITING_STAGES, run_bake
+        from ..jobs.job import run_bake
 
         source = scene or loaded
         if source is not None and same_file(source, output / BLEND_NAME):
@@ -83,31 +85,37 @@ def bake(
             notes=notes,
             with_preview=preview,
         )
-        try:
-            while True:
-                try:
-                    progress = next(job)
-                except StopIteration as done:
-                    report = done.value
-                    break
-                interrupts.check()
-                interrupts.deferred = progress.stage in WRITING_STAGES
-                console.progress(progress.stage, progress.fraction)
-        finally:
-            interrupts.deferred = True
-            job.close()
+        report = carried_out(job, console, interrupts)
         if report_copy is not None:
             make_folder_of(report_copy)
             report.write_copy(report_copy)
         files = written_files(report.as_dict(), preview, keep)
         if plot is not None:
-            from .plot import render_plot
+            from ...bake.result import write_history
 
             console.progress("plot", 1.0)
             make_folder_of(plot)
-            render_plot(report.as_dict(), plot.resolve())
+            write_history(report.as_dict(), plot.resolve())
             files.append((str(plot), "how it was solved"))
         console.lines(summary(str(output), files, report.as_dict()))
+
+
+def carried_out(job: BakeJob, console: Console, interrupts: Interrupts) -> BakeReport:
+    """Run a job to its end, show how far it is, and stop it at Ctrl-C; return its report."""
+    from ..jobs.finish import WRITING_STAGES
+
+    try:
+        while True:
+            try:
+                status = next(job)
+            except StopIteration as done:
+                return done.value
+            interrupts.check()
+            interrupts.deferred = status.stage in WRITING_STAGES
+            console.progress(status.stage, status.fraction)
+    finally:
+        interrupts.deferred = True
+        job.close()
 
 
 def _places(report_copy: Path | None, plot: Path | None) -> dict[str, Path]:
@@ -204,7 +212,7 @@ def restore(
         if not count:
             raise SceneError(f"'{scene or loaded}' shows no bake; there is nothing to restore")
         for each in bpy.data.scenes:
-            runtime.forget(each)
+            last_bake.forget(each)
             kept_bakes.drop(each)
         make_folder_of(output)
         save_restored(output)

@@ -1,4 +1,4 @@
-"""Look at what a lamp's own nodes make of its light: Cycles renders the inside of a sphere around it."""
+"""Evaluate a lamp's nodes: Cycles renders the inside of a sphere around it."""
 
 from __future__ import annotations
 
@@ -10,31 +10,19 @@ from ...numerics import brdf_of_reflectance, intensity_of_flux
 from .world_pixels import look_around, only_for_now, panorama_scene
 
 SIZE = (16, 32)
-"""Rows and columns of the picture: directions in which the lamp is asked."""
+"""Rows and columns of the picture: directions in which the lamp is evaluated."""
 
 _SUBDIVISIONS = 5
 _REFLECTANCE = 0.5
 
 
 def lamp_factor(lamp: bpy.types.Light) -> tuple[np.ndarray, float]:
-    """Return what a lamp's nodes multiply its light with, and by how much that varies with direction.
+    """Return the factor of a lamp's nodes on its light, and its variation with direction.
 
-    Parameters
-    ----------
-    lamp : Light
-        With a node tree, not evaluated. What its nodes know of its shape or place is lost.
-
-    Returns
-    -------
-    factor : (3,) float64
-        The mean over directions.
-    variation : float
-        The standard deviation over directions, relative to the mean.
-
-    Raises
-    ------
-    BakeError
-        If Cycles could not render it.
+    lamp: With a node tree, not evaluated. Inputs of its nodes that depend on its shape or position are lost.
+    Returns factor (3,): The mean over directions.
+    Returns variation: The standard deviation over directions, relative to the mean.
+    Raises BakeError if Cycles could not render it.
     """
     with only_for_now():
         scene = panorama_scene(None)

@@ -22,14 +22,14 @@ _SAME_SCALE = 1e-4  # relative difference of axes below which a scale counts as 
 _EVEN = 0.02  # relative variation with direction below which a lamp's nodes count as constant
 
 ALL_BOUNCES = 1024
-"""A lamp's own limit in Cycles, unless it is set."""
+"""Cycles' default for a lamp's limit of bounces."""
 
 LampFactors = dict[str, tuple[np.ndarray, float]]
-"""By a lamp's full name, what its nodes make of its light (see `lamp_factor`)."""
+"""The factor of each lamp's nodes (see `lamp_factor`), by its full name."""
 
 
 def lamp_factors() -> Generator[float, None, LampFactors]:
-    """Have Cycles evaluate the nodes of all lamps whose light is not a plain constant, one a step.
+    """Let Cycles evaluate the nodes of all lamps whose light is not constant, one per step.
 
     Before the scene is evaluated: rendering would not leave its objects alive.
     """
@@ -55,25 +55,12 @@ def read_lamp(
 ) -> tuple[Light | None, tuple[BakeWarning, ...]]:
     """Return the light that a lamp object, or an instance of one, is.
 
-    Parameters
-    ----------
-    lamp : bpy.types.Object of type LIGHT, evaluated
-    matrix_world : (4, 4) float64
-    factors : dict
-        Of `lamp_factors`.
-    dark : bool
-        Whether a lamp without power is a light as well: it may get some later.
-
-    Returns
-    -------
-    light : Light or None
-        None where it gives no light.
-    warnings : tuple of BakeWarning
-
-    Raises
-    ------
-    SceneError
-        If its position or power is NaN or infinite.
+    lamp bpy.types.Object of type LIGHT, evaluated.
+    matrix_world (4, 4).
+    factors: Of `lamp_factors`.
+    dark: Whether a lamp without power is a light as well: it may get some later.
+    Returns light: None where it gives no light.
+    Raises SceneError if its position or power is NaN or infinite.
     """
     data = lamp.data
     name = lamp.name
@@ -84,7 +71,7 @@ def read_lamp(
     warnings += notes
     if not (all_finite(matrix_world) and np.isfinite(strength).all()):
         raise SceneError(
-            f"lamp '{name}' has a NaN or infinite position or power; mend its transform and strength"
+            f"lamp '{name}' has a NaN or infinite position or power; fix its transform and strength"
         )
     if (strength < 0).any():
         warnings.append(BakeWarning(name, f"lamp '{name}': negative power is not possible; 0 is used"))
@@ -96,7 +83,7 @@ def read_lamp(
 
 
 def _strength(name: str, data: bpy.types.Light, factors: LampFactors) -> tuple[np.ndarray, list[BakeWarning]]:
-    """Return energy × colour of all that scales it, (3,) RGB [W, or W/m² of a sun]."""
+    """Return energy × color of all that scales it, (3,) RGB [W, or W/m² of a sun]."""
     strength = data.energy * np.array(data.color[:3], dtype=np.float64)
     if getattr(data, "use_temperature", False):
         strength = strength * np.array(data.temperature_color[:3], dtype=np.float64)
@@ -198,14 +185,14 @@ def _backward(matrix: np.ndarray) -> np.ndarray:
 
 
 def _sphere_area(data: bpy.types.Light) -> float:
-    """Return what an unnormalised point or spot lamp's power is multiplied by (measured)."""
+    """Return the factor on an unnormalized point or spot lamp's power (measured)."""
     if getattr(data, "normalize", True):
         return 1.0
     return sphere_area(data.shadow_soft_size)
 
 
 def _casts_shadow(data: bpy.types.Light) -> bool:
-    """Tell what Cycles asks: its own switch, or where it has none (later on) that of all engines."""
+    """Return the setting that Cycles uses: its own or, in later versions, that of all engines."""
     return bool(getattr(data.cycles, "cast_shadow", data.use_shadow))
 
 
@@ -214,7 +201,7 @@ def _is_portal(data: bpy.types.Light) -> bool:
 
 
 def _asks_for_distance(tree: bpy.types.NodeTree) -> bool:
-    """Tell whether nodes make light fall off otherwise than with the square of the distance."""
+    """Return whether nodes change the falloff of light from the square of the distance."""
     for node in tree.nodes:
         if node.type == "LIGHT_FALLOFF":
             linked = {output.name for output in node.outputs if output.is_linked}

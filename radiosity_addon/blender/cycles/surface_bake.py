@@ -1,4 +1,4 @@
-"""A scene for the time of a few bakes, in which Cycles evaluates materials.
+"""A temporary scene in which Cycles evaluates materials.
 
 One mesh in it holds triangles of many objects, and copies of their materials glow with what is
 asked for: a bake of emission at one sample is exact. Nothing that was in the file is touched,
@@ -21,13 +21,13 @@ from ..scene_records.export_sources import MaterialSource
 from .surface_rewiring import RewiredMaterial
 
 _PIXEL_OFFSET = np.array([0.001, 0.002])
-"""Blender samples this much beside the centers of texels."""
+"""Blender samples this far from the centers of texels."""
 
 _UV_LAYER = "Tiles"
 
 
 def can_evaluate() -> bool:
-    """Tell whether this Blender has Cycles."""
+    """Return whether this Blender has Cycles."""
     return hasattr(bpy.types.Scene, "cycles")
 
 
@@ -35,16 +35,11 @@ def can_evaluate() -> bool:
 class DrawnSurfaces:
     """The mesh of the triangles that vary, n of them.
 
-    Parameters
-    ----------
-    size : (int, int)
-        Width and height of the image.
-    corners : (n, 3, 3) float32
-    uv : (n, 3, 2) float32
-        In the image, their tiles.
-    inputs : dict of str to (n, 3, 4) float32
-        What nodes ask for.
-    surface : (n,) int
+    size (int, int): Width and height of the image.
+    corners (n, 3, 3) float32.
+    uv (n, 3, 2) float32: In the image, their tiles.
+    inputs dict of str to (n, 3, 4) float32: Inputs of the nodes.
+    surface (n,) int.
     """
 
     size: tuple[int, int]
@@ -73,14 +68,10 @@ def drawn_surfaces(
 
 
 class SurfaceBake:
-    """A scene of one mesh and copies of materials, for the time of a bake.
+    """A temporary scene of one mesh and copies of materials.
 
-    Parameters
-    ----------
-    materials : mapping of int to MaterialSource or None
-        Those to evaluate, by their surface.
-    inputs : sequence of str
-        What their nodes ask for.
+    materials mapping of int to MaterialSource or None: Those to evaluate, by their surface.
+    inputs: Inputs of their nodes.
     """
 
     def __init__(
@@ -129,7 +120,7 @@ class SurfaceBake:
         self._made.append(self._image)
 
     def channel(self, channel: str) -> np.ndarray:
-        """Return one channel, (h, w, 3) float32; what is not drawn is 0."""
+        """Return one channel, (h, w, 3) float32; 0 where nothing is drawn."""
         width, height = self._image.size
         for rewired in self._rewired.values():
             rewired.show(channel, self._image)
@@ -145,18 +136,18 @@ class SurfaceBake:
         return pixels.reshape(height, width, 4)[..., :3]
 
     def close(self) -> None:
-        """Leave the file as it was."""
+        """Remove everything from the file."""
         remove_datablocks(self._made)
         self._made.clear()
 
 
 def attribute_names(inputs: Sequence[str]) -> dict[str, str]:
-    """Return the mesh attribute that holds each of what nodes ask for."""
+    """Return the mesh attribute of each input of the nodes."""
     return {name: f"radiosity_{number}" for number, name in enumerate(inputs)}
 
 
 def bake_emission() -> set[str]:
-    """Have Cycles write what the active object emits into its materials' active images."""
+    """Let Cycles bake the active object's emission into its materials' active images."""
     return bpy.ops.object.bake(
         type="EMIT",
         margin=0,
@@ -169,7 +160,7 @@ def bake_emission() -> set[str]:
 
 
 def _copy_numbers(owner: bpy.types.bpy_struct, to: bpy.types.bpy_struct) -> None:
-    """Copy custom properties that Attribute nodes of the view layer could ask for."""
+    """Copy custom properties that Attribute nodes of the view layer can read."""
     for name, value in owner.items():
         if isinstance(value, (int, float)) or (hasattr(value, "typecode") and len(value) <= 4):
             to[name] = value

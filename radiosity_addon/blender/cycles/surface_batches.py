@@ -19,28 +19,24 @@ from .surface_bake import DrawnSurfaces, attribute_names, drawn_surfaces
 from .surface_rewiring import CHANNELS, RewiredMaterial
 
 MOMENT = 0.04
-"""Seconds of rewiring materials in a step, if that is enough for one."""
+"""Maximum seconds of rewiring materials per step, if one material takes less."""
 
 MAX_NODES = 64
-"""Nodes of a batch's materials, if that is enough for one; to make 64 takes about 20 ms."""
+"""Maximum nodes of a batch's materials, if one material has fewer; making 64 takes about 20 ms."""
 
 MAX_TEXELS = 1024 * 1024
 """Texels of a batch; Cycles takes 0.3–0.9 s for them."""
 
 TEXELS_OF_MESH = 8
-"""A triangle's share of a batch's mesh takes as long as so many texels."""
+"""Cost of a triangle in a batch's mesh, in texels."""
 
 
 @dataclass(frozen=True)
 class MaterialFacts:
     """A material's rewired copy, after it is gone.
 
-    Parameters
-    ----------
-    varying : frozenset of str
-        The channels in which it is not the same all over.
-    nodes : int
-        Those of its trees.
+    varying frozenset of str: The channels in which it is not the same all over.
+    nodes: Those of its trees.
     """
 
     varying: frozenset[str]
@@ -49,15 +45,10 @@ class MaterialFacts:
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Some triangles, n of them.
+    """A batch of n triangles.
 
-    Parameters
-    ----------
-    tiles : SurfaceTiles
-        In the batch's own image.
-    drawn : DrawnSurfaces
-    row, column : (m,) int64
-        Where each of `tiles.texels()` is in the image of all.
+    tiles: In the batch's own image.
+    row, column (m,) int64: Where each of `tiles.texels()` is in the image of all.
     """
 
     tiles: SurfaceTiles
@@ -74,14 +65,10 @@ class Batch:
 def material_facts(
     materials: Mapping[int, MaterialSource | None], inputs: Sequence[str]
 ) -> Generator[float, None, dict[int, MaterialFacts]]:
-    """Rewire each material for a moment, as many a step as fit into one.
+    """Rewire each material temporarily, several per step.
 
-    Parameters
-    ----------
-    materials : mapping of int to MaterialSource or None
-        By their surface.
-    inputs : sequence of str
-        What their nodes ask for.
+    materials mapping of int to MaterialSource or None: By their surface.
+    inputs: Inputs of their nodes.
     """
     facts: dict[int, MaterialFacts] = {}
     until = time.perf_counter() + MOMENT
@@ -107,15 +94,11 @@ def batches(
 ) -> list[Batch]:
     """Divide the triangles that vary; works on arrays alone.
 
-    Parameters
-    ----------
-    tiles : SurfaceTiles
-        Of n triangles.
-    corners : (n, 3, 3) float64
-    inputs : mapping of str to (n, 3, 4) float32
-    surface : (n,) int
-    facts : mapping of int to MaterialFacts
-        Of those that vary.
+    tiles: Of n triangles.
+    corners (n, 3, 3).
+    inputs mapping of str to (n, 3, 4) float32.
+    surface (n,) int.
+    facts mapping of int to MaterialFacts: Of those that vary.
     """
     triangle, row, column, *_ = tiles.texels()
     made = []

@@ -43,30 +43,13 @@ def evaluate_surfaces(
 
     Each bake of Cycles is a step, which leaves nothing in the file: it may be edited before the next.
 
-    Parameters
-    ----------
-    context : bpy.types.Context
-    pieces : sequence of Piece
-        All of the scene, in its order.
-    surfaces : sequence of Surface
-    materials : sequence of MaterialSource or None
-        Parallel to `surfaces`: the file's own, not evaluated ones.
-    settings : BakeSettings
-        `resolution` and `threads` matter here.
-    in_background : bool
-        Whether a window waits.
-
-    Returns
-    -------
-    SurfaceImages or None
-        None where constants say it all.
-
-    Raises
-    ------
-    BakeError
-        If Cycles did not bake.
-    SceneError
-        If a material is gone.
+    pieces: All of the scene, in its order.
+    materials: Parallel to `surfaces`: the file's own, not evaluated ones.
+    settings: `resolution` and `threads` matter here.
+    in_background: Whether a window waits.
+    Returns none where constants suffice.
+    Raises BakeError if Cycles did not bake.
+    Raises SceneError if a material is gone.
     """
     surface = np.concatenate([piece.surface for piece in pieces])
     plain = np.array([one.is_plain for one in surfaces])
@@ -83,7 +66,7 @@ def evaluate_surfaces(
         one.opacity < 1.0 or (row in facts and "passed" in facts[row].varying)
         for row, one in enumerate(surfaces)
     ]
-    # Where no material varies in a channel, what was read of them holds.
+    # Where no material varies in a channel, the constants apply.
     varying = [channel for channel in CHANNELS if any(channel in each.varying for each in facts.values())]
     yield 0.1
 
@@ -117,7 +100,7 @@ def _side(settings: BakeSettings, cut_out: bool) -> int:
 
 
 def _gather(pieces: Sequence[Piece], rows: np.ndarray) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Return world corners (n, 3, 3) of some triangles, and what nodes ask there, (n, 3, 4) by name."""
+    """Return world corners (n, 3, 3) of triangles, and inputs of the nodes there, (n, 3, 4) by name."""
     names = sorted({name for piece in pieces for name in piece.asked})
     corners = np.empty((len(rows), 3, 3))
     inputs = {name: np.zeros((len(rows), 3, 4), dtype=np.float32) for name in names}

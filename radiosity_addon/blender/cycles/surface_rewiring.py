@@ -1,4 +1,4 @@
-"""Copies of materials that glow with what the originals reflect, emit or let through.
+"""Copies of materials that emit what the originals reflect, emit or transmit.
 
 The shader tree is followed once and three expressions are built beside it, of Math nodes on the
 sockets that feed the shaders; Cycles then evaluates them. Node groups are copied for each use,
@@ -36,12 +36,8 @@ CHANNELS = ("reflected", "radiance", "passed")
 class RewiredMaterial:
     """A copy of a material whose output can be switched between the three expressions.
 
-    Parameters
-    ----------
-    original : bpy.types.Material
-        One with nodes.
-    attributes : mapping of str to str
-        The names of the mesh attributes that hold the inputs nodes ask for.
+    original: One with nodes.
+    attributes mapping of str to str: The names of the mesh attributes that hold inputs of the nodes.
     """
 
     def __init__(self, original: bpy.types.Material, attributes: Mapping[str, str]) -> None:
@@ -67,11 +63,11 @@ class RewiredMaterial:
         return sum(len(tree.nodes) for tree in [self._tree, *trees])
 
     def is_constant(self, channel: str) -> bool:
-        """Tell whether a channel is the same all over."""
+        """Return whether a channel is constant."""
         return not is_socket(getattr(self._terms, channel))
 
     def show(self, channel: str, image: bpy.types.Image) -> None:
-        """Make the material glow with one of `CHANNELS`, and be baked into an image."""
+        """Make the material emit one of `CHANNELS`, and bake into an image."""
         value = getattr(self._terms, channel)
         color = self._emission.inputs["Color"]
         for link in list(color.links):
@@ -85,7 +81,7 @@ class RewiredMaterial:
         self._target.image = image
 
     def _prepare(self, tree: bpy.types.NodeTree, attributes: Mapping[str, str]) -> None:
-        """Give every group a tree of its own, and let nodes ask the mesh's attributes."""
+        """Give every group a tree of its own, and let nodes read the mesh's attributes."""
         for node in list(tree.nodes):
             if node.type == "GROUP" and node.node_tree is not None:
                 node.node_tree = node.node_tree.copy()
@@ -115,7 +111,7 @@ class RewiredMaterial:
             _relink(tree, output, number.outputs[0])
 
     def _finish(self, output: bpy.types.Node | None) -> None:
-        """Put an emission shader at the output, and an image to bake into beside it."""
+        """Add an emission shader at the output, and an image to bake into."""
         nodes, links = self._tree.nodes, self._tree.links
         if output is None:
             output = nodes.new("ShaderNodeOutputMaterial")
@@ -169,7 +165,7 @@ class _Rewiring(ShaderTerms[_Place]):
         return NodeAlgebra(place.tree)
 
     def warn(self, message: str) -> None:
-        """Be silent: whoever reads the constants has told it."""
+        """Do nothing: reading the constants has already warned."""
 
     def not_understood(self, _: bpy.types.Node) -> Terms:
         return nothing()

@@ -38,26 +38,18 @@ def read_world(world: bpy.types.World | None, dark: bool = False) -> Generator[f
 
     Each time that Cycles renders it is a step; the world is found by its name again after each.
 
-    Parameters
-    ----------
-    world : World or None
-        As the file has it, not evaluated: it may be rendered.
-    dark : bool
-        Whether a black one is a light as well: it may shine later.
-
-    Raises
-    ------
-    BakeError
-        If its nodes vary with direction, and Cycles could not render them.
+    world: As the file has it, not evaluated: it may be rendered.
+    dark: Whether a black one is a light as well: it may shine later.
+    Raises BakeError if its nodes vary with direction, and Cycles could not render them.
     """
     if world is None or not _lights_surfaces(world):
         return [], ()
     limited = _limited(world)
     if not uses_nodes(world):
         return _constant(np.array(world.color[:3], dtype=np.float64), world.name, dark), limited
-    with known_means_only(None):  # an image is not constant, whatever its mean
+    with known_means_only(None):  # an image is not constant
         radiance, warnings = read_radiance(world, "world")
-    # The walk through the nodes warns of whatever is not constant: then Cycles knows better.
+    # The walk through the nodes warns of values that are not constant; Cycles evaluates those.
     beside = tuple(warning for warning in warnings if "volume" in warning.message)
     if len(beside) == len(warnings):
         return _constant(radiance, world.name, dark), beside + limited
@@ -83,10 +75,7 @@ def _limited(world: bpy.types.World) -> tuple[BakeWarning, ...]:
 def _named(name: str) -> bpy.types.World:
     """Return the world of a full name.
 
-    Raises
-    ------
-    SceneError
-        If it was removed between two steps.
+    Raises SceneError if it was removed between two steps.
     """
     world = next((each for each in bpy.data.worlds if each.name_full == name), None)
     if world is None:
@@ -149,5 +138,4 @@ def _inside(bounds: np.ndarray, window: Bounds) -> np.ndarray:
     latitude = 0.5 * (bounds[:, 0] + bounds[:, 1])
     azimuth = 0.5 * (bounds[:, 2] + bounds[:, 3])
     turned = np.mod(azimuth - window[2], 2.0 * np.pi)
-    inside: np.ndarray = (latitude > window[0]) & (latitude < window[1]) & (turned < window[3] - window[2])
-    return inside
+    return (latitude > window[0]) & (latitude < window[1]) & (turned < window[3] - window[2])

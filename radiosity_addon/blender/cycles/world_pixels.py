@@ -19,7 +19,7 @@ SAMPLES = 16
 """Of each pixel, spread over all of it."""
 
 _AS_DIFFUSE_RAYS = {"Is Diffuse Ray": 1.0, "Is Reflection Ray": 1.0, "Ray Length": 1e5, "Ray Depth": 1.0}
-"""What a Light Path node says of rays that light a surface; all else it says of them is 0."""
+"""Outputs of a Light Path node for rays that light a surface; all others are 0."""
 
 
 def world_pixels(
@@ -27,24 +27,12 @@ def world_pixels(
 ) -> np.ndarray:
     """Return the radiance of a world by direction.
 
-    Parameters
-    ----------
-    world : World
-        As the file has it, not evaluated.
-    window : (4,) float [rad]
-        Latitudes and azimuths to look at (see `solver.environment`).
-    size : (h, w)
-
-    Returns
-    -------
-    (h, w, 3) float64
-        [W/m²/sr]; row 0 is the lowest latitude, azimuths fall from left to right. NaN and
+    world: As the file has it, not evaluated.
+    window (4,) [rad]: Latitudes and azimuths to look at (see `solver.environment`).
+    size (h, w).
+    Returns (h, w, 3): [W/m²/sr]; row 0 is the lowest latitude, azimuths fall from left to right. NaN and
         negative values are 0.
-
-    Raises
-    ------
-    BakeError
-        If Cycles could not render it.
+    Raises BakeError if Cycles could not render it.
     """
     with only_for_now():
         copy = world.copy()
@@ -82,10 +70,7 @@ def panorama_scene(world: bpy.types.World | None, window: Bounds = WHOLE) -> bpy
 def look_around(scene: bpy.types.Scene, size: tuple[int, int], what: str) -> np.ndarray:
     """Render a `panorama_scene`: (h, w, 3) float64 radiance, as `world_pixels` returns it.
 
-    Raises
-    ------
-    BakeError
-        If Cycles could not render `what`.
+    Raises BakeError if Cycles could not render `what`.
     """
     with tempfile.TemporaryDirectory(prefix="radiosity-") as folder:
         path = Path(folder) / "seen.exr"
@@ -125,7 +110,7 @@ def _set_up(scene: bpy.types.Scene, size: tuple[int, int], path: Path) -> None:
 
 
 def _answer_light_paths(tree: bpy.types.NodeTree, copies: dict[str, bpy.types.NodeTree]) -> None:
-    """Have every Light Path node of a tree, and of copies of its groups, answer as for diffuse rays."""
+    """Make every Light Path node of a tree, and of copies of its groups, act as for diffuse rays."""
     for node in list(tree.nodes):
         if node.type == "GROUP" and node.node_tree is not None:
             name = node.node_tree.name_full
@@ -149,7 +134,7 @@ def _replace(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, answer: flo
 
 @contextmanager
 def only_for_now() -> Iterator[None]:
-    """Remove whatever datablock the block makes, the render result included."""
+    """Remove all datablocks that the block creates, including the render result."""
     kinds = (
         "scenes", "objects", "meshes", "materials", "lights", "cameras", "worlds", "node_groups",
         "images", "actions",

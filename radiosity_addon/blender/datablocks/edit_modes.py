@@ -1,4 +1,4 @@
-"""Objects taken out of Edit Mode and other modes, in whatever scene they are being edited."""
+"""Take objects out of Edit Mode and other modes, in any scene."""
 
 from __future__ import annotations
 
@@ -12,10 +12,7 @@ from ...base import BakeError
 def leave_edit_modes(context: bpy.types.Context, objects: Iterable[bpy.types.Object]) -> None:
     """Switch objects that are being edited to object mode; their data cannot be swapped in it.
 
-    Raises
-    ------
-    BakeError
-        If one cannot be switched.
+    Raises BakeError if one cannot be switched.
     """
     for obj in objects:
         if obj.mode != "OBJECT":

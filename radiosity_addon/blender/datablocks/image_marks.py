@@ -1,4 +1,4 @@
-"""Custom properties by which a lightmap's image tells what it is: light to import, for panels."""
+"""Custom properties that identify a lightmap's image. Panels import this module, so it is light."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Mean colours of images, in linear scene colours."""
+"""Mean colors of images, in linear scene colors."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Means = dict[Wanted, "np.ndarray | None"]
 
 
 class UnknownMeanError(Exception):
-    """The mean of an image is wanted that is not among the known ones; it takes too long for the moment."""
+    """An image's mean is needed but not known yet; computing it now would take too long."""
 
     def __init__(self, wanted: Wanted) -> None:
         super().__init__(wanted[0])
@@ -65,17 +65,10 @@ def mean_of_named(wanted: Wanted) -> Generator[float, None, np.ndarray | None]:
 def image_mean_steps(
     image: bpy.types.Image, equirectangular: bool = False
 ) -> Generator[float, None, np.ndarray | None]:
-    """Compute the mean of an image's pixels, colours made linear first; the first step alone asks the image.
+    """Compute the mean of an image's pixels, converted to linear first; only the first step reads the image.
 
-    Parameters
-    ----------
-    image : bpy.types.Image
-    equirectangular : bool
-        Weight each row by the solid angle it covers on the sphere.
-
-    Returns
-    -------
-    (4,) float64, linear RGB and alpha, not weighted by alpha; None for an image without pixels.
+    equirectangular: Weight each row by the solid angle it covers on the sphere.
+    Returns (4,), linear RGB and alpha, not weighted by alpha; None for an image without pixels..
     """
     width, height = image.size
     if width == 0 or height == 0 or image.channels == 0:

@@ -11,7 +11,7 @@ from ...numerics import double_area_vectors
 from ...scene import LIGHTMAP_UV_LAYER
 
 _INFINITE = 1e18
-"""What counts as infinite [m]: Blender stores an infinity it is given as the largest float,
+"""Positions beyond this are infinite [m]: Blender stores an infinity it is given as the largest float,
 and squares of lengths above this overflow single precision."""
 
 
@@ -19,21 +19,13 @@ and squares of lengths above this overflow single precision."""
 class MeshArrays:
     """A mesh, triangulated, in its own space.
 
-    Parameters
-    ----------
-    corners : (t, 3, 3) float64
-        Positions of the triangles' corners.
-    normals : (t, 3, 3) float64
-        Unit shading normals there, as Cycles has them (see `_flat`); 0 for a flat triangle without area.
-    loops : (t, 3) int32
-        The mesh corners (loops) they are.
-    polygon : (t,) int32
-        The polygon each triangle is part of.
-    material : (t,) int32
-        The slot of each triangle's polygon.
-    lightmap_uv : (t, 3, 2) float32 or None
-        The UVs of the layer `Lightmap`, where there is one.
-    uv_layers : int
+    corners (t, 3, 3): Positions of the triangles' corners.
+    normals (t, 3, 3): Unit shading normals there, as Cycles has them (see `_flat`); 0 for a flat triangle
+        without area.
+    loops (t, 3) int32: The mesh corners (loops) they are.
+    polygon (t,) int32: The polygon each triangle is part of.
+    material (t,) int32: The slot of each triangle's polygon.
+    lightmap_uv (t, 3, 2) float32: The UVs of the layer `Lightmap`, where there is one.
     """
 
     corners: np.ndarray
@@ -50,22 +42,17 @@ class MeshArrays:
 
 @dataclass(frozen=True, eq=False)
 class RawMesh:
-    """What a mesh stores, copied as it is: to be worked on when the mesh may be gone.
+    """Raw data of a mesh, copied so that it can be processed when the mesh may be gone.
 
-    Parameters
-    ----------
-    positions : (v, 3) float32
-    vertex : (l,) int32
-        Of each loop.
-    loops : (t, 3) int32
-    polygon : (t,) int32
-    material : (p,) int32
-    normals : (l, 3) float32
-    smooth : (p,) bool
-    by_corner : bool
-        Normals of corners count for flat polygons too; see `_flat`.
-    lightmap_uv : (l, 2) float32 or None
-    uv_layers : int
+    positions (v, 3) float32.
+    vertex (l,) int32: Of each loop.
+    loops (t, 3) int32.
+    polygon (t,) int32.
+    material (p,) int32.
+    normals (l, 3) float32.
+    smooth (p,) bool.
+    by_corner: Normals of corners count for flat polygons too; see `_flat`.
+    lightmap_uv (l, 2) float32.
     """
 
     positions: np.ndarray
@@ -89,7 +76,7 @@ def read_mesh(mesh: bpy.types.Mesh) -> MeshArrays | None:
 
 
 def copy_mesh_data(mesh: bpy.types.Mesh) -> RawMesh:
-    """Copy what is needed of a mesh, as fast as can be."""
+    """Copy the data needed from a mesh, quickly."""
     mesh.calc_loop_triangles()
     triangles, corners, polygons = len(mesh.loop_triangles), len(mesh.loops), len(mesh.polygons)
     layer = mesh.uv_layers.get(LIGHTMAP_UV_LAYER)
@@ -137,17 +124,17 @@ def no_triangles() -> MeshArrays:
 
 
 def all_finite(values: np.ndarray) -> bool:
-    """Tell whether positions of any shape are neither NaN nor infinite."""
+    """Return whether positions of any shape are finite."""
     return bool((np.abs(values) < _INFINITE).all())
 
 
 def not_finite_message(name: str) -> str:
-    """Say whose coordinates are no numbers, and the mend."""
-    return f"object '{name}' has NaN or infinite coordinates; mend its mesh or transform"
+    """Return the error message for an object with invalid coordinates."""
+    return f"object '{name}' has NaN or infinite coordinates; fix its mesh or transform"
 
 
 def same_polygons(first: bpy.types.Mesh, second: bpy.types.Mesh) -> bool:
-    """Tell whether two meshes have the same polygons over the same vertices, corner by corner."""
+    """Return whether two meshes have the same polygons over the same vertices, corner by corner."""
     sizes = [(len(mesh.vertices), len(mesh.polygons), len(mesh.loops)) for mesh in (first, second)]
     if sizes[0] != sizes[1]:
         return False
@@ -165,19 +152,11 @@ def world_from_object(mesh: MeshArrays, matrix: np.ndarray) -> tuple[np.ndarray,
     A mirroring matrix turns counter-clockwise triangles clockwise; Blender swaps them
     back, so that the side its normals show stays the front.
 
-    Parameters
-    ----------
-    mesh : MeshArrays
-    matrix : (4, 4) float64
-
-    Returns
-    -------
-    corners : (t, 3, 3) float64
-    normals : (t, 3, 3) float64, unit
-        In the corners' order. A normal that vanishes becomes the face's, or 0.
-    mirrored : bool
-        Whether the order of the corners was reversed: index what belongs to them
-        with [:, ::-1].
+    matrix (4, 4).
+    Returns corners (t, 3, 3).
+    Returns normals (t, 3, 3), unit: In the corners' order. A normal that vanishes becomes the face's, or 0.
+    Returns mirrored: Whether the order of the corners was reversed: index what belongs to them with [:,
+        ::-1].
     """
     linear = matrix[:3, :3]
     corners = mesh.corners @ linear.T + matrix[:3, 3]
@@ -189,7 +168,7 @@ def world_from_object(mesh: MeshArrays, matrix: np.ndarray) -> tuple[np.ndarray,
 
 
 def normal_matrix(linear: np.ndarray) -> np.ndarray:
-    """Return the matrix that turns normals, but for their length, as `linear` (3, 3) turns positions.
+    """Return the matrix that transforms normals (not their length) as `linear` (3, 3) transforms positions.
 
     The cofactor matrix is det · inverse-transpose, and exists for flattening ones too.
     """
@@ -198,7 +177,7 @@ def normal_matrix(linear: np.ndarray) -> np.ndarray:
 
 
 def degenerate(corners: np.ndarray) -> np.ndarray:
-    """Tell which triangles (t, 3, 3) have no area, within the rounding of single precision: (t,) bool."""
+    """Return (t,) which triangles (t, 3, 3) have no area, within single precision."""
     edges = corners - np.roll(corners, 1, axis=1)
     longest = np.einsum("tci,tci->tc", edges, edges).max(axis=1, initial=0.0)
     double_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)

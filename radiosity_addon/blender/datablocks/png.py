@@ -17,20 +17,10 @@ _END = b"\0\0\0\0IEND\xaeB`\x82"
 def render_png(scene: bpy.types.Scene, path: Path, samples: int, seed: int = 0, threads: int = 0) -> None:
     """Render a scene at its resolution; its other render settings are set here.
 
-    Parameters
-    ----------
-    scene : Scene
-        One made for this picture.
-    path : Path
-    samples : int
-        A pixel.
-    seed, threads : int
-        0 threads leaves their number to the scene.
-
-    Raises
-    ------
-    RuntimeError
-        If Blender could not render or write it.
+    scene: One made for this picture.
+    samples: A pixel.
+    seed, threads: 0 threads leaves their number to the scene.
+    Raises RuntimeError if Blender could not render or write it.
     """
     scene.render.engine = "CYCLES"
     scene.cycles.device = "CPU"
@@ -49,12 +39,9 @@ def render_png(scene: bpy.types.Scene, path: Path, samples: int, seed: int = 0, 
 
 
 def check_whole(path: Path) -> None:
-    """See that a PNG file that Blender has written goes to its end: Blender does not notice a full disk.
+    """Check that a PNG file written by Blender is complete: Blender does not notice a full disk.
 
-    Raises
-    ------
-    RuntimeError
-        If it does not.
+    Raises RuntimeError if it does not.
     """
     with path.open("rb") as file:
         size = file.seek(0, os.SEEK_END)
@@ -64,7 +51,7 @@ def check_whole(path: Path) -> None:
 
 
 def _still_image(render: bpy.types.RenderSettings, path: Path) -> None:
-    """Have nothing but the picture itself written, as an 8-bit PNG."""
+    """Set up Blender to write only the picture, as an 8-bit PNG."""
     render.resolution_percentage = 100
     render.use_border = render.use_multiview = render.use_stamp = False
     render.use_compositing = render.use_sequencer = render.use_simplify = False
@@ -79,7 +66,7 @@ def _still_image(render: bpy.types.RenderSettings, path: Path) -> None:
 
 
 def _without_notes(png: bytes) -> bytes:
-    """Drop a PNG's text chunks: Blender's tell dates and render times, so no two files are the same."""
+    """Drop a PNG's text chunks: Blender's contain dates and render times, so no two files would be equal."""
     kept, start = [png[:8]], 8
     while start < len(png):
         length = int.from_bytes(png[start : start + 4], "big") + 12  # size, type and checksum

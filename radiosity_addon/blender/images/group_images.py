@@ -15,7 +15,7 @@ from ...lightmap.images import LightmapPage, png16_scale, presentable
 from ...options import BakeSettings
 from ..datablocks.bake_record import is_made, remove_datablocks
 from ..datablocks.image_marks import GROUP, PAGE, SCALE_PROPERTY
-from ..session import lightmap_changes
+from ..session.state import session
 from .images import group_file_names, image_scale, set_pixels, write_images
 from .light_mixer import KIND, set_scale
 from .node_group import SCALE
@@ -55,12 +55,8 @@ def each_image(groups: GroupImages) -> Iterator[bpy.types.Image]:
 def shown_images() -> tuple[list[bpy.types.Image], GroupImages]:
     """Return the images of the bake that this file shows, also after it was saved and opened again.
 
-    Returns
-    -------
-    images : list of Image
-        The pages of all light.
-    groups : mapping of str to list of Image
-        Those of each light group.
+    Returns images: The pages of all light.
+    Returns groups mapping of str to list of Image: Those of each light group.
     """
     own = [image for image in bpy.data.images if is_made(image) and image.library is None and PAGE in image]
     own.sort(key=lambda image: image[PAGE])
@@ -76,26 +72,16 @@ def update_images(
     group_images: GroupImages,
     groups: Sequence[LightGroup] = (),
 ) -> None:
-    """Put new light into the images that are shown, in memory: whoever calls saves or packs them.
+    """Put new light into the images that are shown, in memory; the caller saves or packs them.
 
     Materials follow where an image holds scaled values and the scale changes. Images are only touched
     once all are known to fit.
 
-    Parameters
-    ----------
-    images : sequence of Image
-        The lightmaps' pages.
-    pages : sequence of LightmapPage
-        Parallel to `images`.
-    group_images : mapping of str to sequence of Image
-        Those of each light group; empty where there are none.
-    groups : sequence of LightGroup
-        The new light of the same groups.
-
-    Raises
-    ------
-    BakeError
-        If an image is missing, or has another size.
+    images: The lightmaps' pages.
+    pages: Parallel to `images`.
+    group_images mapping of str to sequence of Image: Those of each light group; empty where there are none.
+    groups: The new light of the same groups.
+    Raises BakeError if an image is missing, or has another size.
     """
     pages = presentable(pages)
     new = {group.name: presentable(group.pages) for group in groups}
@@ -112,7 +98,7 @@ def update_images(
             if scale is not None:
                 rescale_materials(image, scale)
             set_pixels(image, page, scale)
-    lightmap_changes.announce()
+    session.lightmaps_changed()
 
 
 def _check_fit(images: Sequence[bpy.types.Image], pages: Sequence[LightmapPage]) -> None:

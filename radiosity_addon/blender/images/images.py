@@ -66,24 +66,12 @@ def names_of_pages(
     They differ from each other, from the other files of the bake, and from stems of `others`, even
     where upper and lower case do not count.
 
-    Parameters
-    ----------
-    names : FileNames
-    settings : BakeSettings
-        Its format and atlas.
-    count : int
-        How many pages there are.
-    objects : sequence of str
-        With an atlas per object, the name of each page's object.
-    groups : sequence of str
-        Names of light groups.
-    others : frozenset of str
-        Stems of file names, `folded`, that are taken.
-
-    Returns
-    -------
-    files : list of list of str
-        Those of all light, then those of each group.
+    settings: Its format and atlas.
+    count: How many pages there are.
+    objects: With an atlas per object, the name of each page's object.
+    groups: Names of light groups.
+    others frozenset of str: Stems of file names, `folded`, that are taken.
+    Returns files: Those of all light, then those of each group.
     """
     ending = _FILE_FORMATS[settings.format][1]
     taken = {*others, *names.reserved(ending)}
@@ -144,26 +132,11 @@ def write_pages(
 ) -> list[bpy.types.Image]:
     """Make an image of each page, saved into `folder` or packed into the .blend.
 
-    Parameters
-    ----------
-    result : BakeResult
-    settings : BakeSettings
-        Its format and atlas name the files.
-    folder : Path or None
-        None packs the images.
-    others : frozenset of str
-        Stems of file names, `folded`, that are taken.
-    names : FileNames
-
-    Returns
-    -------
-    images : list of Image
-        Parallel to `result.pages`.
-
-    Raises
-    ------
-    BakeError
-        If a file cannot be written.
+    settings: Its format and atlas name the files.
+    folder: None packs the images.
+    others frozenset of str: Stems of file names, `folded`, that are taken.
+    Returns images: Parallel to `result.pages`.
+    Raises BakeError if a file cannot be written.
     """
     return write_images(result.pages, page_file_names(result, settings, others, names), settings, folder)
 
@@ -209,12 +182,12 @@ def relative_path(path: Path) -> str:
 
 
 def image_scale(image: bpy.types.Image) -> float:
-    """What a texel of the image must be multiplied by to get the quantity."""
+    """The factor from a texel of the image to the quantity."""
     return float(image.get(SCALE_PROPERTY, 1.0))
 
 
 def lightmap_files(images: Sequence[bpy.types.Image], settings: BakeSettings) -> list[LightmapFile]:
-    """What the report says of the images: file names, and the scale where there is one."""
+    """Entries of the images in the report: file names, and the scale where there is one."""
     scaled = settings.format == "png16"
     return [
         LightmapFile(
@@ -259,10 +232,7 @@ def _store(image: bpy.types.Image, folder: Path | None, file_name: str) -> None:
 def save_image(image: bpy.types.Image, path: Path) -> None:
     """Save an image, which then is of this file.
 
-    Raises
-    ------
-    BakeError
-        If it cannot be written.
+    Raises BakeError if it cannot be written.
     """
     image.filepath_raw = str(path)
     try:

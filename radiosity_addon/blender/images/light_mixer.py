@@ -33,7 +33,7 @@ WHITE = (1.0, 1.0, 1.0, 1.0)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Sliders:
-    """What is set of one light group."""
+    """The sliders of one light group."""
 
     name: str
     color: bpy.types.NodeSocket
@@ -50,13 +50,9 @@ def _all_mixers() -> list[bpy.types.NodeTree]:
 
 
 def new_mixer(names: Sequence[str], scales: Sequence[float]) -> bpy.types.NodeTree:
-    """Make the mixer of some groups; one that was set aside lends the sliders they have in common.
+    """Make the mixer of groups; common sliders are copied from one that was set aside.
 
-    Parameters
-    ----------
-    names : sequence of str
-    scales : sequence of float
-        What the groups' texels must be multiplied by to get the quantity.
+    scales: What the groups' texels must be multiplied by to get the quantity.
     """
     earlier = next((tree for tree in _all_mixers() if not is_made(tree)), None)
     # A copy has its values, its keyframes and its drivers.
@@ -145,7 +141,7 @@ def _new_group_node(tree: bpy.types.NodeTree, name: str) -> bpy.types.Node:
 
 
 def _set_tree(node: bpy.types.Node, sliders: bpy.types.NodeTree) -> None:
-    """Have a node show the sliders, set as they were."""
+    """Make a node show the sliders with their earlier values."""
     old = node.inputs
     color, strength = (tuple(old[COLOR].default_value), old[STRENGTH].default_value) if old else (WHITE, 1.0)
     node.node_tree = sliders
@@ -154,7 +150,7 @@ def _set_tree(node: bpy.types.Node, sliders: bpy.types.NodeTree) -> None:
 
 
 def _sliders_tree() -> bpy.types.NodeTree:
-    """Return the node group of one light group, made anew where the file has none of ours."""
+    """Return the node group of one light group, created if the file has none of ours."""
     for tree in bpy.data.node_groups:
         mine = is_made(tree) and tree.library is None and tree.get(KIND) is None
         # The mixer's name begins with the same words.

@@ -1,4 +1,4 @@
-"""The one node group that turns a lightmap's texel into the light that a surface sends out."""
+"""The node group that converts a lightmap's texel to the light leaving a surface."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SHADER = "Shader"
 
 
 def lightmap_group() -> bpy.types.NodeTree:
-    """Return the node group, made anew where this file has none of ours yet.
+    """Return the node group, created if this file has none of ours.
 
     radiance = Scale · Lightmap · (Base Color, or white if Lightmap Only)
                + Emission · Emission Factor · (1 − Lightmap Only)

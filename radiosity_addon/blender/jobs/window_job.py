@@ -6,11 +6,11 @@ import time
 from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
 
 from ...base import NothingToDoError, RadiosityError, RemainingTime
-from ..session import runtime
+from ..session import facts
 from ..session.redraw import redraw_sidebars
+from ..session.state import session
 from . import live_view
 from .file_watch import guarded
 from .progress_text import progress_text
@@ -37,7 +37,7 @@ _NAVIGATION = {
 
 
 class WindowJob:
-    """A mixin of operators whose work is a generator of `Progress` that returns a report.
+    """A mixin of operators whose work is a generator of `Status` that returns a report.
 
     An operator fills in `_start`, which returns the generator, and `_succeeded`; closing the generator must
     leave everything as it was.
@@ -134,7 +134,7 @@ class WindowJob:
         self._report = None
         self._job = guarded(self._start(context, in_window), context)
         self._ticked = 0.0
-        running = runtime.running
+        running = session.running
         running.active, running.stop = True, lambda: self._end(bpy.context)
         running.stage, running.fraction, running.seconds_left = "export", 0.0, None
         self._remaining = RemainingTime()
@@ -142,7 +142,7 @@ class WindowJob:
     def _advance(self, seconds: float) -> bool:
         """Work for about so long; True once it is done."""
         until = time.perf_counter() + seconds
-        running = runtime.running
+        running = session.running
         while time.perf_counter() < until:
             try:
                 progress = next(self._job)
@@ -155,14 +155,15 @@ class WindowJob:
         return False
 
     def _show_progress(self, context: bpy.types.Context) -> None:
-        context.window_manager.progress_update(int(100 * runtime.running.fraction))
-        context.workspace.status_text_set(f"{progress_text(runtime.running)}    {iface_('Esc cancels')}")
-        redraw_sidebars(context)
+        context.window_manager.progress_update(int(100 * session.running.fraction))
+        context.workspace.status_text_set(f"{progress_text(session.running)}    {'Esc cancels'}")
+        redraw_sidebars()
 
     def _finish(self, context: bpy.types.Context) -> set[str]:
         in_window = self._timer is not None
         self._end(context)
         self._succeeded(context, in_window)
+        facts.refresh()
         return {"FINISHED"}
 
     def _fail(self, context: bpy.types.Context, error: RadiosityError) -> set[str]:
@@ -179,7 +180,7 @@ class WindowJob:
             if job is not None:
                 job.close()
         finally:
-            runtime.running.active, runtime.running.stop = False, None
+            session.running.active, session.running.stop = False, None
             live_view.end()
             if self._timer is not None:
                 context.window_manager.event_timer_remove(self._timer)
@@ -187,4 +188,4 @@ class WindowJob:
                 if context.workspace is not None:  # the window may be closing
                     context.workspace.status_text_set(None)
                 self._timer = None
-            redraw_sidebars(context)
+            redraw_sidebars()

@@ -6,25 +6,26 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import bpy
-from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...base import RadiosityError, one_of_each
 from ..jobs import live_view
 from ..jobs.window_job import WindowJob
 from ..relight import kept_bakes
 from ..relight.relight_properties import keeps, relight_of
-from ..session import live_state, runtime
+from ..session import facts, last_bake
 from ..session.redraw import redraw_sidebars
+from ..session.state import session
 from ..settings.preferences import output_folder
 from ..settings.properties import settings_of
 from .checks import look_first
+from .polls import Conditional, has_folder, has_scene, no_bake_runs
 
 if TYPE_CHECKING:
     from ...bake import KeepOptions
     from ...options import BakeSettings
 
 
-class RADIOSITY_OT_bake(WindowJob, bpy.types.Operator):
+class RADIOSITY_OT_bake(Conditional, WindowJob, bpy.types.Operator):
     """Bake the light of the scene into lightmaps and show them on the objects"""
 
     bl_idname = "radiosity.bake"
@@ -33,16 +34,7 @@ class RADIOSITY_OT_bake(WindowJob, bpy.types.Operator):
 
     _was_editing = False
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Offer the bake wherever there is a scene and no bake is running."""
-        if runtime.running.active:
-            cls.poll_message_set("A bake is running; press Esc to cancel it")
-            return False
-        if context.scene is None:
-            cls.poll_message_set("There is no scene")
-            return False
-        return True
+    conditions = (no_bake_runs, has_scene)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Start the bake, unless there is something to be looked at first."""
@@ -61,7 +53,7 @@ class RADIOSITY_OT_bake(WindowJob, bpy.types.Operator):
         from ..files.ownership import panel_names
         from ..jobs.job import run_bake
 
-        live_state.stop()
+        session.stop_live()
         self._was_editing = context.mode == "EDIT_MESH"
         settings = settings_of(context)
         folder = output_folder(context)
@@ -88,8 +80,6 @@ class RADIOSITY_OT_bake(WindowJob, bpy.types.Operator):
     def _follow(self, progress: Any) -> None:
         if progress.picture is not None:
             live_view.show(progress.picture)
-        if progress.texels is not None:
-            live_view.show_texels(progress.texels)
 
     def _undone(self, context: bpy.types.Context) -> None:
         """Go on with the editing that the export had to leave."""
@@ -108,67 +98,50 @@ class RADIOSITY_OT_bake(WindowJob, bpy.types.Operator):
         if context.scene.radiosity.lightmap_only:
             set_lightmap_only(True)
         taken = sum(report["seconds"].values())
-        message = rpt_("Baked {} objects in {:.1f} s")
-        self.report({"INFO"}, message.format(len(report["objects"]), taken))
+        self.report({"INFO"}, f"Baked {len(report['objects'])} objects in {taken:.1f} s")
         warnings = one_of_each(report["warnings"])
         for warning in warnings[:3]:
             self.report({"WARNING"}, f"{warning['name']}: {warning['message']}")
         if len(warnings) > 3:
-            message = rpt_("and {} more warnings, listed in the panel")
-            self.report({"WARNING"}, message.format(len(warnings) - 3))
+            self.report({"WARNING"}, f"and {len(warnings) - 3} more warnings, listed in the panel")
 
 
-class RADIOSITY_OT_restore(bpy.types.Operator):
+class RADIOSITY_OT_restore(Conditional, bpy.types.Operator):
     """Take the lightmaps off this scene: what you edited since the bake stays"""
 
     bl_idname = "radiosity.restore"
     bl_label = "Restore"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        """Offer it unless a bake is running."""
-        if runtime.running.active:
-            cls.poll_message_set("A bake is running; press Esc to cancel it")
-            return False
-        return True
-
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Bring every baked object of the scene back."""
         from ..apply.restore import restore_scene
 
-        live_state.stop()
+        session.stop_live()
         try:
             restored = restore_scene(context, context.scene)
         except RadiosityError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        runtime.forget(context.scene)
+        last_bake.forget(context.scene)
         kept_bakes.drop(context.scene)
-        redraw_sidebars(context)
+        redraw_sidebars()
+        facts.refresh()
         if not restored.count:
             self.report({"INFO"}, "Nothing to restore: no object of this scene shows a lightmap")
             return {"CANCELLED"}
-        self.report({"INFO"}, rpt_("Restored {} objects").format(restored.count))
+        self.report({"INFO"}, f"Restored {restored.count} objects")
         for warning in restored.warnings:
             self.report({"WARNING"}, warning.message)
         return {"FINISHED"}
 
 
-class RADIOSITY_OT_add_cornell_box(bpy.types.Operator):
+class RADIOSITY_OT_add_cornell_box(Conditional, bpy.types.Operator):
     """Add the Cornell box, ready to bake, to this scene if it is empty, else in a scene of its own"""
 
     bl_idname = "radiosity.add_cornell_box"
     bl_label = "Add Cornell Box"
     bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        """Offer it unless a bake is running."""
-        if runtime.running.active:
-            cls.poll_message_set("A bake is running; press Esc to cancel it")
-            return False
-        return True
 
     def execute(self, _context: bpy.types.Context) -> set[str]:
         """Build the box, in this scene if it is empty, and show it."""
@@ -178,33 +151,25 @@ class RADIOSITY_OT_add_cornell_box(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class RADIOSITY_OT_open_folder(bpy.types.Operator):
+class RADIOSITY_OT_open_folder(Conditional, bpy.types.Operator):
     """Show the lightmaps of the last bake in the file browser"""
 
     bl_idname = "radiosity.open_folder"
     bl_label = "Open Folder"
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Offer it where the last bake wrote files."""
-        last = runtime.last_bake(context.scene)
-        if last is None or not last.folder:
-            cls.poll_message_set("The last bake wrote no files")
-            return False
-        return True
+    conditions = (has_folder,)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Open the folder, if it really is that of a bake of this scene."""
         from ..files.ownership import own_reports
 
-        last = runtime.last_bake(context.scene)
+        last = last_bake.read(context.scene)
         folder = bpy.path.abspath(last.folder) if last is not None else ""
         if not Path(folder).is_dir():
-            self.report({"ERROR"}, rpt_("The folder '{}' is not there any more").format(folder))
+            self.report({"ERROR"}, f"The folder '{folder}' is not there any more")
             return {"CANCELLED"}
         if not own_reports(Path(folder), context.scene):
-            message = rpt_("The folder '{}' holds no bake of this scene")
-            self.report({"ERROR"}, message.format(folder))
+            self.report({"ERROR"}, f"The folder '{folder}' holds no bake of this scene")
             return {"CANCELLED"}
         _open(folder)
         return {"FINISHED"}

@@ -1,20 +1,17 @@
-"""What *Check* found of each scene, and its figures in the user's language."""
+"""What *Check* found of each scene, and its figures."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
 
 from ...base import duration
 from ..relight.relight_properties import keeps, relight_of
-from ..session import runtime
+from ..session import last_bake
+from ..session.state import session
 from ..settings.preferences import output_folder, preferences
 from ..settings.properties import settings_of
-
-_checked: dict[tuple[str, str], Any] = {}
-"""(file, scene) → its last Inspection: what the panel draws, and whether the first bake was looked at."""
 
 
 def look(context: bpy.types.Context) -> Any:
@@ -32,53 +29,42 @@ def look(context: bpy.types.Context) -> Any:
     finally:
         if editing and context.mode == "OBJECT" and bpy.ops.object.mode_set.poll():
             bpy.ops.object.mode_set(mode="EDIT")
-    _checked[_key(context.scene)] = found
+    session.checks[context.scene.name_full] = found
     return found
 
 
 def last_check(scene: bpy.types.Scene) -> Any:
     """Return what was found of a scene when somebody last looked; None if nobody did."""
-    return _checked.get(_key(scene))
+    return session.checks.get(scene.name_full)
 
 
 def look_first(context: bpy.types.Context) -> bool:
     """Tell whether a scene that was neither baked nor checked is odd, so that the user should look first."""
     scene = context.scene
-    known = runtime.last_bake(scene) is not None or last_check(scene) is not None
+    known = last_bake.read(scene) is not None or last_check(scene) is not None
     if known or not preferences(context).check_first:
         return False
     return bool(look(context).is_odd)
 
 
-def forget_checks() -> None:
-    """Drop what was found, as the extension is switched off."""
-    _checked.clear()
-
-
 def figures(found: Any) -> list[tuple[str, str]]:
-    """Return what a bake will be as pairs of a name and a value, in the user's language."""
+    """Return what a bake will be as pairs of a name and a value."""
     plan = found.estimate
     sizes: dict[int, int] = {}
     for page in plan.pages:
         sizes[page] = sizes.get(page, 0) + 1
     pages = ", ".join(f"{count} × {size}²" for size, count in sizes.items())
     return [
-        (iface_("Objects"), f"{found.objects:,}"),
-        (iface_("Triangles"), f"{found.triangles:,} / {found.scene_triangles:,}"),
-        (iface_("Images"), pages or "0"),
-        (iface_("Texels"), iface_("about {}").format(f"{_rounded(found.texels):,}")),
-        (iface_("Memory"), iface_("about {}").format(_bytes(plan.memory))),
+        ("Objects", f"{found.objects:,}"),
+        ("Triangles", f"{found.triangles:,} / {found.scene_triangles:,}"),
+        ("Images", pages or "0"),
+        ("Texels", f"about {_rounded(found.texels):,}"),
+        ("Memory", f"about {_bytes(plan.memory)}"),
         (
-            iface_("Time"),
-            iface_("until the error is reached")
-            if plan.seconds is None
-            else iface_("roughly {}").format(duration(plan.seconds)),
+            "Time",
+            "until the error is reached" if plan.seconds is None else f"roughly {duration(plan.seconds)}",
         ),
     ]
-
-
-def _key(scene: bpy.types.Scene) -> tuple[str, str]:
-    return bpy.data.filepath, scene.name_full
 
 
 def _rounded(count: int) -> int:

@@ -12,12 +12,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import bpy
-from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...base import BakeError
-from ..session import runtime
+from ..session import last_bake
 from ..session.redraw import redraw_sidebars
+from ..session.state import session
 from ..settings.preferences import output_folder
+from .polls import Conditional
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -111,63 +112,44 @@ def _is_remote(folder: Path) -> bool:
     return folder.drive.startswith("\\\\") and folder.drive != here
 
 
-class RADIOSITY_OT_clean(bpy.types.Operator):
+class RADIOSITY_OT_clean(Conditional, bpy.types.Operator):
     """Delete lightmap files that bakes of this file have written and that nothing in it shows any more"""
 
     bl_idname = "radiosity.clean"
     bl_label = "Clean Up Lightmaps"
     bl_options = {"REGISTER"}
 
-    @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        """Offer it unless a bake is running."""
-        if runtime.running.active:
-            cls.poll_message_set("A bake is running; press Esc to cancel it")
-            return False
-        return True
-
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Ask first: files do not come back by undo."""
         found = unused_lightmaps(context)
         if not found.count or bpy.app.background:
             return self.execute(context)
-        message = rpt_("Delete {} lightmap files that nothing shows any more? Undo does not bring them back")
-        return context.window_manager.invoke_confirm(
-            self, event, title="Clean Up Lightmaps", message=message.format(found.count)
-        )
+        message = f"Delete {found.count} unused lightmap files? This cannot be undone"
+        return context.window_manager.invoke_confirm(self, event, title="Clean Up Lightmaps", message=message)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Delete them."""
         found = unused_lightmaps(context)
         for path in found.changed:
-            message = rpt_("'{}' was changed since it was baked: it is left alone")
-            self.report({"WARNING"}, message.format(path.name))
+            self.report({"WARNING"}, f"'{path.name}' was changed since it was baked; it is kept")
         try:
             count = delete(found)
         except OSError as error:
-            self.report({"ERROR"}, rpt_("Cannot delete '{}': {}").format(error.filename, error.strerror))
+            self.report({"ERROR"}, f"Cannot delete '{error.filename}': {error.strerror}")
             return {"CANCELLED"}
         if not count:
             self.report({"INFO"}, "Nothing to clean: every lightmap of this file is shown")
             return {"CANCELLED"}
-        self.report({"INFO"}, rpt_("Deleted {} lightmap files").format(count))
+        self.report({"INFO"}, f"Deleted {count} lightmap files")
         return {"FINISHED"}
 
 
-class RADIOSITY_OT_recover(bpy.types.Operator):
+class RADIOSITY_OT_recover(Conditional, bpy.types.Operator):
     """Put the files of the last whole bake back: a bake was interrupted while it replaced them"""
 
     bl_idname = "radiosity.recover"
     bl_label = "Recover Lightmaps"
     bl_options = {"REGISTER"}
-
-    @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        """Offer it where a bake was interrupted, unless one is running."""
-        if runtime.running.active:
-            cls.poll_message_set("A bake is running; press Esc to cancel it")
-            return False
-        return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Put them back, and have the open file show them."""
@@ -193,8 +175,8 @@ class RADIOSITY_OT_recover(bpy.types.Operator):
 
 def look_for_interrupted(context: bpy.types.Context) -> None:
     """Have the panel say whether a bake of the open file was interrupted; files are only looked at."""
-    runtime.interrupted = bool(interrupted_folders(context))
-    redraw_sidebars(context)
+    session.interrupted = bool(interrupted_folders(context))
+    redraw_sidebars()
 
 
 def look_at_file(*_: object) -> None:
@@ -203,7 +185,7 @@ def look_at_file(*_: object) -> None:
 
 
 def _last_folder(scene: bpy.types.Scene) -> Path | None:
-    last = runtime.last_bake(scene) if scene.is_property_set("radiosity") else None
+    last = last_bake.read(scene) if scene.is_property_set("radiosity") else None
     if last is None or not last.folder:
         return None
     return Path(bpy.path.abspath(last.folder))

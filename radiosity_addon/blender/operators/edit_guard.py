@@ -9,17 +9,14 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_rpt as rpt_
 from mathutils import Matrix
 
 from ..datablocks.bake_record import is_made
 from ..datablocks.edit_modes import leave_edit_mode_of
-from ..session import runtime
+from ..session.state import session
 
 DELAY = 0.05
 """Seconds after a change until it is looked at."""
-
-_noted: set[str] = set()
 
 
 def note(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
@@ -27,8 +24,8 @@ def note(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     for update in depsgraph.updates:
         block = update.id
         if isinstance(block, bpy.types.Object) and block.library is None and _is_guarded(block.original):
-            _noted.add(block.name)
-    if _noted and not bpy.app.timers.is_registered(_look):
+            session.edited.add(block.name)
+    if session.edited and not bpy.app.timers.is_registered(_look):
         bpy.app.timers.register(_look, first_interval=DELAY)
 
 
@@ -43,33 +40,33 @@ def _is_guarded(obj: bpy.types.Object) -> bool:
 
 def _look() -> None:
     """Undo what was noted, and say so in the window."""
-    if runtime.running.active:
+    if session.running.active:
         return
     messages = refuse(bpy.context)
     if messages:
         with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
-            bpy.context.window_manager.popup_menu(_drawn(messages), title=rpt_("Lightmap"), icon="INFO")
+            bpy.context.window_manager.popup_menu(_drawn(messages), title="Lightmap", icon="INFO")
 
 
 def refuse(context: bpy.types.Context) -> list[str]:
     """Put stand-ins back that were noted as changed; returns what to say of each."""
     from ..stand_ins.stand_ins import moved_place, placed
 
-    names, messages = sorted(_noted), []
-    _noted.clear()
+    names, messages = sorted(session.edited), []
+    session.edited.clear()
     for name in names:
         obj = bpy.data.objects.get((name, None))
         if obj is None or not _is_guarded(obj):
             continue
         if obj.mode != "OBJECT":
             leave_edit_mode_of(context, obj)
-            reason = rpt_("'{}' shows a lightmap on what its modifiers or instances make")
-            messages.append(f"{reason.format(name)}: {rpt_('press Restore before editing it')}")
+            messages.append(
+                f"'{name}' shows modifiers or instances as baked: press Restore before editing it"
+            )
         place = placed(obj)
         if is_made(obj) and place is not None and moved_place(obj) is not None:
             obj.matrix_basis = Matrix(place)
-            reason = rpt_("'{}' stands in for an instance and cannot be moved")
-            messages.append(f"{reason.format(name)}: {rpt_('press Restore before moving it')}")
+            messages.append(f"'{name}' stands in for an instance: press Restore before moving it")
     return messages
 
 
@@ -85,4 +82,4 @@ def forget(*_: Any) -> None:
     """Look after nothing that was noted: another file is being opened, or the extension is switched off."""
     if bpy.app.timers.is_registered(_look):
         bpy.app.timers.unregister(_look)
-    _noted.clear()
+    session.edited.clear()

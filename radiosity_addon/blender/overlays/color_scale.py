@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...base import linear_ticks, tick_label
 from ...numerics import Array
-from .plot_layout import linear_ticks, tick_label
 
 _DARK_TO_BRIGHT = (
     (0.10, 0.05, 0.35),

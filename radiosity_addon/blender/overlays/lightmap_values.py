@@ -18,6 +18,7 @@ from ..datablocks.image_marks import QUANTITY_PROPERTY
 from ..datablocks.mesh_arrays import read_mesh, world_from_object
 from ..images.images import image_scale
 from ..session import kept_details
+from ..session.state import session
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,16 +74,6 @@ class PageValues:
         return np.asarray(self.values @ MEANS)
 
 
-_pages: dict[str, PageValues] = {}
-_statistics: dict[tuple[str, str], tuple[LightStatistics, LightStatistics] | None] = {}
-
-
-def forget() -> None:
-    """Read pixels anew the next time: lightmaps have changed."""
-    _pages.clear()
-    _statistics.clear()
-
-
 def lightmap_of(obj: bpy.types.Object) -> bpy.types.Image | None:
     """Return the lightmap that a baked object's materials show; None if it has none."""
     for slot in obj.material_slots:
@@ -126,7 +117,7 @@ def shown_lightmap(obj: bpy.types.Object) -> ShownLightmap | None:
 
 def page_values(image: bpy.types.Image) -> PageValues | None:
     """Return a lightmap's pixels; None if its file is gone."""
-    if image.name not in _pages:
+    if image.name not in session.drawn.pages:
         width, height = image.size
         if width * height == 0 or image.channels == 0:
             return None
@@ -140,8 +131,8 @@ def page_values(image: bpy.types.Image) -> PageValues | None:
         factor = image_scale(image)
         if quantity == "irradiance_over_pi":
             factor = irradiance_under_sky(factor)
-        _pages[image.name] = PageValues(quantity, np.float32(factor) * values)
-    return _pages[image.name]
+        session.drawn.pages[image.name] = PageValues(quantity, np.float32(factor) * values)
+    return session.drawn.pages[image.name]
 
 
 def unit_name(quantity: str, unit: str) -> str:
@@ -164,9 +155,9 @@ def object_statistics(
     if image is None or page is None:
         return None
     key = obj.name_full, image.name
-    if key not in _statistics:
-        _statistics[key] = _summed_up(obj, scene, image, page)
-    found = _statistics[key]
+    if key not in session.drawn.statistics:
+        session.drawn.statistics[key] = _summed_up(obj, scene, image, page)
+    found = session.drawn.statistics[key]
     if found is None:
         return None
     of_watts, of_lumens = found

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ...options import EFFICACY
+from ..session import facts
 from ..session.redraw import redraw_viewports
 
 NONE, FALSE_COLOR, DENSITY, CHECKER, TEXELS, ELEMENTS, LINKS, ERROR = (
@@ -17,6 +18,7 @@ OF_THE_BAKE = frozenset({TEXELS, ELEMENTS, LINKS, ERROR})
 
 
 def _redraw(_settings: RadiosityOverlay, _context: bpy.types.Context) -> None:
+    facts.refresh()
     redraw_viewports()
 
 

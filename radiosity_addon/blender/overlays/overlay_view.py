@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from typing import TYPE_CHECKING, Any
 
 import bpy
 
-from ..session import kept_details, lightmap_changes, runtime
 from ..session.redraw import redraw_viewports
+from ..session.state import session
 from .drawing import NEARER, PagedSurfaces, over_the_objects
 from .overlay_properties import LINKS, NONE, overlay_of
 
@@ -16,20 +15,6 @@ if TYPE_CHECKING:
     from .overlay_pictures import Lines, OverlayPicture
 
 
-class _Drawn:
-    """What is on the graphics card, and what it was made for."""
-
-    def __init__(self) -> None:
-        self.key: tuple[object, ...] | None = None
-        self.picture: OverlayPicture | None = None
-        self.surfaces: PagedSurfaces | None = None
-        self.lines: list[tuple[Lines, Any]] = []
-
-    def clear(self) -> None:
-        self.key, self.picture, self.surfaces, self.lines = None, None, None, []
-
-
-_drawn = _Drawn()
 _handlers: list[tuple[Any, str]] = []
 
 
@@ -41,11 +26,7 @@ def changed() -> None:
 
 def forget(*_: object) -> None:
     """Forget what was read and made: after an undo or redo anything may be different."""
-    # Pixels are only read by a module that is imported when first needed.
-    values = sys.modules.get(f"{__package__}.lightmap_values")
-    if values is not None:
-        values.forget()
-    _drawn.clear()
+    session.drawn.forget()
 
 
 def _draw_over_objects() -> None:
@@ -54,10 +35,10 @@ def _draw_over_objects() -> None:
     picture = _current(context)
     if picture is None:
         return
-    if _drawn.surfaces is not None:
+    if session.drawn.surfaces is not None:
         with over_the_objects():
-            _drawn.surfaces.draw()
-    for lines, batch in _drawn.lines:
+            session.drawn.surfaces.draw()
+    for lines, batch in session.drawn.lines:
         _draw_lines(context, lines, batch)
 
 
@@ -74,19 +55,19 @@ def _draw_legend() -> None:
 def _current(context: bpy.types.Context) -> OverlayPicture | None:
     """Return the picture to draw, made anew if anything it depends on has changed."""
     settings = overlay_of(context)
-    if settings.show == NONE or runtime.running.active:
+    if settings.show == NONE or session.running.active:
         return None
     key = _key(context)
-    if key != _drawn.key:
+    if key != session.drawn.key:
         from .overlay_pictures import overlay_picture
 
-        _drawn.clear()
+        session.drawn.clear()
         # The key first: what cannot be made is not tried again at every redraw.
-        _drawn.key = key
-        _drawn.picture = overlay_picture(context)
-        if _drawn.picture is not None:
-            _upload(_drawn.picture)
-    return _drawn.picture
+        session.drawn.key = key
+        session.drawn.picture = overlay_picture(context)
+        if session.drawn.picture is not None:
+            _upload(session.drawn.picture)
+    return session.drawn.picture
 
 
 def _key(context: bpy.types.Context) -> tuple[object, ...]:
@@ -112,8 +93,8 @@ def _upload(picture: OverlayPicture) -> None:
 
     if picture.surfaces is not None:
         surfaces = picture.surfaces
-        _drawn.surfaces = PagedSurfaces(surfaces.corners, surfaces.uv, surfaces.page)
-        _drawn.surfaces.paint(surfaces.pages)
+        session.drawn.surfaces = PagedSurfaces(surfaces.corners, surfaces.uv, surfaces.page)
+        session.drawn.surfaces.paint(surfaces.pages)
     shader = gpu.shader.from_builtin("POLYLINE_FLAT_COLOR")
     for lines in picture.lines:
         if len(lines.ends):
@@ -121,7 +102,7 @@ def _upload(picture: OverlayPicture) -> None:
                 "pos": np.ascontiguousarray(lines.ends.reshape(-1, 3), dtype=np.float32),
                 "color": np.repeat(lines.colors, 2, axis=0).astype(np.float32),
             }
-            _drawn.lines.append((lines, batch_for_shader(shader, "LINES", given)))
+            session.drawn.lines.append((lines, batch_for_shader(shader, "LINES", given)))
 
 
 def _draw_lines(context: bpy.types.Context, lines: Lines, batch: Any) -> None:
@@ -138,23 +119,17 @@ def _draw_lines(context: bpy.types.Context, lines: Lines, batch: Any) -> None:
         batch.draw(shader)
 
 
-def forget_the_file(*_: object) -> None:
-    """Another file is being opened: what is kept belongs to this one."""
-    kept_details.drop_all()
-    forget()
-
-
 def note_change(_scene: bpy.types.Scene, graph: bpy.types.Depsgraph) -> None:
     """An object has moved, or its mesh or visibility has changed."""
-    if _drawn.key is not None and any(
+    if session.drawn.key is not None and any(
         graph.id_type_updated(kind) for kind in ("OBJECT", "MESH", "COLLECTION")
     ):
-        _drawn.clear()
+        session.drawn.clear()
 
 
 def register() -> None:
     """Begin to draw; without a window there is nothing to draw to."""
-    lightmap_changes.listeners.append(changed)
+    session.on_lightmaps_changed.append(changed)
     if bpy.app.background:
         return
     view = bpy.types.SpaceView3D
@@ -166,7 +141,5 @@ def unregister() -> None:
     """Draw nothing any more, and forget all."""
     while _handlers:
         bpy.types.SpaceView3D.draw_handler_remove(*_handlers.pop())
-    if changed in lightmap_changes.listeners:
-        lightmap_changes.listeners.remove(changed)
-    kept_details.drop_all()
-    forget()
+    if changed in session.on_lightmaps_changed:
+        session.on_lightmaps_changed.remove(changed)

@@ -24,7 +24,6 @@ def draw_text(
     ----------
     layout : UILayout
     text : str
-        In the user's language already.
     icon : str
         Before the first line.
     context : Context

@@ -14,6 +14,7 @@ import bpy
 
 from ..datablocks.bake_record import is_made
 from ..datablocks.image_marks import GROUP, MARK, PAGE
+from ..session.state import session
 from .relight_properties import relight_of
 
 if TYPE_CHECKING:
@@ -42,43 +43,48 @@ class InMemory:
 MOST_EARLIER = 1 << 30
 """Bytes of bakes in memory that no scene shows, but may show again after undo."""
 
-_kept: dict[str, InMemory] = {}
-
 
 def mark_of(scene: bpy.types.Scene) -> str:
     """Return the mark of the bake that a scene shows and that can be lit anew; "" if there is none."""
     return str(relight_of(scene).mark)
 
 
-def set_mark(scene: bpy.types.Scene, mark: str) -> None:
-    """Remember the mark of a scene's bake; "" for one that is not kept."""
-    if mark or mark_of(scene):
+def note(scene: bpy.types.Scene, mark: str) -> None:
+    """Remember the mark of a scene's new bake; "" for one that is not kept."""
+    _forget(scene)
+    if mark:
         scene.radiosity_relight.mark = mark
 
 
 def find(scene: bpy.types.Scene | None) -> InMemory | None:
     """Return the scene's bake, if it is kept in memory."""
-    return None if scene is None else _kept.get(mark_of(scene))
+    return None if scene is None else session.kept_bakes.get(mark_of(scene))
 
 
 def put(scene: bpy.types.Scene, mark: str, bake: KeptBake) -> InMemory:
     """Keep a scene's bake; earlier ones stay for undo, as far as there is room."""
-    _kept.pop(mark, None)
-    _kept[mark] = InMemory(bake, scene.name_full, bake.strengths)
-    _make_room(mark)
-    return _kept[mark]
+    session.kept_bakes.pop(mark, None)
+    session.kept_bakes[mark] = InMemory(bake, scene.name_full, bake.strengths)
+    make_room(mark)
+    return session.kept_bakes[mark]
 
 
-def _make_room(newest: str = "") -> None:
+def make_room(newest: str = "") -> None:
     """Forget the oldest of the bakes that no scene shows, but for what `MOST_EARLIER` has room for."""
     shown = {newest, *map(mark_of, bpy.data.scenes)}
-    earlier = [mark for mark in _kept if mark not in shown]
-    while sum(_kept[mark].bake.nbytes for mark in earlier) > MOST_EARLIER:
-        del _kept[earlier.pop(0)]
+    earlier = [mark for mark in session.kept_bakes if mark not in shown]
+    while sum(session.kept_bakes[mark].bake.nbytes for mark in earlier) > MOST_EARLIER:
+        del session.kept_bakes[earlier.pop(0)]
 
 
 def drop(scene: bpy.types.Scene) -> None:
     """Have the scene show no bake any more; in memory it stays for undo, if there is room."""
+    _forget(scene)
+    make_room()
+
+
+def _forget(scene: bpy.types.Scene) -> None:
+    """Have the scene remember no bake."""
     if not scene.is_property_set("radiosity_relight"):
         return
     group = scene.radiosity_relight
@@ -87,12 +93,6 @@ def drop(scene: bpy.types.Scene) -> None:
     names = [prop.identifier for prop in group.bl_rna.properties if not prop.is_readonly]
     if not any(map(group.is_property_set, names)):
         scene.property_unset("radiosity_relight")
-    _make_room()
-
-
-def drop_all(*_: object) -> None:
-    """Forget all bakes in memory: another file is being opened, or the extension is switched off."""
-    _kept.clear()
 
 
 def mark_images(images: Sequence[bpy.types.Image], mark: str) -> None:

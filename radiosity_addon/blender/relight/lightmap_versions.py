@@ -13,12 +13,10 @@ from __future__ import annotations
 
 import hashlib
 import threading
-from collections import OrderedDict
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import bpy
 
@@ -28,12 +26,11 @@ from ..datablocks.bake_record import is_made
 from ..datablocks.image_marks import PAGE, REPORT, VERSION
 from ..files.lightmap_reports import forget_reports, images_described, listed_in, report_of
 from ..files.ownership import own_reports
-from ..session import lightmap_changes, live_state
 from ..session.redraw import redraw_sidebars, redraw_viewports
+from ..session.state import session
 
 if TYPE_CHECKING:
     from ..files.output import OutputFolder
-    from .file_versions import HeldFiles
 
 TICK = 0.02
 """Seconds between two looks at whether files have been copied."""
@@ -41,27 +38,7 @@ TICK = 0.02
 FOREIGN = "The lightmaps on disk are from another bake than this file: bake again"
 
 
-@dataclass(eq=False, repr=False)
-class State:
-    """Of this session.
-
-    Attributes
-    ----------
-    message : str
-        What panels say; nothing where images and files belong together.
-    """
-
-    message: str = ""
-    held: HeldFiles | None = None
-    reports: OrderedDict[str, dict[str, Any]] = field(default_factory=OrderedDict)
-    """By the digest of each image that they list, the reports of files that were replaced."""
-    shown: dict[str, str] = field(default_factory=dict)
-    """By image, the version that its pixels in memory are; nothing for pixels that are in no file."""
-    swap: _Swap | None = None
-
-
-@dataclass(frozen=True, repr=False)
-class Wanted:
+class Wanted(NamedTuple):
     """An image whose file has other bytes than it should.
 
     Attributes
@@ -82,7 +59,7 @@ class Wanted:
     report: Path
 
 
-state = State()
+state = session.versions
 
 
 def mark(images: Iterable[bpy.types.Image], report: str = REPORT_NAME) -> None:
@@ -294,10 +271,10 @@ def _reload(image: bpy.types.Image) -> None:
     image.reload()
     image.update_tag()
     state.shown[image.name] = image[VERSION]
-    lightmap_changes.announce()
+    session.lightmaps_changed()
     with suppress(RadiosityError):
-        if live_state.state.live is not None:
-            live_state.state.live.look_again()
+        if session.live is not None:
+            session.live.look_again()
 
 
 def _tick() -> float | None:
@@ -316,7 +293,7 @@ def _tick() -> float | None:
         if state.swap is not None:
             return TICK
         redraw_viewports()
-        redraw_sidebars(bpy.context)
+        redraw_sidebars()
         return None
     except Exception as error:  # noqa: BLE001 (a timer that raises is gone)
         state.message = f"{FOREIGN} ({type(error).__name__}: {error})"

@@ -10,7 +10,8 @@ and nothing follows from it.
 from __future__ import annotations
 
 import time
-from collections.abc import Generator
+from collections.abc import Callable, Generator
+from functools import partial
 from typing import Any
 
 import bpy
@@ -18,12 +19,14 @@ import numpy as np
 
 from ...bake.relight import Responses, are_wanted
 from ...bake.result import LightGroup
-from ...base import BakeError, RadiosityError
+from ...bake.scene_diff import RELIGHTABLE
+from ...base import BakeError, Progress, RadiosityError
 from ...lightmap.images import LightmapPage
 from ...numerics import Array
 from ..images.group_images import update_images
-from ..session import live_state
 from ..session.background import in_thread
+from ..session.redraw import redraw_viewports
+from ..session.state import session
 from . import kept_bakes, lightmap_versions
 from .live_scene import LiveScene
 from .live_strengths import StrengthReader
@@ -77,7 +80,7 @@ class LiveRelight:
 
     def settle(self) -> None:
         """Do at one go what the timer would do: for scripts, where no timer fires."""
-        while live_state.state.live is self and self.step(in_background=False):
+        while session.live is self and self.step(in_background=False):
             pass
 
     def look_again(self) -> None:
@@ -111,7 +114,7 @@ class LiveRelight:
                 self._carry_on(in_background)
             return True
         except RadiosityError as error:
-            live_state.stop(f"Live is off: {' '.join(str(error).split())}")
+            session.stop_live(f"Live is off: {' '.join(str(error).split())}")
             return False
 
     def _begin(self) -> None:
@@ -127,14 +130,14 @@ class LiveRelight:
         self._reader = StrengthReader(context.scene, held.bake, self._strengths)
         self._fits = LiveScene(context.scene)
         self._dirty, self._noticed = False, time.perf_counter()
-        self._start(None, lit(held.bake, self._strengths))
+        self._start(None, partial(lit, held.bake, self._strengths))
 
     def read(self) -> None:
         """Read the strengths, and show them as far as it can be done at once."""
         assert self._reader is not None
         assert self._fits is not None
         self._dirty, started = False, time.perf_counter()
-        self._fits.check(self._reader)
+        self._fits.diff(self._reader).refuse_all_but(RELIGHTABLE)
         strengths = self._held().bake.sources.checked(self._reader.read())
         if np.array_equal(strengths, self._strengths):
             return
@@ -166,7 +169,7 @@ class LiveRelight:
             show_emission({held.bake.names[row] for row in np.flatnonzero(changed) if row >= lights})
         self._shown = self._strengths
         self.changes += 1
-        _redraw()
+        redraw_viewports()
 
     def _choose_work(self, in_background: bool) -> bool:
         """Begin what is most wanted; False if all is done, or it is too early."""
@@ -174,15 +177,15 @@ class LiveRelight:
             return False
         missing = self._wanted()
         if missing:
-            self._start(missing[0], self._responses.steps(missing[0]))
+            self._start(missing[0], partial(self._responses.find, missing[0]))
             return True
         resting = time.perf_counter() - self._noticed > REST or not in_background
         if not self._exact and resting:
-            self._start(None, lit(self._held().bake, self._strengths))
+            self._start(None, partial(lit, self._held().bake, self._strengths))
             return True
         ahead = self._responses.unknown()
         if self._exact and ahead and len(self._strengths) - len(ahead) < min(AHEAD, self._responses.room):
-            self._start(ahead[0], self._responses.steps(ahead[0]))
+            self._start(ahead[0], partial(self._responses.find, ahead[0]))
             return True
         return False
 
@@ -190,9 +193,9 @@ class LiveRelight:
         """Return the sources whose responses are missed now."""
         return [] if self._responses is None else self._responses.missing(self._strengths)
 
-    def _start(self, source: int | None, steps: Generator[Any, None, Any]) -> None:
+    def _start(self, source: int | None, work: Callable[[Progress], Any]) -> None:
         """Find out a source's response in the thread, or exact pages if it is None."""
-        self._work, self._doing, self._lit_by = in_thread(steps), source, self._strengths
+        self._work, self._doing, self._lit_by = in_thread(work), source, self._strengths
 
     def _carry_on(self, in_background: bool) -> None:
         """Go on with what runs in the thread; take its result once it is there."""
@@ -224,7 +227,7 @@ class LiveRelight:
         rewrite(kept_bakes.mark_of(scene), pages, groups, 0.0)
         note_shown(scene, held, strengths)
         self._shown, self._exact = strengths, True
-        _redraw()
+        redraw_viewports()
 
     def _end_work(self) -> None:
         work, self._work, self._doing = self._work, None, None
@@ -253,17 +256,8 @@ def _wake() -> None:
 def _tick() -> float | None:
     """Carry on, as long as there is something to do; nothing may be raised."""
     try:
-        live = live_state.state.live
+        live = session.live
         return TICK if live is not None and live.step(in_background=True) else None
     except Exception as error:  # noqa: BLE001 (as above)
-        live_state.stop(f"Live is off: {type(error).__name__}: {error}")
+        session.stop_live(f"Live is off: {type(error).__name__}: {error}")
         return None
-
-
-def _redraw() -> None:
-    """Have every 3D viewport drawn again."""
-    manager = bpy.context.window_manager
-    for window in manager.windows if manager is not None else ():
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()

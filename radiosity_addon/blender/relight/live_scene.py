@@ -7,7 +7,7 @@ import hashlib
 import bpy
 import numpy as np
 
-from ...base import SceneError
+from ...bake.scene_diff import Part, SceneDiff
 from ..datablocks.bake_record import is_made
 from .live_strengths import StrengthReader
 
@@ -43,26 +43,24 @@ class LiveScene:
                 concerns = True
         return concerns
 
-    def check(self, reader: StrengthReader) -> None:
-        """Look at what was noted.
-
-        Raises
-        ------
-        SceneError
-            If anything is not as it was; the message names it.
-        """
+    def diff(self, reader: StrengthReader) -> SceneDiff:
+        """Return what differs of what was noted."""
         objects, self._objects = self._objects, set()
         materials, self._materials = self._materials, set()
-        for name in sorted(objects):
-            obj = bpy.data.objects.get(name)
-            if obj is None or name not in self._matrix:
-                continue
-            if np.abs(_matrix(obj) - self._matrix[name]).max() > STILL:
-                raise SceneError(f"object '{name}' has moved: bake again")
-            if isinstance(obj.data, bpy.types.Mesh) and self._shape.get(name) != _shape(obj.data):
-                raise SceneError(f"object '{name}' has changed its shape: bake again")
-        for name in sorted(materials):
-            reader.check_material(name)
+        return SceneDiff(
+            {
+                Part.PLACE: [name for name in sorted(objects) if self._is_elsewhere(name)],
+                Part.MATERIAL: [name for name in sorted(materials) if reader.reflects_differently(name)],
+            }
+        )
+
+    def _is_elsewhere(self, name: str) -> bool:
+        obj = bpy.data.objects.get(name)
+        if obj is None or name not in self._matrix:
+            return False
+        if np.abs(_matrix(obj) - self._matrix[name]).max() > STILL:
+            return True
+        return isinstance(obj.data, bpy.types.Mesh) and self._shape.get(name) != _shape(obj.data)
 
 
 def _matrix(obj: bpy.types.Object) -> np.ndarray:

@@ -9,8 +9,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ...bake.relight import KeptBake, differs_in_strength_alone
-from ...base import SceneError
+from ...bake.relight import KeptBake
+from ...bake.scene_diff import RELIGHTABLE, Part, SceneDiff, differs_in_strength_alone
 from ...lights import EnvironmentLight, Light, SkyPatch
 from ...numerics import Array
 from ..cycles.lamps import read_lamp
@@ -60,18 +60,12 @@ class StrengthReader:
         ratio = np.where(known, now / np.where(known, self._first, 1.0), 0.0)
         return np.where(self._varies[:, None], self._given * ratio, now)
 
-    def check_material(self, name: str) -> None:
-        """Refuse a material that reflects otherwise than at the start.
-
-        Raises
-        ------
-        SceneError
-        """
+    def reflects_differently(self, name: str) -> bool:
+        """Return whether a material reflects differently than at the start."""
         material, before = bpy.data.materials.get(name), self._reflectance.get(name)
         if material is None or before is None:
-            return
-        if np.abs(read_material(material).reflectance - before).max() > SAME:
-            raise SceneError(f"material '{name}' reflects otherwise now: bake again")
+            return False
+        return bool(np.abs(read_material(material).reflectance - before).max() > SAME)
 
     def _constants(self) -> Array:
         """Return (s, 3) the sources' strengths as far as constants tell them."""
@@ -88,7 +82,7 @@ class StrengthReader:
         if now is None or before is None:
             return np.zeros(3)
         if not differs_in_strength_alone(before, now):
-            raise SceneError(f"lamp '{light.name}' has changed in more than its strength: bake again")
+            SceneDiff({Part.LIGHT: [light.name]}).refuse_all_but(RELIGHTABLE)
         return now.strength
 
     def _of_world(self, name: str) -> Array:

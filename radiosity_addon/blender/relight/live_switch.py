@@ -4,23 +4,22 @@ from __future__ import annotations
 
 import bpy
 
-from ..session import live_state
+from ..session.state import session
 
 
 def start(scene: bpy.types.Scene) -> None:
     """Follow the lights of a scene from now on."""
     from .live_relight import LiveRelight  # with the solver, which registering is not to load
 
-    live_state.stop()
-    live_state.state.message = ""
-    live_state.state.live = LiveRelight(scene)
+    session.stop_live()
+    session.live = LiveRelight(scene)
 
 
 def _switched(manager: bpy.types.WindowManager, context: bpy.types.Context) -> None:
     if manager.radiosity_live:
         start(context.scene)
-    elif live_state.state.live is not None:
-        live_state.stop()
+    elif session.live is not None:
+        session.stop_live()
 
 
 def register() -> None:
@@ -37,5 +36,5 @@ def register() -> None:
 
 def unregister() -> None:
     """Follow no lights any more, and take the switch away."""
-    live_state.stop()
+    session.stop_live()
     del bpy.types.WindowManager.radiosity_live

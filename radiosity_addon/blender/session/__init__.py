@@ -1,4 +1,4 @@
-"""What this session of Blender remembers: the running bake, the last one, whether Live is on.
+"""What this session of Blender remembers: one object (`state.py`), and a scene's memory of its last bake.
 
-Nothing here is part of the file.
+Also work in a thread, and redrawing.
 """

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import bpy
 
+from .state import session
+
 if TYPE_CHECKING:
     from ...bake.result import BakeDetails, BakeResult, PageDetails
     from ...numerics import Array
@@ -30,13 +32,16 @@ class KeptDetails:
     images : tuple of str
         Names of the pages' images.
     bake : str
-        The scene's memory of its last bake, by which it is told that it still is the last.
+        The scene's memory of its last bake: the details count while the scene still has it.
+    megabytes : float
+        Memory of the details [MiB].
     """
 
     details: BakeDetails
     objects: dict[str, BakeObject]
     images: tuple[str, ...]
     bake: str
+    megabytes: float
 
     def page_of(self, image: str) -> PageDetails | None:
         """Return what is known of an image's texels, if anything is."""
@@ -55,32 +60,19 @@ class KeptDetails:
         return seen
 
 
-_kept: dict[str, KeptDetails] = {}
-
-
 def keep(scene: bpy.types.Scene, result: BakeResult, images: Sequence[str]) -> None:
     """Keep a bake that the scene has just remembered."""
     if result.details is not None:
         objects = {baked.object.name: baked.object for baked in result.objects}
-        _kept[scene.name_full] = KeptDetails(
-            result.details, objects, tuple(images), scene.radiosity.last_bake
+        session.kept_details[scene.name_full] = KeptDetails(
+            result.details, objects, tuple(images), scene.radiosity.last_bake, result.details.nbytes / 2**20
         )
 
 
 def details_of(scene: bpy.types.Scene) -> KeptDetails | None:
     """Return what is kept of the scene's last bake; None after a reload, an undo, or without a bake."""
-    found = _kept.get(scene.name_full)
+    found: KeptDetails | None = session.kept_details.get(scene.name_full)
     return found if found is not None and found.bake == scene.radiosity.last_bake else None
-
-
-def drop(scene: bpy.types.Scene) -> None:
-    """Forget what is kept of a scene's bake."""
-    _kept.pop(scene.name_full, None)
-
-
-def drop_all() -> None:
-    """Forget everything, as another file is opened or the extension is switched off."""
-    _kept.clear()
 
 
 def _is_shown(name: str) -> bool:

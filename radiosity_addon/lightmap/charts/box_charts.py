@@ -1,4 +1,4 @@
-"""The chart grower to fall back on: faces that look along the same axis, side by side, are a chart.
+"""The fallback chart grower: connected faces that face along the same axis are a chart.
 
 Takes time in proportion to the mesh, whatever the mesh is like, where xatlas may take minutes.
 Charts are more and smaller than xatlas', and stretched up to √3 before they are set to scale.
@@ -16,19 +16,12 @@ Int = NDArray[np.int64]
 
 
 def box_charts(vertices: Float, faces: Int) -> tuple[Float, Int]:
-    """Cut a mesh into charts by the axis that each face looks along most.
+    """Cut a mesh into charts by the axis closest to each face's normal.
 
-    Parameters
-    ----------
-    vertices : (v, 3) float64
-    faces : (n, 3) int64
-
-    Returns
-    -------
-    uv : (n, 3, 2) float64
-        The faces' shadows on the plane across their axis, counter-clockwise from the front.
-    chart : (n,) int64
-        Faces of one axis that share vertices share a chart.
+    vertices (v, 3).
+    faces (n, 3) int64.
+    Returns uv (n, 3, 2): The faces' shadows on the plane across their axis, counter-clockwise from the front.
+    Returns chart (n,) int64: Faces of one axis that share vertices share a chart.
     """
     corners = vertices[faces]
     normal = double_area_vectors(corners)

@@ -20,19 +20,10 @@ _UPRIGHT = 0.02
 def project_polygons(triangles: Float, group: Int) -> Float:
     """Project each polygon along its Newell normal; a folded one is laid out convex instead.
 
-    Parameters
-    ----------
-    triangles : (n, 3, 3) float64
-        The polygons' triangles [m].
-    group : (n,) int64
-        Which polygon each triangle belongs to, 0 … n_groups − 1.
-
-    Returns
-    -------
-    (n, 3, 2) float64
-        [m], counter-clockwise seen from the front. Corners of a polygon that share a position
-        share a UV. The plane of a non-planar polygon shortens what is steep in it: see
-        `rescale_to_area`.
+    triangles (n, 3, 3): The polygons' triangles [m].
+    group (n,) int64: Which polygon each triangle belongs to, 0 … n_groups − 1.
+    Returns (n, 3, 2): [m], counter-clockwise seen from the front. Corners of a polygon that share a position
+        share a UV. The plane of a non-planar polygon shortens what is steep in it: see `rescale_to_area`.
     """
     cross = double_area_vectors(triangles)
     count = int(group.max()) + 1 if len(group) else 0

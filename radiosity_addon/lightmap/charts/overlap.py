@@ -13,17 +13,14 @@ Int = NDArray[np.int64]
 
 
 def overlapping_triangles(uv: Float, chart: Int) -> NDArray[np.intp]:
-    """Return the triangles that share ground with another one of their chart.
+    """Return the triangles that overlap another one of their chart.
 
     The charts are drawn side by side at some two hundred texels a triangle, on a page of
-    1448² at most; a texel's centre inside two triangles gives them away. Smaller overlaps
+    1448² at most; a texel's center inside two triangles gives them away. Smaller overlaps
     go unseen.
 
-    Parameters
-    ----------
-    uv : (n, 3, 2) float64
-        Every chart in its own place; charts may lie over each other.
-    chart : (n,) int64
+    uv (n, 3, 2): Every chart in its own place; charts may lie over each other.
+    chart (n,) int64.
     """
     if not len(uv):
         return np.zeros(0, dtype=np.intp)
@@ -35,12 +32,11 @@ def overlapping_triangles(uv: Float, chart: Int) -> NDArray[np.intp]:
     texel = np.concatenate([part.texel for part in pairs])
     triangle = np.concatenate([part.triangle for part in pairs])
     crowded = np.bincount(texel, minlength=resolution**2)[texel] > 1
-    found: NDArray[np.intp] = np.unique(triangle[crowded]).astype(np.intp)
-    return found
+    return np.unique(triangle[crowded]).astype(np.intp)
 
 
 def _side_by_side(uv: Float, chart: Int) -> tuple[NDArray[np.float32], int]:
-    """Place charts in shelves, a texel apart; returns uv in [0, 1] and the page's resolution."""
+    """Place charts in shelves, one texel apart; return uv in [0, 1] and the page's resolution."""
     count = int(chart.max()) + 1
     low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
     np.minimum.at(low, chart, uv.min(axis=1))

@@ -1,4 +1,4 @@
-"""xatlas, which only this module imports: in this process, or in one of its own beside a window.
+"""xatlas, imported only here: runs in this process, or in a separate one while a window is open.
 
 xatlas keeps Python's lock for as long as it works, 2.6 s for 16,000 triangles: called from a thread it would
 freeze the window all the same. Run as a script this file is the other process; it must import nothing
@@ -11,7 +11,6 @@ import io
 import os
 import subprocess
 import sys
-import threading
 from pathlib import Path
 from typing import Any
 
@@ -39,20 +38,11 @@ of no consequence, as charts are brought to their own scale later.
 def run_xatlas(vertices: Float, faces: Int) -> tuple[Any, Float, Int]:
     """Cut a mesh into charts in this process.
 
-    Parameters
-    ----------
-    vertices : (v, 3) float64
-        At a scale where triangles are about 1 in area, welded.
-    faces : (n, 3) int64
-
-    Returns
-    -------
-    atlas
-        To be kept a while: destroyed right after its work it may hang.
-    uv : (n, 3, 2) float64
-        Stretched along u and v, each chart otherwise; charts may lie over each other.
-    chart : (n,) int64
-        −1 for faces that xatlas left out.
+    vertices (v, 3): At a scale where triangles are about 1 in area, welded.
+    faces (n, 3) int64.
+    Returns to be kept a while: destroyed right after its work it may hang.
+    Returns uv (n, 3, 2): Stretched along u and v, each chart otherwise; charts may lie over each other.
+    Returns chart (n,) int64: −1 for faces that xatlas left out.
     """
     import xatlas
 
@@ -72,13 +62,8 @@ def run_xatlas(vertices: Float, faces: Int) -> tuple[Any, Float, Int]:
     return atlas, uv[indices].astype(np.float64) * scale, chart
 
 
-def beside_a_window(faces: Int) -> bool:
-    """Tell whether this is the thread of a bake in a window, and the work long enough to be seen in it."""
-    return threading.current_thread() is not threading.main_thread() and len(faces) > WORTH_A_PROCESS
-
-
 def run_apart(vertices: Float, faces: Int) -> tuple[Float, Int] | None:
-    """Cut a mesh into charts in a process of its own; None if none is to be had here.
+    """Cut a mesh into charts in a process of its own; None if none can be started.
 
     Parameters and results are those of `run_xatlas`, to the last bit.
     """
@@ -114,12 +99,12 @@ def _unpacked(data: bytes) -> tuple[NDArray[Any], NDArray[Any]]:
 def _answer() -> None:
     """Read a mesh from standard input and write its charts to standard output."""
     answer = os.dup(1)
-    os.dup2(2, 1)  # whatever else is printed is no part of it
+    os.dup2(2, 1)  # other output must not be mixed with it
     atlas, uv, chart = run_xatlas(*_unpacked(sys.stdin.buffer.read()))
     with os.fdopen(answer, "wb") as file:
         file.write(_packed(uv, chart))
     del uv, chart
-    # Without tidying up: the atlas may hang.
+    # Without cleanup: destroying the atlas may hang.
     os._exit(0 if atlas is not None else 1)
 
 

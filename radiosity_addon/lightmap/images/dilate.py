@@ -1,6 +1,6 @@
 """Filling the texels that no triangle covers, so that filtering never meets an empty one.
 
-Near the charts each uncovered texel takes the weighted mean of its covered neighbours, ring by
+Near the charts each uncovered texel takes the weighted mean of its covered neighbors, ring by
 ring; being a mean over all eight directions it prefers none. What is farther than the rings is
 filled from ever coarser means of the covered texels (a pyramid), so that mip levels stay
 bright too. Covered texels are never changed.
@@ -28,18 +28,10 @@ _NEIGHBOURS = tuple(
 def dilate(pixels: Float32, coverage: Bool, rings: int = 8) -> Float32:
     """Fill every uncovered texel of a page.
 
-    Parameters
-    ----------
-    pixels : (height, width, channels) float32
-        Only covered texels are read.
-    coverage : (height, width) bool
-    rings : int
-        How many texels past the charts are filled by neighbours' means; the rest coarsely.
-
-    Returns
-    -------
-    (height, width, channels) float32
-        A new array; all zero if nothing is covered.
+    pixels (height, width, channels) float32: Only covered texels are read.
+    coverage (height, width) bool.
+    rings: How many texels past the charts are filled by neighbors' means; the rest coarsely.
+    Returns (height, width, channels) float32: A new array; all zero if nothing is covered.
     """
     result = np.where(coverage[..., None], pixels, np.float32(0)).astype(np.float32)
     fill(result, coverage, rings)
@@ -47,7 +39,7 @@ def dilate(pixels: Float32, coverage: Bool, rings: int = 8) -> Float32:
 
 
 def fill(pixels: Float32, coverage: Bool, rings: int = 8) -> None:
-    """Fill every uncovered texel of a page where it is; they must be 0 so far."""
+    """Fill every uncovered texel of a page in place; they must be 0."""
     if not coverage.any():
         return
     filled = coverage.copy()

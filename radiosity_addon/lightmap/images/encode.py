@@ -1,4 +1,4 @@
-"""What the numbers in a lightmap mean, and how they fit into 16 bits."""
+"""The quantities that a lightmap can hold, and their encoding in 16 bits."""
 
 from __future__ import annotations
 
@@ -13,30 +13,21 @@ from ...numerics import brdf_of_reflectance, reflected_radiance, tiles
 from .page import LightmapPage
 
 BAND = 256
-"""Rows of a page that are looked at at once."""
+"""Rows of a page processed at once."""
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 
 
 def to_quantity(irradiance: Float, reflectance: Float, emission: Float, quantity: str) -> Float:
-    """Turn irradiance into what the lightmap is to hold.
+    """Convert irradiance to the lightmap's quantity.
 
-    Parameters
-    ----------
-    irradiance : (n, 3) float
-        H, what arrives [W/m²], linear RGB.
-    reflectance, emission : (n, 3) float
-        ρ and the self-emitted exitance E [W/m²] at the same points.
-    quantity : str
-        "irradiance_over_pi": H/π [W/m²/sr], what Cycles' diffuse bake without colour holds;
-        "irradiance": H [W/m²]; "radiosity": B = E + ρH [W/m²]. A residual is not made of
-        irradiance: see `error_picture`.
-
-    Raises
-    ------
-    UsageError
-        If the quantity is unknown.
+    irradiance (n, 3): H, what arrives [W/m²], linear RGB.
+    reflectance, emission (n, 3): ρ and the self-emitted exitance E [W/m²] at the same points.
+    quantity: "irradiance_over_pi": H/π [W/m²/sr], what Cycles' diffuse bake without color holds;
+        "irradiance": H [W/m²]; "radiosity": B = E + ρH [W/m²]. A residual is not made of irradiance: see
+        `error_picture`.
+    Raises UsageError if the quantity is unknown.
     """
     if quantity == "irradiance_over_pi":
         white = brdf_of_reflectance(1.0)
@@ -49,17 +40,10 @@ def to_quantity(irradiance: Float, reflectance: Float, emission: Float, quantity
 
 
 def presentable(pages: Sequence[LightmapPage], signed: bool = False) -> tuple[LightmapPage, ...]:
-    """Return pages that may be published: what is below 0 by rounding is 0 in them.
+    """Return pages that may be published: values below 0 by rounding become 0.
 
-    Parameters
-    ----------
-    signed : bool
-        Whether they may be negative, as an error picture is.
-
-    Raises
-    ------
-    BakeError
-        If a value is NaN or infinite.
+    signed: Whether they may be negative, as an error picture is.
+    Raises BakeError if a value is NaN or infinite.
     """
     found = []
     for page in pages:
@@ -76,10 +60,7 @@ def presentable(pages: Sequence[LightmapPage], signed: bool = False) -> tuple[Li
 def png16_scale(*pages: Float32) -> float:
     """Return the one scale for all pages of a bake: their largest value, 1 if all are black.
 
-    Raises
-    ------
-    BakeError
-        If a value is NaN or infinite.
+    Raises BakeError if a value is NaN or infinite.
     """
     largest = 0.0
     for pixels in pages:

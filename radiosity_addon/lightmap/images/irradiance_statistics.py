@@ -1,4 +1,4 @@
-"""What of the light on a surface a lighting designer reads first: least, mean, most, and how even it is."""
+"""Statistics of the light on a surface: minimum, mean, maximum and uniformity."""
 
 from __future__ import annotations
 
@@ -14,10 +14,7 @@ from ..texels import TOUCHED
 class LightStatistics:
     """Of one surface.
 
-    Attributes
-    ----------
-    minimum, mean, maximum : float
-        In the unit of what was given; the mean is by area.
+    minimum, mean, maximum: In the unit of what was given; the mean is by area.
     """
 
     minimum: float
@@ -26,7 +23,7 @@ class LightStatistics:
 
     @property
     def uniformity(self) -> float | None:
-        """U₀, the least over the mean, as in EN 12464-1; None in the dark."""
+        """U₀, the minimum over the mean, as in EN 12464-1; None without light."""
         return self.minimum / self.mean if self.mean > 0 else None
 
     def as_dict(self) -> dict[str, float | None]:
@@ -53,9 +50,9 @@ def light_statistics(values: Array, areas: Array) -> LightStatistics | None:
 
 
 def told_texels(state: Array) -> Array:
-    """Tell which of (n,) texels are of the surface as one sees it: none that are divided, hidden or shut in.
+    """Return which of (n,) texels show the visible surface: those that are not divided, hidden or enclosed.
 
-    Those show the mean of two lights, or a dark that nobody looks at. All of them, if there are no others.
+    The others show a mean over two sides, or light that nobody sees. All texels, if there are no others.
     """
     whole = (state == 0) | (state == TOUCHED)
     return whole if whole.any() else np.ones(len(state), dtype=bool)

@@ -17,11 +17,8 @@ def texel_pages(
 ) -> tuple[LightmapPage, ...]:
     """Put texels' values on their pages, filled `rings` past the charts' borders, and stitch the seams.
 
-    Parameters
-    ----------
-    values : (n, 3) float
-    seams : Seams or None
-        None stitches nothing.
+    values (n, 3).
+    seams: None stitches nothing.
     """
     pages = []
     for index in geometry.index:

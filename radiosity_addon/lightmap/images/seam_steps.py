@@ -1,4 +1,4 @@
-"""How large the steps across seams are, against those between neighbours inside charts."""
+"""How large the steps across seams are, against those between neighbors inside charts."""
 
 from __future__ import annotations
 
@@ -12,21 +12,16 @@ from ..texels import NO_TEXEL, TexelGeometry
 from .seams import Seams
 
 NEIGHBOUR = 2.5
-"""Texels side by side on the page are neighbours if they lie no farther apart [texels] in the world."""
+"""Texels side by side on the page are neighbors if they lie no farther apart [texels] in the world."""
 
 
 @dataclass(frozen=True)
 class SeamSteps:
     """Relative steps |a − b| / ½(a + b), of the sums over the channels.
 
-    Attributes
-    ----------
-    across : (s,) float64
-        At places on seams, between bilinear look-ups on either side.
-    inside : (p,) float64
-        Between texels side by side in one chart, everywhere.
-    beside : (q,) float64
-        The same, of those that a look-up on a seam reads.
+    across (s,): At places on seams, between bilinear look-ups on either side.
+    inside (p,): Between texels side by side in one chart, everywhere.
+    beside (q,): The same, for texels that a look-up on a seam reads.
     """
 
     across: Array

@@ -1,4 +1,4 @@
-"""Where one surface goes on in another chart: pairs of places on the page that are one place in the world.
+"""Seams, where a surface continues in another chart: pairs of places on pages, one place in the world.
 
 A seam is an edge of two triangles whose lightmap coordinates differ on its two sides. Only those
 count over which light goes on unbroken: the shading normal is the same on both sides, the surface
@@ -18,7 +18,7 @@ from ...scene import Scene
 from ..texels import NO_TEXEL, TexelGeometry
 
 WELD = 1e-6
-"""Corners are one if they are no farther apart than this part of the scene's extent."""
+"""Corners are merged if their distance is at most this part of the scene's extent."""
 
 SAME_NORMAL = 0.99
 """Least cosine between the shading normals of the two sides, …"""
@@ -33,7 +33,7 @@ SAME_UV = 1e-3
 """Sides that lie closer than this on the page [texels] are one."""
 
 NEAR = 3.0
-"""A texel that far [texels] from a place on a seam has nothing to do with it."""
+"""Texels this far [texels] from a place on a seam do not belong to it."""
 
 CHUNK = 1 << 16
 """Places tested at once; bounds the temporaries to about 40 MB."""
@@ -43,16 +43,10 @@ CHUNK = 1 << 16
 class Seams:
     """s places on seams, and the texels a bilinear look-up of either side reads there.
 
-    Attributes
-    ----------
-    texel : (s, 2, 4) int64
-        One side's four texels, then the other's, numbered row by row and page after page.
-    weight : (s, 2, 4) float64
-        Of the texels; either side's sum to 1.
-    length : (s,) float64
-        Of the seam that the place stands for, in texels, at most 1.
-    triangle : (s, 2) int64
-        The scene's triangles on either side.
+    texel (s, 2, 4) int64: One side's four texels, then the other's, numbered row by row and page after page.
+    weight (s, 2, 4): Of the texels; either side's sum to 1.
+    length (s,): Of the seam that the place stands for, in texels, at most 1.
+    triangle (s, 2) int64: The scene's triangles on either side.
     """
 
     texel: Array
@@ -68,7 +62,7 @@ class Seams:
         return Seams(self.texel[rows], self.weight[rows], self.length[rows], self.triangle[rows])
 
     def of_one_material(self, scene: Scene) -> Seams:
-        """Return the places whose two sides reflect and emit alike, which images do not tell."""
+        """Return the places whose two sides have equal reflectance and emission and no textures."""
         alike = np.ones(len(self), dtype=bool)
         for values in (scene.reflectance, scene.emission):
             alike &= (values[self.triangle[:, 0]] == values[self.triangle[:, 1]]).all(axis=1)
@@ -84,10 +78,7 @@ class Seams:
 def find_seams(scene: Scene, geometry: TexelGeometry, caster: RayCaster | None = None) -> Seams:
     """Find the seams of all charts on all pages.
 
-    Parameters
-    ----------
-    caster : RayCaster or None
-        Tells which seams have something standing on them; None takes it that none has.
+    caster: Detects geometry that stands on seams; None assumes there is none.
     """
     triangle, corner = _shared_edges(scene, geometry)
     ends, pages = _on_pages(geometry, triangle, corner)
@@ -135,13 +126,11 @@ def _in_one(geometry: TexelGeometry) -> Array:
 
 
 def _shared_edges(scene: Scene, geometry: TexelGeometry) -> tuple[Array, Array]:
-    """Return the edges of exactly two triangles that go on in each other.
+    """Return the edges of exactly two triangles that continue each other.
 
-    Returns
-    -------
-    triangle : (p, 2) int
-    corner : (p, 2, 2) int
-        Which of the triangle's corners are the edge's ends, in the same order on both sides.
+    Returns triangle (p, 2) int.
+    Returns corner (p, 2, 2) int: Which of the triangle's corners are the edge's ends, in the same order on
+        both sides.
     """
     every = np.flatnonzero(scene.areas > 0)
     vertex = weld(scene.triangles[every].reshape(-1, 3), WELD).reshape(-1, 3)
@@ -160,7 +149,7 @@ def _shared_edges(scene: Scene, geometry: TexelGeometry) -> tuple[Array, Array]:
     triangle = np.stack([every[first // 3], every[second // 3]], axis=1)
     corner = np.stack([corner[first], corner[second]], axis=1)
     kept = (geometry.page_of_triangle[triangle] >= 0).all(axis=1)
-    # Front beside front: seen from the other side the edge runs the other way.
+    # Both fronts face the same way: from the other side, the edge runs in the other direction.
     kept &= flip[first] != flip[second]
     normal = scene.face_normals[triangle]
     kept &= np.einsum("pk,pk->p", normal[:, 0], normal[:, 1]) > NO_FOLD
@@ -184,12 +173,8 @@ def _bilinear(spots: Array, pages: Array, sizes: Sequence[int]) -> tuple[Array, 
 def _own_texels_only(geometry: TexelGeometry, numbers: Array, weight: Array, at: Array, size: Array) -> Array:
     """Return (s,) which places read no other surface's texels, but their own on both sides.
 
-    Parameters
-    ----------
-    numbers : (s, 2, 4) int
-        The covered texels among those read, or NO_TEXEL.
-    at, size : (s, 3), (s,) float64
-        Where the places are, and the width of a texel there [m].
+    numbers (s, 2, 4) int: The covered texels among those read, or NO_TEXEL.
+    at, size (s, 3), (s,): Where the places are, and the width of a texel there [m].
     """
     covered = (numbers != NO_TEXEL) & (weight > 0)
     distance = np.linalg.norm(geometry.position[numbers] - at[:, None, None], axis=3)
@@ -198,7 +183,7 @@ def _own_texels_only(geometry: TexelGeometry, numbers: Array, weight: Array, at:
 
 
 def _open(geometry: TexelGeometry, caster: RayCaster, numbers: Array, weight: Array) -> Array:
-    """Return (s,) between which sides nothing stands: the texels read most see each other."""
+    """Return (s,) the places with nothing between their sides: the main texels see each other."""
     best = np.where((numbers != NO_TEXEL) & (weight > 0), weight, -1.0).argmax(axis=2)
     ends = np.take_along_axis(numbers, best[:, :, None], axis=2)[..., 0]
     at, normal, facet = geometry.position[ends], geometry.normal[ends], geometry.surface_normal[ends]

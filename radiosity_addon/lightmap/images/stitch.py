@@ -3,7 +3,7 @@
 Least squares over the texels that are read along seams: Σ length (a(x) − b(x))² over places x on
 the seams, where a and b are bilinear look-ups on either side, plus Σ λ (v − v₀)² over the texels,
 solved by conjugate gradients. Texels outside the charts, which dilation made up, give way easily;
-those whose centre is on the surface hardly. No texel leaves the range of the values that were
+those whose center is on the surface hardly. No texel leaves the range of the values that were
 read beside it, so what is dark stays dark, and nothing turns negative.
 """
 
@@ -22,7 +22,7 @@ from .seams import Seams
 Float32 = NDArray[np.float32]
 
 HOLD_COVERED, HOLD_EDGE, HOLD_OUTSIDE = 1.0, 0.1, 0.01
-"""λ of texels whose centre is on the surface, of those of which only a part is, and of dilated ones."""
+"""λ of texels whose center is on the surface, of those of which only a part is, and of dilated ones."""
 
 ITERATIONS = 40
 """Conjugate-gradient steps at most; …"""
@@ -68,18 +68,9 @@ def stitch_in_place(pages: Sequence[Float32], geometry: TexelGeometry, seams: Se
 def stitch(values: Array, hold: Array, seams: Seams) -> Array:
     """Return the texels' values with both sides of every seam brought together.
 
-    Parameters
-    ----------
-    values : (n, k) float
-        Of all texels of all pages, the dilated ones too.
-    hold : (n,) float
-        How strongly each keeps its value: λ.
-    seams : Seams
-
-    Returns
-    -------
-    values : (n, k)
-        A new array of the same type; equal bit for bit where no seam is near.
+    values (n, k): Of all texels of all pages, the dilated ones too.
+    hold (n,): How strongly each keeps its value: λ.
+    Returns values (n, k): A new array of the same type; equal bit for bit where no seam is near.
     """
     result = np.array(values)
     if not len(seams):

@@ -1,4 +1,4 @@
-"""Where each textured triangle is in the image of its surface.
+"""Layout of textured triangles in the image of their surface.
 
 Triangles lie two by two in tiles, as right-angled ones with legs of n texels: the first in the
 lower left corner, its partner turned by half a turn in the upper right. Texel (i, j) of a
@@ -17,23 +17,17 @@ from ...numerics import Array, run_numbers
 
 MAX_LEG = 4096
 _FILLED = 0.9
-"""Of the texels allowed, tiles take this much; the rest is for what shelves leave free."""
+"""The share of the allowed texels that tiles take; the rest is for gaps in the shelves."""
 
 
 @dataclass(frozen=True)
 class SurfaceTiles:
     """A layout of triangles.
 
-    Parameters
-    ----------
-    width, height : int
-        Of the image in texels.
-    leg : (t,) int32
-        Texels along a triangle's legs; 1 is a single texel for all of it.
-    corner : (t, 2) int32
-        The column and row of its first corner's texel.
-    turned : (t,) bool
-        Whether its legs go left and down instead of right and up.
+    width, height: Of the image in texels.
+    leg (t,) int32: Texels along a triangle's legs; 1 is a single texel for all of it.
+    corner (t, 2) int32: The column and row of its first corner's texel.
+    turned (t,) bool: Whether its legs go left and down instead of right and up.
     """
 
     width: int
@@ -45,11 +39,8 @@ class SurfaceTiles:
     def texels(self) -> tuple[Array, Array, Array, Array, Array]:
         """Return every texel that is sampled.
 
-        Returns
-        -------
-        triangle, row, column : (n,) int64
-        weights : (n, 2) float64
-            Of the triangle's second and third corner, at the sample.
+        Returns triangle, row, column (n,) int64.
+        Returns weights (n, 2): Of the triangle's second and third corner, at the sample.
         """
         i, j, triangle = _steps(self.leg)
         column, row = self._at(triangle, i, j)
@@ -65,13 +56,9 @@ class SurfaceTiles:
     def drawn_triangles(self) -> tuple[Array, Array]:
         """Return triangles that cover the centers of their texels, to be drawn into the image.
 
-        Returns
-        -------
-        coordinates : (t, 3, 2) float64
-            Their corners in the image.
-        weights : (t, 3, 2) float64
-            The weights of the triangle's own second and third corner there; they reach a little
-            beyond it.
+        Returns coordinates (t, 3, 2): Their corners in the image.
+        Returns weights (t, 3, 2): The weights of the triangle's own second and third corner there; they reach
+            a little beyond it.
         """
         half = np.full(len(self.leg), -0.5)
         reach = self.leg.astype(float)
@@ -80,11 +67,9 @@ class SurfaceTiles:
         return self._corners(along, across), weights
 
     def fill_diagonals(self, values: Array) -> None:
-        """Give the texels beyond the diagonals the mean of those beside them, in place.
+        """Set the texels beyond the diagonals to the mean of their neighbors, in place.
 
-        Parameters
-        ----------
-        values : (height, width, k) float
+        values (height, width, k).
         """
         wide = np.flatnonzero(self.leg > 1)
         i = run_numbers(self.leg[wide] - 1) + 1
@@ -108,18 +93,9 @@ class SurfaceTiles:
 def lay_out_surfaces(area: Array, group: Array, side: int) -> SurfaceTiles:
     """Give each triangle texels by its area, about side² in all, and a place.
 
-    Parameters
-    ----------
-    area : (t,) float
-        In the world [m²]; 0 for a triangle that takes no more than one texel.
-    group : (t,) int
-        Triangles of different groups have no texel in common, not even in look-ups.
-    side : int
-        Width of the image.
-
-    Returns
-    -------
-    SurfaceTiles
+    area (t,): In the world [m²]; 0 for a triangle that takes no more than one texel.
+    group (t,) int: Triangles of different groups have no texel in common, not even in look-ups.
+    side: Width of the image.
     """
     return _placed(_legs(area, side), group, side)
 
@@ -129,11 +105,7 @@ def lay_out_again(tiles: SurfaceTiles, triangles: Array) -> SurfaceTiles:
 
     `texels` lists the same texels of each triangle for both, in the same order.
 
-    Parameters
-    ----------
-    tiles : SurfaceTiles
-    triangles : (n,) int
-        Not empty.
+    triangles (n,) int: Not empty.
     """
     leg = tiles.leg[triangles]
     taken = np.where(leg > 1, 0.5 * (leg + 1.0) * (leg + 2.0), 1.0).sum()
@@ -177,7 +149,7 @@ def _legs(area: Array, side: int) -> Array:
     low, high = 0.0, float(side) * side / max(float(area[area > 0].min(initial=np.inf)), 1e-30)
     if not (area > 0).any() or not np.isfinite(high):
         return np.ones(len(area), dtype=np.int32)
-    # Bisection on texels a square metre, in the exponent: areas differ by many orders.
+    # Bisection on texels a square meter, in the exponent: areas differ by many orders.
     low = np.log(high) - 100.0
     high = np.log(high)
     for _ in range(50):

@@ -1,8 +1,8 @@
-"""Sixteenths of texels that geometry divides: what answers rays that hit such a texel.
+"""Cells: sixteenths of divided texels, which answer rays that hit such a texel.
 
 A texel that a wall stands on, or that a window's frame covers in part, shows the mean of what it
 holds, as it should. Light that comes back from it must not be the mean: a ray from inside a closed
-box would then bring the lit floor outside. Nor can a whole neighbour answer, for the strip beside a
+box would then bring the lit floor outside. Nor can a whole neighbor answer, for the strip beside a
 frame is darker than what lies a texel farther in the open. So a divided texel answers in cells,
 each as those of its points that see the cell's *anchor* in a straight line just above the surface;
 a hit asks the nearest cell whose anchor it sees (`solver/gather/sub_cells.py` does the same for elements).
@@ -11,11 +11,10 @@ Through a gap the line of sight is free: what is below a hood asks what is below
 
 from __future__ import annotations
 
-from collections.abc import Generator
-
 import numpy as np
 
-from ...numerics import Array, chunk_steps
+from ...base import SILENT, Progress
+from ...numerics import Array, for_chunks
 from ...rays import SIGHT_LIFT, Hits, free_segment
 from ...solver.gather import NOTHING, Footprints, LocalPass, Resolver
 from .occlusion import Crossings, below_hood
@@ -45,12 +44,7 @@ _FIRST = np.stack(np.divmod(np.arange(CELLS), ALONG)[::-1], axis=1) / ALONG
 class TexelCells:
     """The cells of some texels, numbered texel by texel.
 
-    Parameters
-    ----------
-    local : LocalPass
-    geometry : TexelGeometry
-    crossings : Crossings
-        Those have cells that are crossed or touched.
+    crossings: Those have cells that are crossed or touched.
     """
 
     def __init__(self, local: LocalPass, geometry: TexelGeometry, crossings: Crossings) -> None:
@@ -71,8 +65,7 @@ class TexelCells:
             self._anchors[part] = spread + self._lift(texel)[:, None]
             self._below[part] = self._below_hood(texel, spread)
 
-        for _ in chunk_steps(place, len(self.texel), CHUNK_TEXELS, local.threads):
-            pass
+        for_chunks(place, len(self.texel), CHUNK_TEXELS, local.threads)
 
     def __len__(self) -> int:
         return CELLS * len(self.texel)
@@ -92,7 +85,7 @@ class TexelCells:
         geometry, caster = self._geometry, self.local.caster
         found = np.full(len(texel), NOTHING, dtype=np.int32)
         normal = geometry.surface_normal[texel]
-        # On the page a texel may reach beyond its triangle onto one that looks elsewhere.
+        # On the page a texel may extend beyond its triangle onto one with another normal.
         alike = np.einsum("hk,hk->h", geometry.face_normals[hits.triangle], normal) > SAME_SURFACE
         waiting = np.flatnonzero(alike)
         position = geometry.positions_of(hits) + self._lift(texel)
@@ -125,7 +118,7 @@ class TexelCells:
             back = np.broadcast_to(anchor[rows][:, None], points.shape)
             above = lift[rows][:, None]
             seen = free_segment(caster, (points + above).reshape(-1, 3), (back + above).reshape(-1, 3))
-            # What lies behind a wall, or beyond the rim of a hood, is not of this cell.
+            # Points behind a wall, or beyond an occluder's rim, do not belong to this cell.
             own = seen.reshape(points.shape[:2])
             own &= self._below_hood(texel[rows], points) == below[rows, None]
             return np.asarray(np.where(own[..., None], points, back))
@@ -136,22 +129,20 @@ class TexelCells:
         """Return (p, 3) the normals of the triangles that cells are on."""
         return np.asarray(self._geometry.surface_normal[self.texel_of(cell)])
 
-    def gather(self, cell: Array, rays: int, resolve: Resolver) -> Generator[float, None, Array]:
-        """Gather over cells, (p, rays) sources; yields the fraction done."""
-        gathered = yield from self.local.gather_steps(
-            self.footprints(cell), self.upright(cell), rays, resolve
-        )
-        return gathered.sources
+    def gather(self, cell: Array, rays: int, resolve: Resolver, progress: Progress = SILENT) -> Array:
+        """Gather over cells; return (p, rays) sources."""
+        at, upright = self.footprints(cell), self.upright(cell)
+        return self.local.gather(at, upright, rays, resolve, progress=progress).sources
 
     def lit(self, cell: Array) -> Footprints:
-        """Return cells as footprints that ask for lamps: their anchors alone."""
+        """Return cells as footprints for the light of lamps: their anchors alone."""
         texel, geometry = self.texel_of(cell), self._geometry
         expected = self.local.irradiance_at(geometry.triangle[texel], geometry.barycentric[texel])
         anchor = self._anchors[cell // CELLS, cell % CELLS] - self._lift(texel)
         return Footprints(anchor, geometry.normal[texel], self._keys(cell), expected=expected)
 
     def _keys(self, cell: Array) -> Array:
-        """Return (p,) int64 what cells' rays are drawn by: the same whichever other texels are divided."""
+        """Return (p,) int64 sampling keys of cells, which do not depend on other divided texels."""
         texel = self.texel_of(cell).astype(np.int64)
         return np.asarray(len(self._geometry) + CELLS * texel + cell % CELLS)
 

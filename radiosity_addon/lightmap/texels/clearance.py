@@ -1,4 +1,4 @@
-"""Texels that nothing but their own plane comes near: they need no probes for what crosses them.
+"""Texels near nothing but their own plane: they need no probes for crossing geometry.
 
 Space is cut into cells a few texels wide, and every cell that a piece of a triangle may reach remembers a
 plane, or that there are several. A texel whose surroundings lie in cells of its own plane, and in
@@ -45,21 +45,11 @@ def clear_texels(
 ) -> Array:
     """Find texels around which nothing rises off their plane.
 
-    Parameters
-    ----------
-    outset : float
-        What is around a texel in its plane: its square, so many times as large.
-    height : float
-        And how far up that reaches, in widths of the texel.
-    clearance : float
-        What rises less than this off the plane does not count [m].
-    threads : int
-        0 means all cores.
-
-    Returns
-    -------
-    clear : (n,) bool
-        Certain where true; where false, who knows.
+    outset: Size of the square around a texel in its plane, relative to the texel.
+    height: And how far up that reaches, in widths of the texel.
+    clearance: What rises less than this off the plane does not count [m].
+    threads: 0 means all cores.
+    Returns clear (n,) bool: Certain where true; unknown where false.
     """
     clear = np.zeros(len(geometry), dtype=bool)
     if len(geometry) == 0:
@@ -82,7 +72,7 @@ def clear_texels(
 def _surroundings(
     geometry: TexelGeometry, outset: float, height: float, clearance: float, threads: int
 ) -> tuple[Array, Array]:
-    """Return (n, 3) lower and upper bounds of what is around each texel."""
+    """Return (n, 3) lower and upper bounds of the surroundings of each texel."""
     low, high = (geometry.scratch.empty((len(geometry), 3)) for _ in range(2))
 
     def bound(part: slice) -> None:
@@ -117,10 +107,8 @@ def _extent(low: Array, high: Array) -> tuple[Array, Array, float]:
 class _Cells:
     """Cubic cells over the part of space where there are texels.
 
-    Parameters
-    ----------
-    low, high : (3,) float64
-    size : float [m]
+    low, high (3,).
+    size float [m].
     """
 
     def __init__(self, low: Array, high: Array, size: float) -> None:
@@ -181,7 +169,7 @@ class _Cells:
             off = np.abs(np.einsum("nk,nk->n", at - geometry.triangles[of, 0], plane))
             cosine = np.einsum("nk,nk->n", normal.take(other, axis=0), plane)
             bend = np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
-            # The root of what rounding leaves of 1 − 1 is no bend.
+            # The square root of a rounding error of 1 − 1 is not a bend.
             off += reach[other] * np.where(bend < ROUNDED, 0.0, bend)
             flat[other[off > tolerance]] = False
         return flat
@@ -193,7 +181,7 @@ def _pieces(triangles: Array, cells: _Cells, most: int, scratch: Scratch) -> tup
     Left out is what lies where there are no cells. Also returns each piece's triangle, (p,).
     """
     corners, triangle = triangles, np.arange(len(triangles), dtype=np.int32)
-    # A hair narrower: a piece's bounds are widened by what rounding may take.
+    # Slightly narrower, because a piece's bounds are widened by the rounding error.
     widest = cells.size * 0.999
     done = scratch.rows(9, np.float64), scratch.rows(1, np.int32)
     count = 0

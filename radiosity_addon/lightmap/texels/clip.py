@@ -33,7 +33,7 @@ def area_in_unit_square(triangles: Float) -> Float:
     """Return (t,) the exact areas of (t, 3, 2) triangles within [0, 1]², without clipping them.
 
     By Green, the area under the outline, ∮ clamp(y) dx over the part of it with x in [0, 1]: below the
-    square an edge counts nothing, beside it half the sum of its heights, above it 1.
+    square an edge counts 0, next to it half the sum of its heights, above it 1.
     """
     total = np.zeros(len(triangles))
     x, y = np.ascontiguousarray(triangles.transpose(2, 1, 0))

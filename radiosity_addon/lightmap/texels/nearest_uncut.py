@@ -1,4 +1,4 @@
-"""Whole texels next to a divided one: what answers a hit in a strip too narrow for a cell of its own."""
+"""The nearest uncut texels of a divided one; they answer hits in strips too narrow for a cell."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from .occlusion import Crossings
 from .texel_geometry import NO_TEXEL
 
 SAME_PLANE = 0.1
-"""A neighbour's centre may rise so much over the hit's plane, as a part of its distance."""
+"""A neighbor's center may rise so much over the hit's plane, as a part of its distance."""
 
 SAME_SURFACE = 0.9
-"""Cosine between the normals of a texel and its neighbour: on the page it may be anything."""
+"""Cosine between the normals of a texel and its neighbor: on the page it may be anything."""
 
 _AROUND = np.array([[r, c] for r in (-1, 0, 1) for c in (-1, 0, 1) if r or c])
 
@@ -22,15 +22,12 @@ _AROUND = np.array([[r, c] for r in (-1, 0, 1) for c in (-1, 0, 1) if r or c])
 def whole_neighbour(
     crossings: Crossings, caster: RayCaster, texel: Array, position: Array, below: Array
 ) -> Array:
-    """Return (h,) int32: the nearest whole neighbour of each texel whose centre a point sees, or NOTHING.
+    """Return (h,) int32: the nearest whole neighbor of each texel whose center a point sees, or NOTHING.
 
-    Parameters
-    ----------
-    texel : (h,) int
-    position : (h, 3) float64
-        Points on them.
-    below : (h,) bool
-        Whether the points are below a hood: then the neighbour must be as well, and else must not.
+    texel (h,) int.
+    position (h, 3): Points on them.
+    below (h,) bool: Whether the points are below a hood: then the neighbor must be as well, and else must
+        not.
     """
     geometry = crossings.geometry
     around = np.full((len(texel), len(_AROUND)), NO_TEXEL, dtype=np.int32)

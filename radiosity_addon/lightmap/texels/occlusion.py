@@ -1,9 +1,9 @@
-"""Texels that geometry cuts in two: a wall's foot on a floor, the rim of what a box covers.
+"""Texels that geometry divides, occludes or touches.
 
 Such a texel shows the mean of both sides, as it should, but answers no ray with it: see
 `cells.py`.
 
-What hovers closely over a surface (a window's frame a millimetre off the wall, a door in its
+What hovers closely over a surface (a window's frame a millimeter off the wall, a door in its
 frame) parts light from dark likewise, though nothing stands on the texel, and the gap lets lines
 of sight along the surface through. Short probes along the normal tell which texels are *hooded*,
 and which only partly.
@@ -11,13 +11,13 @@ and which only partly.
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from ...numerics import Array, chunk_steps, row_numbers
+from ...base import SILENT, Progress
+from ...numerics import Array, for_chunks, row_numbers
 from ...rays import SIGHT_LIFT, RayCaster
 from .clearance import clear_texels
 from .states import DIVIDED, OCCLUDED, TOUCHED
@@ -44,15 +44,12 @@ _SPOTS = np.array([[u, v] for u in (0.02, 0.5, 0.98) for v in (0.02, 0.5, 0.98)]
 
 @dataclass(frozen=True)
 class Crossings:
-    """What geometry does to n texels, (n,) bool each.
+    """The effect of geometry on n texels, (n,) bool each.
 
-    Attributes
-    ----------
-    geometry : TexelGeometry
-    cut : geometry stands on them
-    touched : they end at geometry; neither cut nor at a rim
-    rim : a hood's rim is above them
-    occluded : all of them is below a hood; neither cut nor at a rim
+    cut geometry stands on them.
+    touched they end at geometry; neither cut nor at a rim.
+    rim a hood's rim is above them.
+    occluded all of them is below a hood; neither cut nor at a rim.
     """
 
     geometry: TexelGeometry
@@ -77,23 +74,24 @@ class Crossings:
 
     @cached_property
     def alone(self) -> Array:
-        """Texels whose light is like no neighbour's, though a line of sight may join them."""
+        """Texels whose light differs from their neighbors' even where they see each other."""
         return self.crossed | self.occluded
 
     @cached_property
     def beside(self) -> Array:
-        """Texels next to a crossed one: what stands there takes half of what they see."""
+        """Texels next to a crossed one: geometry there blocks half of their view."""
         return self.geometry.neighbourhood(self.crossed) & ~self.alone
 
 
-def crossing_steps(
+def find_crossings(
     geometry: TexelGeometry,
     caster: RayCaster,
     threads: int = 0,
     before: Crossings | None = None,
     anew: Array | None = None,
-) -> Generator[float, None, Crossings]:
-    """Find the texels that geometry cuts, touches or hoods; yields the fraction done.
+    progress: Progress = SILENT,
+) -> Crossings:
+    """Find the texels that geometry divides, touches or occludes.
 
     Given how it was `before`, only some texels, row numbers, are tried `anew`.
     """
@@ -128,7 +126,7 @@ def crossing_steps(
         result.occluded[rows] = below.all(axis=1) & ~cut
         result.cut[rows], result.touched[rows] = cut, doubtful & ~cut & ~result.rim[rows]
 
-    yield from chunk_steps(find, len(doubted), CHUNK, threads)
+    for_chunks(find, len(doubted), CHUNK, threads, progress)
     return result
 
 

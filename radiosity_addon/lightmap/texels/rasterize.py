@@ -2,7 +2,7 @@
 
 A texel is the unit square [column, column + 1] × [row, row + 1] in texel coordinates; row 0 is
 v = 0. It is covered where a triangle overlaps it by a positive area, and it belongs to one
-triangle: the one that covers its centre, else the one with the largest overlap. Its *footprint*
+triangle: the one that covers its center, else the one with the largest overlap. Its *footprint*
 is the overlap, a convex polygon of up to seven corners, over which the lightmap averages.
 
 Candidates are found by row spans (for each triangle and row the columns the triangle reaches), so
@@ -36,10 +36,10 @@ UNRESOLVED = 2.0**-23
 """Slivers thinner than this share of the page are rounding of float32 UVs, not coverage."""
 
 _CENTRE = 2.0
-"""Added to the overlap of a pair that covers the centre, so that it beats every other overlap."""
+"""Added to the overlap of a pair that covers the center, so that it beats every other overlap."""
 
 FOOTPRINT = 0.5
-"""Width of a texel's footprint, in texels, where its centre is covered. Cycles' bake spreads its samples
+"""Width of a texel's footprint, in texels, where its center is covered. Cycles' bake spreads its samples
 over just this middle part of a texel, not over the whole of it (docs/decisions/0010)."""
 
 _NOBODY = np.iinfo(np.int32).max
@@ -49,22 +49,13 @@ _NOBODY = np.iinfo(np.int32).max
 class Texels:
     """The covered texels of one page, in row-major order.
 
-    Parameters
-    ----------
-    resolution : int
-        Width and height of the page.
-    uv : (n_triangles, 3, 2) float32
-        The triangles that were rasterised, all of the page's.
-    row, column : (t,) int32
-        Row 0 is v = 0, the bottom.
-    triangle : (t,) int32
-        The triangle the texel belongs to.
-    area : (t,) float32
-        Area of the footprint as a fraction of the texel, in (0, 1].
-    centroid : (t, 3) float32
-        Barycentric coordinates, in the triangle, of the footprint's centroid.
-    centre_inside : (t,) bool
-        Whether the triangle covers the texel's centre.
+    resolution: Width and height of the page.
+    uv (n_triangles, 3, 2) float32: The triangles that were rasterized, all of the page's.
+    row, column (t,) int32: Row 0 is v = 0, the bottom.
+    triangle (t,) int32: The triangle the texel belongs to.
+    area (t,) float32: Area of the footprint as a fraction of the texel, in (0, 1].
+    centroid (t, 3) float32: Barycentric coordinates, in the triangle, of the footprint's centroid.
+    centre_inside (t,) bool: Whether the triangle covers the texel's center.
     """
 
     resolution: int
@@ -109,7 +100,7 @@ class Texels:
 
 
 class _TexelPairs(NamedTuple):
-    """Overlapping (triangle, texel) pairs: flat texel index, triangle, overlap, centre covered."""
+    """Overlapping (triangle, texel) pairs: flat texel index, triangle, overlap, center covered."""
 
     texel: NDArray[np.int64]
     triangle: Int32
@@ -120,20 +111,11 @@ class _TexelPairs(NamedTuple):
 def rasterise(uv: Float32, resolution: int, scratch: Scratch | None = None) -> Texels:
     """Find every texel that a triangle overlaps, and the one triangle it belongs to.
 
-    Parameters
-    ----------
-    uv : (n, 3, 2) float32
-        Triangles in [0, 1], either orientation; what lies outside the page is cut off and
+    uv (n, 3, 2) float32: Triangles in [0, 1], either orientation; what lies outside the page is cut off and
         triangles without area cover nothing.
-    resolution : int
-        Width and height of the page in texels.
-    scratch : Scratch or None
-        Makes the texels' arrays; None keeps them in memory.
-
-    Returns
-    -------
-    Texels
-        Row-major; ties go to the larger overlap, then to the lower triangle index.
+    resolution: Width and height of the page in texels.
+    scratch: Makes the texels' arrays; None keeps them in memory.
+    Returns row-major; ties go to the larger overlap, then to the lower triangle index.
     """
     uv = np.ascontiguousarray(uv, dtype=np.float32)
     best = np.zeros(resolution * resolution, dtype=np.float32)
@@ -167,7 +149,7 @@ def rasterise(uv: Float32, resolution: int, scratch: Scratch | None = None) -> T
 
 
 def centre_weights(uv: Float32, resolution: int, triangle: Int32, row: Int32, column: Int32) -> Float:
-    """Return (p, 3) the barycentric coordinates, each in its triangle, of texels' centres."""
+    """Return (p, 3) the barycentric coordinates, each in its triangle, of texels' centers."""
     origin = _around_texels(uv, resolution, triangle, row, column)
     return _weights_inside(np.full((len(triangle), 1, 2), 0.5), origin)[:, 0]
 
@@ -191,21 +173,12 @@ def coverage_sum(uv: Float32, resolution: int) -> Float:
 def sample_footprints(texels: Texels, u: Float, width: float = FOOTPRINT) -> Float32:
     """Place area-uniform points in each texel's footprint.
 
-    Parameters
-    ----------
-    texels : Texels
-        t texels.
-    u : (t, k, 2) float
-        Points of the unit square; stratified ones give stratified points, because the map
-        from the square to the footprint keeps areas and is continuous within each triangle of
-        the footprint's fan (whole texels take the square as it is).
-    width : float
-        Of the footprint where the centre is covered, in texels.
-
-    Returns
-    -------
-    (t, k, 3) float32
-        Barycentric coordinates in each texel's triangle.
+    texels: t texels.
+    u (t, k, 2): Points of the unit square; stratified ones give stratified points, because the map from the
+        square to the footprint keeps areas and is continuous within each triangle of the footprint's fan
+        (whole texels take the square as it is).
+    width: Of the footprint where the center is covered, in texels.
+    Returns (t, k, 3) float32: Barycentric coordinates in each texel's triangle.
     """
     result = np.empty((*u.shape[:2], 3), dtype=np.float32)
     for start in range(0, len(texels), CHUNK):
@@ -223,7 +196,7 @@ def sample_footprints(texels: Texels, u: Float, width: float = FOOTPRINT) -> Flo
 def overlapping_pairs(uv: Float32, resolution: int, centres_only: bool = False) -> Iterator[_TexelPairs]:
     """Yield, in chunks and by ascending triangle, every pair that overlaps by a positive area.
 
-    With `centres_only`, and several times as fast, those whose centre lies well inside the
+    With `centres_only`, and several times as fast, those whose center lies well inside the
     triangle; their area is given as 1.
     """
     corners = uv.astype(np.float64) * resolution
@@ -243,7 +216,7 @@ def overlapping_pairs(uv: Float32, resolution: int, centres_only: bool = False) 
 
 
 def _centred(uv: Float32, resolution: int, triangle: Int32, row: Int32, column: Int32) -> _TexelPairs:
-    """Return those of the candidate pairs whose centre is inside, off the triangle's sides."""
+    """Return those of the candidate pairs whose center is inside, off the triangle's sides."""
     distance, reach = _edge_distances(uv, resolution, triangle, row, column)
     keep = _all_three(distance > 1e-3 * reach)
     texel = row[keep].astype(np.int64) * resolution + column[keep]
@@ -306,9 +279,9 @@ def _columns(corners: Float, row: Int32, resolution: int) -> tuple[Int32, NDArra
 def _edge_distances(
     uv: Float32, resolution: int, triangle: Int32, row: Int32, column: Int32
 ) -> tuple[Float, Float]:
-    """Return (p, 3) edge functions at the texels' centres, inside positive, and their reach.
+    """Return (p, 3) edge functions at the texels' centers, inside positive, and their reach.
 
-    The reach is how much an edge function changes from the centre to the farthest corner.
+    The reach is how much an edge function changes from the center to the farthest corner.
     """
     corners = uv[triangle].astype(np.float64) * resolution
     edge = np.roll(corners, -1, axis=1) - corners
@@ -353,5 +326,5 @@ def _weights_inside(points: Float, corners: Float) -> Float:
 
 
 def _all_three(sides: Bool) -> Bool:
-    """Return (p,) whether all sides say so, (p, 3); several times as fast as `all` along an axis."""
+    """Return (p,) whether all of (p, 3) are true; several times as fast as `all` along an axis."""
     return np.asarray(sides[:, 0] & sides[:, 1] & sides[:, 2])

@@ -1,7 +1,7 @@
 """Shadow rays of smooth surfaces start on the surface that the normals describe, as in Cycles.
 
 A coarse mesh that is shaded smooth is lit past the planes of its triangles, where they and their
-neighbours lie in their own shadow: a jagged terminator. Near it rays start above the triangle, on
+neighbors lie in their own shadow: a jagged terminator. Near it rays start above the triangle, on
 the curved patch through its corners (a parabola over each edge).
 """
 
@@ -43,7 +43,7 @@ class SmoothLift:
         return np.asarray(0.25 * np.maximum(self._opening, 0.0).sum(axis=1))
 
     def of(self, chosen: Array) -> SmoothLift:
-        """Return what lifts the starts of some texels' rays, numbered among these."""
+        """Return the lifts of the starts of selected texels' rays, numbered among these."""
         lift = copy(self)
         lift._texels = chosen if self._texels is None else self._texels[chosen]
         return lift
@@ -51,13 +51,9 @@ class SmoothLift:
     def __call__(self, texels: Array, starts: Array, directions: Array) -> Array:
         """Return where rays start instead.
 
-        Parameters
-        ----------
-        texels : (r,) int
-        starts : (r, k, 3) float64
-            Points of the texels' triangles.
-        directions : (r, k, 3) float64
-            Unit, toward the lamp.
+        texels (r,) int.
+        starts (r, k, 3): Points of the texels' triangles.
+        directions (r, k, 3): Unit, toward the lamp.
         """
         texels = texels if self._texels is None else self._texels[texels]
         rows = np.flatnonzero(self._smooth[self._geometry.triangle[texels]])

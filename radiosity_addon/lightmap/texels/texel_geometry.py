@@ -1,4 +1,4 @@
-"""Where every lightmap texel lies in the world, over all pages at once."""
+"""Positions of all lightmap texels of all pages in the world."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ EDGE_OFFSETS = 4.0
 """Points keep this many ray offsets from the edges of their triangles."""
 
 SINK = 2.0
-"""Points that lie against another surface are so many ray offsets behind their own."""
+"""Points that touch another surface lie this many ray offsets behind their own."""
 
 CHUNK = 1 << 16
 """Texels placed at once; bounds the temporaries to about 40 MB."""
@@ -30,39 +30,26 @@ _SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 class TexelGeometry:
     """The n covered texels of all pages, numbered page by page.
 
-    Parameters
-    ----------
-    scene : Scene
-    uv : (t, 3, 2) float32
-        Lightmap coordinates of every scene triangle; rows without a lightmap are ignored.
-    page_of_triangle : (t,) int32
-        −1 where a triangle has no lightmap.
-    texels : sequence of Texels
-        One per page.
-    rows : sequence of (p,) int
-        Per page, the scene triangle of each of the page's triangles.
-    scratch : Scratch or None
-        Makes the texels' arrays; None keeps them in memory.
-
-    Attributes
-    ----------
-    scratch : Scratch
-        Makes arrays of what else there is of each texel.
-    uv, page_of_triangle, triangles, face_normals, normals
-        Of every scene triangle, as given.
-    page : (n,) int16, or int32 where there are more pages
-    row, column, triangle : (n,) int32
-    share : (n,) float32
-        What part of the texel its triangle covers.
-    centre_inside : (n,) bool
-        Whether the texel's centre is on its triangle.
-    whole : (n,) bool
-        Whether all of the texel is.
-    barycentric : (n, 2) float32
-        Weights of the triangle's second and third corner at the centre of the footprint.
-    position, normal, surface_normal : (n, 3) float64
-        Centre of the footprint; interpolated shading normal; the triangle's own normal.
+    uv (t, 3, 2) float32: Lightmap coordinates of every scene triangle; rows without a lightmap are ignored.
+    page_of_triangle (t,) int32: −1 where a triangle has no lightmap.
+    texels: One per page.
+    rows sequence of (p,) int: Per page, the scene triangle of each of the page's triangles.
+    scratch: Makes the texels' arrays; None keeps them in memory.
+    scratch: Makes arrays of what else there is of each texel.
+    uv, page_of_triangle, triangles, face_normals, normals: Of every scene triangle, as given.
+    page (n,) int16, or int32 where there are more pages.
+    page_start (pages + 1,) int64: The first texel of each page, and n.
+    row, column, triangle (n,) int32.
+    share (n,) float32: What part of the texel its triangle covers.
+    centre_inside (n,) bool: Whether the texel's center is on its triangle.
+    whole (n,) bool: Whether all of the texel is.
+    barycentric (n, 2) float32: Weights of the triangle's second and third corner at the center of the
+        footprint.
+    position, normal, surface_normal (n, 3): Center of the footprint; interpolated shading normal; the
+        triangle's own normal.
     """
+
+    STORED = ("page", "page_start", "triangle", "centre_inside", "index", "uv", "page_of_triangle")
 
     scratch = Scratch()
 
@@ -79,15 +66,15 @@ class TexelGeometry:
         self._scene = scene
         self.uv, self.page_of_triangle = uv, page_of_triangle
         self.triangles, self.face_normals, self.normals = scene.triangles, scene.face_normals, scene.normals
-        self._first = np.cumsum([0] + [len(page) for page in texels])
-        count = int(self._first[-1])
+        self.page_start = np.cumsum([0] + [len(page) for page in texels])
+        count = int(self.page_start[-1])
         self.index = []
         """per page (height, width) int32: the texel's number, or NO_TEXEL"""
         for number, page in enumerate(texels):
             numbers = np.full((page.resolution,) * 2, NO_TEXEL, dtype=np.int32)
             for tile in tiles(len(page)):
                 own = np.arange(tile.start, tile.stop)
-                numbers[page.row[tile], page.column[tile]] = self._first[number] + own
+                numbers[page.row[tile], page.column[tile]] = self.page_start[number] + own
             self.index.append(numbers)
         self.texels = self._joined(texels)
         self.page = scratch.empty(count, np.int16 if len(texels) <= np.iinfo(np.int16).max else np.int32)
@@ -98,7 +85,7 @@ class TexelGeometry:
         self.position, self.normal = scratch.empty((count, 3)), scratch.empty((count, 3))
         for number, (of, page) in enumerate(zip(rows, self.texels, strict=True)):
             for tile in tiles(len(page), CHUNK):
-                mine = slice(self._first[number] + tile.start, self._first[number] + tile.stop)
+                mine = slice(self.page_start[number] + tile.start, self.page_start[number] + tile.stop)
                 triangle = of[page.triangle[tile]]
                 self.page[mine], self.triangle[mine] = number, triangle
                 self.whole[mine] = page.area[tile] >= 1.0
@@ -116,12 +103,12 @@ class TexelGeometry:
         whole = {}
         for name in names:
             parts = [getattr(page, name) for page in texels]
-            whole[name] = self.scratch.empty(int(self._first[-1]), parts[0].dtype if parts else np.int32)
-            for first, part in zip(self._first, parts, strict=False):
+            whole[name] = self.scratch.empty(int(self.page_start[-1]), parts[0].dtype if parts else np.int32)
+            for first, part in zip(self.page_start, parts, strict=False):
                 for tile in tiles(len(part)):
                     whole[name][first + tile.start : first + tile.stop] = part[tile]
         self.row, self.column, self.centre_inside, self.share = (whole[name] for name in names)
-        rows = [slice(first, first + len(page)) for first, page in zip(self._first, texels, strict=False)]
+        rows = [slice(first, first + len(page)) for first, page in zip(self.page_start, texels, strict=False)]
         return [
             replace(
                 page,
@@ -134,13 +121,13 @@ class TexelGeometry:
         ]
 
     def _put(self, rows: slice, weights: Array) -> None:
-        """Put texels where barycentric weights (r, 3) of their triangles say."""
+        """Move texels to barycentric weights (r, 3) of their triangles."""
         triangle, upright = self.triangle[rows], self.surface_normal[rows]
         self.barycentric[rows] = weights[:, 1:]
         self.position[rows] = self._sunk(rows, _at(self.triangles[triangle], weights[:, None]))[:, 0]
         shading = np.einsum("nc,nck->nk", weights, self.normals[triangle])
         length = np.linalg.norm(shading, axis=1, keepdims=True)
-        # A shading normal that vanished or turned behind the surface says nothing.
+        # A shading normal that vanished or points behind the surface is not usable.
         sane = (length[:, 0] > 1e-6) & (np.einsum("nk,nk->n", shading, upright) > 0)
         self.normal[rows] = np.where(sane[:, None], shading / np.maximum(length, 1e-6), upright)
 
@@ -187,14 +174,10 @@ class TexelGeometry:
         rows = [np.flatnonzero(self.page_of_triangle == page) for page in range(len(self.texels))]
         return TexelGeometry(scene, self.uv, self.page_of_triangle, self.texels, rows, self.scratch)
 
-    def first(self, page: int) -> int:
-        """Return the number of a page's first texel."""
-        return int(self._first[page])
-
     def sample(self, rows: Array, u: Array, width: float = FOOTPRINT) -> Array:
         """Return (r, k, 3) points spread over the middle `width` of r texels by u (r, k, 2)."""
         points = np.empty((len(rows), u.shape[1], 3))
-        # What is inside a texel that is whole on its triangle needs no clipping.
+        # Texels that lie entirely on their triangle need no clipping.
         inner = self.whole[rows] & ((width < 1.0) | ((u > 0.0) & (u < 1.0)).all(axis=(1, 2)))
         plain, cut = np.flatnonzero(inner), np.flatnonzero(~inner)
         points[plain] = self._in_plane(rows[plain], 0.5 + (u[plain].astype(np.float64) - 0.5) * width)
@@ -253,13 +236,13 @@ class TexelGeometry:
             mine = np.flatnonzero(self.page[rows] == number)
             if len(mine) == 0:
                 continue
-            local = rows[mine] - self._first[number]
+            local = rows[mine] - self.page_start[number]
             inside = sample_footprints(page.take(local), u[mine], width)
             weights[mine] = self._drawn_in(inside, self.triangle[rows[mine]])
         return weights
 
     def _drawn_in(self, weights: Array, triangle: Array) -> Array:
-        """Move (n, k, 3) barycentric points that lie on an edge of their triangle off it by a hair."""
+        """Move (n, k, 3) barycentric points that lie on an edge of their triangle slightly off it."""
         inside = np.maximum(weights, self._inset[triangle][:, None])
         moved = (inside != weights).any(axis=2, keepdims=True)
         return np.asarray(np.where(moved, inside / inside.sum(axis=2, keepdims=True), weights))
@@ -268,7 +251,7 @@ class TexelGeometry:
         """Grow a (n,) mask of texels by one texel in all eight directions of their page."""
         grown = np.empty(len(self), dtype=bool)
         for page, (numbers, inside) in enumerate(zip(self.index, self._framed, strict=True)):
-            mine = slice(self._first[page], self._first[page + 1])
+            mine = slice(self.page_start[page], self.page_start[page + 1])
             image = np.zeros((len(numbers) + 2, numbers.shape[1] + 2), dtype=bool)
             flat, own, result = image.ravel(), chosen[mine], grown[mine]
             for tile in tiles(len(inside)):
@@ -281,7 +264,7 @@ class TexelGeometry:
 
     @cached_property
     def _framed(self) -> list[Array]:
-        """Per page, where its texels lie in a page that is one texel larger all around, row by row."""
+        """Per page, the positions of its texels in a page with a border of one texel, row by row."""
         framed = [self.scratch.empty(len(page), np.int32) for page in self.texels]
         for page, places in zip(self.texels, framed, strict=True):
             for tile in tiles(len(page)):

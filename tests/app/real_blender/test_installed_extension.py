@@ -72,13 +72,12 @@ def test_bakes_the_same_light_as_the_module(
 def test_another_method_and_the_plot_from_blenders_command_line(
     installed: Installed, cornell_blend: Path
 ) -> None:
-    output, plot = installed.folder / "jacobi", installed.folder / "plots" / "jacobi.png"
+    output, plot = installed.folder / "jacobi", installed.folder / "plots" / "jacobi.svg"
     bake = ["-b", cornell_blend, "--command", "radiosity", "bake", "--resolution", "32", "--quality", "draft"]
     done = installed.run(*bake, "--output", output, "--method", "jacobi", "--elements", "100", "--plot", plot)
     assert done.returncode == 0, done.stdout
     assert json.loads((output / "report.json").read_text())["solver"]["method"] == "jacobi"
-    width, height = (int.from_bytes(plot.read_bytes()[at : at + 4], "big") for at in (16, 20))
-    assert (width, height) == (1200, 800)
+    assert "Jacobi" in plot.read_text()
     refused = installed.run(*bake, "--output", output, "--method", "jacobi", "--ambient")
     assert refused.returncode == 2
     assert "--ambient does not apply to --method jacobi" in refused.stdout

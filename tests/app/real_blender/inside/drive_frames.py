@@ -23,7 +23,7 @@ from file_dump import differences, dump_file
 ANSWER = Path(sys.argv[sys.argv.index("--") + 1])
 QUALITY, RESOLUTION, BAKES = sys.argv[sys.argv.index("--") + 2 :]
 MODULE = "bl_ext.user_default.radiosity_addon"
-runtime = importlib.import_module(f"{MODULE}.blender.session.runtime")
+runtime = importlib.import_module(f"{MODULE}.blender.session.state").session
 
 IDLE_SECONDS = 4.0
 ESCAPE_AT = ("export", "unwrap", "solve", "light", "late light")

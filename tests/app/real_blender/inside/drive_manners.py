@@ -20,7 +20,8 @@ MODULE = "bl_ext.user_default.radiosity_addon"
 
 cleaning = importlib.import_module(f"{MODULE}.blender.operators.cleaning")
 staging = importlib.import_module(f"{MODULE}.publishing.publish")
-runtime = importlib.import_module(f"{MODULE}.blender.session.runtime")
+last_bake = importlib.import_module(f"{MODULE}.blender.session.last_bake")
+runtime = importlib.import_module(f"{MODULE}.blender.session.state").session
 window_job = importlib.import_module(f"{MODULE}.blender.jobs.window_job")
 
 CORNER = 0.0625  # where an edit puts a corner
@@ -109,11 +110,11 @@ def script():
     invoke(bpy.ops.radiosity.check)
     yield from photograph("check")
     yield from events.key("RET", *view)
-    seen["baking_from_dialog"] = baking() or runtime.last_bake(bpy.context.scene) is not None
+    seen["baking_from_dialog"] = baking() or last_bake.read(bpy.context.scene) is not None
     yield from photograph("dialog-closed")
     yield from events.until(not_baking, 120)
     yield from photograph("after")
-    seen["lit"] = runtime.last_bake(bpy.context.scene) is not None
+    seen["lit"] = last_bake.read(bpy.context.scene) is not None
     yield from scroll("down")
     yield from photograph("below")
     yield from scroll("up")

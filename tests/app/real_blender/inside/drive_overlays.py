@@ -22,7 +22,7 @@ live_view = importlib.import_module(f"{MODULE}.blender.jobs.live_view")
 kept_details = importlib.import_module(f"{MODULE}.blender.session.kept_details")
 overlay_pictures = importlib.import_module(f"{MODULE}.blender.overlays.overlay_pictures")
 overlay_panel = importlib.import_module(f"{MODULE}.blender.panels.overlay_panel")
-runtime = importlib.import_module(f"{MODULE}.blender.session.runtime")
+runtime = importlib.import_module(f"{MODULE}.blender.session.state").session
 texel_pictures = importlib.import_module(f"{MODULE}.bake.result.texel_pictures")
 
 OVERLAYS = ("FALSE_COLOR", "DENSITY", "CHECKER", "TEXELS", "ELEMENTS", "LINKS", "ERROR")
@@ -44,13 +44,13 @@ def texels_drawn():
 
 def remember_texels():
     """Note the pictures of texels on their way to the screen."""
-    show = live_view.show_texels
+    show = live_view.show
 
     def showing(picture):
-        seen["texels"] += 1
+        seen["texels"] += hasattr(picture, "surfaces")
         show(picture)
 
-    live_view.show_texels = showing
+    live_view.show = showing
 
 
 def bake():

@@ -56,7 +56,7 @@ def not_relighting():
 
 def resting():
     """Live has nothing left to do."""
-    live = module("session.live_state").state.live
+    live = module("session.state").session.live
     return live is not None and not bpy.app.timers.is_registered(module("relight.live_relight")._tick)
 
 
@@ -105,7 +105,7 @@ def script():
 
     yield from follow()
     yield from events.until(resting, 60)
-    seen["message"] = module("session.live_state").state.message
+    seen["message"] = module("session.state").session.live_message
     yield 1.0
     seen["still_resting"] = resting()
 
@@ -152,7 +152,7 @@ def drag():
 
 def follow():
     """Change the power step by step; note how long the image takes, and how long until it is drawn."""
-    live = module("session.live_state").state.live
+    live = module("session.state").session.live
     latencies, frames = [], []
     for step in range(STEPS):
         shown = live.changes

@@ -20,7 +20,7 @@ MODULE = "bl_ext.user_default.radiosity_addon.blender"
 STEPS = [-1, -1, 1, 1, -1, -1, -1, 1, -1, -1, 1, 1, 1, 1]
 """Undo and redo, one after the other, from the last of five states on."""
 
-runtime = importlib.import_module(f"{MODULE}.session.runtime")
+runtime = importlib.import_module(f"{MODULE}.session.state").session
 versions = importlib.import_module(f"{MODULE}.relight.lightmap_versions")
 
 seen = {"walk": []}

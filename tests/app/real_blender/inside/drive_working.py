@@ -19,7 +19,7 @@ MODULE = "bl_ext.user_default.radiosity_addon"
 HEADER = 34  # pixels at the sidebar's top: the panel's title, which a click would fold
 
 checks = importlib.import_module(f"{MODULE}.blender.operators.checks")
-runtime = importlib.import_module(f"{MODULE}.blender.session.runtime")
+runtime = importlib.import_module(f"{MODULE}.blender.session.state").session
 
 seen = {}
 

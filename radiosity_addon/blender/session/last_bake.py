@@ -1,40 +1,21 @@
-"""What panels draw from: the running bake's progress, and the last bake's figures.
-
-`draw()` runs at every redraw, so nothing here computes: the last bake is parsed once
-for each new text the scene holds.
-"""
+"""A scene's memory of its last bake: written after a bake, shown by the panel, dropped by Restore."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import bpy
 
 from ...base import one_of_each
 from ...options import METHODS
-from . import kept_details
+from .state import session
 
 MAX_WARNINGS = 100
 """A scene keeps this many of the last bake's warnings; the report has them all."""
 
 
-@dataclass(eq=False, repr=False)
-class Running:
-    """The bake that is going on in this Blender, if any."""
-
-    active: bool = False
-    stage: str = ""
-    fraction: float = 0.0
-    seconds_left: float | None = None
-    """About how long it still takes; None as long as nobody can know."""
-    stop: Callable[[], None] | None = None
-    """Ends it from outside its operator."""
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class LastBake:
+class LastBake(NamedTuple):
     """Figures and warnings of the last bake of a scene."""
 
     figures: tuple[tuple[str, str], ...] = ()
@@ -44,24 +25,8 @@ class LastBake:
     folder: str = ""
 
 
-@dataclass(eq=False, repr=False)
-class _Cache:
-    """What was found last: without this text the decorator would work one out, slowly."""
-
-    text: str = ""
-    parsed: LastBake | None = None
-
-
-running = Running()
-interrupted = False
-"""Whether a bake of the open file was killed while it replaced its lightmaps."""
-_cache = _Cache()
-
-
-def stop_running() -> None:
-    """End the bake that is going on, if any, as the extension is switched off under it."""
-    if running.stop is not None:
-        running.stop()
+_parsed: tuple[str, LastBake | None] = "", None
+"""The text that was read last, and what it says."""
 
 
 def remember(scene: bpy.types.Scene, report: dict, folder: str) -> None:
@@ -91,7 +56,7 @@ def remember(scene: bpy.types.Scene, report: dict, folder: str) -> None:
 
 def forget(scene: bpy.types.Scene) -> None:
     """Drop the scene's memory of its last bake, and all trace of us where nothing else was set."""
-    kept_details.drop(scene)
+    session.kept_details.pop(scene.name_full, None)
     group = scene.radiosity
     group.property_unset("last_bake")
     group.property_unset("baked_light")
@@ -101,14 +66,15 @@ def forget(scene: bpy.types.Scene) -> None:
         scene.property_unset("radiosity")
 
 
-def last_bake(scene: bpy.types.Scene) -> LastBake | None:
+def read(scene: bpy.types.Scene) -> LastBake | None:
     """Return the last bake of the scene; None if there was none."""
     text = scene.radiosity.last_bake
     if not text:
         return None
-    if text != _cache.text:
-        _cache.text, _cache.parsed = text, _parse(text)
-    return _cache.parsed
+    global _parsed
+    if text != _parsed[0]:
+        _parsed = text, _parse(text)
+    return _parsed[1]
 
 
 def _parse(text: str) -> LastBake | None:

@@ -1,0 +1,195 @@
+"""Which bake a scene needs, decided once, after the export: all of it, what changed, what moved, or nothing.
+
+An object has changed if its triangles, their shading normals, its reflectance or opacity, its texel scale
+or its part in the light have. Where lamps, emission, the world or the settings have changed, everything is
+baked. Lightmaps that stay are not touched: the shadows and bounces that changed objects throw on them are
+not renewed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from ..base import BakeWarning, SceneError
+from ..options import BakeSettings
+from ..scene import BakeScene
+from .relight import KeptBake
+from .scene_diff import Part, compare, light_digest, rounded_digest, scene_record
+
+SHORT = 16
+"""Characters of the digests by which objects that are gone are told from renamed ones."""
+
+_NAMED = 5
+"""Objects that a message names."""
+
+
+class ShownLightmap(NamedTuple):
+    """What is remembered of an object's lightmap.
+
+    Attributes
+    ----------
+    digest, light : str
+        Those of the object and of the light it was baked in.
+    density : float
+        Texels per meter.
+    has_groups : bool
+        Whether each light group has a lightmap of its own.
+    """
+
+    digest: str
+    light: str
+    density: float
+    has_groups: bool
+
+
+class ShownBake(NamedTuple):
+    """What is remembered of a scene's lightmaps.
+
+    Attributes
+    ----------
+    lightmaps : mapping of str to ShownLightmap
+        Of the objects that show one.
+    objects : mapping of str to str
+        Digest of each object that the last bake had, with a lightmap or not, cut to `SHORT`.
+    """
+
+    lightmaps: Mapping[str, ShownLightmap]
+    objects: Mapping[str, str]
+
+
+class BakeDigests(NamedTuple):
+    """What is to be remembered of a bake: the digest of the light, and of each object."""
+
+    light: str
+    objects: Mapping[str, str]
+
+    @classmethod
+    def of(cls, bake_scene: BakeScene, settings: BakeSettings) -> BakeDigests:
+        """Return the digests of a scene."""
+        objects = {item.name: rounded_digest(bake_scene, item) for item in bake_scene.objects}
+        return cls(light_digest(bake_scene, settings), objects)
+
+
+@dataclass(frozen=True, eq=False)
+class BakePlan:
+    """Which bake a scene needs.
+
+    Attributes
+    ----------
+    kind : str
+        *full*; *changed*: objects that did not change keep their lightmaps; *moved*: a kept bake is updated
+        for objects that moved; *nothing*.
+    bake_scene : BakeScene
+        Objects that keep their lightmaps are marked as not to be baked.
+    settings : BakeSettings
+    digests : BakeDigests
+        What is to be remembered of the bake.
+    kept : KeptBake or None
+        The bake to update, if *moved*.
+    unchanged : collection of str
+        The objects that keep their lightmaps.
+    gone : sequence of str
+        Objects that the last bake had, if *changed* or *nothing*.
+    """
+
+    kind: Literal["full", "changed", "moved", "nothing"]
+    bake_scene: BakeScene
+    settings: BakeSettings
+    digests: BakeDigests
+    kept: KeptBake | None = None
+    unchanged: Collection[str] = ()
+    gone: Sequence[str] = ()
+
+    @property
+    def reason(self) -> str:
+        """Why nothing is to be done."""
+        if self.gone:
+            return f"no object has changed that gets a lightmap, but {self._gone}"
+        return "nothing has changed since the last bake: there is nothing to do"
+
+    @property
+    def warnings(self) -> tuple[BakeWarning, ...]:
+        """What the bake does not renew."""
+        if self.kind != "changed":
+            return ()
+        message = (
+            f"{len(self.unchanged)} unchanged objects kept their lightmaps: light and shadow that the "
+            "changed ones throw on them are as before; bake all to renew them"
+        )
+        return (BakeWarning("scene", f"{message}; {self._gone}" if self.gone else message),)
+
+    @property
+    def _gone(self) -> str:
+        named = ", ".join(f"'{name}'" for name in self.gone[:_NAMED])
+        more = f" and {len(self.gone) - _NAMED} more" if len(self.gone) > _NAMED else ""
+        return f"gone since the last bake: {named}{more}; light and shadow from there stay until you bake all"
+
+
+def plan_bake(
+    bake_scene: BakeScene, settings: BakeSettings, shown: ShownBake | None, kept: KeptBake | None
+) -> BakePlan:
+    """Return which bake a scene needs.
+
+    Parameters
+    ----------
+    shown : ShownBake or None
+        If given, objects that did not change keep their lightmaps.
+    kept : KeptBake or None
+        If given, and objects have only moved since, it is updated.
+    """
+    digests = BakeDigests.of(bake_scene, settings)
+    if kept is not None and _moved_alone(kept, bake_scene, settings):
+        return BakePlan("moved", bake_scene, settings, digests, kept)
+    full = BakePlan("full", bake_scene, settings, digests)
+    if shown is None:
+        return full
+    baked = [item.name for item in bake_scene.objects if item.bake]
+    same = {
+        name: lightmap
+        for name, lightmap in shown.lightmaps.items()
+        if name in baked and lightmap.light == digests.light and lightmap.digest == digests.objects[name]
+    }
+    if not same or any(lightmap.has_groups for lightmap in same.values()):
+        return full
+    gone = _gone(shown, digests)
+    if len(same) == len(baked):
+        return BakePlan("nothing", bake_scene, settings, digests, unchanged=same.keys(), gone=gone)
+    objects = tuple(replace(item, bake=item.bake and item.name not in same) for item in bake_scene.objects)
+    if settings.atlas == "shared" and settings.texel_density is None:
+        # As sharp as what is kept, on a page of their own.
+        density = float(np.median([lightmap.density for lightmap in same.values()]))
+        settings = replace(settings, texel_density=density, pages=1)
+    changed = replace(bake_scene, objects=objects)
+    return BakePlan("changed", changed, settings, digests, unchanged=same.keys(), gone=gone)
+
+
+def moved_objects(kept: KeptBake, bake_scene: BakeScene) -> tuple[str, ...]:
+    """Return the names of the objects that are elsewhere than when the bake was kept.
+
+    Raises
+    ------
+    SceneError
+        If anything else differs, or the kept bake lacks what updating it needs.
+    """
+    if kept.moves is None:
+        raise SceneError("the kept bake can be relit, but nothing in it moved: bake again")
+    diff = compare(kept.record, scene_record(bake_scene))
+    diff.refuse_all_but({Part.PLACE})
+    return diff[Part.PLACE]
+
+
+def _moved_alone(kept: KeptBake, bake_scene: BakeScene, settings: BakeSettings) -> bool:
+    """Return whether updating a kept bake gives what a bake of the scene would."""
+    if kept.moves is None or kept.settings != settings:
+        return False
+    return compare(kept.record, scene_record(bake_scene)).parts == {Part.PLACE}
+
+
+def _gone(shown: ShownBake, digests: BakeDigests) -> list[str]:
+    """Return the objects that the last bake had and the scene has not, but for renamed ones."""
+    now = {digest[:SHORT] for digest in digests.objects.values()}
+    return [name for name in shown.objects if name not in digests.objects and shown.objects[name] not in now]

@@ -1,0 +1,25 @@
+"""Two exports of a scene compared: what differs between them, part by part.
+
+Plans of bakes, relighting, Live and sidecars all ask here.
+"""
+
+from __future__ import annotations
+
+from .diff import RELIGHTABLE, Part, SceneDiff, compare
+from .lights import aligned, dark, differs_in_strength_alone
+from .record import SceneRecord, as_object_records, light_digest, rounded_digest, scene_record
+
+__all__ = [
+    "RELIGHTABLE",
+    "Part",
+    "SceneDiff",
+    "SceneRecord",
+    "aligned",
+    "as_object_records",
+    "compare",
+    "dark",
+    "differs_in_strength_alone",
+    "light_digest",
+    "rounded_digest",
+    "scene_record",
+]

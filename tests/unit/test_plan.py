@@ -1,0 +1,125 @@
+"""Which parts of a scene differ, and which bake that makes necessary."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from radiosity_addon.bake.plan import SHORT, BakeDigests, ShownBake, ShownLightmap, plan_bake
+from radiosity_addon.bake.scene_diff import Part, compare, scene_record
+from radiosity_addon.options.bake_settings import BakeSettings
+from radiosity_addon.scene.bake_scene import BakeScene
+from tests.relit_rooms import CHANGED, lit_bake
+
+SETTINGS = BakeSettings(resolution=64)
+
+
+def with_box(**changes: object) -> BakeScene:
+    """The room, whose box differs."""
+    scene = lit_bake()
+    objects = [replace(item, **changes) if item.name == "Box" else item for item in scene.objects]  # type: ignore[arg-type]
+    return replace(scene, objects=tuple(objects))
+
+
+def with_arrays(**changes: Callable[[np.ndarray], np.ndarray]) -> BakeScene:
+    """The room, the arrays of whose box differ."""
+    scene = lit_bake()
+    (box,) = [item for item in scene.objects if item.name == "Box"]
+    for name, change in changes.items():
+        values = getattr(scene.scene, name)
+        values[box.rows] = change(values[box.rows])
+    return scene
+
+
+def with_lights(*lights: object) -> BakeScene:
+    scene = lit_bake()
+    scene.scene.lights = lights
+    return scene
+
+
+LIGHTS = lit_bake().scene.lights
+
+DIFFERENT = {
+    "same": (lit_bake, set()),
+    "moved": (lambda: with_arrays(triangles=lambda old: old + 0.1), {Part.PLACE}),
+    "normals": (lambda: with_arrays(normals=lambda old: -old), {Part.PLACE}),
+    "painted": (lambda: with_arrays(reflectance=lambda old: 0.9 * old), {Part.SURFACE}),
+    "glows": (lambda: with_arrays(emission=lambda old: old + 1.0), {Part.EMISSION}),
+    "no shadow": (lambda: with_arrays(in_shadows=np.logical_not), {Part.ROLE}),
+    "not baked": (lambda: with_box(bake=False), {Part.ROLE}),
+    "sharper": (lambda: with_box(texel_scale=2.0), {Part.MESH}),
+    "strengths": (lambda: lit_bake(CHANGED), {Part.STRENGTH, Part.EMISSION}),
+    "lamp gone": (lambda: with_lights(*LIGHTS[1:]), {Part.LIGHT_REMOVED, Part.LIGHT_ORDER}),
+    "lamps swapped": (lambda: with_lights(LIGHTS[1], LIGHTS[0], *LIGHTS[2:]), {Part.LIGHT_ORDER}),
+    "lamp moved": (
+        lambda: with_lights(replace(LIGHTS[0], position=(0.5, 0.5, 0.5)), *LIGHTS[1:]),
+        {Part.LIGHT},
+    ),
+    "order": (lambda: replace(lit_bake(), objects=lit_bake().objects[::-1]), {Part.ORDER}),
+}
+
+
+@pytest.mark.parametrize("change", DIFFERENT)
+def test_a_change_differs_in_its_part_alone(change: str) -> None:
+    make, parts = DIFFERENT[change]
+    assert compare(scene_record(lit_bake()), scene_record(make())).parts == parts
+
+
+def test_settings_differ_where_both_are_known() -> None:
+    one, other = (scene_record(lit_bake(), replace(SETTINGS, seed=seed)) for seed in (0, 1))
+    assert compare(one, other).parts == {Part.SETTINGS}
+    assert compare(one, scene_record(lit_bake())).parts == set()
+
+
+def shown(has_groups: bool = False) -> ShownBake:
+    """What is remembered of a bake of the room, at 10 texels per meter."""
+    digests = BakeDigests.of(lit_bake(), SETTINGS)
+    lightmaps = {
+        item.name: ShownLightmap(digests.objects[item.name], digests.light, 10.0, has_groups)
+        for item in lit_bake().objects
+        if item.bake
+    }
+    return ShownBake(lightmaps, {name: digest[:SHORT] for name, digest in digests.objects.items()})
+
+
+def moved() -> BakeScene:
+    return with_arrays(triangles=lambda old: old + 0.1)
+
+
+def test_only_what_changed_is_baked_and_as_sharp_as_before() -> None:
+    plan = plan_bake(moved(), SETTINGS, shown(), None)
+    assert plan.kind == "changed"
+    assert [item.name for item in plan.bake_scene.objects if item.bake] == ["Box"]
+    assert set(plan.unchanged) == {item.name for item in lit_bake().objects if item.bake} - {"Box"}
+    assert (plan.settings.texel_density, plan.settings.pages) == (10.0, 1)
+    assert len(plan.warnings) == 1
+
+
+def test_nothing_is_planned_where_nothing_changed() -> None:
+    plan = plan_bake(lit_bake(), replace(SETTINGS, threads=2), shown(), None)
+    assert (plan.kind, plan.gone) == ("nothing", [])
+    remembered = shown()
+    remembered = remembered._replace(objects={**remembered.objects, "Shelf": "another"})
+    plan = plan_bake(lit_bake(), SETTINGS, remembered, None)
+    assert (plan.kind, plan.gone) == ("nothing", ["Shelf"])
+    assert "'Shelf'" in plan.reason
+
+
+@pytest.mark.parametrize(
+    ("scene", "settings", "remembered"),
+    [
+        (moved(), SETTINGS, None),
+        (lit_bake(CHANGED), SETTINGS, shown()),
+        (moved(), replace(SETTINGS, seed=1), shown()),
+        (moved(), SETTINGS, shown(has_groups=True)),
+        (moved(), SETTINGS, ShownBake({}, {})),
+    ],
+    ids=["all is wanted", "light", "settings", "light groups", "first bake"],
+)
+def test_all_is_baked(scene: BakeScene, settings: BakeSettings, remembered: ShownBake | None) -> None:
+    plan = plan_bake(scene, settings, remembered, None)
+    assert (plan.kind, plan.warnings) == ("full", ())
+    assert (plan.bake_scene, plan.settings) == (scene, settings)
