@@ -68,7 +68,7 @@ def check_keeping(request: argparse.Namespace, settings: BakeSettings) -> None:
     if request.keep and settings.quantity == "residual":
         raise UsageError("--keep: a residual is of all light together; bake another quantity")
     if request.relight and request.plot is not None:
-        raise UsageError("--relight solves nothing whose history --plot could draw")
+        raise UsageError("--relight solves nothing, so --plot has no history to draw")
 
 
 def check_plot(plot: Path | None) -> None:
@@ -94,8 +94,9 @@ def _add_bake(parser: argparse.ArgumentParser) -> None:
     )
     _add_options(parser, (*BAKE_COMMAND.values(), *EVERY_COMMAND.values()))
     for section in SECTIONS:
-        group = parser.add_argument_group(section)
-        _add_options(group, [option for option in OPTIONS.values() if option.section == section])
+        options = [option for option in OPTIONS.values() if option.section == section]
+        if options:
+            _add_options(parser.add_argument_group(section), options)
 
 
 def _add_restore(parser: argparse.ArgumentParser) -> None:

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from radiosity_addon.rays.embree import EmbreeCaster
-from radiosity_addon.solver import PointLight, Scene, SolverSettings
+from radiosity_addon.solver import PointLight, Scene, SolverSettings, solve
 from radiosity_addon.solver.equations.assembly import galerkin, with_lamps
 from radiosity_addon.solver.equations.fixed_elements import subdivide_evenly
 from radiosity_addon.solver.equations.linear_system import LinearSystem
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
-from radiosity_addon.solver.methods import solve_by_method
-from radiosity_addon.solver.methods.shooting import ShootingState, solve
+from radiosity_addon.solver.methods import shooting, solve_by_method
+from radiosity_addon.solver.methods.shooting import ShootingState
 from radiosity_addon.solver.state.state import SolverState
 from tests.cornell import cornell_box
 from tests.rooms import CEILING, FLOOR, box_room, coloured_room, grey
@@ -100,7 +100,7 @@ def test_shooting_is_never_behind_gathering_of_the_same_cost() -> None:
         if len(state.leaves) and len(found) <= state.iterations:
             found.append(state.unshot_power())
 
-    solve(cornell_box(), settings, watching(look))
+    shooting.solve(cornell_box(), settings, watching(look))
     found, cyclic = np.array(found), np.array(expected)
     assert found.shape == cyclic.shape
     assert (found <= cyclic * (1 + 1e-12)).all()
@@ -123,7 +123,7 @@ def test_a_shot_is_the_relaxation_of_a_row() -> None:
             shots_before = state.shots_of.copy()
             np.testing.assert_allclose(state.unshot, residual, rtol=0, atol=1e-12 * 30)
 
-    solve(cornell_box(), settings, watching(look))
+    shooting.solve(cornell_box(), settings, watching(look))
     assert shots_before.sum() == 300
 
 
@@ -140,7 +140,7 @@ def test_shots_gather_the_bounces_from_below() -> None:
         assert (state.radiosity <= dense + 1e-12 * dense.max()).all()
         before = state.radiosity
 
-    state = solve(cornell_box(), SolverSettings(elements=ELEMENTS, tolerance=1e-3), watching(look))
+    state = shooting.solve(cornell_box(), SolverSettings(elements=ELEMENTS, tolerance=1e-3), watching(look))
     leaves = state.leaves
     error = state.hierarchy.area[leaves] @ (dense - before)[leaves] / state.power
     # Σ A (B∞ − B) = Σ A Σ_k (ρF)^k ρF ΔB ≤ ρ / (1 − ρ) Σ A ΔB.
@@ -167,7 +167,7 @@ def test_the_ambient_term_anticipates_the_mean() -> None:
             plain = area @ state.radiosity[state.leaves] / area.sum()
             behind.append(float((1.0 - plain / exact).max()))
 
-    solve(scene, settings, watching(look))
+    shooting.solve(scene, settings, watching(look))
     assert behind[0] > 0.5
     assert behind[-1] < 3e-3
 
@@ -175,6 +175,6 @@ def test_the_ambient_term_anticipates_the_mean() -> None:
 def test_lamps_are_emission() -> None:
     """The system of the lamps' light as E' = E + ρ H_direct has the same first residual."""
     scene = coloured_room()
-    state = solve(scene, SolverSettings(elements=ELEMENTS, max_iterations=0))
+    state = shooting.solve(scene, SolverSettings(elements=ELEMENTS, max_iterations=0))
     system = with_lamps(galerkin(state.hierarchy, state.caster), state.received)
     assert state.unshot.tobytes() == system.emission.tobytes()

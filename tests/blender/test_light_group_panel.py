@@ -51,7 +51,22 @@ def test_selected_lamps_are_assigned_listed_and_selected_again(lamps: dict) -> N
     select(lamps["one"])
     bpy.ops.radiosity.light_group_remove()
     assert listed() == [("Kitchen", 1, 0, 0, 0, 0)]
+    assert lamps["one"].lightgroup == ""
+    assert [group.name for group in bpy.context.view_layer.lightgroups] == ["Kitchen"]
+
+
+def test_assigning_replaces_the_field_of_earlier_versions(lamps: dict) -> None:
+    lamps["one"].radiosity_light_group = "Old"
+    assert listed() == [("Old", 1, 0, 0, 0, 0)]
+    select(lamps["one"])
+    bpy.ops.radiosity.light_group_assign(group="New")
+    assert listed() == [("New", 1, 0, 0, 0, 0)]
     assert not lamps["one"].is_property_set(NAME)
+
+
+def test_a_group_without_members_is_listed() -> None:
+    bpy.context.view_layer.lightgroups.add(name="Empty")
+    assert listed() == [("Empty", 0, 0, 0, 0, 0)]
 
 
 def test_everything_with_a_name_is_listed() -> None:

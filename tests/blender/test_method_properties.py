@@ -12,7 +12,7 @@ import radiosity_addon
 from radiosity_addon.blender.panels import bake_panel
 from radiosity_addon.blender.panels.option_rows import draw_options
 from radiosity_addon.blender.settings.properties import settings_of
-from radiosity_addon.options import METHODS, OPTIONS, SECTIONS, BakeSettings, options_of_method
+from radiosity_addon.options import METHODS, OPTIONS, PANEL_OPTIONS, SECTIONS, BakeSettings, options_of_method
 
 SETTINGS = {name: option for name, option in OPTIONS.items() if option.methods}
 
@@ -29,7 +29,7 @@ class Layout:
 
     row = split = column
 
-    def prop(self, owner: object, name: str) -> None:
+    def prop(self, owner: object, name: str, **_: object) -> None:
         assert name in owner.bl_rna.properties
         self.drawn.append(name)
 
@@ -121,7 +121,7 @@ def test_every_option_of_the_panel_is_drawn_where_its_section_is(group: bpy.type
     group.size_mode, group.quality = "density", "error"
     expected = {
         option.identifier
-        for option in OPTIONS.values()
+        for option in (*PANEL_OPTIONS.values(), *OPTIONS.values())
         if option.panel is not None and not option.methods and option.name not in {"resolution", "pages"}
     }
     layout = Layout()

@@ -58,7 +58,7 @@ def test_a_material_of_two_colours_keeps_their_proportions() -> None:
     np.testing.assert_allclose(emission[:4], [(2.0, 0, 0), (4.0, 8, 0), (4.0, 8, 0), BLUE])
     for before, after in zip(found.groups, found.of_lamps(strengths)[1:], strict=True):
         np.testing.assert_allclose(after, before.strength * (0.5, 2.0, 1.0))
-    with pytest.raises(SceneError, match="several colours"):
+    with pytest.raises(SceneError, match="several colors"):
         found.checked(np.array([(0.0, 0, 0), (4.0, 8.0, 1.0), BLUE]))
 
 

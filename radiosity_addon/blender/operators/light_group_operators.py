@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import bpy
 
-from ..images.light_mixer import WHITE, mixers, sliders_of
 from ..scene_records.light_membership import NAME, Membership, name_on
 from ..session import facts
 from ..settings.light_group_properties import LONGEST_NAME
@@ -39,7 +38,7 @@ class RADIOSITY_OT_light_group_assign(Conditional, bpy.types.Operator):
         if not name:
             self.report({"ERROR"}, "The light group needs a name")
             return {"CANCELLED"}
-        changed = _name_on_all(context, name)
+        changed = _set_on_selected(context, name)
         if changed is None:
             self.report({"ERROR"}, "Linked objects cannot be changed: make them local or library overrides")
             return {"CANCELLED"}
@@ -58,7 +57,7 @@ class RADIOSITY_OT_light_group_remove(Conditional, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Unname it."""
-        changed = _name_on_all(context, "")
+        changed = _set_on_selected(context, "")
         if changed is None:
             self.report({"ERROR"}, "Linked objects cannot be changed: make them local or library overrides")
             return {"CANCELLED"}
@@ -100,22 +99,26 @@ class RADIOSITY_OT_light_group_reset(Conditional, bpy.types.Operator):
 
     def execute(self, _context: bpy.types.Context) -> set[str]:
         """Set every slider."""
+        from ..images.light_mixer import WHITE, mixers, sliders_of
+
         for tree in mixers():
             for sliders in sliders_of(tree):
                 sliders.color.default_value, sliders.strength.default_value = WHITE, 1.0
         return {"FINISHED"}
 
 
-def _name_on_all(context: bpy.types.Context, name: str) -> int | None:
-    """Name a group on the selected objects; None where one of them is another file's."""
+def _set_on_selected(context: bpy.types.Context, name: str) -> int | None:
+    """Put the selected objects into a group, or with "" into none; None if one of them is another file's."""
     objects = list(context.view_layer.objects.selected)
     if not all(obj.is_editable for obj in objects):
         return None
+    if name:
+        groups = context.view_layer.lightgroups
+        # Blender does not take every name as it is.
+        name = (groups.get(name) or groups.add(name=name)).name
     for obj in objects:
-        if name:
-            setattr(obj, NAME, name)
-        else:
-            obj.property_unset(NAME)
+        obj.lightgroup = name
+        obj.property_unset(NAME)
     facts.outdate()
     return len(objects)
 

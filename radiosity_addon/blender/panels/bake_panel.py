@@ -6,19 +6,19 @@ from typing import Any
 
 import bpy
 
-from ...options import ADVANCED, MAIN, SOLVER
+from ...options import ADVANCED, LAST_BAKE, MAIN, SOLVER
 from ..jobs.progress_text import progress_text
 from ..operators.panel_facts import can_restore, has_meshes
 from ..operators.setting_operators import has_role
 from ..relight import kept_bakes
 from ..session import last_bake
 from ..session.state import session
-from ..settings.preferences import folder_of, is_packed
+from ..settings.preferences import is_packed
 from ..settings.preset_menu import RADIOSITY_PT_presets
 from .check_panel import CheckSection
 from .light_group_panels import LightGroupSection
 from .object_panel import draw_overrides
-from .option_rows import draw_options, draw_preferred
+from .option_rows import draw_options
 from .overlay_panel import OverlaySection
 from .relight_panel import RelightSection
 from .sections import Section, draw_sections
@@ -97,17 +97,9 @@ def _draw_start(layout: Any, context: bpy.types.Context) -> None:
 
 def _draw_settings(layout: Any, context: bpy.types.Context) -> None:
     """Draw the main settings of the next bake."""
-    settings = context.scene.radiosity
-    layout.prop(settings, "scope", expand=True)
-    layout.prop(settings, "size_mode", expand=True)
-
     layout.use_property_split = True
     layout.use_property_decorate = False
     draw_options(layout, MAIN, context)
-    column = layout.column()
-    column.prop(settings, "output_folder")
-    if not settings.is_property_set("output_folder"):
-        draw_preferred(column, folder_of(context), settings.output_folder)
     if is_packed(context):
         draw_text(layout.box(), "The file is not saved: lightmaps are packed into it", "INFO", context)
 
@@ -203,7 +195,7 @@ class LastBakeSection(Section):
     def draw(cls, layout: Any, context: bpy.types.Context) -> None:
         """Draw the figures."""
         last = last_bake.read(context.scene) or last_bake.LastBake()
-        layout.prop(context.scene.radiosity, "lightmap_only")
+        draw_options(layout, LAST_BAKE, context)
         column = layout.column(align=True)
         for name, value in last.figures:
             split = column.split(factor=0.45)

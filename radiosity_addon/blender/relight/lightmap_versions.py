@@ -15,9 +15,8 @@ import hashlib
 import threading
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import bpy
 
@@ -39,8 +38,7 @@ TICK = 0.02
 FOREIGN = "The lightmaps on disk are from another bake than this file: bake again"
 
 
-@dataclass(frozen=True, repr=False)
-class Wanted:
+class Wanted(NamedTuple):
     """An image whose file has other bytes than it should.
 
     Attributes

@@ -21,7 +21,7 @@ from ..cycles.world import read_world
 from ..datablocks.mesh_arrays import all_finite, degenerate, not_finite_message, world_from_object
 from ..datablocks.uv_layers import MAX_UV_LAYERS
 from ..scene_records.export_sources import Export
-from ..scene_records.light_membership import name_on
+from ..scene_records.light_membership import blender_groups, group_on
 from ..scene_records.object_roles import BAKE, BAKEABLE_TYPES, half_visible
 from ..scene_records.pieces import Collected, Piece
 from ..scene_records.render_options import option_warnings, world_of
@@ -99,7 +99,7 @@ def export_steps(
         _check_uv_layers(piece)
     yield 0.5
     background = world_of(context)
-    group = name_on(background)
+    group = group_on(background, blender_groups(context.scene))
     # After that: Cycles may have to render it, which no evaluated object would survive.
     world, warnings = yield from read_world(background, dark)
     collected.lights.extend(world)

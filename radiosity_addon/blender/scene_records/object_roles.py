@@ -9,8 +9,7 @@ lamp's light; both still get a lightmap.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import bpy
 
@@ -30,8 +29,7 @@ BAKEABLE_TYPES = frozenset({"MESH", "CURVE", "SURFACE", "FONT", "META"})
 """All but a mesh are shown as a mesh copy once they are baked."""
 
 
-@dataclass(frozen=True, repr=False)
-class Role:
+class Role(NamedTuple):
     """What one object, or one instance of it, is there for.
 
     Parameters

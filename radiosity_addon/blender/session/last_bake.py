@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import bpy
 
@@ -15,8 +15,7 @@ MAX_WARNINGS = 100
 """A scene keeps this many of the last bake's warnings; the report has them all."""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class LastBake:
+class LastBake(NamedTuple):
     """Figures and warnings of the last bake of a scene."""
 
     figures: tuple[tuple[str, str], ...] = ()

@@ -1,4 +1,4 @@
-"""The light group's name on objects, materials, worlds and collections, and what the panel lists of it."""
+"""Our light group field of materials and collections, and the list of a scene's light groups."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from typing import NamedTuple
 import bpy
 
 from ..datablocks.bake_record import is_made
-from ..scene_records.light_membership import NAME, lamps_by_group, name_on, named
+from ..scene_records.light_membership import NAME, blender_groups, group_on, lamps_by_group, name_on
 from ..session import facts
 
 LONGEST_NAME = 48
 """Characters of a group's name."""
 
 _DESCRIPTIONS = (
-    (bpy.types.Object, "Light group of this lamp, or of all that this object or instance emits"),
-    (bpy.types.Material, "Light group of what this material emits, on objects that name no group themselves"),
-    (bpy.types.World, "Light group of this world's light"),
+    (bpy.types.Object, "Light group in files of earlier versions; Blender's own comes first"),
+    (bpy.types.Material, "Light group of what this material emits, on objects that are in no group"),
+    (bpy.types.World, "Light group in files of earlier versions; Blender's own comes first"),
     (
         bpy.types.Collection,
-        "Light group of the lamps and emissive objects in this collection that no nearer name puts elsewhere",
+        "Light group of the lamps and emissive objects in this collection that are in no other",
     ),
 )
 
@@ -40,20 +40,25 @@ def list_groups(scene: bpy.types.Scene) -> tuple[ListedGroup, ...]:
     found: dict[str, ListedGroup] = {}
 
     def count(name: str, kind: str, number: int = 1) -> None:
+        if not name:
+            return
         group = found.get(name) or ListedGroup(name)
         found[name] = group._replace(**{kind: getattr(group, kind) + number})
 
+    listed = blender_groups(scene)
+    for name in listed:
+        found[name] = ListedGroup(name)
     for name, lamps in lamps_by_group(scene).items():
-        if name:
-            count(name, "lamps", len(lamps))
-    for name, _ in named(obj for obj in scene.objects if obj.type != "LIGHT"):
-        count(name, "objects")
-    for name, _ in named(material for material in bpy.data.materials if not is_made(material)):
-        count(name, "materials")
-    for name, _ in named((scene.collection, *scene.collection.children_recursive)):
-        count(name, "collections")
-    if name_on(scene.world):
-        count(name_on(scene.world), "worlds")
+        count(name, "lamps", len(lamps))
+    for obj in scene.objects:
+        if obj.type != "LIGHT":
+            count(group_on(obj, listed), "objects")
+    for material in bpy.data.materials:
+        if not is_made(material):
+            count(name_on(material), "materials")
+    for collection in (scene.collection, *scene.collection.children_recursive):
+        count(name_on(collection), "collections")
+    count(group_on(scene.world, listed), "worlds")
     return tuple(found[name] for name in sorted(found, key=lambda name: (name.casefold(), name)))
 
 

@@ -7,19 +7,16 @@ from typing import Any
 
 import bpy
 
-from ...options import OPTIONS
+from ...options import OPTIONS, PANEL_OPTIONS
 from .option_properties import option_property
 
-DEFAULT_FOLDER = "//lightmaps/"
+DEFAULT_FOLDER: str = PANEL_OPTIONS["output_folder"].default
 
-PREFERRED = ("memory_limit", "threads")
+PREFERRED = ("output_folder", "memory_limit", "threads")
 """Options that the preferences have too, for scenes that do not set them."""
 
 PACKAGE = __package__.removesuffix(".blender.settings")
 """The add-on's own module: `bl_ext.<repository>.radiosity_addon` where it is installed."""
-
-# Blender 4.5 and later want paths that start with // declared; 4.2 refuses the word.
-_RELATIVE_PATH = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set()
 
 
 class RADIOSITY_AP_preferences(bpy.types.AddonPreferences):
@@ -27,26 +24,22 @@ class RADIOSITY_AP_preferences(bpy.types.AddonPreferences):
 
     bl_idname = PACKAGE
 
-    output_folder: bpy.props.StringProperty(  # type: ignore[valid-type]
-        name="Folder",
-        description="Where lightmaps are written, for scenes in which no folder was chosen. One that begins "
-        "with // is beside the file",
-        default=DEFAULT_FOLDER,
-        subtype="DIR_PATH",
-        options=_RELATIVE_PATH,
+    output_folder: option_property(  # type: ignore[valid-type]
+        PANEL_OPTIONS["output_folder"],
+        description="Where lightmaps are written, for scenes that set no folder. One that begins with // "
+        "is next to the file",
     )
     memory_limit: option_property(  # type: ignore[valid-type]
         OPTIONS["memory_limit"],
-        description="Memory for elements and links in GiB, for scenes that set none; 0 = set by quality",
+        description="Memory that a bake may take in GiB, for scenes that set none. 0 = set by quality",
     )
     threads: option_property(  # type: ignore[valid-type]
         OPTIONS["threads"],
-        description="Processor threads, for scenes that set no number; 0 uses all. "
-        "The result does not depend on it",
+        description="Processor threads, for scenes that set no number; 0 uses all. The result is the same",
     )
     check_first: bpy.props.BoolProperty(  # type: ignore[valid-type]
         name="Check First",
-        description="Before a scene is baked for the first time, show what is odd about it, if anything is",
+        description="Before a scene is baked for the first time, show its problems, if there are any",
         default=True,
     )
 

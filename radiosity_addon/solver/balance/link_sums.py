@@ -1,4 +1,4 @@
-"""What leaves receive, and what they send, over their own links and over those they share.
+"""Sums of what leaves receive and send, over their own links and over those they share.
 
 A leaf hears the links of its ancestors and of the clusters above it besides its own, and is heard
 over theirs. Both sums are 1 where nothing escapes, if the links are right (`conservation`).
@@ -14,19 +14,11 @@ from ..links import ClusterLinks, Links, gather, gather_at_clusters, node_radios
 
 
 class Arriving:
-    """What the receivers of links to clusters take where they are there, per unit of the source's radiosity.
+    """Light that the receivers of links to clusters take, times opacity, per unit of the source's radiosity.
 
-    Parameters
-    ----------
-    received : (e, 2) float64 or None
-        What the leaves' gathered light is scaled with.
-
-    Attributes
-    ----------
-    power : (l,) float64
-        Σ A_f a_f (n_f·v + g·(x_f − c) + h) over the receiver's faces [m²].
-    area : (l,) float64
-        Σ A_f a_f [m²]
+    received (e, 2): What the leaves' gathered light is scaled with.
+    power (l,): Σ A_f a_f (n_f·v + g·(x_f − c) + h) over the receiver's faces [m²].
+    area (l,): Σ A_f a_f [m²]
     """
 
     def __init__(
@@ -55,15 +47,8 @@ def sent_by_leaves(
 ) -> tuple[Array, Array]:
     """Return the shares of leaves' light that own links, and those of ancestors and clusters, carry.
 
-    Parameters
-    ----------
-    received : (e, 2) float64 or None
-        What the leaves' gathered light is scaled with.
-
-    Returns
-    -------
-    own, shared : (e,) float64
-        Of the leaves; other rows mean nothing.
+    received (e, 2): What the leaves' gathered light is scaled with.
+    Returns own, shared (e,): Of the leaves; other rows mean nothing.
     """
     at_links = taken_at_links(hierarchy, links, received)
     sums = sent(hierarchy, links, at_links)
@@ -79,10 +64,7 @@ def received_by_leaves(
 ) -> tuple[Array, Array]:
     """Return ΣFV over own links, and over those of ancestors and clusters, sources scaled by `scale`.
 
-    Returns
-    -------
-    own, shared : (e,) float64
-        Of the leaves; other rows mean nothing.
+    Returns own, shared (e,): Of the leaves; other rows mean nothing.
     """
     there = hierarchy.opacity[:, None]
     gathered = gather(hierarchy, links, there, scale, cut)
@@ -144,19 +126,16 @@ def sent_to_clusters(hierarchy: Hierarchy, links: ClusterLinks, arriving: Arrivi
 
 
 def taken_at_links(hierarchy: Hierarchy, links: Links, received: Array | None = None) -> Array:
-    """Return (l,) A_r F_rs V_rs [m²] of links to elements, of each receiver's area A_r what is there.
+    """Return (l,) A_r F_rs V_rs [m²] of links to elements, with A_r the opaque area of the receiver.
 
-    Parameters
-    ----------
-    received : (e, 2) float64 or None
-        What the light that leaves gather is scaled with, as from `Conservation.balance`.
+    received (e, 2): What the light that leaves gather is scaled with, as from `Conservation.balance`.
     """
     there = hierarchy.opacity if received is None else hierarchy.opacity * received[:, 0]
     below = _taken_below(hierarchy, received)
     child = hierarchy.first_child[links.receiver]
     inner = np.flatnonzero(child != LEAF)
     share = there[links.receiver]
-    # Quarters take unequal parts of what arrives, and may be covered: each counts with what it takes.
+    # Quarters take unequal parts of what arrives, and may be covered: each is weighted by what it takes.
     share[inner] = 0.0
     for quarter in range(4):
         share[inner] += 0.25 * links.to_quarter[inner, quarter] * below[child[inner] + quarter]
@@ -164,7 +143,7 @@ def taken_at_links(hierarchy: Hierarchy, links: Links, received: Array | None = 
 
 
 def _taken_below(hierarchy: Hierarchy, received: Array | None) -> Array:
-    """Return (e,) what part of their ancestors' light the leaves of elements take where they are there."""
+    """Return (e,) the part of their ancestors' light that the leaves of elements take, times opacity."""
     if received is None:
         return hierarchy.opacity
     return np.asarray(pull(hierarchy, hierarchy.opacity[:, None] * received[:, 1:])[:, 0])
@@ -174,7 +153,7 @@ def sent(hierarchy: Hierarchy, links: Links, at_links: Array | None = None) -> A
     """Return (e, 4, 1): the share of the light of each element's quarters that its own links carry.
 
     The transpose of `gather`, with reciprocity (handout (3.30)): Σ_r A_r F_rs V_rs / A_s, of each
-    receiver's area what is there; `at_links` (l,) are other A_r F_rs V_rs [m²], scaled.
+    receiver's opaque area; `at_links` (l,) are other A_r F_rs V_rs [m²], scaled.
     """
     if at_links is None:
         at_links = taken_at_links(hierarchy, links)
@@ -182,7 +161,7 @@ def sent(hierarchy: Hierarchy, links: Links, at_links: Array | None = None) -> A
     element = links.source[single].astype(np.int64) - hierarchy.n_clusters
     per_element = at_links[single] / hierarchy.area[element]
     inner = np.flatnonzero(hierarchy.first_child[element] != LEAF)
-    # Leaves send alike from all their quarters.
+    # Leaves send equally from all their quarters.
     total = np.bincount(element, per_element, hierarchy.n_elements)[:, None, None]
     total = np.repeat(total, 4, axis=1)
     single, element, per_element = single[inner], element[inner], per_element[inner]

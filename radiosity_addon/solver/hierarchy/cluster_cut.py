@@ -1,7 +1,7 @@
-"""A cut through the cluster tree, as far down as links go.
+"""A cut through the cluster tree at the lowest linked clusters.
 
 Of a million faces most are never told apart: links end at clusters of hundreds. Below the nodes of
-the cut nothing need be added up cluster by cluster, so sums upwards and pushes downwards
+the cut nothing need be added up cluster by cluster, so sums upward and pushes downward
 cost one pass over the faces and little more, however deep the tree is.
 """
 
@@ -16,29 +16,18 @@ from .nodes import Hierarchy
 class ClusterCut:
     """The clusters that are linked, those above them, and the nodes of the cut, which tile all faces.
 
-    Parameters
-    ----------
-    hierarchy : Hierarchy
-    linked : (n,) int arrays
-        Nodes; elements among them do not matter.
-
-    Attributes
-    ----------
-    row : (c,) int32
-        Row of each cluster that is linked or above a linked one; −1 elsewhere.
-    n_rows : int
-        Of the `n_inner` clusters above the cut first, then of its nodes.
-    nodes : (k,) int64
-        The cut's.
-    row_of_face : (f,) int32
-        Row of the cut's node that each face lies in.
+    linked (n,) int arrays: Nodes; elements among them do not matter.
+    row (c,) int32: Row of each cluster that is linked or above a linked one; −1 elsewhere.
+    n_rows: Of the `n_inner` clusters above the cut first, then of its nodes.
+    nodes (k,) int64: The cut's.
+    row_of_face (f,) int32: Row of the cut's node that each face lies in.
     """
 
     def __init__(self, hierarchy: Hierarchy, *linked: Array) -> None:
         clusters = hierarchy.clusters
         self._clusters, self._area = clusters, hierarchy.faces.area
         self.kept: object = None
-        """Whatever is prepared for links of these clusters, by whoever prepares it."""
+        """Cache for data derived from links to these clusters."""
         count, n_faces = len(clusters), len(hierarchy.faces)
         used = np.zeros(count + n_faces, dtype=bool)
         for nodes in linked:
@@ -101,7 +90,7 @@ class ClusterCut:
         return result
 
     def push(self, values: Array) -> Array:
-        """Return (n_rows, k): to every row's values those of all clusters above it added."""
+        """Return (n_rows, k): the values of every row plus those of all clusters above it."""
         total = values.copy()
         for level in self._levels:
             total[self._children[level]] += total[level][:, None]

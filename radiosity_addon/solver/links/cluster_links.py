@@ -1,4 +1,4 @@
-"""Links to clusters: many small faces receive together, each by its own normal and place.
+"""Links to clusters: many small faces receive together, each by its own normal and position.
 
 The faces of a cluster look much the same way and see the same sources, but not equally. So
 such a link carries a vector v and a gradient g in place of one number: a face with normal n
@@ -20,32 +20,24 @@ from ...numerics import Array, for_chunks
 from ..hierarchy import ClusterCut, Hierarchy
 
 TERMS = 7
-"""What a cluster passes on is linear in a face's normal and place, and a constant."""
+"""Coefficients of a cluster's light: linear in a face's normal and position, and a constant."""
 
 CHUNK = 1 << 14
-"""Faces that take from their clusters at once: some 3 MB, in the processor's cache."""
+"""Faces processed at once: some 3 MB, in the processor's cache."""
 
 
 @dataclass(frozen=True)
 class ClusterLinks:
     """l links to clusters as arrays, in any order.
 
-    Attributes
-    ----------
-    receiver : (l,) int32
-        Cluster.
-    source : (l,) int32
-        Node: a cluster, or n_clusters + element.
-    factor : (l,) float32
-        Unoccluded form factor, the area mean over the cluster's faces.
-    visibility, error_estimate : (l,) float32
-        As for `Links`.
-    vector : (l, 3) float32
-        v, visibility included: h and the cluster's mean normal times v make factor · visibility.
-    gradient : (l, 3) float32
-        g [1/m], visibility included.
-    even : (l,) float32
-        h, visibility included: what a face receives whichever way it looks; 0 unless the
+    receiver (l,) int32: Cluster.
+    source (l,) int32: Node: a cluster, or n_clusters + element.
+    factor (l,) float32: Unoccluded form factor, the area mean over the cluster's faces.
+    visibility, error_estimate (l,) float32: As for `Links`.
+    vector (l, 3) float32: v, visibility included: h and the cluster's mean normal times v make factor ·
+        visibility.
+    gradient (l, 3) float32: g [1/m], visibility included.
+    even (l,) float32: h, visibility included: the light that a face receives in any orientation; 0 unless the
         receiver's faces look many ways.
     """
 
@@ -85,21 +77,13 @@ def join_cluster_links(parts: list[ClusterLinks]) -> ClusterLinks:
 def gather_at_clusters(
     hierarchy: Hierarchy, cut: ClusterCut, links: ClusterLinks, radiosity: Array, threads: int = 1
 ) -> Array:
-    """Collect what arrives over links to clusters, and push it down to the faces.
+    """Collect the light that arrives over links to clusters, and push it down to the faces.
 
-    Parameters
-    ----------
-    cut : ClusterCut
-        With all clusters of the links. It keeps what the same links need again.
-    radiosity : (n_nodes, k) float64
-        Of every node, the means of clusters included [W/m²].
-    threads : int
-        0 means all cores.
-
-    Returns
-    -------
-    irradiance : (f, k) float64 [W/m²]
-        Linear in the radiosity; below 0 where a face looks past the horizon of what the others see.
+    cut: With all clusters of the links. It keeps what the same links need again.
+    radiosity (n_nodes, k): Of every node, the means of clusters included [W/m²].
+    threads: 0 means all cores.
+    Returns irradiance (f, k) [W/m²]: Linear in the radiosity; below 0 where a face looks past the horizon of
+        what the others see.
     """
     if len(links) == 0:
         return np.zeros((len(hierarchy.faces), radiosity.shape[1]))
@@ -110,7 +94,7 @@ def gather_at_clusters(
 
 
 class _ClusterGather:
-    """Links to clusters in the order of their receivers, with all that does not change with the light."""
+    """Links to clusters in the order of their receivers, with all data that does not depend on the light."""
 
     def __init__(self, hierarchy: Hierarchy, cut: ClusterCut, links: ClusterLinks) -> None:
         clusters, faces = hierarchy.clusters, hierarchy.faces

@@ -1,4 +1,4 @@
-"""The irradiance straight from lamps and sky at points, for equations asked at points."""
+"""The direct irradiance of lamps and sky at points, for equations at points."""
 
 from __future__ import annotations
 
@@ -17,20 +17,17 @@ SKY_RAYS = 256
 """From a point to the sky."""
 
 CHUNK = 1 << 11
-"""Points a thread asks for together; their sky rays take about 25 MB."""
+"""Points that a thread processes together; their sky rays take about 25 MB."""
 
 
 def lamp_irradiance(
     lights: Sequence[Light], points: Array, normals: Array, caster: RayCaster, seed: int, threads: int = 0
 ) -> Array:
-    """Return (n, 3) the irradiance at points straight from lamps and sky [W/m²].
+    """Return (n, 3) the direct irradiance of lamps and sky at points [W/m²].
 
     A lamp's closed form times the share of its shadow rays that pass; the sky by rays alone.
 
-    Parameters
-    ----------
-    points, normals : (n, 3) float64
-        On surfaces; unit normals.
+    points, normals (n, 3): On surfaces; unit normals.
     """
     total = np.zeros((len(points), 3))
 

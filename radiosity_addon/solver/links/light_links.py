@@ -28,14 +28,14 @@ LAMP_SAMPLES = 4
 SKY_RAYS = 16
 """Hemisphere rays of each quarter of an element."""
 COARSEST = 512
-"""An element larger than the scene's area over this is split before light is looked for on it."""
+"""An element larger than the scene's area over this is split before its light is measured."""
 
 NEAR = 0.5
 """So is one that looks larger than this (radius over distance) from the lamp, or than this part
 of a spot's cone."""
 
 SMALL, SMALL_DIVISOR = 2e-5, 4
-"""Elements below this share of all area get so many times fewer samples: there are many of them."""
+"""Elements below this share of all area get fewer samples by this divisor: there are many of them."""
 
 TINY = 2.5e-6
 """Those below this share get a quarter of that, over the whole element."""
@@ -48,13 +48,9 @@ CHUNK = 1 << 13
 class LightLinks:
     """How strongly each light lights each linked element, per unit of its strength.
 
-    Attributes
-    ----------
-    receiver : (l,) int32
-    light : (l,) int32
-        Row of the scene's lights.
-    gain : (l, 4) float32
-        Irradiance per unit of strength on each quarter of the receiver, visibility included.
+    receiver (l,) int32.
+    light (l,) int32: Row of the scene's lights.
+    gain (l, 4) float32: Irradiance per unit of strength on each quarter of the receiver, visibility included.
     """
 
     receiver: Array
@@ -102,16 +98,10 @@ def link_lights(
 ) -> LightLinks:
     """Link every light to the elements it reaches, splitting where its light varies.
 
-    Parameters
-    ----------
-    misplaced_power : float
-        BF_ε [W]: an element is split while (spread of irradiance) × area exceeds it.
-    min_area : float
-        A_ε [m²]: no element becomes smaller.
-    most_elements : int
-        How many the hierarchy may grow to; the largest and most doubtful are split first.
-    as_if : (n_lights,) float64 or None
-        What the lights count for instead of their strengths; those at 0 get no links.
+    misplaced_power: BF_ε [W]: an element is split while (spread of irradiance) × area exceeds it.
+    min_area: A_ε [m²]: no element becomes smaller.
+    most_elements: Limit of the hierarchy's elements; the largest and least certain are split first.
+    as_if (n_lights,): What the lights count for instead of their strengths; those at 0 get no links.
     """
     receivers, numbers, gains = [], [], []
     coarse_area = float(hierarchy.faces.area.sum()) / COARSEST
@@ -123,7 +113,7 @@ def link_lights(
         while len(waiting):
             area = hierarchy.area[waiting]
             may_split = (hierarchy.first_child[waiting] != LEAF) | (area >= 4 * min_area)
-            # Where few samples may miss the light altogether, they are not asked.
+            # Where few samples may miss the light altogether, none are taken.
             blind = may_split & ((area > coarse_area) | too_near(light, hierarchy, waiting))
             blind = _affordable(hierarchy, waiting, blind, area, most_elements)
             gain, error = np.zeros((len(waiting), 4)), np.zeros(len(waiting))
@@ -173,7 +163,8 @@ def too_near(light: Light, hierarchy: Hierarchy, elements: Array) -> Array:
     before = np.einsum("nk,nk->n", along, hierarchy.faces.normal[hierarchy.face[elements]]) < 0
     near = radius > NEAR * distance
     if isinstance(light, SpotLight):
-        # The element's bounding sphere, as the lamp sees it, touches the cone and is not small beside it.
+        # The element's bounding sphere, as the lamp sees it, touches the cone and is not small compared with
+        # it.
         seen = np.arcsin(np.clip(radius / np.maximum(distance, 1e-300), 0.0, 1.0))
         axis = np.asarray(light.direction)
         off = np.arccos(np.clip(along @ axis / np.maximum(distance, 1e-300), -1.0, 1.0))
@@ -192,11 +183,8 @@ def measure_light(
 ) -> tuple[Array, Array]:
     """Measure one light's irradiance on the quarters of elements, per unit of strength, and its error.
 
-    Returns
-    -------
-    gain : (n, 4) float64
-        On each quarter.
-    error : (n,) float64
+    Returns gain (n, 4): On each quarter.
+    Returns error (n,).
     """
     gain, error = np.empty((len(elements), 4)), np.empty(len(elements))
     area = hierarchy.area[elements]
@@ -273,21 +261,13 @@ def _measure_lamp(
 def lamp_light(
     light: Lamp, points: Array, normals: Array, unit: Array, caster: RayCaster
 ) -> tuple[Array, Array]:
-    """Ask for a lamp's light at points, one shadow ray each.
+    """Measure a lamp's light at points, one shadow ray each.
 
-    Parameters
-    ----------
-    points : (n, k, 3) float64
-    normals : (n, 3) float64
-    unit : (n, k, 2) float
-        Places the point of the lamp each ray goes to.
-
-    Returns
-    -------
-    gain : (n, k) float64
-        Unoccluded irradiance per unit of strength.
-    share : (n,) float64
-        How much of it arrives, over the k points together.
+    points (n, k, 3).
+    normals (n, 3).
+    unit (n, k, 2): Places the point of the lamp each ray goes to.
+    Returns gain (n, k): Unoccluded irradiance per unit of strength.
+    Returns share (n,): How much of it arrives, over the k points together.
     """
     flat = points.reshape(-1, 3)
     facing = np.repeat(normals, points.shape[1], axis=0)
@@ -298,7 +278,7 @@ def lamp_light(
     start = flat[rows] + caster.surface_offset * facing[rows]
     lamps = caster.for_lamps
     free = lamps.passing(start, directions[:, 0], distances[:, 0]) if light.casts_shadow else True
-    # A lamp point below the horizon says nothing: the closed form has cut it off already.
+    # A lamp point below the horizon is ignored: the closed form has clipped it already.
     weights[rows] = np.where(above[:, 0] > 0, gain[rows], 0.0)
     passed[rows] = weights[rows] * free
     shape = unit.shape[:2]
@@ -316,17 +296,13 @@ def sky_share(
     keys: Array,
     seed: int,
 ) -> tuple[Array, Array]:
-    """Ask for a sky's light at points, relative to an open sky of its radiance.
+    """Measure a sky's light at points, relative to an open sky of its radiance.
 
     `points` are (n, 3), or (n, rays, 3) to start every ray elsewhere.
 
-    Returns
-    -------
-    share : (n,) float64
-        The cosine-weighted share of each hemisphere that meets no surface, weighted by the
+    Returns share (n,): The cosine-weighted share of each hemisphere that meets no surface, weighted by the
         relative radiance there.
-    error : (n,) float64
-        Its standard error, were the rays independent.
+    Returns error (n,): Its standard error, were the rays independent.
     """
     share, error = np.empty(len(points)), np.empty(len(points))
     for first in range(0, len(points), CHUNK):

@@ -1,4 +1,4 @@
-"""Stratified points on nodes, be they clusters or elements."""
+"""Stratified points on nodes, both clusters and elements."""
 
 from __future__ import annotations
 
@@ -23,19 +23,11 @@ def node_samples(
 ) -> tuple[Array, Array]:
     """Return a point in each of some quarters of nodes.
 
-    Parameters
-    ----------
-    node : (n,) int
-    quarter : (n, k) int
-        Of an element its child's place, of a cluster a fourth of its area in order.
-    keys : (n,) int
-        With the seed, what places the points.
-    streams : tuple of Stream
-        Of places within a face, and of the face within a cluster.
-
-    Returns
-    -------
-    points, normals : (n, k, 3) float64
+    node (n,) int.
+    quarter (n, k) int: Of an element its child's place, of a cluster a fourth of its area in order.
+    keys (n,) int: With the seed, what places the points.
+    streams: Of places within a face, and of the face within a cluster.
+    Returns points, normals (n, k, 3).
     """
     count, samples = quarter.shape
     points, normals = np.empty((count, samples, 3)), np.empty((count, samples, 3))
