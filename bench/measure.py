@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -53,7 +53,6 @@ def ours(job: dict[str, Any]) -> dict[str, Any]:
     """Bake with the add-on: `run` holds the settings; the pixels go to `pixels`."""
     import bpy
 
-    from radiosity_addon.bake.pipeline import bake
     from radiosity_addon.blender.scene_export.export import export_scene
 
     from .prepare import case_of, open_prepared
@@ -65,7 +64,7 @@ def ours(job: dict[str, Any]) -> dict[str, Any]:
     watch = Stopwatch()
     with watch.running():
         bake_scene = export_scene(bpy.context, settings).bake_scene
-        result, leaves = exhaust(bake(bake_scene, settings))
+        result, leaves = watched_bake(bake_scene, settings)
     if len(result.pages) != 1 or any(
         not np.array_equal(placed.uv, placed.object.uv) for placed in result.objects
     ):
@@ -121,16 +120,19 @@ def settings_of(run: dict[str, Any], **more: Any) -> Any:
     return settings
 
 
-def exhaust(steps: Generator[Any, None, Any]) -> tuple[Any, int]:
-    """Run a bake; return its result and the number of leaf elements its last picture shows."""
-    leaves = 0
-    while True:
-        try:
-            progress = next(steps)
-        except StopIteration as done:
-            return done.value, leaves
-        if progress.picture is not None:
-            leaves = len(progress.picture)
+def watched_bake(bake_scene: Any, settings: Any) -> tuple[Any, int]:
+    """Bake; return the result and the number of leaf elements the last picture of them shows."""
+    from radiosity_addon.bake.pipeline import bake
+    from radiosity_addon.bake.result.pictures import Picture
+    from radiosity_addon.base.progress import Progress
+
+    leaves = [0]
+
+    def listen(status: Any) -> None:
+        if isinstance(status.picture, Picture):
+            leaves.append(len(status.picture))
+
+    return bake(bake_scene, settings, Progress(listen)), leaves[-1]
 
 
 def solver_figures(report: dict[str, Any], leaves: int) -> dict[str, Any]:

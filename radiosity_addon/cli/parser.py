@@ -68,7 +68,7 @@ def check_keeping(request: argparse.Namespace, settings: BakeSettings) -> None:
     if request.keep and settings.quantity == "residual":
         raise UsageError("--keep: a residual is of all light together; bake another quantity")
     if request.relight and request.plot is not None:
-        raise UsageError("--relight solves nothing whose history --plot could draw")
+        raise UsageError("--relight solves nothing, so --plot has no history to draw")
 
 
 def check_plot(plot: Path | None) -> None:

@@ -1,7 +1,7 @@
 """Large arrays within a memory budget: beyond it they are stored in temporary files and processed in tiles.
 
 An array in a file is an ordinary array over a memory map. The pages of a map that were read or written stay
-in memory until `trim` drops them, which `parallel.chunk_steps` calls after every chunk: what is in memory is
+in memory until `trim` drops them, which `parallel.map_chunks` calls after every chunk: what is in memory is
 the tile that is being worked on. Values are the same wherever an array lives, so results are the same bytes.
 The files have no name: they are gone when the arrays are, however the process ends.
 """

@@ -19,6 +19,7 @@ import numpy as np
 
 from ..numerics import (
     Array,
+    Stream,
     connected_components,
     cosine_hemisphere,
     edge_distances,
@@ -221,7 +222,7 @@ def _solid_behind(
     back = -scene.face_normals[triangle]
     lift = np.maximum(caster.surface_offset, 2.0 * tolerance[triangle])
     points = points + (lift[:, None] * back)[:, None]
-    unit = stratified_square(np.arange(count), PROBES, 83)
+    unit = stratified_square(np.arange(count), PROBES, Stream.BACK_PROBES)
     directions = to_world(cosine_hemisphere(unit), back)
     hits = caster.intersect(points.reshape(-1, 3), directions.reshape(-1, 3))
     inner = (hits.triangle != NO_HIT) & ~hits.front

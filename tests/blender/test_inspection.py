@@ -15,7 +15,7 @@ import pytest
 
 import radiosity_addon
 from radiosity_addon.base.errors import BakeError
-from radiosity_addon.base.progress import drain
+from radiosity_addon.base.steps import drain
 from radiosity_addon.blender.files.cornell import build_cornell_box
 from radiosity_addon.blender.files.output import OutputFolder
 from radiosity_addon.blender.jobs.inspection import ERROR, INFO, WARNING, Inspection, inspect

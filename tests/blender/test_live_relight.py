@@ -97,7 +97,7 @@ def test_what_it_writes_itself_starts_nothing(live: bpy.types.WindowManager) -> 
     [
         ("move", "object 'Floor' has moved"),
         ("mesh", "object 'Panel' has changed its shape"),
-        ("paint", "material 'Glow' reflects otherwise"),
+        ("paint", "material 'Glow' reflects differently"),
         ("lamp", "lamp 'Bulb' has changed in more than its strength"),
         ("forget", "the kept bake is no longer available"),
     ],

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.base.progress import drain
 from radiosity_addon.numerics.sampling import stratified_square
 from radiosity_addon.solver import PointLight, Scene, SolverSettings, solve
 from radiosity_addon.solver.gather.bright_patches import CONTRAST, MOST, AimedRays, BrightElements
@@ -34,7 +33,7 @@ def gathered(local: LocalPass, rays: int, expected: float | None, seed: int, cou
     up = np.tile([0.0, 0.0, 1.0], (count, 1))
     at = Footprints(np.tile(AT, (count, 1)), up, seed + np.arange(count))
     noise = None if expected is None else np.full(count, expected)
-    return drain(local.gather_steps(at, up, rays, local.leaves_of, noise))
+    return local.gather(at, up, rays, local.leaves_of, noise)
 
 
 def irradiance(local: LocalPass, found: Gathered) -> np.ndarray:

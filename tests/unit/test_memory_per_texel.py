@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 
 from radiosity_addon.bake.texel_memory import LIT_BYTES
-from radiosity_addon.base.progress import drain
 from radiosity_addon.lightmap.lighting import gather_links, source_means, sweeps
 from radiosity_addon.lightmap.lighting.gather_links import StoredLinks
 from radiosity_addon.lightmap.lighting.part_links import Parts
-from radiosity_addon.lightmap.lighting.sweeps import TexelLight, TexelTransport, sweep_steps
+from radiosity_addon.lightmap.lighting.sweeps import TexelLight, TexelTransport, sweep
 from radiosity_addon.lightmap.points.interpolation import Interpolation
 from radiosity_addon.lightmap.points.point_grid import PointGrid
 from radiosity_addon.lightmap.texels.occlusion import Crossings
@@ -73,9 +72,8 @@ def swept(scratch: Scratch) -> TexelLight:
     links = StoredLinks(sources, Interpolation(first, point, weight), rays)
     transport = TexelTransport(links, Parts(np.zeros((0, 3)), []), reflectance)
     trim()
-    steps = sweep_steps(transport, start, lamps, np.zeros((3, 3)), 3, threads=1, scratch=scratch)
     with bytes_taken() as taken:
-        light = drain(steps)
+        light = sweep(transport, start, lamps, np.zeros((3, 3)), 3, threads=1, scratch=scratch)
     MOST.append(taken[0])
     return light
 
@@ -112,8 +110,8 @@ def test_aimed_rays_are_kept_in_files(in_files: Scratch) -> None:
             np.tile([0.15, 0.8, 0.0], (count, 1)), np.tile(UP, (count, 1)), np.arange(count), scratch=scratch
         )
         into = scratch.empty((count, rays), np.int32)
-        steps = local.gather_steps(at, at.normals, rays, local.leaves_of, np.full(count, 1e-9), into)
-        found[scratch] = drain(steps).aimed
+        gathered = local.gather(at, at.normals, rays, local.leaves_of, np.full(count, 1e-9), into)
+        found[scratch] = gathered.aimed
     filed, kept = (found[scratch] for scratch in found)
     assert len(filed.row) == count
     for name in ("row", "sources", "weights", "element"):

@@ -8,7 +8,7 @@ import pytest
 from radiosity_addon.options.methods import METHODS
 from radiosity_addon.scene.overlaps import OVERLAP, shares
 from radiosity_addon.solver import Scene, SolverSettings, solve
-from radiosity_addon.solver.methods import steps_of
+from radiosity_addon.solver.methods import solve_by_method
 from tests.rooms import CEILING, FLOOR, area_mean, box_room, grey
 
 
@@ -46,7 +46,7 @@ def test_a_doubled_floor_makes_no_light(method: str) -> None:
 
 
 def leaf_radiosity(scene: Scene, **settings: object) -> np.ndarray:
-    *_, (_, state) = steps_of(scene, SolverSettings(**{"elements": 28, "tolerance": 1e-8, **settings}))
+    state = solve_by_method(scene, SolverSettings(**{"elements": 28, "tolerance": 1e-8, **settings}))
     return state.radiosity[state.hierarchy.leaves]
 
 

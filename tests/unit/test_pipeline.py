@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gc
 import threading
-from collections.abc import Generator
 from typing import Any
 
 import numpy as np
@@ -12,29 +11,26 @@ import pytest
 
 from radiosity_addon.bake.pipeline import bake
 from radiosity_addon.bake.quality import QUALITIES, quality_of
-from radiosity_addon.bake.result.progress import Progress
+from radiosity_addon.bake.result.pictures import Picture
 from radiosity_addon.bake.result.result import BakeResult
 from radiosity_addon.base.errors import SceneError
+from radiosity_addon.base.progress import Cancelled, Progress, Status
 from radiosity_addon.options import METHODS, BakeSettings, options_of_method
 from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, solve
 from radiosity_addon.solver.links import initial
 from tests.rooms import FLOOR, box_room, grey, rectangle, solid_box, sphere
 from tests.unit.texel_scenes import QUAD_UV, bake_object, bake_scene, in_cell
+from tests.watched import noting
 
 
 def run(scene: BakeScene, **settings: Any) -> BakeResult:
-    steps = bake(scene, BakeSettings(**{"quality": "draft", "resolution": 32, **settings}))
-    fractions = []
-    while True:
-        try:
-            fractions.append(next(steps).fraction)
-        except StopIteration as done:
-            assert fractions == sorted(fractions)
-            assert fractions[0] >= 0
-            assert fractions[-1] <= 1
-            result: BakeResult = done.value
-            return result
+    fractions: list[float] = []
+    progress = Progress(lambda status: fractions.append(status.fraction))
+    result = bake(scene, BakeSettings(**{"quality": "draft", "resolution": 32, **settings}), progress)
+    assert fractions == sorted(fractions)
+    assert 0 <= fractions[0] < fractions[-1] <= 1
+    return result
 
 
 def texels(result: BakeResult, page: int = 0) -> np.ndarray:
@@ -185,9 +181,9 @@ def test_no_texel_in_a_sealed_box_is_lit(wall: float, height: float) -> None:
 
 def test_light_takes_many_short_steps() -> None:
     """A window stays alive, and a bar moves, while texels are lit."""
-    steps = bake(lit_room(lights=[LAMP]), BakeSettings(resolution=256, quality="draft"))
-    stages = [step.stage for step in steps]
-    assert stages.count("light") > 40
+    noted: list[Status] = []
+    bake(lit_room(lights=[LAMP]), BakeSettings(resolution=256, quality="draft"), noting(noted))
+    assert [status.stage for status in noted].count("light") > 40
 
 
 def test_threads_change_no_byte_and_the_seed_does() -> None:
@@ -252,7 +248,9 @@ def test_pictures_tile_the_room_and_the_last_one_is_the_solution(
     room = lit_room(lights=[LAMP], two_sided=True)
     given = {"elements": 60} if "elements" in options_of_method(method) else {}
     settings = BakeSettings(quality="draft", resolution=16, method=method, **given)
-    pictures = [step.picture for step in bake(room, settings) if step.picture is not None]
+    noted: list[Status] = []
+    bake(room, settings, noting(noted))
+    pictures = [status.picture for status in noted if isinstance(status.picture, Picture)]
     assert len(pictures) >= 2
     scene = room.scene
     for picture in pictures:
@@ -277,18 +275,21 @@ def test_pictures_tile_the_room_and_the_last_one_is_the_solution(
 
 
 @pytest.mark.parametrize("steps", [1, 3, 6, 12])
-def test_closing_the_generator_leaves_nothing_running(steps: int) -> None:
+def test_canceled_it_leaves_nothing_running(steps: int) -> None:
     before = {thread.ident for thread in threading.enumerate()}
-    running: Generator[Progress, None, BakeResult] = bake(
-        lit_room(lights=[LAMP]), BakeSettings(quality="draft", resolution=32)
-    )
-    stages = [next(running).stage for _ in range(steps)]
+    stages: list[str] = []
+
+    def listen(status: Status) -> None:
+        stages.append(status.stage)
+        if len(stages) == steps:
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        bake(lit_room(lights=[LAMP]), BakeSettings(quality="draft", resolution=32), Progress(listen))
     assert stages[0] == "unwrap"
-    running.close()
+    assert len(stages) == steps
     gc.collect()
     assert {thread.ident for thread in threading.enumerate()} <= before
-    with pytest.raises(StopIteration):
-        next(running)
 
 
 def test_without_light_it_is_black_and_says_so() -> None:

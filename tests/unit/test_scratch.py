@@ -108,11 +108,7 @@ def baked() -> tuple[BakeResult, int]:
     scene = cornell_box()
     tracemalloc.start()
     try:
-        steps = bake(bake_scene(scene, ("Box", len(scene))), BakeSettings(resolution=64, quality="draft"))
-        while True:
-            try:
-                next(steps)
-            except StopIteration as done:
-                return done.value, tracemalloc.get_traced_memory()[1]
+        result = bake(bake_scene(scene, ("Box", len(scene))), BakeSettings(resolution=64, quality="draft"))
+        return result, tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()

@@ -11,14 +11,14 @@ import bpy
 
 from ...bake import BakeDigests, KeepOptions, timed
 from ...bake.relight import strengths_in
-from ...bake.result import BakeReport, Progress
+from ...bake.result import BakeReport
 from ...bake.sidecar import StoredBake, check_belongs, read_sidecar
-from ...base import BakeWarning, UsageError, drain
+from ...base import BakeWarning, Status, UsageError, staged
 from ...cli import Console, Interrupts, Permissions, summary
 from ...files import BLEND_NAME, PREVIEW_NAME, SIDECAR_NAME
 from ...options import BakeSettings
 from ..files.single_files import check_places, make_folder_of
-from .verbs import open_or_build, output_of, registered, same_file, written_files
+from .verbs import carried_out, open_or_build, output_of, registered, same_file, written_files
 
 if TYPE_CHECKING:
     from ..files.output import OutputFolder
@@ -57,7 +57,6 @@ def relight(
     """
     with registered():
         from ...files import BLEND_NAME, REPORT_NAME
-        from ..jobs.finish import WRITING_STAGES
 
         source = scene or loaded
         if source is not None and same_file(source, output / BLEND_NAME):
@@ -74,19 +73,7 @@ def relight(
         notes = open_or_build(scene, loaded, allowed)
         folder = output_of(output, source, allowed, report_copy)
         job = relight_into(bpy.context, stored, folder, notes, preview)
-        try:
-            while True:
-                try:
-                    progress = next(job)
-                except StopIteration as done:
-                    report = done.value
-                    break
-                interrupts.check()
-                interrupts.deferred = progress.stage in WRITING_STAGES
-                console.progress(progress.stage, progress.fraction)
-        finally:
-            interrupts.deferred = True
-            job.close()
+        report = carried_out(job, console, interrupts)
         if report_copy is not None:
             make_folder_of(report_copy)
             report.write_copy(report_copy)
@@ -100,7 +87,7 @@ def relight_into(
     folder: OutputFolder,
     notes: tuple[BakeWarning, ...] = (),
     preview: bool = True,
-) -> Generator[Progress, None, BakeReport]:
+) -> Generator[Status, None, BakeReport]:
     """Light a stored bake anew, and write its folder as a bake would; the scene shows the lightmaps then.
 
     Raises
@@ -112,26 +99,26 @@ def relight_into(
     from ..jobs.finish import Copies, finish
     from ..jobs.preview import QUICK_SAMPLES
     from ..relight.relight_scene import lit
-    from ..scene_export.export import export_steps, exporting
+    from ..scene_export.export import export_steps
 
     seconds: dict[str, float] = {}
     with folder as output:
         output.expect((BLEND_NAME, PREVIEW_NAME, output.names.sidecar))
-        yield Progress("export", EXPORT)
+        yield Status("export", EXPORT)
         with timed(seconds, "export"):
             shown = Originals(context)
             steps = export_steps(context, stored.settings, dark=True, shown=shown)
-            export = yield from exporting(steps)
+            export = yield from staged(steps, "export", EXPORT, EXPORT)
         with timed(seconds, "relight"):
             kept = stored.kept(export.bake_scene)
-            yield Progress("relight", RELIGHT)
-            pages, groups = drain(lit(kept, strengths_in(kept, export.bake_scene)))
+            yield Status("relight", RELIGHT)
+            pages, groups = lit(kept, strengths_in(kept, export.bake_scene))
         result = stored.result(export.bake_scene, pages)
         result = replace(result, groups=groups, warnings=(*notes, *result.warnings))
         output.expect(page_file_names(result, stored.settings))
         output.expect(name for of in group_file_names(result, stored.settings) for name in of)
-        yield Progress("apply", APPLY)
-        keeping = KeepOptions(sidecar=True, mark=stored.mark)
+        yield Status("apply", APPLY)
+        keeping = KeepOptions(sidecar=True, mark=stored.bake_id)
         finished = finish(
             context,
             stored.settings,

@@ -37,7 +37,7 @@ _NAVIGATION = {
 
 
 class WindowJob:
-    """A mixin of operators whose work is a generator of `Progress` that returns a report.
+    """A mixin of operators whose work is a generator of `Status` that returns a report.
 
     An operator fills in `_start`, which returns the generator, and `_succeeded`; closing the generator must
     leave everything as it was.

@@ -80,8 +80,6 @@ class RADIOSITY_OT_bake(Conditional, WindowJob, bpy.types.Operator):
     def _follow(self, progress: Any) -> None:
         if progress.picture is not None:
             live_view.show(progress.picture)
-        if progress.texels is not None:
-            live_view.show_texels(progress.texels)
 
     def _undone(self, context: bpy.types.Context) -> None:
         """Go on with the editing that the export had to leave."""

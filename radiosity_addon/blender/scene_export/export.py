@@ -11,7 +11,6 @@ from typing import TypeVar
 import bpy
 import numpy as np
 
-from ...bake.result import Progress
 from ...base import BakeWarning, SceneError, UsageError, drain
 from ...lights import EnvironmentLight
 from ...options import BakeSettings
@@ -108,20 +107,6 @@ def export_steps(
     collected.warnings.extend(warnings)
     names = {piece.source.name for piece in chosen}
     return (yield from _assemble(context, collected, names, settings, in_background))
-
-
-def exporting(steps: Generator[float, None, T]) -> Generator[Progress, None, T]:
-    """Take the steps of an export as progress."""
-    try:
-        while True:
-            try:
-                next(steps)
-            except StopIteration as done:
-                result: T = done.value
-                return result
-            yield Progress("export", 0.0)
-    finally:
-        steps.close()
 
 
 @dataclass(frozen=True, eq=False)

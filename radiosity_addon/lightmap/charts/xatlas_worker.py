@@ -11,7 +11,6 @@ import io
 import os
 import subprocess
 import sys
-import threading
 from pathlib import Path
 from typing import Any
 
@@ -61,11 +60,6 @@ def run_xatlas(vertices: Float, faces: Int) -> tuple[Any, Float, Int]:
     chart[chart == np.iinfo(np.uint32).max] = -1
     scale = np.array((max(atlas.width, 1), max(atlas.height, 1)), dtype=np.float64)
     return atlas, uv[indices].astype(np.float64) * scale, chart
-
-
-def beside_a_window(faces: Int) -> bool:
-    """Return whether this is the thread of a bake in a window and the work is long enough to block it."""
-    return threading.current_thread() is not threading.main_thread() and len(faces) > WORTH_A_PROCESS
 
 
 def run_apart(vertices: Float, faces: Int) -> tuple[Float, Int] | None:

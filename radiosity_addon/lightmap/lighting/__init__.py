@@ -12,8 +12,8 @@ from .gather_settings import GatherSettings
 from .part_links import HitNumbers, PartHits, PartLinks, Parts, gather_parts, lit_footprints
 from .partial_light import LightSoFar
 from .reconstruction import STARTS, gather_at, gather_footprints, on_lattice, reconstruct, resolver, sample_of
-from .relight_texels import kept_bytes, relight_steps
-from .sweeps import LitTexels, TexelLight, TexelTransport, sweep_steps
+from .relighting import kept_bytes, relight_texels
+from .sweeps import LitTexels, TexelLight, TexelTransport, sweep
 from .traced_texels import GatherPointLayout, LightingRecord
 from .warm_start import EarlierLight
 
@@ -40,10 +40,10 @@ __all__ = [
     "lit_footprints",
     "on_lattice",
     "reconstruct",
-    "relight_steps",
+    "relight_texels",
     "residual_summary",
     "resolver",
     "sample_of",
-    "sweep_steps",
+    "sweep",
     "texel_residual",
 ]

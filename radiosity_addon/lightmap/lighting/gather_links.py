@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from ...base import SILENT, Progress
 from ...numerics import Array, Scratch, tiles
 from ...solver.gather import AimedRays
 from ..points import Interpolation
-from .source_means import mean_steps
+from .source_means import mean_of_sources
 
 AIMED_ROWS = 1 << 14
 """Points whose aimed rays are looked up at once; bounds the temporaries to a few MB."""
@@ -34,11 +34,15 @@ class StoredLinks:
     spread: Interpolation
     aimed: AimedRays = field(default_factory=AimedRays.none)
 
-    def irradiance_steps(
-        self, table: Array, threads: int = 0, scratch: Scratch | None = None
-    ) -> Generator[float, None, Array]:
-        """Compute (n, 3) what a table of radiosity sends to the texels; yields the fraction done."""
-        mean = yield from mean_steps(table, self.sources, threads, scratch=scratch)
+    def irradiance(
+        self,
+        table: Array,
+        threads: int = 0,
+        scratch: Scratch | None = None,
+        progress: Progress = SILENT,
+    ) -> Array:
+        """Return (n, 3) what a table of radiosity sends to the texels."""
+        mean = mean_of_sources(table, self.sources, threads, scratch=scratch, progress=progress)
         return self.spread_out(table, mean, threads, scratch)
 
     def spread_out(

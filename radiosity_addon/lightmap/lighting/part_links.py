@@ -7,13 +7,13 @@ foot or into a closed box does not come back.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
-from ...base import drain, scaled
+from ...base import SILENT, Progress
 from ...numerics import Array, marked, tiles
 from ...solver.gather import NOTHING, Footprints, LightGains, LocalPass, Resolver, values_of
 from ..texels import TexelCells
@@ -55,6 +55,8 @@ class PartLinks:
     gains : LightGains or None
         The same for each light apart, if it is kept.
     """
+
+    STORED = ("rows", "sources", "reflectance", "gains")
 
     rows: Array
     sources: Array
@@ -150,8 +152,9 @@ def gather_parts(
     element: Array,
     reflectance: Array,
     known: Sequence[PartHits] = (),
-) -> Generator[float, None, tuple[StoredLinks, Parts]]:
-    """Look from the parts that links met, and from those that these met; yields the fraction done.
+    progress: Progress = SILENT,
+) -> tuple[StoredLinks, Parts]:
+    """Look from the parts that links met, and from those that these met.
 
     Parameters
     ----------
@@ -175,10 +178,10 @@ def gather_parts(
     gathering.count(links.sources)
     gathering.count(links.aimed.sources)
     gathering.take_up()
-    for turn in range(ROUNDS):
-        yield from scaled(gathering.ask_new(), 0.7 * turn / ROUNDS, 0.7 * (turn + 1) / ROUNDS)
+    for _, part in progress.part(0.0, 0.7).each(range(ROUNDS)):
+        gathering.ask_new(part)
         gathering.take_up()
-    made, of = yield from scaled(gathering.links(element, reflectance), 0.7, 1.0)
+    made, of = gathering.links(element, reflectance, progress.part(0.7, 1.0))
     start = values_of(numbers.local.reflected(), of)
     for sources in (links.sources, links.aimed.sources):
         gathering.rows.number(sources)
@@ -231,8 +234,8 @@ class _SubCellGather:
                     more = taken[met] = self._asked[some.part[met]] = True
                     self.count(some.sources[met])
 
-    def ask_new(self) -> Generator[float, None, None]:
-        """Look from the parts that were met but not asked yet; yields the fraction done."""
+    def ask_new(self, progress: Progress) -> None:
+        """Look from the parts that were met but not asked yet."""
         new = np.flatnonzero((self._met > 0) & ~self._asked)
         self._asked[new] = True
         often, leaf = self._met[new] >= OFTEN, new < self._numbers.first_cell - self._numbers.texel_count
@@ -241,18 +244,17 @@ class _SubCellGather:
             for is_leaf in (True, False)
             for rays in (RAYS, MANY_RAYS)
         ]
-        for turn, (is_leaf, rays, part) in enumerate(groups):
+        for (is_leaf, rays, part), of_group in progress.each(groups):
             if len(part) == 0:
                 continue
-            steps = self._gather(is_leaf, rays, part)
-            sources = yield from scaled(steps, turn / len(groups), (turn + 1) / len(groups))
+            sources = self._gather(is_leaf, rays, part, of_group)
             self.count(sources)
             self._found.append(PartHits(is_leaf, part, sources))
 
-    def _gather(self, is_leaf: bool, rays: int, part: Array) -> Generator[float, None, Array]:
+    def _gather(self, is_leaf: bool, rays: int, part: Array, progress: Progress) -> Array:
         if is_leaf:
-            return self._local.gather_at_parts(part, rays, self._resolve)
-        return self._cells.gather(self._numbers.cell(part), rays, self._resolve)
+            return self._local.gather_at_parts(part, rays, self._resolve, progress)
+        return self._cells.gather(self._numbers.cell(part), rays, self._resolve, progress)
 
     @cached_property
     def small(self) -> Array:
@@ -270,10 +272,8 @@ class _SubCellGather:
         """What gives sources the rows of the table."""
         return _Rows(self._numbers.elements, self.small + self._numbers.texel_count)
 
-    def links(
-        self, element: Array, reflectance: Array
-    ) -> Generator[float, None, tuple[list[PartLinks], Array]]:
-        """Make the links of the parts asked, and tell whose light rows start with; yields how far it is."""
+    def links(self, element: Array, reflectance: Array, progress: Progress) -> tuple[list[PartLinks], Array]:
+        """Make the links of the parts asked, and tell whose light rows start with."""
         local, cells, first = self._local, self._cells, self._numbers.texel_count
         of_leaves = self.small[self.small < len(local.parts)]
         of_cells = self._numbers.cell(self.small[len(of_leaves) :])
@@ -281,7 +281,7 @@ class _SubCellGather:
         start = [whole, local.parts.leaf_of(of_leaves), element[cells.texel_of(of_cells)]]
         asked = [*(some.take(taken) for some, taken in self._known if taken.any()), *self._found]
         made = []
-        for done, found in enumerate(asked):
+        for found, of_kind in progress.each(asked):
             part = found.part
             if found.is_leaf:
                 share = local.part_reflectance(part)
@@ -290,8 +290,7 @@ class _SubCellGather:
             if found.gains is None:
                 gains = local.new_gains(len(part))
                 at = lit_footprints(self._numbers, found)
-                direct = local.direct_steps(at, found.shadow_rays, gains)
-                lamps = yield from scaled(direct, done / len(asked), (done + 1) / len(asked))
+                lamps = local.direct(at, found.shadow_rays, gains, progress=of_kind)
             else:
                 gains, lamps = found.gains, local.lit_by(found.gains)
             rows, sources = self.rows(first + part), self.rows(found.sources)
@@ -378,7 +377,7 @@ class PartSweeps:
         for _ in range(SWEEPS):
             news = []
             for links, means in zip(self._links, self._means, strict=True):
-                irradiance = links.lamps + drain(means.steps(table, fresh))
+                irradiance = links.lamps + means.of(table, fresh)
                 reflected = (links.reflectance * irradiance).astype(np.float32)
                 moved = np.abs(reflected - table[links.rows]).max(axis=1) > still
                 if moved.any():

@@ -8,18 +8,18 @@ trace nothing, remove what the coarse hierarchy got wrong.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from ...base import scaled
+from ...base import SILENT, Progress
 from ...numerics import Array, marked, row_numbers, tiles
 from ...rays import SIGHT_LIFT, Hits, free_segment
 from ...scene import Scene
 from ...solver.gather import NOTHING, AimedRays, Footprints, Gathered, LocalPass, Resolver, values_of
-from ..points import GatherPoints, fit_steps
+from ..points import GatherPoints, fit
 from ..texels import (
     NO_TEXEL,
     Crossings,
@@ -27,7 +27,7 @@ from ..texels import (
     TexelCells,
     TexelGeometry,
     below_hood,
-    crossing_steps,
+    find_crossings,
     texel_materials,
     whole_neighbour,
 )
@@ -35,7 +35,7 @@ from .gather_links import StoredLinks
 from .gather_settings import GatherSettings
 from .part_links import HitNumbers, gather_parts
 from .partial_light import LightSoFar
-from .sweeps import LitTexels, TexelLight, TexelTransport, sweep_steps
+from .sweeps import LitTexels, TexelLight, TexelTransport, sweep
 from .traced_texels import GatherPointLayout, LightingRecord
 from .warm_start import EarlierLight
 
@@ -61,8 +61,9 @@ def reconstruct(
     geometry: TexelGeometry,
     settings: GatherSettings,
     so_far: LightSoFar | None = None,
-) -> Generator[float, None, TexelLight]:
-    """Compute direct and indirect irradiance of all texels; yields the fraction done.
+    progress: Progress = SILENT,
+) -> TexelLight:
+    """Compute direct and indirect irradiance of all texels.
 
     If `local` can ask for every light apart, what lights the texels anew is kept. `so_far` is told what is
     known on the way.
@@ -75,27 +76,28 @@ def reconstruct(
     if so_far is not None:
         so_far.begin(local, geometry, element, lamps, (reflectance, emission))
     tell = None if so_far is None else so_far.asked
-    direct = local.direct_steps(footprints(geometry, local), gains=gains, total=lamps, tell=tell)
-    lamps = yield from scaled(direct, 0.0, DIRECT)
-    found = crossing_steps(geometry, local.caster, local.threads)
-    crossings = yield from scaled(found, DIRECT, CROSSED)
+    at, part = footprints(geometry, local), progress.part(0.0, DIRECT)
+    lamps = local.direct(at, gains=gains, total=lamps, tell=tell, progress=part)
+    del at
+    part = progress.part(DIRECT, CROSSED)
+    crossings = find_crossings(geometry, local.caster, local.threads, progress=part)
     cells = TexelCells(local, geometry, crossings)
     numbers = HitNumbers(local, cells, len(geometry))
     resolve = resolver(geometry, crossings, numbers)
     met = None if so_far is None else partial(so_far.met, numbers)
-    stored = gather_texels(local, geometry, settings, crossings, resolve, met)
-    links, points = yield from scaled(stored, CROSSED, GATHERED)
+    part = progress.part(CROSSED, GATHERED)
+    links, points = gather_texels(local, geometry, settings, crossings, resolve, met, part)
     chosen = GatherPointLayout.of(points) if gains is not None else None
     # How points are found takes more than what they met says.
-    del points, stored
-    further = gather_parts(numbers, links, resolve, element, reflectance)
-    links, parts = yield from scaled(further, GATHERED, PARTS)
+    del points
+    part = progress.part(GATHERED, PARTS)
+    links, parts = gather_parts(numbers, links, resolve, element, reflectance, progress=part)
     transport = TexelTransport(links, parts, reflectance)
     start, reflected = scratch.empty((len(geometry), 3), np.float32), local.reflected()
     for tile in tiles(len(geometry)):
         start[tile] = values_of(reflected, element[tile])
     seen = None if so_far is None else so_far.swept
-    swept = sweep_steps(
+    light = sweep(
         transport,
         start,
         lamps,
@@ -105,10 +107,10 @@ def reconstruct(
         threads=local.threads,
         seen=seen,
         scratch=scratch,
+        progress=progress.part(PARTS, 1.0),
     )
-    light = yield from scaled(swept, PARTS, 1.0)
     light = replace(light, state=crossings.state)
-    yield 1.0
+    progress.at(1.0)
     if gains is None or chosen is None or local.sources is None or light.table is None:
         return light
     earlier = EarlierLight(local.sources.strengths, light.table)
@@ -151,8 +153,9 @@ def gather_texels(
     crossings: Crossings,
     resolve: Resolver,
     met: Callable[[Array, Gathered, int], None] | None = None,
-) -> Generator[float, None, tuple[StoredLinks, GatherPoints]]:
-    """Gather at few texels, densely where others do not reach; yields the fraction done.
+    progress: Progress = SILENT,
+) -> tuple[StoredLinks, GatherPoints]:
+    """Gather at few texels, densely where others do not reach.
 
     `met` is told of texels that have gathered, and how far they are apart.
     """
@@ -161,27 +164,32 @@ def gather_texels(
     first: list[int] = []
     sources = geometry.scratch.rows(settings.rays, np.int32)
     count = 0
-    width = (1.0 - FIT) / len(settings.strides)
-    for number, stride in enumerate(settings.strides):
-        begin = number * width
-        choice = _choose(points, geometry, stride, settings.support, crossings.beside)
-        chosen = yield from scaled(choice, begin, begin + 0.2 * width)
+    for stride, level in progress.part(0.0, 1.0 - FIT).each(settings.strides):
+        part = level.part(0.0, 0.2)
+        chosen = _choose(points, geometry, stride, settings.support, crossings.beside, part)
         # Across a rim light changes by more than noise: there every ray starts from a point of its own.
         edge = crossings.crossed[chosen]
-        at, closeness = begin + 0.2 * width, []
+        done, closeness = 0.2, []
         for some, starts in ((chosen[~edge], STARTS), (chosen[edge], None)):
-            end = at + 0.8 * width * len(some) / max(len(chosen), 1)
-            rays = gather_at(local, geometry, some, starts, settings.rays, resolve, sources.more(len(some)))
-            gathered = yield from scaled(rays, at, end)
+            before, done = done, done + 0.8 * len(some) / max(len(chosen), 1)
+            gathered = gather_at(
+                local,
+                geometry,
+                some,
+                starts,
+                settings.rays,
+                resolve,
+                into=sources.more(len(some)),
+                progress=level.part(before, done),
+            )
             first.append(count)
             found.append(gathered.aimed)
             count += len(some)
             if met is not None:
                 met(some, gathered, stride)
             closeness.append(gathered.closeness)
-            at = end
         points.add(stride, np.concatenate([chosen[~edge], chosen[edge]]), np.concatenate(closeness))
-    spread = yield from scaled(fit_steps(points, geometry), 1.0 - FIT, 1.0)
+    spread = fit(points, geometry, progress.part(1.0 - FIT, 1.0))
     aimed = AimedRays.joined(found, first, geometry.scratch)
     return StoredLinks(sources.all(), spread, aimed), points
 
@@ -194,15 +202,16 @@ def gather_at(
     rays: int,
     resolve: Resolver,
     into: Array | None = None,
-) -> Generator[float, None, Gathered]:
-    """Gather at some texels; yields the fraction done. `into` (c, rays) int32 takes the sources, if given."""
+    progress: Progress = SILENT,
+) -> Gathered:
+    """Gather at some texels. `into` (c, rays) int32 takes the sources, if given."""
     at = gather_footprints(geometry, chosen, starts)
     expected, upright = (geometry.scratch.empty((len(chosen), *of)) for of in ((), (3,)))
     for tile in tiles(len(chosen), CHUNK):
         some = chosen[tile]
         expected[tile] = local.irradiance_at(geometry.triangle[some], geometry.barycentric[some])
         upright[tile] = geometry.surface_normal[some]
-    return (yield from local.gather_steps(at, upright, rays, resolve, expected, into))
+    return local.gather(at, upright, rays, resolve, expected, into, progress)
 
 
 def gather_footprints(geometry: TexelGeometry, chosen: Array, starts: int | None) -> Footprints:
@@ -220,9 +229,14 @@ def sample_of(geometry: TexelGeometry, chosen: Array, rows: Array, u: Array) -> 
 
 
 def _choose(
-    points: GatherPoints, geometry: TexelGeometry, stride: int, support: float, beside: Array
-) -> Generator[float, None, Array]:
-    """Find the texels on a lattice that no point so far reaches; yields the fraction done.
+    points: GatherPoints,
+    geometry: TexelGeometry,
+    stride: int,
+    support: float,
+    beside: Array,
+    progress: Progress,
+) -> Array:
+    """Find the texels on a lattice that no point so far reaches.
 
     Those beside something, (n,) bool, are chosen as well: points in the open do not know how close
     it is to them.
@@ -232,7 +246,7 @@ def _choose(
         candidates[points.texel] = False
     candidates = row_numbers(candidates)
     if len(points):
-        reached = yield from points.support_steps(candidates)
+        reached = points.support(candidates, progress)
         candidates = candidates[(reached < support) | beside[candidates]]
     return candidates
 

@@ -5,17 +5,17 @@ The unknowns are the texels and the parts that gather rays met where no texel an
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from ...base import drain, scaled
+from ...base import SILENT, Progress
 from ...numerics import Array, Scratch, row_numbers, tiles, trim
 from ...solver.gather import LightGains
 from .gather_links import StoredLinks
 from .part_links import Parts, PartSweeps
-from .source_means import CHUNK_HITS, Means, by_channel, mean_steps
+from .source_means import CHUNK_HITS, Means, by_channel, mean_of_sources
 from .traced_texels import LightingRecord
 from .warm_start import EarlierLight
 
@@ -28,8 +28,8 @@ STILL = 0.1
 """A row of the table moves once it is off by this part of the tolerance: what sees only rows that rest
 need not be asked again, and most rest after a few sweeps."""
 
-SWEPT = 0.7
-"""A sweep takes the other part of the progress left: how many there will be is not known."""
+SWEPT = 0.3
+"""A sweep takes this part of the progress left: how many there will be is not known."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class LitTexels:
     element : (n,) int32
         The leaf element below each, whose light the sweeps start with, or NOTHING.
     sweeps, tolerance
-        As for `sweep_steps`.
+        As for `sweep`.
     earlier : EarlierLight
         What was solved before, the bake's own light first.
     """
@@ -107,7 +107,7 @@ class LitTexels:
     earlier: EarlierLight
 
 
-def sweep_steps(
+def sweep(
     transport: TexelTransport,
     start: Array,
     lamps: Array,
@@ -118,7 +118,8 @@ def sweep_steps(
     estimate: bool = True,
     seen: Callable[[Array], None] | None = None,
     scratch: Scratch | None = None,
-) -> Generator[float, None, TexelLight]:
+    progress: Progress = SILENT,
+) -> TexelLight:
     """Iterate H = direct + Σ ρ H over the stored hits, started from the hierarchy's solution.
 
     Parameters
@@ -140,11 +141,6 @@ def sweep_steps(
         Is given the (n, 3) irradiance after every sweep [W/m²], to be looked at.
     scratch : Scratch or None
         Makes the texels' arrays; None keeps them in memory.
-
-    Yields
-    ------
-    fraction : float
-        Of an unknown number of sweeps: each takes its part of what is left.
     """
     links, reflectance, texel_count = transport.links, transport.reflectance, len(lamps)
     parts = PartSweeps(transport.parts, texel_count, threads)
@@ -155,7 +151,7 @@ def sweep_steps(
     direct, scratch = lamps, scratch or Scratch()
     if beyond.any():
         # The sky's light is direct: its share of the same rays.
-        direct = yield from scaled(links.irradiance_steps(table, threads, scratch), 0.0, 0.1)
+        direct = links.irradiance(table, threads, scratch, progress.part(0.0, 0.1))
         for rows in tiles(texel_count):
             direct[rows] = lamps[rows] + np.maximum(direct[rows], 0.0)
 
@@ -167,15 +163,14 @@ def sweep_steps(
     for rows in tiles(surfaces):
         table[rows][~reached[rows]] = 0.0
     del reached
-    indirect, left = scratch.zeros(direct.shape), 0.9
+    indirect = scratch.zeros(direct.shape)
     changed = np.ones(len(table), dtype=bool)
     means = Means(links.sources, table.shape[1], threads, scratch)
     still = STILL * tolerance * float(table[:texel_count].mean()) if texel_count else 0.0
-    for _ in range(sweeps):
+    for _, turn in zip(range(sweeps), progress.part(0.1, 1.0).turns(SWEPT), strict=False):
         parts.sweep(table, changed, still)
         table[surfaces:] = 0.0
-        mean = yield from scaled(means.steps(table, changed), 1.0 - left, 1.0 - SWEPT * left)
-        left *= SWEPT
+        mean = means.of(table, changed, turn)
         del indirect
         # What aimed rays bring is added to it.
         whole = by_channel(len(mean), table.shape[1], scratch)
@@ -234,8 +229,8 @@ def estimated_noise(
         The radiosity that the links' sources had in the end, the sky's among it.
     """
     half = links.sources.shape[1] // 2
-    whole = drain(mean_steps(table, links.sources, threads, scratch=scratch))
-    part = drain(mean_steps(table, links.sources, threads, half, scratch))
+    whole = mean_of_sources(table, links.sources, threads, scratch=scratch)
+    part = mean_of_sources(table, links.sources, threads, half, scratch)
     for rows in tiles(len(part)):
         part[rows] -= whole[rows]
     del whole

@@ -11,11 +11,10 @@ Through a gap the line of sight is free: what is below a hood asks what is below
 
 from __future__ import annotations
 
-from collections.abc import Generator
-
 import numpy as np
 
-from ...numerics import Array, chunk_steps
+from ...base import SILENT, Progress
+from ...numerics import Array, for_chunks
 from ...rays import SIGHT_LIFT, Hits, free_segment
 from ...solver.gather import NOTHING, Footprints, LocalPass, Resolver
 from .occlusion import Crossings, below_hood
@@ -66,8 +65,7 @@ class TexelCells:
             self._anchors[part] = spread + self._lift(texel)[:, None]
             self._below[part] = self._below_hood(texel, spread)
 
-        for _ in chunk_steps(place, len(self.texel), CHUNK_TEXELS, local.threads):
-            pass
+        for_chunks(place, len(self.texel), CHUNK_TEXELS, local.threads)
 
     def __len__(self) -> int:
         return CELLS * len(self.texel)
@@ -131,12 +129,10 @@ class TexelCells:
         """Return (p, 3) the normals of the triangles that cells are on."""
         return np.asarray(self._geometry.surface_normal[self.texel_of(cell)])
 
-    def gather(self, cell: Array, rays: int, resolve: Resolver) -> Generator[float, None, Array]:
-        """Gather over cells, (p, rays) sources; yields the fraction done."""
-        gathered = yield from self.local.gather_steps(
-            self.footprints(cell), self.upright(cell), rays, resolve
-        )
-        return gathered.sources
+    def gather(self, cell: Array, rays: int, resolve: Resolver, progress: Progress = SILENT) -> Array:
+        """Gather over cells; return (p, rays) sources."""
+        at, upright = self.footprints(cell), self.upright(cell)
+        return self.local.gather(at, upright, rays, resolve, progress=progress).sources
 
     def lit(self, cell: Array) -> Footprints:
         """Return cells as footprints for the light of lamps: their anchors alone."""

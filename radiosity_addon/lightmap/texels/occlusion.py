@@ -11,13 +11,13 @@ and which only partly.
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from ...numerics import Array, chunk_steps, row_numbers
+from ...base import SILENT, Progress
+from ...numerics import Array, for_chunks, row_numbers
 from ...rays import SIGHT_LIFT, RayCaster
 from .clearance import clear_texels
 from .states import DIVIDED, OCCLUDED, TOUCHED
@@ -83,14 +83,15 @@ class Crossings:
         return self.geometry.neighbourhood(self.crossed) & ~self.alone
 
 
-def crossing_steps(
+def find_crossings(
     geometry: TexelGeometry,
     caster: RayCaster,
     threads: int = 0,
     before: Crossings | None = None,
     anew: Array | None = None,
-) -> Generator[float, None, Crossings]:
-    """Find the texels that geometry divides, touches or occludes; yields the fraction done.
+    progress: Progress = SILENT,
+) -> Crossings:
+    """Find the texels that geometry divides, touches or occludes.
 
     Given how it was `before`, only some texels, row numbers, are tried `anew`.
     """
@@ -125,7 +126,7 @@ def crossing_steps(
         result.occluded[rows] = below.all(axis=1) & ~cut
         result.cut[rows], result.touched[rows] = cut, doubtful & ~cut & ~result.rim[rows]
 
-    yield from chunk_steps(find, len(doubted), CHUNK, threads)
+    for_chunks(find, len(doubted), CHUNK, threads, progress)
     return result
 
 

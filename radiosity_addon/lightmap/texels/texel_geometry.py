@@ -38,6 +38,7 @@ class TexelGeometry:
     scratch: Makes arrays of what else there is of each texel.
     uv, page_of_triangle, triangles, face_normals, normals: Of every scene triangle, as given.
     page (n,) int16, or int32 where there are more pages.
+    page_start (pages + 1,) int64: The first texel of each page, and n.
     row, column, triangle (n,) int32.
     share (n,) float32: What part of the texel its triangle covers.
     centre_inside (n,) bool: Whether the texel's center is on its triangle.
@@ -47,6 +48,8 @@ class TexelGeometry:
     position, normal, surface_normal (n, 3): Center of the footprint; interpolated shading normal; the
         triangle's own normal.
     """
+
+    STORED = ("page", "page_start", "triangle", "centre_inside", "index", "uv", "page_of_triangle")
 
     scratch = Scratch()
 
@@ -63,15 +66,15 @@ class TexelGeometry:
         self._scene = scene
         self.uv, self.page_of_triangle = uv, page_of_triangle
         self.triangles, self.face_normals, self.normals = scene.triangles, scene.face_normals, scene.normals
-        self._first = np.cumsum([0] + [len(page) for page in texels])
-        count = int(self._first[-1])
+        self.page_start = np.cumsum([0] + [len(page) for page in texels])
+        count = int(self.page_start[-1])
         self.index = []
         """per page (height, width) int32: the texel's number, or NO_TEXEL"""
         for number, page in enumerate(texels):
             numbers = np.full((page.resolution,) * 2, NO_TEXEL, dtype=np.int32)
             for tile in tiles(len(page)):
                 own = np.arange(tile.start, tile.stop)
-                numbers[page.row[tile], page.column[tile]] = self._first[number] + own
+                numbers[page.row[tile], page.column[tile]] = self.page_start[number] + own
             self.index.append(numbers)
         self.texels = self._joined(texels)
         self.page = scratch.empty(count, np.int16 if len(texels) <= np.iinfo(np.int16).max else np.int32)
@@ -82,7 +85,7 @@ class TexelGeometry:
         self.position, self.normal = scratch.empty((count, 3)), scratch.empty((count, 3))
         for number, (of, page) in enumerate(zip(rows, self.texels, strict=True)):
             for tile in tiles(len(page), CHUNK):
-                mine = slice(self._first[number] + tile.start, self._first[number] + tile.stop)
+                mine = slice(self.page_start[number] + tile.start, self.page_start[number] + tile.stop)
                 triangle = of[page.triangle[tile]]
                 self.page[mine], self.triangle[mine] = number, triangle
                 self.whole[mine] = page.area[tile] >= 1.0
@@ -100,12 +103,12 @@ class TexelGeometry:
         whole = {}
         for name in names:
             parts = [getattr(page, name) for page in texels]
-            whole[name] = self.scratch.empty(int(self._first[-1]), parts[0].dtype if parts else np.int32)
-            for first, part in zip(self._first, parts, strict=False):
+            whole[name] = self.scratch.empty(int(self.page_start[-1]), parts[0].dtype if parts else np.int32)
+            for first, part in zip(self.page_start, parts, strict=False):
                 for tile in tiles(len(part)):
                     whole[name][first + tile.start : first + tile.stop] = part[tile]
         self.row, self.column, self.centre_inside, self.share = (whole[name] for name in names)
-        rows = [slice(first, first + len(page)) for first, page in zip(self._first, texels, strict=False)]
+        rows = [slice(first, first + len(page)) for first, page in zip(self.page_start, texels, strict=False)]
         return [
             replace(
                 page,
@@ -171,10 +174,6 @@ class TexelGeometry:
         rows = [np.flatnonzero(self.page_of_triangle == page) for page in range(len(self.texels))]
         return TexelGeometry(scene, self.uv, self.page_of_triangle, self.texels, rows, self.scratch)
 
-    def first(self, page: int) -> int:
-        """Return the number of a page's first texel."""
-        return int(self._first[page])
-
     def sample(self, rows: Array, u: Array, width: float = FOOTPRINT) -> Array:
         """Return (r, k, 3) points spread over the middle `width` of r texels by u (r, k, 2)."""
         points = np.empty((len(rows), u.shape[1], 3))
@@ -237,7 +236,7 @@ class TexelGeometry:
             mine = np.flatnonzero(self.page[rows] == number)
             if len(mine) == 0:
                 continue
-            local = rows[mine] - self._first[number]
+            local = rows[mine] - self.page_start[number]
             inside = sample_footprints(page.take(local), u[mine], width)
             weights[mine] = self._drawn_in(inside, self.triangle[rows[mine]])
         return weights
@@ -252,7 +251,7 @@ class TexelGeometry:
         """Grow a (n,) mask of texels by one texel in all eight directions of their page."""
         grown = np.empty(len(self), dtype=bool)
         for page, (numbers, inside) in enumerate(zip(self.index, self._framed, strict=True)):
-            mine = slice(self._first[page], self._first[page + 1])
+            mine = slice(self.page_start[page], self.page_start[page + 1])
             image = np.zeros((len(numbers) + 2, numbers.shape[1] + 2), dtype=bool)
             flat, own, result = image.ravel(), chosen[mine], grown[mine]
             for tile in tiles(len(inside)):

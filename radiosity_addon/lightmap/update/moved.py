@@ -7,12 +7,11 @@ texels, for indirect light changes everywhere.
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...base import scaled
+from ...base import SILENT, Progress
 from ...numerics import Array
 from ...solver.gather import LocalPass, values_of
 from ..lighting import (
@@ -21,22 +20,21 @@ from ..lighting import (
     HitNumbers,
     LightingRecord,
     LitTexels,
-    PartHits,
     Parts,
     StoredLinks,
     TexelLight,
     TexelTransport,
     gather_parts,
     resolver,
-    sweep_steps,
+    sweep,
 )
-from ..texels import TexelCells, crossing_steps
+from ..texels import TexelCells, find_crossings
 from .affected import AffectedTexels
 from .moved_light import texel_gains
 from .moved_parts import known_parts, look_again, renumbered
 from .moved_points import MovedPoints
 
-DIRECT, CROSSED, GATHERED, PARTS = 0.2, 0.25, 0.65, 0.85
+DIRECT, CROSSED, GATHERED, KNOWN, PARTS = 0.2, 0.25, 0.65, 0.8, 0.85
 """How much is done when a part ends; rough, from rooms at medium quality."""
 
 
@@ -57,10 +55,10 @@ class PreviousLight:
     local: LocalPass
 
 
-def moved_steps(
-    before: PreviousLight, local: LocalPass, affected: AffectedTexels
-) -> Generator[float, None, tuple[TexelLight, LocalPass]]:
-    """Light the texels of a scene in which something moved; yields the fraction done.
+def light_after_move(
+    before: PreviousLight, local: LocalPass, affected: AffectedTexels, progress: Progress = SILENT
+) -> tuple[TexelLight, LocalPass]:
+    """Light the texels of a scene in which something moved.
 
     Parameters
     ----------
@@ -77,14 +75,13 @@ def moved_steps(
         With elements that are lit as their texels are.
     """
     lit, traced, geometry = before.lit, before.traced, affected.geometry
-    asked = texel_gains(lit.gains, local, before.local, affected)
-    gains = yield from scaled(asked, 0.0, DIRECT)
+    gains = texel_gains(lit.gains, local, before.local, affected, progress.part(0.0, DIRECT))
     direct = local.lit_by(gains)
     more = direct - local.lit_by(lit.gains)
     local = _brightened(local, lit.element, more)
     near = np.flatnonzero(affected.near)
-    found = crossing_steps(geometry, local.caster, local.threads, traced.crossings, near)
-    crossings = yield from scaled(found, DIRECT, CROSSED)
+    part = progress.part(DIRECT, CROSSED)
+    crossings = find_crossings(geometry, local.caster, local.threads, traced.crossings, near, part)
     numbers = HitNumbers(local, TexelCells(local, geometry, crossings), len(geometry))
     resolve = resolver(geometry, crossings, numbers)
     divided = affected.divided(traced.crossings, crossings)
@@ -101,19 +98,16 @@ def moved_steps(
         resolve=resolve,
         bright=bright,
     )
-    stored = moved_points.steps(_renumbered(lit.transport.links, traced, now), traced.points)
-    links, points = yield from scaled(stored, CROSSED, GATHERED)
+    old, part = _renumbered(lit.transport.links, traced, now), progress.part(CROSSED, GATHERED)
+    links, points = moved_points.gather(old, traced.points, part)
 
-    known: list[PartHits] = []
     kept = known_parts(lit.transport.parts.links, traced, numbers, now)
-    at, width = GATHERED, (PARTS - GATHERED) / (len(kept) + 1)
-    for some in kept:
-        again = look_again(some, numbers, before.local, affected, resolve)
-        known.append((yield from scaled(again, at, at + width)))
-        at += width
-    reflectance = lit.transport.reflectance
-    further = gather_parts(numbers, links, resolve, lit.element, reflectance, known)
-    links, parts = yield from scaled(further, at, PARTS)
+    known = [
+        look_again(some, numbers, before.local, affected, resolve, part)
+        for some, part in progress.part(GATHERED, KNOWN).each(kept)
+    ]
+    reflectance, part = lit.transport.reflectance, progress.part(KNOWN, PARTS)
+    links, parts = gather_parts(numbers, links, resolve, lit.element, reflectance, known, part)
 
     transport = TexelTransport(links, parts, reflectance)
     chosen, error = GatherPointLayout.of(points), traced.error
@@ -121,7 +115,7 @@ def moved_steps(
     start = _start(before, traced, local, parts, now)
     of_texels = np.maximum(start[: len(geometry)] + reflectance * more, 0.0)
     transport = replace(transport, parts=replace(parts, start=start[len(geometry) :]))
-    swept = sweep_steps(
+    light = sweep(
         transport,
         of_texels,
         direct,
@@ -131,8 +125,8 @@ def moved_steps(
         threads=local.threads,
         estimate=False,
         scratch=geometry.scratch,
+        progress=progress.part(PARTS, 1.0),
     )
-    light = yield from scaled(swept, PARTS, 1.0)
     assert local.sources is not None  # it asks for lights apart
     assert light.table is not None
     earlier = EarlierLight(local.sources.strengths, light.table)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 
-from ...base import scaled
+from ...base import Progress
 from ...numerics import Array
 from ...solver.gather import Boxes, Footprints, LightGains, LightQuery, LocalPass
 from ..lighting import HitNumbers, PartHits, lit_footprints, sample_of
@@ -27,20 +27,19 @@ def changed_lights(local: LocalPass, before: LocalPass) -> list[tuple[LightQuery
 
 
 def texel_gains(
-    kept: LightGains, local: LocalPass, before: LocalPass, affected: AffectedTexels
-) -> Generator[float, None, LightGains]:
-    """Ask for every light where it may have changed; yields the fraction done."""
+    kept: LightGains, local: LocalPass, before: LocalPass, affected: AffectedTexels, progress: Progress
+) -> LightGains:
+    """Ask for every light where it may have changed."""
     geometry, lights = affected.geometry, changed_lights(local, before)
     gains = LightGains(len(geometry))
     lift = SmoothLift(geometry)
-    for done, (asked, moved) in enumerate(lights):
+    for (asked, moved), part in progress.each(lights):
         gain = kept.of(asked.number)
         touched = affected.texels.copy()
         touched |= moved | affected.boxes.between(geometry.position, asked.light, affected.widen)
         # One texel more: a penumbra is followed from neighbour to neighbour.
         around = np.flatnonzero(geometry.neighbourhood(touched))
-        steps = local.gain_steps(asked, _footprints(geometry, around, lift))
-        found = yield from scaled(steps, done / len(lights), (done + 1) / len(lights))
+        found = local.gain(asked, _footprints(geometry, around, lift), progress=part)
         own = touched[around]
         gain[around[own]] = found[own]
         gains.put(asked.number, gain)
@@ -48,19 +47,24 @@ def texel_gains(
 
 
 def part_gains(
-    parts: PartHits, numbers: HitNumbers, before: LocalPass, boxes: Boxes, at: Array, widen: Array
-) -> Generator[float, None, LightGains]:
+    parts: PartHits,
+    numbers: HitNumbers,
+    before: LocalPass,
+    boxes: Boxes,
+    at: Array,
+    widen: Array,
+    progress: Progress,
+) -> LightGains:
     """Ask for every light at those parts, at (p, 3) anchors, where it may have changed."""
     assert parts.gains is not None  # kept parts keep them
     local = numbers.local
     lights = changed_lights(local, before)
     gains = LightGains(len(parts.part))
-    for done, (asked, moved) in enumerate(lights):
+    for (asked, moved), part in progress.each(lights):
         gain = parts.gains.of(asked.number)
         rows = np.flatnonzero(moved | boxes.between(at, asked.light, widen))
         some = PartHits(parts.is_leaf, parts.part[rows], parts.sources[rows])
-        steps = local.gain_steps(asked, lit_footprints(numbers, some), some.shadow_rays)
-        gain[rows] = yield from scaled(steps, done / len(lights), (done + 1) / len(lights))
+        gain[rows] = local.gain(asked, lit_footprints(numbers, some), some.shadow_rays, part)
         gains.put(asked.number, gain)
     return gains
 

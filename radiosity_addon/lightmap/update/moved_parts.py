@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from ...base import scaled
+from ...base import Progress
 from ...numerics import Array
 from ...solver.gather import STALE, AimedRays, Before, Gathered, LightGains, LocalPass, Resolver
 from ..lighting import HitNumbers, LightingRecord, PartHits, PartLinks
@@ -59,9 +59,14 @@ def renumbered(sources: Array, now: Array) -> Array:
 
 
 def look_again(
-    parts: PartHits, numbers: HitNumbers, before: LocalPass, affected: AffectedTexels, resolve: Resolver
-) -> Generator[float, None, PartHits]:
-    """Trace again what is touched of the rays of parts, and of those to lamps; yields the fraction done."""
+    parts: PartHits,
+    numbers: HitNumbers,
+    before: LocalPass,
+    affected: AffectedTexels,
+    resolve: Resolver,
+    progress: Progress,
+) -> PartHits:
+    """Trace again what is touched of the rays of parts, and of those to lamps."""
     local = numbers.local
     if parts.is_leaf:
         at = local.parts.footprints(parts.part)
@@ -82,7 +87,7 @@ def look_again(
         bright=np.zeros(local.hierarchy.n_elements, dtype=bool),
         hosts=np.zeros(len(affected.moved), dtype=bool),
     )
-    found = yield from scaled(local.regather_steps(at, upright, resolve, earlier), 0.0, 0.6)
-    asked = part_gains(parts, numbers, before, affected.boxes, at.points, widen)
-    gains = yield from scaled(asked, 0.6, 1.0)
+    found = local.regather(at, upright, resolve, earlier, progress=progress.part(0.0, 0.6))
+    part = progress.part(0.6, 1.0)
+    gains = part_gains(parts, numbers, before, affected.boxes, at.points, widen, part)
     return PartHits(parts.is_leaf, parts.part, found.sources, gains)

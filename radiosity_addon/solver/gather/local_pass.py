@@ -8,15 +8,15 @@ whose hits are looked up in the solution.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from ...base import drain, scaled
+from ...base import SILENT, Progress
 from ...lights import Lamp, SkyTable
-from ...numerics import Array, Scratch, tiles
+from ...numerics import SHADOW_STEP, Array, Scratch, Stream, tiles
 from ...rays import Hits
 from ..emitters import EmitterGroup, LightSources, emitter_groups
 from ..hierarchy import Hierarchy
@@ -74,24 +74,13 @@ class LocalPass:
 
     def direct(
         self,
-        points: Array,
-        normals: Array,
-        keys: Array,
-        sampler: Sampler | None = None,
-        near: Callable[[Array], Array] | None = None,
-        rays: int | None = None,
-    ) -> Array:
-        """Return `direct_steps` at points, (n, 3) float64 [W/m²]; see `Footprints` for what they are."""
-        return drain(self.direct_steps(Footprints(points, normals, keys, sampler, near), rays))
-
-    def direct_steps(
-        self,
         at: Footprints,
         rays: int | None = None,
         gains: LightGains | None = None,
         total: Array | None = None,
         tell: Callable[[], None] | None = None,
-    ) -> Generator[float, None, Array]:
+        progress: Progress = SILENT,
+    ) -> Array:
         """Compute the irradiance straight from lamps and emissive surfaces, the sky's apart.
 
         Parameters
@@ -108,10 +97,6 @@ class LocalPass:
         tell : callable or None
             … and this is called after each.
 
-        Yields
-        ------
-        fraction : float
-
         Returns
         -------
         irradiance : (n, 3) float64 [W/m²]
@@ -120,10 +105,9 @@ class LocalPass:
         lights = self.lights(dark=gains is not None)
         if gains is not None:
             at = replace(at, expected=None)
-        spread = SpreadPoints(at, self._seed + 2, self.threads)
-        for done, asked in enumerate(lights):
-            steps = self._arriving(asked, spread, rays)
-            arriving = yield from scaled(steps, done / len(lights), (done + 1) / len(lights))
+        spread = SpreadPoints(at, self._seed + Stream.FOOTPRINT, self.threads)
+        for asked, part in progress.each(lights):
+            arriving = self._arriving(asked, spread, rays, part)
             for rows in tiles(len(total)):
                 total[rows] += arriving[rows, None] * asked.light.strength
             if gains is not None:
@@ -140,27 +124,29 @@ class LocalPass:
             if isinstance(lit, Lamp) and (dark or lit.strength.any())
         ]
         first, seed = len(self._state.scene.lights), self._seed
-        asked = [LightQuery(lit, row, seed + 31 + 7 * place) for place, (row, lit) in enumerate(lamps)]
+        of_lamps, of_groups = seed + Stream.LAMP_SHADOWS, seed + Stream.EMITTER_SHADOWS
+        step = SHADOW_STEP
+        asked = [LightQuery(lit, row, of_lamps + step * place) for place, (row, lit) in enumerate(lamps)]
         groups = enumerate(self.emitters)
-        return asked + [LightQuery(lit, first + place, seed + 17 + 7 * place) for place, lit in groups]
+        return asked + [LightQuery(lit, first + place, of_groups + step * place) for place, lit in groups]
 
-    def gain_steps(
-        self, asked: LightQuery, at: Footprints, rays: int | None = None
-    ) -> Generator[float, None, Array]:
-        """Compute (n,) what one light adds per unit of its strength, as if it were the only one."""
-        spread = SpreadPoints(replace(at, expected=None), self._seed + 2, self.threads)
-        return (yield from self._arriving(asked, spread, rays))
+    def gain(
+        self, asked: LightQuery, at: Footprints, rays: int | None = None, progress: Progress = SILENT
+    ) -> Array:
+        """Return (n,) what one light adds per unit of its strength, as if it were the only one."""
+        spread = SpreadPoints(replace(at, expected=None), self._seed + Stream.FOOTPRINT, self.threads)
+        return self._arriving(asked, spread, rays, progress)
 
     def _arriving(
-        self, asked: LightQuery, spread: SpreadPoints, rays: int | None
-    ) -> Generator[float, None, Array]:
-        """Compute (n,) unoccluded irradiance per unit of a light's strength times visibility."""
+        self, asked: LightQuery, spread: SpreadPoints, rays: int | None, progress: Progress
+    ) -> Array:
+        """Return (n,) unoccluded irradiance per unit of a light's strength times visibility."""
         light, shadow_rays = asked.light, rays or self._state.settings.shadow_rays
         glows = isinstance(light, EmitterGroup)
         caster = self.caster if glows else self.caster.for_lamps
-        gain = yield from scaled(spread.gain_steps(light, NEAR if glows else 0.0), 0.0, 0.1)
-        share = ShadowShare(caster, light, spread, asked.seed, self.threads).steps(gain, shadow_rays)
-        unblocked = yield from scaled(share, 0.1, 1.0)
+        gain = spread.gain(light, NEAR if glows else 0.0, progress.part(0.0, 0.1))
+        share = ShadowShare(caster, light, spread, asked.seed, self.threads)
+        unblocked = share.at_points(gain, shadow_rays, progress.part(0.1, 1.0))
         for rows in tiles(len(gain)):
             gain[rows] *= unblocked[rows]
         return gain
@@ -176,36 +162,15 @@ class LocalPass:
 
     def gather(
         self,
-        points: Array,
-        normals: Array,
-        surface_normals: Array,
-        keys: Array,
-        rays: int,
-        resolve: Resolver,
-        sampler: Sampler | None = None,
-    ) -> tuple[Array, Array]:
-        """Trace cosine-distributed rays and keep what they hit: links at the finest level.
-
-        Returns
-        -------
-        sources : (n, rays) int32
-        closeness : (n,) float64
-            See `Gathered`.
-        """
-        at = Footprints(points, normals, keys, sampler)
-        gathered = drain(self.gather_steps(at, surface_normals, rays, resolve))
-        return gathered.sources, gathered.closeness
-
-    def gather_steps(
-        self,
         at: Footprints,
         surface_normals: Array,
         rays: int,
         resolve: Resolver,
         irradiance: Array | None = None,
         into: Array | None = None,
-    ) -> Generator[float, None, Gathered]:
-        """Trace rays over hemispheres, and rays aimed at bright elements; yields the fraction done.
+        progress: Progress = SILENT,
+    ) -> Gathered:
+        """Trace rays over hemispheres, and rays aimed at bright elements: links at the finest level.
 
         Parameters
         ----------
@@ -225,26 +190,27 @@ class LocalPass:
         if into is not None:
             gathering.sources = into
         if irradiance is None:
-            return (yield from gathering.steps(None, np.zeros(len(at))))
-        return (yield from gathering.steps(self._bright, irradiance))
+            return gathering.trace(None, np.zeros(len(at)), progress)
+        return gathering.trace(self._bright, irradiance, progress)
 
-    def regather_steps(
+    def regather(
         self,
         at: Footprints,
         surface_normals: Array,
         resolve: Resolver,
         before: Before,
         irradiance: Array | None = None,
-    ) -> Generator[float, None, Gathered]:
+        progress: Progress = SILENT,
+    ) -> Gathered:
         """Trace those rays again that something which moved touches; the others stay as they were.
 
-        Parameters are those of `gather_steps`; `before` is what the same rays met.
+        Parameters are those of `gather`; `before` is what the same rays met.
         """
         rays = before.gathered.sources.shape[1]
         retracing = Retracing(self._gathering(at, surface_normals, rays, resolve), before)
         if irradiance is None:
-            return (yield from retracing.steps(None, np.zeros(len(at))))
-        return (yield from retracing.steps(self._bright, irradiance))
+            return retracing.trace(None, np.zeros(len(at)), progress)
+        return retracing.trace(self._bright, irradiance, progress)
 
     def _gathering(self, at: Footprints, surface_normals: Array, rays: int, resolve: Resolver) -> Gathering:
         return Gathering(
@@ -346,11 +312,12 @@ class LocalPass:
         """Return (n,) int32: the part of a leaf element under each hit; NOTHING for none or a black back."""
         return self.parts.at(self.leaves_of(hits), hits)
 
-    def gather_at_parts(self, parts: Array, rays: int, resolve: Resolver) -> Generator[float, None, Array]:
-        """Gather over whole parts instead of points, (p, rays) sources; yields the fraction done."""
+    def gather_at_parts(
+        self, parts: Array, rays: int, resolve: Resolver, progress: Progress = SILENT
+    ) -> Array:
+        """Gather over whole parts instead of points; return (p, rays) sources."""
         at = self.parts.footprints(parts)
-        gathered = yield from self.gather_steps(at, at.normals, rays, resolve)
-        return gathered.sources
+        return self.gather(at, at.normals, rays, resolve, progress=progress).sources
 
     def part_reflectance(self, parts: Array) -> Array:
         """Return (p, 3) the reflectance of parts of leaf elements where their surface is there."""

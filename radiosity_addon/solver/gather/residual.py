@@ -20,6 +20,7 @@ from ...numerics import Array, for_chunks, points_at, split_in_four, weights_at
 from ..equations import corner_factors, visible_share
 from ..links import lamp_irradiance
 from ..state import SolverState
+from .footprints import Footprints
 from .local_pass import LocalPass
 
 CHUNK_PAIRS = 1 << 16
@@ -98,9 +99,9 @@ class Residual:
         """
         local = LocalPass(self._state) if local is None else local
         points, normals = self.position(face, barycentric), self._hierarchy.faces.normal[face]
-        keys = np.arange(len(face))
-        direct = local.direct(points, normals, keys, rays=SHADOW_RAYS)
-        sources, _ = local.gather(points, normals, normals, keys, rays, local.leaves_of)
+        at = Footprints(points, normals, np.arange(len(face)))
+        direct = local.direct(at, rays=SHADOW_RAYS)
+        sources = local.gather(at, normals, rays, local.leaves_of).sources
         indirect = self.gathered(local)[sources].mean(axis=1)
         return self.given(face, barycentric, direct + indirect)
 

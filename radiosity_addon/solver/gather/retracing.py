@@ -5,12 +5,12 @@ Rays depend on their point's key, their number and the seed alone, so any of the
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...numerics import Array, chunk_steps
+from ...base import SILENT, Progress
+from ...numerics import Array, map_chunks
 from ...rays import RayCaster
 from .boxes import Boxes
 from .bright_patches import AimedRays, BrightElements
@@ -85,17 +85,18 @@ class Retracing:
         self._gathering, self._before = gathering, before
         gathering.take_up(before.gathered)
 
-    def steps(self, bright: BrightElements | None, irradiance: Array) -> Generator[float, None, Gathered]:
-        """Trace what is touched; yields the fraction done. Parameters as of `Gathering.steps`."""
+    def trace(
+        self, bright: BrightElements | None, irradiance: Array, progress: Progress = SILENT
+    ) -> Gathered:
+        """Trace what is touched. Parameters as of `Gathering.trace`."""
         before, gathering = self._before, self._gathering
         count, rays = before.gathered.sources.shape
         whole = np.zeros(count, dtype=bool)
         aims = np.zeros(count, dtype=bool)
         aims[before.gathered.aimed.row] = True
         aims_past = self._aims_past_boxes(count)
-        new: dict[int, AimedRays] = {}
 
-        def trace(part: slice) -> None:
+        def trace(part: slice) -> AimedRays | None:
             rows = np.arange(part.start, part.stop)
             stale = before.gathered.sources[rows] == STALE
             asked = stale.any(axis=1) | aims_past[rows]
@@ -103,7 +104,7 @@ class Retracing:
             asked |= before.moved.boxes.above(points, normals, before.widen[rows])
             rows, stale = rows[asked], stale[asked]
             if len(rows) == 0:
-                return
+                return None
             directions, upward = gathering.directions(rows)
             points, _ = gathering.planes(rows)
             touched = before.moved.boxes.met_by(points, directions, before.widen[rows])
@@ -128,16 +129,17 @@ class Retracing:
                 again, shares = again[wanted], shares[wanted]
             else:
                 again = rows[renewed | (past & aims[rows])]
-            if len(again):
-                whole[again] = True
-                found = gathering.trace_rows(again, bright, shares)
-                if found is not None:
-                    new[part.start] = replace(found, row=again[found.row])
+            if len(again) == 0:
+                return None
+            whole[again] = True
+            found = gathering.trace_rows(again, bright, shares)
+            return None if found is None else replace(found, row=again[found.row])
 
-        yield from chunk_steps(trace, count, max(CHUNK_RAYS // rays, 1), gathering.threads)
+        chunks = map_chunks(trace, count, max(CHUNK_RAYS // rays, 1), gathering.threads, progress)
+        new = [found for _, found in chunks if found is not None]
         aimed = before.gathered.aimed
         kept = aimed.entries(~whole[aimed.row])
-        parts = [kept, *(new[start] for start in sorted(new))]
+        parts = [kept, *new]
         return gathering.gathered(AimedRays.joined(parts, [0] * len(parts)))
 
     def _aims_past_boxes(self, count: int) -> Array:

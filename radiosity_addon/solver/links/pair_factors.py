@@ -11,6 +11,7 @@ import numpy as np
 from ...form_factors import kernel, point_to_polygon, triangle_to_triangle, visibility_of, weighted_sums
 from ...numerics import (
     Array,
+    Stream,
     hash_keys,
     pick_in_runs,
     point_on_each_triangle,
@@ -21,7 +22,7 @@ from ...rays import RayCaster
 from ..hierarchy import Hierarchy
 
 EXACT_WITHIN = 1.0
-"""Pairs nearer than this (distance of centres over the sum of radii) get the exact factor."""
+"""Pairs nearer than this (distance of centers over the sum of radii) get the exact factor."""
 
 
 def _symmetric(weight: float) -> list[list[float]]:
@@ -69,18 +70,10 @@ def pair_visibility(
 def trace_pairs(caster: RayCaster, samples: PairSamples, empty_too: bool = False) -> tuple[Array, Array]:
     """Trace the samples of pairs: four each, all sixteen where those disagree.
 
-    Parameters
-    ----------
-    empty_too : bool
-        All sixteen also where the four carry nothing. Not for links: their doubt is about such
-        pairs, and has them refined.
-
-    Returns
-    -------
-    traced : (n, 16) bool
-        Which samples were asked.
-    free : (n, 16) float64
-        What share of these passes: 0 or 1 where there are no cut-outs.
+    empty_too: All sixteen also where the four carry nothing. Not for links: their error estimate is about
+        such pairs, and has them refined.
+    Returns traced (n, 16) bool: Which samples were asked.
+    Returns free (n, 16): What share of these passes: 0 or 1 where there are no cut-outs.
     """
     traced = np.zeros(samples.transfer.shape, dtype=bool)
     free = np.zeros(samples.transfer.shape)
@@ -142,19 +135,19 @@ class PairSamples:
         count = len(receiver)
         # Column 4a + q joins the receiver's quarter q to the source's quarter q xor (turn + a).
         pair = receiver.astype(np.int64) << 32 | source.astype(np.int64)
-        turn = hash_keys(pair, seed) & 3
+        turn = hash_keys(pair, seed + Stream.PAIR_TURN) & 3
         receiver_quarter = np.tile(np.arange(4), samples // 4)
         turned = turn[:, None] + np.repeat(np.arange(samples // 4), 4)
         source_quarter = receiver_quarter[None] ^ (turned % 4)
         quarters = split_in_four(hierarchy.corners[receiver])
-        jitter = stratified_square(pair, samples, seed + 1)
+        jitter = stratified_square(pair, samples, seed + Stream.PAIR_RECEIVER)
         self.receiver_points = point_on_each_triangle(quarters[:, receiver_quarter], jitter)
         self.receiver_normals = hierarchy.faces.normal[hierarchy.face[receiver]]
 
         self.source_points = np.empty((count, samples, 3))
         self.source_normals = np.empty((count, samples, 3))
-        jitter = stratified_square(pair, samples, seed + 2)
-        along = stratified_square(pair, samples, seed + 3)[..., 0]
+        jitter = stratified_square(pair, samples, seed + Stream.PAIR_SOURCE)
+        along = stratified_square(pair, samples, seed + Stream.PAIR_SOURCE_FACE)[..., 0]
         is_cluster = source < hierarchy.n_clusters
         single = np.flatnonzero(~is_cluster)
         element = source[single] - hierarchy.n_clusters

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...base import UsageError
+from ...base import SILENT, Progress, UsageError
 from ...numerics import Array
 from ...scene import Scene
 from ..equations import LinearSystem
@@ -64,8 +64,8 @@ def _iterate(system: LinearSystem, start: Array | None) -> Iterator[Iterate]:
         direction = residual + ratio * direction
 
 
-def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float, SolverState]]:
-    """Solve step by step: yields (fraction done, state); the last state is the solution.
+def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -> SolverState:
+    """Solve; `progress` is shown the state.
 
     Raises
     ------
@@ -77,4 +77,4 @@ def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float,
             "conjugate gradients need reciprocal form factors, which the "
             f"{settings.assembly} assembly does not give: take galerkin, or the method jacobi or gauss-seidel"
         )
-    yield from solve_matrix(scene, settings, conjugate_gradient, copies=2)
+    return solve_matrix(scene, settings, progress, conjugate_gradient, copies=2)

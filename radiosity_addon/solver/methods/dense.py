@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...base import BakeError
+from ...base import SILENT, BakeError, Progress
 from ...numerics import Array
 from ...scene import Scene
 from ..equations import LinearSystem
@@ -45,12 +45,12 @@ def dense(system: LinearSystem) -> Array:
     return radiosity
 
 
-def steps(system: LinearSystem) -> Iterator[Iterate]:
+def iterates(system: LinearSystem) -> Iterator[Iterate]:
     """Yield (B, Σ A |E − K B|) once: there is nothing to iterate."""
     radiosity = dense(system)
     yield radiosity, system.residual_power(radiosity)
 
 
-def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float, SolverState]]:
-    """Solve step by step: yields (fraction done, state); the last state is the solution."""
-    yield from solve_matrix(scene, settings, steps, copies=3)
+def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -> SolverState:
+    """Solve; `progress` is shown the state."""
+    return solve_matrix(scene, settings, progress, iterates, copies=3)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ...base import SILENT, Progress
 from ...numerics import Array
 from ...scene import Scene
 from ..equations import LinearSystem
@@ -39,6 +40,6 @@ def sweep(system: LinearSystem, radiosity: Array) -> None:
         radiosity[row] += residual / diagonal[row]
 
 
-def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float, SolverState]]:
-    """Solve step by step: yields (fraction done, state); the last state is the solution."""
-    yield from solve_matrix(scene, settings, gauss_seidel, copies=2)
+def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -> SolverState:
+    """Solve; `progress` is shown the state."""
+    return solve_matrix(scene, settings, progress, gauss_seidel, copies=2)

@@ -7,15 +7,15 @@ refined and the residual is small.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ...base import SILENT, Progress
 from ...numerics import Array
 from ...scene import Scene
 from ..balance import Balance, Conservation, received_by_faces
-from ..hierarchy import NodeShapes, TreeTop
+from ..hierarchy import ClusterCut, NodeShapes
 from ..links import (
     ClusterLinks,
     Links,
@@ -76,12 +76,14 @@ each other, that keeps the residual from falling, or would let plain iteration g
 class HierarchicalState(SolverState):
     """What the refined hierarchy works on."""
 
+    STORED = ("settings", "hierarchy", "links", "cluster_links", "balance")
+
     links: Links = field(default_factory=no_links)
     """To elements, sorted by receiver."""
     cluster_links: ClusterLinks = field(default_factory=no_cluster_links)
     faint: float = 0.0
     """Above 0 first links had to be made coarser (see `first_links`)."""
-    top: TreeTop | None = None
+    cut: ClusterCut | None = None
     """The clusters that the links use."""
     conservation: Conservation | None = None
     balance: Balance | None = None
@@ -92,21 +94,24 @@ class HierarchicalState(SolverState):
         """Links between elements and clusters, and from lamps."""
         return len(self.links) + len(self.cluster_links) + len(self.light_links)
 
+    def linked_cut(self) -> ClusterCut:
+        """Return the part of the cluster tree that the links use as they are now."""
+        links, cluster_links = self.links, self.cluster_links
+        return ClusterCut(self.hierarchy, links.source, cluster_links.receiver, cluster_links.source)
+
     def closure(self) -> Array:
         """Return (f,) the area mean over each face's leaves of ΣFV over own and inherited links."""
         return link_closure(self.hierarchy, self.links, self.cluster_links)
 
     def balanced_closure(self) -> Array:
         """Return (f,) ΣFV as light was sent and received in the end, scaled (see `conservation`)."""
-        if self.balance is None or self.top is None:
+        if self.balance is None or self.cut is None:
             return self.closure()
-        return received_by_faces(self.hierarchy, self.top, self.balance, self.cluster_links)
+        return received_by_faces(self.hierarchy, self.cut, self.balance, self.cluster_links)
 
 
-def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float, HierarchicalState]]:
-    """Solve step by step: yields (fraction done, state) so that a caller may show or cancel.
-
-    The last state yielded is the solution.
+def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -> HierarchicalState:
+    """Solve; `progress` is shown the state.
 
     Raises
     ------
@@ -118,10 +123,9 @@ def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float,
     hierarchy, caster = state.hierarchy, state.caster
     min_area = settings.min_area * float(hierarchy.faces.area.sum())
     state.conservation = Conservation(caster, min_area, settings.seed, settings.threads)
-    yield 0.02, state
+    progress.at(0.02, state)
     if not state.has_light:
-        yield 1.0, state
-        return
+        return state
     light_threshold = LIGHT_SHARE * settings.error * state.power
     state.light_links = link_lights(
         hierarchy,
@@ -134,13 +138,13 @@ def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float,
         most_light_elements(hierarchy, settings),
     )
     state.keep_lamps_within_power()
-    yield 0.1, state
+    progress.at(0.1, state)
     shapes = NodeShapes(hierarchy)
     state.links, state.cluster_links, state.faint = first_links(
         hierarchy, shapes, caster, settings, link_budget(hierarchy, settings, len(state.light_links))
     )
     state.reset()
-    yield 0.3, state
+    progress.at(0.3, state)
 
     rounds: list[dict[str, float]] = []
     for done, coarsening in enumerate(COARSENING):
@@ -150,13 +154,13 @@ def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float,
             iterate(state, settings.tolerance if coarsening == 1.0 else ROUGH)
             refined = 0 if exhausted(state) else settle(state, shapes, error * state.power, min_area)
             links_refined += refined
-            yield 0.3 + 0.65 * (done + 0.5) / len(COARSENING), state
+            progress.at(0.3 + 0.65 * (done + 0.5) / len(COARSENING), state)
             if not refined or (coarsening > 1.0 and refined <= FEW * state.n_links):
                 break
         rounds.append({"error": error, "links_refined": links_refined, "links": len(state.links)})
     iterate(state, settings.tolerance, last=True)
     tell(state, rounds)
-    yield 1.0, state
+    return state
 
 
 def settle(state: HierarchicalState, shapes: NodeShapes, threshold: float, min_area: float) -> int:
@@ -167,13 +171,7 @@ def settle(state: HierarchicalState, shapes: NodeShapes, threshold: float, min_a
         total += refined
         if refined == 0 or refined > FEW * state.n_links:
             return total
-        state.top = _top(state)
-
-
-def _top(state: HierarchicalState) -> TreeTop:
-    """Return the part of the cluster tree that the links use as they are now."""
-    links, cluster_links = state.links, state.cluster_links
-    return TreeTop(state.hierarchy, links.source, cluster_links.receiver, cluster_links.source)
+        state.cut = state.linked_cut()
 
 
 def refine(state: HierarchicalState, shapes: NodeShapes, threshold: float, min_area: float) -> int:
@@ -184,7 +182,7 @@ def refine(state: HierarchicalState, shapes: NodeShapes, threshold: float, min_a
     hierarchy, settings = state.hierarchy, state.settings
     seed, threads = settings.seed, settings.threads
     chosen = _over(
-        state, misplaced_at_clusters(hierarchy, state.cluster_links, state.radiosity, state.top), threshold
+        state, misplaced_at_clusters(hierarchy, state.cluster_links, state.radiosity, state.cut), threshold
     )
     refined = len(chosen)
     new: list[Links] = []
@@ -199,7 +197,7 @@ def refine(state: HierarchicalState, shapes: NodeShapes, threshold: float, min_a
         kept = np.delete(np.arange(len(state.cluster_links)), chosen)
         state.cluster_links = join_cluster_links([state.cluster_links.take(kept), others])
 
-    errors = misplaced_power(hierarchy, state.links, state.radiosity, state.top)
+    errors = misplaced_power(hierarchy, state.links, state.radiosity, state.cut)
     chosen = _over(state, errors, threshold)
     if len(chosen):
         before = hierarchy.n_elements
@@ -239,11 +237,11 @@ def iterate(state: HierarchicalState, tolerance: float, last: bool = False) -> N
     hierarchy, cluster_links = state.hierarchy, state.cluster_links
     assert state.conservation is not None  # set when the state was made
     lights = state.direct()
-    state.top = _top(state)
+    state.cut = state.linked_cut()
     state.balance = state.conservation.balance(
-        hierarchy, state.top, state.links, cluster_links, rough=not last
+        hierarchy, state.cut, state.links, cluster_links, rough=not last
     )
-    top, balance = state.top, state.balance
+    cut, balance = state.cut, state.balance
     links, scale, received = balance.links, balance.sent, balance.received
     leaves = hierarchy.leaves
     least = state.emission[leaves]
@@ -251,7 +249,7 @@ def iterate(state: HierarchicalState, tolerance: float, last: bool = False) -> N
     best, best_at = np.inf, state.iterations
     while not exhausted(state):
         before = state.radiosity[leaves]
-        bounce(state, links, lights, scale, cluster_links, top, received)
+        bounce(state, links, lights, scale, cluster_links, cut, received)
         state.note()
         if state.residual < 0.9 * best:
             best, best_at = state.residual, state.iterations
@@ -260,7 +258,7 @@ def iterate(state: HierarchicalState, tolerance: float, last: bool = False) -> N
         # What a mixture guesses below the emission is no radiosity.
         state.radiosity[leaves] = np.maximum(mixer.next(before, state.radiosity[leaves]), least)
     if last:
-        _, after = reflect(state, links, lights, scale, cluster_links, top, received)
+        _, after = reflect(state, links, lights, scale, cluster_links, cut, received)
         state.residual = relative_residual(state, after)
         state.history[-1:] = [replace(entry, residual=state.residual) for entry in state.history[-1:]]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ...base import SILENT, Progress
 from ...numerics import Array
 from ...scene import Scene
 from ..equations import LinearSystem
@@ -38,6 +39,6 @@ def jacobi(system: LinearSystem, start: Array | None = None) -> Iterator[Iterate
         radiosity = radiosity + residual / diagonal
 
 
-def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float, SolverState]]:
-    """Solve step by step: yields (fraction done, state); the last state is the solution."""
-    yield from solve_matrix(scene, settings, jacobi, copies=2)
+def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -> SolverState:
+    """Solve; `progress` is shown the state."""
+    return solve_matrix(scene, settings, progress, jacobi, copies=2)

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from ...base import Progress
 from ...numerics import Array
 from ...scene import OVERLAP, Scene, arriving
 from ..equations import (
     LinearSystem,
-    collocation_steps,
+    collocation,
     describe_sets,
-    galerkin_steps,
+    galerkin,
     independent_sets,
-    linear_steps,
+    linear,
     matrix_properties,
     share_overlaps,
     subdivide_evenly,
@@ -33,7 +34,7 @@ Iterate = tuple[Array, Array]
 Solver = Callable[[LinearSystem], Iterator[Iterate]]
 """Yields one iterate after another, from iteration 0 on; ends when there is no better one."""
 
-ASSEMBLIES = {"galerkin": galerkin_steps, "collocation": collocation_steps, "linear": linear_steps}
+ASSEMBLIES = {"galerkin": galerkin, "collocation": collocation, "linear": linear}
 
 GIB = float(1 << 30)
 
@@ -69,22 +70,18 @@ class MatrixState(SolverState):
 
 
 def solve_matrix(
-    scene: Scene, settings: SolverSettings, solver: Solver, copies: int
-) -> Iterator[tuple[float, MatrixState]]:
+    scene: Scene, settings: SolverSettings, progress: Progress, solver: Solver, copies: int
+) -> MatrixState:
     """Assemble the system of a scene, solve it block by block, and set the state.
 
     Parameters
     ----------
+    progress : Progress
+        Is shown the state, the same one all along.
     solver : callable
         Iterates on one block.
     copies : int
         Matrices of n × n numbers that the method holds at once, the system's own included.
-
-    Yields
-    ------
-    fraction : float
-    state : MatrixState
-        The same one all along.
 
     Raises
     ------
@@ -92,10 +89,9 @@ def solve_matrix(
         If the system would need more than the memory limit; nothing is allocated then.
     """
     state = begin(scene, settings, MatrixState)
-    yield 0.0, state
+    progress.at(0.0, state)
     if not state.has_light:
-        yield 1.0, state
-        return
+        return state
     is_linear = settings.assembly == "linear"
     # With more faces than elements asked for the faces are the elements. A mesh of triangles
     # has half as many vertices at least.
@@ -107,9 +103,9 @@ def solve_matrix(
     basis = state.basis = vertex_basis(state.hierarchy) if is_linear else constant_basis(state.hierarchy)
     needed = check_memory(len(basis), copies + is_linear, settings, faces)
     state.reset()
-    yield 0.02, state
+    progress.at(0.02, state)
 
-    system, direct = yield from _assemble(state, basis)
+    system, direct = _assemble(state, basis, progress)
     opacity = state.hierarchy.opacity[basis.elements()]
     overlapping = np.count_nonzero(arriving(system.exchange, opacity) > OVERLAP * system.area)
     system, sends = share_overlaps(system, opacity)
@@ -121,10 +117,10 @@ def solve_matrix(
     blocks = [_Block(rows, system.take(rows), sends[rows, None]) for rows in sets]
     # A block by itself is a copy: the whole matrix need not outlive it.
     del system
-    yield ASSEMBLY_SHARE, state
-    yield from _solve_blocks(state, basis, blocks, solver)
+    progress.at(ASSEMBLY_SHARE, state)
+    _solve_blocks(state, basis, blocks, solver, progress.part(ASSEMBLY_SHARE, 1.0))
     _finish(state, basis, blocks, direct)
-    yield 1.0, state
+    return state
 
 
 def check_memory(unknowns: int, copies: int, settings: SolverSettings, faces: int) -> float:
@@ -147,19 +143,13 @@ def check_memory(unknowns: int, copies: int, settings: SolverSettings, faces: in
     return needed / GIB
 
 
-def _assemble(
-    state: MatrixState, basis: Basis
-) -> Generator[tuple[float, MatrixState], None, tuple[LinearSystem, Array]]:
-    """Assemble the system; yields progress, returns it with the lamps' (n, 3) irradiance in it."""
-    settings, hierarchy = state.settings, state.hierarchy
-    steps = ASSEMBLIES[settings.assembly](hierarchy, state.caster, basis, settings.seed, settings.threads)
-    while True:
-        try:
-            fraction = next(steps)
-        except StopIteration as done:
-            direct = _lamps(state, basis)
-            return with_lamps(done.value, direct), direct
-        yield 0.02 + (ASSEMBLY_SHARE - 0.02) * fraction, state
+def _assemble(state: MatrixState, basis: Basis, progress: Progress) -> tuple[LinearSystem, Array]:
+    """Return the system with the lamps' light in it, and that, (n, 3) [W/m²]."""
+    settings, assemble = state.settings, ASSEMBLIES[state.settings.assembly]
+    part = progress.part(0.02, ASSEMBLY_SHARE)
+    system = assemble(state.hierarchy, state.caster, basis, settings.seed, settings.threads, part)
+    direct = _lamps(state, basis)
+    return with_lamps(system, direct), direct
 
 
 def _lamps(state: MatrixState, basis: Basis) -> Array:
@@ -215,8 +205,8 @@ class _Block:
 
 
 def _solve_blocks(
-    state: MatrixState, basis: Basis, blocks: list[_Block], solver: Solver
-) -> Iterator[tuple[float, MatrixState]]:
+    state: MatrixState, basis: Basis, blocks: list[_Block], solver: Solver, progress: Progress
+) -> None:
     """Run the solver on all independent sets side by side until the residual is small enough."""
     settings = state.settings
     # Each block may keep its share of the residual allowed, by the light that starts in it.
@@ -234,8 +224,7 @@ def _solve_blocks(
         first = first or state.residual
         if not waiting or state.iterations >= settings.max_iterations:
             break
-        done = _progress(first, state.residual, settings.tolerance)
-        yield ASSEMBLY_SHARE + (1.0 - ASSEMBLY_SHARE) * done, state
+        progress.at(_converged(first, state.residual, settings.tolerance), state)
         state.iterations += 1
     state.details["matrix"]["converged"] = not waiting
 
@@ -260,7 +249,7 @@ def _finish(state: MatrixState, basis: Basis, blocks: list[_Block], direct: Arra
     state.set_leaves(means, np.maximum(basis.leaf_means(state.values), 0.0))
 
 
-def _progress(first: float, now: float, last: float) -> float:
+def _converged(first: float, now: float, last: float) -> float:
     """Return how far a residual has come from `first` to `last`, on the scale of its exponent."""
     if not 0.0 < last < first:
         return 0.0

@@ -17,11 +17,11 @@ latest 64 of 500 in the Cornell box 0.2 % were asked for again): that would be t
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from ...base import SILENT, Progress
 from ...numerics import Array
 from ...scene import Scene, arriving, shares
 from ..equations import exchange_areas, subdivide_evenly
@@ -99,8 +99,8 @@ class ShootingState(SolverState):
         return np.asarray(per_face / faces.area)
 
 
-def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float, ShootingState]]:
-    """Shoot until little power is unshot: yields (fraction done, state) after every shot.
+def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -> ShootingState:
+    """Shoot until little power is unshot; `progress` is shown the state after every shot.
 
     Ends when ΣAΔB / Φ is below `settings.tolerance` in every channel, or after
     `settings.max_iterations` shots. `state.residual` is ΣAΔB / Φ, the residual of S; that of
@@ -112,23 +112,22 @@ def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float,
         If even the elements alone would not fit into the memory limit.
     """
     state = begin(scene, settings, ShootingState)
-    yield 0.01, state
+    progress.at(0.01, state)
     if not state.has_light:
-        yield 1.0, state
-        return
+        return state
     refuse_too_many(len(state.hierarchy.faces), settings)
     subdivide_evenly(state.hierarchy, settings.elements)
     state.link_lights_to_leaves()
     start(state)
     state.note()
-    yield 0.05, state
+    progress.at(0.05, state)
     first, next_note = state.residual, 1.0
     while state.residual > settings.tolerance and state.iterations < settings.max_iterations:
         shoot(state)
         if state.iterations >= next_note:
             state.note()
             next_note *= HISTORY_STEP
-        yield 0.05 + 0.94 * _fraction(first, state), state
+        progress.at(0.05 + 0.94 * _fraction(first, state), state)
     if state.history[-1].iteration < state.iterations:
         state.note()
     state.details["shooting"] = {
@@ -136,7 +135,7 @@ def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float,
         "elements_that_shot": int((state.shots_of > 0).sum()),
         "pairs": state.pairs,
     }
-    yield 1.0, state
+    return state
 
 
 def start(state: ShootingState) -> None:

@@ -15,11 +15,11 @@ result is one gather from the patch solution, not the solution of the elements' 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from ...base import SILENT, Progress
 from ...numerics import Array
 from ...scene import Scene, arriving, shares
 from ..equations import exchange_areas, subdivide_evenly
@@ -71,8 +71,8 @@ class TwoLevelState(SolverState):
         return np.asarray(per_face / faces.area)
 
 
-def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float, TwoLevelState]]:
-    """Solve step by step: yields (fraction done, state); the last state is the solution.
+def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -> TwoLevelState:
+    """Solve; `progress` is shown the state.
 
     About `settings.patches` patches, at most one for each of about `settings.elements`
     elements. `state.residual` is that of the patches' system (4.2), with the form factors that
@@ -85,31 +85,26 @@ def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float,
         If the n × m matrix would not fit into the memory limit.
     """
     state = begin(scene, settings, TwoLevelState)
-    yield 0.01, state
+    progress.at(0.01, state)
     if not state.has_light:
-        yield 1.0, state
-        return
+        return state
     refuse_too_large(len(state.hierarchy.faces), settings)
     divide(state)
     state.link_lights_to_leaves()
-    yield 0.05, state
-    for done in add_rows(state, state.leaves):
-        yield 0.05 + 0.55 * done, state
+    progress.at(0.05, state)
+    add_rows(state, state.leaves, progress.part(0.05, 0.6))
     solve_patches(state)
     gather_elements(state)
     _start_comparing(state)
-    fraction = 0.62
-    yield fraction, state
+    progress.at(0.62, state)
+    rounds = progress.part(0.62, 1.0).turns(0.5)
     while len(new := split(state)):
-        # How many rounds will follow is not known: each takes half of what is left.
-        rest = 0.5 * (1.0 - fraction)
-        for done in add_rows(state, new):
-            yield fraction + rest * done, state
-        fraction += rest
+        part = next(rounds)
+        add_rows(state, new, part)
         gather_elements(state)
-        yield fraction, state
+        part.at(1.0, state)
     _finish(state)
-    yield 1.0, state
+    return state
 
 
 def divide(state: TwoLevelState) -> None:
@@ -124,8 +119,8 @@ def divide(state: TwoLevelState) -> None:
     state.details["two_level"] = {"patches": len(state.patches), "elements": [], "rows": []}
 
 
-def add_rows(state: TwoLevelState, new: Array) -> Iterator[float]:
-    """Compute the rows F_qj of elements `new`, the last of the leaves (step 2); yields the part done."""
+def add_rows(state: TwoLevelState, new: Array, progress: Progress = SILENT) -> None:
+    """Compute the rows F_qj of elements `new`, the last of the leaves (step 2)."""
     hierarchy, patches = state.hierarchy, state.patches
     state.leaves = hierarchy.leaves
     kept = len(state.leaves) - len(new)
@@ -142,7 +137,7 @@ def add_rows(state: TwoLevelState, new: Array) -> Iterator[float]:
         )
         to = kept + start + np.arange(len(block))
         state.factors[to] = exchange.reshape(len(block), -1) / hierarchy.area[block][:, None]
-        yield (start + len(block)) / len(new)
+        progress.at((start + len(block)) / len(new), state)
     state.details["two_level"]["elements"].append(len(state.leaves))
     state.details["two_level"]["rows"].append(len(new))
 

@@ -7,24 +7,27 @@ along its links, to start from and where nobody gathered.
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from dataclasses import replace
 
 import numpy as np
 
-from ...base import scaled
+from ...base import SILENT, Progress
 from ...numerics import Array, Scratch, tiles
 from ...solver.element_transport import Relightable
 from ...solver.gather import values_of
-from .sweeps import LitTexels, TexelLight, sweep_steps
+from .sweeps import LitTexels, TexelLight, sweep
 
 SOLVED = 0.3
 """How much is done when the hierarchy is solved; rough."""
 
 
-def relight_steps(
-    kept: LitTexels, solved: Relightable, strengths: Array, scratch: Scratch | None = None
-) -> Generator[float, None, TexelLight]:
+def relight_texels(
+    kept: LitTexels,
+    solved: Relightable,
+    strengths: Array,
+    scratch: Scratch | None = None,
+    progress: Progress = SILENT,
+) -> TexelLight:
     """Light texels by other strengths of the sources.
 
     Parameters
@@ -35,12 +38,8 @@ def relight_steps(
         See `LightSources.strengths` for units.
     scratch : Scratch or None
         Makes the texels' arrays; None keeps them in memory.
-
-    Yields
-    ------
-    fraction : float
     """
-    yield 0.0
+    progress.at(0.0)
     sources, local = solved.sources, solved.local
     given = sources.of_lamps(strengths)
     parts = kept.transport.parts
@@ -60,11 +59,11 @@ def relight_steps(
     else:
         first = known
     start, of_parts = first[: len(kept.element)], first[len(kept.element) :]
-    yield SOLVED
+    progress.at(SOLVED)
     transport = replace(kept.transport, parts=replace(parts, start=of_parts, links=links))
     lamps = kept.gains.irradiance(given)
     beyond = local.beyond(sources.sky(strengths))
-    swept = sweep_steps(
+    light = sweep(
         transport,
         start,
         lamps,
@@ -74,8 +73,8 @@ def relight_steps(
         threads=local.threads,
         estimate=False,
         scratch=scratch,
+        progress=progress.part(SOLVED, 1.0),
     )
-    light = yield from scaled(swept, SOLVED, 1.0)
     if known is None and light.table is not None:
         kept.earlier.add(strengths, light.table)
     return light
