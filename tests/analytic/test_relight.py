@@ -190,7 +190,7 @@ def test_groups_add_up_before_what_sweeps_leave_is_shared_out(room: KeptBake) ->
 def test_groups_that_cannot_be_are_refused() -> None:
     with pytest.raises(UsageError, match="there is no lamp, emissive material or world 'Moon'"):
         bake(lit_bake(), BakeSettings(resolution=16, quality="draft", groups=(("Night", ("Moon",)),)))
-    with pytest.raises(UsageError, match="'Sun' is there twice"):
+    with pytest.raises(UsageError, match="'Sun' is given twice"):
         BakeSettings(groups=(("Day", ("Sun",)), ("Noon", ("Sun",))))
     with pytest.raises(UsageError, match="shooting keeps no links"):
         BakeSettings(groups=(("Day", ("Sun",)),), method="shooting")
