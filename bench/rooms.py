@@ -12,7 +12,7 @@ from radiosity_addon.scene.bake_scene import BakeObject, BakeScene
 from radiosity_addon.solver import Scene, solve
 from tests.rooms import box_room
 
-from .measure import Stopwatch, solver_figures, watched_bake
+from .recording import Stopwatch, solver_figures, watched_bake
 
 SIZE, BLOCK_SIZE, BLOCK_AT = (5.0, 4.0, 3.0), (1.2, 1.0, 0.9), (1.3, 1.5, 0.4)
 POWER = 400.0
@@ -66,7 +66,7 @@ def solve_room(triangles: int, settings: BakeSettings) -> dict[str, Any]:
     with watch.running():
         solution = solve(scene, quality_of(settings).solver)
         report = solution.report
-    leaves = len(solution.local_pass.hierarchy.leaves)
+    leaves = len(solution.local_pass.elements.hierarchy.leaves)
     return {"triangles": len(scene), **watch.figures, **solver_figures(report, leaves)}
 
 

@@ -117,7 +117,7 @@ def _bake(
 ) -> tuple[BakeResult, KeptBake | None]:
     """Bake, and keep what lights the scene anew if asked to."""
     if keep and settings.quantity == "residual":
-        raise UsageError("a residual is of all light together: bake another quantity to light it anew")
+        raise UsageError("a residual is of all light together: bake another quantity to relight it")
     if are_wanted(bake_scene, settings):
         check_groups(bake_scene, settings)
     seconds: dict[str, float] = {}

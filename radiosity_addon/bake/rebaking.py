@@ -54,7 +54,7 @@ def bake_moved(
     seconds: dict[str, float] = {}
     names = moved_objects(kept, bake_scene)
     if not names:
-        raise SceneError("nothing has moved since the last bake; there is nothing to bake anew")
+        raise SceneError("nothing has moved since the last bake; there is nothing to update")
     moved = [item for item in bake_scene.objects if item.name in names]
     moves, settings = kept.moves, kept.settings
     assert moves is not None  # or `moved_objects` refuses

@@ -172,9 +172,9 @@ def _near_pairs(low: Array, high: Array) -> Iterator[tuple[Array, Array]]:
         count = np.searchsorted(key[hosts], key, side="right") - begin
         asked = np.flatnonzero(count)
         for chunk in run_chunks(count[asked], CHUNK_PAIRS):
-            some = asked[chunk]
-            small = np.repeat(some, count[some])
-            large = hosts[run_numbers(count[some], begin[some])]
+            chunk_rows = asked[chunk]
+            small = np.repeat(chunk_rows, count[chunk_rows])
+            large = hosts[run_numbers(count[chunk_rows], begin[chunk_rows])]
             one, other = asking[row[small]], asking[row[large]]
             keep = np.flatnonzero((level[one] > at) | (one < other))
             for axis in range(3):

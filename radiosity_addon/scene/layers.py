@@ -195,7 +195,7 @@ def _contacts(scene: Surfaces, pairs: CoincidentPairs, tolerance: Array) -> tupl
     if len(rows) == 0:
         return contact, _no_covers()
     caster = EmbreeCaster(scene.triangles, only=scene.in_bounces)
-    sides, others, parts, theirs = [], [], [], []
+    sides, others, parts, in_others = [], [], [], []
     for triangle, other, part, in_other in (
         (pairs.first, pairs.second, pairs.in_first, pairs.in_second),
         (pairs.second, pairs.first, pairs.in_second, pairs.in_first),
@@ -205,8 +205,8 @@ def _contacts(scene: Surfaces, pairs: CoincidentPairs, tolerance: Array) -> tupl
         sides.append(2 * triangle[behind])
         others.append(2 * other[behind])
         parts.append(part[behind])
-        theirs.append(in_other[behind])
-    joined = Covers(*(np.concatenate(each) for each in (sides, others, parts, theirs)))
+        in_others.append(in_other[behind])
+    joined = Covers(*(np.concatenate(each) for each in (sides, others, parts, in_others)))
     return contact, _sorted([joined])
 
 
@@ -254,7 +254,7 @@ def _covers(
         rows = np.flatnonzero(exists)
         one, other = 2 * first[rows] + one_is_back[rows], 2 * second[rows] + other_is_back[rows]
         won = wins[rows]
-        mine, theirs = pairs.in_first[rows], pairs.in_second[rows]
+        in_first, in_second = pairs.in_first[rows], pairs.in_second[rows]
         # The same corner by corner, in either orientation of the cover.
         turn = ~pairs.same[rows, None, None]
         which = won[:, None, None]
@@ -262,8 +262,12 @@ def _covers(
             Covers(
                 np.where(won, other, one),
                 np.where(won, one, other),
-                np.where(which, theirs, mine),
-                np.where(which, np.where(turn, mine[:, ::-1], mine), np.where(turn, theirs[:, ::-1], theirs)),
+                np.where(which, in_second, in_first),
+                np.where(
+                    which,
+                    np.where(turn, in_first[:, ::-1], in_first),
+                    np.where(turn, in_second[:, ::-1], in_second),
+                ),
             )
         )
     return _sorted(found)

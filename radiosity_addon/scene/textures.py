@@ -119,10 +119,10 @@ class SurfaceImages:
             rows = np.flatnonzero(depth == levels)
             step = max(CHUNK_SAMPLES // len(inside), 1)
             for first in range(0, len(rows), step):
-                some = rows[first : first + step]
-                points = np.einsum("sc,nck->nsk", inside, place[some]).reshape(-1, 2)
-                found = _nearest(self._weighed, points).reshape(len(some), len(inside), CHANNELS)
-                means[some] = found.mean(axis=1, dtype=np.float64)
+                chunk = rows[first : first + step]
+                points = np.einsum("sc,nck->nsk", inside, place[chunk]).reshape(-1, 2)
+                found = _nearest(self._weighed, points).reshape(len(chunk), len(inside), CHANNELS)
+                means[chunk] = found.mean(axis=1, dtype=np.float64)
         return means
 
     def _place(self, triangle: Array, barycentric: Array) -> Array:

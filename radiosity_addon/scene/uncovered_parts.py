@@ -89,9 +89,9 @@ class OwnParts:
         covered = np.flatnonzero(np.isin(side, self.sides))
         begin, count = self._runs(side[covered])
         result[covered] = 0.0
-        for some in run_chunks(count, CHUNK_PAIRS):
-            row = np.repeat(covered[some], count[some])
-            part = run_numbers(count[some], begin[some])
+        for chunk in run_chunks(count, CHUNK_PAIRS):
+            row = np.repeat(covered[chunk], count[chunk])
+            part = run_numbers(count[chunk], begin[chunk])
             common = _clipped(self.corners[part], corners[row])
             result += np.bincount(row, areas(common) * self.level[part], minlength=len(side))
         result[covered] /= np.maximum(areas(corners[covered]), 1e-300)
@@ -134,8 +134,12 @@ def own_parts(side: Array, part: Array, by: Array, in_cover: Array, scene: Surfa
         seen_through = np.flatnonzero(cut[by[chosen] // 2])
         if len(seen_through):
             row, each = _fans(inner[seen_through])
-            of, one = asked[seen_through[row]], chosen[seen_through[row]]
-            pieces.append(_shining_through(own[of], each, level[of], one, part, in_cover, by, scene))
+            piece_row, piece_cover = asked[seen_through[row]], chosen[seen_through[row]]
+            pieces.append(
+                _shining_through(
+                    own[piece_row], each, level[piece_row], piece_cover, part, in_cover, by, scene
+                )
+            )
         own, corners, level = (np.concatenate(values) for values in zip(*pieces, strict=True))
     kept = (level > NOTHING_LEFT) & (areas(corners) > NOTHING_LEFT)
     rows = np.flatnonzero(kept)
@@ -201,8 +205,8 @@ def _shining_through(
             break
         own, cover, level = (np.repeat(values[open_], 4) for values in (own, cover, level))
         corners = split_in_four(corners[open_]).reshape(-1, 3, 2)
-    one, other, third = (np.concatenate(values) for values in zip(*done, strict=True))
-    return one, other, third
+    all_own, all_corners, all_levels = (np.concatenate(values) for values in zip(*done, strict=True))
+    return all_own, all_corners, all_levels
 
 
 def _moved(points: Array, part: Array, in_cover: Array) -> Array:

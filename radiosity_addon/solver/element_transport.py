@@ -63,8 +63,8 @@ class ElementTransport:
         """
         if not isinstance(state, HierarchicalState):
             raise UsageError(
-                f"the {state.settings.method} method keeps no links to light anew by; "
-                "bake by the hierarchical method"
+                f"the {state.settings.method} method keeps no links for relighting; "
+                "use the hierarchical method"
             )
         hierarchy, settings = state.hierarchy, state.settings
         # Lamps that were dark have no links yet; elements stay as they are for them.
@@ -133,4 +133,4 @@ class Relightable:
     def of(state: SolverState, emitter: Array | None = None) -> Relightable:
         """Keep a state; `emitter` as for `LightSources`, errors as of `ElementTransport.of`."""
         sources = LightSources(state.scene, state.hierarchy.faces, state.caster, emitter)
-        return Relightable(sources, ElementTransport.of(state, sources), LocalPass(state, sources))
+        return Relightable(sources, ElementTransport.of(state, sources), LocalPass.of(state, sources))

@@ -369,7 +369,7 @@ def test_the_memory_limit_counts_faces_and_is_exact() -> None:
     assert solved(scene, elements=1, memory_limit=needed).details["matrix"]["memory_GiB"] == needed
     with pytest.raises(UsageError, match=r"108 unknowns .* GiB: take the method hierarchical"):
         solved(scene, elements=1, memory_limit=0.999 * needed)
-    with pytest.raises(UsageError, match="ask for fewer elements"):
+    with pytest.raises(UsageError, match="use fewer elements"):
         solved(scene, elements=432, memory_limit=needed)
 
 

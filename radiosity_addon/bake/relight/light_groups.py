@@ -59,7 +59,7 @@ def check_groups(bake_scene: BakeScene, settings: BakeSettings) -> None:
     found = {group_of(name, own, settings) for name, own in zip(names, given, strict=True)}
     if len(found) > MAX_GROUPS:
         raise UsageError(
-            f"{len(found)} light groups are more than the {MAX_GROUPS} that materials can mix: join some"
+            f"{len(found)} light groups are more than the {MAX_GROUPS} that materials can mix: merge some"
         )
 
 

@@ -42,8 +42,8 @@ def _side_by_side(uv: Float, chart: Int) -> tuple[NDArray[np.float32], int]:
     np.minimum.at(low, chart, uv.min(axis=1))
     np.maximum.at(high, chart, uv.max(axis=1))
     extent = high - low
-    wanted = float(np.clip(256 * len(uv), 2**14, 2**21))
-    scale = np.sqrt(wanted / max(float(extent.prod(axis=1).sum()), 1e-30))
+    texels_in_all = float(np.clip(256 * len(uv), 2**14, 2**21))
+    scale = np.sqrt(texels_in_all / max(float(extent.prod(axis=1).sum()), 1e-30))
     scale = min(scale, 2048 / max(float(extent.max()), 1e-30))
     size = np.ceil(extent * scale).astype(np.int64) + 1
     width = max(int(np.sqrt(size.prod(axis=1).sum())), int(size[:, 0].max()))

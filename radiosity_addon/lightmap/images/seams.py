@@ -188,7 +188,7 @@ def _open(geometry: TexelGeometry, caster: RayCaster, numbers: Array, weight: Ar
     ends = np.take_along_axis(numbers, best[:, :, None], axis=2)[..., 0]
     at, normal, facet = geometry.position[ends], geometry.normal[ends], geometry.surface_normal[ends]
     length = np.linalg.norm(at[:, 1] - at[:, 0], axis=1)
-    turn = np.minimum(*(np.einsum("sk,sk->s", of[:, 0], of[:, 1]) for of in (normal, facet)))
+    turn = np.minimum(*(np.einsum("sk,sk->s", normals[:, 0], normals[:, 1]) for normals in (normal, facet)))
     lift = SIGHT_LIFT * caster.surface_offset + SAGITTA * length * np.sqrt(np.maximum(1.0 - turn, 0.0))
     at = at + lift[:, None, None] * normal
     along = at[:, 1] - at[:, 0]

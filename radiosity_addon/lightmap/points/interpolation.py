@@ -97,24 +97,24 @@ class GatherPoints:
     def kernel(self, texels: Array, point: Array) -> Array:
         """Return (p,) weights in [0, 1] of gather points for texels (p,), pair by pair; 0 out of reach."""
         geometry = self._geometry
-        of = self.texel.take(point)
-        along = geometry.position.take(of, axis=0) - geometry.position.take(texels, axis=0)
+        points_texel = self.texel.take(point)
+        along = geometry.position.take(points_texel, axis=0) - geometry.position.take(texels, axis=0)
         distance = np.sqrt(np.einsum("pk,pk->p", along, along))
         closeness = np.maximum(self.closeness.take(point), self._own_closeness(texels))
         change = distance * closeness
         # A texel that geometry cuts in two, or hoods, speaks for itself alone, and nobody for it.
-        apart = self._alone.take(of) | self._alone.take(texels)
-        weight = np.where(of == texels, np.maximum(1.0 - change / REACH, 0.0) ** 2, 0.0)
-        row = np.flatnonzero((of != texels) & (change < REACH) & ~apart)
-        start, end = texels.take(row), of.take(row)
-        normal, other = geometry.normal.take(start, axis=0), geometry.normal.take(end, axis=0)
-        bend = np.sqrt(np.maximum(1.0 - np.einsum("pk,pk->p", normal, other), 0.0))
+        apart = self._alone.take(points_texel) | self._alone.take(texels)
+        weight = np.where(points_texel == texels, np.maximum(1.0 - change / REACH, 0.0) ** 2, 0.0)
+        row = np.flatnonzero((points_texel != texels) & (change < REACH) & ~apart)
+        start, end = texels.take(row), points_texel.take(row)
+        normal, end_normal = geometry.normal.take(start, axis=0), geometry.normal.take(end, axis=0)
+        bend = np.sqrt(np.maximum(1.0 - np.einsum("pk,pk->p", normal, end_normal), 0.0))
         spoken = np.maximum(1.0 - (change[row] + bend) / REACH, 0.0) ** 2
         # Over a bulge the straight line dips below the surface, by an eighth of the distance
         # times the turn of the normal: start and end that much higher.
         lift = SIGHT_LIFT * self._caster.surface_offset + SAGITTA * distance[row] * bend
         begin = geometry.position.take(start, axis=0) + lift[:, None] * normal
-        directions = along.take(row, axis=0) + lift[:, None] * (other - normal)
+        directions = along.take(row, axis=0) + lift[:, None] * (end_normal - normal)
         length = np.sqrt(np.einsum("pk,pk->p", directions, directions))
         directions /= np.maximum(length, 1e-300)[:, None]
         heard = spoken > 0
@@ -138,8 +138,10 @@ class GatherPoints:
         farthest = 1.0 / np.maximum(self.closeness[point], 1e-300) + np.linalg.norm(along, axis=1)
         first = np.flatnonzero(np.diff(texels, prepend=-1))
         if len(first):
-            some = texels[first]
-            self.farthest[some] = np.minimum(self.farthest[some], np.minimum.reduceat(farthest, first))
+            these_texels = texels[first]
+            self.farthest[these_texels] = np.minimum(
+                self.farthest[these_texels], np.minimum.reduceat(farthest, first)
+            )
 
     def support(self, texels: Array, progress: Progress = SILENT) -> Array:
         """Return (n,) the summed weights around texels: below 1 they need a point of their own.

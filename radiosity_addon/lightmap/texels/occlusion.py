@@ -68,8 +68,8 @@ class Crossings:
         """(n,) uint8: see `TEXEL_STATES`."""
         state = np.zeros(len(self.cut), dtype=np.uint8)
         # The last one that holds counts.
-        for of, value in ((self.touched, TOUCHED), (self.occluded, OCCLUDED), (self.crossed, DIVIDED)):
-            state[of] = value
+        for flags, value in ((self.touched, TOUCHED), (self.occluded, OCCLUDED), (self.crossed, DIVIDED)):
+            state[flags] = value
         return state
 
     @cached_property
@@ -118,8 +118,10 @@ def find_crossings(
         from_centre = corners - centre
         cut = ~_segments_free(caster, centre + INSET * from_centre, _EDGES)
         doubtful = ~_segments_free(caster, middle + OUTSET * (square - middle), _DIAGONALS) & ~cut
-        some = np.flatnonzero(doubtful)
-        cut[some] = ~_segments_free(caster, centre[some] + INSET * from_centre[some], _DIAGONALS)
+        uncertain = np.flatnonzero(doubtful)
+        cut[uncertain] = ~_segments_free(
+            caster, centre[uncertain] + INSET * from_centre[uncertain], _DIAGONALS
+        )
         spots = geometry.sample(rows, np.broadcast_to(_SPOTS, (len(rows), *_SPOTS.shape)), 1.0)
         below = below_hood(geometry, caster, rows, spots)
         result.rim[rows] = below.any(axis=1) & ~below.all(axis=1)

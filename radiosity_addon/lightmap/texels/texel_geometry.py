@@ -150,8 +150,8 @@ class TexelGeometry:
         """(t,) int64: how many texels each triangle has."""
         found = np.zeros(len(self.triangles), dtype=np.int64)
         for tile in tiles(len(self)):
-            some, count = np.unique(self.triangle[tile], return_counts=True)
-            found[some] += count
+            triangles, count = np.unique(self.triangle[tile], return_counts=True)
+            found[triangles] += count
         return found
 
     @cached_property
@@ -233,12 +233,12 @@ class TexelGeometry:
         """Return (r, k, 3) the barycentric weights of the same points in the texels' triangles."""
         weights = np.empty((len(rows), u.shape[1], 3))
         for number, page in enumerate(self.texels):
-            mine = np.flatnonzero(self.page[rows] == number)
-            if len(mine) == 0:
+            on_page = np.flatnonzero(self.page[rows] == number)
+            if len(on_page) == 0:
                 continue
-            local = rows[mine] - self.page_start[number]
-            inside = sample_footprints(page.take(local), u[mine], width)
-            weights[mine] = self._drawn_in(inside, self.triangle[rows[mine]])
+            local = rows[on_page] - self.page_start[number]
+            inside = sample_footprints(page.take(local), u[on_page], width)
+            weights[on_page] = self._drawn_in(inside, self.triangle[rows[on_page]])
         return weights
 
     def _drawn_in(self, weights: Array, triangle: Array) -> Array:
@@ -251,9 +251,9 @@ class TexelGeometry:
         """Grow a (n,) mask of texels by one texel in all eight directions of their page."""
         grown = np.empty(len(self), dtype=bool)
         for page, (numbers, inside) in enumerate(zip(self.index, self._framed, strict=True)):
-            mine = slice(self.page_start[page], self.page_start[page + 1])
+            on_page = slice(self.page_start[page], self.page_start[page + 1])
             image = np.zeros((len(numbers) + 2, numbers.shape[1] + 2), dtype=bool)
-            flat, own, result = image.ravel(), chosen[mine], grown[mine]
+            flat, own, result = image.ravel(), chosen[on_page], grown[on_page]
             for tile in tiles(len(inside)):
                 flat[inside[tile]] = own[tile]
             image[1:-1] = image[1:-1] | image[:-2] | image[2:]
@@ -289,11 +289,11 @@ class TexelGeometry:
         row = place[:, 1] + second * place[:, 3] + third * place[:, 5]
         page = self.page_of_triangle[triangle] if len(self.index) > 1 else None
         for number, numbers in enumerate(self.index):
-            mine = slice(None) if page is None else np.flatnonzero(page == number)
+            on_page = slice(None) if page is None else np.flatnonzero(page == number)
             last = np.float32(len(numbers) - 1)
-            at = np.clip(row[mine], 0, last).astype(np.int64) * len(numbers)
-            at += np.clip(column[mine], 0, last).astype(np.int64)
-            found[rows[mine]] = numbers.ravel()[at]
+            at = np.clip(row[on_page], 0, last).astype(np.int64) * len(numbers)
+            at += np.clip(column[on_page], 0, last).astype(np.int64)
+            found[rows[on_page]] = numbers.ravel()[at]
         return found
 
     @cached_property

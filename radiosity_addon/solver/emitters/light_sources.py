@@ -94,7 +94,7 @@ class LightSources:
         unknown = ~self.single[:, None] & (self.strengths[lights:] == 0) & (wanted[lights:] > 0)
         if unknown.any():
             raise SceneError(
-                "an emission of several colours cannot be given a channel that it did not have; bake again"
+                "an emission of several colors cannot be given a channel that it did not have; bake again"
             )
         return wanted
 

@@ -1,4 +1,4 @@
-"""Making the linear system: Galerkin or collocation, constant or linear elements (handout §3.2, §3.3).
+"""Assembly of the linear system: Galerkin or collocation, constant or linear elements (handout §3.2, §3.3).
 
 | assembly | K_ij | source |
 |---|---|---|
@@ -32,7 +32,7 @@ BLOCK_PAIRS = 1 << 18
 """Pairs between two reports of progress, about half a second's work; their numbers take 4 MB."""
 
 CHUNK_PAIRS = 1 << 16
-"""Pairs of a point and an element that one thread looks at together; about 60 MB."""
+"""Pairs of a point and an element that one thread processes together; about 60 MB."""
 
 FACING = 1e-13
 """A face rises over another's plane if by more than this part of the scene's extent."""
@@ -50,10 +50,7 @@ def galerkin(
 
     Reciprocal: T_ij = A_i F_ij V_ij is computed once for each pair.
 
-    Parameters
-    ----------
-    basis : Basis or None
-        From `constant_basis`, which None calls.
+    basis: From `constant_basis`, which None calls.
     """
     basis = basis or constant_basis(hierarchy)
     count = len(basis)
@@ -105,10 +102,7 @@ def linear(
 ) -> LinearSystem:
     """Assemble K_ij = N_j(x_i) − ρ_i ∫ N_j κ V dA with hats N_j at the leaves' vertices (3.9).
 
-    Parameters
-    ----------
-    basis : Basis or None
-        From `vertex_basis`, which None calls; needed again to evaluate the solution.
+    basis: From `vertex_basis`, which None calls; needed again to evaluate the solution.
     """
     basis = basis or vertex_basis(hierarchy)
     exchange, area, corner = np.zeros((len(basis), len(basis))), basis.area, basis.corner
@@ -133,17 +127,9 @@ def share_overlaps(system: LinearSystem, opacity: Array) -> tuple[LinearSystem, 
     that is the same system with s ρ for ρ and s E for E, so T stays as it is, and symmetric.
     Of others every row, what an element *receives*, is scaled in place.
 
-    Parameters
-    ----------
-    opacity : (n,) float64
-        Of each unknown's surface: what is not there takes no light.
-
-    Returns
-    -------
-    system : LinearSystem
-        Of the unknowns C.
-    sends : (n,) float64
-        s: B = C / s. 1 throughout where the rows were scaled, and where nothing overlaps.
+    opacity (n,): Of each unknown's surface: what is not there takes no light.
+    Returns system: Of the unknowns C.
+    Returns sends (n,): s: B = C / s. 1 throughout where the rows were scaled, and where nothing overlaps.
     """
     share = shares(arriving(system.exchange, opacity) / system.area)
     if system.reciprocal:
@@ -218,7 +204,7 @@ def _facing(faces: Faces, one: Array, other: Array) -> Array:
 
 
 def _rise(faces: Faces, base: Array, of: Array) -> Array:
-    """Return (b, o) how far the highest corner of faces `of` rises over the planes of faces `base`."""
+    """Return (b, o) the height of the highest corner of faces `of` over the planes of faces `base`."""
     normal = faces.normal[base]
     ground = np.einsum("bk,bk->b", normal, faces.corners[base, 0])
     height = normal @ faces.corners[of].reshape(-1, 3).T

@@ -30,9 +30,9 @@ def independent_sets(system: LinearSystem) -> tuple[list[Array], Array]:
     for first in range(count):
         if not unseen[first]:
             continue
-        found = _reach(system, first, unseen)
-        if len(found) > 1:
-            sets.append(found)
+        reached = _reach(system, first, unseen)
+        if len(reached) > 1:
+            sets.append(reached)
         else:
             alone.append(first)
     return sets, np.array(alone, dtype=np.int64)
@@ -41,15 +41,15 @@ def independent_sets(system: LinearSystem) -> tuple[list[Array], Array]:
 def _reach(system: LinearSystem, first: int, unseen: Array) -> Array:
     """Return the sorted rows joined to `first` by any path, and remove them from `unseen`."""
     unseen[first] = False
-    frontier, found = np.array([first]), [first]
+    frontier, reached = np.array([first]), [first]
     while len(frontier):
         near = np.zeros(len(system), dtype=bool)
         for start in range(0, len(frontier), CHUNK_ROWS):
             near |= _neighbours(system, frontier[start : start + CHUNK_ROWS])
         frontier = np.flatnonzero(near & unseen)
         unseen[frontier] = False
-        found.extend(frontier.tolist())
-    return np.sort(np.array(found))
+        reached.extend(frontier.tolist())
+    return np.sort(np.array(reached))
 
 
 def _neighbours(system: LinearSystem, rows: Array) -> Array:

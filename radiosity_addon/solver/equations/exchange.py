@@ -38,9 +38,9 @@ def exchange_areas(
     def measure(rows: slice) -> None:
         factor = element_factors(hierarchy, receiver[rows], source[rows])
         seen = np.flatnonzero(factor > 0)
-        to, of = receiver[rows][seen], source[rows][seen]
-        visibility = pair_visibility(hierarchy, caster, to, hierarchy.n_clusters + of, seed)
-        exchange[rows.start + seen] = hierarchy.area[to] * factor[seen] * visibility
+        receiving, sending = receiver[rows][seen], source[rows][seen]
+        visibility = pair_visibility(hierarchy, caster, receiving, hierarchy.n_clusters + sending, seed)
+        exchange[rows.start + seen] = hierarchy.area[receiving] * factor[seen] * visibility
 
     for_chunks(measure, len(one), CHUNK, threads)
     return exchange

@@ -40,16 +40,18 @@ def source_factor_bounds(hierarchy: Hierarchy, receiver: Array, source: Array) -
 
 
 def _chunk_bounds(hierarchy: Hierarchy, receiver: Array, source: Array) -> Array:
-    to, of = hierarchy.corners[receiver], hierarchy.corners[source]
-    centre_to, centre_of = to.mean(axis=1), of.mean(axis=1)
-    sizes = _radius(to, centre_to) + _radius(of, centre_of)
-    over_to = np.einsum("nck,nk->nc", of - centre_to[:, None], hierarchy.normal[receiver])
-    over_of = np.einsum("nck,nk->nc", to - centre_of[:, None], hierarchy.normal[source])
+    receiver_corners, source_corners = hierarchy.corners[receiver], hierarchy.corners[source]
+    centre_to, centre_of = receiver_corners.mean(axis=1), source_corners.mean(axis=1)
+    sizes = _radius(receiver_corners, centre_to) + _radius(source_corners, centre_of)
+    over_to = np.einsum("nck,nk->nc", source_corners - centre_to[:, None], hierarchy.normal[receiver])
+    over_of = np.einsum("nck,nk->nc", receiver_corners - centre_of[:, None], hierarchy.normal[source])
     rise_to, rise_of = over_to.max(axis=1), over_of.max(axis=1)
     mutual = (rise_to > COPLANAR * sizes) & (rise_of > COPLANAR * sizes)
 
     apart = np.linalg.norm(centre_of - centre_to, axis=1) - sizes
-    nearest = np.maximum.reduce([apart, over_to.min(axis=1), over_of.min(axis=1), np.zeros(len(to))])
+    nearest = np.maximum.reduce(
+        [apart, over_to.min(axis=1), over_of.min(axis=1), np.zeros(len(receiver_corners))]
+    )
     area_to, area_of = hierarchy.area[receiver], hierarchy.area[source]
     # cosθ = height / distance, for the nearest possible points.
     heights = np.minimum(rise_to, nearest) * np.minimum(rise_of, nearest)

@@ -63,10 +63,10 @@ def _across_edges(hierarchy: Hierarchy, node: Array, position: Array) -> tuple[A
     Returns at_crease (nodes,) bool: Whether it lies on an edge of its face that is not smooth.
     """
     count = int(node.max(initial=-1)) + 1
-    some = np.zeros(count, dtype=np.int64)
-    some[node] = np.arange(len(node))
-    leaf, face = hierarchy.leaves[some // 3], hierarchy.face[hierarchy.leaves[some // 3]]
-    vertices = hierarchy.corners[leaf, some % 3]
+    any_row = np.zeros(count, dtype=np.int64)
+    any_row[node] = np.arange(len(node))
+    leaf, face = hierarchy.leaves[any_row // 3], hierarchy.face[hierarchy.leaves[any_row // 3]]
+    vertices = hierarchy.corners[leaf, any_row % 3]
     weights = weights_at(hierarchy.faces.corners[face], vertices[:, None])[:, 0]
     edge, smooth = _smooth_edges(hierarchy.faces)
 
@@ -77,7 +77,7 @@ def _across_edges(hierarchy: Hierarchy, node: Array, position: Array) -> tuple[A
         side = (opposite + 1) % 3
         at_crease[on_edge] |= ~smooth[face[on_edge], side]
         shared = on_edge[smooth[face[on_edge], side]]
-        keys.append(np.stack([edge[face[shared], side], position[some[shared]]], axis=1))
+        keys.append(np.stack([edge[face[shared], side], position[any_row[shared]]], axis=1))
         nodes.append(shared)
     key, rows = numbered(np.concatenate(keys)), np.concatenate(nodes)
     order = np.argsort(key, kind="stable")

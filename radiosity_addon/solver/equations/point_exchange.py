@@ -82,9 +82,9 @@ def corner_factors(points: Array, normals: Array, corners: Array, source_normals
         rows = np.flatnonzero((ratio >= nearest) & (ratio < farthest))
         step = max(CHUNK_PARTS // 4**generations, 1)
         for start in range(0, len(rows), step):
-            some = rows[start : start + step]
-            factors[some] = _split_factors(
-                points[some], normals[some], corners[some], source_normals[some], generations
+            chunk = rows[start : start + step]
+            factors[chunk] = _split_factors(
+                points[chunk], normals[chunk], corners[chunk], source_normals[chunk], generations
             )
         nearest = farthest
     return factors

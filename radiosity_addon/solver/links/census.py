@@ -37,8 +37,8 @@ def links_by_level(hierarchy: Hierarchy, receiver: Array, source: Array) -> list
     levels = np.stack([hierarchy.level[receiver], of_node[source]], axis=1)
     pairs, counts = np.unique(levels.reshape(-1, 2), axis=0, return_counts=True)
     return [
-        {"receiver_level": int(to), "source_level": int(of), "links": int(count)}
-        for (to, of), count in zip(pairs, counts, strict=True)
+        {"receiver_level": int(receiver_level), "source_level": int(source_level), "links": int(count)}
+        for (receiver_level, source_level), count in zip(pairs, counts, strict=True)
     ]
 
 

@@ -72,8 +72,8 @@ def measure_cluster_links(
             samples: int = samples,
             parts: dict[int, ClusterLinks] = parts,
         ) -> None:
-            of = rows[piece]
-            pairs = _ClusterPairs(hierarchy, receiver[of], source[of], samples, seed)
+            chosen_pairs = rows[piece]
+            pairs = _ClusterPairs(hierarchy, receiver[chosen_pairs], source[chosen_pairs], samples, seed)
             parts[piece.start] = pairs.links(caster, kind)
 
         for_chunks(measure, len(rows), CHUNK_SAMPLES // samples, threads)

@@ -90,11 +90,13 @@ def first_links(
         if pairs is not None:
             break
         limits = limits.looser()
-    count, (to, of) = hierarchy.n_clusters, pairs
-    single = to >= count
+    count, (receiver, source) = hierarchy.n_clusters, pairs
+    single = receiver >= count
     seed, threads = settings.seed, settings.threads
-    to_faces = measure_links(hierarchy, caster, to[single] - count, of[single], seed, threads)
-    to_clusters = measure_cluster_links(hierarchy, shapes, caster, to[~single], of[~single], seed, threads)
+    to_faces = measure_links(hierarchy, caster, receiver[single] - count, source[single], seed, threads)
+    to_clusters = measure_cluster_links(
+        hierarchy, shapes, caster, receiver[~single], source[~single], seed, threads
+    )
     return to_faces.sorted_by_receiver(), to_clusters, limits.faint
 
 
@@ -118,7 +120,7 @@ def _first_pairs(
 ) -> tuple[Array, Array] | None:
     """Return the (n,) receivers and sources of the initial links; None if there are more than `most`."""
     waiting = [_root_pairs(hierarchy)]
-    to, of, found = [], [], 0
+    receivers, sources, found = [], [], 0
     while waiting:
         # The latest first, block by block: what waits never grows to a whole generation.
         receiver, source = waiting.pop()
@@ -126,14 +128,14 @@ def _first_pairs(
             waiting.append((receiver[BLOCK:], source[BLOCK:]))
             receiver, source = receiver[:BLOCK], source[:BLOCK]
         ready, opened = _judge(hierarchy, shapes, receiver, source, limits)
-        to.append(ready[0].astype(np.int32))
-        of.append(ready[1].astype(np.int32))
+        receivers.append(ready[0].astype(np.int32))
+        sources.append(ready[1].astype(np.int32))
         found += len(ready[0])
         if found > most:
             return None
         if len(opened[0]):
             waiting.append(opened)
-    return np.concatenate(to), np.concatenate(of)
+    return np.concatenate(receivers), np.concatenate(sources)
 
 
 def _estimate(hierarchy: Hierarchy, shapes: NodeShapes, limits: _Limits) -> float:

@@ -176,9 +176,11 @@ class PairSamples:
 
     def by_quarter(self, values: Array) -> tuple[Array, Array]:
         """Average (n, 16) values over each of the receiver's and the source's quarters: two (n, 4)."""
-        to = values.reshape(-1, 4, 4).mean(axis=1)
-        of = [np.where(self._source_quarter == q, values, 0.0).sum(axis=1) / 4.0 for q in range(4)]
-        return to, np.stack(of, axis=1)
+        by_receiver_quarter = values.reshape(-1, 4, 4).mean(axis=1)
+        by_source_quarter = [
+            np.where(self._source_quarter == q, values, 0.0).sum(axis=1) / 4.0 for q in range(4)
+        ]
+        return by_receiver_quarter, np.stack(by_source_quarter, axis=1)
 
 
 def sample_clusters(hierarchy: Hierarchy, cluster: Array, share: Array) -> Array:
@@ -195,28 +197,32 @@ def element_factors(hierarchy: Hierarchy, receiver: Array, source: Array) -> Arr
     0 where either lies behind the other. Near pairs are exact, the others Lambert's formula,
     clipped to the receiver's horizon, averaged over the receiver by a cubature rule.
     """
-    to, of = hierarchy.corners[receiver], hierarchy.corners[source]
-    normal_to, normal_of = (hierarchy.faces.normal[hierarchy.face[of]] for of in (receiver, source))
-    centre_to, centre_of = to.mean(axis=1), of.mean(axis=1)
-    radius_to = np.linalg.norm(to - centre_to[:, None], axis=2).max(axis=1)
-    radius_of = np.linalg.norm(of - centre_of[:, None], axis=2).max(axis=1)
-    sizes = radius_to + radius_of
+    receiver_corners, source_corners = hierarchy.corners[receiver], hierarchy.corners[source]
+    receiver_normal, source_normal = (
+        hierarchy.faces.normal[hierarchy.face[source_corners]] for source_corners in (receiver, source)
+    )
+    receiver_center, source_center = receiver_corners.mean(axis=1), source_corners.mean(axis=1)
+    receiver_radius = np.linalg.norm(receiver_corners - receiver_center[:, None], axis=2).max(axis=1)
+    source_radius = np.linalg.norm(source_corners - source_center[:, None], axis=2).max(axis=1)
+    sizes = receiver_radius + source_radius
     # Exactly behind: no corner of the one rises over the other's plane.
-    rise_of = np.einsum("nck,nk->nc", of - centre_to[:, None], normal_to).max(axis=1)
-    rise_to = np.einsum("nck,nk->nc", to - centre_of[:, None], normal_of).max(axis=1)
+    rise_of = np.einsum("nck,nk->nc", source_corners - receiver_center[:, None], receiver_normal).max(axis=1)
+    rise_to = np.einsum("nck,nk->nc", receiver_corners - source_center[:, None], source_normal).max(axis=1)
     faces = (rise_of > 1e-9 * sizes) & (rise_to > 1e-9 * sizes)
-    ratio = np.linalg.norm(centre_to - centre_of, axis=1) / sizes
+    ratio = np.linalg.norm(receiver_center - source_center, axis=1) / sizes
 
     factor = np.zeros(len(receiver))
     near = np.flatnonzero(faces & (ratio < EXACT_WITHIN))
-    factor[near] = triangle_to_triangle(to[near], of[near])
+    factor[near] = triangle_to_triangle(receiver_corners[near], source_corners[near])
     nearest = EXACT_WITHIN
     for farthest, weights, shares in RULES:
         rows = np.flatnonzero(faces & (ratio >= nearest) & (ratio < farthest))
-        points = (weights @ to[rows]).reshape(-1, 3)
+        points = (weights @ receiver_corners[rows]).reshape(-1, 3)
         repeats = len(weights)
         values = point_to_polygon(
-            points, np.repeat(normal_to[rows], repeats, axis=0), np.repeat(of[rows], repeats, axis=0)
+            points,
+            np.repeat(receiver_normal[rows], repeats, axis=0),
+            np.repeat(source_corners[rows], repeats, axis=0),
         )
         factor[rows] = weighted_sums(values.reshape(-1, repeats), shares)
         nearest = farthest

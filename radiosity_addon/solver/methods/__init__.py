@@ -1,4 +1,4 @@
-"""The solvers, one a file, one interface: `solve(scene, settings, progress)` returns the solved state."""
+"""The solvers, one file each, with one interface: `solve(scene, settings, progress)` returns the state."""
 
 from __future__ import annotations
 
@@ -15,6 +15,6 @@ __all__ = ["HierarchicalState", "solve_by_method"]
 
 
 def solve_by_method(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -> SolverState:
-    """Solve by the method the settings name; `progress` is shown the state, which is the same all along."""
+    """Solve by the method in the settings; `progress` receives the state, always the same object."""
     module = import_module("." + settings.method.replace("-", "_"), __name__)
     return cast(SolverState, module.solve(scene, settings, progress))

@@ -1,4 +1,4 @@
-"""Direct solution: Gaussian elimination, the oracle of truth for all other methods (handout §3.4)."""
+"""Direct solution: Gaussian elimination, the reference for all other methods (handout §3.4)."""
 
 from __future__ import annotations
 
@@ -18,14 +18,8 @@ from .matrix import Iterate, solve_matrix
 def dense(system: LinearSystem) -> Array:
     """Solve K B = E exactly, up to rounding.
 
-    Returns
-    -------
-    radiosity : (n, 3) float64 [W/m²]
-
-    Raises
-    ------
-    BakeError
-        If K is singular: a closed part of the scene reflects all light for ever.
+    Returns radiosity (n, 3) [W/m²].
+    Raises BakeError if K is singular: a closed part of the scene reflects all light.
     """
     radiosity = np.empty((len(system), 3))
     solved = np.zeros(3, dtype=bool)
@@ -38,7 +32,7 @@ def dense(system: LinearSystem) -> Array:
             radiosity[:, same] = np.linalg.solve(system.matrix(channel), system.emission[:, same])
         except np.linalg.LinAlgError:
             raise BakeError(
-                "the radiosity matrix is singular: a closed room of reflectance 1 keeps its light for ever; "
+                "the radiosity matrix is singular: a closed room of reflectance 1 never loses its light; "
                 "lower the reflectance"
             ) from None
         solved |= same
@@ -52,5 +46,5 @@ def iterates(system: LinearSystem) -> Iterator[Iterate]:
 
 
 def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -> SolverState:
-    """Solve; `progress` is shown the state."""
+    """Return the solved state; `progress` receives it on the way."""
     return solve_matrix(scene, settings, progress, iterates, copies=3)

@@ -14,14 +14,11 @@ from .matrix import Iterate, solve_matrix
 
 
 def gauss_seidel(system: LinearSystem, start: Array | None = None) -> Iterator[Iterate]:
-    """Iterate B_i ← (E_i − Σ_{j≠i} K_ij B_j) / K_ii without end, with values already updated in this sweep.
+    """Iterate B_i ← (E_i − Σ_{j≠i} K_ij B_j) / K_ii endlessly, with values already updated in this sweep.
 
     One row's update is gathering light to one element. See `jacobi.jacobi` for what is yielded.
 
-    Parameters
-    ----------
-    start : (n, 3) float or None
-        None starts from B = E.
+    start (n, 3): None starts from B = E.
     """
     radiosity = (system.emission if start is None else start).copy()
     while True:
@@ -41,5 +38,5 @@ def sweep(system: LinearSystem, radiosity: Array) -> None:
 
 
 def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -> SolverState:
-    """Solve; `progress` is shown the state."""
+    """Return the solved state; `progress` receives it on the way."""
     return solve_matrix(scene, settings, progress, gauss_seidel, copies=2)

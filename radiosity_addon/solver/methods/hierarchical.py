@@ -55,10 +55,10 @@ COARSENING = (64.0, 16.0, 4.0, 1.0)
 """BF_ε of the rounds, in units of the final one: start coarse, tighten (our addition)."""
 
 ROUGH = 0.03
-"""Residual of the rounds before the last one: enough to tell which links matter."""
+"""Residual of the rounds before the last one: enough to decide which links matter."""
 
 FEW = 1e-3
-"""So small a share of links refined is not worth a gather: their children are judged before it, and
+"""A smaller share of refined links is not worth a gather: their children are evaluated before it, and
 what else it would show is left to the next round, if there is one."""
 
 LIGHT_SHARE = 0.25
@@ -66,7 +66,7 @@ LIGHT_SHARE = 0.25
 
 
 STALLED = 100
-"""Iterations in which the residual must fall by a tenth, or no more follow.
+"""The iteration ends if the residual has not fallen by a tenth in this many iterations.
 
 What a cluster's gradients take from faces below 0 is not taken (`bounce`): where few small faces shine into
 each other, that keeps the residual from falling, or would let plain iteration grow."""
@@ -74,7 +74,7 @@ each other, that keeps the residual from falling, or would let plain iteration g
 
 @dataclass
 class HierarchicalState(SolverState):
-    """What the refined hierarchy works on."""
+    """State of the refined hierarchy."""
 
     STORED = ("settings", "hierarchy", "links", "cluster_links", "balance")
 
@@ -82,12 +82,12 @@ class HierarchicalState(SolverState):
     """To elements, sorted by receiver."""
     cluster_links: ClusterLinks = field(default_factory=no_cluster_links)
     faint: float = 0.0
-    """Above 0 first links had to be made coarser (see `first_links`)."""
+    """Above 0, initial links had to be coarser (see `first_links`)."""
     cut: ClusterCut | None = None
     """The clusters that the links use."""
     conservation: Conservation | None = None
     balance: Balance | None = None
-    """What light was exchanged with at the end."""
+    """The links and factors by which light was exchanged at the end."""
 
     @property
     def n_links(self) -> int:
@@ -95,7 +95,7 @@ class HierarchicalState(SolverState):
         return len(self.links) + len(self.cluster_links) + len(self.light_links)
 
     def linked_cut(self) -> ClusterCut:
-        """Return the part of the cluster tree that the links use as they are now."""
+        """Return the part of the cluster tree that the current links use."""
         links, cluster_links = self.links, self.cluster_links
         return ClusterCut(self.hierarchy, links.source, cluster_links.receiver, cluster_links.source)
 
@@ -104,19 +104,16 @@ class HierarchicalState(SolverState):
         return link_closure(self.hierarchy, self.links, self.cluster_links)
 
     def balanced_closure(self) -> Array:
-        """Return (f,) ΣFV as light was sent and received in the end, scaled (see `conservation`)."""
+        """Return (f,) ΣFV of the light exchange at the end, scaled (see `conservation`)."""
         if self.balance is None or self.cut is None:
             return self.closure()
         return received_by_faces(self.hierarchy, self.cut, self.balance, self.cluster_links)
 
 
 def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -> HierarchicalState:
-    """Solve; `progress` is shown the state.
+    """Return the solved state; `progress` receives it on the way.
 
-    Raises
-    ------
-    UsageError
-        If the scene does not fit into the memory limit; nothing is allocated then.
+    Raises UsageError if the scene does not fit into the memory limit; nothing is allocated then.
     """
     refuse_large_scene(scene, settings)
     state = begin(scene, settings, HierarchicalState)
@@ -164,7 +161,7 @@ def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -
 
 
 def settle(state: HierarchicalState, shapes: NodeShapes, threshold: float, min_area: float) -> int:
-    """Refine links, and few links' children too, by the radiosity there is; return how many."""
+    """Refine links, and the children of few links too, by the current radiosity; return how many."""
     total = 0
     while True:
         refined = refine(state, shapes, threshold, min_area)
@@ -229,9 +226,9 @@ def _over(state: HierarchicalState, errors: Array, threshold: float) -> Array:
 
 
 def iterate(state: HierarchicalState, tolerance: float, last: bool = False) -> None:
-    """Gather and push-pull, accelerated, until the residual is below `tolerance`, or falls no more.
+    """Gather and push-pull, accelerated, until the residual is below `tolerance` or no longer falls.
 
-    Each step tells the residual of the radiosity before it; that of the `last` one is measured
+    Each step yields the residual of the radiosity before it; that of the `last` one is measured
     for the radiosity that is left in the state.
     """
     hierarchy, cluster_links = state.hierarchy, state.cluster_links
@@ -255,7 +252,7 @@ def iterate(state: HierarchicalState, tolerance: float, last: bool = False) -> N
             best, best_at = state.residual, state.iterations
         if state.residual < tolerance or exhausted(state) or state.iterations - best_at > STALLED:
             break
-        # What a mixture guesses below the emission is no radiosity.
+        # Values of a mixture below the emission are not radiosities.
         state.radiosity[leaves] = np.maximum(mixer.next(before, state.radiosity[leaves]), least)
     if last:
         _, after = reflect(state, links, lights, scale, cluster_links, cut, received)
@@ -264,18 +261,15 @@ def iterate(state: HierarchicalState, tolerance: float, last: bool = False) -> N
 
 
 def exhausted(state: HierarchicalState) -> bool:
-    """Whether all iterations allowed are done: what is not lit by then may not be judged."""
+    """Whether all allowed iterations are done; elements that are not lit by then may not be evaluated."""
     return state.iterations >= state.settings.max_iterations
 
 
 def tell(state: HierarchicalState, rounds: list[dict[str, float]]) -> None:
-    """Put into the report how BF_ε fell, and what lies on which level.
+    """Add to the report how BF_ε fell, and the elements and links per level.
 
-    Parameters
-    ----------
-    rounds : list of {"error", "links_refined", "links"}
-        For each BF_ε, as a share of the light's power: how many links were refined for it, and
-        how many there were afterwards.
+    rounds list of {"error", "links_refined", "links"}: For each BF_ε, as a share of the light's power: how
+        many links were refined for it, and how many there were afterward.
     """
     hierarchy, links = state.hierarchy, state.links
     n_links = len(links) + len(state.cluster_links)
@@ -291,7 +285,7 @@ def tell(state: HierarchicalState, rounds: list[dict[str, float]]) -> None:
 
 
 def closure_figures(state: HierarchicalState) -> dict[str, dict[str, float]]:
-    """Return how far ΣFV is from 1 on faces that light reaches and nothing escapes from.
+    """Return the deviation of ΣFV from 1 on lit faces from which nothing escapes.
 
     Of the "links" as they were measured, and "balanced", as their light was scaled: the area
     "mean", the root of the mean "square" of what is missing, and the share of the area that is

@@ -30,10 +30,10 @@ CHUNK = 1 << 18
 
 @dataclass
 class MultiLevelState(SolverState):
-    """What the multi-level hierarchy works on."""
+    """State of the multi-level hierarchy."""
 
     links: Links = field(default_factory=no_links)
-    """In float64, their visibility in the factor: F_rs V_rs."""
+    """In float64, with visibility in the factor: F_rs V_rs."""
 
     @property
     def n_links(self) -> int:
@@ -46,12 +46,9 @@ class MultiLevelState(SolverState):
 
 
 def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -> MultiLevelState:
-    """Solve; `progress` is shown the state.
+    """Return the solved state; `progress` receives it on the way.
 
-    Raises
-    ------
-    UsageError
-        If the pairs of faces alone, before anything is refined, exceed the memory limit.
+    Raises UsageError if the pairs of faces alone, before anything is refined, exceed the memory limit.
     """
     state = begin(scene, settings, MultiLevelState)
     hierarchy = state.hierarchy
@@ -92,7 +89,7 @@ def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -
 
 
 def refuse_too_many_faces(count: int, memory_limit: float) -> None:
-    """Refuse scenes whose first pairs, O(k²) of k faces, do not fit into `memory_limit` GiB."""
+    """Refuse scenes whose initial pairs, O(k²) of k faces, do not fit into `memory_limit` GiB."""
     pairs = count * (count - 1)
     what = f"multi-level, which begins with {pairs:,} pairs of {count:,} faces,"
     advice = "use the method hierarchical, or raise the limit"
@@ -109,18 +106,10 @@ def distinct_pairs(receiver: Array, source: Array, count: int) -> tuple[Array, A
 def link(hierarchy: Hierarchy, receiver: Array, source: Array, exchange: Array) -> Links:
     """Make links of pairs (handout §4.2, Link), leaving out those that exchange nothing.
 
-    Parameters
-    ----------
-    receiver, source : (n,) int
-        Elements, sorted by receiver.
-    exchange : (n,) float64
-        A_r F_rs V_rs [m²].
-
-    Returns
-    -------
-    links : Links
-        float64; visibility 1 and error estimate 0, since F_rs V_rs is one number; equal quarters, as in
-        the handout: what an element gathers, all leaves below it get alike.
+    receiver, source (n,) int: Elements, sorted by receiver.
+    exchange (n,): A_r F_rs V_rs [m²].
+    Returns links: float64; visibility 1 and error estimate 0, since F_rs V_rs is one number; equal quarters,
+        as in the handout: all leaves below an element get the same share of its gathered light.
     """
     kept = exchange > 0
     receiver, source = receiver[kept].astype(np.int32), source[kept].astype(np.int32)
@@ -138,7 +127,7 @@ def link(hierarchy: Hierarchy, receiver: Array, source: Array, exchange: Array) 
 
 
 def overlap_scale(hierarchy: Hierarchy, links: Links) -> Array | None:
-    """Return (e, 2) what to scale leaves' radiosity with where faces lie in one another, or None.
+    """Return (e, 2) factors on leaves' radiosity where faces coincide, or None.
 
     A leaf's ΣFV may rightly be half too large, inheriting its ancestors' means; that of a whole
     face may not.
@@ -162,7 +151,7 @@ def power_over(state: MultiLevelState, pairs: Array) -> float:
 
 
 def tell(state: MultiLevelState) -> None:
-    """Put into the report what lies on which level."""
+    """Add the elements and links per level to the report."""
     hierarchy, links = state.hierarchy, state.links
     state.details["multi_level"] = {
         "form_factor_error": state.settings.form_factor_error,
@@ -173,6 +162,6 @@ def tell(state: MultiLevelState) -> None:
 
 
 def _converged(state: MultiLevelState) -> float:
-    """Return how far the residual has fallen towards the tolerance, by its logarithm."""
+    """Return the progress of the residual toward the tolerance, by its logarithm."""
     goal = np.log(max(state.settings.tolerance, 1e-16))
     return float(np.clip(np.log(max(state.residual, 1e-300)) / goal, 0.0, 1.0)) if goal < 0 else 1.0
