@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import bpy
 
 from ..relight import kept_bakes
+from ..scene_records.object_roles import has_role
 from ..session.facts import fact
 from ..settings.light_group_properties import ListedGroup, list_groups
 
@@ -56,6 +57,21 @@ class LightRow(NamedTuple):
 def has_meshes(context: bpy.types.Context) -> bool:
     """Whether the scene has anything to bake."""
     return any(obj.type == "MESH" for obj in context.scene.objects)
+
+
+def copy_targets(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """Return the selected objects that can take the settings of the active one; linked ones cannot."""
+    return [
+        obj
+        for obj in context.selected_objects
+        if obj != context.object and has_role(obj) and obj.library is None
+    ]
+
+
+@fact(unknown=True)
+def has_copy_targets(context: bpy.types.Context) -> bool:
+    """Whether any selected object can take the settings of the active one."""
+    return bool(copy_targets(context))
 
 
 @fact(unknown=False)

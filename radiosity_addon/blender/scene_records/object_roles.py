@@ -29,6 +29,11 @@ BAKEABLE_TYPES = frozenset({"MESH", "CURVE", "SURFACE", "FONT", "META"})
 """All but a mesh are shown as a mesh copy once they are baked."""
 
 
+def has_role(obj: bpy.types.Object | None) -> bool:
+    """Tell whether an object can light, block or be baked: surfaces, and instances of collections."""
+    return obj is not None and (obj.type in BAKEABLE_TYPES or obj.instance_type == "COLLECTION")
+
+
 class Role(NamedTuple):
     """What one object, or one instance of it, is there for.
 
