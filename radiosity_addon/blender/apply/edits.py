@@ -199,7 +199,7 @@ def _carry(mesh: bpy.types.Mesh, known: StandIn, users: Sequence[bpy.types.Objec
             # The object's mesh was deleted: what the modifiers made of it is all there is.
             mesh[ORIGINAL] = released_copy(mesh, users[0].name)
             set_stand_in(mesh, replace(known, modifiers=(), seal=digest_of_mesh(mesh)))
-            message = f"the mesh of object '{name}' is gone: it keeps what its modifiers made of it"
+            message = f"the mesh of object '{name}' is missing: the result of its modifiers is kept"
             return [BakeWarning(name, f"{message}; they stay switched off")]
         if not edited:
             return []
@@ -265,7 +265,7 @@ def _replace_original(
         kept = released_copy(mesh, f"{original.name if original else name}{EDITED}")
         mesh[ORIGINAL] = kept
         _seal_again(mesh, known)
-        why = "its original is gone" if original is None else "its original is linked or was changed too"
+        why = "its original is missing" if original is None else "its original is linked or was changed too"
         message = f"the mesh of object '{name}' was edited and {why}: the object keeps '{kept.name}'"
         return BakeWarning(name, f"{message} as a mesh of its own")
     if LAYER in original:
