@@ -346,9 +346,9 @@ ON_A_LINE = np.linspace(0.1, 0.7, 6, dtype=np.float32).reshape(2, 3, 1) * np.arr
     [
         (square_uv(-0.2, 0.7), "unit square"),
         (np.concatenate((square_uv(0, 1)[:1], square_uv(0, 1)[:1])), "overlap"),
-        (np.zeros((2, 3, 2), np.float32), "unwrapped anew"),
-        (np.full((2, 3, 2), np.nan, np.float32), "unwrapped anew"),
-        (ON_A_LINE, "unwrapped anew"),
+        (np.zeros((2, 3, 2), np.float32), "unwrapped again"),
+        (np.full((2, 3, 2), np.nan, np.float32), "unwrapped again"),
+        (ON_A_LINE, "unwrapped again"),
     ],
 )
 def test_useless_kept_uvs_are_named(uv, words):

@@ -49,7 +49,7 @@ class Surface:
     varies : bool
         Something it is made of varies over the surface, and means or defaults stand for it.
     fallbacks : tuple of BakeWarning
-        Which; to be told of unless the material is evaluated.
+        Which; reported unless the material is evaluated.
     is_volume : bool
         It has a volume and no surface: fog, through which all light goes.
     """
@@ -236,10 +236,10 @@ class _Reader(ShaderTerms[Stack]):
 
     def not_negative(self, what: str, values: np.ndarray) -> np.ndarray:
         """Replace negative, infinite and NaN values by 0."""
-        mended = np.where(np.isfinite(values) & (values >= 0), values, 0.0)
-        if (mended != values).any():
-            self.warn(f"{what} {_text(values)} is not possible; {_text(mended)} is used")
-        return mended
+        possible = np.where(np.isfinite(values) & (values >= 0), values, 0.0)
+        if (possible != values).any():
+            self.warn(f"{what} {_text(values)} is not possible; {_text(possible)} is used")
+        return possible
 
     def _varying(self, message: str) -> None:
         self.varies = True

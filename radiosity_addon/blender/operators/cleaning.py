@@ -53,12 +53,12 @@ def unused_lightmaps(context: bpy.types.Context) -> Unused:
     files: dict[Path, list[str]] = {}
     changed: list[Path] = []
     for folder in _folders(context):
-        for report, told in reports_in(folder, owner_of(context.scene).is_source_of).items():
+        for report, contents in reports_in(folder, owner_of(context.scene).is_source_of).items():
             # A copy that the command line wrote shows all that is listed with it.
             copy = folder / BLEND_NAME
-            if BLEND_NAME in told[LISTED] and copy.exists() and copy.resolve() != here:
+            if BLEND_NAME in contents[LISTED] and copy.exists() and copy.resolve() != here:
                 continue
-            for name, of in told[LISTED].items():
+            for name, of in contents[LISTED].items():
                 path = folder / name
                 if path.suffix.lower() not in LIGHTMAPS or name == PREVIEW_NAME or not path.is_file():
                     continue
@@ -83,11 +83,11 @@ def delete(unused: Unused) -> int:
     from ...publishing import replacing
 
     for report, names in unused.files.items():
-        told = read_report(report)
+        contents = read_report(report)
         for name in names:
             (report.parent / name).unlink()
         with replacing(report) as aside:
-            aside.write_text(text_of(without(told, names)), encoding="utf-8")
+            aside.write_text(text_of(without(contents, names)), encoding="utf-8")
     return unused.count
 
 

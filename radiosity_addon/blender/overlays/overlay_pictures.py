@@ -30,7 +30,7 @@ STATE_COLORS = {
     TOUCHED: ((0.95, 0.90, 0.30), "Touched: geometry is at their edge"),
     ENCLOSED: ((0.55, 0.25, 0.75), "Enclosed: no light reaches them"),
 }
-"""Display colors of the texels that are told apart, and what they are."""
+"""Display colours of the states of texels, and what they are."""
 
 WIDEST = 2048
 """Pages of more pixels are drawn coarser: as colors they would take a quarter of a gigabyte at 4096."""
@@ -226,8 +226,8 @@ def _texels(context: bpy.types.Context, kept: KeptDetails) -> OverlayPicture | N
         name: page.unit * (page.misfit if signed else page.noise).astype(np.float32)
         for name, page in pages.items()
     }
-    told = np.concatenate([errors[name][page.state != NO_TEXEL_HERE] for name, page in pages.items()])
-    scale = _scale(context, told, signed)
+    known = np.concatenate([errors[name][page.state != NO_TEXEL_HERE] for name, page in pages.items()])
+    scale = _scale(context, known, signed)
     painted = {name: _opaque(scale(_thinned(values))) for name, values in errors.items()}
     title = "Elements Minus Texels" if signed else "Estimated Noise"
     return OverlayPicture(_surfaces(shown, painted), legend=Legend(title, "W/m²", scale))

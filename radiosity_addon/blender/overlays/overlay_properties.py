@@ -14,7 +14,7 @@ NONE, FALSE_COLOR, DENSITY, CHECKER, TEXELS, ELEMENTS, LINKS, ERROR = (
 )
 
 OF_THE_BAKE = frozenset({TEXELS, ELEMENTS, LINKS, ERROR})
-"""What needs the bake in memory; the others are told from lightmaps and UVs alone."""
+"""What needs the bake in memory; the others need lightmaps and UVs alone."""
 
 
 def _redraw(_settings: RadiosityOverlay, _context: bpy.types.Context) -> None:

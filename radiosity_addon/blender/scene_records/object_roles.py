@@ -111,11 +111,11 @@ def role_of(
         mode = IGNORE
     warnings = []
     if mode == BAKE:
-        told = {
+        reasons = {
             "a holdout": held_out or any(obj.is_holdout for obj in both),
             "a shadow catcher": any(obj.is_shadow_catcher for obj in both),
         }
-        for what, is_so in told.items():
+        for what, is_so in reasons.items():
             if is_so:
                 mode = LIGHT_ONLY
                 message = f"object '{shown.name}' is {what}: it lights and blocks but gets no lightmap"

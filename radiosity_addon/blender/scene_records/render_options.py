@@ -63,7 +63,7 @@ def _still_as_in_the_viewport(objects: Iterable[bpy.types.Object]) -> Iterator[B
                 message = f"modifier '{modifier.name}' is driven in viewports, and used as there"
                 yield BakeWarning(obj.name, f"object '{obj.name}': {message}")
             if modifier.type == "NODES" and modifier.show_render and _asks(modifier.node_group, known):
-                message = "its geometry nodes use 'Is Viewport', which is true here; renders may differ"
+                message = "its geometry nodes use 'Is Viewport', which is on in an export; renders may differ"
                 yield BakeWarning(obj.name, f"object '{obj.name}': {message}")
 
 

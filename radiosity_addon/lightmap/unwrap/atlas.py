@@ -260,7 +260,7 @@ def _kept_charts(
     uv = source.uv.astype(np.float64)
     if not np.isfinite(uv).all() or not _has_area(uv):
         warnings.append(
-            BakeWarning(source.name, "its Lightmap UVs have no area or are not numbers; unwrapped anew")
+            BakeWarning(source.name, "its Lightmap UVs have no area or are not numbers; unwrapped again")
         )
         return None
     if uv.min() < -1e-6 or uv.max() > 1 + 1e-6:
