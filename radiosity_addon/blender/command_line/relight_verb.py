@@ -17,8 +17,8 @@ from ...base import BakeWarning, UsageError, drain
 from ...cli import Console, Interrupts, Permissions, summary
 from ...files import BLEND_NAME, PREVIEW_NAME, SIDECAR_NAME
 from ...options import BakeSettings
-from ..files.single_files import check_places, make_folder_of
-from .verbs import open_or_build, output_of, registered, same_file, written_files
+from ..files.single_files import check_places
+from .verbs import open_or_build, output_of, registered, run_through, same_file, written_files
 
 if TYPE_CHECKING:
     from ..files.output import OutputFolder
@@ -57,7 +57,6 @@ def relight(
     """
     with registered():
         from ...files import BLEND_NAME, REPORT_NAME
-        from ..jobs.finish import WRITING_STAGES
 
         source = scene or loaded
         if source is not None and same_file(source, output / BLEND_NAME):
@@ -74,21 +73,8 @@ def relight(
         notes = open_or_build(scene, loaded, allowed)
         folder = output_of(output, source, allowed, report_copy)
         job = relight_into(bpy.context, stored, folder, notes, preview)
-        try:
-            while True:
-                try:
-                    progress = next(job)
-                except StopIteration as done:
-                    report = done.value
-                    break
-                interrupts.check()
-                interrupts.deferred = progress.stage in WRITING_STAGES
-                console.progress(progress.stage, progress.fraction)
-        finally:
-            interrupts.deferred = True
-            job.close()
+        report = run_through(job, console, interrupts)
         if report_copy is not None:
-            make_folder_of(report_copy)
             report.write_copy(report_copy)
         files = written_files(report.as_dict(), preview)
         console.lines(summary(str(output), files, report.as_dict()))

@@ -19,7 +19,9 @@ from ..relight import kept_bakes
 from ..session import last_bake
 
 if TYPE_CHECKING:
+    from ...bake.result import BakeReport
     from ..files.output import OutputFolder
+    from ..jobs.finish import BakeJob
 
 MAX_IMAGES = 8
 """The closing lines name so many lightmaps one by one."""
@@ -64,7 +66,6 @@ def bake(
     """
     with registered():
         from ...files import BLEND_NAME
-        from ..jobs.finish import WRITING_STAGES
         from ..jobs.job import run_bake
 
         source = scene or loaded
@@ -84,31 +85,36 @@ def bake(
             notes=notes,
             with_preview=preview,
         )
-        try:
-            while True:
-                try:
-                    progress = next(job)
-                except StopIteration as done:
-                    report = done.value
-                    break
-                interrupts.check()
-                interrupts.deferred = progress.stage in WRITING_STAGES
-                console.progress(progress.stage, progress.fraction)
-        finally:
-            interrupts.deferred = True
-            job.close()
+        report = run_through(job, console, interrupts)
         if report_copy is not None:
-            make_folder_of(report_copy)
             report.write_copy(report_copy)
         files = written_files(report.as_dict(), preview, keep)
         if plot is not None:
             from ...bake.result import write_history
 
             console.progress("plot", 1.0)
-            make_folder_of(plot)
             write_history(report.as_dict(), plot.resolve())
             files.append((str(plot), "how it was solved"))
         console.lines(summary(str(output), files, report.as_dict()))
+
+
+def run_through(job: BakeJob, console: Console, interrupts: Interrupts) -> BakeReport:
+    """Run a job to its end and return its report; interrupts end it, but not while it writes files."""
+    from ..jobs.finish import WRITING_STAGES
+
+    try:
+        while True:
+            try:
+                progress = next(job)
+            except StopIteration as done:
+                report: BakeReport = done.value
+                return report
+            interrupts.check()
+            interrupts.deferred = progress.stage in WRITING_STAGES
+            console.progress(progress.stage, progress.fraction)
+    finally:
+        interrupts.deferred = True
+        job.close()
 
 
 def _places(report_copy: Path | None, plot: Path | None) -> dict[str, Path]:

@@ -75,18 +75,17 @@ def delete(unused: Unused) -> int:
 
     Raises
     ------
-    OSError
-        If one cannot be deleted; those before it are gone.
+    OSError, BakeError
+        If one cannot be deleted, or its report cannot be written; those before it are gone.
     """
     from ...files import read_report, text_of, without
-    from ...publishing import replacing
+    from ...publishing import write_text
 
     for report, names in unused.files.items():
         told = read_report(report)
         for name in names:
             (report.parent / name).unlink()
-        with replacing(report) as aside:
-            aside.write_text(text_of(without(told, names)), encoding="utf-8")
+        write_text(report, text_of(without(told, names)))
     return unused.count
 
 
@@ -143,6 +142,9 @@ class RADIOSITY_OT_clean(bpy.types.Operator):
             count = delete(found)
         except OSError as error:
             self.report({"ERROR"}, f"Cannot delete '{error.filename}': {error.strerror}")
+            return {"CANCELLED"}
+        except BakeError as error:
+            self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         if not count:
             self.report({"INFO"}, "Nothing to clean: every lightmap of this file is shown")
