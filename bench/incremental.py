@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -20,7 +20,6 @@ import numpy as np
 from radiosity_addon.bake.pipeline import bake, bake_and_keep
 from radiosity_addon.bake.rebaking import bake_moved
 from radiosity_addon.bake.result.result import BakeResult
-from radiosity_addon.base.progress import drain
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import Scene
@@ -69,7 +68,7 @@ def measure(name: str, seeds: bool, **settings: Any) -> dict[str, Any]:
     """Bake a scene, move its object, bake anew both ways, and return what that took."""
     scene, moved, place = SCENES[name]()
     chosen = BakeSettings(threads=1, **settings)
-    (_, kept), keeping = _timed(bake_and_keep(scene, chosen))
+    (_, kept), keeping = _timed(lambda: bake_and_keep(scene, chosen))
     say(f"{name}: kept in {keeping:.1f} s")
     uv = kept.geometry.uv
     item = next(some for some in scene.objects if some.name == moved)
@@ -78,8 +77,8 @@ def measure(name: str, seeds: bool, **settings: Any) -> dict[str, Any]:
         scene=_with(scene.scene, item.rows, place),
         objects=tuple(replace(some, uv=uv[some.rows]) for some in scene.objects),
     )
-    (found, after), seconds = _timed(bake_moved(kept, now))
-    full, whole = _timed(bake(now, chosen))
+    (found, after), seconds = _timed(lambda: bake_moved(kept, now))
+    full, whole = _timed(lambda: bake(now, chosen))
     geometry = after.geometry
     own = (geometry.triangle >= item.first) & (geometry.triangle < item.first + item.count)
     corners = [some.triangles[item.rows].reshape(-1, 3) for some in (scene.scene, now.scene)]
@@ -104,7 +103,7 @@ def measure(name: str, seeds: bool, **settings: Any) -> dict[str, Any]:
         "against_full": {part: _differs(found, full, rows) for part, rows in where.items()},
     }
     if seeds:
-        other = drain(bake(now, replace(chosen, seed=7)))
+        other = bake(now, replace(chosen, seed=7))
         figures["two_seeds"] = {part: _differs(other, full, rows) for part, rows in where.items()}
     say(json.dumps(figures, indent=1))
     return figures
@@ -155,9 +154,9 @@ def _differs(found: BakeResult, expected: BakeResult, rows: np.ndarray) -> dict[
     return {"relative_rmse": float(error), "mean_ratio": float(one[rows].mean() / other[rows].mean())}
 
 
-def _timed(steps: Generator[Any, None, T]) -> tuple[T, float]:
+def _timed(work: Callable[[], T]) -> tuple[T, float]:
     started = time.process_time()
-    result = drain(steps)
+    result = work()
     return result, time.process_time() - started
 
 

@@ -2,30 +2,15 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Generator, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-
-class Stopwatch:
-    """Wall-clock and processor time of one block."""
-
-    def __init__(self) -> None:
-        self.figures: dict[str, float] = {}
-
-    @contextmanager
-    def running(self) -> Iterator[None]:
-        wall, processor = time.perf_counter(), time.process_time()
-        yield
-        self.figures = {
-            "seconds": time.perf_counter() - wall,
-            "cpu_seconds": time.process_time() - processor,
-        }
+from . import rooms
+from .recording import Stopwatch, solver_figures, watched_bake
 
 
 def prepare(job: dict[str, Any]) -> dict[str, Any]:
@@ -53,7 +38,6 @@ def ours(job: dict[str, Any]) -> dict[str, Any]:
     """Bake with the add-on: `run` holds the settings; the pixels go to `pixels`."""
     import bpy
 
-    from radiosity_addon.bake.pipeline import bake
     from radiosity_addon.blender.scene_export.export import export_scene
 
     from .prepare import case_of, open_prepared
@@ -65,7 +49,7 @@ def ours(job: dict[str, Any]) -> dict[str, Any]:
     watch = Stopwatch()
     with watch.running():
         bake_scene = export_scene(bpy.context, settings).bake_scene
-        result, leaves = exhaust(bake(bake_scene, settings))
+        result, leaves = watched_bake(bake_scene, settings)
     if len(result.pages) != 1 or any(
         not np.array_equal(placed.uv, placed.object.uv) for placed in result.objects
     ):
@@ -94,8 +78,6 @@ def oidn(job: dict[str, Any]) -> dict[str, Any]:
 
 def room(job: dict[str, Any]) -> dict[str, Any]:
     """Solve a closed room of `triangles`, or bake it where there is a `resolution`."""
-    from . import rooms
-
     settings = settings_of({"quality": job["quality"]}, threads=job["threads"], keep_uvs=True,
                            resolution=job.get("resolution", 64))  # fmt: skip
     work: Callable[..., dict[str, Any]] = rooms.bake_room if "resolution" in job else rooms.solve_room
@@ -119,30 +101,6 @@ def settings_of(run: dict[str, Any], **more: Any) -> Any:
         preset, solver=solver, gather=replace(preset.gather, **gather)
     )
     return settings
-
-
-def exhaust(steps: Generator[Any, None, Any]) -> tuple[Any, int]:
-    """Run a bake; return its result and the number of leaf elements its last picture shows."""
-    leaves = 0
-    while True:
-        try:
-            progress = next(steps)
-        except StopIteration as done:
-            return done.value, leaves
-        if progress.picture is not None:
-            leaves = len(progress.picture)
-
-
-def solver_figures(report: dict[str, Any], leaves: int) -> dict[str, Any]:
-    """Return what the results keep of a solver's report."""
-    names = ("elements", "links", "rays", "iterations", "residual", "closure_area_mean", "power_W",
-             "estimated_error", "over_budget")  # fmt: skip
-    kept = {name: report[name] for name in names if name in report}
-    leaves = leaves or report.get("leaves", 0)
-    closure = report.get("hierarchical", {}).get("closure")
-    if closure:
-        kept["closure"] = closure
-    return {**kept, "leaves": leaves, "links_per_leaf": report["links"] / max(leaves, 1)}
 
 
 def save_whole(path: Path, pixels: np.ndarray) -> None:

@@ -10,7 +10,8 @@ from __future__ import annotations
 import argparse
 import tempfile
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -20,7 +21,6 @@ from radiosity_addon.bake.pipeline import bake, bake_and_keep
 from radiosity_addon.bake.relight.kept_bake import KeptBake, relight_pages
 from radiosity_addon.bake.relight.responses import Responses
 from radiosity_addon.bake.sidecar.sidecar import read_sidecar, write_sidecar
-from radiosity_addon.base.progress import drain
 from radiosity_addon.lightmap.images.page import LightmapPage
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
@@ -56,8 +56,8 @@ def measure(
     """Bake a scene of the first strengths, light it anew by the others, and say what that took."""
     say(name)
     chosen = BakeSettings(threads=1, **settings)
-    _, plain = _timed(bake(scene(strengths[0][1]), chosen))
-    (result, kept), seconds = _timed(bake_and_keep(scene(strengths[0][1]), chosen))
+    _, plain = _timed(lambda: bake(scene(strengths[0][1]), chosen))
+    (result, kept), seconds = _timed(lambda: bake_and_keep(scene(strengths[0][1]), chosen))
     told: dict[str, Any] = {
         "scene": name,
         "texels": len(kept.geometry),
@@ -70,10 +70,10 @@ def measure(
     told["sidecar"] = _sidecar(kept, result, scene(strengths[0][1]), told["texels"])
     rays = kept.solved.local.caster.rays
     for change, wanted in strengths:
-        first, once = _timed(relight_pages(kept, wanted))
-        _, again = _timed(relight_pages(kept, wanted))
-        full = drain(bake(scene(wanted), chosen)).pages
-        other = drain(bake(scene(wanted), BakeSettings(threads=1, seed=7, **settings))).pages
+        first, once = _timed(partial(relight_pages, kept, wanted))
+        _, again = _timed(partial(relight_pages, kept, wanted))
+        full = bake(scene(wanted), chosen).pages
+        other = bake(scene(wanted), BakeSettings(threads=1, seed=7, **settings)).pages
         entry = {
             "change": change,
             "seconds": once,
@@ -114,7 +114,7 @@ def _sidecar(kept: KeptBake, result: Any, scene: BakeScene, texels: int) -> dict
 def _response(kept: KeptBake, strengths: np.ndarray, pages: tuple[LightmapPage, ...]) -> dict[str, float]:
     """Find out what the first source adds, and sum it up for another strength."""
     responses = Responses(kept, strengths, pages)
-    _, once = _timed(responses.steps(0))
+    _, once = _timed(lambda: responses.find(0))
     wanted = strengths.copy()
     wanted[0] *= 1.5
     started = time.process_time()
@@ -181,9 +181,9 @@ def _clocked(action: Callable[[], Any]) -> float:
     return time.process_time() - started
 
 
-def _timed(steps: Generator[Any, None, T]) -> tuple[T, float]:
+def _timed(work: Callable[[], T]) -> tuple[T, float]:
     started = time.process_time()
-    result = drain(steps)
+    result = work()
     return result, time.process_time() - started
 
 

@@ -6,14 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from radiosity_addon.bake.pipeline import bake
 from radiosity_addon.bake.quality import quality_of
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeObject, BakeScene
-from radiosity_addon.solver import Scene, solve_progress
+from radiosity_addon.solver import Scene, solve
 from tests.rooms import box_room
 
-from .measure import Stopwatch, exhaust, solver_figures
+from .recording import Stopwatch, solver_figures, watched_bake
 
 SIZE, BLOCK_SIZE, BLOCK_AT = (5.0, 4.0, 3.0), (1.2, 1.0, 0.9), (1.3, 1.5, 0.4)
 POWER = 400.0
@@ -65,15 +64,9 @@ def solve_room(triangles: int, settings: BakeSettings) -> dict[str, Any]:
     scene, _ = room(triangles)
     watch = Stopwatch()
     with watch.running():
-        steps = solve_progress(scene, quality_of(settings).solver)
-        state = None
-        while True:
-            try:
-                _, state = next(steps)
-            except StopIteration as done:
-                report = done.value.report
-                break
-    leaves = 0 if state is None else len(state.hierarchy.leaves)
+        solution = solve(scene, quality_of(settings).solver)
+        report = solution.report
+    leaves = len(solution.local_pass.elements.hierarchy.leaves)
     return {"triangles": len(scene), **watch.figures, **solver_figures(report, leaves)}
 
 
@@ -85,7 +78,7 @@ def bake_room(triangles: int, settings: BakeSettings) -> dict[str, Any]:
     item = BakeObject("Room", 0, count, True, np.arange(count, dtype=np.int32), corners, uv)
     watch = Stopwatch()
     with watch.running():
-        result, leaves = exhaust(bake(BakeScene(scene, (item,)), settings))
+        result, leaves = watched_bake(BakeScene(scene, (item,)), settings)
     texels = int(result.pages[0].coverage.sum())
     figures = {**watch.figures, **solver_figures(result.solver, leaves), "stages": result.seconds}
     return {"triangles": count, "texels": texels, **figures}

@@ -11,6 +11,7 @@ from radiosity_addon.options import (
     MAIN,
     METHODS,
     OPTIONS,
+    PANEL_OPTIONS,
     SECTIONS,
     BakeSettings,
     Option,
@@ -20,12 +21,14 @@ from radiosity_addon.options import (
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "options.md"
 
+ALL = (*PANEL_OPTIONS.values(), *OPTIONS.values())
+
 INTRODUCTION = """\
 # Options
 
 All options of a bake, for the command line, the panel and scripts. The
 [user guide](user-guide.md#settings-what-to-choose) says what to choose. `python3 build.py options` writes
-this page from the table in `radiosity_addon/options/bake_settings.py`.
+this page from the tables in `radiosity_addon/options/`.
 
 Scripts set the fields of `radiosity_addon.options.BakeSettings`. They have the names of the options, with
 underscores, except: {exceptions}."""
@@ -44,7 +47,7 @@ def page() -> str:
         parts.append(f"## {section}")
         if part not in (MAIN, section):
             parts.append(f"In the panel under *{part}*.")
-        options = [option for option in OPTIONS.values() if option.section == section]
+        options = [option for option in ALL if option.section == section]
         parts.append(_general([option for option in options if not option.methods]))
         of_methods = [option for option in options if option.methods]
         if of_methods:
@@ -86,8 +89,8 @@ def _methods() -> str:
 
 
 def _presets() -> tuple[str, ...]:
-    labels = [_label(option) for option in OPTIONS.values() if option.preset]
-    text = "A preset sets whether size or density is chosen, and these options, and nothing else:"
+    labels = [_label(option) for option in ALL if option.preset]
+    text = "A preset sets these options and nothing else:"
     return "## Presets", f"{text} {', '.join(labels)}."
 
 
@@ -102,7 +105,9 @@ def _table(titles: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
 
 
 def _flag(option: Option) -> str:
-    """Return an option as it is typed."""
+    """Return an option as it is typed; a dash for what only the panel has."""
+    if PANEL_OPTIONS.get(option.name) is option:
+        return "–"
     if option.choices:
         return f"`{option.flag}`"
     more = "…" if option.kind is tuple and not option.repeated else ""
@@ -128,7 +133,7 @@ def _meaning(option: Option) -> str:
 
 def _default(option: Option) -> str:
     if option.kind is bool:
-        return "off"
+        return "on" if option.default else "off"
     if option.default in (None, ()):
         return "–"
     return plain(option.default) if option.kind in (int, float) else f"`{option.default}`"

@@ -9,8 +9,9 @@ import scenes
 from matplotlib.figure import Figure
 from measures import solved
 
+from radiosity_addon.base import Progress
 from radiosity_addon.solver import Scene, SolverSettings
-from radiosity_addon.solver.methods.shooting import ShootingState, solve_steps
+from radiosity_addon.solver.methods.shooting import ShootingState, solve
 
 STAGES = (20, 80, 320)
 
@@ -52,9 +53,12 @@ def figure(small: bool) -> Figure:
 def shoot(scene: Scene, settings: SolverSettings, stages: tuple[int, ...]) -> dict[int, tuple]:
     """Return the shown radiosity of the leaves without and with the term, by shots."""
     kept: dict[int, tuple] = {}
-    for _, state in solve_steps(scene, settings):
+
+    def look(state: ShootingState) -> None:
         if state.iterations in stages and state.iterations not in kept:
             kept[state.iterations] = picture(state)
+
+    solve(scene, settings, Progress(lambda _: None, look=look))
     return kept
 
 

@@ -1,4 +1,4 @@
-"""How all figures look, and how they become files."""
+"""Style of the figures, and writing them to files."""
 
 from __future__ import annotations
 
@@ -48,14 +48,14 @@ def axes(columns: int = 1, width: float = 6.0, height: float = 3.2) -> tuple[Fig
 
 
 def slope(panel: Axes, x: tuple[float, float], y: float, order: float, text: str) -> None:
-    """Draw a grey line of `order` in a doubly logarithmic panel, from (x[0], y)."""
+    """Draw a gray line of `order` in a doubly logarithmic panel, from (x[0], y)."""
     end = y * (x[1] / x[0]) ** order
     panel.plot(x, (y, end), color=GREY, linewidth=1, linestyle="--")
     panel.annotate(text, (x[1], end), xytext=(4, 0), textcoords="offset points", color="0.4", fontsize=8)
 
 
 def machine() -> str:
-    """Say when and on what seconds were measured."""
+    """Return the machine and date of a time measurement."""
     return f"{datetime.date.today().isoformat()}, {os.cpu_count()} cores of {platform.machine()}"
 
 

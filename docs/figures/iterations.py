@@ -19,7 +19,7 @@ from radiosity_addon.solver.methods.jacobi import jacobi
 SMALL_ENOUGH = 1e-6
 
 TABLE = {0.5: (19, 11, 7), 0.8: (61, 32, 10), 0.95: (269, 136, 12)}
-"""Iterations of Jacobi, Gauss–Seidel and conjugate gradients, as the page tells them."""
+"""Iterations of Jacobi, Gauss–Seidel and conjugate gradients, as quoted on the page."""
 
 
 def figure(small: bool) -> Figure:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from radiosity_addon.solver import Scene, SolverSettings, SolverState, solve_progress
+from radiosity_addon.solver import Scene, SolverSettings, SolverState, solve
 from radiosity_addon.solver.equations.assembly import galerkin
 from radiosity_addon.solver.equations.fixed_elements import subdivide_evenly
 from radiosity_addon.solver.equations.linear_system import LinearSystem
@@ -15,8 +15,7 @@ from radiosity_addon.solver.state.state import begin
 
 def solved(scene: Scene, **settings: Any) -> SolverState:
     """Solve a scene and return the final state; `settings` are fields of `SolverSettings`."""
-    *_, (_, state) = solve_progress(scene, SolverSettings(**settings))
-    return state
+    return solve(scene, SolverSettings(**settings)).local_pass.elements.state
 
 
 def assembled(scene: Scene, elements: int) -> LinearSystem:

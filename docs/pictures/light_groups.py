@@ -39,7 +39,7 @@ MIXES: tuple[Mix, ...] = (
 
 
 def build() -> bpy.types.Scene:
-    """Put a glowing cube and a sky into the Cornell box, each in a light group as the lamp is."""
+    """Put an emissive cube and a sky into the Cornell box, each in a light group as the lamp is."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     scene = build_cornell_box()
     scene.render.resolution_x = scene.render.resolution_y = SIDE

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from .estimate import Estimate, LightmappedObject, estimate_bake
-from .keep import KeepOptions, bake_steps, can_keep
+from .keep import KeepOptions, can_keep, run_pipeline
 from .plan import SHORT, BakeDigests, BakePlan, ShownBake, ShownLightmap, plan_bake
 from .stages import timed
 from .texel_memory import pages_of, refuse_too_large
@@ -20,11 +20,11 @@ __all__ = [
     "LightmappedObject",
     "ShownBake",
     "ShownLightmap",
-    "bake_steps",
     "can_keep",
     "estimate_bake",
     "pages_of",
     "plan_bake",
     "refuse_too_large",
+    "run_pipeline",
     "timed",
 ]

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import uuid
-from collections.abc import Generator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from ..base import SILENT, Progress
 from ..options import BakeSettings
 from .pipeline import bake, bake_and_keep
 from .plan import BakePlan
 from .rebaking import bake_moved
 from .relight import KeptBake
-from .result import BakeResult, Progress
+from .result import BakeResult
 from .sidecar import write_sidecar
 
 
@@ -40,9 +40,9 @@ def can_keep(settings: BakeSettings) -> bool:
     return settings.method == "hierarchical" and settings.quantity != "residual"
 
 
-def bake_steps(
-    plan: BakePlan, keeping: KeepOptions | None, sidecar: Path | None
-) -> Generator[Progress, None, tuple[BakeResult, KeptBake | None]]:
+def run_pipeline(
+    plan: BakePlan, keeping: KeepOptions | None, sidecar: Path | None, progress: Progress = SILENT
+) -> tuple[BakeResult, KeptBake | None]:
     """Bake as planned, and keep the bake if that is asked for.
 
     Parameters
@@ -59,12 +59,12 @@ def bake_steps(
         Those of `bake_and_keep` and `write_sidecar`.
     """
     if keeping is None:
-        return (yield from bake(plan.bake_scene, plan.settings)), None
+        return bake(plan.bake_scene, plan.settings, progress), None
     if plan.kept is not None:
-        result, kept = yield from bake_moved(plan.kept, plan.bake_scene)
+        result, kept = bake_moved(plan.kept, plan.bake_scene, progress)
     else:
-        result, kept = yield from bake_and_keep(plan.bake_scene, plan.settings)
+        result, kept = bake_and_keep(plan.bake_scene, plan.settings, progress)
     if sidecar is not None:
-        yield Progress("sidecar", 1.0)
+        progress.stage("sidecar", 1.0, 1.0).at(1.0)
         write_sidecar(sidecar, kept, result, keeping.mark)
     return result, kept

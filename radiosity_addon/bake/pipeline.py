@@ -1,19 +1,17 @@
 """The bake as prose: unwrap, rasterise, solve, light the texels, encode.
 
-A generator: each step yields `Progress`, so that a headless caller may exhaust it and a
-window may advance it between two redraws. Closing it cancels; nothing outside was touched.
+Canceled or failed, nothing outside was touched.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Generator
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from ..base import BakeError, SceneError, UsageError
+from ..base import SILENT, BakeError, Progress, SceneError, UsageError
 from ..lightmap.images import LightmapPage, Seams, find_seams, texel_pages, turned_away
 from ..lightmap.lighting import (
     GatherSettings,
@@ -30,7 +28,7 @@ from ..numerics import Array, Scratch, tiles
 from ..options import BakeSettings
 from ..rays import RayCaster
 from ..scene import BakeObject, BakeScene
-from ..solver import Solution, SolverSettings, SolverState, solve_progress
+from ..solver import Solution, SolverSettings, SolverState, solve
 from ..solver.element_transport import Relightable
 from .bake_warnings import of_solution, small_objects
 from .estimate import refuse_before_unwrapping
@@ -42,12 +40,11 @@ from .result import (
     LightGroup,
     More,
     Picture,
-    Progress,
     TexelPictures,
     more_of,
     solver_part,
 )
-from .stages import staged, timed
+from .stages import timed
 from .texel_memory import refuse_too_large, share_out_memory, texel_scratch
 
 
@@ -76,21 +73,15 @@ PICTURE_SECONDS = 0.25
 """Time between two pictures of the solution: often enough to watch, too rarely to cost much."""
 
 
-def bake(bake_scene: BakeScene, settings: BakeSettings) -> Generator[Progress, None, BakeResult]:
+def bake(bake_scene: BakeScene, settings: BakeSettings, progress: Progress = SILENT) -> BakeResult:
     """Bake lightmaps for a scene.
 
     Parameters
     ----------
     bake_scene : BakeScene
     settings : BakeSettings
-
-    Yields
-    ------
     progress : Progress
-
-    Returns
-    -------
-    result : BakeResult
+        Gets stages, and pictures of what is solved and lit.
 
     Raises
     ------
@@ -99,34 +90,34 @@ def bake(bake_scene: BakeScene, settings: BakeSettings) -> Generator[Progress, N
     BakeError
         If the lightmaps cannot be laid out.
     """
-    result, _ = yield from _bake(bake_scene, settings, keep=are_wanted(bake_scene, settings))
+    result, _ = _bake(bake_scene, settings, are_wanted(bake_scene, settings), progress)
     return result
 
 
 def bake_and_keep(
-    bake_scene: BakeScene, settings: BakeSettings
-) -> Generator[Progress, None, tuple[BakeResult, KeptBake]]:
+    bake_scene: BakeScene, settings: BakeSettings, progress: Progress = SILENT
+) -> tuple[BakeResult, KeptBake]:
     """Bake lightmaps, and keep what lights them anew (`kept_bake.py`).
 
     Every lamp is asked for with all its shadow rays, those that are dark now too, so that scenes of
-    many lamps take longer than by `bake`. Parameters, yields and errors are those of `bake`.
+    many lamps take longer than by `bake`. Parameters and errors are those of `bake`.
 
     Raises
     ------
     UsageError
         If the method keeps no links, or the quantity is the residual.
     """
-    result, kept = yield from _bake(bake_scene, settings, keep=True)
+    result, kept = _bake(bake_scene, settings, True, progress)
     assert kept is not None
     return result, kept
 
 
 def _bake(
-    bake_scene: BakeScene, settings: BakeSettings, keep: bool
-) -> Generator[Progress, None, tuple[BakeResult, KeptBake | None]]:
+    bake_scene: BakeScene, settings: BakeSettings, keep: bool, progress: Progress
+) -> tuple[BakeResult, KeptBake | None]:
     """Bake, and keep what lights the scene anew if asked to."""
     if keep and settings.quantity == "residual":
-        raise UsageError("a residual is of all light together: bake another quantity to light it anew")
+        raise UsageError("a residual is of all light together: bake another quantity to relight it")
     if are_wanted(bake_scene, settings):
         check_groups(bake_scene, settings)
     seconds: dict[str, float] = {}
@@ -136,26 +127,26 @@ def _bake(
         raise SceneError("nothing to bake: give the scene a render-visible mesh with faces")
 
     refuse_before_unwrapping(bake_scene, settings)
-    yield Progress("unwrap", UNWRAP)
+    part = progress.stage("unwrap", UNWRAP, RASTERISE)
+    part.at(0.0)
     with timed(seconds, "unwrap"):
-        atlas = yield from _unwrap(bake_scene, baked, settings)
-    yield Progress("rasterise", RASTERISE)
+        atlas = _unwrap(bake_scene, baked, settings, part)
+    progress.stage("rasterise", RASTERISE, SOLVE).at(0.0)
     sizes = [page.resolution for page in atlas.pages]
     refuse_too_large(sizes, settings)
     scratch = texel_scratch(sizes, settings)
     with timed(seconds, "rasterise"):
         geometry = _texels(bake_scene, baked, atlas, scratch)
-    yield Progress("solve", SOLVE)
     with timed(seconds, "solve"):
-        solution = yield from solve_scene(bake_scene, quality.solver)
-    yield Progress("light", LIGHT)
+        solution = solve_scene(bake_scene, quality.solver, progress.part(SOLVE, LIGHT))
+    progress.stage("light", LIGHT, ENCODE).at(0.0)
     is_shown = share_out_memory(geometry, settings, keep)
     with timed(seconds, "light"):
         so_far = LightSoFar() if is_shown and len(geometry) <= MOST_SHOWN else None
-        steps = _texel_values(bake_scene, solution, geometry, quality.gather, settings, keep, so_far)
-        pictures = None if so_far is None else TexelPictures(so_far)
-        lit = yield from staged(steps, "light", LIGHT, ENCODE, pictures)
-        del so_far, pictures
+        look = None if so_far is None else TexelPictures(so_far).next
+        part = progress.stage("light", LIGHT, ENCODE, look)
+        lit = _texel_values(bake_scene, solution, geometry, quality.gather, settings, keep, so_far, part)
+        del so_far, look, part
     report = solver_part(solution.final_report(), used_settings(quality.solver), bake_scene.objects)
     from_behind = turned_away(
         baked, bake_scene.scene.areas, fronts=solution.triangle_irradiance, backs=solution.back_irradiance
@@ -163,7 +154,8 @@ def _bake(
     warnings = (*atlas.warnings, *from_behind, *of_solution(solution, quality.solver))
     solved = HierarchyReport(report, warnings)
     more = more_of(solution, baked, geometry, lit.light, settings.light)
-    return (yield from finish(bake_scene, settings, atlas, geometry, solved, lit, more, seconds))
+    part = progress.part(ENCODE, 1.0)
+    return finish(bake_scene, settings, atlas, geometry, solved, lit, more, seconds, part)
 
 
 def finish(
@@ -175,10 +167,11 @@ def finish(
     lit: TexelValues,
     more: More,
     seconds: dict[str, float],
-) -> Generator[Progress, None, tuple[BakeResult, KeptBake | None]]:
+    progress: Progress,
+) -> tuple[BakeResult, KeptBake | None]:
     """Put what texels hold on pages, and tell of the bake; what was kept goes on in the kept bake."""
     baked = baked_objects(bake_scene)
-    yield Progress("encode", ENCODE)
+    progress.stage("encode", 0.0, 0.0).at(0.0)
     with timed(seconds, "encode"):
         seams = _seams(bake_scene, lit.caster, geometry, settings)
         rings = max(DILATED, _padding(settings))
@@ -203,7 +196,7 @@ def finish(
     groups: tuple[LightGroup, ...] = ()
     if kept is not None and are_wanted(bake_scene, settings):
         with timed(seconds, "groups"):
-            groups = yield from staged(group_pages(kept, pages), "groups", ENCODE, 1.0)
+            groups = group_pages(kept, pages, progress=progress.stage("groups", 0.0, 1.0))
 
     report = dict(solved.report)
     if lit.light is not None:
@@ -236,8 +229,8 @@ def baked_objects(bake_scene: BakeScene) -> list[BakeObject]:
 
 
 def _unwrap(
-    bake_scene: BakeScene, baked: list[BakeObject], settings: BakeSettings
-) -> Generator[Progress, None, Atlas]:
+    bake_scene: BakeScene, baked: list[BakeObject], settings: BakeSettings, progress: Progress
+) -> Atlas:
     """Lay the objects' charts out on pages."""
     inputs = [
         AtlasInput(item.name, bake_scene.scene.triangles[item.rows], item.polygon, item.uv, item.texel_scale)
@@ -251,11 +244,7 @@ def _unwrap(
         Limits(settings.max_resolution, _padding(settings)),
         settings.unwrap_seconds,
     )
-    for step in build_atlas(inputs, options):
-        if isinstance(step, Atlas):
-            return step
-        yield Progress("unwrap", UNWRAP + (RASTERISE - UNWRAP) * step)
-    raise AssertionError("the atlas ended without a result")
+    return build_atlas(inputs, options, progress)
 
 
 def _padding(settings: BakeSettings) -> int:
@@ -278,24 +267,25 @@ def _texels(bake_scene: BakeScene, baked: list[BakeObject], atlas: Atlas, scratc
     return TexelGeometry(bake_scene.scene, uv, page_of_triangle, texels, rows, scratch)
 
 
-def solve_scene(bake_scene: BakeScene, settings: SolverSettings) -> Generator[Progress, None, Solution]:
+def solve_scene(bake_scene: BakeScene, settings: SolverSettings, progress: Progress) -> Solution:
     """Solve, with a picture of the solution at first, now and then, and at the end."""
-    steps = solve_progress(bake_scene.scene, settings)
-    state: SolverState | None = None
+    next_picture, last = 0.0, None
+
+    def look(state: SolverState | None) -> Picture | None:
+        nonlocal next_picture, last
+        last = last if state is None else state
+        if state is None or time.perf_counter() < next_picture:
+            return None
+        picture = _picture(state)
+        next_picture = time.perf_counter() + PICTURE_SECONDS
+        return picture
+
+    solving = progress.stage("solve", 0.0, 1.0, look)
+    solving.at(0.0)
+    solution = solve(bake_scene.scene, settings, solving)
     next_picture = 0.0
-    while True:
-        try:
-            fraction, state = next(steps)
-        except StopIteration as done:
-            if state is not None:
-                yield Progress("solve", LIGHT, _picture(state))
-            solution: Solution = done.value
-            return solution
-        picture = None
-        if time.perf_counter() >= next_picture:
-            picture = _picture(state)
-            next_picture = time.perf_counter() + PICTURE_SECONDS
-        yield Progress("solve", SOLVE + (LIGHT - SOLVE) * fraction, picture)
+    solving.at(1.0, last)
+    return solution
 
 
 def _picture(state: SolverState) -> Picture | None:
@@ -321,23 +311,25 @@ def _texel_values(
     settings: BakeSettings,
     keep: bool,
     so_far: LightSoFar | None,
-) -> Generator[float, None, TexelValues]:
+    progress: Progress,
+) -> TexelValues:
     """Compute the quantity asked for at all texels, and estimate the light's relative error."""
     if settings.quantity == "residual":
-        residual = yield from texel_residual(solution, geometry, gather)
+        residual = texel_residual(solution, geometry, gather, progress)
         return TexelValues(residual, solution.local_pass.caster)
     relightable = solution.relightable(bake_scene.emitter) if keep else None
     local = solution.local_pass if relightable is None else relightable.local
     if settings.relative_error is None:
-        light = yield from reconstruct(bake_scene.scene, local, geometry, gather, so_far)
+        light = reconstruct(bake_scene.scene, local, geometry, gather, so_far, progress)
     else:
-        light = yield from light_within(
+        light = light_within(
             bake_scene.scene,
             local,
             geometry,
             settings_for=lambda error: for_error(error).gather,
             error=settings.relative_error,
             so_far=so_far,
+            progress=progress,
         )
     if not keep:
         # Hits were looked up in it: it is large, and stays in memory.

@@ -176,7 +176,7 @@ def moved_objects(kept: KeptBake, bake_scene: BakeScene) -> tuple[str, ...]:
         If anything else differs, or the kept bake lacks what updating it needs.
     """
     if kept.moves is None:
-        raise SceneError("the kept bake can be lit anew, but nothing in it moved: bake again")
+        raise SceneError("the kept bake can be relit, but nothing in it moved: bake again")
     diff = compare(kept.record, scene_record(bake_scene))
     diff.refuse_all_but({Part.PLACE})
     return diff[Part.PLACE]

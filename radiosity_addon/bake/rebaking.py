@@ -6,21 +6,20 @@ are may differ. Lightmaps keep their layout. The result can be moved on.
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from dataclasses import replace
 
 import numpy as np
 
-from ..base import BakeWarning, SceneError
-from ..lightmap.update import AffectedTexels, PreviousLight, moved_steps
+from ..base import SILENT, BakeWarning, Progress, SceneError
+from ..lightmap.update import AffectedTexels, PreviousLight, light_after_move
 from ..numerics import Array
 from ..scene import BakeObject, BakeScene, Scene
 from ..solver.moved_elements import carried
 from .pipeline import TexelValues, baked_objects, finish
 from .plan import moved_objects
 from .relight import HierarchyReport, KeptBake, shown
-from .result import BakeResult, Progress, statistics
-from .stages import staged, timed
+from .result import BakeResult, statistics
+from .stages import timed
 
 RIGID = 1e-4
 """Edges that differ by no more than this part have kept their length."""
@@ -30,8 +29,8 @@ LIT = 0.97
 
 
 def bake_moved(
-    kept: KeptBake, bake_scene: BakeScene
-) -> Generator[Progress, None, tuple[BakeResult, KeptBake]]:
+    kept: KeptBake, bake_scene: BakeScene, progress: Progress = SILENT
+) -> tuple[BakeResult, KeptBake]:
     """Bake a scene in which some objects have moved since a bake was kept.
 
     Parameters
@@ -55,11 +54,12 @@ def bake_moved(
     seconds: dict[str, float] = {}
     names = moved_objects(kept, bake_scene)
     if not names:
-        raise SceneError("nothing has moved since the last bake; there is nothing to bake anew")
+        raise SceneError("nothing has moved since the last bake; there is nothing to update")
     moved = [item for item in bake_scene.objects if item.name in names]
     moves, settings = kept.moves, kept.settings
     assert moves is not None  # or `moved_objects` refuses
-    yield Progress("light", 0.0)
+    lighting = progress.stage("light", 0.0, LIT)
+    lighting.at(0.0)
     with timed(seconds, "light"):
         solved = carried(kept.solved, bake_scene.scene, bake_scene.emitter)
         geometry = kept.geometry.on(bake_scene.scene)
@@ -67,8 +67,7 @@ def bake_moved(
         offset = solved.local.caster.surface_offset
         affected = AffectedTexels.of(kept.geometry, geometry, rows, offset)
         before = PreviousLight(kept.lit, moves.traced, kept.solved.local)
-        steps = moved_steps(before, solved.local, affected)
-        light, local = yield from staged(steps, "light", 0.0, LIT)
+        light, local = light_after_move(before, solved.local, affected, lighting)
     values = shown(light, kept.reflectance, kept.emission, settings, geometry.scratch)
     materials = kept.reflectance, kept.emission
     lit = TexelValues(values, local.caster, light, replace(solved, local=local), materials)
@@ -78,8 +77,9 @@ def bake_moved(
     told = HierarchyReport(report, moves.solved.warnings)
     baked = baked_objects(bake_scene)
     more = statistics(baked, geometry, light, settings.light), None
-    finished = finish(bake_scene, settings, moves.atlas, geometry, told, lit, more, seconds)
-    result, after = yield from finished
+    result, after = finish(
+        bake_scene, settings, moves.atlas, geometry, told, lit, more, seconds, progress.part(LIT, 1.0)
+    )
     assert after is not None  # it keeps what it was given
     warnings = (*result.warnings, *_resized(moved, kept.bake_scene.scene, bake_scene.scene))
     return replace(result, warnings=warnings), after

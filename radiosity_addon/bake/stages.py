@@ -1,33 +1,10 @@
-"""Stages of a bake: their progress as a part of all of it, and how long each took."""
+"""How long each stage of a bake took."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Generator, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TypeVar
-
-from .result import Progress, TexelPictures
-
-T = TypeVar("T")
-
-
-def staged(
-    steps: Generator[float, None, T],
-    stage: str,
-    begin: float,
-    end: float,
-    pictures: TexelPictures | None = None,
-) -> Generator[Progress, None, T]:
-    """Run steps that yield the fraction they have done as one stage, from `begin` to `end` of the whole."""
-    while True:
-        try:
-            fraction = next(steps)
-        except StopIteration as done:
-            result: T = done.value
-            return result
-        texels = None if pictures is None else pictures.next()
-        yield Progress(stage, begin + (end - begin) * fraction, texels=texels)
 
 
 @contextmanager

@@ -7,23 +7,28 @@ from __future__ import annotations
 
 from .bake_warning import BakeWarning
 from .errors import BakeError, NothingToDoError, RadiosityError, SceneError, UsageError
-from .progress import drain, scaled
+from .progress import SILENT, Cancelled, Progress, Status
 from .similar_warnings import one_of_each
+from .steps import drain, staged
 from .ticks import linear_ticks, tick_label
 from .time_left import RemainingTime, duration
 
 __all__ = [
+    "SILENT",
     "BakeError",
     "BakeWarning",
+    "Cancelled",
     "NothingToDoError",
+    "Progress",
     "RadiosityError",
     "RemainingTime",
     "SceneError",
+    "Status",
     "UsageError",
     "drain",
     "duration",
     "linear_ticks",
     "one_of_each",
-    "scaled",
+    "staged",
     "tick_label",
 ]

@@ -1,29 +1,98 @@
-"""Work that yields the fraction it has done: run to its end, or as a part of more."""
+"""How far long work is: one object, passed down to all who do it, that also tells them to stop."""
 
 from __future__ import annotations
 
-from collections.abc import Generator
-from typing import TypeVar
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
 T = TypeVar("T")
 
 
-def drain(steps: Generator[float, None, T]) -> T:
-    """Run steps to their end and return their result."""
-    while True:
-        try:
-            next(steps)
-        except StopIteration as done:
-            result: T = done.value
-            return result
+class Cancelled(BaseException):
+    """Nobody wants the work any more. Not an `Exception`: it is not handled, only cleaned up after."""
 
 
-def scaled(steps: Generator[float, None, T], begin: float, end: float) -> Generator[float, None, T]:
-    """Run steps as a part of a whole: their fractions go from `begin` to `end`."""
-    while True:
-        try:
-            fraction = next(steps)
-        except StopIteration as done:
-            result: T = done.value
-            return result
-        yield begin + (end - begin) * fraction
+@dataclass(frozen=True)
+class Status:
+    """Where a job is.
+
+    Attributes
+    ----------
+    stage : str
+    fraction : float
+        Of the whole job, 0 to 1.
+    picture
+        What the result looks like so far, now and then; else None.
+    """
+
+    stage: str
+    fraction: float
+    picture: Any = None
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Tells a listener how far work is. May be used from any thread.
+
+    Attributes
+    ----------
+    listener : callable or None
+        Takes a `Status`. Raises `Cancelled` to stop the work. None: nobody listens.
+    name : str
+        The stage.
+    begin, end : float
+        The part of the whole that the work is.
+    look : callable or None
+        Makes the picture, or None, of what is shown to `at`, or of None.
+    in_window : bool
+        Whether a window is drawn meanwhile: no step may hold Python's lock for long.
+    """
+
+    listener: Callable[[Status], None] | None = None
+    name: str = ""
+    begin: float = 0.0
+    end: float = 1.0
+    look: Callable[[Any], Any] | None = None
+    in_window: bool = False
+
+    def at(self, fraction: float, shown: object = None) -> None:
+        """Say that a fraction of this part, 0 to 1, is done; `shown` is what a picture can be made of.
+
+        Raises
+        ------
+        Cancelled
+            If the job was canceled.
+        """
+        if self.listener is not None:
+            picture = None if self.look is None else self.look(shown)
+            self.listener(Status(self.name, self._of_whole(fraction), picture))
+
+    def part(self, begin: float, end: float) -> Progress:
+        """Return the progress of work that goes from one fraction of this part to another."""
+        return replace(self, begin=self._of_whole(begin), end=self._of_whole(end))
+
+    def stage(
+        self, name: str, begin: float, end: float, look: Callable[[Any], Any] | None = None
+    ) -> Progress:
+        """Return the progress of a stage, which has a name and perhaps pictures."""
+        return replace(self.part(begin, end), name=name, look=look)
+
+    def each(self, items: Sequence[T]) -> Iterator[tuple[T, Progress]]:
+        """Go through items that take equally long, each with the part that it is."""
+        for number, item in enumerate(items):
+            yield item, self.part(number / len(items), (number + 1) / len(items))
+
+    def turns(self, share: float) -> Iterator[Progress]:
+        """Return the parts of turns without end: each takes a `share` of what is left."""
+        left = 1.0
+        while True:
+            yield self.part(1.0 - left, 1.0 - (1.0 - share) * left)
+            left *= 1.0 - share
+
+    def _of_whole(self, fraction: float) -> float:
+        return self.begin + (self.end - self.begin) * fraction
+
+
+SILENT = Progress()
+"""For work that nobody watches or stops."""

@@ -15,7 +15,7 @@ from .files import ownership
 from .operators import cleaning, edit_guard
 from .overlays import overlay_view
 from .relight import lightmap_versions
-from .session import state
+from .session import facts, state
 
 ALWAYS: tuple[tuple[str, Callable[..., None]], ...] = (
     ("load_pre", ownership.forget_unsaved),
@@ -34,6 +34,10 @@ ALWAYS: tuple[tuple[str, Callable[..., None]], ...] = (
 
 WITH_A_WINDOW: tuple[tuple[str, Callable[..., None]], ...] = (
     ("load_pre", edit_guard.forget),
+    ("load_post", facts.outdate),
+    ("undo_post", facts.outdate),
+    ("redo_post", facts.outdate),
+    ("depsgraph_update_post", facts.outdate),
     ("depsgraph_update_post", overlay_view.note_change),
     ("depsgraph_update_post", edit_guard.note),
 )

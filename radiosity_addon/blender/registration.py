@@ -10,11 +10,12 @@ import bpy
 
 from . import handlers
 from .datablocks import bake_record
-from .operators import bake_operators, cleaning, light_group_operators, relight_operators
+from .operators import bake_operators, cleaning, light_group_operators, relight_operators, setting_operators
 from .overlays import overlay_properties, overlay_view
-from .panels import bake_panel, check_panel, light_group_panels, object_panel
+from .panels import bake_panel, check_panel, light_group_panels, object_panel, overlay_panel
 from .relight import live_switch, relight_properties
 from .scene_records import object_roles
+from .session import facts
 from .session.state import session
 from .settings import light_group_properties, preferences, preset_menu, properties
 
@@ -23,11 +24,13 @@ CLASSES = (
     *bake_operators.CLASSES,
     *relight_operators.CLASSES,
     *light_group_operators.CLASSES,
+    *setting_operators.CLASSES,
     *preset_menu.CLASSES,
     *bake_panel.CLASSES,
     *light_group_panels.CLASSES,
     *check_panel.CLASSES,
     *object_panel.CLASSES,
+    *overlay_panel.CLASSES,
     *cleaning.CLASSES,
 )
 
@@ -50,6 +53,7 @@ def register() -> None:
             _undo.append(partial(bpy.utils.unregister_class, cls))
         preset_menu.register()
         _undo.append(preset_menu.unregister)
+        _undo.append(facts.stop)
         _undo.append(session.stop_running)
     except BaseException:
         unregister()

@@ -1,4 +1,4 @@
-"""The command line's parser, and what it prints.
+"""The command line's parser and output.
 
 Needs neither Blender nor NumPy.
 """

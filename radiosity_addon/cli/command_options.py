@@ -1,4 +1,4 @@
-"""Options of the command line alone: what a command does besides the bake."""
+"""Options that only the command line has."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class _EveryCommand:
 
 
 BAKE_COMMAND = options_of(_BakeCommand)
-"""Options of the verb `bake` by their name in the parsed request."""
+"""Options of the command `bake` by their name in the parsed request."""
 
 EVERY_COMMAND = options_of(_EveryCommand)
-"""Options of both verbs."""
+"""Options of both commands."""

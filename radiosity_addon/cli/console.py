@@ -1,4 +1,4 @@
-"""What the command line prints: progress, where things are, warnings."""
+"""Output of the command line: progress, paths, warnings."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ STEP = 10
 
 
 class Console:
-    """Our own lines on standard output, with Blender's chatter kept off it.
+    """Our own lines on standard output, without Blender's output.
 
     While entered, file descriptor 1 leads to the null device: Blender's C code writes
     a line there for every sample it renders. Our lines go to a copy of the original.
@@ -66,7 +66,7 @@ class Console:
             self._stream = sys.stdout
 
     def progress(self, stage: str, fraction: float) -> None:
-        """Show the stage, how much of the whole is done (0 to 1), and about how long it still takes."""
+        """Show the stage, the overall progress (0 to 1), and the estimated time left."""
         if self.quiet:
             return
         seconds = self._remaining.update(fraction)
@@ -120,7 +120,7 @@ def _flush_everything() -> None:
 
 
 def summary(where: str, files: Iterable[tuple[str, str]], report: dict[str, Any]) -> list[str]:
-    """Return the closing lines of a bake: where things are, how long, what to look at.
+    """Return the closing lines of a bake: paths, time, and warnings.
 
     where: The output folder as the user named it.
     files pairs of (name, what it is).

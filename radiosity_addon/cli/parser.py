@@ -1,4 +1,4 @@
-"""The command line's words as a request: one parser for `python -m`, Blender's `--command` and build.py.
+"""The command line's parser, shared by `python -m`, Blender's `--command` and build.py.
 
 Parsing needs neither Blender nor NumPy.
 """
@@ -20,7 +20,7 @@ BUNDLED_OUTPUT = Path("out/cornell")
 
 
 def build_parser(prog: str) -> argparse.ArgumentParser:
-    """Return the parser of both verbs; it raises `UsageError` where argparse would exit."""
+    """Return the parser of both commands; it raises `UsageError` where argparse would exit."""
     parser = _Parser(prog=prog, description="Bake radiosity lightmaps.", allow_abbrev=False)
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="{bake,restore}")
     _add_bake(verbs.add_parser("bake", help="bake lightmaps", allow_abbrev=False))
@@ -68,7 +68,7 @@ def check_keeping(request: argparse.Namespace, settings: BakeSettings) -> None:
     if request.keep and settings.quantity == "residual":
         raise UsageError("--keep: a residual is of all light together; bake another quantity")
     if request.relight and request.plot is not None:
-        raise UsageError("--relight solves nothing whose history --plot could draw")
+        raise UsageError("--relight solves nothing, so --plot has no history to draw")
 
 
 def check_plot(plot: Path | None) -> None:
@@ -94,8 +94,9 @@ def _add_bake(parser: argparse.ArgumentParser) -> None:
     )
     _add_options(parser, (*BAKE_COMMAND.values(), *EVERY_COMMAND.values()))
     for section in SECTIONS:
-        group = parser.add_argument_group(section)
-        _add_options(group, [option for option in OPTIONS.values() if option.section == section])
+        options = [option for option in OPTIONS.values() if option.section == section]
+        if options:
+            _add_options(parser.add_argument_group(section), options)
 
 
 def _add_restore(parser: argparse.ArgumentParser) -> None:
@@ -113,7 +114,7 @@ def _add_restore(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_options(group: Any, options: Iterable[Option]) -> None:
-    """Add options to a parser or a group of it; of one and what replaces it only one may be given."""
+    """Add options to a parser or a group of it; of an option and its replacement only one may be given."""
     options = list(options)
     replaced = {option.instead_of for option in options}
     exclusive: dict[str, Any] = {}
@@ -144,7 +145,7 @@ def _reading(option: Option) -> dict[str, Any]:
 
 
 def _help(option: Option) -> str:
-    """Return the description as the help has it, with the default, and the methods that have the option."""
+    """Return the description for the help, with the default and the methods that have the option."""
     text = option.description
     text = text[0].lower() + text[1:] if text[1].islower() else text
     if option.methods:

@@ -1,4 +1,4 @@
-"""Words of a command line as paths and names: what no file or object can be called is refused at once."""
+"""Paths and names on the command line; impossible ones are refused at once."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def escaped(line: str) -> str:
 
 
 def _check_text(word: str, what: str) -> None:
-    """Refuse what is empty, holds a NUL or is not UTF-8."""
+    """Refuse words that are empty, contain a NUL or are not UTF-8."""
     if not word:
         raise ArgumentTypeError(f"the {what} is empty")
     if "\0" in word:

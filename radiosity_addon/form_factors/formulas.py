@@ -1,4 +1,4 @@
-"""Form factors, one formula a function: the fraction of what leaves a receiver that meets a source.
+"""Form factors, one function per formula: the fraction of light leaving a receiver that meets a source.
 
 | function | from | to | how |
 |---|---|---|---|
@@ -52,5 +52,4 @@ def disk_factor(
     # The two cosines' lengths go into one division by d².
     weight = np.maximum(cosine_r, 0) * np.maximum(-cosine_s, 0) * areas
     divisor = square * (np.pi * square + areas)
-    factors: FloatArray = weight / np.where(divisor > 0, divisor, 1)
-    return factors
+    return weight / np.where(divisor > 0, divisor, 1)

@@ -1,4 +1,4 @@
-"""Two points that look at each other: geometry term, kernel, throughput, visibility.
+"""Pairs of points: geometry term, kernel, throughput, visibility.
 
 All are symmetric in the two points: what leaves one for the other finds the same way back.
 Whatever the solver samples between two surfaces is one of these.
@@ -40,7 +40,7 @@ def geometry_term(points: Array, normals: Array, other_points: Array, other_norm
 
 
 def ray_geometry_term(cosine: Array, other_cosine: Array, distance: Array) -> Array:
-    """Return G [1/m²] of rays whose cosines and lengths are known already.
+    """Return G [1/m²] of rays with known cosines and lengths.
 
     cosine, other_cosine (...) float: Between the ray and the normals at its two ends; negative ones count as
         0.
@@ -52,7 +52,7 @@ def ray_geometry_term(cosine: Array, other_cosine: Array, distance: Array) -> Ar
 
 
 def kernel(points: Array, normals: Array, other_points: Array, other_normals: Array) -> Array:
-    """Return κ = G/π [1/m²], the share of a matte surface's light that takes this way, per area.
+    """Return κ = G/π [1/m²], the share of a matte surface's light that travels between the points, per area.
 
     B(x) = E(x) + ρ(x) ∫ B(x') κ(x, x') V(x, x') dA' (handout (2.25)). Parameters as for
     `geometry_term`.
@@ -78,7 +78,7 @@ def throughput(geometry: Array, area: Array | float, other_area: Array | float) 
 def visibility_of(
     caster: RayCaster, points: Array, normals: Array, other_points: Array, other_normals: Array
 ) -> Array:
-    """Return V of pairs of points on surfaces: whether nothing lies between them, or how much passes.
+    """Return V of pairs of points on surfaces: the share of light that passes between them.
 
     Both ends leave their surfaces by the caster's offset, so that no surface hides itself.
     The geometry term handles pairs that face away from each other.

@@ -1,4 +1,4 @@
-"""What share of a point's hemisphere a shape fills, weighted by the cosine: closed forms.
+"""Closed forms for the cosine-weighted share of a point's hemisphere that a polygon fills.
 
 The form factor from an oriented point to a shape is its projected solid angle over π. By
 Stokes it is an integral along the outline, F = 1/(2π) n · ∮ ω × dω (Lambert 1760; handout
@@ -85,7 +85,7 @@ def _chunk_factors(
     turn = np.zeros(corners.shape[2], dtype=corners.dtype)
     rows = np.flatnonzero(whole)
     if 2 * len(rows) > len(turn):
-        # Copying half the rows out costs more than working on the others in vain.
+        # Copying half of the rows costs more than processing the others needlessly.
         turn = np.where(whole, _closed_turn(corners, normal), 0.0)
     elif len(rows):
         turn[rows] = _closed_turn(corners.take(rows, axis=2), normal.take(rows, axis=1))
@@ -123,8 +123,7 @@ def edge_turn(start: Float64Array, end: Float64Array, normal: Float64Array) -> F
     length = np.sqrt(cross_x * cross_x + cross_y * cross_y + cross_z * cross_z)
     angle = np.arctan2(length, _dot(start, end))
     along = cross_x * normal[0] + cross_y * normal[1] + cross_z * normal[2]
-    turn: Float64Array = along * (angle / np.where(length > 0.0, length, 1.0))
-    return turn
+    return along * (angle / np.where(length > 0.0, length, 1.0))
 
 
 def _cut_turn(

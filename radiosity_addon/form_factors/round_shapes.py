@@ -16,7 +16,7 @@ PANEL = 16
 """Gauss nodes a panel of an ellipse's arc; also the first number of nodes on a whole one."""
 
 MAX_NODES = 4096
-"""Nodes on an ellipse before a point is taken as it is: it lies within 1/500 of the rim."""
+"""Nodes on an ellipse at most; points within 1/500 of the rim reach this limit."""
 
 ELLIPSE_TOLERANCE = 1e-8
 """Change of an ellipse's factor between a number of nodes and its double that ends the doubling."""
@@ -26,7 +26,7 @@ _CHUNK_NODES = 1 << 18
 
 
 def cap_cosine(cosine: npt.ArrayLike, sine_half: npt.ArrayLike) -> Float64Array:
-    """Return what stands for cosθ where a lamp is a round cap instead of a point.
+    """Return the factor that replaces cosθ where a lamp is a round cap instead of a point.
 
     The projected solid angle of a spherical cap of half angle α about a direction at θ from
     the normal, clipped to the horizon, divided by π sin²α. It is cosθ while the whole cap is
@@ -104,7 +104,7 @@ def point_to_ellipse(
 def _arc_factor(
     offset: Float64Array, normals: Float64Array, u: Float64Array, v: Float64Array, nodes: int, cut: bool
 ) -> Float64Array:
-    """Return (m,) factors from the arc above the horizon, or the whole ellipse, with so many nodes."""
+    """Return (m,) factors from the arc above the horizon, or the whole ellipse, with a number of nodes."""
     height, rise_u, rise_v = np.einsum("ij,ij->i", offset, normals), normals @ u, normals @ v
     summit = np.arctan2(rise_v, rise_u)
     if cut:
@@ -130,15 +130,13 @@ def _arc_factor(
         ends = summit + np.array([[-1.0], [1.0]]) * half
         rim = offset + np.cos(ends)[..., None] * u + np.sin(ends)[..., None] * v
         total += _horizon_turn(rim[1], rim[0], normals)
-    factor: Float64Array = -total / (2.0 * np.pi)
-    return factor
+    return -total / (2.0 * np.pi)
 
 
 def _horizon_turn(start: Float64Array, end: Float64Array, normals: Float64Array) -> Float64Array:
     """Return the angle about the normal from one direction in the horizon to another, within ±π."""
     sine = np.einsum("ij,ij->i", np.cross(start, end), normals)
-    angle: Float64Array = np.arctan2(sine, np.einsum("ij,ij->i", start, end))
-    return angle
+    return np.arctan2(sine, np.einsum("ij,ij->i", start, end))
 
 
 @lru_cache(maxsize=16)

@@ -29,7 +29,7 @@ BLIND_ERROR = 1e-3
 """Quadrature error between nodes next to an edge, in squares of the interval (measured)."""
 
 BLIND_BISECTIONS = 6
-"""Bisections on that suspicion alone; it would cut a needle's edges to dust."""
+"""Limit of bisections for that reason alone, which would otherwise cut a needle's edges into many parts."""
 
 MAX_BISECTIONS = 24
 """Ends the bisection at singular points; intervals there are below 1e-7 of their edge."""
@@ -116,7 +116,7 @@ def _chunk_factors(receivers: Float64Array, sources: Float64Array) -> Float64Arr
     apart = np.linalg.norm(inner.mean(axis=1) - centre, axis=1)
     outer_radius = _radius(outer, centre)
     inner_radius = _radius(inner, inner.mean(axis=1))
-    # Distances to the other's plane; what is within rounding of it lies in it.
+    # Distances to the other's plane; corners within rounding of it lie in it.
     noise = IN_PLANE * (apart + outer_radius + inner_radius)[:, None]
     outer_height = _heights(outer, inner[:, 0], inner_normal, noise)
     inner_height = _heights(inner, outer[:, 0], outer_normal, noise)
@@ -150,8 +150,7 @@ def _chunk_factors(receivers: Float64Array, sources: Float64Array) -> Float64Arr
     if len(rows):
         mutual[rows] = _overlap_area(outer[rows], inner[rows], inner_normal[rows]) / outer_area[rows]
     share = np.divide(outer_area, area_r, out=np.zeros_like(area_r), where=area_r > 0.0)
-    factors: Float64Array = np.clip(mutual, 0.0, 1.0) * share
-    return factors
+    return np.clip(mutual, 0.0, 1.0) * share
 
 
 def _normals(triangles: Float64Array) -> tuple[Float64Array, Float64Array]:
@@ -164,8 +163,7 @@ def _normals(triangles: Float64Array) -> tuple[Float64Array, Float64Array]:
 def _radius(triangles: Float64Array, centres: Float64Array) -> Float64Array:
     """Return the distance (m,) from each center to its triangle's farthest corner."""
     arms = triangles - centres[:, None]
-    radius: Float64Array = np.sqrt(np.einsum("ijk,ijk->ij", arms, arms).max(axis=1))
-    return radius
+    return np.sqrt(np.einsum("ijk,ijk->ij", arms, arms).max(axis=1))
 
 
 def _heights(
@@ -183,8 +181,7 @@ def _cubature(outer: Float64Array, outer_normal: Float64Array, inner: Float64Arr
     spread = (count, len(_CUBATURE_WEIGHTS), 3)
     normals = np.broadcast_to(outer_normal[:, None], spread).reshape(-1, 3)
     factors = point_to_polygon(points, normals, np.repeat(inner, spread[1], axis=0))
-    mean: Float64Array = weighted_sums(factors.reshape(count, -1), _CUBATURE_WEIGHTS)
-    return mean
+    return weighted_sums(factors.reshape(count, -1), _CUBATURE_WEIGHTS)
 
 
 def _along_needles(outer: Float64Array, outer_normal: Float64Array, inner: Float64Array) -> Float64Array:
@@ -207,10 +204,7 @@ def _along_needles(outer: Float64Array, outer_normal: Float64Array, inner: Float
     points = start[:, None] + at[..., None] * side[:, None] + 0.5 * height[..., None] * off[:, None]
     normals = np.repeat(outer_normal, NEEDLE_POINTS, axis=0)
     factors = point_to_polygon(points.reshape(-1, 3), normals, np.repeat(inner, NEEDLE_POINTS, axis=0))
-    mean: Float64Array = weighted_sums(
-        factors.reshape(count, -1), np.full(NEEDLE_POINTS, 1.0 / NEEDLE_POINTS)
-    )
-    return mean
+    return weighted_sums(factors.reshape(count, -1), np.full(NEEDLE_POINTS, 1.0 / NEEDLE_POINTS))
 
 
 def weighted_sums(values: Float64Array, weights: Float64Array) -> Float64Array:
@@ -233,8 +227,7 @@ def _overlap_area(polygons: Float64Array, triangles: Float64Array, normals: Floa
         polygons = clip_half_plane(polygons, np.einsum("ijk,ik->ij", polygons - start[:, None], inward))
     arms = polygons[:, 1:] - polygons[:, :1]
     total = np.cross(arms[:, :-1], arms[:, 1:]).sum(axis=1)
-    area: Float64Array = 0.5 * np.sqrt(np.einsum("ij,ij->i", total, total))
-    return area
+    return 0.5 * np.sqrt(np.einsum("ij,ij->i", total, total))
 
 
 def _outline_factor(outer: Float64Array, inner: Float64Array, area: Float64Array) -> Float64Array:
@@ -278,8 +271,7 @@ def _square_distances(points: Float64Array, polygons: Float64Array) -> Float64Ar
     square = np.einsum("ijk,ijk->ij", edge, edge)
     foot = -np.einsum("ijk,ijk->ij", start, edge) / np.where(square > 0.0, square, 1.0)
     nearest = start + np.clip(foot, 0.0, 1.0)[..., None] * edge
-    distances: Float64Array = np.einsum("ijk,ijk->ij", nearest, nearest).min(axis=1)
-    return distances
+    return np.einsum("ijk,ijk->ij", nearest, nearest).min(axis=1)
 
 
 def _edge_integrals(points: Float64Array, direction: Float64Array, polygons: Float64Array) -> Float64Array:
@@ -318,5 +310,4 @@ def _offsets(end: list[Float64Array], *points: Float64Array) -> list[Float64Arra
 
 def _half_log(square: Float64Array) -> Float64Array:
     """Return ln r of r², with a finite stand-in at r = 0, where ln r is multiplied by 0."""
-    half_log: Float64Array = 0.5 * np.log(np.maximum(square, np.finfo(float).tiny))
-    return half_log
+    return 0.5 * np.log(np.maximum(square, np.finfo(float).tiny))

@@ -14,10 +14,10 @@ from .light import Emitter, Float64Array, Rays, Samples, directions_to, row_cosi
 AREA_SHAPES = ("rectangle", "ellipse")
 
 _NODES = 10
-"""Of Gauss and Legendre, each way over the part of a lamp that a point sees through the soft-box."""
+"""Gauss-Legendre nodes, along each axis, over the part of a lamp that a point sees through the soft-box."""
 
 _NARROWEST = 1e-3
-"""Spreads [rad] below this shine as it does, all but in parallel: a millimeter of blur at a meter."""
+"""Smallest spread [rad], nearly parallel light: a millimeter of blur at a meter."""
 
 _NODES_CHUNK = 1 << 9
 """Points integrated at a time; temporaries stay in the processor's cache."""
@@ -68,9 +68,8 @@ class AreaLight(Emitter):
 
     @property
     def _facing(self) -> Float64Array:
-        """A vector along the side it shines to."""
-        facing: Float64Array = np.cross(np.asarray(self.edge_u), np.asarray(self.edge_v))
-        return facing
+        """A vector toward the side that it lights."""
+        return np.cross(np.asarray(self.edge_u), np.asarray(self.edge_v))
 
     @property
     def flux(self) -> Float64Array:
@@ -102,7 +101,7 @@ class AreaLight(Emitter):
         return point_to_polygon(points, normals, np.broadcast_to(corners, (len(points), 4, 3))) / self.area
 
     def shadow_rays(self, points: Float64Array, normals: Float64Array, u: Samples) -> Rays:
-        """Return rays to samples uniform over what shines of the lamp (see `Lamp.shadow_rays`)."""
+        """Return rays to samples uniform over the emitting area of the lamp (see `Lamp.shadow_rays`)."""
         if not self._is_open:
             directions, distances, weights = self._narrow_rays(points, normals, np.asarray(u, np.float64))
             return directions, distances, weights / u.shape[1]
@@ -118,8 +117,7 @@ class AreaLight(Emitter):
         """Map (…, 2) points of the unit square to uniform points of the lamp, (…, 3)."""
         centre, half_u, half_v = self._half_axes()
         across = concentric_disk(square) if self.shape == "ellipse" else 2.0 * square - 1.0
-        points: Float64Array = centre + across @ np.stack([half_u, half_v])
-        return points
+        return centre + across @ np.stack([half_u, half_v])
 
     @property
     def _is_open(self) -> bool:
@@ -128,17 +126,15 @@ class AreaLight(Emitter):
 
     @property
     def _normal(self) -> Float64Array:
-        normal: Float64Array = self._facing / np.linalg.norm(self._facing)
-        return normal
+        return self._facing / np.linalg.norm(self._facing)
 
     def _through_slats(self, across: Float64Array, ahead: Float64Array) -> Float64Array:
-        """Return the share of radiance sent `across` for so much `ahead`; over all angles its power is 1."""
+        """Return the share of radiance by `across` and `ahead`; its power over all angles is 1."""
         half = 0.5 * self.spread
         # tan α − α, whose terms cancel for a small α.
         excess = np.tan(half) - half if half > 0.05 else half**3 / 3.0 * (1.0 + 0.4 * half * half)
         tangent = across / np.where(ahead > 0.0, ahead, np.inf)
-        share: Float64Array = np.where(ahead > 0.0, np.maximum(np.tan(half) - tangent, 0.0) / excess, 0.0)
-        return share
+        return np.where(ahead > 0.0, np.maximum(np.tan(half) - tangent, 0.0) / excess, 0.0)
 
     def _narrow_irradiance(self, points: Float64Array, normals: Float64Array) -> Float64Array:
         """Integrate over the part of the lamp that shines on each point, which the slats end smoothly."""
@@ -160,8 +156,7 @@ class AreaLight(Emitter):
         height = above @ self._normal
         aside = np.linalg.norm(above - height[:, None] * self._normal, axis=1)
         circle = max(np.linalg.norm(half_u + half_v), np.linalg.norm(half_u - half_v))
-        shines: npt.NDArray[np.bool_] = (height > 0) & (aside < height * np.tan(0.5 * self.spread) + circle)
-        return shines
+        return (height > 0) & (aside < height * np.tan(0.5 * self.spread) + circle)
 
     def _narrow_rays(self, points: Float64Array, normals: Float64Array, u: Float64Array) -> Rays:
         """Return rays to (n, k, 2) points of the square, carried onto what shines; weights not yet by k.

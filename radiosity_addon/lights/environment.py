@@ -22,10 +22,10 @@ CELLS = (64, 128)
 """Rows and columns of the even part: cells of 2.8°."""
 
 BRIGHT = 4.0
-"""Radiance above this many times the sphere's mean is a patch's."""
+"""Pixels above this many times the sphere's mean belong to patches."""
 
 PATCH_RADIUS = np.radians(15.0)
-"""A patch reaches so far around its brightest pixel: its light comes from about one direction and
+"""A patch reaches this far around its brightest pixel: its light comes from about one direction and
 has about one color."""
 
 MAX_PATCHES = 12
@@ -66,8 +66,7 @@ class EnvironmentImage(EnvironmentLight):
 
     def relative(self, directions: Float64Array) -> Float64Array:
         """Return (...) radiance by directions (..., 3), relative to `radiance`."""
-        values: Float64Array = np.asarray(self.image).ravel()[cell_of(directions, self.shape)]
-        return values
+        return np.asarray(self.image).ravel()[cell_of(directions, self.shape)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,12 +98,11 @@ class SkyPatch(Lamp):
     def direction(self) -> Float64Array:
         """(3,) the way its light travels, in the mean, of length 1."""
         mean = -(np.asarray(self.share) @ self._toward())
-        unit: Float64Array = mean / np.linalg.norm(mean)
-        return unit
+        return mean / np.linalg.norm(mean)
 
     @property
     def half_angle(self) -> float:
-        """How far its farthest corner is from `direction` [rad]."""
+        """Angle between its farthest corner and `direction` [rad]."""
         low, high, left, right = np.asarray(self.bounds).T
         corners = np.concatenate(
             [_directions(np.sin(up), azimuth) for up in (low, high) for azimuth in (left, right)]
@@ -143,8 +141,7 @@ def cell_of(directions: Float64Array, shape: tuple[int, int]) -> npt.NDArray[np.
     azimuth = np.arctan2(directions[..., 1], directions[..., 0])
     row = np.clip(((0.5 + latitude / np.pi) * height).astype(np.int64), 0, height - 1)
     column = np.clip(((0.5 - azimuth / (2.0 * np.pi)) * width).astype(np.int64), 0, width - 1)
-    cells: npt.NDArray[np.int64] = row * width + column
-    return cells
+    return row * width + column
 
 
 def cell_directions(shape: tuple[int, int]) -> Float64Array:
@@ -165,12 +162,11 @@ def pixel_bounds(shape: tuple[int, int], window: Bounds = WHOLE) -> Float64Array
 def solid_angles(bounds: Float64Array) -> Float64Array:
     """Return (m,) [sr] of pixels' bounds."""
     low, high, left, right = bounds.T
-    angles: Float64Array = (np.sin(high) - np.sin(low)) * (right - left)
-    return angles
+    return (np.sin(high) - np.sin(low)) * (right - left)
 
 
 def bright_patches(pixels: Float64Array) -> tuple[Float64Array, list[npt.NDArray[np.int64]]]:
-    """Split off what is far brighter than the mean.
+    """Split off pixels that are far brighter than the mean.
 
     pixels (h, w, 3): Radiance of the whole sphere.
     Returns excess (h w, 3): What of each pixel's radiance is a patch's.
@@ -222,7 +218,7 @@ def even_part(pixels: Float64Array, name: str = "") -> list[EnvironmentLight]:
 
 
 class SkyTable:
-    """What rays that leave the scene find, by cell.
+    """The light that rays leaving the scene meet, by cell.
 
     strengths (l, 3) or None [W/m²/sr]: What the lights have instead of their own strengths.
     """

@@ -20,7 +20,7 @@ Samples = npt.NDArray[np.floating[Any]]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Light:
-    """What lights a scene from outside its surfaces; `name` is for messages only."""
+    """A light other than the scene's surfaces; `name` is for messages only."""
 
     name: str = ""
 
@@ -126,5 +126,4 @@ def directions_to(offsets: Float64Array) -> tuple[Float64Array, Float64Array]:
 
 def row_cosines(directions: Float64Array, normals: Float64Array) -> Float64Array:
     """Return (n, k) cosines above the horizon of (n, k, 3) directions about (n, 3) normals, else 0."""
-    cosines: Float64Array = np.maximum(np.einsum("ikj,ij->ik", directions, normals), 0.0)
-    return cosines
+    return np.maximum(np.einsum("ikj,ij->ik", directions, normals), 0.0)

@@ -38,7 +38,7 @@ _EDGE_CHUNK = 1 << 10
 
 
 class _Bulb(Emitter):
-    """What point and spot lamps share: intensity power/4π, a radius and an attenuation by direction.
+    """Common part of point and spot lamps: intensity power/4π, a radius and an attenuation by direction.
 
     With soft falloff the lamp is a disk of that radius facing the receiver, of radiance
     I/(π r²): H = I cosθ / (d² + r²) while all of it is up. Without, a sphere of the same
@@ -252,8 +252,7 @@ class SpotLight(_Bulb):
         if self.blend == 0.0:
             return np.where(above > 0.0, 1.0, 0.0)
         step = np.clip(above / (self.blend * self._opening), 0.0, 1.0)
-        smooth: Float64Array = step * step * (3.0 - 2.0 * step)
-        return smooth
+        return step * step * (3.0 - 2.0 * step)
 
     def unit_irradiance(self, points: Float64Array, normals: Float64Array) -> Float64Array:
         """Return the irradiance per power; where the cone's edge crosses the lamp, averaged over it."""

@@ -61,7 +61,7 @@ class SunLight(Lamp):
         return np.asarray(self.irradiance, dtype=np.float64)
 
     def unit_irradiance(self, points: Float64Array, normals: Float64Array) -> Float64Array:  # noqa: ARG002
-        """Return cosθ, or what the cap keeps of it at the horizon (see `Lamp.unit_irradiance`)."""
+        """Return cosθ, reduced where the cap is cut by the horizon (see `Lamp.unit_irradiance`)."""
         return cap_cosine(-(normals @ np.asarray(self.direction)), np.sin(0.5 * self.angle))
 
     def shadow_rays(self, points: Float64Array, normals: Float64Array, u: Samples) -> Rays:

@@ -9,7 +9,7 @@ from .arrays import Array
 from .bilinear import texels_around
 from .discrete import pick_in_rows, pick_in_runs, running_sums
 from .meshes import connected_components, connected_faces, numbered, weld
-from .parallel import chunk_steps, for_chunks, thread_count
+from .parallel import for_chunks, map_chunks, thread_count
 from .polygons import areas, clip_half_plane, edge_distances
 from .radiometry import (
     HEMISPHERE,
@@ -42,6 +42,7 @@ from .sampling import (
     uniform_cone,
 )
 from .scratch import TILE, Rows, Scratch, folder, marked, row_numbers, tiles, trim
+from .streams import LAMP_STEP, LIGHT_STEP, SHADOW_STEP, Stream
 from .triangles import (
     WHOLE_TRIANGLE,
     double_area_vectors,
@@ -56,15 +57,18 @@ from .triangles import (
 
 __all__ = [
     "HEMISPHERE",
+    "LAMP_STEP",
+    "LIGHT_STEP",
     "MAX_REFLECTANCE",
+    "SHADOW_STEP",
     "TILE",
     "WHOLE_TRIANGLE",
     "Array",
     "Rows",
     "Scratch",
+    "Stream",
     "areas",
     "brdf_of_reflectance",
-    "chunk_steps",
     "clip_half_plane",
     "concentric_disk",
     "cone_projected_solid_angle",
@@ -82,6 +86,7 @@ __all__ = [
     "irradiance_from_point",
     "irradiance_under_sky",
     "luminous",
+    "map_chunks",
     "marked",
     "numbered",
     "orthonormal_basis",

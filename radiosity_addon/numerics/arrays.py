@@ -1,4 +1,4 @@
-"""The array type of annotations; shapes, kinds and units stand in the docstrings."""
+"""The array type of annotations; docstrings give shapes, dtypes and units."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What hangs together: equal rows, corners in one place, and what pairs or shared corners join."""
+"""Grouping: equal rows, corners in one place, connected components of pairs and faces."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from .arrays import Array
 
 OFF_LATTICE = 0.382
-"""Round coordinates, which are the likely ones, are this part of a cell above the cell's lower end."""
+"""Offset of the cells' lower ends, in cells, so that round coordinates do not lie on a boundary."""
 
 
 def numbered(rows: Array) -> Array:
@@ -52,7 +52,7 @@ def connected_components(count: int, one: Array, other: Array) -> Array:
 
 
 def connected_faces(corners: Array) -> Array:
-    """Number the sets of faces that hang together by corners, given (n, 3) numbers: (n,) int64."""
+    """Number the sets of faces connected by corners, given (n, 3) numbers: (n,) int64."""
     first = corners[:, :1].repeat(2, axis=1)
     label = connected_components(int(corners.max(initial=-1)) + 1, first.ravel(), corners[:, 1:].ravel())
     return numbered(label[corners[:, 0]])

@@ -8,10 +8,14 @@ threads are enough.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
 
+from ..base import SILENT, Progress
 from .scratch import trim
+
+T = TypeVar("T")
 
 
 def thread_count(threads: int) -> int:
@@ -23,18 +27,20 @@ def thread_count(threads: int) -> int:
     return os.cpu_count() or 1
 
 
-def for_chunks(work: Callable[[slice], None], rows: int, chunk: int, threads: int) -> None:
-    """Call `work` on slices of at most `chunk` rows that cover 0 … rows (see `chunk_steps`)."""
-    for _ in chunk_steps(work, rows, chunk, threads):
+def for_chunks(
+    work: Callable[[slice], None], rows: int, chunk: int, threads: int, progress: Progress = SILENT
+) -> None:
+    """Call `work` on slices of at most `chunk` rows that cover 0 … rows (see `map_chunks`)."""
+    for _ in map_chunks(work, rows, chunk, threads, progress):
         pass
 
 
-def chunk_steps(
-    work: Callable[[slice], None], rows: int, chunk: int, threads: int
-) -> Generator[float, None, None]:
-    """Do the same in steps, and yield the fraction done after each.
+def map_chunks(
+    work: Callable[[slice], T], rows: int, chunk: int, threads: int, progress: Progress = SILENT
+) -> Iterator[tuple[slice, T]]:
+    """Call `work` on slices of at most `chunk` rows; return each slice with its result, in order.
 
-    Closed early, it lets the slices in hand end and leaves out the others.
+    Canceled, it lets the slices in hand end and leaves out the others.
 
     work: Takes a slice of rows; must touch nothing another slice writes.
     threads: 0 means all cores.
@@ -42,18 +48,17 @@ def chunk_steps(
     slices = [slice(start, min(start + chunk, rows)) for start in range(0, rows, chunk)]
     workers = min(thread_count(threads), len(slices))
 
-    def one(piece: slice) -> None:
-        work(piece)
+    def one(piece: slice) -> T:
+        result = work(piece)
         trim()
+        return result
 
-    if workers <= 1:
-        for number, piece in enumerate(slices):
-            one(piece)
-            yield (number + 1) / len(slices)
-        return
-    pool = ThreadPoolExecutor(workers)
+    pool = ThreadPoolExecutor(workers) if workers > 1 else None
     try:
-        for number, _ in enumerate(pool.map(one, slices)):
-            yield (number + 1) / len(slices)
+        results = map(one, slices) if pool is None else pool.map(one, slices)
+        for number, (piece, result) in enumerate(zip(slices, results, strict=True)):
+            yield piece, result
+            progress.at((number + 1) / len(slices))
     finally:
-        pool.shutdown(cancel_futures=True)
+        if pool is not None:
+            pool.shutdown(cancel_futures=True)

@@ -21,7 +21,7 @@ def clip_half_plane(polygon: Array, distance: Array) -> Array:
     result = np.empty((count, size + 1, polygon.shape[2]))
     result[:, :-1] = polygon
     result[:, -1] = polygon[:, -1]
-    # Most polygons are on one side: only those that are cut take work.
+    # Most polygons are on one side: only the others have to be cut.
     result[~inside.any(axis=1)] = 0.0
     cut = np.flatnonzero(inside.any(axis=1) & ~inside.all(axis=1))
     if len(cut):

@@ -1,4 +1,4 @@
-"""The quantities of light, and how one follows from another (handout §1 and §2.1.2).
+"""The quantities of light and their conversions (handout §1 and §2.1.2).
 
 | quantity | symbol | unit | is |
 |---|---|---|---|
@@ -31,8 +31,7 @@ HEMISPHERE = math.pi
 
 def radiosity_of_radiance(radiance: Value) -> Value:
     """Return B = πL [W/m²] of a surface that sends L [W/m²/sr] in every direction (handout (2.11))."""
-    radiosity: Value = HEMISPHERE * radiance
-    return radiosity
+    return HEMISPHERE * radiance
 
 
 def radiance_of_radiosity(radiosity: Value) -> Value:
@@ -42,8 +41,7 @@ def radiance_of_radiosity(radiosity: Value) -> Value:
 
 def irradiance_under_sky(radiance: Value) -> Value:
     """Return H = πL [W/m²] under an open sky of radiance L [W/m²/sr] (handout (1.5))."""
-    irradiance: Value = HEMISPHERE * radiance
-    return irradiance
+    return HEMISPHERE * radiance
 
 
 def intensity_of_flux(flux: Value) -> Value:
@@ -53,8 +51,7 @@ def intensity_of_flux(flux: Value) -> Value:
 
 def flux_of_intensity(intensity: Value) -> Value:
     """Return Φ = 4πI [W] of a uniform point lamp (handout (1.8))."""
-    flux: Value = SPHERE * intensity
-    return flux
+    return SPHERE * intensity
 
 
 def irradiance_from_point(intensity: Value | float, cosine: Value, distance: Value) -> Value:
@@ -63,8 +60,7 @@ def irradiance_from_point(intensity: Value | float, cosine: Value, distance: Val
     θ lies between the surface's normal and the lamp. Nothing else is looked at: no shadow, no
     second bounce. That is local illumination; a matte surface then shows f H (2.14 – 2.17).
     """
-    irradiance: Value = intensity * cosine / (distance * distance)
-    return irradiance
+    return intensity * cosine / (distance * distance)
 
 
 def radiance_of_disc(intensity: Value, radius: float) -> Value:
@@ -79,8 +75,7 @@ def radiance_of_flux(flux: Value, area: float) -> Value:
 
 def flux_of_radiance(radiance: Value, area: float) -> Value:
     """Return Φ = πAL [W] that leaves one side of a surface of A [m²] and radiance L [W/m²/sr]."""
-    flux: Value = radiosity_of_radiance(radiance) * area
-    return flux
+    return radiosity_of_radiance(radiance) * area
 
 
 def sphere_area(radius: float) -> float:
@@ -90,8 +85,7 @@ def sphere_area(radius: float) -> float:
 
 def cone_solid_angle(one_minus_cosine: Value) -> Value:
     """Return 2π (1 − cosα) [sr] of a cone of half angle α; given so it is exact for narrow ones too."""
-    solid_angle: Value = 0.5 * SPHERE * one_minus_cosine
-    return solid_angle
+    return 0.5 * SPHERE * one_minus_cosine
 
 
 def cone_projected_solid_angle(half_angle: float) -> float:
@@ -112,12 +106,11 @@ def brdf_of_reflectance(reflectance: Value) -> Value:
 
 def reflected_radiance(brdf: Value | float, irradiance: Value) -> Value:
     """Return L_r = f H [W/m²/sr] that a matte surface reflects (handout (2.10))."""
-    radiance: Value = brdf * irradiance
-    return radiance
+    return brdf * irradiance
 
 
 LUMINANCE = (0.2126, 0.7152, 0.0722)
-"""How bright the channels of linear Rec. 709 look (ITU-R BT.709)."""
+"""Luminance weights of the channels of linear Rec. 709 (ITU-R BT.709)."""
 
 
 def luminous(radiant: npt.NDArray[Any], efficacy: float) -> npt.NDArray[Any]:

@@ -1,4 +1,4 @@
-"""Runs of different length, one after the other in one array: what is known of them is their counts."""
+"""Runs of different lengths, one after the other in one array, given by their counts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where samples lie: low-discrepancy points and the maps that carry them onto shapes.
+"""Samples: low-discrepancy points, and maps that carry them onto shapes.
 
 Counter-based: a point depends on its row's key, its own index and the seed alone, never on
 what was drawn before, so neither chunks nor threads change a result.
@@ -133,8 +133,7 @@ def points_on_triangles(triangles: FloatArray, u: FloatArray) -> FloatArray:
     first = unit[..., 0] - smaller
     second = unit[..., 1] - smaller
     weights = np.stack([1.0 - first - second, first, second], axis=-1)
-    points: FloatArray = weights @ triangles
-    return points
+    return weights @ triangles
 
 
 def point_on_each_triangle(triangles: FloatArray, u: FloatArray) -> FloatArray:
@@ -213,5 +212,4 @@ def to_world(local: FloatArray, normals: FloatArray) -> FloatArray:
     Returns directions (n, k, 3).
     """
     tangent, bitangent = orthonormal_basis(normals)
-    directions: FloatArray = local @ np.stack([tangent, bitangent, normals], axis=-2)
-    return directions
+    return local @ np.stack([tangent, bitangent, normals], axis=-2)

@@ -1,7 +1,7 @@
-"""Large arrays within a memory budget: beyond it they live in temporary files and are worked on in tiles.
+"""Large arrays within a memory budget: beyond it they are stored in temporary files and processed in tiles.
 
 An array in a file is an ordinary array over a memory map. The pages of a map that were read or written stay
-in memory until `trim` drops them, which `parallel.chunk_steps` calls after every chunk: what is in memory is
+in memory until `trim` drops them, which `parallel.map_chunks` calls after every chunk: what is in memory is
 the tile that is being worked on. Values are the same wherever an array lives, so results are the same bytes.
 The files have no name: they are gone when the arrays are, however the process ends.
 """
@@ -50,12 +50,12 @@ class Scratch:
         self.free: Callable[[], float] | None = None
         """Returns the memory that the rest of the process leaves for arrays, if known [bytes]."""
         self.in_memory = 0
-        """What the arrays take of memory now [bytes]."""
+        """Memory that the arrays use now [bytes]."""
         self.in_files = 0
-        """What arrays in files have taken so far [bytes]."""
+        """Space that arrays in files have used so far [bytes]."""
 
     def empty(self, shape: int | Sequence[int], dtype: npt.DTypeLike = np.float64) -> Array:
-        """Return an array of any content."""
+        """Return an uninitialized array."""
         size = math.prod(shape) if isinstance(shape, Sequence) else shape
         size *= np.dtype(dtype).itemsize
         if size < SMALLEST:
@@ -74,7 +74,7 @@ class Scratch:
         return result
 
     def room(self) -> float:
-        """Return what further arrays may take of memory [bytes]."""
+        """Return the memory that further arrays may use [bytes]."""
         left = self.budget - self.in_memory
         return left if self.free is None else min(left, self.free())
 
@@ -83,7 +83,7 @@ class Scratch:
         return Rows(self, width, dtype)
 
     def counted(self, array: Array) -> Array:
-        """Count an array in memory until it is gone."""
+        """Count an array in memory until it is freed."""
         if array.nbytes < SMALLEST:
             return array
         with _lock:
@@ -107,10 +107,10 @@ class Rows:
         self._file: BinaryIO | None = None
 
     def more(self, count: int) -> Array:
-        """Return the next `count` rows, of any content, to be filled."""
+        """Return the next `count` rows, uninitialized."""
         start, row = self._count, self._width * self._dtype.itemsize
         self._count += count
-        # Blocks in memory are joined at last: for a moment they are there twice.
+        # Blocks in memory are joined at the end: they briefly exist twice.
         size = self._count * row
         if self._file is None and size >= SMALLEST and size + count * row > self._scratch.room():
             self._file = _temporary_file()
@@ -136,7 +136,7 @@ class Rows:
             np.concatenate([values.reshape(-1, self._width) for values in pending], out=block)
 
     def all(self) -> Array:
-        """Return all rows as one array, and give the blocks up."""
+        """Return all rows as one array, and release the blocks."""
         self._write()
         blocks, self._blocks = self._blocks, []
         shape = (self._count, self._width)
@@ -186,7 +186,7 @@ def is_in_file(array: Array) -> bool:
 
 
 def trim() -> None:
-    """Drop from memory what arrays in files have there; it stays in the files."""
+    """Drop the pages of arrays in files from memory; the files keep them."""
     if not _maps or not hasattr(mmap, "MADV_DONTNEED"):
         return
     with _lock:

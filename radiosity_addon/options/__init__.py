@@ -9,18 +9,22 @@ from .bake_settings import OPTIONS, BakeSettings, GroupSetting, options_of_metho
 from .constants import EFFICACY, MAX_GROUPS, MAX_RESOLUTION, OTHERS
 from .methods import METHODS, SYMMETRIC_ONLY
 from .option_record import UNBOUNDED, Option, option, options_of, plain
-from .sections import ADVANCED, GROUPS, MAIN, SECTIONS, SOLVER, sections_of
+from .panel_settings import PANEL_OPTIONS, RELIGHT_GROUP
+from .sections import ADVANCED, GROUPS, LAST_BAKE, MAIN, SECTIONS, SOLVER, sections_of
 
 __all__ = [
     "ADVANCED",
     "EFFICACY",
     "GROUPS",
+    "LAST_BAKE",
     "MAIN",
     "MAX_GROUPS",
     "MAX_RESOLUTION",
     "METHODS",
     "OPTIONS",
     "OTHERS",
+    "PANEL_OPTIONS",
+    "RELIGHT_GROUP",
     "SECTIONS",
     "SOLVER",
     "SYMMETRIC_ONLY",

@@ -5,6 +5,22 @@ from __future__ import annotations
 from .methods import METHODS
 from .option_record import Choice
 
+SCOPES = (
+    Choice("all", "All", "Every mesh that shows in renders"),
+    Choice("selected", "Selected", "The selected meshes that show in renders"),
+    Choice(
+        "changed",
+        "Changed",
+        "Objects whose shape, place or reflectance differs from the last bake; others keep their lightmaps, "
+        "without new shadows. All, if the light has changed",
+    ),
+)
+
+SIZE_MODES = (
+    Choice("resolution", "Resolution", "Square images of this many pixels"),
+    Choice("density", "Density", "Pixels per meter of surface; the image size follows"),
+)
+
 ATLASES = (
     Choice("shared", "Shared", "One image for all objects"),
     Choice("per-object", "Per Object", "An image for each object"),
@@ -26,7 +42,7 @@ QUANTITIES = (
     Choice(
         "radiosity",
         "Radiosity",
-        "The light that leaves: own emission and what is reflected [W/m²]",
+        "The light that leaves: emission and reflected light [W/m²]",
     ),
     Choice(
         "residual",
@@ -37,8 +53,8 @@ QUANTITIES = (
 
 LIGHTS = (
     Choice("all", "All", "Direct and indirect light"),
-    Choice("direct", "Direct", "Only the light that comes straight from lamps, emitters and world"),
-    Choice("indirect", "Indirect", "Only the light that was reflected, for lamps that stay dynamic"),
+    Choice("direct", "Direct", "Only light straight from lamps, emitters and the world"),
+    Choice("indirect", "Indirect", "Only reflected light, for lamps that stay dynamic"),
 )
 
 FORMATS = (

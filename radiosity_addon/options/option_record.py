@@ -47,6 +47,10 @@ class PanelRow(NamedTuple):
         Digits shown, and hundredths that a click on the arrow adds.
     only_if : pairs of (property, value)
         The row is shown, and the option taken from the panel, only where all of these hold.
+    expand : bool
+        Choices are buttons side by side instead of a menu.
+    group : str
+        The scene's group of properties that holds it.
     other_choice : Choice or None
         A last choice in the menu, for which the option keeps its default.
     """
@@ -61,6 +65,8 @@ class PanelRow(NamedTuple):
     precision: int = 3
     step: float = 3
     only_if: tuple[tuple[str, str], ...] = ()
+    expand: bool = False
+    group: str = "radiosity"
     other_choice: Choice | None = None
 
 

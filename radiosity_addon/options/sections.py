@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 MAIN, ADVANCED, GROUPS, SOLVER = "Radiosity Lightmaps", "Advanced", "Light Groups", "Solver"
+LAST_BAKE = "Last Bake"
 """Parts of the panel."""
 
+OBJECTS, RELIGHTING, VIEWPORT = "Objects", "Relighting", "Viewport"
+"""Sections that only the panel has options in."""
+
 SECTIONS = {
+    OBJECTS: MAIN,
     "Size": MAIN,
     "Quality": MAIN,
     "Pages": MAIN,
@@ -13,10 +18,13 @@ SECTIONS = {
     "Layout": ADVANCED,
     "Scene": ADVANCED,
     "Computation": ADVANCED,
+    RELIGHTING: ADVANCED,
+    VIEWPORT: ADVANCED,
     "Light Groups": GROUPS,
     "Solver": SOLVER,
+    LAST_BAKE: LAST_BAKE,
 }
-"""Every section of the table, in order, with the part of the panel that shows it."""
+"""Every section of the tables, in order, with the part of the panel that shows it."""
 
 
 def sections_of(part: str) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""Casting rays at triangles: what a ray meets first, and whether two points see each other.
+"""Ray casting: the first triangle that a ray meets, and whether two points see each other.
 
 Embree does the work; only `embree.py` imports it.
 """

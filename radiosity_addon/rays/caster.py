@@ -68,7 +68,7 @@ class RayCaster(Protocol):
         ...
 
     def passing(self, origins: Array, directions: Array, distances: Array, least: float = 0.0) -> Array:
-        """Return (n,) what share of light passes: `unoccluded`, but between 0 and 1 through cut-outs.
+        """Return (n,) the share of light that passes: as `unoccluded`, but between 0 and 1 through cut-outs.
 
         Their opacity counts as at least `least` and as at most 1 − `least`, for callers that judge
         by few rays: where some met a cut-out, more are needed.

@@ -1,4 +1,4 @@
-"""Surfaces that lie back to back in one plane: which of them a ray meets.
+"""Coplanar surfaces back to back: which of them a ray meets.
 
 The back of a one-sided triangle is black. Where another surface lies in it and faces the ray, that
 one is in front, but Embree reports either, as rounding has it. So sides of which a black back may lie

@@ -1,4 +1,4 @@
-"""What goes into the pipeline and what comes out: plain arrays, no bpy.
+"""The pipeline's input: plain arrays, no bpy.
 
 The Blender side fills a `BakeScene` (export) and consumes a `BakeResult` (apply); the
 pipeline between them knows nothing of Blender.
@@ -39,13 +39,13 @@ class BakeObject:
 
     @property
     def rows(self) -> slice:
-        """Where its triangles are among the scene's."""
+        """The rows of its triangles in the scene."""
         return slice(self.first, self.first + self.count)
 
 
 @dataclass(frozen=True)
 class BakeScene:
-    """A scene ready to bake: the solver's arrays and whose triangles they are.
+    """A scene ready to bake: the solver's arrays, and the object of each triangle.
 
     scene: Triangles in world space, counter-clockwise from the front whatever the sign of the object's scale.
     objects: They partition the scene's triangles in order.

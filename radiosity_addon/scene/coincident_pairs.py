@@ -1,4 +1,4 @@
-"""Pairs of triangles that lie in one another: coplanar within a tolerance, with an area in common."""
+"""Pairs of coincident triangles: coplanar within a tolerance, with a common area."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class CoincidentPairs:
         return len(self.first)
 
     def take(self, rows: Array) -> CoincidentPairs:
-        """Return some of the pairs."""
+        """Return selected pairs."""
         return CoincidentPairs(*(getattr(self, name)[rows] for name in _FIELDS))
 
 
@@ -68,7 +68,7 @@ def tolerances(triangles: Array) -> Array:
 
 
 def coincident_pairs(triangles: Array, rows: Array, tolerance: Array, reach: Array) -> CoincidentPairs:
-    """Find the pairs among some triangles.
+    """Find the pairs among triangles.
 
     triangles (t, 3, 3).
     rows (n,) int: Those that take part; they have an area.
@@ -172,9 +172,9 @@ def _near_pairs(low: Array, high: Array) -> Iterator[tuple[Array, Array]]:
         count = np.searchsorted(key[hosts], key, side="right") - begin
         asked = np.flatnonzero(count)
         for chunk in run_chunks(count[asked], CHUNK_PAIRS):
-            some = asked[chunk]
-            small = np.repeat(some, count[some])
-            large = hosts[run_numbers(count[some], begin[some])]
+            chunk_rows = asked[chunk]
+            small = np.repeat(chunk_rows, count[chunk_rows])
+            large = hosts[run_numbers(count[chunk_rows], begin[chunk_rows])]
             one, other = asking[row[small]], asking[row[large]]
             keep = np.flatnonzero((level[one] > at) | (one < other))
             for axis in range(3):

@@ -17,6 +17,8 @@ class Faces:
     Triangles without area, or out of the bounces, have no faces. Backs exist where `two_sided`.
     """
 
+    STORED = ("triangle", "normal", "centre", "area")
+
     def __init__(self, scene: Scene) -> None:
         solid = np.flatnonzero((scene.areas > 0) & scene.in_bounces)
         backs = solid[scene.two_sided[solid]]

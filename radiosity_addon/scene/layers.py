@@ -19,6 +19,7 @@ import numpy as np
 
 from ..numerics import (
     Array,
+    Stream,
     connected_components,
     cosine_hemisphere,
     edge_distances,
@@ -34,7 +35,7 @@ from .surfaces import Surfaces
 from .uncovered_parts import OwnParts, own_parts
 
 NEAR_EMITTERS = 3.0
-"""What emits is covered by what is this many surface offsets in front of it: shadow rays pass that by."""
+"""Emissive faces are covered by faces up to this many surface offsets in front: shadow rays miss those."""
 
 ONE_PLANE = 0.5
 """Faces closer than this part of their tolerance count as coplanar: their order is lost in rounding."""
@@ -46,7 +47,7 @@ PROBES = 32
 """Rays that decide whether a face belongs to a solid."""
 
 MANY_COPIES = 4
-"""More exact copies of one triangle than these are not compared pair by pair."""
+"""Beyond this number, exact copies of one triangle are not compared pair by pair."""
 
 MOST_COVERS = 16
 """A hit is handed on from cover to cover this often at most."""
@@ -101,13 +102,13 @@ class Layers:
 
     @cached_property
     def own(self) -> OwnParts:
-        """What is left of the covered sides."""
+        """The uncovered parts of covered sides."""
         return own_parts(
             self.covers.side, self.covers.part, self.covers.by, self.covers.in_cover, self._scene
         )
 
     def owners(self, hits: Hits) -> Hits:
-        """Return hits with those on covered sides moved to what covers them."""
+        """Return hits, with those on covered sides moved to their covers."""
         side = 2 * hits.triangle + ~hits.front
         moved = np.flatnonzero((hits.triangle != NO_HIT) & self._is_covered[side])
         if len(moved) == 0:
@@ -122,7 +123,7 @@ class Layers:
                 row, cover = row[solid], cover[solid]
             if len(row) == 0:
                 break
-            # Any cover will do: it hands on to its own.
+            # Any cover will do: it passes the hit on to its own.
             row, only = np.unique(row, return_index=True)
             cover, waiting = cover[only], waiting[row]
             points = self.points(side[waiting], place[waiting])
@@ -194,7 +195,7 @@ def _contacts(scene: Surfaces, pairs: CoincidentPairs, tolerance: Array) -> tupl
     if len(rows) == 0:
         return contact, _no_covers()
     caster = EmbreeCaster(scene.triangles, only=scene.in_bounces)
-    sides, others, parts, theirs = [], [], [], []
+    sides, others, parts, in_others = [], [], [], []
     for triangle, other, part, in_other in (
         (pairs.first, pairs.second, pairs.in_first, pairs.in_second),
         (pairs.second, pairs.first, pairs.in_second, pairs.in_first),
@@ -204,8 +205,8 @@ def _contacts(scene: Surfaces, pairs: CoincidentPairs, tolerance: Array) -> tupl
         sides.append(2 * triangle[behind])
         others.append(2 * other[behind])
         parts.append(part[behind])
-        theirs.append(in_other[behind])
-    joined = Covers(*(np.concatenate(each) for each in (sides, others, parts, theirs)))
+        in_others.append(in_other[behind])
+    joined = Covers(*(np.concatenate(each) for each in (sides, others, parts, in_others)))
     return contact, _sorted([joined])
 
 
@@ -221,7 +222,7 @@ def _solid_behind(
     back = -scene.face_normals[triangle]
     lift = np.maximum(caster.surface_offset, 2.0 * tolerance[triangle])
     points = points + (lift[:, None] * back)[:, None]
-    unit = stratified_square(np.arange(count), PROBES, 83)
+    unit = stratified_square(np.arange(count), PROBES, Stream.BACK_PROBES)
     directions = to_world(cosine_hemisphere(unit), back)
     hits = caster.intersect(points.reshape(-1, 3), directions.reshape(-1, 3))
     inner = (hits.triangle != NO_HIT) & ~hits.front
@@ -231,7 +232,7 @@ def _solid_behind(
 def _covers(
     scene: Surfaces, pairs: CoincidentPairs, tolerance: Array, emits: Array, contact: Array
 ) -> Covers:
-    """Return what covers what."""
+    """Return the covered parts and their covers."""
     first, second = pairs.first, pairs.second
     if len(pairs) == 0:
         return _no_covers()
@@ -253,7 +254,7 @@ def _covers(
         rows = np.flatnonzero(exists)
         one, other = 2 * first[rows] + one_is_back[rows], 2 * second[rows] + other_is_back[rows]
         won = wins[rows]
-        mine, theirs = pairs.in_first[rows], pairs.in_second[rows]
+        in_first, in_second = pairs.in_first[rows], pairs.in_second[rows]
         # The same corner by corner, in either orientation of the cover.
         turn = ~pairs.same[rows, None, None]
         which = won[:, None, None]
@@ -261,8 +262,12 @@ def _covers(
             Covers(
                 np.where(won, other, one),
                 np.where(won, one, other),
-                np.where(which, theirs, mine),
-                np.where(which, np.where(turn, mine[:, ::-1], mine), np.where(turn, theirs[:, ::-1], theirs)),
+                np.where(which, in_second, in_first),
+                np.where(
+                    which,
+                    np.where(turn, in_first[:, ::-1], in_first),
+                    np.where(turn, in_second[:, ::-1], in_second),
+                ),
             )
         )
     return _sorted(found)

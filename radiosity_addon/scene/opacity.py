@@ -242,14 +242,14 @@ class _Ways:
         if self._stacks is None:
             self._last = triangle[:, None]
             return at, new
-        of, new = self._stacks.through(new)
-        number = np.arange(len(of)) - np.searchsorted(of, of)
+        hit_row, new = self._stacks.through(new)
+        number = np.arange(len(hit_row)) - np.searchsorted(hit_row, hit_row)
         last = np.full((len(triangle), max(self._last.shape[1], int(number.max(initial=0)) + 1)), NO_HIT)
         last[:, : self._last.shape[1]] = self._last
         last[at] = NO_HIT
-        last[at[of], number] = new.triangle
+        last[at[hit_row], number] = new.triangle
         self._last = last
-        return at[of], new
+        return at[hit_row], new
 
     def keep(self, going: Array) -> None:
         """Go on with the rays of a mask."""

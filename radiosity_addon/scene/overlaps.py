@@ -1,4 +1,4 @@
-"""Surfaces that lie in one another: no element sends or sees more than there is.
+"""Coincident surfaces: limits what an element sends and sees.
 
 Of coplanar surfaces in one place one counts (`layers.py`). Where others are too close for rays to
 tell which is in front, both are seen, ΣFV comes to 2, and light would grow without end. So an element
@@ -13,7 +13,7 @@ import numpy as np
 from ..numerics import Array
 
 OVERLAP = 1.1
-"""ΣFV above this is no rounding and no want of rays: something is seen twice."""
+"""ΣFV above this is not caused by rounding or few rays: a surface is counted twice."""
 
 
 def shares(sums: Array, limit: float = OVERLAP) -> Array:

@@ -79,11 +79,11 @@ class Scene:
 
     @cached_property
     def layers(self) -> Layers:
-        """Which sides are covered by others in the same place."""
+        """The sides that coincident sides cover."""
         return Layers(self)
 
     def _average(self, images: SurfaceImages) -> None:
-        """Take the images' area means for the textured triangles' constants."""
+        """Use the images' area means as constants of the textured triangles."""
         if len(images) != len(self):
             raise SceneError(f"the surface images are of {len(images)} triangles; there are {len(self)}")
         rows = np.flatnonzero(images.textured)

@@ -42,16 +42,16 @@ class Stacks:
         return len(self._other) > 0
 
     def through(self, hits: Hits) -> tuple[Array, Hits]:
-        """Return all that n rays meet where they hit cut-outs: (m,) which ray, sorted, and m hits."""
+        """Return all cut-outs at the hits of n rays: (m,) the ray, sorted, and m hits."""
         ray = np.arange(len(hits.triangle))
         side = 2 * hits.triangle.astype(np.int64) + ~hits.front
         place = hits.barycentric.astype(np.float64)
-        of, part = holding(self._first, self._part, side, place)
-        if len(of) == 0:
+        hit_row, part = holding(self._first, self._part, side, place)
+        if len(hit_row) == 0:
             return ray, hits
         other = self._other[part]
-        points = self._layers.points(side[of], place[of])
-        all_sides, all_rays = np.concatenate([side, other]), np.concatenate([ray, of])
+        points = self._layers.points(side[hit_row], place[hit_row])
+        all_sides, all_rays = np.concatenate([side, other]), np.concatenate([ray, hit_row])
         order = np.lexsort((self._depth[all_sides], all_rays))
         ray, side = all_rays[order], all_sides[order]
         weights = np.concatenate([place, self._layers.weights(other, points)])[order]

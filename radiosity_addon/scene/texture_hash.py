@@ -24,7 +24,7 @@ SAME_PATTERN = 1e-4
 """Patterns that differ by no more than this part (RMS) are one: rounding is far below, an edit far above."""
 
 CHUNK = 1 << 20
-"""Texels that are looked at at a time."""
+"""Texels processed at a time."""
 
 _STEPS = 1 << 13
 """Resolution of barycentric weights when a triangle's texels are sorted."""
@@ -78,12 +78,12 @@ def same_glow(before: Glow, now: Glow) -> bool:
         return True
     if not before:
         return False
-    one, other = np.array(before, dtype=np.float64), np.array(now, dtype=np.float64)
-    if one.shape != other.shape or not np.isfinite(one).all():
+    old, new = np.array(before, dtype=np.float64), np.array(now, dtype=np.float64)
+    if old.shape != new.shape or not np.isfinite(old).all():
         return False
-    dark = ~other.any(axis=1)
-    apart = np.sqrt(((one - other) ** 2).mean(axis=1))
-    return bool((dark | (apart <= SAME_PATTERN)).all())
+    unlit = ~new.any(axis=1)
+    apart = np.sqrt(((old - new) ** 2).mean(axis=1))
+    return bool((unlit | (apart <= SAME_PATTERN)).all())
 
 
 def _texels(images: SurfaceImages, rows: Array) -> Iterator[tuple[Array, Array]]:
@@ -97,13 +97,13 @@ def _texels(images: SurfaceImages, rows: Array) -> Iterator[tuple[Array, Array]]
     low = np.rint(np.floor(corners.min(axis=1) + 1e-3)).astype(np.int64)
     size = np.rint(np.ceil(corners.max(axis=1) - 1e-3)).astype(np.int64) - low + 1
     for columns, lines in np.unique(size, axis=0):
-        mine = np.flatnonzero((size == (columns, lines)).all(axis=1))
+        of_this_size = np.flatnonzero((size == (columns, lines)).all(axis=1))
         grid = np.stack(np.meshgrid(np.arange(columns), np.arange(lines)), axis=-1).reshape(-1, 2)
         step = max(CHUNK // max(len(grid), 1), 1)
-        for start in range(0, len(mine), step):
-            some = mine[start : start + step]
-            at = low[some, None] + grid
-            inside, order = _on_triangles(corners[some], at)
+        for start in range(0, len(of_this_size), step):
+            chunk = of_this_size[start : start + step]
+            at = low[chunk, None] + grid
+            inside, order = _on_triangles(corners[chunk], at)
             column, line = np.clip(at[..., 0], 0, width - 1), np.clip(at[..., 1], 0, height - 1)
             pixel = np.take_along_axis(line * width + column, order, axis=1)
             inside = np.take_along_axis(inside, order, axis=1)
@@ -117,7 +117,7 @@ def _on_triangles(corners: Array, at: Array) -> tuple[Array, Array]:
     _, second, third = np.moveaxis(plane_weights_at(corners, at), -1, 0)
     hair = 0.25 / _STEPS
     inside = (second >= -hair) & (third >= -hair) & (second + third <= 1.0 + hair)
-    # What has no area in the image is its first corner's texel.
+    # A triangle without area in the image uses its first corner's texel.
     point = signed_double_areas(corners) == 0.0
     nearest = np.abs(at - corners[:, :1]).sum(axis=2).argmin(axis=1)
     inside[point] = np.arange(at.shape[1]) == nearest[point, None]

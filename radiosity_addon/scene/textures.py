@@ -23,7 +23,7 @@ MAX_DEPTH = 8
 """An area's mean is taken over 4^8 parts at most."""
 
 LEAST_DEPTH = 2
-"""And over 4^2 at least."""
+"""An area's mean is taken over 4^2 parts at least."""
 
 SMALL = 8.0
 """Areas up to this many texels wide, whose samples often lie at the boundary, take four times as many."""
@@ -76,7 +76,7 @@ class SurfaceImages:
         return len(self.textured)
 
     def same_as(self, other: SurfaceImages) -> bool:
-        """Whether another image shows the same on the same triangles."""
+        """Whether another image has the same values on the same triangles."""
         return all(
             np.array_equal(getattr(self, name), getattr(other, name))
             for name in ("textured", "image_uv", "values")
@@ -119,10 +119,10 @@ class SurfaceImages:
             rows = np.flatnonzero(depth == levels)
             step = max(CHUNK_SAMPLES // len(inside), 1)
             for first in range(0, len(rows), step):
-                some = rows[first : first + step]
-                points = np.einsum("sc,nck->nsk", inside, place[some]).reshape(-1, 2)
-                found = _nearest(self._weighed, points).reshape(len(some), len(inside), CHANNELS)
-                means[some] = found.mean(axis=1, dtype=np.float64)
+                chunk = rows[first : first + step]
+                points = np.einsum("sc,nck->nsk", inside, place[chunk]).reshape(-1, 2)
+                found = _nearest(self._weighed, points).reshape(len(chunk), len(inside), CHANNELS)
+                means[chunk] = found.mean(axis=1, dtype=np.float64)
         return means
 
     def _place(self, triangle: Array, barycentric: Array) -> Array:
@@ -173,7 +173,7 @@ def _refuse(bad: Array, complaint: str) -> None:
 
 
 def _bilinear(image: Array, place: Array) -> Array:
-    """Look (h, w, k) up at (n, 2) places in texels, (n, k); beyond the middles of the rim its own values."""
+    """Look (h, w, k) up at (n, 2) places in texels, (n, k); constant beyond the centers of border texels."""
     height, width = image.shape[:2]
     texels = image.reshape(height * width, -1)
     around, share = texels_around(place, width, height)

@@ -1,4 +1,4 @@
-"""What is left of sides that others cover: triangles in the weights of each side's corners."""
+"""Uncovered parts of sides: triangles in the weights of each side's corners."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ EVEN = 0.05
 """A cover whose opacity varies less over a part hides its mean, …"""
 
 FINEST = 5
-"""… or the part is split in four so often at most."""
+"""… otherwise the part is split in four, at most this many times."""
 
 CHUNK_PAIRS = 1 << 17
 """Elements and parts clipped at once; their temporaries take about 50 MB."""
@@ -55,12 +55,12 @@ class OwnParts:
 
     @cached_property
     def share(self) -> Array:
-        """(s,) float64: what part of each of `sides` is left."""
+        """(s,) float64: the uncovered share of each of `sides`."""
         left = 2.0 * areas(self.corners) * self.level
         return np.bincount(np.searchsorted(self.sides, self.side), left, minlength=len(self.sides))
 
     def share_of(self, side: Array) -> Array:
-        """Return (n,) what part of sides is left; 1 of those that nothing covers."""
+        """Return (n,) the uncovered share of sides; 1 if nothing covers them."""
         result = np.ones(len(side))
         place = np.minimum(np.searchsorted(self.sides, side), max(len(self.sides) - 1, 0))
         if len(self.sides):
@@ -84,14 +84,14 @@ class OwnParts:
         return rows, corners, level
 
     def share_of_elements(self, side: Array, corners: Array) -> Array:
-        """Return (n,) what is left of counter-clockwise triangles (n, 3, 2) within sides (n,)."""
+        """Return (n,) the uncovered share of counter-clockwise triangles (n, 3, 2) within sides (n,)."""
         result = np.ones(len(side))
         covered = np.flatnonzero(np.isin(side, self.sides))
         begin, count = self._runs(side[covered])
         result[covered] = 0.0
-        for some in run_chunks(count, CHUNK_PAIRS):
-            row = np.repeat(covered[some], count[some])
-            part = run_numbers(count[some], begin[some])
+        for chunk in run_chunks(count, CHUNK_PAIRS):
+            row = np.repeat(covered[chunk], count[chunk])
+            part = run_numbers(count[chunk], begin[chunk])
             common = _clipped(self.corners[part], corners[row])
             result += np.bincount(row, areas(common) * self.level[part], minlength=len(side))
         result[covered] /= np.maximum(areas(corners[covered]), 1e-300)
@@ -134,8 +134,12 @@ def own_parts(side: Array, part: Array, by: Array, in_cover: Array, scene: Surfa
         seen_through = np.flatnonzero(cut[by[chosen] // 2])
         if len(seen_through):
             row, each = _fans(inner[seen_through])
-            of, one = asked[seen_through[row]], chosen[seen_through[row]]
-            pieces.append(_shining_through(own[of], each, level[of], one, part, in_cover, by, scene))
+            piece_row, piece_cover = asked[seen_through[row]], chosen[seen_through[row]]
+            pieces.append(
+                _shining_through(
+                    own[piece_row], each, level[piece_row], piece_cover, part, in_cover, by, scene
+                )
+            )
         own, corners, level = (np.concatenate(values) for values in zip(*pieces, strict=True))
     kept = (level > NOTHING_LEFT) & (areas(corners) > NOTHING_LEFT)
     rows = np.flatnonzero(kept)
@@ -144,7 +148,7 @@ def own_parts(side: Array, part: Array, by: Array, in_cover: Array, scene: Surfa
 
 
 def _clipped(triangles: Array, polygons: Array) -> Array:
-    """Return (n, …, 2) what triangles (n, 3, 2) and convex polygons (n, k, 2) have in common."""
+    """Return (n, …, 2) the intersections of triangles (n, 3, 2) and convex polygons (n, k, 2)."""
     result = triangles
     for edge in range(polygons.shape[1]):
         result = clip_half_plane(result, edge_distances(result, polygons, edge))
@@ -152,7 +156,7 @@ def _clipped(triangles: Array, polygons: Array) -> Array:
 
 
 def _outside(triangles: Array, polygons: Array) -> list[tuple[Array, Array]]:
-    """Return what of triangles (n, 3, 2) lies outside of convex polygons, as triangles with their rows."""
+    """Return the parts of triangles (n, 3, 2) outside of convex polygons, as triangles with their rows."""
     found = []
     rest = triangles
     for edge in range(polygons.shape[1]):
@@ -184,7 +188,7 @@ def _shining_through(
     by: Array,
     scene: Surfaces,
 ) -> tuple[Array, Array, Array]:
-    """Return parts that lie under cut-out covers, split where the opacity varies, and what shows of them."""
+    """Return parts that lie under cut-out covers, split where the opacity varies, and their visible share."""
     assert scene.images is not None
     images = scene.images
     done = []
@@ -201,8 +205,8 @@ def _shining_through(
             break
         own, cover, level = (np.repeat(values[open_], 4) for values in (own, cover, level))
         corners = split_in_four(corners[open_]).reshape(-1, 3, 2)
-    one, other, third = (np.concatenate(values) for values in zip(*done, strict=True))
-    return one, other, third
+    all_own, all_corners, all_levels = (np.concatenate(values) for values in zip(*done, strict=True))
+    return all_own, all_corners, all_levels
 
 
 def _moved(points: Array, part: Array, in_cover: Array) -> Array:

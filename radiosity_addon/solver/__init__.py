@@ -7,11 +7,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
-
+from ..base import SILENT, Progress
 from ..lights import AreaLight, EnvironmentLight, PointLight, SpotLight, SunLight
 from ..scene import Scene
-from .methods import steps_of
+from .methods import solve_by_method
 from .settings import SolverSettings
 from .solution import Solution
 from .state import SolverState
@@ -27,27 +26,14 @@ __all__ = [
     "SpotLight",
     "SunLight",
     "solve",
-    "solve_progress",
 ]
 
 
-def solve(scene: Scene, settings: SolverSettings | None = None) -> Solution:
-    """Solve the radiosity equation of a scene by the method the settings name."""
-    steps = solve_progress(scene, settings or SolverSettings())
-    while True:
-        try:
-            next(steps)
-        except StopIteration as done:
-            solution: Solution = done.value
-            return solution
+def solve(scene: Scene, settings: SolverSettings | None = None, progress: Progress = SILENT) -> Solution:
+    """Solve the radiosity equation of a scene by the method the settings name.
 
-
-def solve_progress(
-    scene: Scene, settings: SolverSettings
-) -> Generator[tuple[float, SolverState], None, Solution]:
-    """Solve step by step: yields the fraction done and the state so far, returns the `Solution`."""
-    state = None
-    for fraction, state in steps_of(scene, settings):
-        yield fraction, state
-    assert state is not None  # every method yields at least once
+    `progress` is shown the state so far: the same object all along.
+    """
+    state = solve_by_method(scene, settings or SolverSettings(), progress)
+    progress.at(1.0, state)
     return Solution(state)

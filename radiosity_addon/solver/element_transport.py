@@ -14,7 +14,7 @@ from ..base import UsageError
 from ..numerics import Array
 from .emitters import LightSources
 from .gather import LocalPass
-from .links import join_light_links, link_lights, push
+from .links import LightLinks, join_light_links, link_lights, push
 from .methods import HierarchicalState
 from .state import Anderson, SolverState, bounce
 
@@ -35,28 +35,37 @@ class _Relit(HierarchicalState):
         return self.own_emission
 
 
+@dataclass(frozen=True, eq=False)
 class ElementTransport:
     """How light gets from the sources to the elements, and from element to element.
 
-    Parameters
+    Attributes
     ----------
-    state : SolverState
-        Solved by the refined hierarchy.
+    state : HierarchicalState
+        What was solved.
     sources : LightSources
-
-    Raises
-    ------
-    UsageError
-        If another method solved it.
+    light_links : LightLinks
+        From all lights, dark ones too, as they could be lit.
     """
 
-    def __init__(self, state: SolverState, sources: LightSources) -> None:
+    state: HierarchicalState
+    sources: LightSources
+    light_links: LightLinks
+
+    @staticmethod
+    def of(state: SolverState, sources: LightSources) -> ElementTransport:
+        """Link lamps that were dark as well.
+
+        Raises
+        ------
+        UsageError
+            If another method than the refined hierarchy solved it.
+        """
         if not isinstance(state, HierarchicalState):
             raise UsageError(
-                f"the {state.settings.method} method keeps no links to light anew by; "
-                "bake by the hierarchical method"
+                f"the {state.settings.method} method keeps no links for relighting; "
+                "use the hierarchical method"
             )
-        self._state, self._sources = state, sources
         hierarchy, settings = state.hierarchy, state.settings
         # Lamps that were dark have no links yet; elements stay as they are for them.
         dark = np.array([not light.strength.any() for light in sources.lights], dtype=bool)
@@ -72,23 +81,18 @@ class ElementTransport:
             settings.threads,
             as_if=missing,
         )
-        self._light_links = join_light_links(state.light_links, further)
-
-    @property
-    def state(self) -> HierarchicalState:
-        """What was solved."""
-        return self._state
+        return ElementTransport(state, sources, join_light_links(state.light_links, further))
 
     def irradiance(self, strengths: Array) -> Array:
         """Solve for (s, 3) strengths of the sources: (e, 3) area means over every element [W/m²]."""
-        state, hierarchy = self._state, self._state.hierarchy
+        state, hierarchy = self.state, self.state.hierarchy
         triangle = hierarchy.faces.triangle[hierarchy.face]
-        emission = self._sources.emission(hierarchy.emission, triangle, strengths)
+        emission = self.sources.emission(hierarchy.emission, triangle, strengths)
         own = {entry.name: getattr(state, entry.name) for entry in fields(HierarchicalState)}
         relit = _Relit(**{**own, "history": [], "own_emission": emission, "iterations": 0})
         relit.reset()
-        given = strengths[: len(self._sources.lights)]
-        lights = push(hierarchy, self._light_links.irradiance(given, hierarchy.n_elements))
+        given = strengths[: len(self.sources.lights)]
+        lights = push(hierarchy, self.light_links.irradiance(given, hierarchy.n_elements))
         leaves = hierarchy.leaves
         area = hierarchy.area[leaves]
         entering = emission[leaves] + hierarchy.reflectance[leaves] * lights[leaves]
@@ -102,7 +106,7 @@ class ElementTransport:
         least, mixer = emission[leaves], Anderson(area)
         for _ in range(ITERATIONS):
             before = relit.radiosity[leaves]
-            bounce(relit, links, lights, scale, relit.cluster_links, relit.top, received)
+            bounce(relit, links, lights, scale, relit.cluster_links, relit.cut, received)
             if relit.residual < state.settings.tolerance:
                 break
             relit.radiosity[leaves] = np.maximum(mixer.next(before, relit.radiosity[leaves]), least)
@@ -127,6 +131,6 @@ class Relightable:
 
     @staticmethod
     def of(state: SolverState, emitter: Array | None = None) -> Relightable:
-        """Keep a state; `emitter` as for `LightSources`, errors as of `ElementTransport`."""
+        """Keep a state; `emitter` as for `LightSources`, errors as of `ElementTransport.of`."""
         sources = LightSources(state.scene, state.hierarchy.faces, state.caster, emitter)
-        return Relightable(sources, ElementTransport(state, sources), LocalPass(state, sources))
+        return Relightable(sources, ElementTransport.of(state, sources), LocalPass.of(state, sources))

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..numerics import Array
 from .element_transport import Relightable
-from .gather import LocalPass, Residual
+from .gather import Footprints, LocalPass, Residual
 from .state import LinkRecord, SolverState, power_balance, record_links
 
 POINT_RAYS = 1024
@@ -76,7 +76,7 @@ class Solution:
     @cached_property
     def local_pass(self) -> LocalPass:
         """The local pass over this solution: direct light and gather rays at points."""
-        return LocalPass(self._state)
+        return LocalPass.of(self._state)
 
     def relightable(self, emitter: Array | None = None) -> Relightable:
         """Return what lights this scene anew.
@@ -120,10 +120,10 @@ class Solution:
         normals = np.asarray(normals, dtype=np.float64).reshape(-1, 3)
         normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
         local = self.local_pass
-        keys = np.arange(len(points))
-        direct = local.direct(points, normals, keys, rays=64)
-        sources, _ = local.gather(points, normals, normals, keys, POINT_RAYS, local.leaves_of)
-        radiosity = np.concatenate([local.reflected(), local.beyond()])
+        at = Footprints(points, normals, np.arange(len(points)))
+        direct = local.direct.at(at, rays=64)
+        sources = local.gather.at(at, normals, POINT_RAYS, local.elements.leaves_of).sources
+        radiosity = np.concatenate([local.elements.reflected(), local.elements.beyond()])
         return np.asarray(direct + radiosity[sources].mean(axis=1))
 
     def residual(

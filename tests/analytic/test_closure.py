@@ -15,7 +15,7 @@ from bench.rooms import room
 from radiosity_addon.bake.quality import QUALITIES
 from radiosity_addon.numerics.sampling import cosine_hemisphere, points_on_triangles, to_world
 from radiosity_addon.solver import PointLight, Scene, Solution
-from radiosity_addon.solver.methods.hierarchical import HierarchicalState, solve_steps
+from radiosity_addon.solver.methods.hierarchical import HierarchicalState, solve
 from tests.cornell import cornell_box
 from tests.rooms import CEILING, box_room, coloured_room, grey, solid_box
 
@@ -86,8 +86,7 @@ SCENES = {
 
 @cache
 def solved(name: str) -> HierarchicalState:
-    *_, (_, state) = solve_steps(SCENES[name](), QUALITIES["medium"].solver)
-    return state
+    return solve(SCENES[name](), QUALITIES["medium"].solver)
 
 
 DARK = {"boxes that touch": 17, "cornell with a front": 4}

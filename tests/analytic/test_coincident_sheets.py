@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from radiosity_addon.bake.pipeline import bake
-from radiosity_addon.base.progress import drain
 from radiosity_addon.lightmap.images.page import LightmapPage
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.solver import PointLight, Scene
@@ -37,7 +36,7 @@ def pages(twin: np.ndarray | None = None, baked: bool = True) -> dict[str, Light
     parts = [("Floor", 2), ("Ceiling", 2), ("Walls", 8)]
     twins = [] if twin is None else [("Twin", len(twin), None, baked)]
     settings = BakeSettings(quality="medium", resolution=32, atlas="per-object")
-    result = drain(bake(bake_scene(scene, *parts, *twins), settings))
+    result = bake(bake_scene(scene, *parts, *twins), settings)
     named = zip(result.objects, result.pages, strict=True)
     return {item.object.name: page for item, page in named}
 

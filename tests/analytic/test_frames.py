@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from radiosity_addon.base.progress import drain
 from radiosity_addon.lightmap.lighting.gather_settings import GatherSettings
 from radiosity_addon.lightmap.lighting.reconstruction import reconstruct
 from radiosity_addon.lightmap.lighting.sweeps import TexelLight
@@ -37,7 +36,7 @@ def light_of(
     pages = np.repeat(np.append(np.arange(len(baked)), [-1] * len(others)), 2)
     geometry = texel_geometry(scene, uv, SIZE, pages)
     local = solve(scene, SolverSettings(error=1e-3)).local_pass
-    return geometry, drain(reconstruct(scene, local, geometry, GatherSettings(rays=256)))
+    return geometry, reconstruct(scene, local, geometry, GatherSettings(rays=256))
 
 
 def test_beside_a_bar_the_sky_is_hidden_as_the_closed_form_says() -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.base.progress import drain
 from radiosity_addon.lightmap.lighting.gather_settings import GatherSettings
 from radiosity_addon.lightmap.lighting.reconstruction import reconstruct
 from radiosity_addon.solver import EnvironmentLight, Scene, SolverSettings, solve
@@ -35,7 +34,7 @@ def test_light_reaches_into_a_gap_as_far_as_the_gap_is_high(reflectance: float) 
     uv = np.concatenate([QUAD_UV, QUAD_UV, np.zeros((4, 3, 2), np.float32)])
     geometry = texel_geometry(scene, uv, SIZE, np.array([0, 0, 1, 1, -1, -1, -1, -1]))
     local = solve(scene, SolverSettings(error=1e-3)).local_pass
-    light = drain(reconstruct(scene, local, geometry, GatherSettings(rays=256)))
+    light = reconstruct(scene, local, geometry, GatherSettings(rays=256))
     irradiance = (light.direct + light.indirect).mean(axis=1)
     depth = geometry.position[:, 0] - RIM
     # The sky shines up past the floor's own borders as well.

@@ -32,8 +32,7 @@ def multi_level_settings(form_factor_error: float, min_area: float, **others: fl
 
 def solved(scene: Scene, form_factor_error: float, min_area: float, **others: float) -> MultiLevelState:
     settings = multi_level_settings(form_factor_error, min_area, **others)
-    *_, (_, state) = multi_level.solve_steps(scene, settings)
-    return state
+    return multi_level.solve(scene, settings)
 
 
 def cube(reflectance: float = 0.5) -> Scene:
@@ -165,8 +164,7 @@ def test_links_at_a_fixed_finest_level_are_the_matrix() -> None:
 
 
 def refined(scene: Scene, error: float) -> HierarchicalState:
-    *_, (_, state) = hierarchical.solve_steps(scene, SolverSettings(error=error, min_area=1e-7))
-    return state
+    return hierarchical.solve(scene, SolverSettings(error=error, min_area=1e-7))
 
 
 def test_links_of_the_refined_hierarchy_grow_like_its_elements() -> None:

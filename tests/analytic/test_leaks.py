@@ -58,13 +58,7 @@ def sealed_box(
 
 
 def run(scene: BakeScene, quality: str) -> BakeResult:
-    steps = bake(scene, BakeSettings(quality=quality, resolution=64, atlas="per-object"))
-    while True:
-        try:
-            next(steps)
-        except StopIteration as done:
-            result: BakeResult = done.value
-            return result
+    return bake(scene, BakeSettings(quality=quality, resolution=64, atlas="per-object"))
 
 
 def filtered(page: LightmapPage, item: BakedObject) -> np.ndarray:

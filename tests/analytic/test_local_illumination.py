@@ -27,14 +27,9 @@ def baked(quantity: str, light: str, position: tuple[float, float, float]) -> np
     loops = np.arange(6, dtype=np.int32).reshape(2, 3)
     target = BakeObject("Floor", 0, 2, True, np.zeros(2, dtype=np.int32), loops, UV)
     settings = BakeSettings(quality="draft", resolution=RESOLUTION, quantity=quantity, light=light)
-    steps = bake(BakeScene(scene, (target,)), settings)
-    while True:
-        try:
-            next(steps)
-        except StopIteration as done:
-            (page,) = done.value.pages
-            assert page.coverage.all()
-            return np.asarray(page.pixels, dtype=np.float64)
+    (page,) = bake(BakeScene(scene, (target,)), settings).pages
+    assert page.coverage.all()
+    return np.asarray(page.pixels, dtype=np.float64)
 
 
 @pytest.mark.parametrize("position", [(0.3, -0.2, 0.8), (-1.4, 0.6, 0.5), (0.0, 0.0, 2.5)])

@@ -11,7 +11,7 @@ from radiosity_addon.base.errors import UsageError
 from radiosity_addon.form_factors.formulas import point_to_polygon
 from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, SolverSettings
 from radiosity_addon.solver.equations.linear_basis import INWARD
-from radiosity_addon.solver.methods import steps_of
+from radiosity_addon.solver.methods import solve_by_method
 from radiosity_addon.solver.methods.dense import dense
 from radiosity_addon.solver.methods.matrix import MatrixState
 from tests.cornell import cornell_box
@@ -31,7 +31,7 @@ CIE_5_6_CEILING_PERCENT = {0.25: 26.80, 0.75: 30.94, 1.25: 33.98, 1.75: 35.57}
 
 def solved(scene: Scene, method: str = "dense", **settings: object) -> MatrixState:
     """Run a matrix method and return its last state."""
-    *_, (_, state) = steps_of(scene, SolverSettings(**{"method": method, "elements": 96, **settings}))
+    state = solve_by_method(scene, SolverSettings(**{"method": method, "elements": 96, **settings}))
     assert isinstance(state, MatrixState)
     return state
 
@@ -369,7 +369,7 @@ def test_the_memory_limit_counts_faces_and_is_exact() -> None:
     assert solved(scene, elements=1, memory_limit=needed).details["matrix"]["memory_GiB"] == needed
     with pytest.raises(UsageError, match=r"108 unknowns .* GiB: take the method hierarchical"):
         solved(scene, elements=1, memory_limit=0.999 * needed)
-    with pytest.raises(UsageError, match="ask for fewer elements"):
+    with pytest.raises(UsageError, match="use fewer elements"):
         solved(scene, elements=432, memory_limit=needed)
 
 

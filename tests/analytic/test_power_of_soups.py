@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from radiosity_addon.bake.pipeline import bake
-from radiosity_addon.base.progress import drain
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.solver import Scene, SolverSettings, solve
 from tests.analytic.soup_tracer import Soup, measure
@@ -155,7 +154,7 @@ def test_lightmaps_absorb_what_glowing_panels_in_a_ceiling_send() -> None:
     scene = Scene(triangles, grey(count, reflectance), emission[:, None] * np.ones(3), two_sided=True)
     parts = [("Walls", 10), ("Ceiling", 2), *((f"Panel {number}", 2) for number in range(5))]
     settings = BakeSettings(quality="medium", resolution=64, atlas="per-object", quantity="irradiance")
-    result = drain(bake(bake_scene(scene, *parts), settings))
+    result = bake(bake_scene(scene, *parts), settings)
     mean = {
         item.object.name: float(page.pixels[page.coverage][:, 0].mean())
         for item, page in zip(result.objects, result.pages, strict=True)

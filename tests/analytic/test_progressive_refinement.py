@@ -11,19 +11,19 @@ from radiosity_addon.solver.equations.assembly import galerkin, with_lamps
 from radiosity_addon.solver.equations.fixed_elements import subdivide_evenly
 from radiosity_addon.solver.equations.linear_system import LinearSystem
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
-from radiosity_addon.solver.methods import steps_of
-from radiosity_addon.solver.methods.shooting import solve_steps
+from radiosity_addon.solver.methods import shooting, solve_by_method
+from radiosity_addon.solver.methods.shooting import ShootingState
 from radiosity_addon.solver.state.state import SolverState
 from tests.cornell import cornell_box
 from tests.rooms import CEILING, FLOOR, box_room, coloured_room, grey
+from tests.watched import watching
 
 ELEMENTS = 90
 
 
 def by(method: str, scene: Scene, **changes: object) -> SolverState:
     settings = SolverSettings(method=method, elements=ELEMENTS, **changes)
-    *_, (_, state) = steps_of(scene, settings)
-    return state
+    return solve_by_method(scene, settings)
 
 
 @pytest.mark.parametrize("scene", [cornell_box, coloured_room])
@@ -95,9 +95,12 @@ def test_shooting_is_never_behind_gathering_of_the_same_cost() -> None:
 
     found = []
     settings = SolverSettings(elements=ELEMENTS, tolerance=0.0, max_iterations=5 * len(system))
-    for _, state in solve_steps(cornell_box(), settings):
+
+    def look(state: ShootingState) -> None:
         if len(state.leaves) and len(found) <= state.iterations:
             found.append(state.unshot_power())
+
+    shooting.solve(cornell_box(), settings, watching(look))
     found, cyclic = np.array(found), np.array(expected)
     assert found.shape == cyclic.shape
     assert (found <= cyclic * (1 + 1e-12)).all()
@@ -112,11 +115,15 @@ def test_a_shot_is_the_relaxation_of_a_row() -> None:
     residual = system.emission.copy()
     settings = SolverSettings(elements=ELEMENTS, tolerance=0.0, max_iterations=300)
     shots_before = np.zeros(len(system), dtype=int)
-    for _, state in solve_steps(cornell_box(), settings):
+
+    def look(state: ShootingState) -> None:
+        nonlocal shots_before
         if len(state.leaves) and state.shots_of.sum() > shots_before.sum():
             relax(system, residual, int(np.argmax(state.shots_of - shots_before)))
             shots_before = state.shots_of.copy()
             np.testing.assert_allclose(state.unshot, residual, rtol=0, atol=1e-12 * 30)
+
+    shooting.solve(cornell_box(), settings, watching(look))
     assert shots_before.sum() == 300
 
 
@@ -124,12 +131,16 @@ def test_shots_gather_the_bounces_from_below() -> None:
     """B only rises while shooting, towards the dense solution, and never past it."""
     dense = by("dense", cornell_box()).radiosity
     before = np.zeros_like(dense)
-    for _, state in solve_steps(cornell_box(), SolverSettings(elements=ELEMENTS, tolerance=1e-3)):
+
+    def look(state: ShootingState) -> None:
+        nonlocal before
         if len(state.leaves) == 0:
-            continue
+            return
         assert (state.radiosity >= before * (1 - 1e-14)).all()
         assert (state.radiosity <= dense + 1e-12 * dense.max()).all()
         before = state.radiosity
+
+    state = shooting.solve(cornell_box(), SolverSettings(elements=ELEMENTS, tolerance=1e-3), watching(look))
     leaves = state.leaves
     error = state.hierarchy.area[leaves] @ (dense - before)[leaves] / state.power
     # Σ A (B∞ − B) = Σ A Σ_k (ρF)^k ρF ΔB ≤ ρ / (1 − ρ) Σ A ΔB.
@@ -147,13 +158,16 @@ def test_the_ambient_term_anticipates_the_mean() -> None:
     exact = area @ dense.radiosity[dense.hierarchy.leaves] / area.sum()
     settings = SolverSettings(elements=ELEMENTS, tolerance=1e-3, ambient=True)
     behind = []
-    for _, state in solve_steps(scene, settings):
+
+    def look(state: ShootingState) -> None:
         if len(state.leaves):
             shown = area @ state.shown()[state.leaves] / area.sum()
             # One ρ in a closed room: the mean is exact but for what closure is off.
             np.testing.assert_allclose(shown, exact, rtol=3e-3)
             plain = area @ state.radiosity[state.leaves] / area.sum()
             behind.append(float((1.0 - plain / exact).max()))
+
+    shooting.solve(scene, settings, watching(look))
     assert behind[0] > 0.5
     assert behind[-1] < 3e-3
 
@@ -161,6 +175,6 @@ def test_the_ambient_term_anticipates_the_mean() -> None:
 def test_lamps_are_emission() -> None:
     """The system of the lamps' light as E' = E + ρ H_direct has the same first residual."""
     scene = coloured_room()
-    *_, (_, state) = solve_steps(scene, SolverSettings(elements=ELEMENTS, max_iterations=0))
+    state = shooting.solve(scene, SolverSettings(elements=ELEMENTS, max_iterations=0))
     system = with_lamps(galerkin(state.hierarchy, state.caster), state.received)
     assert state.unshot.tobytes() == system.emission.tobytes()

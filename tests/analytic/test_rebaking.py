@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +13,8 @@ from radiosity_addon.bake.plan import moved_objects, plan_bake
 from radiosity_addon.bake.rebaking import bake_moved
 from radiosity_addon.bake.relight.kept_bake import KeptBake, relight_pages
 from radiosity_addon.bake.result.result import BakeResult
+from radiosity_addon.bake.sidecar.sidecar import read_sidecar, write_sidecar
 from radiosity_addon.base.errors import SceneError
-from radiosity_addon.base.progress import drain
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import PointLight, Scene
@@ -31,7 +32,7 @@ def pixels(result: BakeResult) -> np.ndarray:
 
 def full(scene: BakeScene, kept: KeptBake, **settings: int) -> np.ndarray:
     """What a whole bake gives, by the same lightmap coordinates."""
-    return pixels(drain(bake(laid_out_as(scene, kept.geometry.uv), replace(SETTINGS, **settings))))
+    return pixels(bake(laid_out_as(scene, kept.geometry.uv), replace(SETTINGS, **settings)))
 
 
 def relative(found: np.ndarray, expected: np.ndarray, where: np.ndarray | slice = slice(None)) -> float:
@@ -41,26 +42,39 @@ def relative(found: np.ndarray, expected: np.ndarray, where: np.ndarray | slice 
 
 @pytest.fixture(scope="module")
 def kept() -> KeptBake:
-    _, kept = drain(bake_and_keep(room(), SETTINGS))
+    _, kept = bake_and_keep(room(), SETTINGS)
     return kept
 
 
 @pytest.fixture(scope="module")
 def moved(kept: KeptBake) -> tuple[BakeResult, KeptBake]:
-    result, after = drain(bake_moved(kept, room(ELSEWHERE, 30.0)))
+    result, after = bake_moved(kept, room(ELSEWHERE, 30.0))
     return result, after
 
 
 @pytest.fixture(scope="module")
 def fresh(kept: KeptBake) -> tuple[BakeResult, KeptBake]:
     """A full bake of the box at its new place."""
-    result, after = drain(bake_and_keep(laid_out_as(room(ELSEWHERE, 30.0), kept.geometry.uv), SETTINGS))
+    result, after = bake_and_keep(laid_out_as(room(ELSEWHERE, 30.0), kept.geometry.uv), SETTINGS)
     return result, after
 
 
 @pytest.fixture(scope="module")
 def expected(fresh: tuple[BakeResult, KeptBake]) -> np.ndarray:
     return pixels(fresh[0])
+
+
+def test_a_bake_that_followed_a_move_is_relit_from_its_sidecar(
+    moved: tuple[BakeResult, KeptBake], tmp_path: Path
+) -> None:
+    result, after = moved
+    path = tmp_path / "lightmap.relight"
+    write_sidecar(path, after, result, "bake")
+    stored = read_sidecar(path).kept(laid_out_as(room(ELSEWHERE, 30.0), after.geometry.uv))
+    wanted = 2.0 * after.strengths
+    fresh = replace(after, lit=replace(after.lit, warm_start=after.lit.warm_start.first()))
+    pages = [relight_pages(bake, wanted)[0].pixels for bake in (stored, fresh)]
+    np.testing.assert_array_equal(*pages)
 
 
 def test_a_moved_box_gives_what_a_full_bake_gives(
@@ -88,11 +102,11 @@ def test_what_moved_can_move_back(
     kept: KeptBake, moved: tuple[BakeResult, KeptBake], expected: np.ndarray
 ) -> None:
     """On from what was baked anew: errors do not pile up, nor do points."""
-    result, back = drain(bake_moved(moved[1], room()))
+    result, back = bake_moved(moved[1], room())
     before = full(room(), kept)
     assert result.solver["moved"] == ["Box"]
     assert relative(pixels(result), before) < 0.01
-    again, after = drain(bake_moved(back, room(ELSEWHERE, 30.0)))
+    again, after = bake_moved(back, room(ELSEWHERE, 30.0))
     assert relative(pixels(again), expected) < 0.01
     points = [len(some.lit.transport.links.sources) for some in (kept, after)]
     assert points[1] < 1.2 * points[0]
@@ -101,23 +115,21 @@ def test_what_moved_can_move_back(
 def test_it_can_be_lit_anew(moved: tuple[BakeResult, KeptBake], fresh: tuple[BakeResult, KeptBake]) -> None:
     """As a full bake of the moved scene can."""
     strengths = moved[1].strengths
-    same = pixels(replace(moved[0], pages=drain(relight_pages(moved[1], strengths))))
+    same = pixels(replace(moved[0], pages=relight_pages(moved[1], strengths)))
     assert relative(same, pixels(moved[0])) < moved[1].lit.tolerance
     strengths = strengths * np.array([2.0, 0.5, 0.0, 1.0, 1.5])[:, None]
-    found, expected = (
-        pixels(replace(of[0], pages=drain(relight_pages(of[1], strengths)))) for of in (moved, fresh)
-    )
+    found, expected = (pixels(replace(of[0], pages=relight_pages(of[1], strengths))) for of in (moved, fresh))
     assert relative(found, expected) < 0.01
 
 
 def test_what_glows_may_move(kept: KeptBake) -> None:
-    found, _ = drain(bake_moved(kept, room(panel=-0.6)))
+    found, _ = bake_moved(kept, room(panel=-0.6))
     assert found.solver["moved"] == ["Panel"]
     assert relative(pixels(found), full(room(panel=-0.6), kept)) < 0.01
 
 
 def test_another_size_keeps_its_texels_and_is_told_of(kept: KeptBake) -> None:
-    found, _ = drain(bake_moved(kept, room(size=1.3)))
+    found, _ = bake_moved(kept, room(size=1.3))
     assert any("another size" in warning.message for warning in found.warnings)
     assert relative(pixels(found), full(room(size=1.3), kept)) < 0.01
 
@@ -138,8 +150,8 @@ def sealed(at: float) -> BakeScene:
 
 def test_no_light_comes_along_into_a_sealed_box() -> None:
     """A lit block that is put into it is black then, as all in it is."""
-    _, kept = drain(bake_and_keep(sealed(1.9), SETTINGS))
-    result, after = drain(bake_moved(kept, sealed(0.5)))
+    _, kept = bake_and_keep(sealed(1.9), SETTINGS)
+    result, after = bake_moved(kept, sealed(0.5))
     triangle = after.geometry.triangle
     inside = ((triangle >= 12) & (triangle < 24)) | (triangle >= 36)
     found = pixels(result)
@@ -164,14 +176,14 @@ def shelves(at: float) -> BakeScene:
 
 def test_parts_that_nothing_meets_any_more_are_left_out() -> None:
     """Else they wrote what they reflect to the row that stands for nothing, and a second move failed."""
-    first, kept = drain(bake_and_keep(shelves(1.9), SETTINGS))
-    _, after = drain(bake_moved(kept, shelves(0.8)))
-    rows = np.concatenate([links.rows for links in after.lit.transport.parts.links])
+    first, kept = bake_and_keep(shelves(1.9), SETTINGS)
+    _, after = bake_moved(kept, shelves(0.8))
+    rows = np.concatenate([links.rows for links in after.lit.transport.cells.links])
     assert rows.min() >= len(after.geometry)
-    before = np.concatenate([links.rows for links in kept.lit.transport.parts.links])
-    old, new = (some.moves.traced.numbered(of) for some, of in ((kept, before), (after, rows)))
+    before = np.concatenate([links.rows for links in kept.lit.transport.cells.links])
+    old, new = (some.moves.traced.rows.numbers(of) for some, of in ((kept, before), (after, rows)))
     assert np.setdiff1d(old, new).size > 0
-    back, _ = drain(bake_moved(after, shelves(1.9)))
+    back, _ = bake_moved(after, shelves(1.9))
     assert relative(pixels(back), pixels(first)) < 0.01
 
 
@@ -180,7 +192,7 @@ def test_what_moved_is_told_by_name(kept: KeptBake) -> None:
     assert moved_objects(kept, room(turn=1.0)) == ("Box",)
     assert moved_objects(kept, room(turn=1.0, panel=0.1)) == ("Box", "Panel")
     with pytest.raises(SceneError, match="nothing has moved"):
-        drain(bake_moved(kept, room()))
+        bake_moved(kept, room())
 
 
 def test_a_kept_bake_is_updated_if_objects_have_moved_and_nothing_else(kept: KeptBake) -> None:

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from radiosity_addon.bake.pipeline import bake
-from radiosity_addon.base.progress import drain
 from radiosity_addon.lightmap.images.page import LightmapPage
 from radiosity_addon.lights.sun_and_sky import Light
 from radiosity_addon.options.bake_settings import BakeSettings
@@ -44,7 +43,7 @@ def pages(
     scene = Scene(triangles, grey(count, 0.5), grey(count, 0.0), lights=[light], two_sided=True)
     parts = [("Ground", len(ground)), ("Bottom", 2), ("Box", len(box) - 2)]
     settings = BakeSettings(quality="draft", resolution=32, atlas="per-object", quantity="irradiance")
-    result = drain(bake(bake_scene(scene, *parts), settings))
+    result = bake(bake_scene(scene, *parts), settings)
     return {item.object.name: page for item, page in zip(result.objects, result.pages, strict=True)}
 
 
@@ -102,9 +101,7 @@ def test_walls_of_neighboring_rooms_stay_lit() -> None:
         scene = Scene(triangles, grey(count, 0.5), grey(count, 0.0), lights=lamps, two_sided=True)
         settings = BakeSettings(quality="draft", resolution=32, atlas="per-object")
         parts = [(f"Room {number}", 12) for number in range(count // 12)]
-        return np.array(
-            [values(page).mean() for page in drain(bake(bake_scene(scene, *parts), settings)).pages]
-        )
+        return np.array([values(page).mean() for page in bake(bake_scene(scene, *parts), settings).pages])
 
     alone = baked(room, lamps[:1])
     np.testing.assert_allclose(baked(triangles, lamps), alone[0], rtol=5e-3)

@@ -66,7 +66,7 @@ def refuse_work(monkeypatch: pytest.MonkeyPatch) -> None:
     def worked(*_arguments: object) -> None:
         raise AssertionError("the bake was not stopped before the work")
 
-    monkeypatch.setattr("radiosity_addon.blender.jobs.job.bake_steps", worked)
+    monkeypatch.setattr("radiosity_addon.blender.jobs.job.run_pipeline", worked)
 
 
 def bake() -> None:

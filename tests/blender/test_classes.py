@@ -11,6 +11,7 @@ import pytest
 import radiosity_addon
 from radiosity_addon.blender import registration
 from radiosity_addon.blender.files.cornell import build_cornell_box
+from radiosity_addon.blender.operators.polls import Conditional
 from radiosity_addon.blender.panels import bake_panel
 from radiosity_addon.blender.panels.sections import Section
 from radiosity_addon.blender.session.state import session
@@ -104,7 +105,9 @@ def test_every_operator_says_what_it_does_and_every_panel_has_a_name() -> None:
 
 def test_every_section_has_a_name_of_its_own() -> None:
     sections = Section.__subclasses__()
-    assert {section.__name__ for section in sections} > {section.__name__ for section in bake_panel.SECTIONS}
+    assert {section.__name__ for section in sections} > {
+        section.__name__ for section in (*bake_panel.NEXT_BAKE, *bake_panel.RESULT)
+    }
     assert len({section.name for section in sections}) == len(sections)
     assert all(section.label and section.name.startswith("radiosity_") for section in sections)
 
@@ -134,25 +137,13 @@ def test_every_operator_that_refuses_says_why() -> None:
     silent, refused = [], set()
     for situation in situations():
         for cls in OPERATORS:
-            poll = cls.__dict__.get("poll")
-            if poll is None:
+            if not issubclass(cls, Conditional):
                 continue
             said: list[str] = []
-            stub = type(cls.__name__, (), {"poll_message_set": said.append, **_helpers(cls)})
-            if not poll.__func__(stub, bpy.context):
+            stub = type(cls.__name__, (), {"poll_message_set": said.append, "conditions": cls.conditions})
+            if not Conditional.poll.__func__(stub, bpy.context):
                 refused.add(cls.__name__)
                 if not said or not said[-1].strip():
                     silent.append(f"{cls.__name__}: {situation}")
     assert silent == []
     assert "RADIOSITY_OT_bake" in refused
-
-
-def _helpers(cls: type) -> dict[str, Any]:
-    """What a poll may use of its class beside Blender's own: constants and class methods."""
-    return {
-        name: value
-        for base in reversed(cls.__mro__)
-        if base.__module__.startswith("radiosity")
-        for name, value in vars(base).items()
-        if not name.startswith("__") and name != "poll"
-    }

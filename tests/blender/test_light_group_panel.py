@@ -11,7 +11,7 @@ import radiosity_addon
 from radiosity_addon.blender.images.light_mixer import mixers, sliders_of
 from radiosity_addon.blender.panels import light_group_panels
 from radiosity_addon.blender.scene_records.light_membership import NAME
-from radiosity_addon.blender.settings.light_group_properties import listed_groups, outdate
+from radiosity_addon.blender.settings.light_group_properties import list_groups
 from radiosity_addon.blender.settings.properties import settings_of
 from tests.blender.group_bake import bake_groups, lit_plane, slide
 from tests.blender.scenes import add_lamp, add_mesh, set_world, shader_material
@@ -37,7 +37,7 @@ def selected() -> set[str]:
 def listed() -> list[tuple[str, int, int, int, int, int]]:
     return [
         (group.name, group.lamps, group.objects, group.materials, group.collections, group.worlds)
-        for group in listed_groups(bpy.context.scene)
+        for group in list_groups(bpy.context.scene)
     ]
 
 
@@ -51,7 +51,22 @@ def test_selected_lamps_are_assigned_listed_and_selected_again(lamps: dict) -> N
     select(lamps["one"])
     bpy.ops.radiosity.light_group_remove()
     assert listed() == [("Kitchen", 1, 0, 0, 0, 0)]
+    assert lamps["one"].lightgroup == ""
+    assert [group.name for group in bpy.context.view_layer.lightgroups] == ["Kitchen"]
+
+
+def test_assigning_replaces_the_field_of_earlier_versions(lamps: dict) -> None:
+    lamps["one"].radiosity_light_group = "Old"
+    assert listed() == [("Old", 1, 0, 0, 0, 0)]
+    select(lamps["one"])
+    bpy.ops.radiosity.light_group_assign(group="New")
+    assert listed() == [("New", 1, 0, 0, 0, 0)]
     assert not lamps["one"].is_property_set(NAME)
+
+
+def test_a_group_without_members_is_listed() -> None:
+    bpy.context.view_layer.lightgroups.add(name="Empty")
+    assert listed() == [("Empty", 0, 0, 0, 0, 0)]
 
 
 def test_everything_with_a_name_is_listed() -> None:
@@ -69,18 +84,6 @@ def test_everything_with_a_name_is_listed() -> None:
     ]
     bpy.ops.radiosity.light_group_select(group="Signs")
     assert selected() == {sign.name}
-
-
-def test_the_list_follows_collections_though_they_do_not_tell(
-    lamps: dict, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    collection = bpy.data.collections.new("Lamps")
-    bpy.context.scene.collection.children.link(collection)
-    collection.radiosity_light_group = "lamps"
-    assert listed() == [("lamps", 0, 0, 0, 1, 0)]
-    collection.objects.link(lamps["one"])
-    monkeypatch.setattr("radiosity_addon.blender.settings.light_group_properties.OUTDATED_AFTER", 0.0)
-    assert listed() == [("lamps", 1, 0, 0, 1, 0)]
 
 
 def test_buttons_that_cannot_work_are_off_or_say_why(lamps: dict) -> None:
@@ -135,7 +138,6 @@ def test_the_panel_draws_groups_and_sliders(lamps: dict) -> None:
     lit_plane().active_material.radiosity_light_group = "Glow"
     lamps["one"].radiosity_light_group = "Lamps"
     bake_groups()
-    outdate()
     notes: list = []
     light_group_panels.LightGroupSection.draw(_Layout(notes), bpy.context)
     labels = [words.get("text") for name, _, words in notes if name == "label"]

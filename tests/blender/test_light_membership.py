@@ -136,3 +136,28 @@ def test_groups_that_are_wanted_and_not_there_are_warned_of() -> None:
     assert not any("light group" in warning.message for warning in exported().warnings)
     told = [warning.message for warning in exported(light_groups=True).warnings]
     assert told == ["scene 'Scene': no lamp, emissive material or world is in a light group; none is baked"]
+
+
+def test_blenders_own_groups_count_where_a_view_layer_lists_them() -> None:
+    bpy.context.view_layer.lightgroups.add(name="hall")
+    one, other = lamp("one"), lamp("other")
+    one.lightgroup, other.lightgroup = "hall", "removed"
+    world = set_world(1.0, 1.0, 1.0)
+    world.lightgroup = "hall"
+    assert of_lamps() == {"one": "hall", "other": "", world.name: "hall"}
+
+
+def test_blenders_own_group_comes_before_the_field_of_earlier_versions() -> None:
+    bpy.context.view_layer.lightgroups.add(name="hall")
+    lamp("earlier", "before")
+    lamp("own", "before").lightgroup = "hall"
+    assert of_lamps() == {"own": "hall", "earlier": "before"}
+
+
+def test_an_objects_blender_group_wins_over_its_materials() -> None:
+    bpy.context.view_layer.lightgroups.add(name="hall")
+    glow = shader_material("glow", "ShaderNodeEmission")
+    glow.radiosity_light_group = "signs"
+    add_mesh("Sign", material=glow)
+    add_mesh("Own", material=glow).lightgroup = "hall"
+    assert of_emitters() == {("glow", "signs"), ("glow", "hall")}

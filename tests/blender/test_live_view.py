@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import radiosity_addon
-from radiosity_addon.bake.result.progress import Picture
+from radiosity_addon.bake.result.pictures import Picture
 from radiosity_addon.blender.files.cornell import build_cornell_box
 from radiosity_addon.blender.jobs import live_view
 from radiosity_addon.blender.jobs.job import run_bake
@@ -30,7 +30,7 @@ def registered() -> Iterator[None]:
 
 def pictures(in_background: bool = False) -> list[Picture]:
     job = run_bake(bpy.context, QUICK, None, in_background=in_background)
-    return [progress.picture for progress in job if progress.picture is not None]
+    return [status.picture for status in job if isinstance(status.picture, Picture)]
 
 
 def seen_names() -> set[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from types import SimpleNamespace
 
 import bpy
 import pytest
@@ -11,7 +12,7 @@ import radiosity_addon
 from radiosity_addon.blender.panels import bake_panel
 from radiosity_addon.blender.panels.option_rows import draw_options
 from radiosity_addon.blender.settings.properties import settings_of
-from radiosity_addon.options import METHODS, OPTIONS, SECTIONS, BakeSettings, options_of_method
+from radiosity_addon.options import METHODS, OPTIONS, PANEL_OPTIONS, SECTIONS, BakeSettings, options_of_method
 
 SETTINGS = {name: option for name, option in OPTIONS.items() if option.methods}
 
@@ -21,19 +22,25 @@ class Layout:
 
     def __init__(self) -> None:
         self.drawn: list[str] = []
+        self.by_quality: list[SimpleNamespace] = []
 
     def column(self, **_: object) -> Layout:
         return self
 
-    def prop(self, owner: object, name: str) -> None:
+    row = split = column
+
+    def prop(self, owner: object, name: str, **_: object) -> None:
         assert name in owner.bl_rna.properties
         self.drawn.append(name)
 
     def label(self, **_: object) -> None:
         pass
 
-    def operator(self, *_: object, **_more: object) -> None:
-        pass
+    def operator(self, _name: str, text: str, **_: object) -> SimpleNamespace:
+        properties = SimpleNamespace()
+        if text:
+            self.by_quality.append(properties)
+        return properties
 
 
 @pytest.fixture(autouse=True)
@@ -80,6 +87,25 @@ def test_untouched_settings_come_from_the_quality(method: str, group: bpy.types.
     assert set(given) <= {"assembly"}
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_a_number_left_to_the_quality_is_a_button_until_it_is_set(
+    method: str, group: bpy.types.PropertyGroup
+) -> None:
+    group.method = method
+    layout = Layout()
+    bake_panel.SolverSection.draw(layout, bpy.context)
+    names = [properties.option for properties in layout.by_quality]
+    assert set(names) == {name for name in options_of_method(method) if SETTINGS[name].automatic}
+    assert not set(names) & set(layout.drawn)
+    for name in names:
+        bpy.ops.radiosity.set_option(option=name)
+        value = getattr(group, name)
+        assert value > 0
+        assert settings_of(bpy.context).method_settings()[name] == pytest.approx(value)
+        bpy.ops.radiosity.set_option(option=name)
+        assert not group.is_property_set(name)
+
+
 def test_a_row_that_is_not_shown_has_no_effect(group: bpy.types.PropertyGroup) -> None:
     group.resolution, group.texel_density, group.max_resolution = 100, 12.3, 2048
     group.pages, group.relative_error = 3, 0.1
@@ -95,7 +121,7 @@ def test_every_option_of_the_panel_is_drawn_where_its_section_is(group: bpy.type
     group.size_mode, group.quality = "density", "error"
     expected = {
         option.identifier
-        for option in OPTIONS.values()
+        for option in (*PANEL_OPTIONS.values(), *OPTIONS.values())
         if option.panel is not None and not option.methods and option.name not in {"resolution", "pages"}
     }
     layout = Layout()
@@ -147,4 +173,4 @@ def test_the_last_bake_tells_how_it_was_solved() -> None:
     assert figures["Method"] == "Gauss-Seidel"
     assert figures["Iterations"] == "17"
     assert figures["Residual"] == "2.5e-05"
-    assert figures["Separate parts"] == "2"
+    assert figures["Separate Parts"] == "2"

@@ -242,7 +242,7 @@ def test_sidecars_that_do_not_fit_are_refused(baked: Path, wrong: str) -> None:
     elif wrong == "another bake":
         kept_bakes.note(bpy.context.scene, "other")
         kept_bakes.mark_images([bpy.data.images[LIGHTMAP]], "other")
-        message = "has no sidecar of its own"
+        message = "has no sidecar"
     elif wrong == "missing":
         path.unlink()
         message = "has no sidecar"

@@ -12,7 +12,7 @@ import pytest
 import radiosity_addon
 from radiosity_addon.bake.pipeline import bake
 from radiosity_addon.base.errors import UsageError
-from radiosity_addon.base.progress import drain
+from radiosity_addon.base.steps import drain
 from radiosity_addon.blender.apply.restore import restore
 from radiosity_addon.blender.jobs.job import run_bake
 from radiosity_addon.options.bake_settings import BakeSettings
@@ -160,7 +160,7 @@ def test_ray_visibility_as_in_cycles(flags: dict[str, bool]) -> None:
             setattr(obj, attribute, value)
     add_lamp("POINT", transform={"location": (0.5, 0, 3)}, energy=500.0, shadow_soft_size=0.1)
     export = export_with(objects=("Meter",))
-    result = drain(bake(export.bake_scene, BakeSettings(resolution=32, quantity="irradiance")))
+    result = bake(export.bake_scene, BakeSettings(resolution=32, quantity="irradiance"))
     page = result.pages[0]
     ours = page.pixels[page.coverage].mean(axis=0)
     cycles = measure_irradiance(meter, samples=512)

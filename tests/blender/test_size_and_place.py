@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from radiosity_addon.bake.pipeline import bake
-from radiosity_addon.base.progress import drain
 from radiosity_addon.blender.scene_export.export import export_scene
 from radiosity_addon.options.bake_settings import BakeSettings
 from tests.golden.rows.geometry import lit, moved
@@ -25,7 +24,7 @@ def baked(place: tuple[float, float, float], scale: float) -> np.ndarray:
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     lit(blockers=True)
     moved(place, scale)
-    return drain(bake(export_scene(bpy.context, SETTINGS).bake_scene, SETTINGS)).pages[0].pixels
+    return bake(export_scene(bpy.context, SETTINGS).bake_scene, SETTINGS).pages[0].pixels
 
 
 @pytest.mark.parametrize(

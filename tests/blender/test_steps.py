@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
-from radiosity_addon.base.progress import drain
+from radiosity_addon.base.steps import drain
 from radiosity_addon.blender.apply import rebake, sweep
 from radiosity_addon.blender.cycles import surface_bake, surface_batches, world_pixels
 from radiosity_addon.blender.datablocks.bake_record import is_made

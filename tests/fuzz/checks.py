@@ -10,7 +10,7 @@ import numpy as np
 from radiosity_addon.bake.plan import BakePlan
 from radiosity_addon.bake.result.result import BakeResult
 from radiosity_addon.base.errors import SceneError, UsageError
-from radiosity_addon.base.progress import drain
+from radiosity_addon.base.steps import drain
 from radiosity_addon.blender.apply.restore import restore
 from radiosity_addon.blender.jobs import job
 from radiosity_addon.lights.environment import EnvironmentImage
@@ -58,18 +58,18 @@ def check(seed: int) -> bool:
 
 def _bake(settings: BakeSettings, seen: list[tuple[BakeScene, BakeResult]]) -> None:
     """Bake the open scene, and keep what the pipeline was given and gave."""
-    bake_steps = job.bake_steps
+    run_pipeline = job.run_pipeline
 
     def watched(plan: BakePlan, *given: Any):
-        result, kept = yield from bake_steps(plan, *given)
+        result, kept = run_pipeline(plan, *given)
         seen.append((plan.bake_scene, result))
         return result, kept
 
-    job.bake_steps = watched
+    job.run_pipeline = watched
     try:
         drain(job.run_bake(bpy.context, settings, None))
     finally:
-        job.bake_steps = bake_steps
+        job.run_pipeline = run_pipeline
 
 
 def _check_texels(scene: BakeScene, result: BakeResult, settings: BakeSettings) -> None:

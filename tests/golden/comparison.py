@@ -12,7 +12,6 @@ from bench.layout import objects_with_layout
 from radiosity_addon.bake.pipeline import bake
 from radiosity_addon.bake.result.result import BakeResult
 from radiosity_addon.base.bake_warning import BakeWarning
-from radiosity_addon.base.progress import drain
 from radiosity_addon.blender.scene_export.export import export_scene
 from radiosity_addon.lightmap.texels.rasterize import rasterise
 from radiosity_addon.options.bake_settings import BakeSettings
@@ -74,7 +73,7 @@ def bake_row(row: Row, quality: str = "medium") -> BakeResult:
     row.build()
     names = tuple(obj.name for obj in objects_with_layout(bpy.context.scene))
     settings = BakeSettings(resolution=row.resolution, keep_uvs=True, quality=quality, objects=names)
-    return drain(bake(export_scene(bpy.context, settings).bake_scene, settings))
+    return bake(export_scene(bpy.context, settings).bake_scene, settings)
 
 
 def compare(row: Row, quality: str = "medium") -> Comparison:

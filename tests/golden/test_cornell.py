@@ -13,7 +13,6 @@ from bench.error_measure import relative_rmse
 from bench.layout import write_layout
 from radiosity_addon.bake.pipeline import bake
 from radiosity_addon.bake.result.result import BakeResult
-from radiosity_addon.base.progress import drain
 from radiosity_addon.blender.files.cornell import build_cornell_box
 from radiosity_addon.blender.scene_export.export import export_scene
 from radiosity_addon.lightmap.texels.rasterize import rasterise
@@ -51,7 +50,7 @@ def comparison(empty_blender: None) -> Comparison:
     build_cornell_box()
     write_layout(reference.uv)
     settings = BakeSettings(resolution=reference.resolution, keep_uvs=True)
-    result = drain(bake(export_scene(bpy.context, settings).bake_scene, settings))
+    result = bake(export_scene(bpy.context, settings).bake_scene, settings)
     size = reference.resolution
     owner, compared = np.full((size, size), -1), np.zeros((size, size), dtype=bool)
     for number, item in enumerate(result.objects):

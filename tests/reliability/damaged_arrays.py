@@ -56,7 +56,7 @@ def damage_arrays(path: Path, random: Random) -> str:
 
 def _break_words(told: Any, random: Random) -> str:
     """Put an odd value somewhere into the description."""
-    node, path = told["told"], []
+    node, path = told["description"], []
     while True:
         keys = list(node) if isinstance(node, dict) else list(range(len(node)))
         key = random.choice(keys)
@@ -66,7 +66,7 @@ def _break_words(told: Any, random: Random) -> str:
             node = inner
             continue
         node[key] = random.choice(
-            (-1, 2**40, 1e300, float("nan"), None, "text", [], {"object": 0}, {"array": 10**6})
+            (-1, 2**40, 1e300, float("nan"), None, "text", [], {"object": ["Links", {}]}, {"array": 10**6})
         )
         return "/".join(path)[-60:]
 

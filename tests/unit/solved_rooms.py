@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from radiosity_addon.solver import Scene, SolverSettings
-from radiosity_addon.solver.methods.hierarchical import HierarchicalState, solve_steps
+from radiosity_addon.solver.methods.hierarchical import HierarchicalState, solve
 from tests.rooms import CEILING, WALLS, box_room, grey, solid_box
 
 
@@ -28,5 +28,4 @@ def corridor() -> Scene:
 
 def solved(scene: Scene, **settings: float) -> HierarchicalState:
     """Run the solver and return all it worked on."""
-    *_, (_, state) = solve_steps(scene, SolverSettings(**settings))
-    return state
+    return solve(scene, SolverSettings(**settings))

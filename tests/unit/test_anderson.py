@@ -86,7 +86,7 @@ def test_a_bright_closed_room_needs_a_quarter_of_jacobis_gathers() -> None:
     assert len(state.cluster_links) > 0
     assert state.settings == SolverSettings(error=3e-3)
     measured = (state.links, state.cluster_links)
-    balance = state.conservation.balance(state.hierarchy, state.top, *measured, rough=True)
+    balance = state.conservation.balance(state.hierarchy, state.cut, *measured, rough=True)
     links = (balance.links, state.direct())
 
     state.reset()
@@ -99,7 +99,7 @@ def test_a_bright_closed_room_needs_a_quarter_of_jacobis_gathers() -> None:
     state.reset()
     state.iterations = 0
     while not exhausted(state):
-        bounce(state, *links, balance.sent, state.cluster_links, state.top, balance.received)
+        bounce(state, *links, balance.sent, state.cluster_links, state.cut, balance.received)
         if state.residual < 1e-5:
             break
     assert accelerated < 0.25 * state.iterations

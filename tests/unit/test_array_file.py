@@ -63,10 +63,10 @@ def test_a_flipped_bit_is_noticed(path: Path, at: int) -> None:
         read_arrays(path, MAGIC, 3)
 
 
-def test_other_kinds_and_versions_are_refused(path: Path) -> None:
+def test_other_kinds_and_formats_are_refused(path: Path) -> None:
     with pytest.raises(ArrayFileError, match="no such file"):
         read_arrays(path, b"OTHERS", 3)
-    with pytest.raises(ArrayFileError, match="has version 3, and this is for version 4"):
+    with pytest.raises(ArrayFileError, match="has format 3, and this version reads format 4"):
         read_arrays(path, MAGIC, 4)
 
 
@@ -91,7 +91,7 @@ def forged(path: Path, head: dict, body: bytes) -> None:
 )
 def test_a_file_that_was_forged_is_refused(tmp_path: Path, entry: object) -> None:
     path = tmp_path / "forged"
-    forged(path, {"told": None, "arrays": [entry]}, b"")
+    forged(path, {"description": None, "arrays": [entry]}, b"")
     with pytest.raises(ArrayFileError, match="damaged"):
         read_arrays(path, MAGIC, 3)
 
@@ -109,7 +109,11 @@ def test_bombs_are_refused_before_anything_of_their_size_is_allocated(
     """100 MB of zeros in half a megabyte, and claims that a file of this size cannot keep."""
     path, packed = tmp_path / "bomb", zeros
     blocks = [len(packed)] * -(-claimed // array_file.BLOCK)
-    forged(path, {"told": None, "arrays": [{"kind": "uint8", "shape": [claimed], "blocks": blocks}]}, packed)
+    forged(
+        path,
+        {"description": None, "arrays": [{"kind": "uint8", "shape": [claimed], "blocks": blocks}]},
+        packed,
+    )
     tracemalloc.start()
     with pytest.raises(ArrayFileError, match=r"damaged|cannot"):
         read_arrays(path, MAGIC, 3)
@@ -119,7 +123,7 @@ def test_bombs_are_refused_before_anything_of_their_size_is_allocated(
 
 def test_a_description_that_is_a_bomb_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "bomb"
-    forged(path, {"told": " " * 150_000_000, "arrays": []}, b"")
+    forged(path, {"description": " " * 150_000_000, "arrays": []}, b"")
     tracemalloc.start()
     with pytest.raises(ArrayFileError, match="damaged"):
         read_arrays(path, MAGIC, 3)

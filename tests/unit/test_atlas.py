@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from radiosity_addon.base.errors import BakeError
+from radiosity_addon.base.progress import Progress
 from radiosity_addon.lightmap.charts import cut_charts as charts_module
 from radiosity_addon.lightmap.charts.cut_charts import unwrap
 from radiosity_addon.lightmap.charts.flatten import project_polygons
@@ -262,7 +263,7 @@ def test_a_folded_polygon_does_not_overlap_itself():
 
 def test_without_a_chart_grower_every_polygon_is_a_chart():
     triangles, polygon = uv_sphere(6, 8)
-    *_, charts = unwrap(triangles, polygon, None)
+    charts = unwrap(triangles, polygon, None)
     assert charts.count == 48
     np.testing.assert_array_equal(np.unique(charts.chart, return_inverse=True)[1], polygon)
 
@@ -275,7 +276,7 @@ def test_a_polygon_that_the_grower_cuts_gets_its_own_chart():
         chart[0] = chart.max() + 1
         return uv, chart
 
-    *_, charts = unwrap(triangles, polygon, cutting)
+    charts = unwrap(triangles, polygon, cutting)
     assert charts.count == 6
     assert charts.chart[0] == charts.chart[1]
     assert (charts.chart[2:] != charts.chart[0]).all()
@@ -284,7 +285,9 @@ def test_a_polygon_that_the_grower_cuts_gets_its_own_chart():
 def test_large_objects_go_through_in_pieces(monkeypatch):
     triangles, polygon = lumpy_ngons(7, rings=8, segments=12)
     monkeypatch.setattr(charts_module, "PIECE", 40)
-    *steps, atlas = build_atlas(inputs((triangles, polygon)), AtlasOptions(256))
+    steps = []
+    progress = Progress(lambda status: steps.append(status.fraction))
+    atlas = build_atlas(inputs((triangles, polygon)), AtlasOptions(256), progress)
     assert len(steps) > len(triangles) / 40
     assert steps == sorted(steps)
     assert steps[0] >= 0
@@ -374,7 +377,7 @@ def test_overlaps_within_a_chart_are_found_and_cut_out():
     wound = triangles[..., :2]
     assert coverage_sum((wound * 0.2 + 0.5).astype(np.float32), 128).max() > 1.9
     assert len(overlapping_triangles(wound, np.zeros(len(wound), dtype=np.int64))) > 30
-    *_, charts = unwrap(triangles, polygon, from_above)
+    charts = unwrap(triangles, polygon, from_above)
     for chart in range(charts.count):
         part = charts.uv[charts.chart == chart]
         part = (part - part.min(axis=(0, 1))) / np.ptp(part, axis=(0, 1)).max()
@@ -383,5 +386,5 @@ def test_overlaps_within_a_chart_are_found_and_cut_out():
 
 def test_what_does_not_overlap_is_left_alone():
     triangles, polygon = uv_sphere(12, 16)
-    *_, charts = unwrap(triangles, polygon, grow_charts)
+    charts = unwrap(triangles, polygon, grow_charts)
     assert len(overlapping_triangles(charts.uv, charts.chart)) == 0

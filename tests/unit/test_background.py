@@ -1,94 +1,117 @@
-"""A generator advanced in a thread behaves as if it were not."""
+"""Work in a thread behaves as if it were not in one, and can be stopped."""
 
 from __future__ import annotations
 
 import sys
 import threading
+import time
 from collections.abc import Generator
 
 import pytest
 
+from radiosity_addon.base.progress import Progress
 from radiosity_addon.blender.session.background import TURN, in_thread
 
 
-def finish(steps: Generator) -> tuple[list, object]:
-    """All that a generator yields but None, and what it returns."""
-    yielded = []
+def finish(steps: Generator) -> tuple[list[float], object]:
+    """The fractions that come through, and what is returned."""
+    fractions = []
     while True:
         try:
-            value = next(steps)
+            status = next(steps)
         except StopIteration as end:
-            return yielded, end.value
-        if value is not None:
-            yielded.append(value)
+            return fractions, end.value
+        if status is not None:
+            fractions.append(status.fraction)
 
 
-def test_what_it_yields_and_returns_comes_through() -> None:
+@pytest.mark.parametrize("in_window", [True, False])
+def test_what_it_tells_and_returns_comes_through(in_window: bool) -> None:
     threads = set()
 
-    def work() -> Generator[int, None, str]:
+    def work(progress: Progress) -> str:
         for number in range(5):
             threads.add(threading.current_thread())
-            yield number
+            progress.at(number / 4)
         return "result"
 
-    assert finish(in_thread(work())) == ([0, 1, 2, 3, 4], "result")
+    assert finish(in_thread(work, in_window)) == ([0, 0.25, 0.5, 0.75, 1], "result")
     assert len(threads) == 1
     assert threading.main_thread() not in threads
 
 
 def test_what_it_raises_comes_through() -> None:
-    def work() -> Generator[int, None, None]:
-        yield 1
+    def work(progress: Progress) -> None:
+        progress.at(0.5)
         raise ValueError("the reason")
 
     with pytest.raises(ValueError, match="the reason"):
-        finish(in_thread(work()))
+        finish(in_thread(work))
 
 
 def test_a_long_step_does_not_hold_the_caller() -> None:
     go_on = threading.Event()
 
-    def work() -> Generator[str, None, None]:
+    def work(progress: Progress) -> None:
         go_on.wait(60)
-        yield "done"
+        progress.at(1.0)
 
-    steps = in_thread(work())
+    steps = in_thread(work)
     assert [next(steps) for _ in range(3)] == [None, None, None]
     go_on.set()
-    assert finish(steps) == (["done"], None)
+    assert finish(steps) == ([1.0], None)
 
 
-def test_the_steps_go_on_while_the_caller_does_something_else() -> None:
+def test_outside_a_window_only_news_come() -> None:
+    def work(progress: Progress) -> None:
+        time.sleep(0.05)
+        progress.at(1.0)
+
+    assert [status.fraction for status in in_thread(work, in_window=False) if status] == [1.0]
+    assert None not in list(in_thread(work, in_window=False))
+
+
+def test_the_work_goes_on_while_the_caller_does_something_else() -> None:
     arrived = threading.Event()
 
-    def work() -> Generator[int, None, None]:
-        yield from range(3)
+    def work(progress: Progress) -> None:
+        for number in range(3):
+            progress.at(number / 2)
         arrived.set()
 
-    steps = in_thread(work())
+    steps = in_thread(work)
     first = next(steps)
     assert arrived.wait(60)
-    assert (first, finish(steps)) in [(0, ([1, 2], None)), (None, ([0, 1, 2], None))]
+    fractions, _ = finish(steps)
+    assert [*([] if first is None else [first.fraction]), *fractions] == [0, 0.5, 1]
 
 
-def test_closing_in_a_step_returns_at_once_and_closes_the_work_after_it() -> None:
-    go_on, closed, goes_on = threading.Event(), threading.Event(), []
+@pytest.mark.parametrize("in_window", [True, False])
+def test_closed_it_cancels_the_work_where_it_next_tells_how_far_it_is(in_window: bool) -> None:
+    """In a window closing does not wait for that."""
+    go_on, cleaned_up, goes_on = threading.Event(), threading.Event(), []
 
-    def work() -> Generator[str, None, None]:
+    def work(progress: Progress) -> None:
         try:
+            progress.at(0.0)
             go_on.wait(60)
-            yield "the step that was running"
+            progress.at(0.5)
             goes_on.append(True)
         finally:
-            closed.set()
+            cleaned_up.set()
 
-    steps = in_thread(work())
-    assert next(steps) is None
-    steps.close()
-    assert not closed.is_set()
-    go_on.set()
-    assert closed.wait(60)
+    steps = in_thread(work, in_window)
+    while next(steps) is None:
+        pass
+    if in_window:
+        steps.close()
+        assert not cleaned_up.is_set()
+        go_on.set()
+        assert cleaned_up.wait(60)
+    else:
+        threading.Timer(0.05, go_on.set).start()
+        steps.close()
+        assert cleaned_up.is_set()
     assert goes_on == []
 
 
@@ -96,14 +119,14 @@ def test_turns_are_short_while_it_runs_and_as_before_afterwards() -> None:
     """A window that is drawn asks for Python's lock dozens of times; each takes a turn at most."""
     before, during = sys.getswitchinterval(), []
 
-    def work() -> Generator[int, None, None]:
+    def work(progress: Progress) -> None:
         during.append(sys.getswitchinterval())
-        yield 1
+        progress.at(1.0)
 
-    finish(in_thread(work()))
+    finish(in_thread(work))
     assert during == [pytest.approx(TURN)]
     assert sys.getswitchinterval() == before
-    steps = in_thread(work())
+    steps = in_thread(work)
     next(steps)
     steps.close()
     assert sys.getswitchinterval() == before

@@ -7,10 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from radiosity_addon.base.progress import drain
 from radiosity_addon.lightmap.texels import clearance, occlusion
 from radiosity_addon.lightmap.texels.clearance import clear_texels
-from radiosity_addon.lightmap.texels.occlusion import HOOD, OUTSET, crossing_steps
+from radiosity_addon.lightmap.texels.occlusion import HOOD, OUTSET, find_crossings
 from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
 from radiosity_addon.rays.caster import SIGHT_LIFT
 from radiosity_addon.rays.embree import EmbreeCaster
@@ -67,11 +66,11 @@ def test_probes_find_the_same_where_clear_texels_are_left_out(
     seed: int, n: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     geometry, caster = setting(*clutter(seed), n=n, seed=seed if seed % 2 else None)
-    found = drain(crossing_steps(geometry, caster))
+    found = find_crossings(geometry, caster)
     some = clear(geometry, caster)
     rays = caster.rays
     monkeypatch.setattr(occlusion, "clear_texels", lambda of, *_: np.zeros(len(of), dtype=bool))
-    every = drain(crossing_steps(geometry, caster))
+    every = find_crossings(geometry, caster)
     assert rays < caster.rays - rays
     assert some.mean() > 0.2
     for field in dataclasses.fields(every):

@@ -1,4 +1,4 @@
-"""The top of the cluster tree: what its tips hold, and sums and pushes against whole faces."""
+"""A cut through the cluster tree: what its nodes hold, and sums and pushes against whole faces."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from radiosity_addon.solver import Scene
-from radiosity_addon.solver.hierarchy.cluster_cut import TreeTop
+from radiosity_addon.solver.hierarchy.cluster_cut import ClusterCut
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from tests.rooms import box_room, grey
 
@@ -33,43 +33,43 @@ def linked(request: pytest.FixtureRequest, hierarchy: Hierarchy) -> np.ndarray:
 def test_tips_tile_the_faces_and_none_is_linked_above_another(
     hierarchy: Hierarchy, linked: np.ndarray
 ) -> None:
-    top = TreeTop(hierarchy, linked, hierarchy.n_clusters + np.arange(5))
+    cut = ClusterCut(hierarchy, linked, hierarchy.n_clusters + np.arange(5))
     count = hierarchy.n_clusters
-    held = [faces_of(hierarchy, tip) if tip < count else np.array([tip - count]) for tip in top.tips]
+    held = [faces_of(hierarchy, node) if node < count else np.array([node - count]) for node in cut.nodes]
     np.testing.assert_array_equal(np.sort(np.concatenate(held)), np.arange(len(hierarchy.faces)))
     for number, faces in enumerate(held):
-        assert (top.tip[faces] == top.n_inner + number).all()
-        # Nothing below a tip is linked: that is what makes it one.
+        assert (cut.row_of_face[faces] == cut.n_inner + number).all()
+        # Nothing below a node of the cut is linked: that is what makes it one.
         for cluster in linked:
             inside = np.isin(faces_of(hierarchy, cluster), faces)
-            assert not inside.all() or cluster == top.tips[number]
-    assert (top.row[linked] >= 0).all()
-    assert top.n_tips + top.n_inner == top.n_rows
+            assert not inside.all() or cluster == cut.nodes[number]
+    assert (cut.row[linked] >= 0).all()
+    assert len(cut.nodes) + cut.n_inner == cut.n_rows
 
 
 def test_sums_and_means_are_those_of_the_clusters(hierarchy: Hierarchy, linked: np.ndarray) -> None:
-    top = TreeTop(hierarchy, linked)
+    cut = ClusterCut(hierarchy, linked)
     values = np.random.default_rng(1).uniform(0, 1, (len(hierarchy.faces), 2))
-    sums, means = top.sums(values), top.means(values)
+    sums, means = cut.sums(values), cut.means(values)
     expected = hierarchy.clusters.average(values, hierarchy.faces.area)
     for cluster in linked:
         np.testing.assert_allclose(
-            sums[top.row[cluster]], values[faces_of(hierarchy, cluster)].sum(axis=0), rtol=1e-12
+            sums[cut.row[cluster]], values[faces_of(hierarchy, cluster)].sum(axis=0), rtol=1e-12
         )
     np.testing.assert_allclose(means[linked], expected[linked], rtol=1e-12)
 
 
 def test_push_is_the_transpose_of_sums(hierarchy: Hierarchy, linked: np.ndarray) -> None:
     """Σ over faces of (what is pushed to them) · w = Σ over rows of values · (sum of w below)."""
-    top = TreeTop(hierarchy, linked)
+    cut = ClusterCut(hierarchy, linked)
     rng = np.random.default_rng(2)
-    values, weights = rng.normal(size=(top.n_rows, 1)), rng.normal(size=(len(hierarchy.faces), 1))
-    pushed = top.push(values)[top.tip]
-    assert (pushed * weights).sum() == pytest.approx((values * top.sums(weights)).sum(), rel=1e-10)
+    values, weights = rng.normal(size=(cut.n_rows, 1)), rng.normal(size=(len(hierarchy.faces), 1))
+    pushed = cut.push(values)[cut.row_of_face]
+    assert (pushed * weights).sum() == pytest.approx((values * cut.sums(weights)).sum(), rel=1e-10)
 
 
 def test_a_scene_of_one_face_has_one_tip() -> None:
     triangle = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], dtype=float)
-    top = TreeTop(Hierarchy(Scene(triangle, grey(1, 0.5), grey(1, 1.0))), np.zeros(0, dtype=int))
-    assert (top.n_inner, top.n_tips, top.tip.tolist()) == (0, 1, [0])
-    np.testing.assert_array_equal(top.sums(np.array([[3.0]])), [[3.0]])
+    cut = ClusterCut(Hierarchy(Scene(triangle, grey(1, 0.5), grey(1, 1.0))), np.zeros(0, dtype=int))
+    assert (cut.n_inner, len(cut.nodes), cut.row_of_face.tolist()) == (0, 1, [0])
+    np.testing.assert_array_equal(cut.sums(np.array([[3.0]])), [[3.0]])

@@ -9,7 +9,7 @@ from radiosity_addon.form_factors.formulas import point_to_polygon
 from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.solver import Scene, SolverSettings
 from radiosity_addon.solver.hierarchy.bounds import NodeShapes
-from radiosity_addon.solver.hierarchy.cluster_cut import TreeTop
+from radiosity_addon.solver.hierarchy.cluster_cut import ClusterCut
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from radiosity_addon.solver.links.cluster_links import ClusterLinks, gather_at_clusters, no_cluster_links
 from radiosity_addon.solver.links.cluster_pairs import measure_cluster_links
@@ -54,10 +54,10 @@ def test_the_mean_of_what_faces_receive_is_the_factor(made) -> None:
     carried = np.einsum("lk,lk->l", mean_normal, links.vector) + links.even
     np.testing.assert_allclose(carried, links.factor * links.visibility, rtol=2e-5, atol=1e-8)
     some = links.take(np.array([5]))
-    top = TreeTop(hierarchy, links.receiver, links.source)
+    cut = ClusterCut(hierarchy, links.receiver, links.source)
     radiosity = np.ones((hierarchy.n_clusters + hierarchy.n_elements, 1))
     faces = faces_of(hierarchy, int(some.receiver[0]))
-    at_faces = gather_at_clusters(hierarchy, top, some, radiosity)[:, 0]
+    at_faces = gather_at_clusters(hierarchy, cut, some, radiosity)[:, 0]
     mean = np.average(at_faces[faces], weights=hierarchy.faces.area[faces])
     assert mean == pytest.approx(float(some.factor[0] * some.visibility[0]), rel=1e-4)
     assert not np.delete(at_faces, faces).any()
@@ -80,11 +80,11 @@ def test_gather_is_the_sum_over_links_and_faces(made) -> None:
             share = faces.area[sent, None] / clusters.area[of]
             offset = (faces.centre[sent] - clusters.centre[of]) @ slope
             expected[rows] -= (share * offset[:, None] * radiosity[sent]).sum(axis=0)
-    top = TreeTop(hierarchy, links.receiver, links.source)
+    cut = ClusterCut(hierarchy, links.receiver, links.source)
     np.testing.assert_allclose(
-        gather_at_clusters(hierarchy, top, links, nodes), expected, rtol=1e-5, atol=1e-7
+        gather_at_clusters(hierarchy, cut, links, nodes), expected, rtol=1e-5, atol=1e-7
     )
-    assert not gather_at_clusters(hierarchy, top, no_cluster_links(), nodes).any()
+    assert not gather_at_clusters(hierarchy, cut, no_cluster_links(), nodes).any()
 
 
 def exact(hierarchy: Hierarchy, to: np.ndarray, of: np.ndarray, radiosity: np.ndarray) -> np.ndarray:
@@ -114,8 +114,8 @@ def errors_of_one_link(size: float) -> tuple[float, float]:
     for seed in range(200):
         links = measure_cluster_links(hierarchy, shapes, caster, np.array([to]), np.array([of]), seed, 1)
         assert links.visibility[0] == 1
-        top = TreeTop(hierarchy, links.receiver, links.source)
-        got.append(gather_at_clusters(hierarchy, top, links, node_radiosity(hierarchy, rising))[:32, 0])
+        cut = ClusterCut(hierarchy, links.receiver, links.source)
+        got.append(gather_at_clusters(hierarchy, cut, links, node_radiosity(hierarchy, rising))[:32, 0])
     mean = np.mean(got, axis=0)
     bias, noise = np.sqrt(((mean - wanted) ** 2).mean()), np.sqrt(((got - mean) ** 2).mean())
     return float(bias / wanted.mean()), float(noise / wanted.mean())
@@ -231,10 +231,10 @@ def test_what_looks_all_ways_is_lit_all_around() -> None:
     links = measure_cluster_links(hierarchy, shapes, caster, to, walls, 0, 1)
     assert len(links) == len(walls)
     assert (links.even > 0).all()
-    top = TreeTop(hierarchy, links.receiver)
+    cut = ClusterCut(hierarchy, links.receiver)
     bright = np.ones((hierarchy.n_elements, 2))
     bright[: len(room), 1] = hierarchy.faces.centre[: len(room), 2] > 1.99
-    got = gather_at_clusters(hierarchy, top, links, node_radiosity(hierarchy, bright))[faces]
+    got = gather_at_clusters(hierarchy, cut, links, node_radiosity(hierarchy, bright))[faces]
     np.testing.assert_allclose(got[:, 0], 1.0, atol=0.12)
     wanted = exact(hierarchy, faces, np.arange(len(room)), bright[: len(room), 1])
     area = hierarchy.faces.area[faces]

@@ -28,7 +28,7 @@ def closed(request: pytest.FixtureRequest) -> HierarchicalState:
 
 def factors(state: HierarchicalState, conservation: Conservation | None = None) -> np.ndarray:
     conservation = conservation or state.conservation
-    return conservation.factors(state.hierarchy, state.top, state.links, state.cluster_links)
+    return conservation.factors(state.hierarchy, state.cut, state.links, state.cluster_links)
 
 
 def received(state: HierarchicalState, scale: np.ndarray | None) -> np.ndarray:
@@ -41,7 +41,7 @@ def received(state: HierarchicalState, scale: np.ndarray | None) -> np.ndarray:
     means = pull(hierarchy, radiosity if scale is None else scale[:, 1:] * radiosity)
     sent_to = node_radiosity(hierarchy, means)
     count = len(hierarchy.faces)
-    arriving[:count] += gather_at_clusters(hierarchy, state.top, state.cluster_links, sent_to)
+    arriving[:count] += gather_at_clusters(hierarchy, state.cut, state.cluster_links, sent_to)
     return np.asarray(hierarchy.area @ arriving / hierarchy.area[leaves])
 
 
@@ -171,7 +171,7 @@ def test_balanced_leaves_still_send_what_they_have(cluttered: HierarchicalState)
     own = gathered.mean(axis=1)[leaves]
     shared = push(hierarchy, gathered)[leaves] - own
     sent_to = node_radiosity(hierarchy, pull(hierarchy, scale[:, 1:] * radiosity))
-    at_faces = gather_at_clusters(hierarchy, cluttered.top, cluttered.cluster_links, sent_to)
+    at_faces = gather_at_clusters(hierarchy, cluttered.cut, cluttered.cluster_links, sent_to)
     shared += at_faces[hierarchy.face[leaves]]
     area = hierarchy.area[leaves, None]
     arriving = (area * received_by[leaves, :1] * own + area * received_by[leaves, 1:] * shared).sum(axis=0)
@@ -187,7 +187,7 @@ def test_own_links_are_not_scaled_down_for_noise() -> None:
     state = solved(Scene(room[kept], grey(int(kept.sum()), 0.5), emission[kept]), error=0.1)
     hierarchy, arrivals = state.hierarchy, state.conservation.arrivals
     leaves = hierarchy.leaves
-    own, _ = sent_by_leaves(hierarchy, state.top, state.links, state.cluster_links)
+    own, _ = sent_by_leaves(hierarchy, state.cut, state.links, state.cluster_links)
     own, arriving, error = own[leaves], arrivals.share[leaves], arrivals.error(leaves)
     factor = factors(state)[leaves]
     assert (own > arriving + 1e-6).mean() > 0.1

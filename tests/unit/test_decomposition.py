@@ -8,7 +8,7 @@ import pytest
 from radiosity_addon.solver import Scene, SolverSettings
 from radiosity_addon.solver.equations.decomposition import describe_sets, independent_sets
 from radiosity_addon.solver.equations.linear_system import LinearSystem
-from radiosity_addon.solver.methods import steps_of
+from radiosity_addon.solver.methods import solve_by_method
 from radiosity_addon.solver.methods.dense import dense
 from radiosity_addon.solver.methods.jacobi import jacobi
 from radiosity_addon.solver.methods.matrix import MatrixState
@@ -102,7 +102,7 @@ def two_rooms() -> tuple[np.ndarray, np.ndarray]:
 
 
 def solve(scene: Scene, **settings: object) -> MatrixState:
-    *_, (_, state) = steps_of(scene, SolverSettings(**{"method": "dense", "elements": 120, **settings}))
+    state = solve_by_method(scene, SolverSettings(**{"method": "dense", "elements": 120, **settings}))
     assert isinstance(state, MatrixState)
     return state
 

@@ -156,14 +156,14 @@ def test_visibility_past_half_a_wall(edge: float) -> None:
     assert seen.mean() == pytest.approx(expected, abs=0.06)
 
 
-def test_doubt_is_larger_where_rays_disagree_and_never_nothing() -> None:
+def test_error_estimate_is_larger_where_rays_disagree_and_never_nothing() -> None:
     """Four agreeing rays are no proof."""
     free, half = occluded(), occluded(half_wall(0.45))
     assert ((half.visibility > 0) & (half.visibility < 1)).all()
-    assert (half.doubt > 1.5 * free.doubt).all()
-    assert (free.doubt >= free.factor / 6).all()
+    assert (half.error_estimate > 1.5 * free.error_estimate).all()
+    assert (free.error_estimate >= free.factor / 6).all()
     hidden = occluded(rectangle((-1, -1, 1), (3, 0, 0), (0, 3, 0)))
-    np.testing.assert_allclose(hidden.doubt, hidden.factor / 6, rtol=1e-6)
+    np.testing.assert_allclose(hidden.error_estimate, hidden.factor / 6, rtol=1e-6)
 
 
 def test_closed_convex_room_sees_itself_whole() -> None:

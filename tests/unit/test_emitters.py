@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.base.progress import drain
 from radiosity_addon.form_factors.formulas import point_to_polygon
 from radiosity_addon.numerics.sampling import stratified_square
 from radiosity_addon.rays.embree import EmbreeCaster
@@ -107,7 +106,7 @@ def test_a_hidden_face_far_off_does_not_darken_what_lies_close_before_a_large_on
     flat = np.random.default_rng(5).uniform(-0.5, 0.5, (count, 2))
     points = np.concatenate([flat, np.zeros((count, 1))], axis=1)
     at = Footprints(points, np.tile([0, 0, 1.0], (count, 1)), np.arange(count))
-    share = drain(ShadowShare(caster, group, SpreadPoints(at, 0), 0).steps(np.ones(count, dtype=bool), 64))
+    share = ShadowShare(caster, group, SpreadPoints(at, 0), 0).at_points(np.ones(count, dtype=bool), 64)
     factor = factors(triangles, points, at.normals)
     truth = factor[:, :2].sum(axis=1) / factor.sum(axis=1)
     assert (truth < 0.999).mean() > 0.5
@@ -167,7 +166,7 @@ def test_lifted_rays_do_not_end_on_a_face_that_lies_parallel() -> None:
     (group,) = EmitterGroup.of_faces(Faces(scene), caster)
     points = np.concatenate([np.random.default_rng(5).uniform(-0.5, 0.5, (50, 2)), np.zeros((50, 1))], axis=1)
     at = Footprints(points, np.tile([0, 0, 1.0], (50, 1)), np.arange(50))
-    share = drain(ShadowShare(caster, group, SpreadPoints(at, 0), 0).steps(np.ones(50, dtype=bool), 16))
+    share = ShadowShare(caster, group, SpreadPoints(at, 0), 0).at_points(np.ones(50, dtype=bool), 16)
     np.testing.assert_allclose(share, 1.0, rtol=1e-12)
 
 
@@ -176,8 +175,8 @@ def test_a_face_does_not_light_itself_from_behind() -> None:
     floor, wall = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0)), rectangle((0, 0, 0), (0, 1, 0), (0, 0, 1))
     points = np.array([[0.5, 0.5, 0.0], [0.1, 0.5, 0.0], [0.9, 0.2, 0.0]])
     scene = Scene(np.concatenate([floor, wall]), grey(4, 0.4), grey(4, 0.3), two_sided=True)
-    light = solve(scene, SolverSettings(error=1e-2)).local_pass.direct(
-        points, np.tile([0, 0, 1.0], (3, 1)), np.arange(3)
+    light = solve(scene, SolverSettings(error=1e-2)).local_pass.direct.at(
+        Footprints(points, np.tile([0, 0, 1.0], (3, 1)), np.arange(3))
     )
     alone = factors(wall, points, np.tile([0, 0, 1.0], (3, 1))).sum(axis=1)
     np.testing.assert_allclose(light, 0.3 * np.repeat(alone[:, None], 3, axis=1), rtol=1e-9)
@@ -210,6 +209,6 @@ def test_a_footprint_that_is_rounded_off_its_plane_does_not_see_its_own_back() -
     assert (above < -1e-10).mean() > 0.2
     expected = factors(wall, points, np.repeat(spread.at.normals, spread.count, axis=0)).sum(axis=1)
     expected += factors(wall[:, ::-1], points, np.repeat(spread.at.normals, spread.count, axis=0)).sum(axis=1)
-    gain = drain(spread.gain_steps(group, 0.05))
+    gain = spread.gain(group, 0.05)
     np.testing.assert_allclose(gain, expected.reshape(-1, spread.count).mean(axis=1), atol=1e-4)
     assert gain.min() > 0.1

@@ -10,6 +10,7 @@ import pytest
 from radiosity_addon.bake.pipeline import bake
 from radiosity_addon.bake.result.result import BakeResult
 from radiosity_addon.base.errors import UsageError
+from radiosity_addon.base.progress import Progress
 from radiosity_addon.lightmap.images.dilate import dilate
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
@@ -24,15 +25,11 @@ which is no multiple of the elements' width."""
 
 
 def run(scene: BakeScene, **settings: Any) -> BakeResult:
-    steps = bake(scene, BakeSettings(**{"quality": "draft", "quantity": "residual", **settings}))
-    fractions = []
-    while True:
-        try:
-            fractions.append(next(steps).fraction)
-        except StopIteration as done:
-            assert fractions == sorted(fractions)
-            result: BakeResult = done.value
-            return result
+    fractions: list[float] = []
+    progress = Progress(lambda status: fractions.append(status.fraction))
+    result = bake(scene, BakeSettings(**{"quality": "draft", "quantity": "residual", **settings}), progress)
+    assert fractions == sorted(fractions)
+    return result
 
 
 def texels(result: BakeResult) -> np.ndarray:
@@ -114,9 +111,9 @@ def test_a_sky_counts_as_what_arrives() -> None:
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"format": "png16"}, "negative values, which format png16 cannot hold: take format exr"),
-        ({"light": "direct"}, "not of its direct light: take light all"),
-        ({"light": "indirect"}, "not of its indirect light: take light all"),
+        ({"format": "png16"}, "negative values, which format png16 cannot hold: use format exr"),
+        ({"light": "direct"}, "not of its direct light: use light all"),
+        ({"light": "indirect"}, "not of its indirect light: use light all"),
     ],
 )
 def test_what_it_cannot_be_is_refused(wrong: dict[str, str], message: str) -> None:

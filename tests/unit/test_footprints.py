@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.base.progress import drain
 from radiosity_addon.lights.sun_and_sky import AreaLight, PointLight
 from radiosity_addon.numerics.sampling import points_on_triangles, stratified_square
 from radiosity_addon.rays.embree import EmbreeCaster
@@ -40,8 +39,8 @@ def share_of(
     at: Footprints, caster: EmbreeCaster, rays: int = 4, threads: int = 1, seed: int = 0
 ) -> np.ndarray:
     spread = SpreadPoints(at, seed + 2, threads)
-    gain = drain(spread.gain_steps(LAMP))
-    return drain(ShadowShare(caster, LAMP, spread, seed + 5, threads).steps(gain, rays))
+    gain = spread.gain(LAMP)
+    return ShadowShare(caster, LAMP, spread, seed + 5, threads).at_points(gain, rays)
 
 
 def blocker() -> EmbreeCaster:
@@ -57,7 +56,7 @@ def test_a_gain_is_the_mean_over_the_footprint() -> None:
     mean = near.unit_irradiance(each, np.repeat(at.normals, 4096, axis=0)).reshape(COUNT, -1).mean(axis=1)
     own = near.unit_irradiance(at.points, at.normals)
     assert np.abs(own / mean - 1).max() > 0.2
-    gain = drain(SpreadPoints(at, 1).gain_steps(near))
+    gain = SpreadPoints(at, 1).gain(near)
     np.testing.assert_allclose(gain, mean, rtol=0.05)
     assert np.abs(gain - mean).mean() < 0.01 * mean.mean()
 
@@ -94,7 +93,7 @@ def test_a_glowing_edge_beside_the_centre_shines_on_its_part_of_the_footprint() 
         return centre[rows, None] + np.concatenate([half * (2 * u - 1), 0 * u[..., :1]], axis=2)
 
     at = Footprints(centre, np.tile([0.0, 0.0, 1.0], (33, 1)), np.arange(33), across)
-    gain = drain(SpreadPoints(at, 1).gain_steps(group, 0.05))
+    gain = SpreadPoints(at, 1).gain(group, 0.05)
     # Where x is past the edge: F = (1 + x/√(x² + h²))/2, whose integral is (x + √(x² + h²))/2.
     ends = np.array([-half, half]) - begins
     expected = np.diff(0.5 * (ends + np.hypot(ends, height)))[0] / (2 * half)

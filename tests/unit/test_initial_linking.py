@@ -111,10 +111,10 @@ def test_links_are_few_while_the_error_asks_for_no_finer(
 
 def test_coarse_first_links_still_send_what_there_is(clutter: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every leaf sends no more than it has, and the mean light is that of the fine links."""
-    *_, (_, fine) = hierarchical.solve_steps(clutter, SolverSettings(error=1e-3))
+    fine = hierarchical.solve(clutter, SolverSettings(error=1e-3))
     monkeypatch.setattr(initial, "FEWEST", 1)
     settings = SolverSettings(error=1e-3, max_links=10_000)
-    *_, (_, coarse) = hierarchical.solve_steps(clutter, settings)
+    coarse = hierarchical.solve(clutter, settings)
     # Finer than BF_ε asks for none need be; a short budget alone makes them coarser.
     assert fine.details["hierarchical"]["first_faint"] <= initial.COARSEST_FAINT * 1e-3
     assert coarse.details["hierarchical"]["first_faint"] > fine.details["hierarchical"]["first_faint"]

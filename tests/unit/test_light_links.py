@@ -82,9 +82,9 @@ def test_sky_on_a_plane_and_under_a_roof() -> None:
     """π in the open; under a roof what the complement of its exact factor leaves."""
     sky = EnvironmentLight(1.0)
     hierarchy, caster = setting(FLOOR)
-    gain, doubt = measure_light(hierarchy, sky, caster, np.arange(2), seed=0)
+    gain, error = measure_light(hierarchy, sky, caster, np.arange(2), seed=0)
     assert (gain == np.pi).all()
-    assert (doubt == 0).all()
+    assert (error == 0).all()
     # Equal parallel unit squares at distance 1: F = 0.19982 (Howell C-11).
     below, above = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0), 6), rectangle((0, 0, 1), (0, 1, 0), (1, 0, 0))
     hierarchy, caster = setting(np.concatenate([below, above]))

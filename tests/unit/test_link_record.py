@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from radiosity_addon.solver import PointLight, Scene, SolverSettings, SunLight
-from radiosity_addon.solver.methods import steps_of
+from radiosity_addon.solver.methods import solve_by_method
 from radiosity_addon.solver.state.link_record import leaves_on, nearest_leaf, record_links
 from tests.rooms import box_room, grey, rectangle
 from tests.unit.solved_rooms import corridor, furnished, solved
@@ -57,7 +57,7 @@ def test_what_shines_from_afar_is_drawn_a_scene_away() -> None:
 @pytest.mark.parametrize("method", ["shooting", "multi-level"])
 def test_every_method_has_a_record(method: str) -> None:
     settings = SolverSettings(method=method, elements=60)
-    *_, (_, state) = steps_of(lamp_room(), settings)
+    state = solve_by_method(lamp_room(), settings)
     record = record_links(state)
     assert record.leaf.any()
     lamps = record.source >= record.n_clusters + len(record.corners)

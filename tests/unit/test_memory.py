@@ -35,15 +35,14 @@ except ImportError:
     os._exit(3)
 import numpy as np
 from radiosity_addon.solver import Scene, SolverSettings
-from radiosity_addon.solver.methods.hierarchical import solve_steps
+from radiosity_addon.solver.methods.hierarchical import solve
 from tests.rooms import box_room, grey, sphere
 
 def solve(triangles, **more):
     emission = grey(len(triangles), 0.0)
     emission[:2] = 1.0
     scene = Scene(triangles, grey(len(triangles), 0.5), emission)
-    *_, (_, state) = solve_steps(scene, SolverSettings(threads=1, **more))
-    return state
+    return solve(scene, SolverSettings(threads=1, **more))
 
 def peak():
     # Where there is one: a child's ru_maxrss begins at what its parent had.
@@ -72,6 +71,7 @@ def lit_room(n: int) -> Scene:
     return Scene(triangles, grey(len(triangles), 0.5), emission)
 
 
+@pytest.mark.full  # a process's peak; the budget and what a link takes are checked by the tests below
 def test_a_solution_takes_no_more_than_the_limit() -> None:
     """4,108 faces of clutter, refined until the limit stops it: what the process grows by."""
     limit = 0.25
@@ -91,11 +91,11 @@ def test_what_does_not_fit_is_refused_before_anything_is_allocated(monkeypatch: 
     scene = lit_room(20)
     monkeypatch.setattr(hierarchical, "begin", None)
     with pytest.raises(UsageError, match=r"4,800 faces.*at least 0\.2\d* GiB.*limit of 0\.1 GiB: raise"):
-        next(hierarchical.solve_steps(scene, SolverSettings(memory_limit=0.1, threads=1)))
+        hierarchical.solve(scene, SolverSettings(memory_limit=0.1, threads=1))
 
 
 def test_a_small_scene_needs_little() -> None:
-    *_, (_, state) = hierarchical.solve_steps(lit_room(1), SolverSettings(memory_limit=0.01, error=0.01))
+    state = hierarchical.solve(lit_room(1), SolverSettings(memory_limit=0.01, error=0.01))
     assert state.residual < 1e-4
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from radiosity_addon.bake.quality import quality_of
 from radiosity_addon.base.errors import UsageError
+from radiosity_addon.base.progress import Status
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.solver import PointLight, Scene, SolverSettings, solve
 from radiosity_addon.solver.equations.exchange import exchange_areas
@@ -21,6 +22,7 @@ from radiosity_addon.solver.methods.multi_level import MultiLevelState, refuse_t
 from radiosity_addon.solver.state import memory
 from tests.rooms import CEILING, box_room, grey
 from tests.unit.solved_rooms import furnished
+from tests.watched import noting
 
 
 def scene_of(triangles: np.ndarray, two_sided: bool = False) -> Scene:
@@ -28,8 +30,7 @@ def scene_of(triangles: np.ndarray, two_sided: bool = False) -> Scene:
 
 
 def multi_level_state(scene: Scene, **settings: float) -> MultiLevelState:
-    *_, (_, state) = multi_level.solve_steps(scene, SolverSettings(method="multi-level", **settings))
-    return state
+    return multi_level.solve(scene, SolverSettings(method="multi-level", **settings))
 
 
 def cube() -> Scene:
@@ -192,7 +193,7 @@ def test_the_residual_falls_by_the_reflectance_each_bounce() -> None:
 def test_iterations_are_limited(method: str, module) -> None:
     for limit in (1, 3):
         settings = SolverSettings(method=method, max_iterations=limit)
-        *_, (_, state) = module.solve_steps(cube(), settings)
+        state = module.solve(cube(), settings)
         assert state.iterations == limit
         assert state.residual > settings.tolerance
 
@@ -200,17 +201,17 @@ def test_iterations_are_limited(method: str, module) -> None:
 def test_one_iteration_is_one_bounce() -> None:
     """Gather reads the previous radiosity: after one, only what the ceiling sent straight."""
     settings = SolverSettings(method="multi-level", form_factor_error=0.0, min_area=0.05, max_iterations=1)
-    *_, (_, state) = multi_level.solve_steps(cube(), settings)
+    state = multi_level.solve(cube(), settings)
     floor = state.hierarchy.faces.area[:2] @ state.irradiance[:2, 0]
     assert floor == pytest.approx(0.1998248957, rel=1e-4)  # Howell C-11
     assert state.irradiance[2:4].max() == 0.0  # the ceiling itself gets nothing yet
 
 
 def test_progress_never_falls_and_ends_at_one() -> None:
-    for method, module in (("multi-level", multi_level), ("hierarchical", hierarchical)):
-        fractions = [
-            part for part, _ in module.solve_steps(furnished(), SolverSettings(method=method, error=1e-2))
-        ]
+    for method in ("multi-level", "hierarchical"):
+        noted: list[Status] = []
+        solve(furnished(), SolverSettings(method=method, error=1e-2), noting(noted))
+        fractions = [status.fraction for status in noted]
         assert fractions[-1] == 1.0
         assert (np.diff(fractions) >= 0).all()
         assert len(fractions) > 10
@@ -218,7 +219,7 @@ def test_progress_never_falls_and_ends_at_one() -> None:
 
 def test_rounds_tell_how_the_threshold_fell() -> None:
     settings = SolverSettings(error=1e-3)
-    *_, (_, state) = hierarchical.solve_steps(furnished(), settings)
+    state = hierarchical.solve(furnished(), settings)
     rounds = state.details["hierarchical"]["rounds"]
     np.testing.assert_allclose([r["error"] for r in rounds], [0.064, 0.016, 0.004, 0.001])
     assert [r["links"] for r in rounds] == sorted(r["links"] for r in rounds)
@@ -275,12 +276,12 @@ def test_a_bake_limits_the_area_by_the_form_factor_error(given: dict[str, float]
 
 def test_memory_bounds_the_links_of_the_refined_hierarchy() -> None:
     """A limit too small for what the error asks stops refinement like a budget of links, and says so."""
-    *_, (_, free) = hierarchical.solve_steps(furnished(), SolverSettings(error=1e-3))
+    free = hierarchical.solve(furnished(), SolverSettings(error=1e-3))
     settings = SolverSettings(error=1e-3, memory_limit=1.0)
     others = 2**30 - memory.free_bytes(free.hierarchy, settings)
     limit = (others + (len(free.links) // 2) * memory.LINK_BYTES) / 2**30
     tight = SolverSettings(error=1e-3, memory_limit=limit)
-    *_, (_, bound) = hierarchical.solve_steps(furnished(), tight)
+    bound = hierarchical.solve(furnished(), tight)
     assert free.over_budget == 0.0
     assert bound.over_budget > 1e-3
     assert len(bound.links) <= memory.link_budget(bound.hierarchy, tight, 0) < len(free.links)

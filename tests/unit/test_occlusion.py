@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.base.progress import drain
-from radiosity_addon.lightmap.texels.occlusion import Crossings, crossing_steps
+from radiosity_addon.lightmap.texels.occlusion import Crossings, find_crossings
 from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.solver import Scene
 from tests.rooms import grey, rectangle, solid_box
@@ -24,7 +23,7 @@ def crossings_of(*others: np.ndarray) -> Crossings:
     uv[:2] = QUAD_UV
     pages = np.full(len(triangles), -1)
     pages[:2] = 0
-    return drain(crossing_steps(texel_geometry(scene, uv, SIZE, pages), EmbreeCaster(triangles)))
+    return find_crossings(texel_geometry(scene, uv, SIZE, pages), EmbreeCaster(triangles))
 
 
 def image(crossings: Crossings) -> np.ndarray:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gc
 import threading
-from collections.abc import Generator
 from typing import Any
 
 import numpy as np
@@ -12,29 +11,26 @@ import pytest
 
 from radiosity_addon.bake.pipeline import bake
 from radiosity_addon.bake.quality import QUALITIES, quality_of
-from radiosity_addon.bake.result.progress import Progress
+from radiosity_addon.bake.result.pictures import Picture
 from radiosity_addon.bake.result.result import BakeResult
 from radiosity_addon.base.errors import SceneError
+from radiosity_addon.base.progress import Cancelled, Progress, Status
 from radiosity_addon.options import METHODS, BakeSettings, options_of_method
 from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, solve
 from radiosity_addon.solver.links import initial
 from tests.rooms import FLOOR, box_room, grey, rectangle, solid_box, sphere
 from tests.unit.texel_scenes import QUAD_UV, bake_object, bake_scene, in_cell
+from tests.watched import noting
 
 
 def run(scene: BakeScene, **settings: Any) -> BakeResult:
-    steps = bake(scene, BakeSettings(**{"quality": "draft", "resolution": 48, **settings}))
-    fractions = []
-    while True:
-        try:
-            fractions.append(next(steps).fraction)
-        except StopIteration as done:
-            assert fractions == sorted(fractions)
-            assert fractions[0] >= 0
-            assert fractions[-1] <= 1
-            result: BakeResult = done.value
-            return result
+    fractions: list[float] = []
+    progress = Progress(lambda status: fractions.append(status.fraction))
+    result = bake(scene, BakeSettings(**{"quality": "draft", "resolution": 32, **settings}), progress)
+    assert fractions == sorted(fractions)
+    assert 0 <= fractions[0] < fractions[-1] <= 1
+    return result
 
 
 def texels(result: BakeResult, page: int = 0) -> np.ndarray:
@@ -78,10 +74,15 @@ def test_open_floor_under_a_sky_and_what_a_box_covers() -> None:
     np.testing.assert_allclose(corners, np.pi, rtol=0.02)
 
 
-def test_direct_and_indirect_are_parts_of_all() -> None:
-    every, direct, indirect = (
-        run(lit_room(lights=[LAMP]), light=light) for light in ("all", "direct", "indirect")
-    )
+@pytest.fixture(scope="module")
+def lamp_lit() -> BakeResult:
+    """The room with the lamp and the default settings."""
+    return run(lit_room(lights=[LAMP]))
+
+
+def test_direct_and_indirect_are_parts_of_all(lamp_lit: BakeResult) -> None:
+    every = lamp_lit
+    direct, indirect = (run(lit_room(lights=[LAMP]), light=light) for light in ("direct", "indirect"))
     total = texels(direct).astype(float) + texels(indirect)
     np.testing.assert_allclose(total, texels(every), rtol=1e-6, atol=1e-7)
     assert texels(direct).max() > 0
@@ -121,7 +122,7 @@ def test_no_seam_between_coplanar_charts() -> None:
     scene = Scene(triangles, grey(14, 0.7), grey(14, 0.0), lights=[lamp])
     uv = [in_cell((0, 0), (0.5, 0.5)), in_cell((0.5, 0.5), (1, 1))]
     parts = (("Left", 2, uv[0]), ("Right", 2, uv[1]), ("Rest", 10, None, False))
-    pixels = run(bake_scene(scene, *parts), resolution=64, quality="medium").pages[0].pixels
+    pixels = run(bake_scene(scene, *parts), resolution=64).pages[0].pixels
     left, right = pixels[:32, :32], pixels[32:, 32:]
     step = np.maximum(np.abs(left[:, -1] - left[:, -2]), np.abs(right[:, 1] - right[:, 0])).mean()
     joint = np.abs(right[:, 0] - left[:, -1]).mean()
@@ -173,16 +174,16 @@ def test_no_texel_in_a_sealed_box_is_lit(wall: float, height: float) -> None:
         triangles, grey(count, 0.8), grey(count, 0), two_sided=True, lights=[lamp, EnvironmentLight(0.2)]
     )
     parts = (("Room", 12), ("Inner", 12), ("Outer", 12, None, False))
-    pages = run(bake_scene(scene, *parts[: 1 + len(shells)]), resolution=64, atlas="per-object").pages
+    pages = run(bake_scene(scene, *parts[: 1 + len(shells)]), atlas="per-object").pages
     assert pages[0].pixels[pages[0].coverage].mean() > 1
     assert not pages[1].pixels.any()
 
 
 def test_light_takes_many_short_steps() -> None:
     """A window stays alive, and a bar moves, while texels are lit."""
-    steps = bake(lit_room(lights=[LAMP]), BakeSettings(resolution=256))
-    stages = [step.stage for step in steps]
-    assert stages.count("light") > 40
+    noted: list[Status] = []
+    bake(lit_room(lights=[LAMP]), BakeSettings(resolution=256, quality="draft"), noting(noted))
+    assert [status.stage for status in noted].count("light") > 40
 
 
 def test_threads_change_no_byte_and_the_seed_does() -> None:
@@ -217,7 +218,7 @@ def test_a_page_an_object_or_one_for_all() -> None:
     assert len(shared.pages) == 1
     for result in (apart, shared):
         for page in result.pages:
-            assert page.pixels.shape == (48, 48, 3)
+            assert page.pixels.shape == (32, 32, 3)
             assert page.pixels.dtype == np.float32
             assert np.isfinite(page.pixels).all()
             assert page.coverage.any()
@@ -247,7 +248,9 @@ def test_pictures_tile_the_room_and_the_last_one_is_the_solution(
     room = lit_room(lights=[LAMP], two_sided=True)
     given = {"elements": 60} if "elements" in options_of_method(method) else {}
     settings = BakeSettings(quality="draft", resolution=16, method=method, **given)
-    pictures = [step.picture for step in bake(room, settings) if step.picture is not None]
+    noted: list[Status] = []
+    bake(room, settings, noting(noted))
+    pictures = [status.picture for status in noted if isinstance(status.picture, Picture)]
     assert len(pictures) >= 2
     scene = room.scene
     for picture in pictures:
@@ -272,18 +275,21 @@ def test_pictures_tile_the_room_and_the_last_one_is_the_solution(
 
 
 @pytest.mark.parametrize("steps", [1, 3, 6, 12])
-def test_closing_the_generator_leaves_nothing_running(steps: int) -> None:
+def test_canceled_it_leaves_nothing_running(steps: int) -> None:
     before = {thread.ident for thread in threading.enumerate()}
-    running: Generator[Progress, None, BakeResult] = bake(
-        lit_room(lights=[LAMP]), BakeSettings(quality="draft", resolution=32)
-    )
-    stages = [next(running).stage for _ in range(steps)]
+    stages: list[str] = []
+
+    def listen(status: Status) -> None:
+        stages.append(status.stage)
+        if len(stages) == steps:
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        bake(lit_room(lights=[LAMP]), BakeSettings(quality="draft", resolution=32), Progress(listen))
     assert stages[0] == "unwrap"
-    running.close()
+    assert len(stages) == steps
     gc.collect()
     assert {thread.ident for thread in threading.enumerate()} <= before
-    with pytest.raises(StopIteration):
-        next(running)
 
 
 def test_without_light_it_is_black_and_says_so() -> None:
@@ -297,11 +303,11 @@ def test_without_light_it_is_black_and_says_so() -> None:
 def test_a_solution_short_of_its_tolerance_says_so(method: str) -> None:
     scene = lit_room(lights=[LAMP], reflectance=0.9)
     few = {"elements": 48} if "elements" in options_of_method(method) else {}
-    short = run(scene, method=method, max_iterations=1, **few)
+    short = run(scene, method=method, resolution=16, max_iterations=1, **few)
     assert [warning.name for warning in short.warnings] == ["scene"]
     assert f"{method} method stopped after 1 iteration" in short.warnings[0].message
     assert short.solver["residual"] > short.solver["settings"]["tolerance"]
-    done = run(scene, method=method, **few)
+    done = run(scene, method=method, resolution=16, **few)
     assert done.warnings == ()
     assert done.solver["residual"] <= done.solver["settings"]["tolerance"]
 
@@ -319,13 +325,13 @@ def test_nothing_to_bake_is_an_error() -> None:
             run(BakeScene(scene, objects))
 
 
-def test_triangles_without_area_do_no_harm() -> None:
+def test_triangles_without_area_do_no_harm(lamp_lit: BakeResult) -> None:
     triangles, _ = box_room()
     flat = np.concatenate([triangles, np.zeros((2, 3, 3)), triangles[:1, [0, 0, 1]]])
     scene = Scene(flat, grey(15, 0.5), grey(15, 0.0), lights=[LAMP])
     result = run(bake_scene(scene, ("Room", 15)))
     assert np.isfinite(result.pages[0].pixels).all()
-    assert texels(result).mean() == pytest.approx(texels(run(lit_room(lights=[LAMP]))).mean(), rel=0.02)
+    assert texels(result).mean() == pytest.approx(texels(lamp_lit).mean(), rel=0.02)
 
 
 def test_links_that_had_to_begin_coarse_are_told_of(monkeypatch: pytest.MonkeyPatch) -> None:

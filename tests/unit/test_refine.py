@@ -17,7 +17,7 @@ def hierarchy_of(count: int = 9) -> Hierarchy:
     return Hierarchy(Scene(rng.normal(size=(count, 3, 3)), grey(count, 0.5), grey(count, 0.0)))
 
 
-def links_between(receiver: np.ndarray, source: np.ndarray, doubt: np.ndarray | float = 0.1) -> Links:
+def links_between(receiver: np.ndarray, source: np.ndarray, error: np.ndarray | float = 0.1) -> Links:
     count = len(receiver)
     ones = np.ones((count, 4), dtype=np.float32)
     flat = np.full(count, 0.2, dtype=np.float32)
@@ -26,7 +26,7 @@ def links_between(receiver: np.ndarray, source: np.ndarray, doubt: np.ndarray | 
         np.asarray(source, dtype=np.int32),
         flat,
         flat,
-        np.broadcast_to(np.float32(doubt), (count,)).copy(),
+        np.broadcast_to(np.float32(error), (count,)).copy(),
         ones,
         ones,
     )
@@ -131,7 +131,7 @@ def test_a_shared_parent_gets_four_children_once() -> None:
     assert (hierarchy.first_child != LEAF).sum() == 1
 
 
-def test_misplaced_power_is_brightest_channel_times_area_times_doubt() -> None:
+def test_misplaced_power_is_brightest_channel_times_area_times_error_estimate() -> None:
     hierarchy = hierarchy_of(4)
     radiosity = np.array([[1.0, 5, 2], [0, 0, 0], [3, 1, 1], [1, 1, 1]])
     n = hierarchy.n_clusters

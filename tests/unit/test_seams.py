@@ -62,7 +62,7 @@ def painted(geometry: TexelGeometry, field: Field) -> list[np.ndarray]:
     pages = []
     for number, index in enumerate(geometry.index):
         page = np.zeros((*index.shape, 3), dtype=np.float32)
-        page[index >= 0] = values[geometry.page == number][index[index >= 0] - geometry.first(number)]
+        page[index >= 0] = values[geometry.page == number][index[index >= 0] - geometry.page_start[number]]
         pages.append(dilate(page, index >= 0))
     return pages
 

@@ -8,13 +8,16 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from radiosity_addon import solver
+from radiosity_addon.base import Progress
 from radiosity_addon.base.errors import UsageError
 from radiosity_addon.solver import PointLight, Scene, Solution, SolverSettings
 from radiosity_addon.solver.equations.exchange import exchange_areas
-from radiosity_addon.solver.methods import shooting, steps_of
-from radiosity_addon.solver.methods.shooting import LOOK_AHEAD, MOST_COLUMNS, ShootingState, solve_steps
+from radiosity_addon.solver.methods import shooting, solve_by_method
+from radiosity_addon.solver.methods.shooting import LOOK_AHEAD, MOST_COLUMNS, ShootingState, solve
 from tests.cornell import cornell_box
 from tests.rooms import box_room, grey
+from tests.watched import watching
 
 
 def settings(**changes: object) -> SolverSettings:
@@ -22,8 +25,7 @@ def settings(**changes: object) -> SolverSettings:
 
 
 def run(scene: Scene, **changes: object) -> ShootingState:
-    *_, (_, state) = solve_steps(scene, settings(**changes))
-    return state
+    return solve(scene, settings(**changes))
 
 
 def form_factors(state: ShootingState) -> np.ndarray:
@@ -36,10 +38,12 @@ def form_factors(state: ShootingState) -> np.ndarray:
 
 def test_the_unshot_is_the_residual_of_what_was_shot() -> None:
     """E' − K S = ΔB after every shot, element by element; so no light is made or lost on the way."""
-    factors = None
-    for _, state in solve_steps(cornell_box(), settings(max_iterations=200)):
+    factors = direct = None
+
+    def look(state: ShootingState) -> None:
+        nonlocal factors, direct
         if len(state.leaves) == 0:
-            continue
+            return
         if factors is None:
             factors = form_factors(state)
             direct = state.unshot.copy()  # nothing is shot yet: E'
@@ -51,17 +55,22 @@ def test_the_unshot_is_the_residual_of_what_was_shot() -> None:
         gathered = direct + state.reflectance[state.leaves] * (factors @ radiosity) - radiosity
         power = state.hierarchy.area[state.leaves] @ np.abs(gathered)
         assert (power < 0.78 * state.unshot_power()).all()
+
+    state = solve(cornell_box(), settings(max_iterations=200), watching(look))
     assert state.iterations == 200
 
 
 def test_the_balance_of_power_holds_after_every_shot() -> None:
     """Of what was shot, A S, part was taken back in as irradiance: Σ A S ΣF = Σ A H."""
-    for _, state in solve_steps(cornell_box(), settings(max_iterations=100)):
+
+    def look(state: ShootingState) -> None:
         if state.iterations in (1, 10, 100):
             leaves, area = state.leaves, state.hierarchy.area[state.leaves]
             shot = state.radiosity[leaves] - state.unshot
             # An element that has shot knows its ΣF; others have shot nothing.
             np.testing.assert_allclose((area * state.reach) @ shot, area @ state.received, rtol=1e-12)
+
+    solve(cornell_box(), settings(max_iterations=100), watching(look))
 
 
 def test_each_shot_is_the_largest_and_lowers_the_unshot_power() -> None:
@@ -87,12 +96,15 @@ def test_stops_at_the_tolerance_or_at_the_number_of_shots() -> None:
     assert done.details["shooting"]["shots"] == done.iterations
 
 
-def test_every_shot_is_yielded_and_the_history_is_thinned() -> None:
+def test_every_shot_is_shown_and_the_history_is_thinned() -> None:
     fractions, shots = [], []
-    for fraction, state in solve_steps(cornell_box(), settings(tolerance=0.01)):
+
+    def look(state: ShootingState) -> None:
         assert len(state.shown()) == state.hierarchy.n_elements
-        fractions.append(fraction)
         shots.append(state.iterations)
+
+    progress = Progress(lambda status: fractions.append(status.fraction), look=look)
+    state = solver.solve(cornell_box(), settings(tolerance=0.01), progress).local_pass.elements.state
     assert fractions == sorted(fractions)
     assert fractions[-1] == 1.0
     assert np.diff(shots).max() == 1
@@ -104,17 +116,21 @@ def test_every_shot_is_yielded_and_the_history_is_thinned() -> None:
 
 
 def test_the_ambient_term_changes_only_what_is_shown() -> None:
-    plain, ambient = (
-        solve_steps(cornell_box(), settings(ambient=on, max_iterations=250)) for on in (False, True)
-    )
+    seen: dict[bool, list[tuple]] = {False: [], True: []}
+
+    def shoot(on: bool) -> ShootingState:
+        def look(state: ShootingState) -> None:
+            same = (state.radiosity.tobytes(), state.irradiance.tobytes(), state.unshot.tobytes())
+            seen[on].append((*same, state.residual, state.shown().copy(), state.shown() is state.radiosity))
+
+        return solve(cornell_box(), settings(ambient=on, max_iterations=250), watching(look))
+
+    one, other = shoot(False), shoot(True)
     differs = 0
-    for (_, one), (_, other) in zip(plain, ambient, strict=True):
-        assert one.radiosity.tobytes() == other.radiosity.tobytes()
-        assert one.irradiance.tobytes() == other.irradiance.tobytes()
-        assert one.unshot.tobytes() == other.unshot.tobytes()
-        assert one.residual == other.residual
-        assert one.shown() is one.radiosity
-        differs += (other.shown() > one.shown()).any()
+    for plain, ambient in zip(seen[False], seen[True], strict=True):
+        assert plain[:4] == ambient[:4]
+        assert plain[5]
+        differs += (ambient[4] > plain[4]).any()
     assert differs > 100
     first, second = Solution(one), Solution(other)
     assert first.triangle_irradiance.tobytes() == second.triangle_irradiance.tobytes()
@@ -126,18 +142,21 @@ def test_the_ambient_term_is_exact_where_all_surfaces_are_alike() -> None:
     triangles = corners[[[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]]
     scene = Scene(triangles, np.tile([0.2, 0.5, 0.9], (4, 1)), grey(4, 2.0))
     exact = 2.0 / (1.0 - np.array([0.2, 0.5, 0.9]))
-    for _, state in solve_steps(scene, settings(elements=4, ambient=True, tolerance=1e-6)):
+
+    def look(state: ShootingState) -> None:
         if state.iterations == 0 and len(state.leaves):
             np.testing.assert_allclose(state.shown(), np.tile(exact, (4, 1)), rtol=1e-14)
         if len(state.leaves):
             # The factors of the four faces add up to 1 within the outline integral's 3e-5.
             np.testing.assert_allclose(state.shown().mean(axis=0), exact, rtol=1e-3)
+
+    state = solve(scene, settings(elements=4, ambient=True, tolerance=1e-6), watching(look))
     assert state.iterations > 50
 
 
 def test_memory_grows_with_the_elements_not_with_their_square() -> None:
     """Past the scene's own, what shooting allocates at its peak is linear in n, and n² far off."""
-    peaks, counts = [], (2_000, 12_000)
+    peaks, counts = [], (2_000, 6_000)
     for count in counts:
         run(cornell_box(), max_iterations=1)  # tables that are made once
         state = run(cornell_box(), elements=count, max_iterations=0, threads=1)
@@ -153,8 +172,11 @@ def test_memory_grows_with_the_elements_not_with_their_square() -> None:
 def test_columns_are_few_and_made_ahead() -> None:
     """Few columns wait at any time, and few are made in vain; that changes no shot."""
     waiting = []
-    for _, state in solve_steps(cornell_box(), settings(tolerance=0.05)):
+
+    def look(state: ShootingState) -> None:
         waiting.append(len(state.columns))
+
+    state = solve(cornell_box(), settings(tolerance=0.05), watching(look))
     assert LOOK_AHEAD <= max(waiting) < MOST_COLUMNS
     assert state.n_links <= state.pairs < 1.2 * state.n_links
 
@@ -202,6 +224,5 @@ def test_threads_change_nothing() -> None:
 
 
 def test_it_is_chosen_by_name() -> None:
-    *_, (fraction, state) = steps_of(cornell_box(), settings(tolerance=0.1))
-    assert fraction == 1.0
+    state = solve_by_method(cornell_box(), settings(tolerance=0.1))
     assert isinstance(state, ShootingState)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import ast
 from pathlib import Path
 
+from tests.conftest import slow_tests
+
 ROOT = Path(__file__).resolve().parents[2]
 LONGEST_FILE = 400
 
@@ -27,3 +29,9 @@ def test_own_modules_are_imported_relatively() -> None:
                 names = [node.module or ""]
             absolute += [f"{path}:{node.lineno}" for name in names if name.split(".")[0] == "radiosity_addon"]
     assert absolute == []
+
+
+def test_slow_tests_that_are_listed_exist() -> None:
+    for name in slow_tests():
+        path, _, function = name.partition("::")
+        assert f"def {function}(" in (ROOT / path).read_text(encoding="utf-8"), name

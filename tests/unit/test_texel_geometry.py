@@ -88,7 +88,7 @@ def test_texels_are_numbered_page_by_page() -> None:
     assert set(geometry.triangle.tolist()) == {0, 1, 2, 3, 6, 7}
     for page in (0, 1):
         mine = np.flatnonzero(geometry.page == page)
-        assert mine[0] == geometry.first(page)
+        assert mine[0] == geometry.page_start[page]
         np.testing.assert_array_equal(geometry.index[page][geometry.row[mine], geometry.column[mine]], mine)
         assert (geometry.index[page] != NO_TEXEL).sum() == len(mine)
     # Positions of the second page are those of its rectangle.

@@ -38,8 +38,7 @@ triangles, _ = box_room()
 scene = Scene(triangles, grey(12, 0.1), grey(12, 0.0), lights=[PointLight((0.5, 0.4, 0.6), 10.0)])
 limit = float(sys.argv[1])
 settings = dict(quality="draft", threads=2, memory_limit=limit)
-for _ in bake(bake_scene(scene, ("Room", 12)), BakeSettings(resolution=int(sys.argv[2]), **settings)):
-    pass
+bake(bake_scene(scene, ("Room", 12)), BakeSettings(resolution=int(sys.argv[2]), **settings))
 print(peak())
 sys.stdout.flush()
 os._exit(0)
@@ -87,7 +86,7 @@ def test_a_bake_is_refused_before_anything_is_unwrapped(
     triangles, _ = box_room()
     scene = bake_scene(Scene(triangles, grey(12, 0.5), grey(12, 0.0)), ("Room", 12))
     with pytest.raises(UsageError, match="memory limit"):
-        next(bake(scene, BakeSettings(**size)))  # type: ignore[arg-type]
+        bake(scene, BakeSettings(**size))  # type: ignore[arg-type]
 
 
 def test_settings_alone_tell_the_pages_of_a_shared_atlas() -> None:
@@ -105,6 +104,7 @@ def test_a_bake_stays_within_the_limit_by_what_is_foreseen() -> None:
     assert plans[0].memory < plans[1].memory <= 4 * 2**30 - min(process_bytes(), 2 * 2**30)
 
 
+@pytest.mark.full  # a page of a megapixel; `test_memory_per_texel` counts what each stage takes on small ones
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="no peak of a process to read")
 def test_the_peak_of_a_process_stays_within_the_limit() -> None:
     """1024² texels, for which 0.9 GB were needed once."""

@@ -10,15 +10,17 @@ import pytest
 
 from radiosity_addon.bake.pipeline import bake
 from radiosity_addon.bake.result import texel_pictures
-from radiosity_addon.bake.result.progress import Progress, TexelPicture
+from radiosity_addon.bake.result.pictures import TexelPicture
 from radiosity_addon.bake.result.result import BakeResult
 from radiosity_addon.bake.result.texel_pictures import TexelPictures, coarser
+from radiosity_addon.base.progress import Status
 from radiosity_addon.lightmap.texels.states import ENCLOSED, NO_TEXEL_HERE
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import PointLight, Scene
 from tests.rooms import box_room, grey, solid_box
 from tests.unit.texel_scenes import bake_scene
+from tests.watched import noting
 
 SETTINGS = BakeSettings(quality="draft", resolution=48, quantity="radiosity", threads=1)
 
@@ -32,13 +34,10 @@ def room() -> BakeScene:
     return bake_scene(scene, ("Room", 12), ("Box", 12))
 
 
-def run() -> tuple[BakeResult, list[Progress]]:
-    steps, seen = bake(room(), SETTINGS), []
-    while True:
-        try:
-            seen.append(next(steps))
-        except StopIteration as done:
-            return done.value, seen
+def run() -> tuple[BakeResult, list[TexelPicture]]:
+    seen: list[Status] = []
+    result = bake(room(), SETTINGS, noting(seen))
+    return result, [status.picture for status in seen if isinstance(status.picture, TexelPicture)]
 
 
 @pytest.fixture(scope="module")
@@ -46,8 +45,7 @@ def watched() -> tuple[BakeResult, list[TexelPicture]]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(texel_pictures, "SECONDS", 0.0)
         patch.setattr(texel_pictures, "SHARE", 1e9)
-        result, seen = run()
-    return result, [progress.texels for progress in seen if progress.texels is not None]
+        return run()
 
 
 def errors(result: BakeResult, pictures: list[TexelPicture]) -> np.ndarray:
@@ -75,9 +73,9 @@ def test_each_stage_is_nearer_to_the_result(watched: tuple[BakeResult, list[Texe
 
 def test_watching_changes_nothing(watched: tuple[BakeResult, list[TexelPicture]]) -> None:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(TexelPictures, "next", lambda _: None)
+        patch.setattr(TexelPictures, "next", lambda *_: None)
         unwatched, seen = run()
-    assert not [progress for progress in seen if progress.texels is not None]
+    assert seen == []
     np.testing.assert_array_equal(unwatched.pages[0].pixels, watched[0].pages[0].pixels)
 
 
@@ -147,12 +145,7 @@ def test_an_evenly_lit_room_has_a_uniformity_of_one() -> None:
     """Walls that emit E = 1 and reflect a half: H = 2 everywhere."""
     triangles, _ = box_room()
     scene = bake_scene(Scene(triangles, grey(12, 0.5), grey(12, 1.0)), ("Room", 12))
-    steps = bake(scene, BakeSettings(quality="draft", resolution=32, threads=1))
-    while True:
-        try:
-            next(steps)
-        except StopIteration as done:
-            light = done.value.light[0]["irradiance_W_m2"]
-            break
+    result = bake(scene, BakeSettings(quality="draft", resolution=32, threads=1))
+    light = result.light[0]["irradiance_W_m2"]
     assert light["mean"] == pytest.approx(2.0, rel=0.01)
     assert light["uniformity"] == pytest.approx(1.0, abs=0.03)

@@ -196,7 +196,7 @@ def test_the_solution_is_a_fixed_point(state: HierarchicalState) -> None:
     gathered = gather(hierarchy, state.balance.links, state.radiosity, scale)
     own = gathered.mean(axis=1)
     sent = node_radiosity(hierarchy, pull(hierarchy, scale[:, 1:] * state.radiosity))
-    at_faces = np.maximum(gather_at_clusters(hierarchy, state.top, state.cluster_links, sent), 0.0)
+    at_faces = np.maximum(gather_at_clusters(hierarchy, state.cut, state.cluster_links, sent), 0.0)
     shared = push(hierarchy, gathered) - own + at_faces[hierarchy.face]
     arriving = received[:, :1] * own + received[:, 1:] * shared
     faces = hierarchy.face[leaves]

@@ -7,13 +7,16 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from radiosity_addon import solver
 from radiosity_addon.base.errors import UsageError
+from radiosity_addon.base.progress import Status
 from radiosity_addon.solver import PointLight, Scene, Solution, SolverSettings
 from radiosity_addon.solver.equations.exchange import exchange_areas
-from radiosity_addon.solver.methods import steps_of, two_level
-from radiosity_addon.solver.methods.two_level import FINEST, TwoLevelState, contrasts, solve_steps
+from radiosity_addon.solver.methods import solve_by_method, two_level
+from radiosity_addon.solver.methods.two_level import FINEST, TwoLevelState, contrasts, solve
 from tests.cornell import cornell_box
 from tests.rooms import box_room, grey
+from tests.watched import noting, watching
 
 NEVER = 1e9
 """A contrast no scene has."""
@@ -25,8 +28,7 @@ def settings(**changes: object) -> SolverSettings:
 
 
 def run(scene: Scene, **changes: object) -> TwoLevelState:
-    *_, (_, state) = solve_steps(scene, settings(**changes))
-    return state
+    return solve(scene, settings(**changes))
 
 
 def test_elements_gather_once_from_the_patch_solution() -> None:
@@ -163,16 +165,21 @@ def test_there_is_a_picture_at_any_time(monkeypatch: pytest.MonkeyPatch, block: 
     """Whenever the method yields, every element has a radiosity; halfway rounds show the parents'."""
     monkeypatch.setattr(two_level, "BLOCK_PAIRS", block)
     seen = []
-    for _, state in solve_steps(cornell_box(), settings(contrast=1.0)):
+
+    def look(state: TwoLevelState) -> None:
         assert len(state.shown()) == len(state.irradiance) == state.hierarchy.n_elements
         seen.append(state.hierarchy.area[state.hierarchy.leaves] @ state.shown()[state.hierarchy.leaves])
+
+    solver.solve(cornell_box(), settings(contrast=1.0), watching(look))
     # The picture's power is the emitters' at first and the solution's from the first gather on.
     assert (seen[0] == seen[1]).all()
     np.testing.assert_allclose(seen[-len(seen) // 2 :], seen[-1:] * len(seen[-len(seen) // 2 :]), rtol=0.02)
 
 
 def test_progress_rises_and_the_history_has_an_entry_a_round() -> None:
-    fractions = [fraction for fraction, _ in solve_steps(cornell_box(), settings(contrast=1.0))]
+    noted: list[Status] = []
+    solver.solve(cornell_box(), settings(contrast=1.0), noting(noted))
+    fractions = [status.fraction for status in noted]
     assert all(a <= b for a, b in pairwise(fractions))
     assert fractions[-1] == 1.0
     state = run(cornell_box(), contrast=1.0)
@@ -226,6 +233,5 @@ def test_threads_change_nothing() -> None:
 
 
 def test_it_is_chosen_by_name() -> None:
-    *_, (fraction, state) = steps_of(cornell_box(), settings(elements=60, patches=32))
-    assert fraction == 1.0
+    state = solve_by_method(cornell_box(), settings(elements=60, patches=32))
     assert isinstance(state, TwoLevelState)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -32,7 +31,7 @@ def test_the_other_process_gives_the_same_charts(bowl) -> None:
     np.testing.assert_array_equal(found[1], chart)
 
 
-def test_only_a_thread_with_much_to_do_asks_for_a_process(bowl, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_much_to_do_beside_a_window_asks_for_a_process(bowl, monkeypatch: pytest.MonkeyPatch) -> None:
     asked = []
 
     def apart(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -44,9 +43,8 @@ def test_only_a_thread_with_much_to_do_asks_for_a_process(bowl, monkeypatch: pyt
     growers.grow_charts(vertices, faces[:20])
     growers.grow_charts(vertices, faces)
     assert asked == []
-    with ThreadPoolExecutor(1) as thread:
-        thread.submit(growers.grow_charts, vertices, faces[:20]).result()
-        thread.submit(growers.grow_charts, vertices, faces).result()
+    growers.grow_charts(vertices, faces[:20], in_window=True)
+    growers.grow_charts(vertices, faces, in_window=True)
     assert asked == [len(faces)]
 
 
@@ -56,8 +54,7 @@ def test_without_another_process_the_work_is_done_here(
 ) -> None:
     monkeypatch.setattr(sys, "executable", program)
     assert xatlas_worker.run_apart(*bowl) is None
-    with ThreadPoolExecutor(1) as thread:
-        _, chart = thread.submit(growers.grow_charts, *bowl).result()
+    _, chart = growers.grow_charts(*bowl, in_window=True)
     assert len(chart) == len(bowl[1])
 
 
@@ -73,7 +70,7 @@ def test_a_frame_of_thin_strips_becomes_charts(width: float) -> None:
     # Where it is unlimited this ends the process, so another one tries first.
     vertices = (corners - 0.5) / np.sqrt(0.5 * width)
     assert xatlas_worker.run_apart(vertices, np.concatenate(halves)) is not None
-    *_, charts = unwrap(triangles, np.tile(side, 2), growers.grow_charts)
+    charts = unwrap(triangles, np.tile(side, 2), growers.grow_charts)
     assert (charts.chart >= 0).all()
     edges = charts.uv[:, 1:] - charts.uv[:, :1]
     area = 0.5 * np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])

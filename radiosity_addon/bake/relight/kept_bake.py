@@ -7,7 +7,6 @@ whatever moves, turns or reflects otherwise needs a new bake.
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -15,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from ...base import BakeError, BakeWarning
+from ...base import SILENT, BakeError, BakeWarning, Progress
 from ...lightmap.images import LightmapPage, Seams, presentable, texel_pages, to_quantity
-from ...lightmap.lighting import LightingRecord, LitTexels, TexelLight, kept_bytes, relight_steps
+from ...lightmap.lighting import LightingRecord, RelightableTexels, TexelLight, kept_bytes, relight_texels
 from ...lightmap.texels import TexelGeometry
 from ...lightmap.unwrap import Atlas
 from ...numerics import Array, Scratch, tiles
@@ -25,7 +24,6 @@ from ...options import BakeSettings
 from ...scene import BakeScene
 from ...solver.element_transport import Relightable
 from ...solver.emitters import LightSources
-from ..result import Progress
 from ..scene_diff import SceneRecord, scene_record
 
 DAMAGED = (
@@ -71,7 +69,7 @@ class KeptBake:
     bake_scene, settings
         The bake's.
     solved : Relightable
-    lit : LitTexels
+    lit : RelightableTexels
     geometry, seams, rings
         The texels, what is stitched, and how far pages are dilated [texels].
     reflectance, emission : (n, 3) float64
@@ -85,7 +83,7 @@ class KeptBake:
     bake_scene: BakeScene
     settings: BakeSettings
     solved: Relightable
-    lit: LitTexels
+    lit: RelightableTexels
     geometry: TexelGeometry
     seams: Seams | None
     rings: int
@@ -130,7 +128,7 @@ class KeptBake:
         return scene_record(self.bake_scene, self.settings, self.geometry.uv)
 
 
-def relight_pages(kept: KeptBake, strengths: Array) -> Generator[Progress, None, tuple[LightmapPage, ...]]:
+def relight_pages(kept: KeptBake, strengths: Array, progress: Progress = SILENT) -> tuple[LightmapPage, ...]:
     """Compute the lightmaps for other strengths of the sources.
 
     Parameters
@@ -147,9 +145,9 @@ def relight_pages(kept: KeptBake, strengths: Array) -> Generator[Progress, None,
     """
     wanted = kept.sources.checked(strengths)
     if not kept.origin:
-        return (yield from _relight(kept, wanted))
+        return _relight(kept, wanted, progress)
     try:
-        return (yield from _relight(kept, wanted))
+        return _relight(kept, wanted, progress)
     except (*DAMAGED, BakeError) as error:
         raise damaged(kept.origin) from error
 
@@ -159,20 +157,14 @@ def damaged(path: Path | str) -> BakeError:
     return BakeError(f"'{path}' is not used: it is damaged; bake again")
 
 
-def _relight(kept: KeptBake, wanted: Array) -> Generator[Progress, None, tuple[LightmapPage, ...]]:
+def _relight(kept: KeptBake, wanted: Array, progress: Progress) -> tuple[LightmapPage, ...]:
     """Compute the lightmaps for strengths that are checked."""
     scratch = kept.geometry.scratch
-    steps = relight_steps(kept.lit, kept.solved, wanted, scratch)
-    while True:
-        try:
-            yield Progress("relight", 0.95 * next(steps))
-        except StopIteration as done:
-            light: TexelLight = done.value
-            break
+    light = relight_texels(kept.lit, kept.solved, wanted, scratch, progress.part(0.0, 0.95))
     emission = kept.sources.emission(kept.emission, kept.geometry.triangle, wanted)
     values = shown(light, kept.reflectance, emission, kept.settings, scratch)
     pages = presentable(texel_pages(kept.geometry, values, kept.seams, kept.rings))
-    yield Progress("relight", 1.0)
+    progress.at(1.0)
     return pages
 
 

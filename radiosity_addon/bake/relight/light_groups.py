@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from ...base import UsageError
+from ...base import SILENT, Progress, UsageError
 from ...lightmap.images import LightmapPage
 from ...numerics import Array, tiles
 from ...options import MAX_GROUPS, OTHERS, BakeSettings
@@ -59,7 +59,7 @@ def check_groups(bake_scene: BakeScene, settings: BakeSettings) -> None:
     found = {group_of(name, own, settings) for name, own in zip(names, given, strict=True)}
     if len(found) > MAX_GROUPS:
         raise UsageError(
-            f"{len(found)} light groups are more than the {MAX_GROUPS} that materials can mix: join some"
+            f"{len(found)} light groups are more than the {MAX_GROUPS} that materials can mix: merge some"
         )
 
 
@@ -73,9 +73,12 @@ def _check_members(settings: BakeSettings, names: Sequence[str]) -> None:
 
 
 def group_pages(
-    kept: KeptBake, pages: tuple[LightmapPage, ...], strengths: Array | None = None
-) -> Generator[float, None, tuple[LightGroup, ...]]:
-    """Compute the lightmaps of each of the light groups; yields the fraction done.
+    kept: KeptBake,
+    pages: tuple[LightmapPage, ...],
+    strengths: Array | None = None,
+    progress: Progress = SILENT,
+) -> tuple[LightGroup, ...]:
+    """Compute the lightmaps of each of the light groups.
 
     They sum to the whole: what sweeps that end, clamps at 0 and stitching leave of it, a small
     part, is shared out over the groups in proportion.
@@ -89,16 +92,7 @@ def group_pages(
     """
     given = kept.strengths if strengths is None else kept.sources.checked(strengths)
     chosen = members(kept.settings, kept.names, kept.groups, given)
-    found = []
-    for number, (_, rows) in enumerate(chosen):
-        steps = relight_pages(kept, given * rows[:, None])
-        while True:
-            try:
-                fraction = next(steps).fraction
-            except StopIteration as done:
-                found.append(done.value)
-                break
-            yield (number + fraction) / len(chosen)
+    found = [relight_pages(kept, given * rows[:, None], part) for (_, rows), part in progress.each(chosen)]
     for number, page in enumerate(pages):
         share_out(page.pixels, [of[number].pixels for of in found])
     return tuple(

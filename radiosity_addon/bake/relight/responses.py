@@ -7,14 +7,11 @@ quite linear: who stops changing things wants exact pages again.
 
 from __future__ import annotations
 
-from collections.abc import Generator
-
 import numpy as np
 
-from ...base import SceneError
+from ...base import SILENT, Progress, SceneError
 from ...lightmap.images import LightmapPage
 from ...numerics import Array
-from ..result import Progress
 from .kept_bake import KeptBake, relight_pages
 
 MOST = 1 << 28
@@ -54,12 +51,12 @@ class Responses:
         """Return all sources whose response is not known."""
         return [source for source in range(len(self.strengths)) if source not in self._of]
 
-    def steps(self, source: int) -> Generator[Progress, None, None]:
-        """Find out what a source adds to the lightmaps; yields how far it is."""
+    def find(self, source: int, progress: Progress = SILENT) -> None:
+        """Find out what a source adds to the lightmaps."""
         unit = self._unit(source)
         only = np.zeros_like(self.strengths)
         only[source] = unit
-        pages = yield from relight_pages(self._kept, only)
+        pages = relight_pages(self._kept, only, progress)
         # Laid out as the pixels of images are: one after the other, each channel scaled apart.
         self._of[source] = unit, tuple(page.pixels for page in pages)
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from .details import MEANS, More, more_of, statistics
 from .history_plot import write_history
-from .progress import Picture, Progress, TexelPicture, TexelSurfaces
+from .pictures import Picture, TexelPicture, TexelSurfaces
 from .report import BakeReport, LightmapFile, solver_part
 from .result import BakeDetails, BakedObject, BakeResult, LightGroup, PageDetails
 from .texel_pictures import TexelPictures
@@ -23,7 +23,6 @@ __all__ = [
     "More",
     "PageDetails",
     "Picture",
-    "Progress",
     "TexelPicture",
     "TexelPictures",
     "TexelSurfaces",

@@ -9,7 +9,7 @@ import numpy as np
 from ...lightmap.lighting import LightSoFar
 from ...lightmap.texels import NO_TEXEL, TexelGeometry
 from ...numerics import Array
-from .progress import TexelPicture, TexelSurfaces
+from .pictures import TexelPicture, TexelSurfaces
 
 SECONDS = 0.25
 """Between two pictures, at least."""
@@ -34,7 +34,7 @@ class TexelPictures:
         self._shown, self._next = 0, 0.0
         self._surfaces: TexelSurfaces | None = None
 
-    def next(self) -> TexelPicture | None:
+    def next(self, _: object = None) -> TexelPicture | None:
         """Return a picture if there is something new and it is time."""
         started = time.perf_counter()
         so_far = self._so_far

@@ -1,8 +1,8 @@
-"""A file of numbers and arrays that tells whether it is whole, and of which reading it runs nothing.
+"""A file of numbers and arrays with a digest of its content; reading it runs nothing.
 
-The head is a few bytes of magic, a version, and a digest of all that follows: a description in JSON,
-then arrays in compressed blocks. Bytes of equal weight lie together (the first of every number, then the
-second …), which halves what integers and fractions of about the same size take.
+The head is a few bytes of magic, the format's number, and a digest of all that follows: a description in
+JSON, then arrays in compressed blocks. Bytes of equal weight lie together (the first of every number, then
+the second …), which halves what integers and fractions of about the same size take.
 """
 
 from __future__ import annotations
@@ -78,14 +78,14 @@ class TooLargeError(ArrayFileError):
     """A file that may be whole but takes more memory than is allowed."""
 
 
-def write_arrays(path: Path, magic: bytes, version: int, told: Any, arrays: list[Array]) -> int:
+def write_arrays(path: Path, magic: bytes, format_number: int, description: Any, arrays: list[Array]) -> int:
     """Write a description and arrays; return the bytes that they take.
 
     Parameters
     ----------
     magic : bytes
         16 of them at most: the kind of file.
-    told : any
+    description : any
         What JSON can hold.
     arrays : list of arrays of the `KINDS`
 
@@ -100,18 +100,18 @@ def write_arrays(path: Path, magic: bytes, version: int, told: Any, arrays: list
         {"kind": array.dtype.name, "shape": list(array.shape), "blocks": [len(block) for block in some]}
         for array, some in zip(arrays, blocks, strict=True)
     ]
-    head = zlib.compress(json.dumps({"told": told, "arrays": entries}).encode())
+    head = zlib.compress(json.dumps({"description": description, "arrays": entries}).encode())
     body = [head, *(block for some in blocks for block in some)]
     digest = hashlib.blake2b(digest_size=32)
     for part in body:
         digest.update(part)
     with path.open("wb") as file:
-        file.write(_HEAD.pack(magic, version, digest.digest(), len(head)))
+        file.write(_HEAD.pack(magic, format_number, digest.digest(), len(head)))
         file.writelines(body)
         return file.tell()
 
 
-def read_arrays(path: Path, magic: bytes, version: int, most: int = MOST) -> tuple[Any, list[Array]]:
+def read_arrays(path: Path, magic: bytes, format_number: int, most: int = MOST) -> tuple[Any, list[Array]]:
     """Read what `write_arrays` wrote.
 
     Parameters
@@ -124,16 +124,16 @@ def read_arrays(path: Path, magic: bytes, version: int, most: int = MOST) -> tup
     OSError
         If the file cannot be read.
     ArrayFileError
-        If it is of another kind or version, not as it was written, or too large.
+        If it is of another kind or format, not as it was written, or too large.
     """
     with _opened(path) as file:
         size = os.fstat(file.fileno()).st_size
-        _check_head(file.read(_HEAD.size), magic, version)
+        _check_head(file.read(_HEAD.size), magic, format_number)
         if size > most:
             raise TooLargeError(f"it has {size >> 20} MB, more than the memory limit of {most >> 20} MB")
         file.seek(0)
         content = file.read(size)
-    digest, length = _check_head(content, magic, version)
+    digest, length = _check_head(content, magic, format_number)
     body = memoryview(content)[_HEAD.size :]
     if hashlib.blake2b(body, digest_size=32).digest() != digest:
         raise ArrayFileError("it is damaged")
@@ -145,15 +145,15 @@ def read_arrays(path: Path, magic: bytes, version: int, most: int = MOST) -> tup
             raise ArrayFileError(f"it claims to hold {total >> 20} MB, which a file of its size cannot")
         if total > most:
             raise TooLargeError(f"it takes {total >> 20} MB, more than the memory limit of {most >> 20} MB")
-        return head["told"], _read(body[length:], entries)
+        return head["description"], _read(body[length:], entries)
     except _DAMAGED as error:
         raise ArrayFileError("it is damaged") from error
 
 
-def read_digest(path: Path, magic: bytes, version: int) -> str:
+def read_digest(path: Path, magic: bytes, format_number: int) -> str:
     """Return the digest that a file's head holds, without reading the rest; errors as of `read_arrays`."""
     with _opened(path) as file:
-        return _check_head(file.read(_HEAD.size), magic, version)[0].hex()
+        return _check_head(file.read(_HEAD.size), magic, format_number)[0].hex()
 
 
 def _opened(path: Path) -> BinaryIO:
@@ -163,15 +163,15 @@ def _opened(path: Path) -> BinaryIO:
     return path.open("rb")
 
 
-def _check_head(content: bytes, magic: bytes, version: int) -> tuple[bytes, int]:
+def _check_head(content: bytes, magic: bytes, format_number: int) -> tuple[bytes, int]:
     """Return the digest and the description's length that a file's first bytes hold."""
     if len(content) < _HEAD.size:
         raise ArrayFileError("it is cut off")
     kind, found, digest, length = _HEAD.unpack_from(content)
     if kind != magic.ljust(16, b"\0"):
         raise ArrayFileError("it is no such file")
-    if found != version:
-        raise ArrayFileError(f"it has version {found}, and this is for version {version}")
+    if found != format_number:
+        raise ArrayFileError(f"it has format {found}, and this version reads format {format_number}")
     return digest, length
 
 
@@ -215,7 +215,7 @@ def _compressed(block: Array) -> bytes:
 
 
 def _read(body: memoryview, entries: list[dict[str, Any]]) -> list[Array]:
-    """Return the arrays that entries tell of."""
+    """Return the arrays that entries describe."""
     made, jobs, at = [], [], 0
     for entry in entries:
         dtype, shape = np.dtype(entry["kind"]), tuple(entry["shape"])
@@ -231,7 +231,7 @@ def _read(body: memoryview, entries: list[dict[str, Any]]) -> list[Array]:
             jobs.append((flat[number * step : (number + 1) * step], body[at : at + size]))
             at += size
     if at != len(body):
-        raise ValueError("more or less than was told")
+        raise ValueError("more or less than was described")
     with ThreadPoolExecutor() as threads:
         list(threads.map(_expand, jobs))
     return made

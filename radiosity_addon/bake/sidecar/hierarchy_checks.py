@@ -7,12 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ...numerics import Array
 from ...scene import Faces
 from ...solver.balance import Balance
 from ...solver.element_transport import ElementTransport
-from ...solver.emitters import LightSources
-from ...solver.hierarchy import LEAF, Clusters, Hierarchy, TreeTop
+from ...solver.hierarchy import LEAF, Clusters, Hierarchy
 from ...solver.links import ClusterLinks, LightLinks, Links
 from ...solver.methods import HierarchicalState
 from ...solver.settings import SolverSettings
@@ -24,39 +22,32 @@ MOST_FACTOR = 1e3
 """Means of samples may exceed what the exact form factor cannot."""
 
 
-def check_elements(transport: ElementTransport, sources: LightSources, triangles: int) -> int:
+def check_elements(transport: ElementTransport, lights: int, triangles: int) -> int:
     """Check the hierarchy with its links; return the number of elements."""
-    state = instance(transport._state, HierarchicalState)
-    if transport._sources is not sources:
-        raise ValueError("sources of something else")
+    state = instance(transport.state, HierarchicalState)
     settings = instance(state.settings, SolverSettings)
     for name, value in asdict(settings).items():
         if type(value) is not type(getattr(SolverSettings(), name)):
             number(value, 0.0)
     whole(settings.threads, 0, MOST_THREADS)
+    whole(settings.seed, 0, 1 << 64)
     number(settings.tolerance, 0.0)
     hierarchy = instance(state.hierarchy, Hierarchy)
     _check_hierarchy(hierarchy, triangles)
     clusters, count = len(hierarchy.clusters), hierarchy.n_elements
-    top = state.top
-    if top is not None:
-        _check_top(instance(top, TreeTop), hierarchy)
     if state.balance is not None:
         balance = instance(state.balance, Balance)
         numbers(balance.sent, (count, 2), 0.0)
         numbers(balance.received, (count, 2), 0.0)
-        _check_links(instance(balance.links, Links), clusters, count, top)
-    else:
-        _check_links(instance(state.links, Links), clusters, count, top)
-    _check_cluster_links(instance(state.cluster_links, ClusterLinks), clusters, count, top)
-    links = instance(transport._light_links, LightLinks)
-    integers(links.receiver, (len(links.receiver),), 0, count - 1)
-    integers(links.light, links.receiver.shape, 0, len(sources.lights) - 1)
-    numbers(links.gain, (len(links.receiver), 4), 0.0)
-    for name in ("power", "residual", "over_budget", "faint"):
-        number(getattr(state, name), 0.0)
-    number(state.started, -LARGE)
-    whole(state.iterations, 0, 1 << 62)
+        _check_links(instance(balance.links, Links), clusters, count)
+    _check_links(instance(state.links, Links), clusters, count)
+    links = instance(state.cluster_links, ClusterLinks)
+    require(len(links) == 0 or state.balance is not None, "links to clusters without a balance")
+    _check_cluster_links(links, clusters, count)
+    of_lights = instance(transport.light_links, LightLinks)
+    integers(of_lights.receiver, (len(of_lights.receiver),), 0, count - 1)
+    integers(of_lights.light, of_lights.receiver.shape, 0, lights - 1)
+    numbers(of_lights.gain, (len(of_lights.receiver), 4), 0.0)
     return count
 
 
@@ -74,6 +65,9 @@ def _check_hierarchy(hierarchy: Hierarchy, triangles: int) -> None:
     numbers(clusters.centre, (c, 3), -LARGE)
     require((clusters.area > 0.0).all(), "a cluster without area")
     require((np.bincount(clusters.order, minlength=f) == 1).all(), "faces in no order")
+    nodes = np.concatenate([hierarchy.roots, clusters.children.ravel()])
+    integers(nodes, nodes.shape, 0, c + f - 1)
+    require((np.bincount(nodes, minlength=c + f) == 1).all(), "a cluster of nobody, or of several")
     _check_levels(clusters.levels, c)
     for level in clusters.levels:
         below = clusters.children[level]
@@ -105,50 +99,21 @@ def _check_levels(levels: Any, count: int) -> None:
     require(at == count, "levels")
 
 
-def _check_top(top: TreeTop, hierarchy: Hierarchy) -> None:
-    clusters, faces = hierarchy.clusters, hierarchy.faces
-    f, c = len(faces.triangle), len(clusters.start)
-    require(top._clusters is clusters, "clusters of something else")
-    whole(top.n_inner, 0, c)
-    tips = len(top._start)
-    whole(top.n_rows, top.n_inner + tips, top.n_inner + tips)
-    integers(top.row, (c,), -1, top.n_rows - 1)
-    integers(top.tip, (f,), top.n_inner, top.n_rows - 1)
-    integers(top._start, (tips,), 0, f - 1)
-    require(bool((np.diff(top._start) > 0).all()) and (top._start[:1] == 0).all(), "tips in no order")
-    require(tips > 0 or f == 0, "no tips")
-    integers(top._children, (top.n_inner, 2), 0, top.n_rows - 1)
-    numbers(top._area, (f,), 0.0)
-    _check_levels(top._levels, top.n_inner)
-    for level in top._levels:
-        require((top._children[level] >= level.stop).all(), "a cluster in itself")
-
-
-def _check_links(links: Links, clusters: int, elements: int, top: TreeTop | None) -> None:
+def _check_links(links: Links, clusters: int, elements: int) -> None:
     count = len(links.receiver)
     integers(links.receiver, (count,), 0, elements - 1)
     require((np.diff(links.receiver) >= 0).all(), "links in no order")
     integers(links.source, (count,), 0, clusters + elements - 1)
-    _in_top(links.source, clusters, top)
     numbers(links.factor, (count,), 0.0, MOST_FACTOR)
     numbers(links.visibility, (count,), 0.0, 1.0 + SLACK)
     numbers(links.to_quarter, (count, 4), 0.0, 4.0 + SLACK)
     numbers(links.of_quarter, (count, 4), 0.0, 4.0 + SLACK)
 
 
-def _check_cluster_links(links: ClusterLinks, clusters: int, elements: int, top: TreeTop | None) -> None:
+def _check_cluster_links(links: ClusterLinks, clusters: int, elements: int) -> None:
     count = len(links.receiver)
     integers(links.receiver, (count,), 0, clusters - 1)
     integers(links.source, (count,), 0, clusters + elements - 1)
-    require(count == 0 or top is not None, "links to clusters that are not there")
-    _in_top(links.receiver, clusters, top)
-    _in_top(links.source, clusters, top)
     numbers(links.vector, (count, 3), -LARGE)
     numbers(links.gradient, (count, 3), -LARGE)
     numbers(links.even, (count,), -LARGE)
-
-
-def _in_top(nodes: Array, clusters: int, top: TreeTop | None) -> None:
-    """Refuse clusters that the top of the tree has no row for."""
-    if top is not None:
-        require((top.row[nodes[nodes < clusters]] >= 0).all(), "a cluster below the top")

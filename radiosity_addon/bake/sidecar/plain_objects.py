@@ -1,12 +1,13 @@
 """Objects of known classes as plain values and arrays, and back: what a file can hold.
 
-Only attributes that a table names are stored, and only classes in it are made again, without calling
-anything of theirs: what was read cannot run. Objects that others share stay shared.
+A class declares what is stored of it in `STORED`, a tuple of public attributes; a dataclass without it stores
+all of its fields. Objects are made again without calling anything of theirs: what was read cannot run.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -14,123 +15,89 @@ import numpy.typing as npt
 
 Array = npt.NDArray[Any]
 
-Table = Mapping[type, Sequence[str]]
-"""Classes, and which of their attributes are kept; the others come back as None."""
+
+def stored_names(kind: Any) -> tuple[str, ...]:
+    """Return the attributes that are stored of a class."""
+    declared: tuple[str, ...] | None = getattr(kind, "STORED", None)
+    return tuple(entry.name for entry in fields(kind)) if declared is None else declared
 
 
-def flatten(value: Any, table: Table, skipped: Sequence[tuple[Any, str]] = ()) -> tuple[Any, list[Array]]:
+def flatten(value: Any, kinds: Collection[type]) -> tuple[Any, list[Array]]:
     """Return what JSON can hold of a value, and the arrays it refers to.
 
     Parameters
     ----------
-    skipped : sequence of (object, attribute)
-        What is stored as None although the table names it.
+    kinds : collection of types
+        The classes that may be stored.
 
     Raises
     ------
     TypeError
-        If it holds something that is in no table.
+        If it holds anything else.
     """
-    writer = _Writer(table, {(id(owner), name) for owner, name in skipped})
-    tree = writer.node(value)
-    return {"tree": tree, "objects": writer.objects}, writer.arrays
+    arrays: list[Array] = []
 
-
-def restore(told: Any, arrays: list[Array], table: Table, dropped: Mapping[type, Sequence[str]]) -> Any:
-    """Return the value that `flatten` took apart.
-
-    Parameters
-    ----------
-    dropped : mapping of type to attributes
-        What was not kept and is set to None.
-
-    Raises
-    ------
-    ValueError, KeyError, TypeError, IndexError
-        If it is not as `flatten` would write it.
-    """
-    reader = _Reader(arrays, {kind.__name__: kind for kind in table}, told["objects"])
-    for made, entry in zip(reader.made, told["objects"], strict=True):
-        kept, left = table[type(made)], dropped.get(type(made), ())
-        if set(entry["has"]) != set(kept):
-            raise ValueError("other attributes than these")
-        for name in left:
-            object.__setattr__(made, name, None)
-        for name, node in entry["has"].items():
-            object.__setattr__(made, name, reader.value(node))
-    return reader.value(told["tree"])
-
-
-class _Writer:
-    """Takes a value apart, each object and array once."""
-
-    def __init__(self, table: Table, skipped: set[tuple[int, str]]) -> None:
-        self._table, self._skipped = table, skipped
-        self._object_of: dict[int, int] = {}
-        self._array_of: dict[int, int] = {}
-        self.objects: list[dict[str, Any]] = []
-        self.arrays: list[Array] = []
-
-    def node(self, value: Any) -> Any:
-        """Return what stands for a value."""
+    def node(value: Any) -> Any:
         if value is None or isinstance(value, bool | int | float | str):
             return value
         if isinstance(value, np.generic):
             return value.item()
         if isinstance(value, np.ndarray):
-            return {"array": self._array(value)}
+            arrays.append(value)
+            return {"array": len(arrays) - 1}
         if isinstance(value, slice):
             return {"slice": [value.start, value.stop, value.step]}
         if isinstance(value, tuple | list):
             kind = "tuple" if isinstance(value, tuple) else "list"
-            return {kind: [self.node(item) for item in value]}
+            return {kind: [node(item) for item in value]}
         if isinstance(value, dict):
-            return {"dict": [[self.node(key), self.node(item)] for key, item in value.items()]}
-        return {"object": self._object(value)}
-
-    def _array(self, value: Array) -> int:
-        if id(value) not in self._array_of:
-            self._array_of[id(value)] = len(self.arrays)
-            self.arrays.append(value)
-        return self._array_of[id(value)]
-
-    def _object(self, value: Any) -> int:
-        if type(value) not in self._table:
+            return {"dict": [[node(key), node(item)] for key, item in value.items()]}
+        if type(value) not in kinds:
             raise TypeError(f"a {type(value).__name__} cannot be stored")
-        if id(value) not in self._object_of:
-            self._object_of[id(value)] = len(self.objects)
-            entry: dict[str, Any] = {"class": type(value).__name__, "has": {}}
-            self.objects.append(entry)
-            for name in self._table[type(value)]:
-                skip = (id(value), name) in self._skipped
-                entry["has"][name] = None if skip else self.node(getattr(value, name))
-        return self._object_of[id(value)]
+        names = stored_names(type(value))
+        return {"object": [type(value).__name__, {name: node(getattr(value, name)) for name in names}]}
+
+    return node(value), arrays
 
 
-class _Reader:
-    """Puts a value together again."""
+def restore(tree: Any, arrays: list[Array], kinds: Collection[type]) -> Any:
+    """Return the value that `flatten` took apart; fields of dataclasses that are not stored are None.
 
-    def __init__(
-        self, arrays: list[Array], classes: Mapping[str, type], objects: list[dict[str, Any]]
-    ) -> None:
-        self._arrays = arrays
-        self.made: list[Any] = [object.__new__(classes[entry["class"]]) for entry in objects]
+    Raises
+    ------
+    ValueError, KeyError, TypeError, IndexError, RecursionError
+        If it is not as `flatten` would write it.
+    """
+    class_of: Mapping[str, type] = {kind.__name__: kind for kind in kinds}
 
-    def value(self, node: Any) -> Any:
-        """Return what a node stands for."""
+    def value(node: Any) -> Any:
         if not isinstance(node, dict):
             return node
         ((kind, content),) = node.items()
         if kind == "array":
-            return self._arrays[content]
+            return arrays[content]
         if kind == "slice":
             return slice(*content)
         if kind == "tuple":
-            return tuple(self.value(item) for item in content)
+            return tuple(value(item) for item in content)
         if kind == "list":
-            return [self.value(item) for item in content]
+            return [value(item) for item in content]
         if kind == "dict":
-            return {self.value(key): self.value(item) for key, item in content}
+            return {value(key): value(item) for key, item in content}
         if kind == "object":
-            return self.made[content]
+            name, stored = content
+            return made(class_of[name], stored)
         raise ValueError("unknown node")
+
+    def made(kind: type, stored: Mapping[str, Any]) -> Any:
+        if set(stored) != set(stored_names(kind)):
+            raise ValueError("other attributes than these")
+        result: Any = object.__new__(kind)
+        if is_dataclass(kind):
+            for entry in fields(kind):
+                object.__setattr__(result, entry.name, None)
+        for name, node in stored.items():
+            object.__setattr__(result, name, value(node))
+        return result
+
+    return value(tree)

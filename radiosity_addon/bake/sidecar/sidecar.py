@@ -1,4 +1,4 @@
-"""A kept bake in a file beside its lightmaps: what lights it anew when Blender was closed meanwhile.
+"""A kept bake in a file next to its lightmaps: what relights it after Blender was closed.
 
 Only what relighting reads is stored. The geometry itself is not: the scene brings it again, and its
 objects must be those of the bake.
@@ -7,9 +7,9 @@ objects must be those of the bake.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from copy import copy
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,14 @@ from ...base import BakeError, RadiosityError
 from ...files import BAKE, DIGEST, FILE, KEPT
 from ...files import SIDECAR_NAME as SIDECAR_NAME
 from ...lightmap.images import LightmapPage, Seams
-from ...lightmap.lighting import EarlierLight, LitTexels, PartLinks, Parts, StoredLinks, TexelTransport
+from ...lightmap.lighting import (
+    GatherLinks,
+    RelightableTexels,
+    SubCellLinks,
+    SubCells,
+    TexelTransport,
+    WarmStart,
+)
 from ...lightmap.points import Interpolation
 from ...lightmap.texels import TexelGeometry
 from ...lights import AreaLight, EnvironmentImage, EnvironmentLight, PointLight, SkyPatch, SpotLight, SunLight
@@ -27,8 +34,8 @@ from ...solver.balance import Balance
 from ...solver.element_transport import ElementTransport, Relightable
 from ...solver.emitters import EmitterGroup, LightSources
 from ...solver.gather import AimedRays, LightGains, LocalPass
-from ...solver.hierarchy import Clusters, Hierarchy, TreeTop
-from ...solver.links import ClusterLinks, LightLinks, Links
+from ...solver.hierarchy import Clusters, Hierarchy
+from ...solver.links import ClusterLinks, LightLinks, Links, no_links
 from ...solver.methods import HierarchicalState
 from ...solver.settings import SolverSettings
 from ..relight import DAMAGED, KeptBake, damaged
@@ -38,65 +45,20 @@ from .array_file import ArrayFileError, TooLargeError, read_arrays, read_digest,
 from .plain_objects import flatten, restore
 from .sidecar_checks import check_stored, stored_layout
 
-MAGIC, VERSION = b"RADIOSITYRELIGHT", 2
-"""Version 1 did not know textures, and what solving stores may differ from it."""
+MAGIC, FORMAT = b"RADIOSITYRELIGHT", 3
+"""The format rises with whatever is stored: classes say it themselves (`plain_objects.stored_names`)."""
 
 OF_SOURCES = ("emitter", "emitter_names", "light_groups", "emitter_groups")
-"""What a scene says of its sources beside their strengths: it stays as it was baked."""
+"""What a scene says of its sources besides their strengths: it stays as it was baked."""
 
-
-def _all(kind: Any) -> tuple[str, ...]:
-    return tuple(entry.name for entry in fields(kind))
-
-
-_LIGHTS = (PointLight, SpotLight, SunLight, AreaLight, EnvironmentLight, EnvironmentImage, SkyPatch)
-
-STORED: Mapping[type, Sequence[str]] = {
-    **{kind: _all(kind) for kind in _LIGHTS},
-    **{
-        kind: _all(kind)
-        for kind in (SolverSettings, LightLinks, Interpolation, AimedRays, Seams, Relightable)
-    },
-    **{kind: _all(kind) for kind in (StoredLinks, TexelTransport, LitTexels, Balance, Parts)},
-    PartLinks: ("rows", "sources", "reflectance", "gains"),
-    Links: ("receiver", "source", "factor", "visibility", "to_quarter", "of_quarter"),
-    ClusterLinks: ("receiver", "source", "vector", "gradient", "even"),
-    Clusters: ("order", "start", "children", "area", "centre", "levels"),
-    TreeTop: (
-        *("row", "n_inner", "n_rows", "tip", "_clusters", "_area"),
-        *("_start", "_children", "_levels"),
-    ),
-    Faces: ("triangle", "normal", "centre", "area"),
-    Hierarchy: (
-        *("faces", "clusters", "face", "first_child", "level"),
-        *("area", "reflectance", "emission", "opacity"),
-    ),
-    HierarchicalState: (
-        *("settings", "hierarchy", "power", "links", "cluster_links", "top", "balance", "residual"),
-        *("iterations", "over_budget", "faint", "started"),
-    ),
-    LightSources: ("lights", "emitter", "groups", "strengths", "_owner", "_single"),
-    EmitterGroup: ("strength",),
-    ElementTransport: ("_state", "_sources", "_light_links"),
-    LocalPass: ("sources", "threads", "_state", "_seed"),
-    LightGains: ("_count", "_of"),
-    EarlierLight: ("_known",),
-    TexelGeometry: ("page", "triangle", "centre_inside", "index", "_first", "uv", "page_of_triangle"),
-}
-"""What is stored of each class: all that relighting reads."""
-
-DROPPED: Mapping[type, Sequence[str]] = {
-    PartLinks: ("lamps",),
-    Links: ("doubt",),
-    ClusterLinks: ("factor", "visibility", "doubt"),
-    TreeTop: ("kept", "tips"),
-    HierarchicalState: (
-        *("scene", "caster", "light_links", "irradiance", "radiosity"),
-        *("history", "details", "conservation"),
-    ),
-    LocalPass: ("caster", "emitters"),
-}
-"""What only a bake needs, for which None stands."""
+KINDS: tuple[type, ...] = (
+    *(PointLight, SpotLight, SunLight, AreaLight, EnvironmentLight, EnvironmentImage, SkyPatch),
+    *(LightSources, EmitterGroup, SolverSettings, ElementTransport, HierarchicalState),
+    *(Hierarchy, Faces, Clusters, Links, ClusterLinks, LightLinks, Balance),
+    *(RelightableTexels, TexelTransport, GatherLinks, AimedRays, Interpolation, SubCells, SubCellLinks),
+    *(LightGains, WarmStart, TexelGeometry, Seams),
+)
+"""The classes that may be stored: those that relighting reads."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,14 +67,14 @@ class StoredBake:
 
     Attributes
     ----------
-    mark : str
-        The bake's own, which whoever wrote it knows it by.
+    bake_id : str
+        The bake's own, which its images and its report carry as well.
     settings : BakeSettings
     path : Path
         Its file, for messages.
     """
 
-    mark: str
+    bake_id: str
     settings: BakeSettings
     path: Path
     _stored: Mapping[str, Any]
@@ -134,11 +96,11 @@ class StoredBake:
         if stored_layout(stored) != (len(bake_scene.scene), baked):
             raise damaged(self.path)
         scene = copy(bake_scene.scene)
-        scene.emission, scene.lights = stored["emission"], stored["solved"].sources.lights
+        scene.emission, scene.lights = stored["emission"], stored["elements"].sources.lights
         return KeptBake(
             replace(bake_scene, scene=scene, **stored["of_sources"]),
             self.settings,
-            solved=stored["solved"],
+            solved=_solved(stored["elements"]),
             lit=stored["lit"],
             geometry=stored["geometry"],
             seams=stored["seams"],
@@ -159,14 +121,14 @@ class StoredBake:
         return BakeResult(pages, objects, report["solver"], bake_scene.warnings, {}, report["atlas"])
 
 
-def write_sidecar(path: Path, kept: KeptBake, result: BakeResult, mark: str) -> int:
+def write_sidecar(path: Path, kept: KeptBake, result: BakeResult, bake_id: str) -> int:
     """Write a kept bake to a file; return the bytes that it takes.
 
     Parameters
     ----------
     result : BakeResult
         The bake's.
-    mark : str
+    bake_id : str
         See `StoredBake`.
 
     Raises
@@ -174,28 +136,29 @@ def write_sidecar(path: Path, kept: KeptBake, result: BakeResult, mark: str) -> 
     BakeError
         If the file cannot be written.
     """
-    state = kept.solved.elements.state
-    # Balanced links stand for those that were measured.
-    skipped = [] if state.balance is None else [(state, "links")]
+    elements = kept.solved.elements
+    if elements.state.balance is not None:
+        # Balanced links stand for those that were measured.
+        elements = replace(elements, state=replace(elements.state, links=no_links()))
     stored = {
-        "mark": mark,
+        "bake_id": bake_id,
         "settings": asdict(kept.settings),
         "objects": kept.record.objects,
         "emission": kept.bake_scene.scene.emission,
         "of_sources": {name: getattr(kept.bake_scene, name) for name in OF_SOURCES},
         "pages": [item.page for item in result.objects],
         "report": {"solver": {**result.solver, "history": []}, "atlas": result.atlas},
-        "solved": kept.solved,
-        "lit": replace(kept.lit, earlier=kept.lit.earlier.first()),
+        "elements": elements,
+        "lit": replace(kept.lit, warm_start=kept.lit.warm_start.first()),
         "geometry": kept.geometry,
         "seams": kept.seams,
         "rings": kept.rings,
         "texel_reflectance": kept.reflectance,
         "texel_emission": kept.emission,
     }
-    told, arrays = flatten(stored, STORED, skipped)
+    description, arrays = flatten(stored, KINDS)
     try:
-        return write_arrays(path, MAGIC, VERSION, told, arrays)
+        return write_arrays(path, MAGIC, FORMAT, description, arrays)
     except OSError as error:
         raise BakeError(f"cannot write '{path}': {error.strerror}") from error
 
@@ -211,16 +174,16 @@ def read_sidecar(path: Path, memory_limit: float | None = None) -> StoredBake:
     Raises
     ------
     BakeError
-        If there is none, it is damaged or of another version, or would take too much memory.
+        If there is none, it is damaged or of another format, or would take too much memory.
     """
     most = int((memory_limit or SolverSettings.memory_limit) * (1 << 30))
     try:
-        told, arrays = read_arrays(path, MAGIC, VERSION, most)
-        stored = restore(told, arrays, STORED, DROPPED)
+        description, arrays = read_arrays(path, MAGIC, FORMAT, most)
+        stored = restore(description, arrays, KINDS)
         check_stored(stored)
-        return StoredBake(stored["mark"], BakeSettings(**stored["settings"]), path, stored)
+        return StoredBake(stored["bake_id"], BakeSettings(**stored["settings"]), path, stored)
     except FileNotFoundError:
-        raise BakeError(f"there is no '{path}': bake with a sidecar to light that bake anew") from None
+        raise BakeError(f"there is no '{path}': bake with a sidecar to relight that bake") from None
     except OSError as error:
         raise BakeError(f"cannot read '{path}': {error.strerror}") from error
     except TooLargeError as error:
@@ -231,8 +194,17 @@ def read_sidecar(path: Path, memory_limit: float | None = None) -> StoredBake:
         raise damaged(path) from error
 
 
-def sidecar_entry(path: Path, mark: str) -> dict[str, str]:
-    """Return what a report tells of the bake that was kept in a sidecar beside it.
+def _solved(elements: ElementTransport) -> Relightable:
+    """Make what is not stored of a solved scene that was read and checked."""
+    state = elements.state
+    if state.balance is not None:
+        state.links = state.balance.links
+        state.cut = state.linked_cut()
+    return Relightable(elements.sources, elements, LocalPass.of(state, elements.sources))
+
+
+def sidecar_entry(path: Path, bake_id: str) -> dict[str, str]:
+    """Return what a report says of the bake that was kept in a sidecar next to it.
 
     Raises
     ------
@@ -240,7 +212,7 @@ def sidecar_entry(path: Path, mark: str) -> dict[str, str]:
         If the sidecar cannot be read.
     """
     try:
-        return {BAKE: mark, DIGEST: read_digest(path, MAGIC, VERSION), FILE: path.name}
+        return {BAKE: bake_id, DIGEST: read_digest(path, MAGIC, FORMAT), FILE: path.name}
     except OSError as error:
         raise BakeError(f"cannot read '{path}': {error.strerror}") from error
     except ArrayFileError as error:
@@ -248,20 +220,20 @@ def sidecar_entry(path: Path, mark: str) -> dict[str, str]:
 
 
 def check_belongs(stored: StoredBake, report: Path) -> None:
-    """Refuse a sidecar that the report beside it does not name as that of its bake.
+    """Refuse a sidecar that the report next to it does not name as that of its bake.
 
     Raises
     ------
     BakeError
     """
     try:
-        told = json.loads(report.read_text(encoding="utf-8"))
-        kept = told.get(KEPT) if isinstance(told, dict) else None
+        data = json.loads(report.read_text(encoding="utf-8"))
+        kept = data.get(KEPT) if isinstance(data, dict) else None
     except (OSError, ValueError, RecursionError):
         raise BakeError(f"'{report}' cannot be read, or is no report: bake again, with --keep") from None
     if not isinstance(kept, dict):
         raise BakeError(
             f"'{stored.path}' is older than the bake of '{report}', which was not kept: bake again"
         )
-    if kept.get(BAKE) != stored.mark or kept != sidecar_entry(stored.path, stored.mark):
+    if kept.get(BAKE) != stored.bake_id or kept != sidecar_entry(stored.path, stored.bake_id):
         raise BakeError(f"'{stored.path}' belongs to another bake than '{report}': bake again")

@@ -14,14 +14,21 @@ from typing import Any
 import numpy as np
 
 from ...lightmap.images import Seams
-from ...lightmap.lighting import EarlierLight, LitTexels, PartLinks, Parts, StoredLinks, TexelTransport
+from ...lightmap.lighting import (
+    GatherLinks,
+    RelightableTexels,
+    SubCellLinks,
+    SubCells,
+    TexelTransport,
+    WarmStart,
+)
 from ...lightmap.points import Interpolation
 from ...lightmap.texels import TexelGeometry
 from ...lights import Light, SkyPatch, SkyTable
 from ...options import MAX_RESOLUTION, BakeSettings
-from ...solver.element_transport import ElementTransport, Relightable
+from ...solver.element_transport import ElementTransport
 from ...solver.emitters import NO_SOURCE, EmitterGroup, LightSources
-from ...solver.gather import NOTHING, AimedRays, LightGains, LocalPass
+from ...solver.gather import NOTHING, AimedRays, LightGains, lowest_number
 from ..scene_diff import as_object_records
 from .hierarchy_checks import MOST_LEVELS, MOST_THREADS, check_elements
 from .value_checks import LARGE, SLACK, array_of, instance, integers, number, numbers, require, whole
@@ -45,25 +52,20 @@ def check_stored(stored: Any) -> None:
     ValueError, KeyError, TypeError, IndexError, AttributeError, RadiosityError
         If anything is not as it must be.
     """
-    instance(stored["mark"], str)
+    instance(stored["bake_id"], str)
     _check_settings(BakeSettings(**stored["settings"]))
     stored["objects"] = as_object_records(stored["objects"])
-    solved, lit, geometry = (
-        instance(stored["solved"], Relightable),
-        instance(stored["lit"], LitTexels),
-        instance(stored["geometry"], TexelGeometry),
-    )
+    transport = instance(stored["elements"], ElementTransport)
+    lit, geometry = instance(stored["lit"], RelightableTexels), instance(stored["geometry"], TexelGeometry)
     emission = stored["emission"]
     triangles = len(emission)
     numbers(emission, (triangles, 3), 0.0)
     _check_named(stored["of_sources"], triangles)
-    sources = instance(solved.sources, LightSources)
+    sources = instance(transport.sources, LightSources)
     lamps = _check_sources(sources, triangles)
-    elements = check_elements(instance(solved.elements, ElementTransport), sources, triangles)
-    _check_local(instance(solved.local, LocalPass), solved)
+    elements = check_elements(transport, len(sources.lights), triangles)
     texels = _check_geometry(geometry, triangles)
-    cells = len(SkyTable(sources.lights).radiosity)
-    _check_lit(lit, sources, texels, elements, lamps, cells)
+    _check_lit(lit, sources, texels, elements, lamps)
     if stored["seams"] is not None:
         _check_seams(instance(stored["seams"], Seams), geometry, triangles)
     whole(stored["rings"], 0, MOST_RINGS)
@@ -137,8 +139,8 @@ def _check_sources(sources: LightSources, triangles: int) -> int:
     integers(sources.emitter, (triangles,), NO_SOURCE, count - 1)
     shining = np.unique(sources.emitter[sources.emitter >= 0])
     require(sources.strengths[len(lights) + shining].any(axis=1).all(), "emission without strength")
-    integers(sources._owner, (len(groups),), 0, count - 1)
-    array_of(sources._single, "b", (count,))
+    integers(sources.owner, (len(groups),), 0, count - 1)
+    array_of(sources.single, "b", (count,))
     for group in groups:
         numbers(instance(group, EmitterGroup).strength, (3,), 0.0)
     return len(lights) + len(groups)
@@ -162,13 +164,6 @@ def _check_light(light: Any) -> None:
         numbers(made.share, np.shape(made.bounds)[:1], 0.0, 1.0 + SLACK)
 
 
-def _check_local(local: LocalPass, solved: Relightable) -> None:
-    require(local.sources is solved.sources, "sources of something else")
-    require(local._state is solved.elements._state, "a state of something else")
-    whole(local.threads, 0, MOST_THREADS)
-    whole(local._seed, 0, 1 << 64)
-
-
 def _check_geometry(geometry: TexelGeometry, triangles: int) -> int:
     """Check where texels are; return their number."""
     pages, n = len(instance(geometry.index, list)), len(geometry.page)
@@ -179,15 +174,15 @@ def _check_geometry(geometry: TexelGeometry, triangles: int) -> int:
     integers(geometry.page_of_triangle, (triangles,), -1, pages - 1)
     shown = geometry.uv[geometry.page_of_triangle >= 0]
     require(((shown >= -SLACK) & (shown <= 1.0 + SLACK)).all(), "UVs beside their page")
-    integers(geometry._first, (pages + 1,), 0, n)
-    require(geometry._first[0] == 0 and geometry._first[-1] == n, "texels of no page")
+    integers(geometry.page_start, (pages + 1,), 0, n)
+    require(geometry.page_start[0] == 0 and geometry.page_start[-1] == n, "texels of no page")
     require((np.diff(geometry.page) >= 0).all(), "pages in no order")
     counts = np.bincount(geometry.page, minlength=pages)
-    require((counts == np.diff(geometry._first)).all(), "texels of no page")
+    require((counts == np.diff(geometry.page_start)).all(), "texels of no page")
     for page, index in enumerate(geometry.index):
         size = len(index)
         whole(size, 1, MAX_RESOLUTION)
-        first, last = int(geometry._first[page]), int(geometry._first[page + 1])
+        first, last = int(geometry.page_start[page]), int(geometry.page_start[page + 1])
         integers(index, (size, size), -1, last - 1)
         covered = index[index >= 0]
         require((covered >= first).all(), "texels of another page")
@@ -195,13 +190,11 @@ def _check_geometry(geometry: TexelGeometry, triangles: int) -> int:
     return n
 
 
-def _check_lit(
-    lit: LitTexels, sources: LightSources, texels: int, elements: int, lamps: int, cells: int
-) -> None:
+def _check_lit(lit: RelightableTexels, sources: LightSources, texels: int, elements: int, lamps: int) -> None:
     transport = instance(lit.transport, TexelTransport)
-    links, parts = instance(transport.links, StoredLinks), instance(transport.parts, Parts)
-    # Negative numbers count from the table's end, where nothing and the sky's cells are.
-    surfaces, lowest = texels + len(parts.start), -cells - 2
+    links, cells = instance(transport.links, GatherLinks), instance(transport.cells, SubCells)
+    surfaces, lowest = texels + len(cells.start), lowest_number(SkyTable(sources.lights))
+    require(surfaces >= texels + elements, "elements without a row")
     gather = len(links.sources)
     rays = np.shape(links.sources)[1]
     require(rays > 0, "no rays")
@@ -214,11 +207,10 @@ def _check_lit(
     numbers(aimed.weights, shape, 0.0)
     integers(aimed.element, (len(aimed.element), shape[1]), NOTHING, elements - 1)
     numbers(transport.reflectance, (texels, 3), 0.0, 1.0)
-    numbers(parts.start, (surfaces - texels, 3), 0.0)
-    integers(parts.element, (surfaces - texels,), NOTHING, elements - 1)
-    integers(parts.small, (surfaces - texels - elements,), 0, 1 << 62)
-    for some in instance(parts.links, list):
-        count = len(instance(some, PartLinks).rows)
+    numbers(cells.start, (surfaces - texels, 3), 0.0)
+    integers(cells.element, (surfaces - texels,), NOTHING, elements - 1)
+    for some in instance(cells.links, list):
+        count = len(instance(some, SubCellLinks).rows)
         integers(some.rows, (count,), texels, surfaces - 1)
         require(np.shape(some.sources)[1] > 0, "no rays")
         integers(some.sources, (count, np.shape(some.sources)[1]), lowest, surfaces - 1)
@@ -228,7 +220,7 @@ def _check_lit(
     integers(lit.element, (texels,), NOTHING, elements - 1)
     whole(lit.sweeps, 0, MOST_ROUNDS)
     number(lit.tolerance, 0.0)
-    known = instance(instance(lit.earlier, EarlierLight)._known, list)
+    known = instance(instance(lit.warm_start, WarmStart).solutions, list)
     require(len(known) > 0, "no light")
     for strengths, table in known:
         numbers(strengths, sources.strengths.shape, 0.0)
@@ -247,8 +239,8 @@ def _check_interpolation(spread: Interpolation, texels: int, gather: int) -> Non
 
 
 def _check_gains(gains: LightGains, count: int, lamps: int) -> None:
-    require(gains._count == count, "gains of something else")
-    for light, (rows, gain) in instance(gains._of, dict).items():
+    require(gains.count == count, "gains of something else")
+    for light, (rows, gain) in instance(gains.gain_of, dict).items():
         whole(light, 0, lamps - 1)
         if rows is None:
             numbers(gain, (count,), 0.0)

@@ -11,9 +11,9 @@ import bpy
 
 from ...bake import BakeDigests, KeepOptions, timed
 from ...bake.relight import strengths_in
-from ...bake.result import BakeReport, Progress
+from ...bake.result import BakeReport
 from ...bake.sidecar import StoredBake, check_belongs, read_sidecar
-from ...base import BakeWarning, UsageError, drain
+from ...base import BakeWarning, Status, UsageError, staged
 from ...cli import Console, Interrupts, Permissions, summary
 from ...files import BLEND_NAME, PREVIEW_NAME, SIDECAR_NAME
 from ...options import BakeSettings
@@ -86,7 +86,7 @@ def relight_into(
     folder: OutputFolder,
     notes: tuple[BakeWarning, ...] = (),
     preview: bool = True,
-) -> Generator[Progress, None, BakeReport]:
+) -> Generator[Status, None, BakeReport]:
     """Light a stored bake anew, and write its folder as a bake would; the scene shows the lightmaps then.
 
     Raises
@@ -98,26 +98,26 @@ def relight_into(
     from ..jobs.finish import Copies, finish
     from ..jobs.preview import QUICK_SAMPLES
     from ..relight.relight_scene import lit
-    from ..scene_export.export import export_steps, exporting
+    from ..scene_export.export import export_steps
 
     seconds: dict[str, float] = {}
     with folder as output:
         output.expect((BLEND_NAME, PREVIEW_NAME, output.names.sidecar))
-        yield Progress("export", EXPORT)
+        yield Status("export", EXPORT)
         with timed(seconds, "export"):
             shown = Originals(context)
             steps = export_steps(context, stored.settings, dark=True, shown=shown)
-            export = yield from exporting(steps)
+            export = yield from staged(steps, "export", EXPORT, EXPORT)
         with timed(seconds, "relight"):
             kept = stored.kept(export.bake_scene)
-            yield Progress("relight", RELIGHT)
-            pages, groups = drain(lit(kept, strengths_in(kept, export.bake_scene)))
+            yield Status("relight", RELIGHT)
+            pages, groups = lit(kept, strengths_in(kept, export.bake_scene))
         result = stored.result(export.bake_scene, pages)
         result = replace(result, groups=groups, warnings=(*notes, *result.warnings))
         output.expect(page_file_names(result, stored.settings))
         output.expect(name for of in group_file_names(result, stored.settings) for name in of)
-        yield Progress("apply", APPLY)
-        keeping = KeepOptions(sidecar=True, mark=stored.mark)
+        yield Status("apply", APPLY)
+        keeping = KeepOptions(sidecar=True, mark=stored.bake_id)
         finished = finish(
             context,
             stored.settings,

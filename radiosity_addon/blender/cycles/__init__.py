@@ -1,4 +1,4 @@
-"""What Cycles evaluates for us: textures, lamps with nodes, worlds.
+"""Evaluation by Cycles: textures, lamps with nodes, worlds.
 
 In scenes of our own that are removed again.
 """

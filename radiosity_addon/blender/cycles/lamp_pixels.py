@@ -10,14 +10,14 @@ from ...numerics import brdf_of_reflectance, intensity_of_flux
 from .world_pixels import look_around, only_for_now, panorama_scene
 
 SIZE = (16, 32)
-"""Rows and columns of the picture: directions in which the lamp is asked."""
+"""Rows and columns of the picture: directions in which the lamp is evaluated."""
 
 _SUBDIVISIONS = 5
 _REFLECTANCE = 0.5
 
 
 def lamp_factor(lamp: bpy.types.Light) -> tuple[np.ndarray, float]:
-    """Return what a lamp's nodes multiply its light with, and by how much that varies with direction.
+    """Return the factor of a lamp's nodes on its light, and its variation with direction.
 
     lamp: With a node tree, not evaluated. Inputs of its nodes that depend on its shape or position are lost.
     Returns factor (3,): The mean over directions.

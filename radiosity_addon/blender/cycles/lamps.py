@@ -22,14 +22,14 @@ _SAME_SCALE = 1e-4  # relative difference of axes below which a scale counts as 
 _EVEN = 0.02  # relative variation with direction below which a lamp's nodes count as constant
 
 ALL_BOUNCES = 1024
-"""A lamp's own limit in Cycles, unless it is set."""
+"""Cycles' default for a lamp's limit of bounces."""
 
 LampFactors = dict[str, tuple[np.ndarray, float]]
 """The factor of each lamp's nodes (see `lamp_factor`), by its full name."""
 
 
 def lamp_factors() -> Generator[float, None, LampFactors]:
-    """Have Cycles evaluate the nodes of all lamps whose light is not a plain constant, one a step.
+    """Let Cycles evaluate the nodes of all lamps whose light is not constant, one per step.
 
     Before the scene is evaluated: rendering would not leave its objects alive.
     """
@@ -97,10 +97,10 @@ def _strength(name: str, data: bpy.types.Light, factors: LampFactors) -> tuple[n
     mean, variation = measured
     notes = []
     if _asks_for_distance(data.node_tree):
-        message = "its nodes change its light with distance; what they make of it at 1 m is used"
+        message = "its nodes change its light with distance; their result at 1 m is used"
         notes.append(BakeWarning(name, f"lamp '{name}': {message}"))
     if variation > _EVEN:
-        message = "its nodes shine unevenly; their mean over all directions is used"
+        message = "its nodes depend on direction; their mean over all directions is used"
         notes.append(BakeWarning(name, f"lamp '{name}': {message}"))
     return strength * mean, notes
 
@@ -185,7 +185,7 @@ def _backward(matrix: np.ndarray) -> np.ndarray:
 
 
 def _sphere_area(data: bpy.types.Light) -> float:
-    """Return what an unnormalized point or spot lamp's power is multiplied by (measured)."""
+    """Return the factor on an unnormalized point or spot lamp's power (measured)."""
     if getattr(data, "normalize", True):
         return 1.0
     return sphere_area(data.shadow_soft_size)

@@ -1,4 +1,4 @@
-"""A scene for the time of a few bakes, in which Cycles evaluates materials.
+"""A temporary scene in which Cycles evaluates materials.
 
 One mesh in it holds triangles of many objects, and copies of their materials glow with what is
 asked for: a bake of emission at one sample is exact. Nothing that was in the file is touched,
@@ -68,7 +68,7 @@ def drawn_surfaces(
 
 
 class SurfaceBake:
-    """A scene of one mesh and copies of materials, for the time of a bake.
+    """A temporary scene of one mesh and copies of materials.
 
     materials mapping of int to MaterialSource or None: Those to evaluate, by their surface.
     inputs: Inputs of their nodes.
@@ -136,7 +136,7 @@ class SurfaceBake:
         return pixels.reshape(height, width, 4)[..., :3]
 
     def close(self) -> None:
-        """Leave the file as it was."""
+        """Remove everything from the file."""
         remove_datablocks(self._made)
         self._made.clear()
 
@@ -147,7 +147,7 @@ def attribute_names(inputs: Sequence[str]) -> dict[str, str]:
 
 
 def bake_emission() -> set[str]:
-    """Have Cycles write what the active object emits into its materials' active images."""
+    """Let Cycles bake the active object's emission into its materials' active images."""
     return bpy.ops.object.bake(
         type="EMIT",
         margin=0,

@@ -19,10 +19,10 @@ from .surface_bake import DrawnSurfaces, attribute_names, drawn_surfaces
 from .surface_rewiring import CHANNELS, RewiredMaterial
 
 MOMENT = 0.04
-"""Seconds of rewiring materials in a step, if that is enough for one."""
+"""Maximum seconds of rewiring materials per step, if one material takes less."""
 
 MAX_NODES = 64
-"""Nodes of a batch's materials, if that is enough for one; to make 64 takes about 20 ms."""
+"""Maximum nodes of a batch's materials, if one material has fewer; making 64 takes about 20 ms."""
 
 MAX_TEXELS = 1024 * 1024
 """Texels of a batch; Cycles takes 0.3–0.9 s for them."""
@@ -45,7 +45,7 @@ class MaterialFacts:
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Some triangles, n of them.
+    """A batch of n triangles.
 
     tiles: In the batch's own image.
     row, column (m,) int64: Where each of `tiles.texels()` is in the image of all.
@@ -65,7 +65,7 @@ class Batch:
 def material_facts(
     materials: Mapping[int, MaterialSource | None], inputs: Sequence[str]
 ) -> Generator[float, None, dict[int, MaterialFacts]]:
-    """Rewire each material for a moment, as many a step as fit into one.
+    """Rewire each material temporarily, several per step.
 
     materials mapping of int to MaterialSource or None: By their surface.
     inputs: Inputs of their nodes.

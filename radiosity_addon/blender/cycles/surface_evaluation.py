@@ -66,7 +66,7 @@ def evaluate_surfaces(
         one.opacity < 1.0 or (row in facts and "passed" in facts[row].varying)
         for row, one in enumerate(surfaces)
     ]
-    # Where no material varies in a channel, what was read of them holds.
+    # Where no material varies in a channel, the constants apply.
     varying = [channel for channel in CHANNELS if any(channel in each.varying for each in facts.values())]
     yield 0.1
 

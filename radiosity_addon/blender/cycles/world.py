@@ -138,5 +138,4 @@ def _inside(bounds: np.ndarray, window: Bounds) -> np.ndarray:
     latitude = 0.5 * (bounds[:, 0] + bounds[:, 1])
     azimuth = 0.5 * (bounds[:, 2] + bounds[:, 3])
     turned = np.mod(azimuth - window[2], 2.0 * np.pi)
-    inside: np.ndarray = (latitude > window[0]) & (latitude < window[1]) & (turned < window[3] - window[2])
-    return inside
+    return (latitude > window[0]) & (latitude < window[1]) & (turned < window[3] - window[2])

@@ -1,4 +1,4 @@
-"""Blender's datablocks: what a bake made or changed, and reading meshes and images.
+"""Blender's datablocks: the record of a bake's changes, and reading meshes and images.
 
 Knows nothing of bakes in progress.
 """

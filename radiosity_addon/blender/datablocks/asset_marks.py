@@ -1,4 +1,4 @@
-"""Fake users and asset marks: what Blender does not copy with a datablock."""
+"""Fake users and asset marks, which Blender does not copy with a datablock."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a bake changed, remembered in the file so that Restore can take it off again.
+"""The record of a bake's changes, stored in the file for Restore.
 
 Everything a bake makes carries a marker. What is needed to bring an object back hangs on what the bake put on
 it, so that it is copied along with it and also holds for library overrides:
@@ -20,13 +20,13 @@ MADE_MARKER = "radiosity_lightmaps"
 """Custom property of the datablocks that a bake made."""
 
 ORIGINAL = "radiosity_original"
-"""Custom property of a material copy or a stand-in mesh: the datablock of the user's that it shows."""
+"""Custom property of a material copy or a stand-in mesh: the user's datablock that it shows."""
 
 LAYER = "radiosity_layer"
 """Custom property of a mesh with a UV layer of ours; see `uv_layers.py`."""
 
 ASIDE = ".earlier "
-"""How names of what an earlier bake made begin while a new one is made."""
+"""Name prefix of an earlier bake's datablocks while a new bake is prepared."""
 
 _MADE_KINDS = ("objects", "collections", "meshes", "materials", "node_groups", "images")
 """The collections of `bpy.data` that a bake adds to."""
@@ -45,7 +45,7 @@ class ModifierRecord(bpy.types.PropertyGroup):
 
 
 class BakeRecord(bpy.types.PropertyGroup):
-    """How one object was before the bake."""
+    """The state of one object before the bake."""
 
     is_baked: bpy.props.BoolProperty(  # type: ignore[valid-type]
         name="Baked", description="The object shows a lightmap; Restore brings the original back"
@@ -63,13 +63,13 @@ class BakeRecord(bpy.types.PropertyGroup):
         type=ModifierRecord, description="Modifiers that were switched off: their result is in the baked copy"
     )
     fingerprint: bpy.props.StringProperty(  # type: ignore[valid-type]
-        description="What shape and reflectance were when the object was baked"
+        description="Shape and reflectance when the object was baked"
     )
     texels_per_metre: bpy.props.FloatProperty(  # type: ignore[valid-type]
-        description="How fine the lightmap is, for a texel scale of 1"
+        description="Texels per meter at a texel scale of 1"
     )
     light: bpy.props.StringProperty(  # type: ignore[valid-type]
-        description="What the light and the settings were when the object was baked"
+        description="Light and settings when the object was baked"
     )
     scene: bpy.props.StringProperty(  # type: ignore[valid-type]
         description="The scene whose bake the object shows"
@@ -86,14 +86,14 @@ class BakeRecord(bpy.types.PropertyGroup):
 
 
 def register() -> None:
-    """Register the record and hang it on every object."""
+    """Register the record and add it to every object."""
     bpy.utils.register_class(ModifierRecord)
     bpy.utils.register_class(BakeRecord)
     bpy.types.Object.radiosity_bake = bpy.props.PointerProperty(type=BakeRecord)
 
 
 def unregister() -> None:
-    """Take the record's type away; what a file remembers stays in the file."""
+    """Unregister the record's type; records stay in their files."""
     del bpy.types.Object.radiosity_bake
     bpy.utils.unregister_class(BakeRecord)
     bpy.utils.unregister_class(ModifierRecord)
@@ -121,7 +121,7 @@ def shows_lightmap(obj: bpy.types.Object) -> bool:
 
 
 def is_baked() -> bool:
-    """Whether the file shows a bake, so that Restore has something to do."""
+    """Whether the file shows a bake that Restore can remove."""
     return bool(recorded_objects()) or next(made_datablocks(), None) is not None
 
 
@@ -131,7 +131,7 @@ def mark_made(datablock: bpy.types.ID) -> None:
 
 
 def unmark_made(datablock: bpy.types.ID) -> None:
-    """Take the mark off again: Restore will leave the datablock alone."""
+    """Remove the mark, so that Restore leaves the datablock alone."""
     datablock.pop(MADE_MARKER, None)
 
 

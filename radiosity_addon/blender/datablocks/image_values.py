@@ -21,7 +21,7 @@ Means = dict[Wanted, "np.ndarray | None"]
 
 
 class UnknownMeanError(Exception):
-    """The mean of an image is wanted that is not among the known ones; it takes too long for the moment."""
+    """An image's mean is needed but not known yet; computing it now would take too long."""
 
     def __init__(self, wanted: Wanted) -> None:
         super().__init__(wanted[0])

@@ -1,4 +1,4 @@
-"""Keyframes and drivers, by the data paths of what they move."""
+"""Keyframes and drivers, by the data paths that they animate."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def path_of(socket: bpy.types.NodeSocket) -> str:
 
 
 def is_keyed(socket: bpy.types.NodeSocket) -> bool:
-    """Whether keyframes or a driver of its tree move a socket's value."""
+    """Whether keyframes or a driver of its tree animate a socket's value."""
     tree = socket.id_data
     if tree.animation_data is None:
         return False
@@ -22,7 +22,7 @@ def is_keyed(socket: bpy.types.NodeSocket) -> bool:
 
 
 def move_keys(tree: bpy.types.NodeTree, before: str, after: str) -> None:
-    """Have what moved one path of a tree move another."""
+    """Redirect the animation of one path of a tree to another."""
     if tree.animation_data is not None and before != after:
         for curve in list(curves(tree)):
             if curve.data_path == before:

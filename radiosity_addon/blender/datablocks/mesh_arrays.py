@@ -11,7 +11,7 @@ from ...numerics import double_area_vectors
 from ...scene import LIGHTMAP_UV_LAYER
 
 _INFINITE = 1e18
-"""What counts as infinite [m]: Blender stores an infinity it is given as the largest float,
+"""Positions beyond this are infinite [m]: Blender stores an infinity it is given as the largest float,
 and squares of lengths above this overflow single precision."""
 
 
@@ -42,7 +42,7 @@ class MeshArrays:
 
 @dataclass(frozen=True, eq=False)
 class RawMesh:
-    """What a mesh stores, copied as it is: to be worked on when the mesh may be gone.
+    """Raw data of a mesh, copied so that it can be processed when the mesh may be gone.
 
     positions (v, 3) float32.
     vertex (l,) int32: Of each loop.
@@ -76,7 +76,7 @@ def read_mesh(mesh: bpy.types.Mesh) -> MeshArrays | None:
 
 
 def copy_mesh_data(mesh: bpy.types.Mesh) -> RawMesh:
-    """Copy what is needed of a mesh, as fast as can be."""
+    """Copy the data needed from a mesh, quickly."""
     mesh.calc_loop_triangles()
     triangles, corners, polygons = len(mesh.loop_triangles), len(mesh.loops), len(mesh.polygons)
     layer = mesh.uv_layers.get(LIGHTMAP_UV_LAYER)
@@ -168,7 +168,7 @@ def world_from_object(mesh: MeshArrays, matrix: np.ndarray) -> tuple[np.ndarray,
 
 
 def normal_matrix(linear: np.ndarray) -> np.ndarray:
-    """Return the matrix that turns normals, but for their length, as `linear` (3, 3) turns positions.
+    """Return the matrix that transforms normals (not their length) as `linear` (3, 3) transforms positions.
 
     The cofactor matrix is det · inverse-transpose, and exists for flattening ones too.
     """

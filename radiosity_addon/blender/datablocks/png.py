@@ -39,7 +39,7 @@ def render_png(scene: bpy.types.Scene, path: Path, samples: int, seed: int = 0, 
 
 
 def check_whole(path: Path) -> None:
-    """See that a PNG file that Blender has written goes to its end: Blender does not notice a full disk.
+    """Check that a PNG file written by Blender is complete: Blender does not notice a full disk.
 
     Raises RuntimeError if it does not.
     """
@@ -51,7 +51,7 @@ def check_whole(path: Path) -> None:
 
 
 def _still_image(render: bpy.types.RenderSettings, path: Path) -> None:
-    """Have nothing but the picture itself written, as an 8-bit PNG."""
+    """Set up Blender to write only the picture, as an 8-bit PNG."""
     render.resolution_percentage = 100
     render.use_border = render.use_multiview = render.use_stamp = False
     render.use_compositing = render.use_sequencer = render.use_simplify = False

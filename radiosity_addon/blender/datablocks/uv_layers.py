@@ -1,4 +1,4 @@
-"""The UV layer `Lightmap` of a mesh: put on, and taken off so that the mesh is as before.
+"""Adding the UV layer `Lightmap` to a mesh, and removing it so that the mesh is as before.
 
 A mesh with the layer has a record of it in a custom property, which is copied along with the mesh. A layer
 of the user's that has this name gets another one meanwhile; where eight layers leave no room for that, its
@@ -18,10 +18,10 @@ from ...scene import LIGHTMAP_UV_LAYER
 from .bake_record import LAYER
 
 MAX_UV_LAYERS = 8
-"""Blender keeps no ninth."""
+"""Maximum number of UV layers in Blender."""
 
 KEPT_NAME = f"{LIGHTMAP_UV_LAYER} (original)"
-"""What a layer of the user's is called while ours has its name."""
+"""The name of the user's layer while ours has its name."""
 
 KEPT_VALUES = "radiosity_kept_uv"
 """The attribute that holds the user's layer where there is no room for two."""
@@ -29,7 +29,7 @@ KEPT_VALUES = "radiosity_kept_uv"
 
 @dataclass(frozen=True)
 class LayerRecord:
-    """What a bake did to the layers and slots of a mesh.
+    """A bake's changes to the layers and slots of a mesh.
 
     ours: The layer `Lightmap` is ours; False where the user's own was kept as it is.
     kept: The present name of the user's layer `Lightmap`; "" if there was none.
@@ -56,7 +56,7 @@ def layer_record(mesh: bpy.types.Mesh) -> LayerRecord | None:
 
 
 def set_record(mesh: bpy.types.Mesh, record: LayerRecord) -> None:
-    """Have the mesh remember what was done to it."""
+    """Store the record on the mesh."""
     mesh[LAYER] = json.dumps(vars(record))
 
 
@@ -79,7 +79,7 @@ def check_room(mesh: bpy.types.Mesh, object_name: str) -> None:
 
 
 def put_layer_on(mesh: bpy.types.Mesh, loops: np.ndarray, uv: np.ndarray, object_name: str) -> None:
-    """Put the layer `Lightmap` on, and remember what was there; which layers are active stays.
+    """Add the layer `Lightmap`, and record the previous state; active layers do not change.
 
     mesh: `check_room` has passed it.
     loops (n, 3) int32: The mesh corner of each triangle corner.
@@ -94,7 +94,7 @@ def put_layer_on(mesh: bpy.types.Mesh, loops: np.ndarray, uv: np.ndarray, object
     coordinates[corners] = wanted
     take_layer_off(mesh)
     if LIGHTMAP_UV_LAYER in mesh.uv_layers:
-        # Kept coordinates are the user's own layer: there is nothing to put on.
+        # Kept coordinates are the user's own layer: nothing to add.
         same = np.array_equal(_values(mesh, LIGHTMAP_UV_LAYER)[corners], wanted)
         if same:
             set_record(mesh, LayerRecord(ours=False))
@@ -111,14 +111,14 @@ def layer_values(mesh: bpy.types.Mesh) -> np.ndarray | None:
 
 
 def put_back_layer(mesh: bpy.types.Mesh, record: LayerRecord, values: np.ndarray | None) -> None:
-    """Put on again what `layer_values` and `layer_record` returned before it was taken off."""
+    """Restore the results of `layer_values` and `layer_record` from before the layer was removed."""
     if values is not None and len(values) == len(mesh.loops):
         record = replace(record, kept=_put_on(mesh, values).kept)
     set_record(mesh, record)
 
 
 def take_layer_off(mesh: bpy.types.Mesh) -> None:
-    """Take our layer off; the user's own `Lightmap` gets its name, place and values back."""
+    """Remove our layer; the user's own `Lightmap` gets its name, position and values back."""
     record = layer_record(mesh)
     if record is None:
         return
@@ -140,7 +140,7 @@ def take_layer_off(mesh: bpy.types.Mesh) -> None:
 
 
 def _put_on(mesh: bpy.types.Mesh, coordinates: np.ndarray) -> LayerRecord:
-    """Put the layer on; returns what is to be remembered."""
+    """Add the layer; return its record."""
     layers = mesh.uv_layers
     kept = ""
     active, rendered = _roles(mesh)

@@ -182,7 +182,7 @@ def relative_path(path: Path) -> str:
 
 
 def image_scale(image: bpy.types.Image) -> float:
-    """What a texel of the image must be multiplied by to get the quantity."""
+    """The factor from a texel of the image to the quantity."""
     return float(image.get(SCALE_PROPERTY, 1.0))
 
 

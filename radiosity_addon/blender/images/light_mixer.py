@@ -33,7 +33,7 @@ WHITE = (1.0, 1.0, 1.0, 1.0)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Sliders:
-    """What is set of one light group."""
+    """The sliders of one light group."""
 
     name: str
     color: bpy.types.NodeSocket
@@ -50,7 +50,7 @@ def _all_mixers() -> list[bpy.types.NodeTree]:
 
 
 def new_mixer(names: Sequence[str], scales: Sequence[float]) -> bpy.types.NodeTree:
-    """Make the mixer of some groups; one that was set aside lends the sliders they have in common.
+    """Make the mixer of groups; common sliders are copied from one that was set aside.
 
     scales: What the groups' texels must be multiplied by to get the quantity.
     """
@@ -107,7 +107,7 @@ def _wire(
     tree.interface.new_socket(LIGHTMAP, in_out="OUTPUT", socket_type="NodeSocketColor")
     for name in names:
         factor = tree.interface.new_socket(name, in_out="OUTPUT", socket_type="NodeSocketColor")
-        factor.description = "What light of this group is multiplied with"
+        factor.description = "Factor for light of this group"
     given, result = nodes.new("NodeGroupInput"), nodes.new("NodeGroupOutput")
     given.location, result.location = (-250, 0), (700, 0)
     kept = {node[GROUP]: node for node in nodes if node.get(GROUP) is not None}
@@ -141,7 +141,7 @@ def _new_group_node(tree: bpy.types.NodeTree, name: str) -> bpy.types.Node:
 
 
 def _set_tree(node: bpy.types.Node, sliders: bpy.types.NodeTree) -> None:
-    """Have a node show the sliders, set as they were."""
+    """Make a node show the sliders with their earlier values."""
     old = node.inputs
     color, strength = (tuple(old[COLOR].default_value), old[STRENGTH].default_value) if old else (WHITE, 1.0)
     node.node_tree = sliders
@@ -169,7 +169,7 @@ def _sliders_tree() -> bpy.types.NodeTree:
     strength.default_value, strength.min_value, strength.max_value = 1.0, 0.0, 1000.0
     texel = declare(TEXEL, "NodeSocketColor", "The texel of this group's lightmap")
     texel.default_value, texel.hide_value = (0.0, 0.0, 0.0, 1.0), True
-    scale = declare(SCALE, "NodeSocketFloat", "What a texel is multiplied with to get the quantity")
+    scale = declare(SCALE, "NodeSocketFloat", "Factor from a texel to the quantity")
     scale.default_value, scale.hide_value = 1.0, True
     for name in (FACTOR, LIGHT):
         tree.interface.new_socket(name, in_out="OUTPUT", socket_type="NodeSocketColor")

@@ -13,9 +13,9 @@ import bpy
 
 from ...bake import BakeDigests, KeepOptions, timed
 from ...bake.relight import KeptBake
-from ...bake.result import BakeReport, BakeResult, Progress
+from ...bake.result import BakeReport, BakeResult
 from ...bake.sidecar import sidecar_entry
-from ...base import BakeWarning
+from ...base import BakeWarning, Status, staged
 from ...files import KEPT, PLAIN_NAMES, PREVIEW_NAME
 from ...options import BakeSettings
 from ..apply.apply import apply_steps
@@ -34,7 +34,7 @@ from ..scene_records.export_sources import Export
 from ..session import kept_details, last_bake
 from .preview import SAMPLES, render_preview
 
-BakeJob = Generator[Progress, None, BakeReport]
+BakeJob = Generator[Status, None, BakeReport]
 Shown = tuple[list[bpy.types.Image], GroupImages, tuple[BakeWarning, ...]]
 
 APPLYING = {False: (0.98, 1.0), True: (0.85, 0.89)}
@@ -128,7 +128,7 @@ def finish(
         with timed(seconds, "apply"):
             result = replace(result, warnings=(*earlier.warnings, *result.warnings))
             showing = _show(context, settings, export, result, output, keeping, earlier)
-            images, groups, warnings = yield from _told(showing, *APPLYING[copies is not None])
+            images, groups, warnings = yield from staged(showing, "apply", *APPLYING[copies is not None])
             result = replace(result, warnings=(*warnings, *result.warnings))
         # A copy remembers its bake too; the time that is left to do is not in its figures.
         report = _report(result, images, groups, settings, seconds)
@@ -142,16 +142,16 @@ def finish(
         elif output is not None and copies is not None:
             undo.pop_all().close()  # the copy is to hold nothing of the earlier bake
             undo.enter_context(_restored_on_failure(context))
-            yield Progress("save", APPLYING[True][1])
+            yield Status("save", APPLYING[True][1])
             with timed(seconds, "save"):
                 save_copy(output)
             if copies.samples is not None:
-                yield Progress("preview", PREVIEW)
+                yield Status("preview", PREVIEW)
                 with timed(seconds, "preview"):
                     render_preview(context, output.staging / PREVIEW_NAME, settings, copies.samples)
             report = _report(result, images, groups, settings, seconds)
             report = output.write_report(_with_sidecar(report, output, keeping))
-            yield Progress("write", 1.0)
+            yield Status("write", 1.0)
             output.publish()
     if keeping is not None and kept is not None:
         kept_bakes.put(scene, keeping.mark, kept)
@@ -221,19 +221,6 @@ def _show(
         remove_datablocks([*images, *each_image(groups)])
         raise
     return images, groups, behind
-
-
-def _told(steps: Generator[float, None, Shown], begin: float, end: float) -> Generator[Progress, None, Shown]:
-    """Report steps of showing the lightmaps as progress between two fractions of the whole."""
-    try:
-        while True:
-            try:
-                fraction = next(steps)
-            except StopIteration as done:
-                return done.value
-            yield Progress("apply", begin + (end - begin) * fraction)
-    finally:
-        steps.close()
 
 
 def _report(

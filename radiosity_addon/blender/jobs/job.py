@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 
 import bpy
 
-from ...bake import BakePlan, KeepOptions, bake_steps, pages_of, plan_bake, refuse_too_large, timed
+from ...bake import BakePlan, KeepOptions, pages_of, plan_bake, refuse_too_large, run_pipeline, timed
 from ...bake.relight import KeptBake
-from ...bake.result import BakeResult, Progress
-from ...base import BakeWarning, NothingToDoError
+from ...bake.result import BakeResult
+from ...base import BakeWarning, NothingToDoError, Progress, Status, staged
 from ...files import BLEND_NAME, PREVIEW_NAME
 from ...numerics import Array
 from ...options import BakeSettings
@@ -22,7 +23,7 @@ from ..apply.shown_bake import shown_bake
 from ..files.output import OutputFolder
 from ..images.images import possible_names
 from ..relight import lightmap_versions
-from ..scene_export.export import export_steps, exporting
+from ..scene_export.export import export_steps
 from ..scene_records.export_sources import Export
 from ..session.background import in_thread
 from .finish import APPLYING, BakeJob, Copies, Scope, finish
@@ -82,7 +83,7 @@ def run_bake(
 
     Yields
     ------
-    progress : Progress
+    status : Status
         The stage that begins or goes on. A picture holds what the viewports show as surfaces.
 
     Returns
@@ -102,18 +103,18 @@ def run_bake(
         if output is not None:
             # First: a folder that cannot be written, or holds files of others, is no news for after the work.
             stack.enter_context(output)
-        yield Progress("export", 0.0)
+        yield Status("export", 0.0)
         if output is not None:
             preview = (PREVIEW_NAME,) if with_preview else ()
             beside = (BLEND_NAME, *preview) if with_copy else ()
             sidecars = (output.names.sidecar,) if keeping and keeping.sidecar else ()
             for _ in output.expecting((*beside, *sidecars)):
-                yield Progress("export", 0.0)
+                yield Status("export", 0.0)
         originals = Originals(context)
         with timed(seconds, "export"):
             steps = export_steps(context, settings, keeping is not None, in_background, originals)
-            export = yield from exporting(steps)
-            yield Progress("export", 0.0)
+            export = yield from staged(steps, "export", 0.0, 0.0)
+            yield Status("export", 0.0)
             with originals():
                 context.view_layer.update()
                 check_targets(export)
@@ -127,14 +128,15 @@ def run_bake(
             shown = files_shown_by(scope.keep)
             lightmaps = possible_names(output.names, plan.settings, plan.bake_scene, output.path, shown)
             for _ in output.expecting(lightmaps):
-                yield Progress("export", SOLVE)
+                yield Status("export", SOLVE)
         copies = Copies(SAMPLES if with_preview else None) if with_copy and output is not None else None
         sidecar = output.staging / output.names.sidecar if output and keeping and keeping.sidecar else None
         solved, _ = APPLYING[copies is not None]
-        result, kept = yield from _solve(bake_steps(plan, keeping, sidecar), seen, in_background, solved)
+        baking = partial(run_pipeline, plan, keeping, sidecar)
+        result, kept = yield from _solve(baking, seen, in_background, solved)
         result = replace(result, warnings=(*warnings, *result.warnings))
         seconds.update(result.seconds)
-        yield Progress("apply", solved)
+        yield Status("apply", solved)
         finished = finish(
             context,
             plan.settings,
@@ -178,25 +180,24 @@ def _plan(
 
 
 def _solve(
-    baking: Generator[Progress, None, tuple[BakeResult, KeptBake | None]],
+    baking: Callable[[Progress], tuple[BakeResult, KeptBake | None]],
     seen: Array,
     in_background: bool,
     end: float,
-) -> Generator[Progress, None, tuple[BakeResult, KeptBake | None]]:
+) -> Generator[Status, None, tuple[BakeResult, KeptBake | None]]:
     """Run the pipeline, its progress scaled to its share of the whole, its pictures to what is `seen`."""
-    steps = in_thread(baking) if in_background else baking
-    shown, only = Progress("unwrap", SOLVE), Seen(seen)
+    steps = in_thread(lambda progress: baking(progress.part(SOLVE, end)), in_background)
+    status, only = Status("unwrap", SOLVE), Seen(seen)
     try:
         while True:
             try:
-                progress = next(steps)
+                news = next(steps)
             except StopIteration as done:
                 return done.value
-            picture = texels = None
-            if progress is not None:
-                shown = Progress(progress.stage, SOLVE + (end - SOLVE) * progress.fraction)
-                picture, texels = only.of_elements(progress.picture), only.of_texels(progress.texels)
             # Each picture comes once, however long the step after it takes.
-            yield replace(shown, picture=picture, texels=texels)
+            status = replace(status, picture=None)
+            if news is not None:
+                status = replace(news, picture=only.of(news.picture))
+            yield status
     finally:
         steps.close()

@@ -53,12 +53,10 @@ class Seen:
         self._triangles = triangles
         self._surfaces: tuple[TexelSurfaces, TexelSurfaces] | None = None
 
-    def of_elements(self, picture: Picture | None) -> Picture | None:
-        """Return the picture of the elements that are seen."""
-        return None if picture is None else picture.only(self._triangles[picture.triangle])
-
-    def of_texels(self, picture: TexelPicture | None) -> TexelPicture | None:
-        """Return the picture of the texels on surfaces that are seen."""
+    def of(self, picture: Picture | TexelPicture | None) -> Picture | TexelPicture | None:
+        """Return the picture of the elements, or of the texels on surfaces, that are seen."""
+        if isinstance(picture, Picture):
+            return picture.only(self._triangles[picture.triangle])
         if picture is None:
             return None
         if self._surfaces is None or self._surfaces[0] is not picture.surfaces:

@@ -43,17 +43,17 @@ class _LiveView:
         self._shader: Any = None
         self._handler = bpy.types.SpaceView3D.draw_handler_add(self._draw, (), "WINDOW", "POST_VIEW")
 
-    def show(self, picture: Picture) -> None:
-        """Draw this from now on."""
-        self._picture, self._batches = picture, {}
+    def show(self, picture: Picture | TexelPicture) -> None:
+        """Draw this from now on; texels in place of the elements below them."""
+        from ...bake.result import TexelPicture
+        from .live_picture import beside
 
-    def show_texels(self, picture: TexelPicture) -> None:
-        """Draw texels in place of the elements below them from now on."""
-        if self._picture is not None and self._texels is None:
-            from .live_picture import beside
-
-            self.show(beside(self._picture, picture.surfaces))
-        self._texels = picture
+        if isinstance(picture, TexelPicture):
+            if self._picture is not None and self._texels is None:
+                self.show(beside(self._picture, picture.surfaces))
+            self._texels = picture
+        else:
+            self._picture, self._batches = picture, {}
 
     def close(self) -> None:
         """Draw nothing any more."""
@@ -133,17 +133,10 @@ def begin(scene: bpy.types.Scene) -> None:
     bpy.app.handlers.load_pre.append(_end_with_the_file)
 
 
-def show(picture: Picture) -> None:
+def show(picture: Picture | TexelPicture) -> None:
     """Draw a picture in place of the one before, unless nothing shines in it yet."""
     if _view is not None and picture.radiosity.any():
         _view.show(picture)
-        _redraw()
-
-
-def show_texels(picture: TexelPicture) -> None:
-    """Draw texels as far as they are lit, in place of the elements on their surfaces."""
-    if _view is not None:
-        _view.show_texels(picture)
         _redraw()
 
 

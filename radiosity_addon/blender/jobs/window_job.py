@@ -8,6 +8,7 @@ from typing import Any
 import bpy
 
 from ...base import NothingToDoError, RadiosityError, RemainingTime
+from ..session import facts
 from ..session.redraw import redraw_sidebars
 from ..session.state import session
 from . import live_view
@@ -36,7 +37,7 @@ _NAVIGATION = {
 
 
 class WindowJob:
-    """A mixin of operators whose work is a generator of `Progress` that returns a report.
+    """A mixin of operators whose work is a generator of `Status` that returns a report.
 
     An operator fills in `_start`, which returns the generator, and `_succeeded`; closing the generator must
     leave everything as it was.
@@ -85,7 +86,7 @@ class WindowJob:
         if event.type == "ESC" and event.value == "PRESS":
             self._end(context)
             self._undone(context)
-            self.report({"INFO"}, "Cancelled; everything is as it was")
+            self.report({"INFO"}, "Canceled; nothing was changed")
             return {"CANCELLED"}
         if not event.type.startswith("TIMER"):
             return {"PASS_THROUGH"} if event.type in _NAVIGATION else {"RUNNING_MODAL"}
@@ -162,6 +163,7 @@ class WindowJob:
         in_window = self._timer is not None
         self._end(context)
         self._succeeded(context, in_window)
+        facts.refresh()
         return {"FINISHED"}
 
     def _fail(self, context: bpy.types.Context, error: RadiosityError) -> set[str]:

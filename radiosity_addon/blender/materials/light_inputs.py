@@ -25,9 +25,10 @@ _EMISSIVE = {
 
 @dataclass(frozen=True)
 class LightInputs:
-    """Where a light's color and strength are set."""
+    """Where a light's color and strength are set, and the datablock that holds them."""
 
     icon: str
+    block: bpy.types.ID
     color: Input = NOTHING
     strength: Input = NOTHING
 
@@ -53,7 +54,7 @@ def inputs_of(scene: bpy.types.Scene, name: str, emits: bool) -> LightInputs | N
     lamp = scene.objects.get(name)
     if lamp is not None and lamp.type == "LIGHT":
         data = lamp.data
-        return LightInputs(f"LIGHT_{data.type}", (data, "color"), (data, "energy"))
+        return LightInputs(f"LIGHT_{data.type}", data, (data, "color"), (data, "energy"))
     world = shown_world(scene, name)
     return None if world is None else _of_nodes(world, "WORLD")
 
@@ -67,15 +68,15 @@ def shown_world(scene: bpy.types.Scene, name: str) -> bpy.types.World | None:
 def _of_nodes(owner: Any, icon: str) -> LightInputs:
     """Return the inputs of the node that feeds an owner's surface, or the first one that emits."""
     if not uses_nodes(owner):
-        return LightInputs(icon, (owner, "color") if isinstance(owner, bpy.types.World) else NOTHING)
+        return LightInputs(icon, owner, (owner, "color") if isinstance(owner, bpy.types.World) else NOTHING)
     output = output_node(owner.node_tree)
     links = output.inputs["Surface"].links if output is not None else ()
     nodes = [link.from_node for link in links] + list(owner.node_tree.nodes)
     node = next((node for node in nodes if node.type in _EMISSIVE), None)
     if node is None:
-        return LightInputs(icon)
+        return LightInputs(icon, owner)
     color, strength = (_socket(node, name) for name in _EMISSIVE[node.type])
-    return LightInputs(icon, color, strength)
+    return LightInputs(icon, owner, color, strength)
 
 
 def _socket(node: bpy.types.Node, name: str) -> Input:

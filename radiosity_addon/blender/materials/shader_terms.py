@@ -42,7 +42,7 @@ DIFFUSE = (
 
 _IGNORED_WEIGHTS = (  # Principled sockets that should be 0, and what we do instead
     ("Transmission Weight", "transmission is ignored: the surface is baked opaque"),
-    ("Subsurface Weight", "subsurface scattering is ignored: the base colour is used"),
+    ("Subsurface Weight", "subsurface scattering is ignored: the base color is used"),
     ("Coat Weight", "the coat is ignored"),
     ("Sheen Weight", "the sheen is ignored"),
 )
@@ -172,7 +172,7 @@ class ShaderTerms(ShaderWalk[Place, Terms]):
             self._normal_map(node)
         reflected = self.color(color, place)
         if node.type != "BSDF_DIFFUSE":
-            self.warn(f"{node.bl_label} is baked as diffuse; its colour is used")
+            self.warn(f"{node.bl_label} is baked as diffuse; its color is used")
         return Terms(reflected, np.zeros(3), np.zeros(3))
 
     def _emission(self, node: bpy.types.Node, place: Place) -> Terms:

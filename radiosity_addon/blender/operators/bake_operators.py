@@ -12,19 +12,20 @@ from ..jobs import live_view
 from ..jobs.window_job import WindowJob
 from ..relight import kept_bakes
 from ..relight.relight_properties import keeps, relight_of
-from ..session import last_bake
+from ..session import facts, last_bake
 from ..session.redraw import redraw_sidebars
 from ..session.state import session
 from ..settings.preferences import output_folder
 from ..settings.properties import settings_of
 from .checks import look_first
+from .polls import Conditional, has_folder, has_scene, no_bake_runs
 
 if TYPE_CHECKING:
     from ...bake import KeepOptions
     from ...options import BakeSettings
 
 
-class RADIOSITY_OT_bake(WindowJob, bpy.types.Operator):
+class RADIOSITY_OT_bake(Conditional, WindowJob, bpy.types.Operator):
     """Bake the light of the scene into lightmaps and show them on the objects"""
 
     bl_idname = "radiosity.bake"
@@ -33,23 +34,14 @@ class RADIOSITY_OT_bake(WindowJob, bpy.types.Operator):
 
     _was_editing = False
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Offer the bake wherever there is a scene and no bake is running."""
-        if session.running.active:
-            cls.poll_message_set("A bake is running; press Esc to cancel it")
-            return False
-        if context.scene is None:
-            cls.poll_message_set("There is no scene")
-            return False
-        return True
+    conditions = (no_bake_runs, has_scene)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Start the bake, unless there is something to be looked at first."""
         try:
             in_window = not bpy.app.background and context.window is not None
             if in_window and look_first(context):
-                self.report({"INFO"}, "Look at what is odd before this scene is baked for the first time")
+                self.report({"INFO"}, "This scene has problems: see the list before its first bake")
                 bpy.ops.radiosity.check("INVOKE_DEFAULT")
                 return {"CANCELLED"}
         except RadiosityError as error:
@@ -88,8 +80,6 @@ class RADIOSITY_OT_bake(WindowJob, bpy.types.Operator):
     def _follow(self, progress: Any) -> None:
         if progress.picture is not None:
             live_view.show(progress.picture)
-        if progress.texels is not None:
-            live_view.show_texels(progress.texels)
 
     def _undone(self, context: bpy.types.Context) -> None:
         """Go on with the editing that the export had to leave."""
@@ -116,20 +106,12 @@ class RADIOSITY_OT_bake(WindowJob, bpy.types.Operator):
             self.report({"WARNING"}, f"and {len(warnings) - 3} more warnings, listed in the panel")
 
 
-class RADIOSITY_OT_restore(bpy.types.Operator):
+class RADIOSITY_OT_restore(Conditional, bpy.types.Operator):
     """Take the lightmaps off this scene: what you edited since the bake stays"""
 
     bl_idname = "radiosity.restore"
     bl_label = "Restore"
     bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        """Offer it unless a bake is running."""
-        if session.running.active:
-            cls.poll_message_set("A bake is running; press Esc to cancel it")
-            return False
-        return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Bring every baked object of the scene back."""
@@ -144,6 +126,7 @@ class RADIOSITY_OT_restore(bpy.types.Operator):
         last_bake.forget(context.scene)
         kept_bakes.drop(context.scene)
         redraw_sidebars()
+        facts.refresh()
         if not restored.count:
             self.report({"INFO"}, "Nothing to restore: no object of this scene shows a lightmap")
             return {"CANCELLED"}
@@ -153,20 +136,12 @@ class RADIOSITY_OT_restore(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class RADIOSITY_OT_add_cornell_box(bpy.types.Operator):
+class RADIOSITY_OT_add_cornell_box(Conditional, bpy.types.Operator):
     """Add the Cornell box, ready to bake, to this scene if it is empty, else in a scene of its own"""
 
     bl_idname = "radiosity.add_cornell_box"
     bl_label = "Add Cornell Box"
     bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        """Offer it unless a bake is running."""
-        if session.running.active:
-            cls.poll_message_set("A bake is running; press Esc to cancel it")
-            return False
-        return True
 
     def execute(self, _context: bpy.types.Context) -> set[str]:
         """Build the box, in this scene if it is empty, and show it."""
@@ -176,20 +151,13 @@ class RADIOSITY_OT_add_cornell_box(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class RADIOSITY_OT_open_folder(bpy.types.Operator):
+class RADIOSITY_OT_open_folder(Conditional, bpy.types.Operator):
     """Show the lightmaps of the last bake in the file browser"""
 
     bl_idname = "radiosity.open_folder"
     bl_label = "Open Folder"
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Offer it where the last bake wrote files."""
-        last = last_bake.read(context.scene)
-        if last is None or not last.folder:
-            cls.poll_message_set("The last bake wrote no files")
-            return False
-        return True
+    conditions = (has_folder,)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Open the folder, if it really is that of a bake of this scene."""
@@ -198,10 +166,10 @@ class RADIOSITY_OT_open_folder(bpy.types.Operator):
         last = last_bake.read(context.scene)
         folder = bpy.path.abspath(last.folder) if last is not None else ""
         if not Path(folder).is_dir():
-            self.report({"ERROR"}, f"The folder '{folder}' is not there any more")
+            self.report({"ERROR"}, f"The folder '{folder}' no longer exists")
             return {"CANCELLED"}
         if not own_reports(Path(folder), context.scene):
-            self.report({"ERROR"}, f"The folder '{folder}' holds no bake of this scene")
+            self.report({"ERROR"}, f"The folder '{folder}' contains no bake of this scene")
             return {"CANCELLED"}
         _open(folder)
         return {"FINISHED"}

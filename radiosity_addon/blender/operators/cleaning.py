@@ -18,6 +18,7 @@ from ..session import last_bake
 from ..session.redraw import redraw_sidebars
 from ..session.state import session
 from ..settings.preferences import output_folder
+from .polls import Conditional
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -110,20 +111,12 @@ def _is_remote(folder: Path) -> bool:
     return folder.drive.startswith("\\\\") and folder.drive != here
 
 
-class RADIOSITY_OT_clean(bpy.types.Operator):
+class RADIOSITY_OT_clean(Conditional, bpy.types.Operator):
     """Delete lightmap files that bakes of this file have written and that nothing in it shows any more"""
 
     bl_idname = "radiosity.clean"
     bl_label = "Clean Up Lightmaps"
     bl_options = {"REGISTER"}
-
-    @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        """Offer it unless a bake is running."""
-        if session.running.active:
-            cls.poll_message_set("A bake is running; press Esc to cancel it")
-            return False
-        return True
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Ask first: files do not come back by undo."""
@@ -147,26 +140,18 @@ class RADIOSITY_OT_clean(bpy.types.Operator):
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         if not count:
-            self.report({"INFO"}, "Nothing to clean: every lightmap of this file is shown")
+            self.report({"INFO"}, "Nothing to clean up: all lightmaps of this file are used")
             return {"CANCELLED"}
         self.report({"INFO"}, f"Deleted {count} lightmap files")
         return {"FINISHED"}
 
 
-class RADIOSITY_OT_recover(bpy.types.Operator):
+class RADIOSITY_OT_recover(Conditional, bpy.types.Operator):
     """Put the files of the last whole bake back: a bake was interrupted while it replaced them"""
 
     bl_idname = "radiosity.recover"
     bl_label = "Recover Lightmaps"
     bl_options = {"REGISTER"}
-
-    @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        """Offer it where a bake was interrupted, unless one is running."""
-        if session.running.active:
-            cls.poll_message_set("A bake is running; press Esc to cancel it")
-            return False
-        return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Put them back, and have the open file show them."""
@@ -186,7 +171,7 @@ class RADIOSITY_OT_recover(bpy.types.Operator):
         for image in bpy.data.images:
             if image.filepath and Path(bpy.path.abspath(image.filepath_raw)).parent.resolve() in done:
                 image.reload()
-        self.report({"INFO"}, "The lightmaps are those of the last whole bake again")
+        self.report({"INFO"}, "Recovered the lightmaps of the last complete bake")
         return {"FINISHED"}
 
 

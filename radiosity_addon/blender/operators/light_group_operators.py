@@ -4,24 +4,13 @@ from __future__ import annotations
 
 import bpy
 
-from ..images.light_mixer import WHITE, mixers, sliders_of
 from ..scene_records.light_membership import NAME, Membership, name_on
-from ..session.state import session
-from ..settings.light_group_properties import LONGEST_NAME, outdate
+from ..session import facts
+from ..settings.light_group_properties import LONGEST_NAME
+from .polls import Conditional, has_light_groups, has_selection, in_object_mode, no_bake_runs
 
 
-def _on_selection(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    """Poll of what needs selected objects, and no bake that is running."""
-    if session.running.active:
-        cls.poll_message_set("A bake is running; press Esc to cancel it")
-        return False
-    if not context.view_layer.objects.selected:
-        cls.poll_message_set("Select lamps or objects that emit light first")
-        return False
-    return True
-
-
-class RADIOSITY_OT_light_group_assign(bpy.types.Operator):
+class RADIOSITY_OT_light_group_assign(Conditional, bpy.types.Operator):
     """Put the selected lamps, emissive objects and instances into this light group"""
 
     bl_idname = "radiosity.light_group_assign"
@@ -35,10 +24,7 @@ class RADIOSITY_OT_light_group_assign(bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Offer it where objects are selected."""
-        return _on_selection(cls, context)
+    conditions = (no_bake_runs, has_selection)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         """Ask for the name where none is given."""
@@ -52,7 +38,7 @@ class RADIOSITY_OT_light_group_assign(bpy.types.Operator):
         if not name:
             self.report({"ERROR"}, "The light group needs a name")
             return {"CANCELLED"}
-        changed = _name_on_all(context, name)
+        changed = _set_on_selected(context, name)
         if changed is None:
             self.report({"ERROR"}, "Linked objects cannot be changed: make them local or library overrides")
             return {"CANCELLED"}
@@ -60,28 +46,25 @@ class RADIOSITY_OT_light_group_assign(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class RADIOSITY_OT_light_group_remove(bpy.types.Operator):
+class RADIOSITY_OT_light_group_remove(Conditional, bpy.types.Operator):
     """Take the light group's name off the selected objects; their material's or collection's then holds"""
 
     bl_idname = "radiosity.light_group_remove"
     bl_label = "Remove from Light Group"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Offer it where objects are selected."""
-        return _on_selection(cls, context)
+    conditions = (no_bake_runs, has_selection)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Unname it."""
-        changed = _name_on_all(context, "")
+        changed = _set_on_selected(context, "")
         if changed is None:
             self.report({"ERROR"}, "Linked objects cannot be changed: make them local or library overrides")
             return {"CANCELLED"}
         return {"FINISHED"}
 
 
-class RADIOSITY_OT_light_group_select(bpy.types.Operator):
+class RADIOSITY_OT_light_group_select(Conditional, bpy.types.Operator):
     """Select the lamps and objects of this light group, and those with a material that is in it"""
 
     bl_idname = "radiosity.light_group_select"
@@ -92,13 +75,7 @@ class RADIOSITY_OT_light_group_select(bpy.types.Operator):
         name="Light Group", description="The light group's name", maxlen=LONGEST_NAME
     )
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Offer it where objects can be selected."""
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Objects can only be selected in object mode")
-            return False
-        return True
+    conditions = (in_object_mode,)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Select them, and nothing else."""
@@ -111,40 +88,38 @@ class RADIOSITY_OT_light_group_select(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class RADIOSITY_OT_light_group_reset(bpy.types.Operator):
+class RADIOSITY_OT_light_group_reset(Conditional, bpy.types.Operator):
     """Set all light groups back to white and strength 1, the light as it was baked; keyframes stay"""
 
     bl_idname = "radiosity.light_group_reset"
     bl_label = "Reset Light Groups"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        """Offer it where something baked has sliders."""
-        if not mixers():
-            cls.poll_message_set("Nothing that is baked has light groups")
-            return False
-        return True
+    conditions = (has_light_groups,)
 
     def execute(self, _context: bpy.types.Context) -> set[str]:
         """Set every slider."""
+        from ..images.light_mixer import WHITE, mixers, sliders_of
+
         for tree in mixers():
             for sliders in sliders_of(tree):
                 sliders.color.default_value, sliders.strength.default_value = WHITE, 1.0
         return {"FINISHED"}
 
 
-def _name_on_all(context: bpy.types.Context, name: str) -> int | None:
-    """Name a group on the selected objects; None where one of them is another file's."""
+def _set_on_selected(context: bpy.types.Context, name: str) -> int | None:
+    """Put the selected objects into a group, or with "" into none; None if one of them is another file's."""
     objects = list(context.view_layer.objects.selected)
     if not all(obj.is_editable for obj in objects):
         return None
+    if name:
+        groups = context.view_layer.lightgroups
+        # Blender does not take every name as it is.
+        name = (groups.get(name) or groups.add(name=name)).name
     for obj in objects:
-        if name:
-            setattr(obj, NAME, name)
-        else:
-            obj.property_unset(NAME)
-    outdate()
+        obj.lightgroup = name
+        obj.property_unset(NAME)
+    facts.outdate()
     return len(objects)
 
 

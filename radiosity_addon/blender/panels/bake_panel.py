@@ -1,4 +1,4 @@
-"""The tab *Radiosity* in the 3D viewport's sidebar."""
+"""The tab *Radiosity* in the 3D viewport's sidebar: check, bake, look, relight, export."""
 
 from __future__ import annotations
 
@@ -6,19 +6,20 @@ from typing import Any
 
 import bpy
 
-from ...options import ADVANCED, MAIN, SOLVER
+from ...options import ADVANCED, LAST_BAKE, MAIN, SOLVER
 from ..jobs.progress_text import progress_text
+from ..operators.panel_facts import can_restore, has_meshes
+from ..operators.setting_operators import has_role
+from ..relight import kept_bakes
 from ..session import last_bake
 from ..session.state import session
-from ..settings.option_properties import AUTOMATIC
-from ..settings.preferences import folder_of, output_folder
+from ..settings.preferences import is_packed
 from ..settings.preset_menu import RADIOSITY_PT_presets
 from .check_panel import CheckSection
 from .light_group_panels import LightGroupSection
-from .object_panel import draw_overrides, has_role
-from .option_rows import draw_options, draw_preferred
+from .object_panel import draw_overrides
+from .option_rows import draw_options
 from .overlay_panel import OverlaySection
-from .relight_buttons import draw_relight_buttons
 from .relight_panel import RelightSection
 from .sections import Section, draw_sections
 from .wrapped_text import draw_text
@@ -36,7 +37,7 @@ class _Panel:
 
 
 class RADIOSITY_PT_progress(_Panel, bpy.types.Panel):
-    """How far the bake is that runs, in place of all buttons.
+    """Progress of the bake, in place of all buttons.
 
     A panel of its own: within one, Blender takes a progress bar under the mouse for the first label of what
     is drawn next, and shows that as a bar.
@@ -57,7 +58,7 @@ class RADIOSITY_PT_progress(_Panel, bpy.types.Panel):
 
 
 class RADIOSITY_PT_main(_Panel, bpy.types.Panel):
-    """Bake, Restore, the settings that matter, and below them sections that fold."""
+    """The buttons, the main settings, and sections that fold."""
 
     bl_idname = "RADIOSITY_PT_main"
 
@@ -71,46 +72,52 @@ class RADIOSITY_PT_main(_Panel, bpy.types.Panel):
         RADIOSITY_PT_presets.draw_panel_header(self.layout)
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Draw the buttons and settings."""
-        _draw_buttons(self.layout, context)
+        """Draw everything for the next bake, then everything about the last one."""
+        _draw_start(self.layout, context)
         _draw_settings(self.layout, context)
-        draw_sections(self.layout, SECTIONS, context)
+        draw_sections(self.layout, NEXT_BAKE, context)
+        _draw_result(self.layout, context)
+        draw_sections(self.layout, RESULT, context)
 
 
-def _draw_buttons(layout: Any, context: bpy.types.Context) -> None:
-    """Draw what can be done, and what should be known of the last bake."""
-    column = layout.column()
-    column.scale_y = 1.5
-    column.operator("radiosity.bake", text="Bake Radiosity", icon="LIGHT_AREA")
-    layout.operator("radiosity.restore", icon="LOOP_BACK")
+def _draw_start(layout: Any, context: bpy.types.Context) -> None:
+    """Draw Check and Bake."""
+    if not has_meshes(context):
+        layout.operator("radiosity.add_cornell_box", icon="CUBE")
+    row = layout.split(factor=0.32, align=True)
+    row.scale_y = 1.5
+    row.operator("radiosity.check", icon="VIEWZOOM")
+    row.operator("radiosity.bake", text="Bake Radiosity", icon="LIGHT_AREA")
     if session.interrupted:
         box = layout.box()
         draw_text(box, "A bake was interrupted while it replaced its files", "ERROR", context)
         box.operator("radiosity.recover", icon="RECOVER_LAST")
-    draw_relight_buttons(layout, context)
-    hint = unseen_hint(context)
-    if hint is not None:
-        draw_text(layout.box(), hint, "INFO", context)
+    draw_sections(layout, (CheckSection,), context)
 
 
 def _draw_settings(layout: Any, context: bpy.types.Context) -> None:
-    """Draw the settings that matter for the next bake."""
-    settings = context.scene.radiosity
-    layout.prop(settings, "scope", expand=True)
-    layout.prop(settings, "size_mode", expand=True)
-
+    """Draw the main settings of the next bake."""
     layout.use_property_split = True
     layout.use_property_decorate = False
     draw_options(layout, MAIN, context)
-    column = layout.column()
-    column.prop(settings, "output_folder")
-    if not settings.is_property_set("output_folder"):
-        draw_preferred(column, folder_of(context), settings.output_folder)
-    if output_folder(context) is None:
-        text = "The file is not saved: lightmaps will be packed into it"
-        draw_text(layout.box(), text, "INFO", context)
-    if not any(obj.type == "MESH" for obj in context.scene.objects):
-        layout.operator("radiosity.add_cornell_box", icon="CUBE")
+    if is_packed(context):
+        draw_text(layout.box(), "The file is not saved: lightmaps are packed into it", "INFO", context)
+
+
+def _draw_result(layout: Any, context: bpy.types.Context) -> None:
+    """Draw what can be done with the last bake, and anything wrong with it."""
+    if can_restore(context):
+        row = layout.row(align=True)
+        row.operator("radiosity.restore", icon="LOOP_BACK")
+        if kept_bakes.mark_of(context.scene):
+            row.operator("radiosity.relight", icon="OUTLINER_OB_LIGHT")
+            row.prop(context.window_manager, "radiosity_live", toggle=True, icon="REC")
+    for message in (session.live_message, session.versions.message):
+        if message:
+            draw_text(layout.box(), message, "ERROR", context)
+    hint = unseen_hint(context)
+    if hint is not None:
+        draw_text(layout.box(), hint, "INFO", context)
 
 
 WORKBENCH = "The Workbench render engine shows no lightmaps: choose EEVEE or Cycles"
@@ -137,16 +144,11 @@ class AdvancedSection(Section):
     def draw(cls, layout: Any, context: bpy.types.Context) -> None:
         """Draw the settings."""
         layout.use_property_split = True
-        settings = context.scene.radiosity
         draw_options(layout, ADVANCED, context)
-        column = layout.column(heading="Viewport")
-        column.prop(settings, "show_while_solving")
-        column.prop(settings, "show_result")
-        layout.operator("radiosity.clean", icon="BRUSH_DATA")
 
 
 class ObjectSection(Section):
-    """What the active object is there for."""
+    """Settings of the active object."""
 
     name = "radiosity_object"
     label = "Active Object"
@@ -165,21 +167,20 @@ class ObjectSection(Section):
 
 
 class SolverSection(Section):
-    """How the light's balance is solved."""
+    """The method and its settings."""
 
     name = "radiosity_solver"
     label = "Solver"
 
     @classmethod
     def draw(cls, layout: Any, context: bpy.types.Context) -> None:
-        """Draw the method, and of the settings those that apply to it."""
+        """Draw the method, and the settings that apply to it."""
         layout.use_property_split = True
         draw_options(layout, SOLVER, context)
-        layout.label(text=AUTOMATIC, icon="INFO")
 
 
 class LastBakeSection(Section):
-    """What the last bake measured."""
+    """Figures of the last bake."""
 
     name = "radiosity_last_bake"
     label = "Last Bake"
@@ -194,19 +195,17 @@ class LastBakeSection(Section):
     def draw(cls, layout: Any, context: bpy.types.Context) -> None:
         """Draw the figures."""
         last = last_bake.read(context.scene) or last_bake.LastBake()
+        draw_options(layout, LAST_BAKE, context)
         column = layout.column(align=True)
         for name, value in last.figures:
             split = column.split(factor=0.45)
             split.label(text=name)
             split.label(text=value, translate=False)
-        layout.prop(context.scene.radiosity, "lightmap_only")
-        if last.folder:
-            layout.operator("radiosity.open_folder", icon="FILE_FOLDER")
         draw_sections(layout, (WarningsSection,), context)
 
 
 class WarningsSection(Section):
-    """What the last bake did not understand, and what it used instead."""
+    """Warnings of the last bake."""
 
     name = "radiosity_warnings"
     label = "Warnings"
@@ -214,32 +213,38 @@ class WarningsSection(Section):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Show it only where there is something to say."""
+        """Show it only if there are any."""
         last = last_bake.read(context.scene)
         return last is not None and bool(last.warnings)
 
     @classmethod
     def draw(cls, layout: Any, context: bpy.types.Context) -> None:
-        """Draw the warnings, the first ones of many."""
+        """Draw the first warnings."""
         last = last_bake.read(context.scene) or last_bake.LastBake()
         for name, message in last.warnings[:SHOWN_WARNINGS]:
             draw_text(layout.box(), f"{name}: {message}", "ERROR", context)
         hidden = last.warning_count - len(last.warnings[:SHOWN_WARNINGS])
         if hidden > 0:
-            text = f"and {hidden} more, in the report"
-            layout.label(text=text, translate=False)
+            layout.label(text=f"and {hidden} more, in the report", translate=False)
 
 
-SECTIONS: tuple[type[Section], ...] = (
-    ObjectSection,
-    SolverSection,
-    AdvancedSection,
-    CheckSection,
-    LightGroupSection,
-    LastBakeSection,
-    RelightSection,
-    OverlaySection,
-)
+class ExportSection(Section):
+    """The files of bakes."""
+
+    name = "radiosity_export"
+    label = "Export"
+
+    @classmethod
+    def draw(cls, layout: Any, _context: bpy.types.Context) -> None:
+        """Draw what can be done with the files."""
+        layout.operator("radiosity.open_folder", icon="FILE_FOLDER")
+        layout.operator("radiosity.clean", icon="BRUSH_DATA")
+
+
+NEXT_BAKE: tuple[type[Section], ...] = (ObjectSection, LightGroupSection, SolverSection, AdvancedSection)
 """Below the main settings, in this order."""
+
+RESULT: tuple[type[Section], ...] = (LastBakeSection, OverlaySection, RelightSection, ExportSection)
+"""Below Restore and Relight, in this order."""
 
 CLASSES = (RADIOSITY_PT_progress, RADIOSITY_PT_main)

@@ -1,4 +1,4 @@
-"""*Check*: what a bake will be and what is odd, in a pop-up and in the panel, before time is spent."""
+"""*Check*: an estimate of the bake and problems of the scene, in a dialog and in the panel."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import bpy
 
 from ...base import RadiosityError
 from ..operators.checks import figures, last_check, look
-from ..session.state import session
+from ..operators.polls import Conditional, has_scene, no_bake_runs
 from .sections import Section
 from .wrapped_text import draw_text
 
@@ -19,8 +19,8 @@ POPUP_WIDTH = 460
 _ICONS = {"ERROR": "CANCEL", "WARNING": "ERROR", "INFO": "INFO"}
 
 
-class RADIOSITY_OT_check(bpy.types.Operator):
-    """Show what will be baked, how large the lightmaps get and what is odd, before time is spent on a bake"""
+class RADIOSITY_OT_check(Conditional, bpy.types.Operator):
+    """Show what would be baked, the size of the lightmaps and problems of the scene, without baking"""
 
     bl_idname = "radiosity.check"
     bl_label = "Check"
@@ -28,16 +28,7 @@ class RADIOSITY_OT_check(bpy.types.Operator):
 
     _shown = False  # in a dialog, whose button bakes
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Offer it unless a bake is running."""
-        if session.running.active:
-            cls.poll_message_set("A bake is running; press Esc to cancel it")
-            return False
-        if context.scene is None:
-            cls.poll_message_set("There is no scene")
-            return False
-        return True
+    conditions = (no_bake_runs, has_scene)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Report what is found in the scene; from the dialog, bake it."""
@@ -78,18 +69,27 @@ class RADIOSITY_OT_check(bpy.types.Operator):
 
 
 class CheckSection(Section):
-    """What the next bake will be."""
+    """The result of the last check."""
 
     name = "radiosity_check"
-    label = "Before Baking"
+    label = "Check"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Show it once the scene was checked."""
+        return last_check(context.scene) is not None
+
+    @classmethod
+    def draw_header(cls, header: Any, context: bpy.types.Context) -> None:
+        """Draw how many problems there are."""
+        count = sum(finding.level != "INFO" for finding in last_check(context.scene).findings)
+        problems = f"{count or 'No'} problem{'' if count == 1 else 's'}"
+        header.label(text=f"Checked: {problems}", icon="ERROR" if count else "CHECKMARK", translate=False)
 
     @classmethod
     def draw(cls, layout: Any, context: bpy.types.Context) -> None:
-        """Draw the button, and what was found last."""
-        layout.operator("radiosity.check", icon="VIEWZOOM")
-        found = last_check(context.scene)
-        if found is not None:
-            draw_inspection(layout, found, context, None)
+        """Draw figures and findings."""
+        draw_inspection(layout, last_check(context.scene), context, None)
 
 
 def draw_inspection(layout: Any, found: Any, context: bpy.types.Context, width: float | None) -> None:
@@ -100,7 +100,7 @@ def draw_inspection(layout: Any, found: Any, context: bpy.types.Context, width: 
         split.label(text=name, translate=False)
         split.label(text=value, translate=False)
     if not found.findings:
-        layout.label(text="Nothing is odd", icon="CHECKMARK")
+        layout.label(text="No problems found", icon="CHECKMARK")
     for finding in found.findings[:SHOWN_FINDINGS]:
         draw_text(layout.box(), finding.message, _ICONS[finding.level], context, width)
     hidden = len(found.findings) - SHOWN_FINDINGS

@@ -1,4 +1,4 @@
-"""Light groups in the sidebar, and their names in the properties of what has them."""
+"""Light groups in the sidebar, and the fields of materials and collections in the Properties editor."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import Any
 import bpy
 
 from ...options import GROUPS
-from ..images.light_mixer import Sliders, mixers, sliders_of
+from ..operators.panel_facts import light_mixers, listed_groups
 from ..scene_records.light_membership import NAME
-from ..scene_records.object_roles import BAKEABLE_TYPES
-from ..settings.light_group_properties import ListedGroup, listed_groups
+from ..settings.light_group_properties import ListedGroup
 from .option_rows import draw_options
+from .relight_panel import draw_light
 from .sections import Section
 
 _COUNTS = (
@@ -39,24 +39,26 @@ class LightGroupSection(Section):
     def draw(cls, layout: Any, context: bpy.types.Context) -> None:
         """Draw the list, and below it the sliders."""
         draw_options(layout, GROUPS, context, in_header="light_groups")
-        groups = listed_groups(context.scene)
+        groups = listed_groups(context)
         column = layout.column(align=True)
         for group in groups:
             _draw_group(column.row(align=True), group)
         if not groups:
-            layout.label(text="No light group yet: select lamps", icon="INFO")
+            layout.label(text="No light groups yet: select lamps", icon="INFO")
         row = layout.row(align=True)
         row.operator("radiosity.light_group_assign", text="New Group", icon="ADD").group = ""
         row.operator("radiosity.light_group_remove", text="Ungroup", icon="REMOVE")
-        if context.scene.world is not None:
-            layout.prop(context.scene.world, NAME, text="World")
-        shown = mixers()
-        for tree in shown:
+        layout.use_property_split = True
+        _draw_membership(layout, context, context.object, "Active Object")
+        _draw_membership(layout, context, context.scene.world, "World")
+        layout.use_property_split = False
+        shown = light_mixers(context)
+        for name, rows in shown:
             box = layout.box()
             if len(shown) > 1:
-                box.label(text=tree.name, icon="NODETREE")
-            for sliders in sliders_of(tree):
-                _draw_sliders(box, sliders)
+                box.label(text=name, icon="NODETREE", translate=False)
+            for light in rows:
+                draw_light(box, light)
         if shown:
             layout.operator("radiosity.light_group_reset", text="Reset", icon="LOOP_BACK")
         elif groups and not context.scene.radiosity.use_light_groups:
@@ -66,56 +68,25 @@ class LightGroupSection(Section):
 
 
 class _NamePanel:
-    """A light group's name, at home with what it is on."""
+    """The group of what its editor shows, which Blender has no field for."""
 
     bl_label = "Radiosity Light Group"
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
     bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def owner(cls, context: bpy.types.Context) -> bpy.types.ID | None:
-        """Return what the name is on."""
-        raise NotImplementedError
+    bl_context = ""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Show it where there is something to name."""
-        return cls.owner(context) is not None
+        return getattr(context, cls.bl_context, None) is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the name."""
         layout: Any = self.layout  # type: ignore[attr-defined]
         layout.use_property_split = True
         layout.use_property_decorate = False
-        layout.prop(self.owner(context), NAME)
-
-
-class RADIOSITY_PT_light_group_object(_NamePanel, bpy.types.Panel):
-    """The group of an object: a lamp, what may emit, or an instance of a collection."""
-
-    bl_idname = "RADIOSITY_PT_light_group_object"
-    bl_context = "object"
-
-    @classmethod
-    def owner(cls, context: bpy.types.Context) -> bpy.types.ID | None:
-        """Return the object shown, if it can shine."""
-        obj = context.object
-        shines = obj is not None and (obj.type in (*BAKEABLE_TYPES, "LIGHT") or obj.instance_type != "NONE")
-        return obj if shines else None
-
-
-class RADIOSITY_PT_light_group_lamp(_NamePanel, bpy.types.Panel):
-    """The same of a lamp, where its power is."""
-
-    bl_idname = "RADIOSITY_PT_light_group_lamp"
-    bl_context = "data"
-
-    @classmethod
-    def owner(cls, context: bpy.types.Context) -> bpy.types.ID | None:
-        """Return the lamp object; the name is on the object, for lamps share their data."""
-        obj = context.object
-        return obj if obj is not None and obj.type == "LIGHT" else None
+        layout.prop(getattr(context, self.bl_context), NAME)
 
 
 class RADIOSITY_PT_light_group_material(_NamePanel, bpy.types.Panel):
@@ -124,23 +95,6 @@ class RADIOSITY_PT_light_group_material(_NamePanel, bpy.types.Panel):
     bl_idname = "RADIOSITY_PT_light_group_material"
     bl_context = "material"
 
-    @classmethod
-    def owner(cls, context: bpy.types.Context) -> bpy.types.ID | None:
-        """Return the material shown."""
-        return getattr(context, "material", None)
-
-
-class RADIOSITY_PT_light_group_world(_NamePanel, bpy.types.Panel):
-    """The group of a world's light."""
-
-    bl_idname = "RADIOSITY_PT_light_group_world"
-    bl_context = "world"
-
-    @classmethod
-    def owner(cls, context: bpy.types.Context) -> bpy.types.ID | None:
-        """Return the world shown."""
-        return getattr(context, "world", None)
-
 
 class RADIOSITY_PT_light_group_collection(_NamePanel, bpy.types.Panel):
     """The group of all lamps and emissive objects in a collection."""
@@ -148,10 +102,16 @@ class RADIOSITY_PT_light_group_collection(_NamePanel, bpy.types.Panel):
     bl_idname = "RADIOSITY_PT_light_group_collection"
     bl_context = "collection"
 
-    @classmethod
-    def owner(cls, context: bpy.types.Context) -> bpy.types.ID | None:
-        """Return the collection shown."""
-        return getattr(context, "collection", None)
+
+def _draw_membership(layout: Any, context: bpy.types.Context, owner: Any, label: str) -> None:
+    """Draw Blender's field of an object or a world, which its own editors show with Cycles alone."""
+    if owner is None:
+        return
+    layer = context.view_layer
+    row = layout.row(align=True)
+    row.prop_search(owner, "lightgroup", layer, "lightgroups", text=label, results_are_suggestions=True)
+    if owner.lightgroup and owner.lightgroup not in layer.lightgroups:
+        row.operator("scene.view_layer_add_lightgroup", icon="ADD", text="").name = owner.lightgroup
 
 
 def _draw_group(row: Any, group: ListedGroup) -> None:
@@ -165,18 +125,7 @@ def _draw_group(row: Any, group: ListedGroup) -> None:
     row.operator("radiosity.light_group_assign", text="", icon="IMPORT").group = group.name
 
 
-def _draw_sliders(layout: Any, sliders: Sliders) -> None:
-    """Draw a baked group's color and strength; both can be keyframed where they are drawn."""
-    row = layout.row(align=True)
-    row.label(text=sliders.name)
-    row.prop(sliders.color, "default_value", text="")
-    row.prop(sliders.strength, "default_value", text="")
-
-
 CLASSES = (
-    RADIOSITY_PT_light_group_object,
-    RADIOSITY_PT_light_group_lamp,
     RADIOSITY_PT_light_group_material,
-    RADIOSITY_PT_light_group_world,
     RADIOSITY_PT_light_group_collection,
 )

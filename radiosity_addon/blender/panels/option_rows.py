@@ -6,8 +6,8 @@ from typing import Any
 
 import bpy
 
-from ...options import OPTIONS, sections_of
-from ..settings.option_properties import shown
+from ...options import Option, sections_of
+from ..settings.option_properties import PROPERTIES, shown
 from ..settings.preferences import PREFERRED, preferences
 
 
@@ -21,20 +21,46 @@ def draw_options(layout: Any, part: str, context: bpy.types.Context, in_header: 
     """
     settings = context.scene.radiosity
     for section in sections_of(part):
-        options = [option for option in OPTIONS.values() if option.section == section]
+        options = [option for option in PROPERTIES if option.section == section]
         rows = [option for option in options if shown(option, settings) and option.name != in_header]
         if not rows:
             continue
         # Only next to a check box there is room for a heading.
-        column = layout.column(heading=section if rows[0].kind is bool else "")
+        column = layout.column(heading=section if rows[0].kind is bool and section != part else "")
         for option in rows:
-            column.prop(settings, option.identifier)
-            if option.name in PREFERRED and not settings.is_property_set(option.identifier):
-                preferred = getattr(preferences(context), option.name)
-                draw_preferred(column, preferred, getattr(settings, option.identifier))
+            _draw_option(column, option, context)
 
 
-def draw_preferred(layout: Any, preferred: Any, own: Any) -> None:
-    """Say that the preferences' value counts where the scene has none of its own."""
-    if preferred != own:
-        layout.label(text=f"From the preferences: {preferred}", icon="INFO", translate=False)
+def _draw_option(layout: Any, option: Option, context: bpy.types.Context) -> None:
+    """Draw one option, and whether the preferences' value is used instead."""
+    row = option.panel
+    assert row is not None
+    group = getattr(context.scene, row.group)
+    if row.expand:
+        # Over the whole width: next to a label the choices would not fit.
+        buttons = layout.row(align=True)
+        buttons.use_property_split = False
+        buttons.prop(group, option.identifier, expand=True)
+    elif option.automatic:
+        _draw_automatic(layout, option, group)
+    else:
+        layout.prop(group, option.identifier)
+    if option.name in PREFERRED and not group.is_property_set(option.identifier):
+        preferred = getattr(preferences(context), option.name)
+        if preferred != getattr(group, option.identifier):
+            layout.label(text=f"From the preferences: {preferred}", icon="INFO", translate=False)
+
+
+def _draw_automatic(layout: Any, option: Option, settings: Any) -> None:
+    """Draw a number that the quality sets: a button until it has a value, then the value and a way back."""
+    if getattr(settings, option.identifier):
+        row = layout.row(align=True)
+        row.prop(settings, option.identifier)
+        row.operator("radiosity.set_option", text="", icon="LOOP_BACK").option = option.name
+        return
+    assert option.panel is not None
+    row = layout.split(factor=0.4)
+    name = row.row()
+    name.alignment = "RIGHT"
+    name.label(text=option.panel.label)
+    row.operator("radiosity.set_option", text="set by quality").option = option.name

@@ -15,9 +15,8 @@ import hashlib
 import threading
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import bpy
 
@@ -40,8 +39,7 @@ TICK = 0.02
 FOREIGN = "The lightmaps on disk are from another bake than this file: bake again"
 
 
-@dataclass(frozen=True, repr=False)
-class Wanted:
+class Wanted(NamedTuple):
     """An image whose file has other bytes than it should.
 
     Attributes
@@ -90,7 +88,7 @@ def _open(report: Path) -> OutputFolder:
         for own in own_reports(report.parent, scene):
             if own.names.report == report.name:
                 return OutputFolder(report.parent, own.names, owner=own.owner).__enter__()
-    raise BakeError(f"'{report}' is no report of this file's")
+    raise BakeError(f"'{report}' is not a report of this file")
 
 
 def publish(output: OutputFolder, report: BakeReport) -> None:

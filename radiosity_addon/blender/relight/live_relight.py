@@ -10,7 +10,8 @@ and nothing follows from it.
 from __future__ import annotations
 
 import time
-from collections.abc import Generator
+from collections.abc import Callable, Generator
+from functools import partial
 from typing import Any
 
 import bpy
@@ -19,7 +20,7 @@ import numpy as np
 from ...bake.relight import Responses, are_wanted
 from ...bake.result import LightGroup
 from ...bake.scene_diff import RELIGHTABLE
-from ...base import BakeError, RadiosityError
+from ...base import BakeError, Progress, RadiosityError
 from ...lightmap.images import LightmapPage
 from ...numerics import Array
 from ..images.group_images import update_images
@@ -129,7 +130,7 @@ class LiveRelight:
         self._reader = StrengthReader(context.scene, held.bake, self._strengths)
         self._fits = LiveScene(context.scene)
         self._dirty, self._noticed = False, time.perf_counter()
-        self._start(None, lit(held.bake, self._strengths))
+        self._start(None, partial(lit, held.bake, self._strengths))
 
     def read(self) -> None:
         """Read the strengths, and show them as far as it can be done at once."""
@@ -176,15 +177,15 @@ class LiveRelight:
             return False
         missing = self._wanted()
         if missing:
-            self._start(missing[0], self._responses.steps(missing[0]))
+            self._start(missing[0], partial(self._responses.find, missing[0]))
             return True
         resting = time.perf_counter() - self._noticed > REST or not in_background
         if not self._exact and resting:
-            self._start(None, lit(self._held().bake, self._strengths))
+            self._start(None, partial(lit, self._held().bake, self._strengths))
             return True
         ahead = self._responses.unknown()
         if self._exact and ahead and len(self._strengths) - len(ahead) < min(AHEAD, self._responses.room):
-            self._start(ahead[0], self._responses.steps(ahead[0]))
+            self._start(ahead[0], partial(self._responses.find, ahead[0]))
             return True
         return False
 
@@ -192,9 +193,9 @@ class LiveRelight:
         """Return the sources whose responses are missed now."""
         return [] if self._responses is None else self._responses.missing(self._strengths)
 
-    def _start(self, source: int | None, steps: Generator[Any, None, Any]) -> None:
+    def _start(self, source: int | None, work: Callable[[Progress], Any]) -> None:
         """Find out a source's response in the thread, or exact pages if it is None."""
-        self._work, self._doing, self._lit_by = in_thread(steps), source, self._strengths
+        self._work, self._doing, self._lit_by = in_thread(work), source, self._strengths
 
     def _carry_on(self, in_background: bool) -> None:
         """Go on with what runs in the thread; take its result once it is there."""
@@ -236,13 +237,13 @@ class LiveRelight:
     def _of_scene(self) -> bpy.types.Scene:
         scene = bpy.data.scenes.get(self._scene)
         if scene is None:
-            raise BakeError("the scene is not there any more")
+            raise BakeError("the scene no longer exists")
         return scene
 
     def _held(self) -> kept_bakes.InMemory:
         held = kept_bakes.find(self._of_scene())
         if held is None:
-            raise BakeError("the bake that was kept is not there any more")
+            raise BakeError("the kept bake is no longer available")
         return held
 
 

@@ -1,4 +1,4 @@
-"""What is set for relighting, and remembered of it: with each scene, and of this session alone."""
+"""The scene's options of relighting, and its memory of the bake that can be relit."""
 
 from __future__ import annotations
 
@@ -7,37 +7,24 @@ from typing import Any
 
 import bpy
 
-from ...options import BakeSettings
+from ...options import RELIGHT_GROUP, BakeSettings
+from ..settings.option_properties import properties_of
 
 
-class RelightSettings(bpy.types.PropertyGroup):
-    """`scene.radiosity_relight`"""
+class RelightOptions:
+    """The options of relighting; mixed into their property group."""
 
-    keep: bpy.props.BoolProperty(  # type: ignore[valid-type]
-        name="Keep for Relighting",
-        description="Keep in memory how light gets about, so that other strengths and colors of lamps, "
-        "emission and world need no new bake. Takes about 300 bytes for each pixel that shows "
-        "a surface, 60 MB at 512 × 512, 1 GB at 2048 × 2048. Bakes of many lamps take somewhat longer",
-        default=True,
-    )
-    sidecar: bpy.props.BoolProperty(  # type: ignore[valid-type]
-        name="Write Sidecar",
-        description="Also write it to a file beside the lightmaps, so that this bake can be lit anew after "
-        "the scene was closed. About half as large as in memory",
-        default=False,
-    )
-    only_moved: bpy.props.BoolProperty(  # type: ignore[valid-type]
-        name="Only What Moved",
-        description="When nothing but places of objects has changed since a bake that is still in memory, "
-        "bake anew only what they touch: the same light in less than half of the time. The layout of the "
-        "lightmaps stays",
-        default=True,
-    )
+    __annotations__ = properties_of(RELIGHT_GROUP)
+
+
+class RelightSettings(RelightOptions, bpy.types.PropertyGroup):
+    """`scene.radiosity_relight`: the options of relighting, and a memory of the bake that is shown."""
+
     mark: bpy.props.StringProperty(  # type: ignore[valid-type]
-        name="Mark", description="Which bake the scene shows", options={"HIDDEN"}
+        name="Mark", description="The bake that the scene shows", options={"HIDDEN"}
     )
     strengths: bpy.props.StringProperty(  # type: ignore[valid-type]
-        name="Strengths", description="The strengths its lightmaps were lit by last", options={"HIDDEN"}
+        name="Strengths", description="The light strengths that the lightmaps show", options={"HIDDEN"}
     )
 
 
@@ -45,9 +32,8 @@ def relight_of(scene: bpy.types.Scene) -> Any:
     """Return the scene's settings to read: Blender would add a group to the file where there is none yet."""
     if scene.is_property_set("radiosity_relight"):
         return scene.radiosity_relight
-    properties = RelightSettings.bl_rna.properties
-    names = ("keep", "sidecar", "only_moved", "mark", "strengths")
-    return SimpleNamespace(**{name: properties[name].default for name in names})
+    properties = [prop for prop in RelightSettings.bl_rna.properties if not prop.is_readonly]
+    return SimpleNamespace(**{prop.identifier: getattr(prop, "default", None) for prop in properties})
 
 
 def keeps(scene: bpy.types.Scene, settings: BakeSettings) -> bool:

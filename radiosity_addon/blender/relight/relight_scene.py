@@ -11,17 +11,17 @@ import bpy
 import numpy as np
 
 from ...bake.relight import KeptBake, are_wanted, group_pages, relight_pages, strengths_in
-from ...bake.result import LightGroup, Progress
+from ...bake.result import LightGroup
 from ...bake.sidecar import StoredBake, read_sidecar
-from ...base import BakeError, drain
+from ...base import SILENT, BakeError, Progress, Status, drain, staged
 from ...lightmap.images import LightmapPage
 from ...numerics import Array
 from ..apply.rebake import Originals
-from ..scene_export.export import export_steps, exporting
+from ..scene_export.export import export_steps
 from ..session.background import in_thread
 from . import kept_bakes, lightmap_versions
 from .kept_bakes import InMemory
-from .kept_sidecars import sidecar_of
+from .kept_sidecars import NO_BAKE, NO_DATA, sidecar_of
 from .relight_properties import relight_of
 from .relit_images import rewrite
 from .relit_materials import refresh
@@ -42,7 +42,7 @@ class RelightReport:
 
 def run_relight(
     context: bpy.types.Context, in_background: bool = False
-) -> Generator[Progress, None, RelightReport]:
+) -> Generator[Status, None, RelightReport]:
     """Light the scene's kept bake as its lights are now, and rewrite its lightmaps.
 
     A generator as `run_bake`; closed, or after an error, everything is as it was.
@@ -54,12 +54,11 @@ def run_relight(
     """
     started = time.perf_counter()
     lightmap_versions.flush()
-    yield Progress("export", 0.0)
-    held, strengths = yield from exporting(strengths_steps(context, in_background))
+    yield Status("export", 0.0)
+    held, strengths = yield from staged(strengths_steps(context, in_background), "export", 0.0, 0.0)
     same = np.array_equal(strengths, held.shown)
-    steps = lit(held.bake, strengths)
-    pages, groups = yield from _shown(in_thread(steps) if in_background else steps)
-    yield Progress("write", LIT)
+    pages, groups = yield from _lit_in_thread(held.bake, strengths, in_background)
+    yield Status("write", LIT)
     mark = kept_bakes.mark_of(context.scene)
     taken = time.perf_counter() - started
     rewrite(mark, pages, groups, taken)
@@ -105,40 +104,37 @@ def stored_bake(scene: bpy.types.Scene) -> StoredBake:
     mark = kept_bakes.mark_of(scene)
     images = kept_bakes.images_of(mark) if mark else {}
     if not images:
-        raise BakeError("the scene shows no bake that was kept: bake with Keep for Relighting")
+        raise BakeError(NO_BAKE)
     path = sidecar_of(mark)
     if path is None:
-        raise BakeError("the bake is not in memory any more, and has no sidecar: bake again")
+        raise BakeError(NO_DATA)
     stored = read_sidecar(path)
-    if stored.mark != mark:
+    if stored.bake_id != mark:
         raise BakeError(f"'{path}' belongs to another bake: bake again")
     return stored
 
 
-def lit(kept: KeptBake, strengths: Array) -> Generator[float, None, Relit]:
-    """Compute the pages of a kept bake, and those of its light groups; yields the fraction done."""
-    steps = relight_pages(kept, strengths)
-    while True:
-        try:
-            yield next(steps).fraction
-        except StopIteration as done:
-            pages = done.value
-            break
+def lit(kept: KeptBake, strengths: Array, progress: Progress = SILENT) -> Relit:
+    """Compute the pages of a kept bake, and those of its light groups."""
     if not are_wanted(kept.bake_scene, kept.settings):
-        return pages, ()
-    return pages, (yield from group_pages(kept, pages, strengths))
+        return relight_pages(kept, strengths, progress), ()
+    pages = relight_pages(kept, strengths, progress.part(0.0, 0.5))
+    return pages, group_pages(kept, pages, strengths, progress.part(0.5, 1.0))
 
 
-def _shown(steps: Generator[float | None, None, Relit]) -> Generator[Progress, None, Relit]:
-    """Tell of the steps as progress."""
-    fraction = 0.0
+def _lit_in_thread(kept: KeptBake, strengths: Array, in_background: bool) -> Generator[Status, None, Relit]:
+    """Do the same in a thread."""
+    status = Status("relight", READ)
+    steps = in_thread(
+        lambda progress: lit(kept, strengths, progress.stage("relight", READ, LIT)), in_background
+    )
     try:
         while True:
             try:
-                fraction = next(steps) or fraction
+                status = next(steps) or status
             except StopIteration as done:
                 return done.value
-            yield Progress("relight", READ + (LIT - READ) * fraction)
+            yield status
     finally:
         steps.close()
 

@@ -11,7 +11,6 @@ from typing import TypeVar
 import bpy
 import numpy as np
 
-from ...bake.result import Progress
 from ...base import BakeWarning, SceneError, UsageError, drain
 from ...lights import EnvironmentLight
 from ...options import BakeSettings
@@ -22,7 +21,7 @@ from ..cycles.world import read_world
 from ..datablocks.mesh_arrays import all_finite, degenerate, not_finite_message, world_from_object
 from ..datablocks.uv_layers import MAX_UV_LAYERS
 from ..scene_records.export_sources import Export
-from ..scene_records.light_membership import name_on
+from ..scene_records.light_membership import blender_groups, group_on
 from ..scene_records.object_roles import BAKE, BAKEABLE_TYPES, half_visible
 from ..scene_records.pieces import Collected, Piece
 from ..scene_records.render_options import option_warnings, world_of
@@ -100,7 +99,7 @@ def export_steps(
         _check_uv_layers(piece)
     yield 0.5
     background = world_of(context)
-    group = name_on(background)
+    group = group_on(background, blender_groups(context.scene))
     # After that: Cycles may have to render it, which no evaluated object would survive.
     world, warnings = yield from read_world(background, dark)
     collected.lights.extend(world)
@@ -108,20 +107,6 @@ def export_steps(
     collected.warnings.extend(warnings)
     names = {piece.source.name for piece in chosen}
     return (yield from _assemble(context, collected, names, settings, in_background))
-
-
-def exporting(steps: Generator[float, None, T]) -> Generator[Progress, None, T]:
-    """Take the steps of an export as progress."""
-    try:
-        while True:
-            try:
-                next(steps)
-            except StopIteration as done:
-                result: T = done.value
-                return result
-            yield Progress("export", 0.0)
-    finally:
-        steps.close()
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,28 +1,41 @@
 """Which light group each lamp, emissive surface and world of a scene is in.
 
-A name on what stands in the scene and can be selected wins, that is on the instance before what it shows;
-then one on the object, then one on the material that emits, then one on the innermost collection around the
-object, then one on the innermost collection around the instance. What is dark may be in a group too.
+Objects and worlds have Blender's own field, which counts if a view layer of the scene lists the group, as in
+Cycles. Materials and collections have a field of ours; it is read from objects and worlds too, where files of
+earlier versions hold it.
+
+The name on an instance wins, then that on the object it shows, then that on the material that emits, then
+that on the innermost collection around the object, then that on the innermost around the instance. What is
+dark may be in a group too.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import bpy
 
 NAME = "radiosity_light_group"
-"""The property of objects, materials, worlds and collections that names their light group."""
+"""Our property of materials and collections, and of objects and worlds in files of earlier versions."""
 
 
 def name_on(owner: bpy.types.ID | None) -> str:
-    """Return the group named on an object, a material, a world or a collection; "" where none is."""
+    """Return the group that our field names; "" for none."""
     return str(getattr(owner, NAME, "")).strip()
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class PlaceGroups:
+def blender_groups(scene: bpy.types.Scene) -> frozenset[str]:
+    """Return the names of the light groups that the scene's view layers list."""
+    return frozenset(group.name for layer in scene.view_layers for group in layer.lightgroups)
+
+
+def group_on(owner: bpy.types.Object | bpy.types.World | None, listed: frozenset[str]) -> str:
+    """Return the group of an object or a world: Blender's if it is listed, else ours."""
+    name = getattr(owner, "lightgroup", "")
+    return name if name in listed else name_on(owner)
+
+
+class PlaceGroups(NamedTuple):
     """The names that hold for all that one object, or one instance of it, shows.
 
     Parameters
@@ -49,9 +62,10 @@ class PlaceGroups:
 
 
 class Membership:
-    """The names on a scene's collections, read once."""
+    """The names in a scene, of which those on collections are read once."""
 
     def __init__(self, scene: bpy.types.Scene) -> None:
+        self._listed = blender_groups(scene)
         self._around: dict[bpy.types.Object, str] = {}
         collections = _collections_of(scene)
         if any(map(name_on, collections)):
@@ -67,7 +81,7 @@ class Membership:
             same.
         """
         around = self._around.get(shown, "") or self._around.get(owner, "")
-        return PlaceGroups(name_on(owner) or name_on(shown), around)
+        return PlaceGroups(group_on(owner, self._listed) or group_on(shown, self._listed), around)
 
 
 def _collections_of(scene: bpy.types.Scene) -> list[bpy.types.Collection]:
@@ -116,11 +130,3 @@ def lamps_by_group(scene: bpy.types.Scene) -> dict[str, list[bpy.types.Object]]:
         if obj.type == "LIGHT":
             found.setdefault(membership.at(obj, obj).of_lamp, []).append(obj)
     return found
-
-
-def named(owners: Iterable[bpy.types.ID]) -> Iterator[tuple[str, bpy.types.ID]]:
-    """Yield those owners on which a group is named, each after its group."""
-    for owner in owners:
-        name = name_on(owner)
-        if name:
-            yield name, owner

@@ -9,8 +9,7 @@ lamp's light; both still get a lightmap.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import bpy
 
@@ -23,15 +22,14 @@ BAKE, LIGHT_ONLY, IGNORE = "BAKE", "LIGHT_ONLY", "IGNORE"
 MODES = (
     (BAKE, "Bake", "It gets a lightmap, and lights and blocks"),
     (LIGHT_ONLY, "Light Only", "It lights and blocks but gets no lightmap"),
-    (IGNORE, "Ignore", "It is left out as if it were not there"),
+    (IGNORE, "Ignore", "It is left out entirely"),
 )
 
 BAKEABLE_TYPES = frozenset({"MESH", "CURVE", "SURFACE", "FONT", "META"})
 """All but a mesh are shown as a mesh copy once they are baked."""
 
 
-@dataclass(frozen=True, repr=False)
-class Role:
+class Role(NamedTuple):
     """What one object, or one instance of it, is there for.
 
     Parameters
@@ -55,11 +53,11 @@ class Role:
 def register() -> None:
     """Hang mode and texel scale on every object."""
     bpy.types.Object.radiosity_mode = bpy.props.EnumProperty(
-        name="Mode", description="What the object is there for in a bake", items=MODES, default=BAKE
+        name="Mode", description="Role of the object in a bake", items=MODES, default=BAKE
     )
     bpy.types.Object.radiosity_texel_scale = bpy.props.FloatProperty(
         name="Texel Scale",
-        description="Lightmap pixels per metre, relative to the other objects",
+        description="Lightmap pixels per meter, relative to the other objects",
         default=1.0,
         min=0.01,
         soft_min=0.1,

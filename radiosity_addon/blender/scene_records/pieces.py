@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -125,7 +125,7 @@ def piece_of(found: Found, mesh: MeshArrays | None, rows: np.ndarray, collected:
         shown = np.unique(surface)
         if len(shown) and all(collected.surfaces[row].is_volume for row in shown):
             # All there is of it is what fills it.
-            role, mesh, surface = replace(role, mode=IGNORE), no_triangles(), surface[:0]
+            role, mesh, surface = role._replace(mode=IGNORE), no_triangles(), surface[:0]
             asked, inputs = frozenset(), {}
     if mesh is None or not all_finite(found.matrix):
         raise SceneError(not_finite_message(found.shown))
@@ -133,7 +133,7 @@ def piece_of(found: Found, mesh: MeshArrays | None, rows: np.ndarray, collected:
         return None
     used = np.unique(np.clip(mesh.material, 0, max(len(found.empty) - 1, 0)))
     if any(found.empty[slot] for slot in used if slot < len(found.empty)):
-        message = f"object '{name}' has an empty material slot; grey {DEFAULT_GREY} is used"
+        message = f"object '{name}' has an empty material slot; gray {DEFAULT_GREY} is used"
         collected.warnings.append(BakeWarning(name, message))
     can_bake = found.can_bake and role.mode == BAKE
     if can_bake and found.library:

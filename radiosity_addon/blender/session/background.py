@@ -1,4 +1,4 @@
-"""Steps that may be long, taken in a thread so that a window stays alive meanwhile."""
+"""Work on plain arrays in a thread: a window stays alive meanwhile, and Ctrl-C stops it."""
 
 from __future__ import annotations
 
@@ -9,66 +9,78 @@ from concurrent.futures import ThreadPoolExecutor
 from queue import Empty, SimpleQueue
 from typing import TypeVar
 
-T = TypeVar("T")
+from ...base import Cancelled, Progress, Status
+
 R = TypeVar("R")
 
 PATIENCE = 0.005
-"""Seconds that one `next` waits for a step to end."""
+"""Seconds that one `next` waits for news."""
 
 TURN = 0.001
 """Seconds after which a thread that runs Python hands over to one that waits, instead of Python's 5 ms: to
 draw a window once takes dozens of turns."""
 
 
-def in_thread(steps: Generator[T, None, R]) -> Generator[T | None, None, R]:
-    """Advance a generator in a thread of its own, one step after the other.
+def in_thread(work: Callable[[Progress], R], in_window: bool = True) -> Generator[Status | None, None, R]:
+    """Do work in a thread of its own.
 
-    Only for generators of plain arrays: Blender's data must not be touched from a thread.
-    The thread does not wait for the caller, who may be drawing a window: what it yields must
-    not change afterwards.
+    Only for work on plain arrays: Blender's data must not be touched from a thread.
+    The thread does not wait for the caller, who may be drawing a window: pictures that it
+    tells of must not change afterwards.
 
     Parameters
     ----------
-    steps : generator
-        What it yields, returns or raises comes through as it is, in order.
+    work : callable
+        Takes the progress to tell of. What it returns or raises comes through as it is.
+    in_window : bool
+        Return from every `next` within a moment. Else only with news.
 
     Yields
     ------
-    what the generator yields; None while there is nothing new
+    status : Status or None
+        In order; None while there is nothing new.
 
     Notes
     -----
-    Closed in the middle of a step, this returns at once; the step ends by itself and the
-    generator is closed after it, in the thread.
+    Closed, this cancels the work, which ends when it next tells of its progress. In a window this returns at
+    once; else it waits for that, since nobody else would.
     """
-    yielded: SimpleQueue[T] = SimpleQueue()
+    news: SimpleQueue[Status] = SimpleQueue()
     closed = threading.Event()
+
+    def listen(status: Status) -> None:
+        if closed.is_set():
+            raise Cancelled
+        news.put(status)
+
     turn = sys.getswitchinterval()
-    sys.setswitchinterval(min(turn, TURN))
+    if in_window:
+        sys.setswitchinterval(min(turn, TURN))
     thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="radiosity")
-    running = thread.submit(_run, steps, yielded, closed)
+    running = thread.submit(work, Progress(listen, in_window=in_window))
     try:
         while True:
             over = running.done()
             try:
-                value = yielded.get(timeout=0.0 if over else PATIENCE)
+                status = news.get(timeout=0.0 if over else PATIENCE)
             except Empty:
                 if over:
                     return running.result()
-                yield None
+                if in_window:
+                    yield None
             else:
-                yield value
+                yield status
     finally:
         sys.setswitchinterval(turn)
         closed.set()
-        thread.shutdown(wait=False)
+        thread.shutdown(wait=not in_window)
 
 
 def elsewhere(work: Callable[[], R], in_background: bool) -> Generator[float, None, R]:
     """Do work on plain arrays: in a thread, with a step now and then, if somebody waits, else at once."""
     if not in_background:
         return work()
-    steps = in_thread(_once(work))
+    steps = in_thread(lambda _: work())
     try:
         while True:
             try:
@@ -79,22 +91,3 @@ def elsewhere(work: Callable[[], R], in_background: bool) -> Generator[float, No
             yield 0.0
     finally:
         steps.close()
-
-
-def _once(work: Callable[[], R]) -> Generator[None, None, R]:
-    yield from ()
-    return work()
-
-
-def _run(steps: Generator[T, None, R], yielded: SimpleQueue[T], closed: threading.Event) -> R:
-    """Take all steps and return what the generator returns; stop after the one in which it is closed."""
-    try:
-        while not closed.is_set():
-            try:
-                yielded.put(next(steps))
-            except StopIteration as end:
-                result: R = end.value
-                return result
-    finally:
-        steps.close()
-    raise GeneratorExit

@@ -32,13 +32,16 @@ class KeptDetails:
     images : tuple of str
         Names of the pages' images.
     bake : str
-        The scene's memory of its last bake, by which it is told that it still is the last.
+        The scene's memory of its last bake: the details count while the scene still has it.
+    megabytes : float
+        Memory of the details [MiB].
     """
 
     details: BakeDetails
     objects: dict[str, BakeObject]
     images: tuple[str, ...]
     bake: str
+    megabytes: float
 
     def page_of(self, image: str) -> PageDetails | None:
         """Return what is known of an image's texels, if anything is."""
@@ -62,7 +65,7 @@ def keep(scene: bpy.types.Scene, result: BakeResult, images: Sequence[str]) -> N
     if result.details is not None:
         objects = {baked.object.name: baked.object for baked in result.objects}
         session.kept_details[scene.name_full] = KeptDetails(
-            result.details, objects, tuple(images), scene.radiosity.last_bake
+            result.details, objects, tuple(images), scene.radiosity.last_bake, result.details.nbytes / 2**20
         )
 
 

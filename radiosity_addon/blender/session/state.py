@@ -96,6 +96,12 @@ class Session:
         The last check of a scene, by the scene's full name.
     edited : set of str
         Names of stand-ins that were changed and not looked at yet.
+    facts : dict
+        What panels show, by the function that works it out and the scene (`facts.py`).
+    wanted_facts : dict
+        When each was last drawn [s].
+    facts_made : float
+        When they were last worked out [s].
     versions : Versions
     drawn : Drawn
     on_lightmaps_changed : list of callables
@@ -111,6 +117,9 @@ class Session:
         self.kept_details: dict[str, Any] = {}
         self.checks: dict[str, Any] = {}
         self.edited: set[str] = set()
+        self.facts: dict[Any, Any] = {}
+        self.wanted_facts: dict[Any, float] = {}
+        self.facts_made = float("-inf")
         self.versions = Versions()
         self.drawn = Drawn()
         self.on_lightmaps_changed: list[Callable[[], None]] = []
@@ -142,6 +151,7 @@ class Session:
         self.kept_details.clear()
         self.checks.clear()
         self.edited.clear()
+        self.facts.clear()
         self.drawn.forget()
         self.interrupted = False
 

@@ -1,35 +1,31 @@
-"""The light group's name on objects, materials, worlds and collections, and what the panel lists of it."""
+"""Our light group field of materials and collections, and the list of a scene's light groups."""
 
 from __future__ import annotations
 
-import time
-from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import bpy
 
 from ..datablocks.bake_record import is_made
-from ..scene_records.light_membership import NAME, lamps_by_group, name_on, named
+from ..scene_records.light_membership import NAME, blender_groups, group_on, lamps_by_group, name_on
+from ..session import facts
 
 LONGEST_NAME = 48
 """Characters of a group's name."""
 
-OUTDATED_AFTER = 1.0
-"""Seconds after which the list is made anew if it is drawn: collections change without telling us."""
-
 _DESCRIPTIONS = (
-    (bpy.types.Object, "Light group of this lamp, or of all that this object or instance emits"),
-    (bpy.types.Material, "Light group of what this material emits, on objects that name no group themselves"),
-    (bpy.types.World, "Light group of this world's light"),
+    (bpy.types.Object, "Light group in files of earlier versions; Blender's own comes first"),
+    (bpy.types.Material, "Light group of what this material emits, on objects that are in no group"),
+    (bpy.types.World, "Light group in files of earlier versions; Blender's own comes first"),
     (
         bpy.types.Collection,
-        "Light group of the lamps and emissive objects in this collection that no nearer name puts elsewhere",
+        "Light group of the lamps and emissive objects in this collection that are in no other",
     ),
 )
 
 
-@dataclass(eq=False, repr=False)
-class ListedGroup:
-    """One light group of a scene, as the panel lists it."""
+class ListedGroup(NamedTuple):
+    """One light group of a scene, as the panel lists it: how many of each kind are in it."""
 
     name: str
     lamps: int = 0
@@ -39,59 +35,40 @@ class ListedGroup:
     worlds: int = 0
 
 
-@dataclass(eq=False, repr=False)
-class _Cache:
-    """What was found last: without this text the decorator would work one out, slowly."""
-
-    scene: str = ""
-    made: float = float("-inf")
-    groups: list[ListedGroup] = field(default_factory=list)
-
-
-_cache = _Cache()
-
-
-def listed_groups(scene: bpy.types.Scene) -> list[ListedGroup]:
-    """Return the scene's light groups by name, at most a second old: `draw()` runs at every redraw."""
-    now = time.monotonic()
-    if _cache.scene != scene.name_full or now - _cache.made > OUTDATED_AFTER:
-        _cache.scene, _cache.made, _cache.groups = scene.name_full, now, _listed(scene)
-    return _cache.groups
-
-
-def outdate() -> None:
-    """Have the list made anew: a name has changed."""
-    _cache.made = float("-inf")
-
-
-def _listed(scene: bpy.types.Scene) -> list[ListedGroup]:
+def list_groups(scene: bpy.types.Scene) -> tuple[ListedGroup, ...]:
+    """Return the scene's light groups by name."""
     found: dict[str, ListedGroup] = {}
 
     def count(name: str, kind: str, number: int = 1) -> None:
-        group = found.setdefault(name, ListedGroup(name))
-        setattr(group, kind, getattr(group, kind) + number)
+        if not name:
+            return
+        group = found.get(name) or ListedGroup(name)
+        found[name] = group._replace(**{kind: getattr(group, kind) + number})
 
+    listed = blender_groups(scene)
+    for name in listed:
+        found[name] = ListedGroup(name)
     for name, lamps in lamps_by_group(scene).items():
-        if name:
-            count(name, "lamps", len(lamps))
-    for name, _ in named(obj for obj in scene.objects if obj.type != "LIGHT"):
-        count(name, "objects")
-    for name, _ in named(material for material in bpy.data.materials if not is_made(material)):
-        count(name, "materials")
-    for name, _ in named((scene.collection, *scene.collection.children_recursive)):
-        count(name, "collections")
-    if name_on(scene.world):
-        count(name_on(scene.world), "worlds")
-    return [found[name] for name in sorted(found, key=lambda name: (name.casefold(), name))]
+        count(name, "lamps", len(lamps))
+    for obj in scene.objects:
+        if obj.type != "LIGHT":
+            count(group_on(obj, listed), "objects")
+    for material in bpy.data.materials:
+        if not is_made(material):
+            count(name_on(material), "materials")
+    for collection in (scene.collection, *scene.collection.children_recursive):
+        count(name_on(collection), "collections")
+    count(group_on(scene.world, listed), "worlds")
+    return tuple(found[name] for name in sorted(found, key=lambda name: (name.casefold(), name)))
 
 
 def _changed(_owner: bpy.types.ID, _context: bpy.types.Context) -> None:
-    outdate()
+    facts.outdate()
 
 
 def _known_names(_owner: bpy.types.ID, context: bpy.types.Context, text: str) -> list[str]:
     """Suggest the groups there are while a name is typed."""
-    return [group.name for group in listed_groups(context.scene) if text.casefold() in group.name.casefold()]
+    return [group.name for group in list_groups(context.scene) if text.casefold() in group.name.casefold()]
 
 
 def register() -> None:
@@ -115,4 +92,3 @@ def unregister() -> None:
     """Take it away; what a file holds stays in the file."""
     for kind, _ in _DESCRIPTIONS:
         delattr(kind, NAME)
-    outdate()

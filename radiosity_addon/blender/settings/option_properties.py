@@ -6,9 +6,15 @@ from typing import Any
 
 import bpy
 
-from ...options import OPTIONS, SYMMETRIC_ONLY, UNBOUNDED, Option
+from ...options import OPTIONS, PANEL_OPTIONS, SYMMETRIC_ONLY, UNBOUNDED, Option
 
 AUTOMATIC = "0 = set by quality"
+
+PROPERTIES = (*PANEL_OPTIONS.values(), *(option for option in OPTIONS.values() if option.panel is not None))
+"""Every option that the panel has, in the order of its rows."""
+
+# Blender 4.5 and later want paths that start with // declared; 4.2 refuses the word.
+_RELATIVE_PATH = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set()
 
 
 def option_property(option: Option, **more: Any) -> Any:
@@ -23,6 +29,9 @@ def option_property(option: Option, **more: Any) -> Any:
         words["items"] = [(choice.value, choice.label, choice.description) for choice in choices]
         words["default"] = option.default or option.values[0]
         return bpy.props.EnumProperty(**{**words, **more})
+    if option.kind is str:
+        words |= {"default": option.default, "subtype": row.subtype, "options": _RELATIVE_PATH}
+        return bpy.props.StringProperty(**{**words, **more})
     low, high = option.limits
     words |= {
         "min": low,
@@ -41,12 +50,19 @@ def option_property(option: Option, **more: Any) -> Any:
     return bpy.props.FloatProperty(precision=row.precision, step=row.step, **words)
 
 
+def properties_of(group: str) -> dict[str, Any]:
+    """Return the properties that a group of the scene's holds, by their identifiers."""
+    return {
+        option.identifier: option_property(option)
+        for option in PROPERTIES
+        if option.panel is not None and option.panel.group == group
+    }
+
+
 class OptionProperties:
     """What `scene.radiosity` holds of the options; mixed into its property group."""
 
-    __annotations__ = {
-        option.identifier: option_property(option) for option in OPTIONS.values() if option.panel is not None
-    }
+    __annotations__ = properties_of("radiosity")
 
 
 def shown(option: Option, group: Any) -> bool:

@@ -7,19 +7,16 @@ from typing import Any
 
 import bpy
 
-from ...options import OPTIONS
+from ...options import OPTIONS, PANEL_OPTIONS
 from .option_properties import option_property
 
-DEFAULT_FOLDER = "//lightmaps/"
+DEFAULT_FOLDER: str = PANEL_OPTIONS["output_folder"].default
 
-PREFERRED = ("memory_limit", "threads")
+PREFERRED = ("output_folder", "memory_limit", "threads")
 """Options that the preferences have too, for scenes that do not set them."""
 
 PACKAGE = __package__.removesuffix(".blender.settings")
 """The add-on's own module: `bl_ext.<repository>.radiosity_addon` where it is installed."""
-
-# Blender 4.5 and later want paths that start with // declared; 4.2 refuses the word.
-_RELATIVE_PATH = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set()
 
 
 class RADIOSITY_AP_preferences(bpy.types.AddonPreferences):
@@ -27,26 +24,22 @@ class RADIOSITY_AP_preferences(bpy.types.AddonPreferences):
 
     bl_idname = PACKAGE
 
-    output_folder: bpy.props.StringProperty(  # type: ignore[valid-type]
-        name="Folder",
-        description="Where lightmaps are written, for scenes in which no folder was chosen. One that begins "
-        "with // is beside the file",
-        default=DEFAULT_FOLDER,
-        subtype="DIR_PATH",
-        options=_RELATIVE_PATH,
+    output_folder: option_property(  # type: ignore[valid-type]
+        PANEL_OPTIONS["output_folder"],
+        description="Where lightmaps are written, for scenes that set no folder. One that begins with // "
+        "is next to the file",
     )
     memory_limit: option_property(  # type: ignore[valid-type]
         OPTIONS["memory_limit"],
-        description="Memory for elements and links in GiB, for scenes that set none; 0 = set by quality",
+        description="Memory that a bake may take in GiB, for scenes that set none. 0 = set by quality",
     )
     threads: option_property(  # type: ignore[valid-type]
         OPTIONS["threads"],
-        description="Processor threads, for scenes that set no number; 0 uses all. "
-        "The result does not depend on it",
+        description="Processor threads, for scenes that set no number; 0 uses all. The result is the same",
     )
     check_first: bpy.props.BoolProperty(  # type: ignore[valid-type]
         name="Check First",
-        description="Before a scene is baked for the first time, show what is odd about it, if anything is",
+        description="Before a scene is baked for the first time, show its problems, if there are any",
         default=True,
     )
 
@@ -55,7 +48,7 @@ class RADIOSITY_AP_preferences(bpy.types.AddonPreferences):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        column = layout.column(heading="For Scenes That Set Nothing Else")
+        column = layout.column(heading="Defaults")
         column.prop(self, "output_folder")
         column.prop(self, "memory_limit")
         column.prop(self, "threads")
@@ -101,9 +94,11 @@ def memory_limit_of(context: bpy.types.Context) -> float | None:
 CLASSES = (RADIOSITY_AP_preferences,)
 
 
+def is_packed(context: bpy.types.Context) -> bool:
+    """Whether the panel's bake packs its lightmaps: a folder next to an unsaved file has no place yet."""
+    return folder_of(context).startswith("//") and not bpy.data.filepath
+
+
 def output_folder(context: bpy.types.Context) -> Path | None:
-    """Return where the panel's bake writes; None packs, for an unsaved file has no place."""
-    folder = folder_of(context)
-    if folder.startswith("//") and not bpy.data.filepath:
-        return None
-    return Path(bpy.path.abspath(folder)).resolve()
+    """Return where the panel's bake writes; None if it packs."""
+    return None if is_packed(context) else Path(bpy.path.abspath(folder_of(context))).resolve()

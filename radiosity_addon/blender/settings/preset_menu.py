@@ -8,15 +8,12 @@ import bpy
 from bl_operators.presets import AddPresetBase
 from bl_ui.utils import PresetPanel
 
-from ...options import OPTIONS
+from .option_properties import PROPERTIES
 
 FOLDER = "radiosity"
 """Below `presets`, here and among the user's scripts."""
 
-PRESET_PROPERTIES = (
-    "size_mode",
-    *(option.identifier for option in OPTIONS.values() if option.preset),
-)
+PRESET_PROPERTIES = tuple(option.identifier for option in PROPERTIES if option.preset)
 """What a preset sets, and all it sets: size, quality and method."""
 
 

@@ -1,4 +1,4 @@
-"""Charts: cutting a mesh into pieces that lie flat.
+"""Charts: cutting a mesh into flat pieces.
 
 xatlas does the cutting; only `xatlas_worker.py` imports it.
 """

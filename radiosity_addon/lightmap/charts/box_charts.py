@@ -1,4 +1,4 @@
-"""The chart grower to fall back on: faces that look along the same axis, side by side, are a chart.
+"""The fallback chart grower: connected faces that face along the same axis are a chart.
 
 Takes time in proportion to the mesh, whatever the mesh is like, where xatlas may take minutes.
 Charts are more and smaller than xatlas', and stretched up to √3 before they are set to scale.
@@ -16,7 +16,7 @@ Int = NDArray[np.int64]
 
 
 def box_charts(vertices: Float, faces: Int) -> tuple[Float, Int]:
-    """Cut a mesh into charts by the axis that each face looks along most.
+    """Cut a mesh into charts by the axis closest to each face's normal.
 
     vertices (v, 3).
     faces (n, 3) int64.

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...base import SILENT, Progress
 from ...numerics import connected_faces, double_area_vectors, numbered, signed_double_areas
 from .flatten import project, project_polygons, rescale_to_area, undo_stretch
 from .overlap import overlapping_triangles
@@ -45,24 +46,25 @@ class Charts:
     count: int
 
 
-def unwrap(triangles: Float, polygon: Int, grow: GrowCharts | None) -> Iterator[Charts]:
+def unwrap(triangles: Float, polygon: Int, grow: GrowCharts | None, progress: Progress = SILENT) -> Charts:
     """Cut an object into charts, piece by piece.
 
     triangles (n, 3, 3): Corners in world space [m].
     polygon (n,) int: The polygon of each triangle.
     grow: The chart grower; None gives every polygon a chart of its own.
-    Yields of all the triangles, with those pieces done so far; the last one is the result.
     """
     polygon = numbered(polygon)
     uv = np.zeros((len(triangles), 3, 2))
     chart = np.full(len(triangles), -1, dtype=np.int64)
-    count = 0
+    count = done = 0
     for rows in _pieces(triangles, polygon):
         piece_uv, piece_chart = _unwrap_piece(triangles[rows], polygon[rows], grow)
         uv[rows] = piece_uv
         chart[rows] = np.where(piece_chart >= 0, piece_chart + count, -1)
         count = max(count, int(chart.max()) + 1)
-        yield Charts(uv, chart, count)
+        done += len(rows)
+        progress.at(done / len(triangles))
+    return Charts(uv, chart, count)
 
 
 def _pieces(triangles: Float, polygon: Int) -> Iterator[NDArray[np.intp]]:
@@ -111,7 +113,7 @@ def _unwrap_piece(
         return uv, chart
     chart[used] = numbered(chart[used])
     uv[used] = _to_scale(uv[used], triangles[used], chart[used], own[used])
-    # Own charts were looked at already.
+    # Separate charts were checked before.
     over = _overlapping_polygons(uv, np.where(own, -1, chart), polygon)
     if not len(over):
         return uv, chart
@@ -125,7 +127,7 @@ def _unwrap_piece(
 
 
 def _overlapping_polygons(uv: Float, chart: Int, polygon: Int) -> NDArray[np.intp]:
-    """Return the triangles to cut out until, as far as is seen, no chart overlaps itself."""
+    """Return the triangles to cut out until no overlap of a chart with itself is found."""
     # Two triangles side by side cannot overlap.
     left = np.flatnonzero(chart >= 0)
     left = left[np.bincount(chart[left])[chart[left]] > 2] if len(left) else left
@@ -138,7 +140,7 @@ def _overlapping_polygons(uv: Float, chart: Int, polygon: Int) -> NDArray[np.int
 
 
 def _split_parts(uv: Float, chart: Int) -> Int:
-    """Renumber charts so that what no longer hangs together becomes charts of their own."""
+    """Renumber charts so that disconnected parts become separate charts."""
     used = np.flatnonzero(chart >= 0)
     if not len(used):
         return chart

@@ -1,4 +1,4 @@
-"""Objects that must not be destroyed right after their work: they rest for a while first.
+"""Delayed destruction of objects that must not be destroyed right after their work.
 
 xatlas ends its threads with a call that one of them misses if it is just about to wait for more
 work, and its destructor then waits for that thread for ever, with Python's lock held: the whole
@@ -18,11 +18,11 @@ REST = 0.5
 """Seconds."""
 
 MOST = max(8, min(256, 1024 // (os.cpu_count() or 1)))
-"""So many rest at once: each keeps as many threads as the machine has cores."""
+"""Maximum number of waiting objects: each keeps as many threads as the machine has cores."""
 
 
 class Resting:
-    """Keeps objects alive until they have rested; older ones go whenever a new one comes.
+    """Keeps objects alive for a while; expired ones are released when a new one arrives.
 
     rest: Seconds that each is kept at least.
     most: With more than this, `keep` waits for the oldest.
@@ -40,7 +40,7 @@ class Resting:
         self._kept: deque[tuple[float, object]] = deque()
 
     def keep(self, worked: object) -> None:
-        """Hold on to what has just done its work, and let go of what has rested."""
+        """Keep an object that has just done its work, and release expired ones."""
         self._kept.append((self._clock() + self._rest, worked))
         if len(self._kept) > self._most:
             self._sleep(max(self._kept[0][0] - self._clock(), 0.0))

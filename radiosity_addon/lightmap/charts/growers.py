@@ -1,4 +1,4 @@
-"""Cutting meshes into charts: xatlas, and what stands in for it."""
+"""Cutting meshes into charts: xatlas, and its fallback."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .box_charts import box_charts
 from .delayed_release import Resting
-from .xatlas_worker import beside_a_window, run_apart, run_xatlas
+from .xatlas_worker import WORTH_A_PROCESS, run_apart, run_xatlas
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -18,15 +18,16 @@ _resting = Resting()
 """The latest of xatlas' atlases: destroyed right after their work they may hang."""
 
 
-def grow_charts(vertices: Float, faces: Int) -> tuple[Float, Int]:
+def grow_charts(vertices: Float, faces: Int, in_window: bool = False) -> tuple[Float, Int]:
     """Cut a mesh into charts with xatlas.
 
     vertices (v, 3): At a scale where triangles are about 1 in area, welded.
     faces (n, 3) int64.
+    in_window: Whether a window is drawn meanwhile; long work is then done in another process.
     Returns uv (n, 3, 2): Stretched along u and v, each chart otherwise; charts may lie over each other.
     Returns chart (n,) int64: −1 for faces that xatlas left out.
     """
-    if beside_a_window(faces):
+    if in_window and len(faces) > WORTH_A_PROCESS:
         grown = run_apart(vertices, faces)
         if grown is not None:
             return grown
@@ -41,8 +42,8 @@ class PatientGrower:
     gave_up: Whether it came to that.
     """
 
-    def __init__(self, seconds: float) -> None:
-        self._seconds, self._spent = seconds, 0.0
+    def __init__(self, seconds: float, in_window: bool = False) -> None:
+        self._seconds, self._spent, self._in_window = seconds, 0.0, in_window
         self.gave_up = False
 
     def __call__(self, vertices: Float, faces: Int) -> tuple[Float, Int]:
@@ -51,6 +52,6 @@ class PatientGrower:
             self.gave_up = True
             return box_charts(vertices, faces)
         started = time.perf_counter()
-        grown = grow_charts(vertices, faces)
+        grown = grow_charts(vertices, faces, self._in_window)
         self._spent += time.perf_counter() - started
         return grown

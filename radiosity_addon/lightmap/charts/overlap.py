@@ -13,7 +13,7 @@ Int = NDArray[np.int64]
 
 
 def overlapping_triangles(uv: Float, chart: Int) -> NDArray[np.intp]:
-    """Return the triangles that share ground with another one of their chart.
+    """Return the triangles that overlap another one of their chart.
 
     The charts are drawn side by side at some two hundred texels a triangle, on a page of
     1448² at most; a texel's center inside two triangles gives them away. Smaller overlaps
@@ -32,8 +32,7 @@ def overlapping_triangles(uv: Float, chart: Int) -> NDArray[np.intp]:
     texel = np.concatenate([part.texel for part in pairs])
     triangle = np.concatenate([part.triangle for part in pairs])
     crowded = np.bincount(texel, minlength=resolution**2)[texel] > 1
-    found: NDArray[np.intp] = np.unique(triangle[crowded]).astype(np.intp)
-    return found
+    return np.unique(triangle[crowded]).astype(np.intp)
 
 
 def _side_by_side(uv: Float, chart: Int) -> tuple[NDArray[np.float32], int]:
@@ -43,8 +42,8 @@ def _side_by_side(uv: Float, chart: Int) -> tuple[NDArray[np.float32], int]:
     np.minimum.at(low, chart, uv.min(axis=1))
     np.maximum.at(high, chart, uv.max(axis=1))
     extent = high - low
-    wanted = float(np.clip(256 * len(uv), 2**14, 2**21))
-    scale = np.sqrt(wanted / max(float(extent.prod(axis=1).sum()), 1e-30))
+    texels_in_all = float(np.clip(256 * len(uv), 2**14, 2**21))
+    scale = np.sqrt(texels_in_all / max(float(extent.prod(axis=1).sum()), 1e-30))
     scale = min(scale, 2048 / max(float(extent.max()), 1e-30))
     size = np.ceil(extent * scale).astype(np.int64) + 1
     width = max(int(np.sqrt(size.prod(axis=1).sum())), int(size[:, 0].max()))

@@ -11,7 +11,6 @@ import io
 import os
 import subprocess
 import sys
-import threading
 from pathlib import Path
 from typing import Any
 
@@ -63,13 +62,8 @@ def run_xatlas(vertices: Float, faces: Int) -> tuple[Any, Float, Int]:
     return atlas, uv[indices].astype(np.float64) * scale, chart
 
 
-def beside_a_window(faces: Int) -> bool:
-    """Return whether this is the thread of a bake in a window and the work is long enough to block it."""
-    return threading.current_thread() is not threading.main_thread() and len(faces) > WORTH_A_PROCESS
-
-
 def run_apart(vertices: Float, faces: Int) -> tuple[Float, Int] | None:
-    """Cut a mesh into charts in a process of its own; None if none is to be had here.
+    """Cut a mesh into charts in a process of its own; None if none can be started.
 
     Parameters and results are those of `run_xatlas`, to the last bit.
     """
@@ -110,7 +104,7 @@ def _answer() -> None:
     with os.fdopen(answer, "wb") as file:
         file.write(_packed(uv, chart))
     del uv, chart
-    # Without tidying up: the atlas may hang.
+    # Without cleanup: destroying the atlas may hang.
     os._exit(0 if atlas is not None else 1)
 
 

@@ -39,7 +39,7 @@ def dilate(pixels: Float32, coverage: Bool, rings: int = 8) -> Float32:
 
 
 def fill(pixels: Float32, coverage: Bool, rings: int = 8) -> None:
-    """Fill every uncovered texel of a page where it is; they must be 0 so far."""
+    """Fill every uncovered texel of a page in place; they must be 0."""
     if not coverage.any():
         return
     filled = coverage.copy()
@@ -85,8 +85,10 @@ def _fill_coarsely(pixels: Float32, filled: Bool) -> None:
     # In bands of an even number of rows.
     band = max(BAND // width // 2, 1)
     for first in range(0, len(coarse), band):
-        some = slice(first, first + band)
-        coarse[some], known[some] = _halved(pixels[2 * first :][: 2 * band], filled[2 * first :][: 2 * band])
+        in_band = slice(first, first + band)
+        coarse[in_band], known[in_band] = _halved(
+            pixels[2 * first :][: 2 * band], filled[2 * first :][: 2 * band]
+        )
     _fill_coarsely(coarse, known)
     for first in range(0, len(coarse), band):
         rows = slice(2 * first, min(2 * (first + band), height))

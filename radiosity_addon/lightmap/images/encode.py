@@ -1,4 +1,4 @@
-"""What the numbers in a lightmap mean, and how they fit into 16 bits."""
+"""The quantities that a lightmap can hold, and their encoding in 16 bits."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from ...numerics import brdf_of_reflectance, reflected_radiance, tiles
 from .page import LightmapPage
 
 BAND = 256
-"""Rows of a page that are looked at at once."""
+"""Rows of a page processed at once."""
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 
 
 def to_quantity(irradiance: Float, reflectance: Float, emission: Float, quantity: str) -> Float:
-    """Turn irradiance into what the lightmap is to hold.
+    """Convert irradiance to the lightmap's quantity.
 
     irradiance (n, 3): H, what arrives [W/m²], linear RGB.
     reflectance, emission (n, 3): ρ and the self-emitted exitance E [W/m²] at the same points.
@@ -40,7 +40,7 @@ def to_quantity(irradiance: Float, reflectance: Float, emission: Float, quantity
 
 
 def presentable(pages: Sequence[LightmapPage], signed: bool = False) -> tuple[LightmapPage, ...]:
-    """Return pages that may be published: what is below 0 by rounding is 0 in them.
+    """Return pages that may be published: values below 0 by rounding become 0.
 
     signed: Whether they may be negative, as an error picture is.
     Raises BakeError if a value is NaN or infinite.

@@ -1,4 +1,4 @@
-"""What of the light on a surface a lighting designer reads first: least, mean, most, and how even it is."""
+"""Statistics of the light on a surface: minimum, mean, maximum and uniformity."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class LightStatistics:
 
     @property
     def uniformity(self) -> float | None:
-        """U₀, the least over the mean, as in EN 12464-1; None in the dark."""
+        """U₀, the minimum over the mean, as in EN 12464-1; None without light."""
         return self.minimum / self.mean if self.mean > 0 else None
 
     def as_dict(self) -> dict[str, float | None]:

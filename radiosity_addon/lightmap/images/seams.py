@@ -1,4 +1,4 @@
-"""Where one surface goes on in another chart: pairs of places on the page that are one place in the world.
+"""Seams, where a surface continues in another chart: pairs of places on pages, one place in the world.
 
 A seam is an edge of two triangles whose lightmap coordinates differ on its two sides. Only those
 count over which light goes on unbroken: the shading normal is the same on both sides, the surface
@@ -33,7 +33,7 @@ SAME_UV = 1e-3
 """Sides that lie closer than this on the page [texels] are one."""
 
 NEAR = 3.0
-"""A texel that far [texels] from a place on a seam has nothing to do with it."""
+"""Texels this far [texels] from a place on a seam do not belong to it."""
 
 CHUNK = 1 << 16
 """Places tested at once; bounds the temporaries to about 40 MB."""
@@ -126,7 +126,7 @@ def _in_one(geometry: TexelGeometry) -> Array:
 
 
 def _shared_edges(scene: Scene, geometry: TexelGeometry) -> tuple[Array, Array]:
-    """Return the edges of exactly two triangles that go on in each other.
+    """Return the edges of exactly two triangles that continue each other.
 
     Returns triangle (p, 2) int.
     Returns corner (p, 2, 2) int: Which of the triangle's corners are the edge's ends, in the same order on
@@ -183,12 +183,12 @@ def _own_texels_only(geometry: TexelGeometry, numbers: Array, weight: Array, at:
 
 
 def _open(geometry: TexelGeometry, caster: RayCaster, numbers: Array, weight: Array) -> Array:
-    """Return (s,) between which sides nothing stands: the texels read most see each other."""
+    """Return (s,) the places with nothing between their sides: the main texels see each other."""
     best = np.where((numbers != NO_TEXEL) & (weight > 0), weight, -1.0).argmax(axis=2)
     ends = np.take_along_axis(numbers, best[:, :, None], axis=2)[..., 0]
     at, normal, facet = geometry.position[ends], geometry.normal[ends], geometry.surface_normal[ends]
     length = np.linalg.norm(at[:, 1] - at[:, 0], axis=1)
-    turn = np.minimum(*(np.einsum("sk,sk->s", of[:, 0], of[:, 1]) for of in (normal, facet)))
+    turn = np.minimum(*(np.einsum("sk,sk->s", normals[:, 0], normals[:, 1]) for normals in (normal, facet)))
     lift = SIGHT_LIFT * caster.surface_offset + SAGITTA * length * np.sqrt(np.maximum(1.0 - turn, 0.0))
     at = at + lift[:, None, None] * normal
     along = at[:, 1] - at[:, 0]

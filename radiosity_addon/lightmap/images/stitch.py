@@ -52,16 +52,16 @@ def stitch_in_place(pages: Sequence[Float32], geometry: TexelGeometry, seams: Se
     hold = np.full(len(texel), HOLD_OUTSIDE)
     values = np.empty((len(texel), pages[0].shape[-1]), dtype=pages[0].dtype)
     own = [(slice(*on_pages[number : number + 2]), ends[number]) for number in range(len(flat))]
-    for page, index, (mine, first) in zip(flat, geometry.index, own, strict=True):
-        values[mine] = page[texel[mine] - first]
-        numbers = index.ravel()[texel[mine] - first]
+    for page, index, (on_page, first) in zip(flat, geometry.index, own, strict=True):
+        values[on_page] = page[texel[on_page] - first]
+        numbers = index.ravel()[texel[on_page] - first]
         covered = numbers != NO_TEXEL
         inside = geometry.centre_inside[numbers[covered]]
-        hold[mine][covered] = np.where(inside, HOLD_COVERED, HOLD_EDGE)
+        hold[on_page][covered] = np.where(inside, HOLD_COVERED, HOLD_EDGE)
     rows = replace(seams, texel=inverse.reshape(seams.texel.shape))
     values = stitch(values, hold, rows)
-    for page, (mine, first) in zip(flat, own, strict=True):
-        page[texel[mine] - first] = values[mine]
+    for page, (on_page, first) in zip(flat, own, strict=True):
+        page[texel[on_page] - first] = values[on_page]
     trim()
 
 

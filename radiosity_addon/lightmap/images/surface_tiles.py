@@ -1,4 +1,4 @@
-"""Where each textured triangle is in the image of its surface.
+"""Layout of textured triangles in the image of their surface.
 
 Triangles lie two by two in tiles, as right-angled ones with legs of n texels: the first in the
 lower left corner, its partner turned by half a turn in the upper right. Texel (i, j) of a
@@ -17,7 +17,7 @@ from ...numerics import Array, run_numbers
 
 MAX_LEG = 4096
 _FILLED = 0.9
-"""Of the texels allowed, tiles take this much; the rest is for what shelves leave free."""
+"""The share of the allowed texels that tiles take; the rest is for gaps in the shelves."""
 
 
 @dataclass(frozen=True)

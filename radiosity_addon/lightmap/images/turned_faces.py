@@ -1,4 +1,4 @@
-"""Objects that are lit from behind only: a lightmap holds the light on fronts, so theirs is black.
+"""Objects lit from behind only: lightmaps hold the light on fronts, so theirs are black.
 
 A wall whose normals point out of its room looks right in every render, as both sides of a surface
 show, and black once it is baked. Somebody who does not know that will look for a leak.
@@ -18,7 +18,7 @@ DARK = 0.02
 """A front that gets less than this part of its back's light is dark, …"""
 
 SEEN = 0.1
-"""… and seen to be so where the back gets at least this part of what lit sides get on average."""
+"""… if the back gets at least this part of the mean light of lit sides."""
 
 MUCH = 0.1
 """Objects are warned of where more than this part of their area is like that: walls often are one object,
@@ -28,7 +28,7 @@ and closed ones, which are dark inside, never are."""
 def turned_away(
     objects: Iterable[BakeObject], areas: Array, fronts: Array, backs: Array
 ) -> Iterator[BakeWarning]:
-    """Yield a warning for each object of which much is lit from behind.
+    """Yield a warning for each object with a large area lit from behind.
 
     objects: Those that get lightmaps.
     areas (t,) [m²].

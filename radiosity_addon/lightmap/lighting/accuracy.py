@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 
-from ...base import scaled
+from ...base import SILENT, Progress
 from ...scene import Scene
 from ...solver.gather import LocalPass
 from ..texels import TexelGeometry
@@ -27,25 +27,21 @@ def light_within(
     settings_for: Callable[[float], GatherSettings],
     error: float,
     so_far: LightSoFar | None = None,
-) -> Generator[float, None, TexelLight]:
+    progress: Progress = SILENT,
+) -> TexelLight:
     """Light the texels so that their estimated relative RMS error is at most `error`, if that can be had.
 
     Parameters
     ----------
     settings_for : callable
         How densely to gather for an error; at its limits it returns the same again.
-
-    Yields
-    ------
-    fraction : float
-        How many tries there will be is not known: each takes half of what is left.
     """
-    goal, left = error, 1.0
+    goal = error
+    # How many tries there will be is not known: each takes half of what is left.
+    turns = progress.turns(0.5)
     settings = settings_for(goal)
     for tries in range(TRIES, 0, -1):
-        steps = reconstruct(scene, local, geometry, settings, so_far)
-        light = yield from scaled(steps, 1.0 - left, 1.0 - 0.5 * left)
-        left *= 0.5
+        light = reconstruct(scene, local, geometry, settings, so_far, next(turns))
         goal *= MARGIN * error / max(light.error, 1e-9)
         before, settings = settings, settings_for(goal)
         if light.error <= error or settings == before:

@@ -8,15 +8,13 @@ and no sweep corrects them.
 
 from __future__ import annotations
 
-from collections.abc import Generator
-
 import numpy as np
 
-from ...base import scaled
+from ...base import SILENT, Progress
 from ...numerics import Array, stratified_square
 from ...solver.gather import Residual
 from ...solver.solution import Solution
-from ..texels import TexelGeometry, crossing_steps
+from ..texels import TexelGeometry, find_crossings
 from .gather_settings import GatherSettings
 from .reconstruction import CROSSED, DIRECT, GATHERED, footprints, gather_texels
 
@@ -25,9 +23,9 @@ SAMPLES = 4
 
 
 def texel_residual(
-    solution: Solution, geometry: TexelGeometry, settings: GatherSettings
-) -> Generator[float, None, Array]:
-    """Compute r of all texels, each a mean over its footprint; yields the fraction done.
+    solution: Solution, geometry: TexelGeometry, settings: GatherSettings, progress: Progress = SILENT
+) -> Array:
+    """Return r of all texels, each a mean over its footprint.
 
     Returns
     -------
@@ -35,16 +33,14 @@ def texel_residual(
         Positive where the elements are brighter than the light they send there makes the surface.
     """
     local, residual = solution.local_pass, solution.element_residual
-    direct = yield from scaled(local.direct_steps(footprints(geometry, local)), 0.0, DIRECT)
-    found = crossing_steps(geometry, local.caster, local.threads)
-    crossings = yield from scaled(found, DIRECT, CROSSED)
-    stored = gather_texels(local, geometry, settings, crossings, local.leaves_of)
-    links, _ = yield from scaled(stored, CROSSED, GATHERED)
-    arriving = links.irradiance_steps(residual.gathered(local), local.threads)
-    irradiance = direct + (yield from scaled(arriving, GATHERED, 1.0))
-    values = _residual_at(residual, geometry, irradiance)
-    yield 1.0
-    return values
+    direct = local.direct.at(footprints(geometry, local), progress=progress.part(0.0, DIRECT))
+    part = progress.part(DIRECT, CROSSED)
+    crossings = find_crossings(geometry, local.caster, local.threads, progress=part)
+    part = progress.part(CROSSED, GATHERED)
+    links, _ = gather_texels(local, geometry, settings, crossings, local.elements.leaves_of, progress=part)
+    part = progress.part(GATHERED, 1.0)
+    direct += links.irradiance(residual.gathered(local), local.threads, progress=part)
+    return _residual_at(residual, geometry, direct)
 
 
 def residual_summary(residual: Array) -> dict[str, list[float]]:

@@ -2,29 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from ...base import SILENT, Progress
 from ...numerics import Array, Scratch, tiles
 from ...solver.gather import AimedRays
 from ..points import Interpolation
-from .source_means import mean_steps
+from .source_means import mean_of_sources
 
 AIMED_ROWS = 1 << 14
 """Points whose aimed rays are looked up at once; bounds the temporaries to a few MB."""
 
 
 @dataclass(frozen=True)
-class StoredLinks:
+class GatherLinks:
     """What the gather points saw, and how they speak for the texels.
 
     Attributes
     ----------
     sources : (g, rays) int32
         Rows of the table of radiosity: texels by number, parts of elements and cells of texels after them
-        (see `HitNumbers` for what they are before the table is made); NOTHING and the sky negative.
+        (see `HitTable` for what they are before the table is made); NOTHING and the sky negative.
     spread : Interpolation
     aimed : AimedRays
         What some of the points ask apart.
@@ -34,11 +34,15 @@ class StoredLinks:
     spread: Interpolation
     aimed: AimedRays = field(default_factory=AimedRays.none)
 
-    def irradiance_steps(
-        self, table: Array, threads: int = 0, scratch: Scratch | None = None
-    ) -> Generator[float, None, Array]:
-        """Compute (n, 3) what a table of radiosity sends to the texels; yields the fraction done."""
-        mean = yield from mean_steps(table, self.sources, threads, scratch=scratch)
+    def irradiance(
+        self,
+        table: Array,
+        threads: int = 0,
+        scratch: Scratch | None = None,
+        progress: Progress = SILENT,
+    ) -> Array:
+        """Return (n, 3) what a table of radiosity sends to the texels."""
+        mean = mean_of_sources(table, self.sources, threads, scratch=scratch, progress=progress)
         return self.spread_out(table, mean, threads, scratch)
 
     def spread_out(

@@ -8,36 +8,32 @@ trace nothing, remove what the coarse hierarchy got wrong.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from ...base import scaled
+from ...base import SILENT, Progress
 from ...numerics import Array, marked, row_numbers, tiles
-from ...rays import SIGHT_LIFT, Hits, free_segment
 from ...scene import Scene
-from ...solver.gather import NOTHING, AimedRays, Footprints, Gathered, LocalPass, Resolver, values_of
-from ..points import GatherPoints, fit_steps
+from ...solver.gather import AimedRays, Footprints, Gathered, LocalPass, Resolver, values_of
+from ..points import GatherPoints, fit
 from ..texels import (
-    NO_TEXEL,
     Crossings,
     SmoothLift,
-    TexelCells,
     TexelGeometry,
-    below_hood,
-    crossing_steps,
+    find_crossings,
     texel_materials,
-    whole_neighbour,
 )
-from .gather_links import StoredLinks
+from .gather_links import GatherLinks
 from .gather_settings import GatherSettings
-from .part_links import HitNumbers, gather_parts
+from .hit_table import HitTable
 from .partial_light import LightSoFar
-from .sweeps import LitTexels, TexelLight, TexelTransport, sweep_steps
+from .sub_cells import gather_sub_cells
+from .sweeps import RelightableTexels, TexelLight, TexelTransport, sweep
 from .traced_texels import GatherPointLayout, LightingRecord
-from .warm_start import EarlierLight
+from .warm_start import WarmStart
 
 DIRECT, CROSSED, GATHERED, PARTS = 0.25, 0.3, 0.8, 0.9
 """How much is done when a part ends; rough, from rooms at medium quality."""
@@ -51,9 +47,6 @@ STARTS = 16
 FIT = 0.15
 """The part of gathering that weighs the points."""
 
-WIDE = 4.0
-"""Texels this many times wider than the median tell less of the light than leaf elements that are smaller."""
-
 
 def reconstruct(
     scene: Scene,
@@ -61,59 +54,59 @@ def reconstruct(
     geometry: TexelGeometry,
     settings: GatherSettings,
     so_far: LightSoFar | None = None,
-) -> Generator[float, None, TexelLight]:
-    """Compute direct and indirect irradiance of all texels; yields the fraction done.
+    progress: Progress = SILENT,
+) -> TexelLight:
+    """Compute direct and indirect irradiance of all texels.
 
     If `local` can ask for every light apart, what lights the texels anew is kept. `so_far` is told what is
     known on the way.
     """
     scratch = geometry.scratch
-    gains = local.new_gains(len(geometry), scratch)
+    gains = local.direct.new_gains(len(geometry), scratch)
     lamps = scratch.zeros((len(geometry), 3))
     reflectance, emission = texel_materials(scene, geometry)
     element = elements_below(local, geometry)
     if so_far is not None:
         so_far.begin(local, geometry, element, lamps, (reflectance, emission))
     tell = None if so_far is None else so_far.asked
-    direct = local.direct_steps(footprints(geometry, local), gains=gains, total=lamps, tell=tell)
-    lamps = yield from scaled(direct, 0.0, DIRECT)
-    found = crossing_steps(geometry, local.caster, local.threads)
-    crossings = yield from scaled(found, DIRECT, CROSSED)
-    cells = TexelCells(local, geometry, crossings)
-    numbers = HitNumbers(local, cells, len(geometry))
-    resolve = resolver(geometry, crossings, numbers)
-    met = None if so_far is None else partial(so_far.met, numbers)
-    stored = gather_texels(local, geometry, settings, crossings, resolve, met)
-    links, points = yield from scaled(stored, CROSSED, GATHERED)
+    at, part = footprints(geometry, local), progress.part(0.0, DIRECT)
+    lamps = local.direct.at(at, gains=gains, total=lamps, tell=tell, progress=part)
+    del at
+    part = progress.part(DIRECT, CROSSED)
+    crossings = find_crossings(geometry, local.caster, local.threads, progress=part)
+    table = HitTable(local, geometry, crossings)
+    met = None if so_far is None else partial(so_far.met, table)
+    part = progress.part(CROSSED, GATHERED)
+    links, points = gather_texels(local, geometry, settings, crossings, table.number, met, part)
     chosen = GatherPointLayout.of(points) if gains is not None else None
     # How points are found takes more than what they met says.
-    del points, stored
-    further = gather_parts(numbers, links, resolve, element, reflectance)
-    links, parts = yield from scaled(further, GATHERED, PARTS)
-    transport = TexelTransport(links, parts, reflectance)
-    start, reflected = scratch.empty((len(geometry), 3), np.float32), local.reflected()
+    del points
+    part = progress.part(GATHERED, PARTS)
+    cells, rows = gather_sub_cells(table, links, element, reflectance, progress=part)
+    transport = TexelTransport(links, cells, reflectance)
+    start, reflected = scratch.empty((len(geometry), 3), np.float32), local.elements.reflected()
     for tile in tiles(len(geometry)):
         start[tile] = values_of(reflected, element[tile])
     seen = None if so_far is None else so_far.swept
-    swept = sweep_steps(
+    light = sweep(
         transport,
         start,
         lamps,
-        local.beyond(),
+        local.elements.beyond(),
         sweeps=settings.sweeps,
         tolerance=settings.tolerance,
         threads=local.threads,
         seen=seen,
         scratch=scratch,
+        progress=progress.part(PARTS, 1.0),
     )
-    light = yield from scaled(swept, PARTS, 1.0)
     light = replace(light, state=crossings.state)
-    yield 1.0
-    if gains is None or chosen is None or local.sources is None or light.table is None:
+    progress.at(1.0)
+    if gains is None or chosen is None or local.direct.sources is None or light.table is None:
         return light
-    earlier = EarlierLight(local.sources.strengths, light.table)
-    lit = LitTexels(transport, gains, element, settings.sweeps, settings.tolerance, earlier)
-    traced = LightingRecord(settings, crossings, numbers, chosen, parts.small, local.bright, light.error)
+    warm_start = WarmStart(local.direct.sources.strengths, light.table)
+    lit = RelightableTexels(transport, gains, element, settings.sweeps, settings.tolerance, warm_start)
+    traced = LightingRecord(settings, table, chosen, rows, local.gather.bright, light.error)
     return replace(light, kept=lit, traced=traced)
 
 
@@ -123,7 +116,7 @@ def footprints(geometry: TexelGeometry, local: LocalPass) -> Footprints:
     keys, expected = scratch.empty(len(geometry), np.int32), scratch.empty(len(geometry))
     for tile in tiles(len(geometry), CHUNK):
         keys[tile] = np.arange(tile.start, tile.stop)
-        expected[tile] = local.irradiance_at(geometry.triangle[tile], geometry.barycentric[tile])
+        expected[tile] = local.elements.irradiance_at(geometry.triangle[tile], geometry.barycentric[tile])
     return Footprints(
         geometry.position,
         geometry.normal,
@@ -140,7 +133,7 @@ def elements_below(local: LocalPass, geometry: TexelGeometry) -> Array:
     """Return (n,) int32 the leaf elements below the texels, or NOTHING."""
     element = geometry.scratch.empty(len(geometry), np.int32)
     for tile in tiles(len(geometry), CHUNK):
-        element[tile] = local.leaf_at_fronts(geometry.triangle[tile], geometry.barycentric[tile])
+        element[tile] = local.elements.leaf_at_fronts(geometry.triangle[tile], geometry.barycentric[tile])
     return element
 
 
@@ -151,8 +144,9 @@ def gather_texels(
     crossings: Crossings,
     resolve: Resolver,
     met: Callable[[Array, Gathered, int], None] | None = None,
-) -> Generator[float, None, tuple[StoredLinks, GatherPoints]]:
-    """Gather at few texels, densely where others do not reach; yields the fraction done.
+    progress: Progress = SILENT,
+) -> tuple[GatherLinks, GatherPoints]:
+    """Gather at few texels, densely where others do not reach.
 
     `met` is told of texels that have gathered, and how far they are apart.
     """
@@ -161,29 +155,34 @@ def gather_texels(
     first: list[int] = []
     sources = geometry.scratch.rows(settings.rays, np.int32)
     count = 0
-    width = (1.0 - FIT) / len(settings.strides)
-    for number, stride in enumerate(settings.strides):
-        begin = number * width
-        choice = _choose(points, geometry, stride, settings.support, crossings.beside)
-        chosen = yield from scaled(choice, begin, begin + 0.2 * width)
+    for stride, level in progress.part(0.0, 1.0 - FIT).each(settings.strides):
+        part = level.part(0.0, 0.2)
+        chosen = _choose(points, geometry, stride, settings.support, crossings.beside, part)
         # Across a rim light changes by more than noise: there every ray starts from a point of its own.
         edge = crossings.crossed[chosen]
-        at, closeness = begin + 0.2 * width, []
+        done, closeness = 0.2, []
         for some, starts in ((chosen[~edge], STARTS), (chosen[edge], None)):
-            end = at + 0.8 * width * len(some) / max(len(chosen), 1)
-            rays = gather_at(local, geometry, some, starts, settings.rays, resolve, sources.more(len(some)))
-            gathered = yield from scaled(rays, at, end)
+            before, done = done, done + 0.8 * len(some) / max(len(chosen), 1)
+            gathered = gather_at(
+                local,
+                geometry,
+                some,
+                starts,
+                settings.rays,
+                resolve,
+                into=sources.more(len(some)),
+                progress=level.part(before, done),
+            )
             first.append(count)
             found.append(gathered.aimed)
             count += len(some)
             if met is not None:
                 met(some, gathered, stride)
             closeness.append(gathered.closeness)
-            at = end
         points.add(stride, np.concatenate([chosen[~edge], chosen[edge]]), np.concatenate(closeness))
-    spread = yield from scaled(fit_steps(points, geometry), 1.0 - FIT, 1.0)
+    spread = fit(points, geometry, progress.part(1.0 - FIT, 1.0))
     aimed = AimedRays.joined(found, first, geometry.scratch)
-    return StoredLinks(sources.all(), spread, aimed), points
+    return GatherLinks(sources.all(), spread, aimed), points
 
 
 def gather_at(
@@ -194,15 +193,16 @@ def gather_at(
     rays: int,
     resolve: Resolver,
     into: Array | None = None,
-) -> Generator[float, None, Gathered]:
-    """Gather at some texels; yields the fraction done. `into` (c, rays) int32 takes the sources, if given."""
+    progress: Progress = SILENT,
+) -> Gathered:
+    """Gather at some texels. `into` (c, rays) int32 takes the sources, if given."""
     at = gather_footprints(geometry, chosen, starts)
     expected, upright = (geometry.scratch.empty((len(chosen), *of)) for of in ((), (3,)))
     for tile in tiles(len(chosen), CHUNK):
         some = chosen[tile]
-        expected[tile] = local.irradiance_at(geometry.triangle[some], geometry.barycentric[some])
+        expected[tile] = local.elements.irradiance_at(geometry.triangle[some], geometry.barycentric[some])
         upright[tile] = geometry.surface_normal[some]
-    return (yield from local.gather_steps(at, upright, rays, resolve, expected, into))
+    return local.gather.at(at, upright, rays, resolve, expected, into, progress)
 
 
 def gather_footprints(geometry: TexelGeometry, chosen: Array, starts: int | None) -> Footprints:
@@ -220,9 +220,14 @@ def sample_of(geometry: TexelGeometry, chosen: Array, rows: Array, u: Array) -> 
 
 
 def _choose(
-    points: GatherPoints, geometry: TexelGeometry, stride: int, support: float, beside: Array
-) -> Generator[float, None, Array]:
-    """Find the texels on a lattice that no point so far reaches; yields the fraction done.
+    points: GatherPoints,
+    geometry: TexelGeometry,
+    stride: int,
+    support: float,
+    beside: Array,
+    progress: Progress,
+) -> Array:
+    """Find the texels on a lattice that no point so far reaches.
 
     Those beside something, (n,) bool, are chosen as well: points in the open do not know how close
     it is to them.
@@ -232,7 +237,7 @@ def _choose(
         candidates[points.texel] = False
     candidates = row_numbers(candidates)
     if len(points):
-        reached = yield from points.support_steps(candidates)
+        reached = points.support(candidates, progress)
         candidates = candidates[(reached < support) | beside[candidates]]
     return candidates
 
@@ -241,49 +246,3 @@ def on_lattice(geometry: TexelGeometry, stride: int) -> Array:
     """Return (n,) bool: the texels in every so many rows and columns of their page."""
     row, column = geometry.row, geometry.column
     return marked(len(geometry), lambda tile: (row[tile] % stride == 0) & (column[tile] % stride == 0))
-
-
-def resolver(geometry: TexelGeometry, crossings: Crossings, numbers: HitNumbers) -> Resolver:
-    """Number hits: texels by their own number, then parts of leaf elements, then cells of divided texels."""
-    wide = geometry.texel_area > (WIDE * geometry.texel_size) ** 2
-    local, cells = numbers.local, numbers.cells
-
-    def resolve(hits: Hits) -> Array:
-        texel = geometry.texel_at(hits)
-        found = texel.copy()
-        divided = np.flatnonzero((texel != NO_TEXEL) & crossings.crossed[texel])
-        # What a touched texel ends at hides a corner of it: who hits that corner is not its own.
-        touched = np.flatnonzero((texel != NO_TEXEL) & crossings.touched[texel])
-        apart = touched[~_sees_centre(local, geometry, texel[touched], hits.take(touched))]
-        divided = np.concatenate([divided, apart])
-        cell = cells.at(texel[divided], hits.take(divided))
-        found[divided] = cell + numbers.first_cell
-        without = divided[cell == NOTHING]
-        found[without] = _beside(crossings, local, texel[without], hits.take(without))
-        doubtful = np.flatnonzero((found >= 0) & wide[hits.triangle])
-        finer = local.leaf_areas(hits.take(doubtful)) < geometry.texel_area[hits.triangle[doubtful]]
-        found[doubtful[finer]] = NO_TEXEL
-        elsewhere = found == NO_TEXEL
-        part = local.parts_of(hits.take(elsewhere))
-        found[elsewhere] = np.where(part == NOTHING, NOTHING, part + len(geometry))
-        return found
-
-    return resolve
-
-
-def _beside(crossings: Crossings, local: LocalPass, texel: Array, hits: Hits) -> Array:
-    """Return (h,) what answers hits on texels without a cell for them: a neighbour, or NO_TEXEL.
-
-    NOTHING below a hood: elements do not know of hoods, and their light would be that of the open.
-    """
-    geometry, caster = crossings.geometry, local.caster
-    position = geometry.positions_of(hits)
-    below = below_hood(geometry, caster, texel, position[:, None])[:, 0]
-    found = whole_neighbour(crossings, caster, texel, position, below)
-    return np.where((found == NOTHING) & ~below, NO_TEXEL, found)
-
-
-def _sees_centre(local: LocalPass, geometry: TexelGeometry, texel: Array, hits: Hits) -> Array:
-    """Return (h,) whether nothing is between hits and the centres of their texels."""
-    lift = SIGHT_LIFT * local.caster.surface_offset * geometry.surface_normal[texel]
-    return free_segment(local.caster, geometry.positions_of(hits) + lift, geometry.position[texel] + lift)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
-
 import numpy as np
 
-from ...base import drain
-from ...numerics import Array, Scratch, chunk_steps, tiles
+from ...base import SILENT, Progress
+from ...numerics import Array, Scratch, for_chunks, tiles
 
 CHUNK_HITS = 1 << 18
 """Hits averaged at once: their values stay in the processor's cache."""
@@ -34,8 +32,8 @@ class Means:
             self._mean[rows] = 0.0
         self._known = False
 
-    def steps(self, table: Array, changed: Array) -> Generator[float, None, Array]:
-        """Compute (g, channels) the means of the table's rows; yields the fraction done.
+    def of(self, table: Array, changed: Array, progress: Progress = SILENT) -> Array:
+        """Return (g, channels) the means of the table's rows.
 
         Parameters
         ----------
@@ -57,7 +55,7 @@ class Means:
 
         if anew or changed.any():
             chunk = max(CHUNK_HITS // max(self._sources.shape[1], 1), 1)
-            yield from chunk_steps(average, len(self._sources), chunk, self._threads)
+            for_chunks(average, len(self._sources), chunk, self._threads, progress)
         self._known = True
         return self._mean
 
@@ -67,15 +65,15 @@ def by_channel(count: int, channels: int, scratch: Scratch | None = None) -> Arr
     return (scratch or Scratch()).empty((channels, count)).T
 
 
-def mean_of_sources(table: Array, sources: Array) -> Array:
-    """Return (g, 3): the mean of the table's rows each gather point saw."""
-    return drain(mean_steps(table, sources, 1))
-
-
-def mean_steps(
-    table: Array, sources: Array, threads: int, rays: int | None = None, scratch: Scratch | None = None
-) -> Generator[float, None, Array]:
-    """Compute the same, of the first `rays` alone if they are given; yields the fraction done."""
+def mean_of_sources(
+    table: Array,
+    sources: Array,
+    threads: int = 1,
+    rays: int | None = None,
+    scratch: Scratch | None = None,
+    progress: Progress = SILENT,
+) -> Array:
+    """Return (g, 3): the mean of the table's rows each gather point saw, by its first `rays` if given."""
     result = by_channel(len(sources), table.shape[1], scratch)
     columns = _columns(table)
 
@@ -83,7 +81,7 @@ def mean_steps(
         result[rows] = _mean_of(columns, sources[rows, :rays])
 
     chunk = max(CHUNK_HITS // max(sources.shape[1] if rays is None else rays, 1), 1)
-    yield from chunk_steps(average, len(sources), chunk, threads)
+    for_chunks(average, len(sources), chunk, threads, progress)
     return result
 
 

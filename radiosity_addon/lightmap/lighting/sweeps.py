@@ -1,23 +1,23 @@
 """Jacobi sweeps over the texels along stored gather hits: no ray is traced.
 
-The unknowns are the texels and the parts that gather rays met where no texel answers (`part_links.py`).
+The unknowns are the texels and the parts that gather rays met where no texel answers (`sub_cells.py`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from ...base import drain, scaled
+from ...base import SILENT, Progress
 from ...numerics import Array, Scratch, row_numbers, tiles, trim
 from ...solver.gather import LightGains
-from .gather_links import StoredLinks
-from .part_links import Parts, PartSweeps
-from .source_means import CHUNK_HITS, Means, by_channel, mean_steps
+from .gather_links import GatherLinks
+from .source_means import CHUNK_HITS, Means, by_channel, mean_of_sources
+from .sub_cells import SubCells, SubCellSweeps
 from .traced_texels import LightingRecord
-from .warm_start import EarlierLight
+from .warm_start import WarmStart
 
 TOLERANCE = 2e-4
 """Largest change of any texel, relative to the mean, at which the sweeps end by default. Most texels are
@@ -28,8 +28,8 @@ STILL = 0.1
 """A row of the table moves once it is off by this part of the tolerance: what sees only rows that rest
 need not be asked again, and most rest after a few sweeps."""
 
-SWEPT = 0.7
-"""A sweep takes the other part of the progress left: how many there will be is not known."""
+SWEPT = 0.3
+"""A sweep takes this part of the progress left: how many there will be is not known."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +43,8 @@ class TexelLight:
     error : float
         Estimate of the whole's RMS error, relative to its mean; 0 if it was not asked for.
     table : (surfaces, 3) float32 or None [W/m²]
-        What texels and parts reflected in the end.
-    kept : LitTexels or None
+        What texels and cells reflected in the end.
+    kept : RelightableTexels or None
         What lights them anew, if it is kept, …
     traced : LightingRecord or None
         … and how they were lit.
@@ -58,7 +58,7 @@ class TexelLight:
     indirect: Array
     error: float = 0.0
     table: Array | None = None
-    kept: LitTexels | None = None
+    kept: RelightableTexels | None = None
     traced: LightingRecord | None = None
     noise: Array | None = None
     state: Array | None = None
@@ -70,32 +70,32 @@ class TexelTransport:
 
     Attributes
     ----------
-    links : StoredLinks
-    parts : Parts
+    links : GatherLinks
+    cells : SubCells
     reflectance : (n, 3) float64
         Of the texels.
     """
 
-    links: StoredLinks
-    parts: Parts
+    links: GatherLinks
+    cells: SubCells
     reflectance: Array
 
 
 @dataclass(frozen=True)
-class LitTexels:
+class RelightableTexels:
     """How light gets to n texels from each light, and on from texel to texel.
 
     Attributes
     ----------
     transport : TexelTransport
-        Its parts keep gains as well.
+        Its cells keep gains as well.
     gains : LightGains
         Of the texels.
     element : (n,) int32
         The leaf element below each, whose light the sweeps start with, or NOTHING.
     sweeps, tolerance
-        As for `sweep_steps`.
-    earlier : EarlierLight
+        As for `sweep`.
+    warm_start : WarmStart
         What was solved before, the bake's own light first.
     """
 
@@ -104,10 +104,10 @@ class LitTexels:
     element: Array
     sweeps: int
     tolerance: float
-    earlier: EarlierLight
+    warm_start: WarmStart
 
 
-def sweep_steps(
+def sweep(
     transport: TexelTransport,
     start: Array,
     lamps: Array,
@@ -118,7 +118,8 @@ def sweep_steps(
     estimate: bool = True,
     seen: Callable[[Array], None] | None = None,
     scratch: Scratch | None = None,
-) -> Generator[float, None, TexelLight]:
+    progress: Progress = SILENT,
+) -> TexelLight:
     """Iterate H = direct + Σ ρ H over the stored hits, started from the hierarchy's solution.
 
     Parameters
@@ -128,8 +129,8 @@ def sweep_steps(
         What the texels reflect, by the hierarchy.
     lamps : (n, 3) float64 [W/m²]
         Irradiance of the texels straight from lamps and emissive surfaces.
-    beyond : (cells + 2, 3) float64 [W/m²]
-        Radiosity of the sky and of nothing, see `LocalPass.beyond`.
+    beyond : (sky cells + 2, 3) float64 [W/m²]
+        Radiosity of the sky and of nothing, see `table_end`.
     sweeps : int
         At most so many, …
     tolerance : float
@@ -140,42 +141,36 @@ def sweep_steps(
         Is given the (n, 3) irradiance after every sweep [W/m²], to be looked at.
     scratch : Scratch or None
         Makes the texels' arrays; None keeps them in memory.
-
-    Yields
-    ------
-    fraction : float
-        Of an unknown number of sweeps: each takes its part of what is left.
     """
     links, reflectance, texel_count = transport.links, transport.reflectance, len(lamps)
-    parts = PartSweeps(transport.parts, texel_count, threads)
+    cells = SubCellSweeps(transport.cells, texel_count, threads)
     # Columns lie one after the other in memory.
-    surfaces = texel_count + len(transport.parts.start)
+    surfaces = texel_count + len(transport.cells.start)
     table = np.zeros((surfaces + len(beyond), 3), dtype=np.float32, order="F")
     table[surfaces:] = beyond
     direct, scratch = lamps, scratch or Scratch()
     if beyond.any():
         # The sky's light is direct: its share of the same rays.
-        direct = yield from scaled(links.irradiance_steps(table, threads, scratch), 0.0, 0.1)
+        direct = links.irradiance(table, threads, scratch, progress.part(0.0, 0.1))
         for rows in tiles(texel_count):
             direct[rows] = lamps[rows] + np.maximum(direct[rows], 0.0)
 
     for rows in tiles(texel_count):
         table[rows] = start[rows]
     del start
-    table[texel_count:surfaces] = transport.parts.start
-    reached = _reached(links, parts, direct, len(beyond))
+    table[texel_count:surfaces] = transport.cells.start
+    reached = _reached(links, cells, direct, len(beyond))
     for rows in tiles(surfaces):
         table[rows][~reached[rows]] = 0.0
     del reached
-    indirect, left = scratch.zeros(direct.shape), 0.9
+    indirect = scratch.zeros(direct.shape)
     changed = np.ones(len(table), dtype=bool)
     means = Means(links.sources, table.shape[1], threads, scratch)
     still = STILL * tolerance * float(table[:texel_count].mean()) if texel_count else 0.0
-    for _ in range(sweeps):
-        parts.sweep(table, changed, still)
+    for _, turn in zip(range(sweeps), progress.part(0.1, 1.0).turns(SWEPT), strict=False):
+        cells.sweep(table, changed, still)
         table[surfaces:] = 0.0
-        mean = yield from scaled(means.steps(table, changed), 1.0 - left, 1.0 - SWEPT * left)
-        left *= SWEPT
+        mean = means.of(table, changed, turn)
         del indirect
         # What aimed rays bring is added to it.
         whole = by_channel(len(mean), table.shape[1], scratch)
@@ -219,7 +214,7 @@ def relative_error(noise: Array, *irradiance: Array) -> float:
 
 
 def estimated_noise(
-    links: StoredLinks, table: Array, threads: int = 0, scratch: Scratch | None = None
+    links: GatherLinks, table: Array, threads: int = 0, scratch: Scratch | None = None
 ) -> Array:
     """Estimate (n, 3) the error of texels' irradiance: the noise of the gather rays [W/m²].
 
@@ -229,26 +224,26 @@ def estimated_noise(
 
     Parameters
     ----------
-    links : StoredLinks
+    links : GatherLinks
     table : (rows, 3) float32
         The radiosity that the links' sources had in the end, the sky's among it.
     """
     half = links.sources.shape[1] // 2
-    whole = drain(mean_steps(table, links.sources, threads, scratch=scratch))
-    part = drain(mean_steps(table, links.sources, threads, half, scratch))
+    whole = mean_of_sources(table, links.sources, threads, scratch=scratch)
+    part = mean_of_sources(table, links.sources, threads, half, scratch)
     for rows in tiles(len(part)):
         part[rows] -= whole[rows]
     del whole
     return links.spread(part, scratch=scratch)
 
 
-def _reached(links: StoredLinks, parts: PartSweeps, direct: Array, beyond: int) -> Array:
+def _reached(links: GatherLinks, cells: SubCellSweeps, direct: Array, beyond: int) -> Array:
     """Return (table rows − beyond,) bool: what light can get to along the links, after any number of bounces.
 
     The sweeps' fixed point is 0 elsewhere. Found outright, because from what the hierarchy leaked into
     a sealed box they would only fade, by the reflectance a sweep.
     """
-    reached = parts.lit_or_unknown(direct)
+    reached = cells.lit_or_unknown(direct)
     padded = np.append(reached, np.zeros(beyond, dtype=bool))  # nothing, and the sky, whose light is direct
     aims = np.zeros(len(links.sources), dtype=bool)
     while True:
@@ -260,5 +255,5 @@ def _reached(links: StoredLinks, parts: PartSweeps, direct: Array, beyond: int) 
         links.mark_aims(aims, padded)
         more = ~padded[: len(direct)] & links.spread.any_of(aims)
         padded[: len(direct)] |= more
-        if not (parts.reach(padded) or more.any()):
+        if not (cells.reach(padded) or more.any()):
             return padded[: len(reached)]

@@ -5,11 +5,11 @@ Weights of a local linear fit in world space.
 
 from __future__ import annotations
 
-from .interpolation import GatherPoints, Interpolation, fit_steps, refit
+from .interpolation import GatherPoints, Interpolation, fit, refit
 
 __all__ = [
     "GatherPoints",
     "Interpolation",
-    "fit_steps",
+    "fit",
     "refit",
 ]

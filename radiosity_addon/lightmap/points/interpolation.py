@@ -11,13 +11,12 @@ open the reach is long, and a wall thin.
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from dataclasses import dataclass
 
 import numpy as np
 
-from ...base import drain
-from ...numerics import Array, Scratch, chunk_steps, for_chunks, run_starts, tiles
+from ...base import SILENT, Progress
+from ...numerics import Array, Scratch, for_chunks, map_chunks, run_starts, tiles
 from ...rays import SAGITTA, SIGHT_LIFT, RayCaster
 from ..texels import TexelGeometry
 from .point_grid import NONE, PointGrid
@@ -98,24 +97,24 @@ class GatherPoints:
     def kernel(self, texels: Array, point: Array) -> Array:
         """Return (p,) weights in [0, 1] of gather points for texels (p,), pair by pair; 0 out of reach."""
         geometry = self._geometry
-        of = self.texel.take(point)
-        along = geometry.position.take(of, axis=0) - geometry.position.take(texels, axis=0)
+        points_texel = self.texel.take(point)
+        along = geometry.position.take(points_texel, axis=0) - geometry.position.take(texels, axis=0)
         distance = np.sqrt(np.einsum("pk,pk->p", along, along))
         closeness = np.maximum(self.closeness.take(point), self._own_closeness(texels))
         change = distance * closeness
         # A texel that geometry cuts in two, or hoods, speaks for itself alone, and nobody for it.
-        apart = self._alone.take(of) | self._alone.take(texels)
-        weight = np.where(of == texels, np.maximum(1.0 - change / REACH, 0.0) ** 2, 0.0)
-        row = np.flatnonzero((of != texels) & (change < REACH) & ~apart)
-        start, end = texels.take(row), of.take(row)
-        normal, other = geometry.normal.take(start, axis=0), geometry.normal.take(end, axis=0)
-        bend = np.sqrt(np.maximum(1.0 - np.einsum("pk,pk->p", normal, other), 0.0))
+        apart = self._alone.take(points_texel) | self._alone.take(texels)
+        weight = np.where(points_texel == texels, np.maximum(1.0 - change / REACH, 0.0) ** 2, 0.0)
+        row = np.flatnonzero((points_texel != texels) & (change < REACH) & ~apart)
+        start, end = texels.take(row), points_texel.take(row)
+        normal, end_normal = geometry.normal.take(start, axis=0), geometry.normal.take(end, axis=0)
+        bend = np.sqrt(np.maximum(1.0 - np.einsum("pk,pk->p", normal, end_normal), 0.0))
         spoken = np.maximum(1.0 - (change[row] + bend) / REACH, 0.0) ** 2
         # Over a bulge the straight line dips below the surface, by an eighth of the distance
         # times the turn of the normal: start and end that much higher.
         lift = SIGHT_LIFT * self._caster.surface_offset + SAGITTA * distance[row] * bend
         begin = geometry.position.take(start, axis=0) + lift[:, None] * normal
-        directions = along.take(row, axis=0) + lift[:, None] * (other - normal)
+        directions = along.take(row, axis=0) + lift[:, None] * (end_normal - normal)
         length = np.sqrt(np.einsum("pk,pk->p", directions, directions))
         directions /= np.maximum(length, 1e-300)[:, None]
         heard = spoken > 0
@@ -139,25 +138,22 @@ class GatherPoints:
         farthest = 1.0 / np.maximum(self.closeness[point], 1e-300) + np.linalg.norm(along, axis=1)
         first = np.flatnonzero(np.diff(texels, prepend=-1))
         if len(first):
-            some = texels[first]
-            self.farthest[some] = np.minimum(self.farthest[some], np.minimum.reduceat(farthest, first))
+            these_texels = texels[first]
+            self.farthest[these_texels] = np.minimum(
+                self.farthest[these_texels], np.minimum.reduceat(farthest, first)
+            )
 
-    def support(self, texels: Array) -> Array:
+    def support(self, texels: Array, progress: Progress = SILENT) -> Array:
         """Return (n,) the summed weights around texels: below 1 they need a point of their own.
 
         From then on no point speaks for them that lies farther off than their neighbours allow.
         """
-        return drain(self.support_steps(texels))
-
-    def support_steps(self, texels: Array) -> Generator[float, None, Array]:
-        """Compute the same; yields the fraction done."""
         scratch = self._geometry.scratch
         total = scratch.empty(len(texels))
-        parts: dict[int, tuple[Array, Array, Array]] = {}
         kept = scratch.rows(1, np.int32), scratch.rows(1, np.int32), scratch.rows(1, np.float32)
         self._weighed = Weighed.nothing()
 
-        def weigh(rows: slice) -> None:
+        def weigh(rows: slice) -> tuple[Array, Array, Array]:
             row, point = self.pairs(texels[rows])
             self._clamp(texels[rows][row], point)
             weight = self.kernel(texels[rows][row], point)
@@ -165,13 +161,11 @@ class GatherPoints:
             reached = np.flatnonzero(weight)
             # In single precision: they are kept for all texels.
             single = weight[reached].astype(np.float32)
-            parts[rows.start] = texels[rows][row[reached]], point[reached], single
+            return texels[rows][row[reached]], point[reached], single
 
-        steps = chunk_steps(weigh, len(texels), CHUNK, self.threads)
-        for start, fraction in zip(range(0, len(texels), CHUNK), steps, strict=True):
-            for table, values in zip(kept, parts.pop(start), strict=True):
+        for _, found in map_chunks(weigh, len(texels), CHUNK, self.threads, progress):
+            for table, values in zip(kept, found, strict=True):
                 table.extend(values)
-            yield fraction
         in_order = all((np.diff(texels[rows]) > 0).all() for rows in tiles(len(texels)))
         if in_order and len(texels):
             self._weighed = Weighed(len(self._grids), texels, *(table.all()[:, 0] for table in kept))
@@ -180,7 +174,7 @@ class GatherPoints:
     def weights_of(self, texels: slice) -> tuple[Array, Array, Array]:
         """Return rows, points and weights above 0 for a run of all texels, sorted by row.
 
-        What `support_steps` weighed last is not weighed again.
+        What `support` weighed last is not weighed again.
         """
         known = self._weighed
         run = np.arange(texels.start, texels.stop)
@@ -253,26 +247,16 @@ class Interpolation:
         return slice(int(self.first[rows.start]), int(stop))
 
 
-def fit(points: GatherPoints, geometry: TexelGeometry) -> Interpolation:
-    """Weigh the gather points around every texel (see `fit_steps`)."""
-    return drain(fit_steps(points, geometry))
-
-
-def fit_steps(points: GatherPoints, geometry: TexelGeometry) -> Generator[float, None, Interpolation]:
+def fit(points: GatherPoints, geometry: TexelGeometry, progress: Progress = SILENT) -> Interpolation:
     """Weigh the gather points around every texel: a local linear fit, evaluated at the texel.
-
-    Yields
-    ------
-    fraction : float
 
     Raises
     ------
     ValueError
         If nothing speaks for a texel: it should have become a gather point itself.
     """
-    parts: dict[int, tuple[Array, Array, Array]] = {}
 
-    def weigh(rows: slice) -> None:
+    def weigh(rows: slice) -> tuple[Array, Array, Array]:
         row, point, kernel = points.weights_of(rows)
         count = np.bincount(row, minlength=rows.stop - rows.start)
         if not count.all():
@@ -280,25 +264,22 @@ def fit_steps(points: GatherPoints, geometry: TexelGeometry) -> Generator[float,
                 "a texel has no gather point in reach: the last level must take all that lack one"
             )
         along = geometry.position[points.texel[point]] - geometry.position[row + rows.start]
-        parts[rows.start] = count, point.astype(np.int32), _linear_weights(along, kernel, count)
+        return count, point.astype(np.int32), _linear_weights(along, kernel, count)
 
     scratch = geometry.scratch
     first = scratch.empty(len(geometry), np.int64)
     point, weight = scratch.rows(1, np.int32), scratch.rows(1, np.float32)
     total = 0
-    steps = chunk_steps(weigh, len(geometry), CHUNK, points.threads)
-    for start, fraction in zip(range(0, len(geometry), CHUNK), steps, strict=True):
-        count, numbers, weights = parts.pop(start)
-        first[start : start + len(count)] = total + run_starts(count)
+    for rows, (count, numbers, weights) in map_chunks(weigh, len(geometry), CHUNK, points.threads, progress):
+        first[rows] = total + run_starts(count)
         total += len(numbers)
         point.extend(numbers)
         weight.extend(weights)
-        yield fraction
     return Interpolation(first, point.all()[:, 0], weight.all()[:, 0])
 
 
 def refit(points: GatherPoints, geometry: TexelGeometry, texels: Array) -> tuple[Array, Array, Array]:
-    """Weigh the gather points around some texels, in ascending order, as `fit_steps` does.
+    """Weigh the gather points around some texels, in ascending order, as `fit` does.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Texels: the triangle of each, its place in the world, what reflects there, what cuts it.
+"""Texels: their triangles, positions and materials, and the geometry that divides them.
 
 No light yet.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from .cells import TexelCells
 from .nearest_uncut import whole_neighbour
-from .occlusion import Crossings, below_hood, crossing_steps
+from .occlusion import Crossings, below_hood, find_crossings
 from .rasterize import FOOTPRINT, coverage_sum, overlapping_pairs, rasterise
 from .states import DIVIDED, ENCLOSED, NO_TEXEL_HERE, OCCLUDED, TOUCHED
 from .surface_materials import texel_materials
@@ -28,7 +28,7 @@ __all__ = [
     "TexelGeometry",
     "below_hood",
     "coverage_sum",
-    "crossing_steps",
+    "find_crossings",
     "overlapping_pairs",
     "rasterise",
     "texel_materials",

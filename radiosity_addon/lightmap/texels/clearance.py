@@ -1,4 +1,4 @@
-"""Texels that nothing but their own plane comes near: they need no probes for what crosses them.
+"""Texels near nothing but their own plane: they need no probes for crossing geometry.
 
 Space is cut into cells a few texels wide, and every cell that a piece of a triangle may reach remembers a
 plane, or that there are several. A texel whose surroundings lie in cells of its own plane, and in
@@ -72,7 +72,7 @@ def clear_texels(
 def _surroundings(
     geometry: TexelGeometry, outset: float, height: float, clearance: float, threads: int
 ) -> tuple[Array, Array]:
-    """Return (n, 3) lower and upper bounds of what is around each texel."""
+    """Return (n, 3) lower and upper bounds of the surroundings of each texel."""
     low, high = (geometry.scratch.empty((len(geometry), 3)) for _ in range(2))
 
     def bound(part: slice) -> None:
@@ -143,12 +143,12 @@ class _Cells:
         for place in places:
             for rows in tiles(len(corners), CHUNK_PIECES):
                 owner = self._owner.take(place[rows])
-                other = np.flatnonzero(owner != triangle[rows])
-                of = owner[other]
-                apart = corners[rows].take(other, axis=0) - first.take(of, axis=0)[:, None]
-                plane = geometry.face_normals.take(of, axis=0)
+                elsewhere = np.flatnonzero(owner != triangle[rows])
+                others_triangle = owner[elsewhere]
+                apart = corners[rows].take(elsewhere, axis=0) - first.take(others_triangle, axis=0)[:, None]
+                plane = geometry.face_normals.take(others_triangle, axis=0)
                 off = _largest(np.abs(np.einsum("pck,pk->pc", apart, plane)))
-                self._several[place[rows][other[off > tolerance]]] = True
+                self._several[place[rows][elsewhere[off > tolerance]]] = True
 
     def all_flat(
         self, geometry: TexelGeometry, rows: slice, low: Array, high: Array, tolerance: float
@@ -163,15 +163,15 @@ class _Cells:
         for place in self.corners_of(low, np.minimum(high, low + self.size)):
             flat &= ~self._several.take(place)
             owner = self._owner.take(place)
-            other = np.flatnonzero(flat & (owner >= 0) & (owner != own))
-            of = owner[other]
-            plane, at = geometry.face_normals.take(of, axis=0), position.take(other, axis=0)
-            off = np.abs(np.einsum("nk,nk->n", at - geometry.triangles[of, 0], plane))
-            cosine = np.einsum("nk,nk->n", normal.take(other, axis=0), plane)
+            elsewhere = np.flatnonzero(flat & (owner >= 0) & (owner != own))
+            others_triangle = owner[elsewhere]
+            plane, at = geometry.face_normals.take(others_triangle, axis=0), position.take(elsewhere, axis=0)
+            off = np.abs(np.einsum("nk,nk->n", at - geometry.triangles[others_triangle, 0], plane))
+            cosine = np.einsum("nk,nk->n", normal.take(elsewhere, axis=0), plane)
             bend = np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
-            # The root of what rounding leaves of 1 − 1 is no bend.
-            off += reach[other] * np.where(bend < ROUNDED, 0.0, bend)
-            flat[other[off > tolerance]] = False
+            # The square root of a rounding error of 1 − 1 is not a bend.
+            off += reach[elsewhere] * np.where(bend < ROUNDED, 0.0, bend)
+            flat[elsewhere[off > tolerance]] = False
         return flat
 
 
@@ -188,16 +188,16 @@ def _pieces(triangles: Array, cells: _Cells, most: int, scratch: Scratch) -> tup
     while len(corners):
         halves = scratch.rows(9, np.float64), scratch.rows(1, np.int32)
         for rows in tiles(len(corners), CHUNK_PIECES):
-            some, of = corners[rows], triangle[rows]
-            low, high = _bounds(some)
+            chunk, chunk_triangle = corners[rows], triangle[rows]
+            low, high = _bounds(chunk)
             within = (high >= cells.low) & (low <= cells.high)
             inside = within[:, 0] & within[:, 1] & within[:, 2]
             small = _largest(high - low) <= widest
             ready, split = np.flatnonzero(inside & small), np.flatnonzero(inside & ~small)
-            done[0].extend(some[ready])
-            done[1].extend(of[ready])
-            halves[0].extend(_halved(some[split]))
-            halves[1].extend(np.repeat(of[split], 2))
+            done[0].extend(chunk[ready])
+            done[1].extend(chunk_triangle[ready])
+            halves[0].extend(_halved(chunk[split]))
+            halves[1].extend(np.repeat(chunk_triangle[split], 2))
             count += len(ready)
         corners, triangle = halves[0].all().reshape(-1, 3, 3), halves[1].all()[:, 0]
         if count + len(corners) > most + len(triangles):
@@ -207,8 +207,8 @@ def _pieces(triangles: Array, cells: _Cells, most: int, scratch: Scratch) -> tup
 
 def _bounds(corners: Array) -> tuple[Array, Array]:
     """Return (p, 3) twice: the lower and upper bounds of (p, 3, 3) triangles."""
-    one, other, third = corners[:, 0], corners[:, 1], corners[:, 2]
-    return np.minimum(np.minimum(one, other), third), np.maximum(np.maximum(one, other), third)
+    first, second, third = corners[:, 0], corners[:, 1], corners[:, 2]
+    return np.minimum(np.minimum(first, second), third), np.maximum(np.maximum(first, second), third)
 
 
 def _largest(vectors: Array) -> Array:
@@ -221,9 +221,9 @@ def _halved(corners: Array) -> Array:
     edges = corners[:, [1, 2, 0]] - corners
     longest = np.einsum("nek,nek->ne", edges, edges).argmax(axis=1)
     rows = np.arange(len(corners))
-    one, other, tip = (corners[rows, (longest + step) % 3] for step in range(3))
+    start, end, tip = (corners[rows, (longest + step) % 3] for step in range(3))
     halves = np.empty((len(corners), 2, 3, 3))
-    halves[:, 0, 0], halves[:, 1, 1] = one, other
-    halves[:, 0, 1] = halves[:, 1, 0] = 0.5 * (one + other)
+    halves[:, 0, 0], halves[:, 1, 1] = start, end
+    halves[:, 0, 1] = halves[:, 1, 0] = 0.5 * (start + end)
     halves[:, :, 2] = tip[:, None]
     return halves.reshape(-1, 3, 3)

@@ -32,13 +32,13 @@ def whole_neighbour(
     geometry = crossings.geometry
     around = np.full((len(texel), len(_AROUND)), NO_TEXEL, dtype=np.int32)
     for page, numbers in enumerate(geometry.index):
-        mine = np.flatnonzero(geometry.page[texel] == page)
-        row = geometry.row[texel[mine]][:, None] + _AROUND[:, 0]
-        column = geometry.column[texel[mine]][:, None] + _AROUND[:, 1]
+        on_page = np.flatnonzero(geometry.page[texel] == page)
+        row = geometry.row[texel[on_page]][:, None] + _AROUND[:, 0]
+        column = geometry.column[texel[on_page]][:, None] + _AROUND[:, 1]
         inside = (row >= 0) & (row < len(numbers)) & (column >= 0) & (column < len(numbers))
         last = len(numbers) - 1
         near = numbers[np.clip(row, 0, last), np.clip(column, 0, last)]
-        around[mine] = np.where(inside, near, NO_TEXEL)
+        around[on_page] = np.where(inside, near, NO_TEXEL)
     whole = (around != NO_TEXEL) & ~crossings.crossed[around]
     whole &= crossings.occluded[around] == below[:, None]
     normal = geometry.surface_normal[texel]

@@ -1,4 +1,4 @@
-"""Texels that geometry cuts in two: a wall's foot on a floor, the rim of what a box covers.
+"""Texels that geometry divides, occludes or touches.
 
 Such a texel shows the mean of both sides, as it should, but answers no ray with it: see
 `cells.py`.
@@ -11,13 +11,13 @@ and which only partly.
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from ...numerics import Array, chunk_steps, row_numbers
+from ...base import SILENT, Progress
+from ...numerics import Array, for_chunks, row_numbers
 from ...rays import SIGHT_LIFT, RayCaster
 from .clearance import clear_texels
 from .states import DIVIDED, OCCLUDED, TOUCHED
@@ -44,7 +44,7 @@ _SPOTS = np.array([[u, v] for u in (0.02, 0.5, 0.98) for v in (0.02, 0.5, 0.98)]
 
 @dataclass(frozen=True)
 class Crossings:
-    """What geometry does to n texels, (n,) bool each.
+    """The effect of geometry on n texels, (n,) bool each.
 
     cut geometry stands on them.
     touched they end at geometry; neither cut nor at a rim.
@@ -68,8 +68,8 @@ class Crossings:
         """(n,) uint8: see `TEXEL_STATES`."""
         state = np.zeros(len(self.cut), dtype=np.uint8)
         # The last one that holds counts.
-        for of, value in ((self.touched, TOUCHED), (self.occluded, OCCLUDED), (self.crossed, DIVIDED)):
-            state[of] = value
+        for flags, value in ((self.touched, TOUCHED), (self.occluded, OCCLUDED), (self.crossed, DIVIDED)):
+            state[flags] = value
         return state
 
     @cached_property
@@ -79,18 +79,19 @@ class Crossings:
 
     @cached_property
     def beside(self) -> Array:
-        """Texels next to a crossed one: what stands there takes half of what they see."""
+        """Texels next to a crossed one: geometry there blocks half of their view."""
         return self.geometry.neighbourhood(self.crossed) & ~self.alone
 
 
-def crossing_steps(
+def find_crossings(
     geometry: TexelGeometry,
     caster: RayCaster,
     threads: int = 0,
     before: Crossings | None = None,
     anew: Array | None = None,
-) -> Generator[float, None, Crossings]:
-    """Find the texels that geometry cuts, touches or hoods; yields the fraction done.
+    progress: Progress = SILENT,
+) -> Crossings:
+    """Find the texels that geometry divides, touches or occludes.
 
     Given how it was `before`, only some texels, row numbers, are tried `anew`.
     """
@@ -117,15 +118,17 @@ def crossing_steps(
         from_centre = corners - centre
         cut = ~_segments_free(caster, centre + INSET * from_centre, _EDGES)
         doubtful = ~_segments_free(caster, middle + OUTSET * (square - middle), _DIAGONALS) & ~cut
-        some = np.flatnonzero(doubtful)
-        cut[some] = ~_segments_free(caster, centre[some] + INSET * from_centre[some], _DIAGONALS)
+        uncertain = np.flatnonzero(doubtful)
+        cut[uncertain] = ~_segments_free(
+            caster, centre[uncertain] + INSET * from_centre[uncertain], _DIAGONALS
+        )
         spots = geometry.sample(rows, np.broadcast_to(_SPOTS, (len(rows), *_SPOTS.shape)), 1.0)
         below = below_hood(geometry, caster, rows, spots)
         result.rim[rows] = below.any(axis=1) & ~below.all(axis=1)
         result.occluded[rows] = below.all(axis=1) & ~cut
         result.cut[rows], result.touched[rows] = cut, doubtful & ~cut & ~result.rim[rows]
 
-    yield from chunk_steps(find, len(doubted), CHUNK, threads)
+    for_chunks(find, len(doubted), CHUNK, threads, progress)
     return result
 
 

@@ -139,12 +139,12 @@ def rasterise(uv: Float32, resolution: int, scratch: Scratch | None = None) -> T
         triangle[tile], score = owner[at], best[at]
         area[tile], centre_inside[tile] = 1.0, score >= _CENTRE
         whole = score >= _CENTRE + 1
-        some = tile.start + np.flatnonzero(whole)
-        centroid[some] = centre_weights(uv, resolution, triangle[some], row[some], column[some])
-        some = tile.start + np.flatnonzero(~whole)
-        polygon, origin, _ = _clip(uv, resolution, triangle[some], row[some], column[some])
-        area[some], middle = polygon_area_centroid(polygon)
-        centroid[some] = _weights_inside(middle[:, None], origin)[:, 0]
+        numbers = tile.start + np.flatnonzero(whole)
+        centroid[numbers] = centre_weights(uv, resolution, triangle[numbers], row[numbers], column[numbers])
+        numbers = tile.start + np.flatnonzero(~whole)
+        polygon, origin, _ = _clip(uv, resolution, triangle[numbers], row[numbers], column[numbers])
+        area[numbers], middle = polygon_area_centroid(polygon)
+        centroid[numbers] = _weights_inside(middle[:, None], origin)[:, 0]
     return Texels(resolution, uv, row, column, triangle, area, centroid, centre_inside)
 
 

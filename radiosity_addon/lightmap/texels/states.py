@@ -1,4 +1,4 @@
-"""What may be the matter with a texel."""
+"""States of texels: normal, divided, occluded, touched, enclosed."""
 
 from __future__ import annotations
 
@@ -9,5 +9,5 @@ NO_TEXEL_HERE = 255
 DIVIDED, OCCLUDED, TOUCHED, ENCLOSED = 1, 2, 3, 4
 
 TEXEL_STATES = (0, DIVIDED, OCCLUDED, TOUCHED, ENCLOSED)
-"""0: nothing is the matter. Geometry stands on the texel or a close rim is above it; something is close above
+"""0: normal. Geometry stands on the texel or a close rim is above it; something is close above
 all of it; it ends at geometry; no light reaches it because it is inside or behind something."""

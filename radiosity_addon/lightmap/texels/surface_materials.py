@@ -1,4 +1,4 @@
-"""What reflects and emits at lightmap texels: constants of their triangles, or means of images."""
+"""Reflectance and emission at lightmap texels: constants of their triangles, or means of images."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ CHUNK = 1 << 14
 """Texels looked up at once; their temporaries take about 60 MB."""
 
 WHOLE = 1.0
-"""The width of whole texels: what their light reflects from when they are seen."""
+"""The width of whole texels, whose mean reflectance counts where other surfaces see them."""
 
 __all__ = ["FOOTPRINT", "WHOLE", "texel_materials"]
 

@@ -43,7 +43,7 @@ class SmoothLift:
         return np.asarray(0.25 * np.maximum(self._opening, 0.0).sum(axis=1))
 
     def of(self, chosen: Array) -> SmoothLift:
-        """Return what lifts the starts of some texels' rays, numbered among these."""
+        """Return the lifts of the starts of selected texels' rays, numbered among these."""
         lift = copy(self)
         lift._texels = chosen if self._texels is None else self._texels[chosen]
         return lift

@@ -1,4 +1,4 @@
-"""Where every lightmap texel lies in the world, over all pages at once."""
+"""Positions of all lightmap texels of all pages in the world."""
 
 from __future__ import annotations
 
@@ -38,6 +38,7 @@ class TexelGeometry:
     scratch: Makes arrays of what else there is of each texel.
     uv, page_of_triangle, triangles, face_normals, normals: Of every scene triangle, as given.
     page (n,) int16, or int32 where there are more pages.
+    page_start (pages + 1,) int64: The first texel of each page, and n.
     row, column, triangle (n,) int32.
     share (n,) float32: What part of the texel its triangle covers.
     centre_inside (n,) bool: Whether the texel's center is on its triangle.
@@ -47,6 +48,8 @@ class TexelGeometry:
     position, normal, surface_normal (n, 3): Center of the footprint; interpolated shading normal; the
         triangle's own normal.
     """
+
+    STORED = ("page", "page_start", "triangle", "centre_inside", "index", "uv", "page_of_triangle")
 
     scratch = Scratch()
 
@@ -63,15 +66,15 @@ class TexelGeometry:
         self._scene = scene
         self.uv, self.page_of_triangle = uv, page_of_triangle
         self.triangles, self.face_normals, self.normals = scene.triangles, scene.face_normals, scene.normals
-        self._first = np.cumsum([0] + [len(page) for page in texels])
-        count = int(self._first[-1])
+        self.page_start = np.cumsum([0] + [len(page) for page in texels])
+        count = int(self.page_start[-1])
         self.index = []
         """per page (height, width) int32: the texel's number, or NO_TEXEL"""
         for number, page in enumerate(texels):
             numbers = np.full((page.resolution,) * 2, NO_TEXEL, dtype=np.int32)
             for tile in tiles(len(page)):
                 own = np.arange(tile.start, tile.stop)
-                numbers[page.row[tile], page.column[tile]] = self._first[number] + own
+                numbers[page.row[tile], page.column[tile]] = self.page_start[number] + own
             self.index.append(numbers)
         self.texels = self._joined(texels)
         self.page = scratch.empty(count, np.int16 if len(texels) <= np.iinfo(np.int16).max else np.int32)
@@ -82,7 +85,7 @@ class TexelGeometry:
         self.position, self.normal = scratch.empty((count, 3)), scratch.empty((count, 3))
         for number, (of, page) in enumerate(zip(rows, self.texels, strict=True)):
             for tile in tiles(len(page), CHUNK):
-                mine = slice(self._first[number] + tile.start, self._first[number] + tile.stop)
+                mine = slice(self.page_start[number] + tile.start, self.page_start[number] + tile.stop)
                 triangle = of[page.triangle[tile]]
                 self.page[mine], self.triangle[mine] = number, triangle
                 self.whole[mine] = page.area[tile] >= 1.0
@@ -100,12 +103,12 @@ class TexelGeometry:
         whole = {}
         for name in names:
             parts = [getattr(page, name) for page in texels]
-            whole[name] = self.scratch.empty(int(self._first[-1]), parts[0].dtype if parts else np.int32)
-            for first, part in zip(self._first, parts, strict=False):
+            whole[name] = self.scratch.empty(int(self.page_start[-1]), parts[0].dtype if parts else np.int32)
+            for first, part in zip(self.page_start, parts, strict=False):
                 for tile in tiles(len(part)):
                     whole[name][first + tile.start : first + tile.stop] = part[tile]
         self.row, self.column, self.centre_inside, self.share = (whole[name] for name in names)
-        rows = [slice(first, first + len(page)) for first, page in zip(self._first, texels, strict=False)]
+        rows = [slice(first, first + len(page)) for first, page in zip(self.page_start, texels, strict=False)]
         return [
             replace(
                 page,
@@ -147,8 +150,8 @@ class TexelGeometry:
         """(t,) int64: how many texels each triangle has."""
         found = np.zeros(len(self.triangles), dtype=np.int64)
         for tile in tiles(len(self)):
-            some, count = np.unique(self.triangle[tile], return_counts=True)
-            found[some] += count
+            triangles, count = np.unique(self.triangle[tile], return_counts=True)
+            found[triangles] += count
         return found
 
     @cached_property
@@ -171,14 +174,10 @@ class TexelGeometry:
         rows = [np.flatnonzero(self.page_of_triangle == page) for page in range(len(self.texels))]
         return TexelGeometry(scene, self.uv, self.page_of_triangle, self.texels, rows, self.scratch)
 
-    def first(self, page: int) -> int:
-        """Return the number of a page's first texel."""
-        return int(self._first[page])
-
     def sample(self, rows: Array, u: Array, width: float = FOOTPRINT) -> Array:
         """Return (r, k, 3) points spread over the middle `width` of r texels by u (r, k, 2)."""
         points = np.empty((len(rows), u.shape[1], 3))
-        # What is inside a texel that is whole on its triangle needs no clipping.
+        # Texels that lie entirely on their triangle need no clipping.
         inner = self.whole[rows] & ((width < 1.0) | ((u > 0.0) & (u < 1.0)).all(axis=(1, 2)))
         plain, cut = np.flatnonzero(inner), np.flatnonzero(~inner)
         points[plain] = self._in_plane(rows[plain], 0.5 + (u[plain].astype(np.float64) - 0.5) * width)
@@ -234,12 +233,12 @@ class TexelGeometry:
         """Return (r, k, 3) the barycentric weights of the same points in the texels' triangles."""
         weights = np.empty((len(rows), u.shape[1], 3))
         for number, page in enumerate(self.texels):
-            mine = np.flatnonzero(self.page[rows] == number)
-            if len(mine) == 0:
+            on_page = np.flatnonzero(self.page[rows] == number)
+            if len(on_page) == 0:
                 continue
-            local = rows[mine] - self._first[number]
-            inside = sample_footprints(page.take(local), u[mine], width)
-            weights[mine] = self._drawn_in(inside, self.triangle[rows[mine]])
+            local = rows[on_page] - self.page_start[number]
+            inside = sample_footprints(page.take(local), u[on_page], width)
+            weights[on_page] = self._drawn_in(inside, self.triangle[rows[on_page]])
         return weights
 
     def _drawn_in(self, weights: Array, triangle: Array) -> Array:
@@ -252,9 +251,9 @@ class TexelGeometry:
         """Grow a (n,) mask of texels by one texel in all eight directions of their page."""
         grown = np.empty(len(self), dtype=bool)
         for page, (numbers, inside) in enumerate(zip(self.index, self._framed, strict=True)):
-            mine = slice(self._first[page], self._first[page + 1])
+            on_page = slice(self.page_start[page], self.page_start[page + 1])
             image = np.zeros((len(numbers) + 2, numbers.shape[1] + 2), dtype=bool)
-            flat, own, result = image.ravel(), chosen[mine], grown[mine]
+            flat, own, result = image.ravel(), chosen[on_page], grown[on_page]
             for tile in tiles(len(inside)):
                 flat[inside[tile]] = own[tile]
             image[1:-1] = image[1:-1] | image[:-2] | image[2:]
@@ -265,7 +264,7 @@ class TexelGeometry:
 
     @cached_property
     def _framed(self) -> list[Array]:
-        """Per page, where its texels lie in a page that is one texel larger all around, row by row."""
+        """Per page, the positions of its texels in a page with a border of one texel, row by row."""
         framed = [self.scratch.empty(len(page), np.int32) for page in self.texels]
         for page, places in zip(self.texels, framed, strict=True):
             for tile in tiles(len(page)):
@@ -290,11 +289,11 @@ class TexelGeometry:
         row = place[:, 1] + second * place[:, 3] + third * place[:, 5]
         page = self.page_of_triangle[triangle] if len(self.index) > 1 else None
         for number, numbers in enumerate(self.index):
-            mine = slice(None) if page is None else np.flatnonzero(page == number)
+            on_page = slice(None) if page is None else np.flatnonzero(page == number)
             last = np.float32(len(numbers) - 1)
-            at = np.clip(row[mine], 0, last).astype(np.int64) * len(numbers)
-            at += np.clip(column[mine], 0, last).astype(np.int64)
-            found[rows[mine]] = numbers.ravel()[at]
+            at = np.clip(row[on_page], 0, last).astype(np.int64) * len(numbers)
+            at += np.clip(column[on_page], 0, last).astype(np.int64)
+            found[rows[on_page]] = numbers.ravel()[at]
         return found
 
     @cached_property

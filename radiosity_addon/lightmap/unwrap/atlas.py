@@ -7,14 +7,14 @@ Otherwise each object's kept layout is packed, as one chart of unchanged shape, 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base import BakeError, BakeWarning
+from ...base import SILENT, BakeError, BakeWarning, Progress
 from ...numerics import signed_double_areas, triangle_areas
 from ..charts import Charts, PatientGrower, rescale_to_area, unwrap
 from ..texels import coverage_sum
@@ -133,8 +133,8 @@ class _Layout:
     kept: bool
 
 
-def build_atlas(objects: Sequence[AtlasInput], options: AtlasOptions) -> Iterator[float | Atlas]:
-    """Lay out all objects; yields the fraction done now and then, and at the end the `Atlas`.
+def build_atlas(objects: Sequence[AtlasInput], options: AtlasOptions, progress: Progress = SILENT) -> Atlas:
+    """Lay out all objects.
 
     Parameters
     ----------
@@ -155,18 +155,12 @@ def build_atlas(objects: Sequence[AtlasInput], options: AtlasOptions) -> Iterato
     # A density's page is not known yet, and may be as large as any.
     probe = _PROBE if options.texel_density is not None else min(options.resolution, _PROBE)
     for source in objects:
-        layout = None
-        for layout in _lay_flat(source, probe, warnings, options.unwrap_seconds):
-            share = float((layout.charts.chart >= 0).mean()) if len(source.triangles) else 0.0
-            yield 0.7 * (done + share * len(source.triangles)) / max(total, 1)
-        assert layout is not None
-        layouts.append(layout)
-        done += len(source.triangles)
+        before, done = done, done + len(source.triangles)
+        part = progress.part(0.7 * before / max(total, 1), 0.7 * done / max(total, 1))
+        layouts.append(_lay_flat(source, probe, warnings, options.unwrap_seconds, part))
+        part.at(1.0)
 
-    for laid in _lay_on_pages(layouts, options):
-        if laid is None:
-            yield 0.7
-    assert laid is not None
+    laid = _lay_on_pages(layouts, options, progress.part(0.7, 1.0))
     placed: list[AtlasObject | None] = [None] * len(layouts)
     for number, (group, packing) in enumerate(laid):
         if packing.crowded:
@@ -175,7 +169,7 @@ def build_atlas(objects: Sequence[AtlasInput], options: AtlasOptions) -> Iterato
         for each, uv in zip(group, np.split(packing.uv, ends[:-1]), strict=True):
             placed[each] = AtlasObject(uv, number)
     pages = tuple(_page(packing) for _, packing in laid)
-    yield Atlas(tuple(each for each in placed if each is not None), pages, tuple(warnings))
+    return Atlas(tuple(each for each in placed if each is not None), pages, tuple(warnings))
 
 
 def run_atlas(
@@ -185,18 +179,16 @@ def run_atlas(
     shared: bool = True,
     **options: Any,
 ) -> Atlas:
-    """Run `build_atlas` through and return the `Atlas`."""
-    *_, result = build_atlas(objects, AtlasOptions(resolution, texel_density, shared, **options))
-    assert isinstance(result, Atlas)
-    return result
+    """Return the `Atlas` by some options."""
+    return build_atlas(objects, AtlasOptions(resolution, texel_density, shared, **options))
 
 
 _Laid = list[tuple[list[int], Packing]]
 """Per page the numbers of its objects, and how they lie there."""
 
 
-def _lay_on_pages(layouts: list[_Layout], options: AtlasOptions) -> Iterator[_Laid | None]:
-    """Pack objects on as many pages as are asked for or needed; None now and then, at last the pages."""
+def _lay_on_pages(layouts: list[_Layout], options: AtlasOptions, progress: Progress) -> _Laid:
+    """Pack objects on as many pages as are asked for or needed."""
     density = options.texel_density
     surfaces = [_surface([layout]) * layout.source.scale**2 for layout in layouts]
     count = len(layouts)
@@ -212,20 +204,14 @@ def _lay_on_pages(layouts: list[_Layout], options: AtlasOptions) -> Iterator[_La
         laid: _Laid = []
         try:
             for group in groups:
-                packing = None
-                for trial in _pack_group([layouts[each] for each in group], options):
-                    packing = trial or packing
-                    yield None
-                assert packing is not None
-                laid.append((group, packing))
+                laid.append((group, _pack_group([layouts[each] for each in group], options, progress)))
         except BakeError:
             # What does not fit at the density asked for may fit on more pages.
             if density is None or len(groups) == len(layouts):
                 raise
             count = max(count, len(groups)) + 1
             continue
-        yield laid
-        return
+        return laid
 
 
 def _extents(charts: Charts) -> Float:
@@ -239,31 +225,27 @@ def _extents(charts: Charts) -> Float:
     return extents
 
 
-def _pack_group(group: list[_Layout], options: AtlasOptions) -> Iterator[Packing | None]:
+def _pack_group(group: list[_Layout], options: AtlasOptions, progress: Progress) -> Packing:
     """Lay out one page, its kept UVs as they are where that is possible."""
     kept = _kept_as_they_are(group, options.resolution, options.texel_density, options.limits.side)
     if kept is not None:
-        yield kept
-        return
-    yield from _pack_page(group, options.resolution, options.texel_density, options.limits)
+        return kept
+    return _pack_page(group, options.resolution, options.texel_density, options.limits, progress)
 
 
 def _lay_flat(
-    source: AtlasInput, probe: int, warnings: list[BakeWarning], seconds: float
-) -> Iterator[_Layout]:
+    source: AtlasInput, probe: int, warnings: list[BakeWarning], seconds: float, progress: Progress
+) -> _Layout:
     """Cut one object into charts, or take the UVs it has."""
     triangles = np.asarray(source.triangles, dtype=np.float64).reshape(-1, 3, 3)
     if source.uv is not None:
         kept = _kept_charts(source, triangles, probe, warnings)
         if kept is not None:
-            yield _Layout(source, _scaled(kept, source.scale), kept=True)
-            return
+            return _Layout(source, _scaled(kept, source.scale), kept=True)
     if not len(triangles):
-        yield _Layout(source, Charts(np.zeros((0, 3, 2)), np.zeros(0, dtype=np.int64), 0), kept=False)
-        return
-    grower = PatientGrower(seconds)
-    for charts in unwrap(triangles, np.asarray(source.polygon, dtype=np.int64), grower):
-        yield _Layout(source, _scaled(charts, source.scale), kept=False)
+        return _Layout(source, Charts(np.zeros((0, 3, 2)), np.zeros(0, dtype=np.int64), 0), kept=False)
+    grower = PatientGrower(seconds, progress.in_window)
+    charts = unwrap(triangles, np.asarray(source.polygon, dtype=np.int64), grower, progress)
     if grower.gave_up:
         warnings.append(
             BakeWarning(
@@ -273,6 +255,7 @@ def _lay_flat(
                 "keep UVs, or simplify it",
             )
         )
+    return _Layout(source, _scaled(charts, source.scale), kept=False)
 
 
 def _scaled(charts: Charts, scale: float) -> Charts:
@@ -347,8 +330,8 @@ def _apart(layouts: list[Float32], resolution: int) -> bool:
 
 
 def _pack_page(
-    group: list[_Layout], resolution: int, density: float | None, limits: Limits
-) -> Iterator[Packing | None]:
+    group: list[_Layout], resolution: int, density: float | None, limits: Limits, progress: Progress
+) -> Packing:
     """Pack the charts of several objects together; triangles without area get a harmless place."""
     uv = np.concatenate([layout.charts.uv for layout in group])
     first = np.cumsum([0] + [layout.charts.count for layout in group])
@@ -360,16 +343,12 @@ def _pack_page(
     )
     used = np.flatnonzero(chart >= 0)
     if not len(used):
-        yield Packing(np.full(uv.shape, 0.5, dtype=np.float32), resolution if density is None else 4, 0.0)
-        return
-    for packing in pack(uv[used], chart[used], resolution, density, limits):
-        if packing is None:
-            yield None
-            continue
-        pages = np.empty(uv.shape, dtype=np.float32)
-        pages[used] = packing.uv
-        _park(pages, chart, [len(layout.source.triangles) for layout in group])
-        yield Packing(pages, packing.resolution, packing.density, packing.crowded)
+        return Packing(np.full(uv.shape, 0.5, dtype=np.float32), resolution if density is None else 4, 0.0)
+    packing = pack(uv[used], chart[used], resolution, density, limits, progress)
+    pages = np.empty(uv.shape, dtype=np.float32)
+    pages[used] = packing.uv
+    _park(pages, chart, [len(layout.source.triangles) for layout in group])
+    return Packing(pages, packing.resolution, packing.density, packing.crowded)
 
 
 def _park(uv: Float32, chart: Int, lengths: list[int]) -> None:

@@ -9,13 +9,12 @@ a limit on time, and cannot be run twice on one atlas (docs/decisions/0005).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base import BakeError
+from ...base import SILENT, BakeError, Progress
 from ...numerics import signed_double_areas
 from ...options import MAX_RESOLUTION
 from .chart_profiles import Shapes, align, measure, outline
@@ -118,8 +117,13 @@ class _Job:
 
 
 def pack(
-    uv: Float, chart: Int, resolution: int, density: float | None, limits: Limits | None = None
-) -> Iterator[Packing | None]:
+    uv: Float,
+    chart: Int,
+    resolution: int,
+    density: float | None,
+    limits: Limits | None = None,
+    progress: Progress = SILENT,
+) -> Packing:
     """Pack charts into a square page.
 
     Parameters
@@ -133,12 +137,8 @@ def pack(
     density : float or None
         Texels per metre; the page becomes the smallest square multiple of 4 that holds it.
     limits : Limits or None
-
-    Yields
-    ------
-    Packing or None
-        After each trial (so that a caller can breathe) the best so far, if there is one yet;
-        the last one is the result.
+    progress : Progress
+        How many trials there will be is not known: it stays where it is.
 
     Raises
     ------
@@ -147,14 +147,12 @@ def pack(
     """
     job = _job(uv, chart, limits or Limits())
     if density is not None:
-        yield _pack_at(job, density)
-        return
-    packing, finer = None, resolution
-    while packing is None:
-        for packing in _pack_into(job, finer, resolution):
-            yield packing
+        return _pack_at(job, density)
+    finer = resolution
+    while (packing := _pack_into(job, finer, resolution, progress)) is None:
         # Too small to keep the charts apart: pack a finer page and shrink it.
         finer *= 2
+    return packing
 
 
 def _job(uv: Float, chart: Int, limits: Limits) -> _Job:
@@ -197,8 +195,8 @@ def _measured(job: _Job, scale: Float, cell: int) -> tuple[Float, Shapes]:
     return cells, measure(job.edges * cells[job.owner][:, None], job.owner, job.extent * cells)
 
 
-def _pack_into(job: _Job, resolution: int, page: int) -> Iterator[Packing | None]:
-    """Look for the largest scale that fits a page of `resolution`; None as long as none does.
+def _pack_into(job: _Job, resolution: int, page: int, progress: Progress) -> Packing | None:
+    """Look for the largest scale that fits a page of `resolution`; None if none does.
 
     `page` is the page's real size when `resolution` is a finer stand-in for it.
     """
@@ -206,7 +204,7 @@ def _pack_into(job: _Job, resolution: int, page: int) -> Iterator[Packing | None
     side = resolution // cell - 2 * job.limits.border(cell)
     count = len(job.extent)
     if side < 1:
-        return
+        return None
     full = resolution / float(np.sqrt(job.area))
     best: Packing | None = None
     low, scale, trials = 0.0, 0.85 * full, int(np.clip(6000 // count, 6, 40))
@@ -220,7 +218,7 @@ def _pack_into(job: _Job, resolution: int, page: int) -> Iterator[Packing | None
                 best = _packing(_moved(job, scaled, placement, cell) * cell, resolution, page, scale)
             else:
                 high = scale
-            yield best
+            progress.at(0.0)
             if low == 0.0:
                 if high * job.extent.max() < SMALLEST:
                     break
@@ -231,9 +229,10 @@ def _pack_into(job: _Job, resolution: int, page: int) -> Iterator[Packing | None
             else:
                 scale = float(np.sqrt(low * high))
         if low == 0.0:
-            return
+            return best
         # Another stretch is worth a search only if it beats the best so far.
         scale = low * 1.002
+    return best
 
 
 def _pack_at(job: _Job, density: float) -> Packing:

@@ -6,10 +6,10 @@ Everything else keeps what its rays met.
 from __future__ import annotations
 
 from .affected import AffectedTexels
-from .moved import PreviousLight, moved_steps
+from .moved import PreviousLight, light_after_move
 
 __all__ = [
     "AffectedTexels",
     "PreviousLight",
-    "moved_steps",
+    "light_after_move",
 ]

@@ -7,36 +7,34 @@ texels, for indirect light changes everywhere.
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...base import scaled
+from ...base import SILENT, Progress
 from ...numerics import Array
 from ...solver.gather import LocalPass, values_of
 from ..lighting import (
-    EarlierLight,
+    GatherLinks,
     GatherPointLayout,
-    HitNumbers,
+    HitTable,
     LightingRecord,
-    LitTexels,
-    PartHits,
-    Parts,
-    StoredLinks,
+    RelightableTexels,
+    SubCells,
+    TableRows,
     TexelLight,
     TexelTransport,
-    gather_parts,
-    resolver,
-    sweep_steps,
+    WarmStart,
+    gather_sub_cells,
+    sweep,
 )
-from ..texels import TexelCells, crossing_steps
+from ..texels import find_crossings
 from .affected import AffectedTexels
 from .moved_light import texel_gains
-from .moved_parts import known_parts, look_again, renumbered
 from .moved_points import MovedPoints
+from .moved_sub_cells import known_sub_cells, renumbered, trace_again
 
-DIRECT, CROSSED, GATHERED, PARTS = 0.2, 0.25, 0.65, 0.85
+DIRECT, CROSSED, GATHERED, KNOWN, PARTS = 0.2, 0.25, 0.65, 0.8, 0.85
 """How much is done when a part ends; rough, from rooms at medium quality."""
 
 
@@ -46,21 +44,21 @@ class PreviousLight:
 
     Attributes
     ----------
-    lit : LitTexels
+    lit : RelightableTexels
     traced : LightingRecord
     local : LocalPass
         Of the scene as it was.
     """
 
-    lit: LitTexels
+    lit: RelightableTexels
     traced: LightingRecord
     local: LocalPass
 
 
-def moved_steps(
-    before: PreviousLight, local: LocalPass, affected: AffectedTexels
-) -> Generator[float, None, tuple[TexelLight, LocalPass]]:
-    """Light the texels of a scene in which something moved; yields the fraction done.
+def light_after_move(
+    before: PreviousLight, local: LocalPass, affected: AffectedTexels, progress: Progress = SILENT
+) -> tuple[TexelLight, LocalPass]:
+    """Light the texels of a scene in which something moved.
 
     Parameters
     ----------
@@ -77,20 +75,18 @@ def moved_steps(
         With elements that are lit as their texels are.
     """
     lit, traced, geometry = before.lit, before.traced, affected.geometry
-    asked = texel_gains(lit.gains, local, before.local, affected)
-    gains = yield from scaled(asked, 0.0, DIRECT)
-    direct = local.lit_by(gains)
-    more = direct - local.lit_by(lit.gains)
+    gains = texel_gains(lit.gains, local, before.local, affected, progress.part(0.0, DIRECT))
+    direct = local.direct.lit_by(gains)
+    more = direct - local.direct.lit_by(lit.gains)
     local = _brightened(local, lit.element, more)
     near = np.flatnonzero(affected.near)
-    found = crossing_steps(geometry, local.caster, local.threads, traced.crossings, near)
-    crossings = yield from scaled(found, DIRECT, CROSSED)
-    numbers = HitNumbers(local, TexelCells(local, geometry, crossings), len(geometry))
-    resolve = resolver(geometry, crossings, numbers)
-    divided = affected.divided(traced.crossings, crossings)
-    now = affected.renumbered(traced, numbers, divided)
+    part = progress.part(DIRECT, CROSSED)
+    crossings = find_crossings(geometry, local.caster, local.threads, traced.table.crossings, near, part)
+    table = HitTable(local, geometry, crossings)
+    divided = affected.divided(traced.table.crossings, crossings)
+    number_now = affected.renumbered(traced.table, table, divided)
 
-    bright = traced.bright | local.bright
+    bright = traced.bright | local.gather.bright
     moved_points = MovedPoints(
         local,
         before=before.local,
@@ -98,87 +94,84 @@ def moved_steps(
         settings=traced.settings,
         crossings=crossings,
         divided=divided,
-        resolve=resolve,
+        resolve=table.number,
         bright=bright,
     )
-    stored = moved_points.steps(_renumbered(lit.transport.links, traced, now), traced.points)
-    links, points = yield from scaled(stored, CROSSED, GATHERED)
+    old, part = _renumbered(lit.transport.links, traced.rows, number_now), progress.part(CROSSED, GATHERED)
+    links, points = moved_points.gather(old, traced.points, part)
 
-    known: list[PartHits] = []
-    kept = known_parts(lit.transport.parts.links, traced, numbers, now)
-    at, width = GATHERED, (PARTS - GATHERED) / (len(kept) + 1)
-    for some in kept:
-        again = look_again(some, numbers, before.local, affected, resolve)
-        known.append((yield from scaled(again, at, at + width)))
-        at += width
-    reflectance = lit.transport.reflectance
-    further = gather_parts(numbers, links, resolve, lit.element, reflectance, known)
-    links, parts = yield from scaled(further, at, PARTS)
+    kept = known_sub_cells(lit.transport.cells.links, traced.rows, table, number_now)
+    known = [
+        trace_again(hits, table, before.local, affected, part)
+        for hits, part in progress.part(GATHERED, KNOWN).each(kept)
+    ]
+    reflectance, part = lit.transport.reflectance, progress.part(KNOWN, PARTS)
+    cells, rows = gather_sub_cells(table, links, lit.element, reflectance, known, part)
 
-    transport = TexelTransport(links, parts, reflectance)
+    transport = TexelTransport(links, cells, reflectance)
     chosen, error = GatherPointLayout.of(points), traced.error
-    traced = LightingRecord(traced.settings, crossings, numbers, chosen, parts.small, bright, error)
-    start = _start(before, traced, local, parts, now)
+    traced = LightingRecord(traced.settings, table, chosen, rows, bright, error)
+    start = _start(before, traced, local, cells, number_now)
     of_texels = np.maximum(start[: len(geometry)] + reflectance * more, 0.0)
-    transport = replace(transport, parts=replace(parts, start=start[len(geometry) :]))
-    swept = sweep_steps(
+    transport = replace(transport, cells=replace(cells, start=start[len(geometry) :]))
+    light = sweep(
         transport,
         of_texels,
         direct,
-        local.beyond(),
+        local.elements.beyond(),
         sweeps=lit.sweeps,
         tolerance=lit.tolerance,
         threads=local.threads,
         estimate=False,
         scratch=geometry.scratch,
+        progress=progress.part(PARTS, 1.0),
     )
-    light = yield from scaled(swept, PARTS, 1.0)
-    assert local.sources is not None  # it asks for lights apart
+    assert local.direct.sources is not None  # it asks for lights apart
     assert light.table is not None
-    earlier = EarlierLight(local.sources.strengths, light.table)
-    lit = replace(lit, transport=transport, gains=gains, earlier=earlier)
+    warm_start = WarmStart(local.direct.sources.strengths, light.table)
+    lit = replace(lit, transport=transport, gains=gains, warm_start=warm_start)
     light = replace(light, error=error, kept=lit, traced=traced)
     return light, _lit_as(local, lit.element, light)
 
 
-def _renumbered(links: StoredLinks, traced: LightingRecord, now: Array) -> StoredLinks:
+def _renumbered(links: GatherLinks, rows: TableRows, number_now: Array) -> GatherLinks:
     """Return stored links with sources as hits are numbered now."""
-    aimed = replace(links.aimed, sources=renumbered(traced.numbered(links.aimed.sources), now))
-    return replace(links, sources=renumbered(traced.numbered(links.sources), now), aimed=aimed)
+    aimed = replace(links.aimed, sources=renumbered(rows.numbers(links.aimed.sources), number_now))
+    return replace(links, sources=renumbered(rows.numbers(links.sources), number_now), aimed=aimed)
 
 
 def _brightened(local: LocalPass, element: Array, more: Array) -> LocalPass:
     """Add what texels get more of lamps, (n, 3) [W/m²], to their elements' light, in the mean."""
     change, _ = _means(local, element, more)
-    return local.with_irradiance(np.maximum(local.state.irradiance + change, 0.0))
+    return local.with_irradiance(np.maximum(local.elements.state.irradiance + change, 0.0))
 
 
 def _lit_as(local: LocalPass, element: Array, light: TexelLight) -> LocalPass:
     """Give elements the mean light of their texels, where they have any."""
     mean, count = _means(local, element, light.direct + light.indirect)
-    return local.with_irradiance(np.where(count[:, None] > 0, mean, local.state.irradiance))
+    return local.with_irradiance(np.where(count[:, None] > 0, mean, local.elements.state.irradiance))
 
 
 def _means(local: LocalPass, element: Array, values: Array) -> tuple[Array, Array]:
     """Return (e, 3) texels' mean values over elements, and (e,) how many texels there are."""
-    rows, total = element >= 0, local.hierarchy.n_elements
+    rows, total = element >= 0, local.elements.hierarchy.n_elements
     count = np.bincount(element[rows], minlength=total)
     sums = [np.bincount(element[rows], values[rows, channel], minlength=total) for channel in range(3)]
     return np.stack(sums, axis=1) / np.maximum(count, 1)[:, None], count
 
 
 def _start(
-    before: PreviousLight, traced: LightingRecord, local: LocalPass, parts: Parts, now: Array
+    before: PreviousLight, traced: LightingRecord, local: LocalPass, cells: SubCells, number_now: Array
 ) -> Array:
     """Return (rows, 3) what surfaces reflect to start with: what they did, or what the hierarchy says."""
-    element = np.concatenate([before.lit.element, parts.element])
-    start = values_of(local.reflected(), element)
-    old = before.traced
-    number = now[old.numbered(np.arange(old.row_count))]
+    element = np.concatenate([before.lit.element, cells.element])
+    start = values_of(local.elements.reflected(), element)
+    old, rows = before.traced.rows, traced.rows
+    number = number_now[old.numbers(np.arange(len(old)))]
     stands = number >= 0
-    place = np.full(traced.numbers.end, -1)
-    place[traced.numbered(np.arange(traced.row_count))] = np.arange(traced.row_count)
+    place = np.full(traced.table.end, -1)
+    place[rows.numbers(np.arange(len(rows)))] = np.arange(len(rows))
     row = place[number[stands]]
     known = row >= 0
-    start[row[known]] = before.lit.earlier.baked[stands][known]
+    start[row[known]] = before.lit.warm_start.baked[stands][known]
     return start

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 
-from ...base import scaled
+from ...base import Progress
 from ...numerics import Array
 from ...solver.gather import Boxes, Footprints, LightGains, LightQuery, LocalPass
-from ..lighting import HitNumbers, PartHits, lit_footprints, sample_of
+from ..lighting import HitTable, SubCellHits, sample_of
 from ..texels import SmoothLift, TexelGeometry
 from .affected import AffectedTexels
 
 
 def changed_lights(local: LocalPass, before: LocalPass) -> list[tuple[LightQuery, bool]]:
     """Pair the lights that shine on points with whether they themselves moved."""
-    old = {asked.number: asked.light for asked in before.lights()}
+    old = {asked.number: asked.light for asked in before.direct.lights()}
     result = []
-    for asked in local.lights():
+    for asked in local.direct.lights():
         was = old.get(asked.number)
         same_as = getattr(asked.light, "same_as", None)
         result.append((asked, was is None or (same_as is not None and not same_as(was))))
@@ -27,40 +27,44 @@ def changed_lights(local: LocalPass, before: LocalPass) -> list[tuple[LightQuery
 
 
 def texel_gains(
-    kept: LightGains, local: LocalPass, before: LocalPass, affected: AffectedTexels
-) -> Generator[float, None, LightGains]:
-    """Ask for every light where it may have changed; yields the fraction done."""
+    kept: LightGains, local: LocalPass, before: LocalPass, affected: AffectedTexels, progress: Progress
+) -> LightGains:
+    """Ask for every light where it may have changed."""
     geometry, lights = affected.geometry, changed_lights(local, before)
     gains = LightGains(len(geometry))
     lift = SmoothLift(geometry)
-    for done, (asked, moved) in enumerate(lights):
+    for (asked, moved), part in progress.each(lights):
         gain = kept.of(asked.number)
         touched = affected.texels.copy()
         touched |= moved | affected.boxes.between(geometry.position, asked.light, affected.widen)
         # One texel more: a penumbra is followed from neighbour to neighbour.
         around = np.flatnonzero(geometry.neighbourhood(touched))
-        steps = local.gain_steps(asked, _footprints(geometry, around, lift))
-        found = yield from scaled(steps, done / len(lights), (done + 1) / len(lights))
+        found = local.direct.gain(asked, _footprints(geometry, around, lift), progress=part)
         own = touched[around]
         gain[around[own]] = found[own]
         gains.put(asked.number, gain)
     return gains
 
 
-def part_gains(
-    parts: PartHits, numbers: HitNumbers, before: LocalPass, boxes: Boxes, at: Array, widen: Array
-) -> Generator[float, None, LightGains]:
-    """Ask for every light at those parts, at (p, 3) anchors, where it may have changed."""
-    assert parts.gains is not None  # kept parts keep them
-    local = numbers.local
+def sub_cell_gains(
+    hits: SubCellHits,
+    table: HitTable,
+    before: LocalPass,
+    boxes: Boxes,
+    at: Array,
+    widen: Array,
+    progress: Progress,
+) -> LightGains:
+    """Ask for every light at those cells, at (p, 3) anchors, where it may have changed."""
+    assert hits.gains is not None  # kept cells keep them
+    local = table.local
     lights = changed_lights(local, before)
-    gains = LightGains(len(parts.part))
-    for done, (asked, moved) in enumerate(lights):
-        gain = parts.gains.of(asked.number)
+    gains = LightGains(len(hits.number))
+    for (asked, moved), part in progress.each(lights):
+        gain = hits.gains.of(asked.number)
         rows = np.flatnonzero(moved | boxes.between(at, asked.light, widen))
-        some = PartHits(parts.is_leaf, parts.part[rows], parts.sources[rows])
-        steps = local.gain_steps(asked, lit_footprints(numbers, some), some.shadow_rays)
-        gain[rows] = yield from scaled(steps, done / len(lights), (done + 1) / len(lights))
+        points = table.lit_footprints(hits.number[rows], hits.of_element)
+        gain[rows] = local.direct.gain(asked, points, hits.shadow_rays, part)
         gains.put(asked.number, gain)
     return gains
 

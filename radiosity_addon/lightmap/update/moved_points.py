@@ -7,20 +7,19 @@ line of sight to a point may have opened or closed; there further points are cho
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from dataclasses import replace
 
 import numpy as np
 
-from ...base import scaled
+from ...base import Progress
 from ...numerics import Array, row_numbers, run_numbers, run_starts
 from ...rays import SAGITTA, SIGHT_LIFT
 from ...solver.gather import AimedRays, Before, Gathered, LocalPass, Resolver
 from ..lighting import (
     STARTS,
+    GatherLinks,
     GatherPointLayout,
     GatherSettings,
-    StoredLinks,
     gather_at,
     gather_footprints,
     on_lattice,
@@ -67,77 +66,73 @@ class MovedPoints:
         resolve: Resolver,
         bright: Array,
     ) -> None:
-        self._local, self._before, self._disturbance = local, before, affected
+        self._local, self._before, self._affected = local, before, affected
         self._moved = affected.traced(before.caster)
         self._settings, self._crossings, self._resolve = settings, crossings, resolve
         self._divided, self._bright = divided, bright
         self._geometry = affected.geometry
 
-    def steps(
-        self, links: StoredLinks, points: GatherPointLayout
-    ) -> Generator[float, None, tuple[StoredLinks, GatherPoints]]:
-        """Gather where it is needed; yields the fraction done.
+    def gather(
+        self, links: GatherLinks, points: GatherPointLayout, progress: Progress
+    ) -> tuple[GatherLinks, GatherPoints]:
+        """Gather where it is needed.
 
         Parameters
         ----------
-        links : StoredLinks
-            Of before, sources numbered as they are now, or STALE.
+        links : GatherLinks
+            Of before, sources numbered as they are now, or UNNUMBERED.
         points : GatherPointLayout
             Of before.
         """
-        stays = ~(self._disturbance.texels | self._divided)[points.texel]
+        stays = ~(self._affected.texels | self._divided)[points.texel]
         rows = np.flatnonzero(stays)
-        kept = yield from scaled(self._again(links, points, rows), 0.0, 0.5)
+        kept = self._again(links, points, rows, progress.part(0.0, 0.5))
         closer = ~stays
         closer[rows] = kept.closeness > CLOSER * points.closeness[rows]
         doubted = self._doubted(links.spread, points, closer)
-        chosen = self._choose(points, rows, kept, doubted)
-        found, new, number = yield from scaled(chosen, 0.5, 0.9)
+        found, new, number = self._choose(points, rows, kept, doubted, progress.part(0.5, 0.9))
         spread = _merged(links.spread, number, doubted, refit(new, self._geometry, np.flatnonzero(doubted)))
-        yield 1.0
-        return StoredLinks(found.sources, spread, found.aimed), new
+        progress.at(1.0)
+        return GatherLinks(found.sources, spread, found.aimed), new
 
     def _again(
-        self, links: StoredLinks, points: GatherPointLayout, rows: Array
-    ) -> Generator[float, None, Gathered]:
-        """Trace again what is touched of the rays of some points; yields the fraction done."""
+        self, links: GatherLinks, points: GatherPointLayout, rows: Array, progress: Progress
+    ) -> Gathered:
+        """Trace again what is touched of the rays of some points."""
         sources, closeness = links.sources[rows], points.closeness[rows].copy()
         aimed: list[AimedRays] = []
         # Across a rim every ray starts from a point of its own.
         edge = self._crossings.crossed[points.texel[rows]]
         place = np.full(len(points.texel), -1)
-        for done, (mine, starts) in enumerate(((~edge, STARTS), (edge, None))):
+        for (mine, starts), part in progress.each(((~edge, STARTS), (edge, None))):
             some = rows[mine]
             chosen = np.zeros(len(points.texel), dtype=bool)
             chosen[some] = True
             place[some] = np.arange(len(some))
             before = Gathered(sources[mine], closeness[mine], links.aimed.of_points(chosen))
-            steps = self._regather(before, points.texel[some], starts)
-            found = yield from scaled(steps, 0.5 * done, 0.5 * done + 0.5)
+            found = self._regather(before, points.texel[some], starts, part)
             sources[mine], closeness[mine] = found.sources, found.closeness
             aimed.append(replace(found.aimed, row=np.flatnonzero(mine)[found.aimed.row]))
         return Gathered(sources, closeness, AimedRays.joined(aimed, [0, 0]))
 
-    def _regather(
-        self, before: Gathered, texel: Array, starts: int | None
-    ) -> Generator[float, None, Gathered]:
+    def _regather(self, before: Gathered, texel: Array, starts: int | None, progress: Progress) -> Gathered:
         geometry, local = self._geometry, self._local
-        corners = self._before.hierarchy.corners[before.aimed.element]
+        corners = self._before.elements.hierarchy.corners[before.aimed.element]
         low, high = corners.min(axis=2), corners.max(axis=2)
         aimed_at = 0.5 * (low + high), 0.5 * (high - low)
-        hierarchy = local.hierarchy
+        hierarchy = local.elements.hierarchy
         hosts = np.zeros(len(geometry.triangles), dtype=bool)
         hosts[hierarchy.faces.triangle[hierarchy.face[self._bright]]] = True
-        widen = self._disturbance.widen[texel]
+        widen = self._affected.widen[texel]
         earlier = Before(before, aimed_at, self._moved, widen, self._bright, hosts)
-        expected = local.irradiance_at(geometry.triangle[texel], geometry.barycentric[texel])
+        expected = local.elements.irradiance_at(geometry.triangle[texel], geometry.barycentric[texel])
         at = gather_footprints(geometry, texel, starts)
         upright = geometry.surface_normal[texel]
-        return (yield from local.regather_steps(at, upright, self._resolve, earlier, expected))
+        return local.gather.again_at(at, upright, self._resolve, earlier, expected, progress)
 
     def _doubted(self, spread: Interpolation, points: GatherPointLayout, closer: Array) -> Array:
         """Return (n,) bool: the texels whose points are to be weighed again."""
-        geometry, moved = self._geometry, self._disturbance
+        geometry, moved = self._geometry, self._affected
         doubted = moved.texels | geometry.neighbourhood(self._divided) | spread.any_of(closer)
         # A texel's points are in cells beside its own, no wider than the coarsest lattice.
         farthest = CELLS_ACROSS * max(*self._settings.strides, 1.5) * geometry.texel_size
@@ -155,9 +150,14 @@ class MovedPoints:
         return np.asarray(doubted)
 
     def _choose(
-        self, points: GatherPointLayout, rows: Array, kept: Gathered, doubted: Array
-    ) -> Generator[float, None, tuple[Gathered, GatherPoints, Array]]:
-        """Add points among the doubted texels, level by level; yields the fraction done.
+        self,
+        points: GatherPointLayout,
+        rows: Array,
+        kept: Gathered,
+        doubted: Array,
+        progress: Progress,
+    ) -> tuple[Gathered, GatherPoints, Array]:
+        """Add points among the doubted texels, level by level.
 
         Returns
         -------
@@ -175,18 +175,20 @@ class MovedPoints:
         blocks: list[Gathered] = []
         first: list[int] = []
         total = 0
-        for level, stride in enumerate(settings.strides):
+        for (level, stride), of_level in progress.each(list(enumerate(settings.strides))):
             mine = points.level[rows] == level
-            chosen = yield from self._lacking(new, doubted & ~taken, stride)
+            chosen = self._lacking(new, doubted & ~taken, stride, of_level.part(0.0, 0.2))
             taken[chosen] = True
             number[rows[mine]] = total + np.arange(int(mine.sum()))
             part = Gathered(kept.sources[mine], kept.closeness[mine], kept.aimed.of_points(mine))
             texel, level_blocks = [points.texel[rows[mine]]], [part]
             edge = self._crossings.crossed[chosen]
-            for some, starts in ((chosen[~edge], STARTS), (chosen[edge], None)):
+            kinds = (chosen[~edge], STARTS), (chosen[edge], None)
+            for (some, starts), of_kind in of_level.part(0.2, 1.0).each(kinds):
                 texel.append(some)
-                steps = gather_at(local, geometry, some, starts, settings.rays, self._resolve)
-                level_blocks.append((yield from scaled(steps, level / 3, (level + 1) / 3)))
+                level_blocks.append(
+                    gather_at(local, geometry, some, starts, settings.rays, self._resolve, progress=of_kind)
+                )
             for block in level_blocks:
                 first.append(total)
                 total += len(block.sources)
@@ -197,11 +199,11 @@ class MovedPoints:
         sources = np.concatenate([block.sources for block in blocks])
         return Gathered(sources, new.closeness, aimed), new, number
 
-    def _lacking(self, points: GatherPoints, among: Array, stride: int) -> Generator[float, None, Array]:
+    def _lacking(self, points: GatherPoints, among: Array, stride: int, progress: Progress) -> Array:
         """Find the texels of some, (n,) bool, on a lattice, that no point so far reaches."""
         candidates = row_numbers(on_lattice(self._geometry, stride) & among)
         if len(points):
-            reached = yield from points.support_steps(candidates)
+            reached = points.support(candidates, progress)
             lacks = (reached < self._settings.support) | self._crossings.beside[candidates]
             candidates = candidates[lacks]
         return np.asarray(candidates)

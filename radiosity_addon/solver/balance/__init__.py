@@ -1,4 +1,4 @@
-"""Conservation of light: every leaf sends out what it has, no more and no less.
+"""Conservation of light: every leaf sends exactly the light it has.
 
 Corrects visibilities that rays only estimate.
 """

@@ -1,4 +1,4 @@
-"""Let every leaf send out what it has: no more, no less.
+"""Makes every leaf send exactly the light it has.
 
 Links of different levels do not add up at a leaf. It has fine links of its own to what is
 near and shares its ancestors' coarse links to what is far; in a corner the own ones are
@@ -28,14 +28,14 @@ import numpy as np
 
 from ...numerics import Array
 from ...rays import RayCaster
-from ..hierarchy import Hierarchy, TreeTop
+from ..hierarchy import ClusterCut, Hierarchy
 from ..links import ClusterLinks, Links, pull
 from .enclosure import Arrivals
 from .link_sums import received_by_leaves, received_over_clusters, sent_by_leaves
 from .visibility_correction import corrected
 
 ROUNDS = 8
-"""How often both balances are struck in turn at most, …"""
+"""Maximum number of rounds of both balances, …"""
 
 ENOUGH = 2e-3
 """… until no face receives more or less by this part."""
@@ -46,35 +46,31 @@ AMONG_THEMSELVES = 0.65
 KNOWN = 5e-3
 """Standard error of what arrives from a face, if its sum is to count as known."""
 
-DOUBT = 3.0
-"""Standard errors that a leaf's own links may send more than its rays say arrives."""
+STANDARD_ERRORS = 3.0
+"""Standard errors by which a leaf's own links may exceed its rays' estimate."""
 
 SURE = 0.01
-"""Faces that receive less than this over links to clusters, which miss more than rays, know which of their
-visibilities to blame for what they lack."""
+"""In faces that receive less than this over links to clusters, which miss more than rays do, the lack can be
+assigned to visibilities."""
 
 LIMIT = 2.0
-"""Largest factor: a leaf with hardly any links is not blown up, …"""
+"""Largest factor, which limits leaves with hardly any links, …"""
 
 LIMIT_CLOSED = 32.0
-"""… nor where all arrives; but there nothing is noise, and what is not sent is lost."""
+"""… and the limit where all light arrives: there is no noise, and light that is not sent would be lost."""
 
 LIMIT_RECEIVED = 1.5
-"""Largest factor on what a face receives, and the inverse of the least: more is no error of a curve, and
-must not be hidden."""
+"""Largest factor on what a face receives, and the inverse of the smallest: a larger error is not caused by
+curvature, and must not be hidden."""
 
 
 @dataclass(frozen=True)
 class Balance:
-    """What light is exchanged with.
+    """The links and factors by which light is exchanged.
 
-    Attributes
-    ----------
-    links : Links
-        To elements, their visibilities corrected (see `known_sums`).
-    sent, received : (e, 2) float64
-        What leaves' radiosity and their gathered light are scaled with, over their own links and
-        over those they share with their ancestors and clusters; 1 where nothing is known.
+    links: To elements, their visibilities corrected (see `known_sums`).
+    sent, received (e, 2): What leaves' radiosity and their gathered light are scaled with, over their own
+        links and over those they share with their ancestors and clusters; 1 where nothing is known.
     """
 
     links: Links
@@ -83,7 +79,7 @@ class Balance:
 
 
 class Conservation:
-    """Knows what share of each leaf's light arrives, and makes links exchange that."""
+    """Makes links exchange the share of each leaf's light that arrives."""
 
     def __init__(self, caster: RayCaster, min_area: float, seed: int, threads: int = 0) -> None:
         self.arrivals = Arrivals(caster, min_area, seed, threads)
@@ -91,49 +87,46 @@ class Conservation:
     def balance(
         self,
         hierarchy: Hierarchy,
-        top: TreeTop,
+        cut: ClusterCut,
         links: Links,
         cluster_links: ClusterLinks,
         rough: bool = False,
     ) -> Balance:
-        """Return what to exchange light with, in place of what was measured.
+        """Return the links and factors that replace the measured ones.
 
-        Parameters
-        ----------
-        rough : bool
-            While links are still refined: only what leaves send is balanced, to keep the power.
+        rough: While links are still refined: only what leaves send is balanced, to keep the power.
         """
         self.arrivals.measure(hierarchy)
         scale, received = np.ones((2, hierarchy.n_elements, 2))
         if rough:
-            return Balance(links, self.factors(hierarchy, top, links, cluster_links), received)
+            return Balance(links, self.factors(hierarchy, cut, links, cluster_links), received)
         closed = self.closed(hierarchy)
-        sure = closed & (received_over_clusters(hierarchy, top, cluster_links, scale) < SURE)
+        sure = closed & (received_over_clusters(hierarchy, cut, cluster_links, scale) < SURE)
         if sure.any():
-            rows = sum(received_by_leaves(hierarchy, top, links, cluster_links, scale))
-            columns = sum(sent_by_leaves(hierarchy, top, links, cluster_links))
+            rows = sum(received_by_leaves(hierarchy, cut, links, cluster_links, scale))
+            columns = sum(sent_by_leaves(hierarchy, cut, links, cluster_links))
             sums = pull(hierarchy, np.stack([rows, columns], axis=1))[: len(closed)]
             links = corrected(hierarchy, links, sure, sums[:, 0], sums[:, 1])
         wanted, error, escapes = self.arrivals.of_faces(hierarchy)
         known = closed | (~escapes & (error < KNOWN) & (wanted > 0.0))
         if closed.any() and not known.all():
-            # What faces get from others, whose own sums nobody knows, is not theirs to correct.
+            # Light from faces whose sums are unknown cannot be corrected at the receiver.
             among = np.where(known[hierarchy.face], 1.0, 0.0)[:, None] * scale
-            get = sum(received_by_leaves(hierarchy, top, links, cluster_links, scale))
-            get_from_known = sum(received_by_leaves(hierarchy, top, links, cluster_links, among))
+            get = sum(received_by_leaves(hierarchy, cut, links, cluster_links, scale))
+            get_from_known = sum(received_by_leaves(hierarchy, cut, links, cluster_links, among))
             gets = pull(hierarchy, np.stack([get, get_from_known], axis=1))[: len(known)]
             known &= gets[:, 1] > AMONG_THEMSELVES * gets[:, 0]
         if not (known & closed).any():
-            return Balance(links, self.factors(hierarchy, top, links, cluster_links), received)
+            return Balance(links, self.factors(hierarchy, cut, links, cluster_links), received)
         leaves = hierarchy.leaves[known[hierarchy.face[hierarchy.leaves]]]
         for number in range(ROUNDS):
-            own, shared = received_by_leaves(hierarchy, top, links, cluster_links, scale)
+            own, shared = received_by_leaves(hierarchy, cut, links, cluster_links, scale)
             if number > 0:
                 sums = pull(hierarchy, received * np.stack([own, shared], axis=1)).sum(axis=1)
                 if np.abs(sums[: len(known)] - wanted)[known].max() < ENOUGH:
                     break
             received[leaves] = _receive(hierarchy, leaves, own, shared, wanted, closed)
-            scale = self.factors(hierarchy, top, links, cluster_links, received)
+            scale = self.factors(hierarchy, cut, links, cluster_links, received)
         return Balance(links, scale, received)
 
     def closed(self, hierarchy: Hierarchy) -> Array:
@@ -145,27 +138,24 @@ class Conservation:
     def factors(
         self,
         hierarchy: Hierarchy,
-        top: TreeTop,
+        cut: ClusterCut,
         links: Links,
         cluster_links: ClusterLinks,
         received: Array | None = None,
     ) -> Array:
-        """Return (e, 2): what to scale leaves' radiosity with, over own links and over shared ones.
+        """Return (e, 2): factors on leaves' radiosity, over own links and over shared ones.
 
-        Parameters
-        ----------
-        received : (e, 2) float64 or None
-            What the leaves' gathered light is scaled with, as from `balance`.
+        received (e, 2): What the leaves' gathered light is scaled with, as from `balance`.
         """
         self.arrivals.measure(hierarchy)
         leaves = hierarchy.leaves
-        own, shared = sent_by_leaves(hierarchy, top, links, cluster_links, received)
+        own, shared = sent_by_leaves(hierarchy, cut, links, cluster_links, received)
         result = np.ones((hierarchy.n_elements, 2))
         arriving = self.arrivals.share[leaves]
         limit = np.where(arriving == 1.0, LIMIT_CLOSED, LIMIT)
         result[leaves] = _over_shared(arriving, own[leaves], shared[leaves], limit)
         # Own links are better than few rays: scaled down for rays' noise, and not up, they would lose power.
-        most = np.minimum(arriving + DOUBT * self.arrivals.error(leaves), 1.0)
+        most = np.minimum(arriving + STANDARD_ERRORS * self.arrivals.error(leaves), 1.0)
         result[leaves, 0] = np.minimum(1.0, most / np.maximum(own[leaves], 1e-300))
         return result
 
@@ -173,9 +163,9 @@ class Conservation:
 def _receive(
     hierarchy: Hierarchy, leaves: Array, own: Array, shared: Array, wanted: Array, closed: Array
 ) -> Array:
-    """Return (n, 2) what to scale leaves' own and shared light with, that faces receive what is `wanted`.
+    """Return (n, 2) factors on leaves' own and shared light by which faces receive the sums `wanted`.
 
-    Leaf by leaf where all is 1. Where part ends on black backs, which few rays of a leaf tell roughly, by
+    Leaf by leaf where all is 1. Where part ends on black backs, which few rays of a leaf estimate roughly, by
     one number a face.
     """
     face = hierarchy.face[leaves]
@@ -189,13 +179,13 @@ def _receive(
 
 
 def _over_all(wanted: Array, sums: Array) -> Array:
-    """Return (n,) what (n,) sums are scaled with to make `wanted`, within `LIMIT_RECEIVED`."""
+    """Return (n,) factors from sums (n,) to `wanted`, within `LIMIT_RECEIVED`."""
     scale = np.clip(wanted / np.maximum(sums, 1e-300), 1.0 / LIMIT_RECEIVED, LIMIT_RECEIVED)
     return np.where(sums > 0, scale, 1.0)
 
 
 def _over_shared(wanted: Array, own: Array, shared: Array, limit: Array | float) -> Array:
-    """Return (n, 2) what own and shared are scaled with to make `wanted`: own, if it can be, with 1."""
+    """Return (n, 2) factors on own and shared sums to make `wanted`: 1 for own, if possible."""
     left = np.maximum(wanted - own, 0.0)
     return np.stack(
         [
@@ -207,9 +197,9 @@ def _over_shared(wanted: Array, own: Array, shared: Array, limit: Array | float)
 
 
 def received_by_faces(
-    hierarchy: Hierarchy, top: TreeTop, balance: Balance, cluster_links: ClusterLinks
+    hierarchy: Hierarchy, cut: ClusterCut, balance: Balance, cluster_links: ClusterLinks
 ) -> Array:
     """Return (f,) ΣFV over each face's, its elements' and its clusters' links, as balanced."""
-    own, shared = received_by_leaves(hierarchy, top, balance.links, cluster_links, balance.sent)
+    own, shared = received_by_leaves(hierarchy, cut, balance.links, cluster_links, balance.sent)
     balanced = balance.received * np.stack([own, shared], axis=1)
     return np.asarray(pull(hierarchy, balanced)[: len(hierarchy.faces)].sum(axis=1))

@@ -1,4 +1,4 @@
-"""What share of the light of leaves arrives anywhere, found by rays.
+"""Enclosure: the share of the light of leaves that arrives at surfaces, measured by rays.
 
 In a closed scene all of it, and the rays agree: no noise. Light that leaves the scene arrives nowhere,
 nor does what ends on the black back of a one-sided triangle.
@@ -8,44 +8,39 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...numerics import Array, cosine_hemisphere, for_chunks, stratified_square, to_world
+from ...numerics import Array, Stream, cosine_hemisphere, for_chunks, stratified_square, to_world
 from ...rays import RayCaster
-from ..hierarchy import Hierarchy, TreeTop
+from ..hierarchy import ClusterCut, Hierarchy
 from ..links import node_samples, pull
 
 RAYS = 32
 """Hemisphere rays of a leaf; in a closed scene they all agree, and there is no noise at all."""
 
 LAMP_RAYS = 512
-"""Rays of a leaf that shines, where not all of the others arrive: most power starts there."""
+"""Rays of an emissive leaf, where not all of the others arrive: most power starts there."""
 
 HELD_RAYS = 128
 """Rays of other leaves of which none escapes, but some end on black backs."""
 
 SPREAD_RAYS = 1 << 17
-"""So many rays in all, by area, where not all arrive: of a few large leaves each carries much light …"""
+"""Total number of rays, by area, where not all arrive: each of a few large leaves carries much light …"""
 
 MOST_OF_ONE = 1 << 13
-"""… but no more of one leaf than these."""
+"""… but at most this many per leaf."""
 
 MOST_RAYS = 1 << 20
-"""Neighbours that share rays which disagree ask their own, unless they would be more than these."""
+"""Neighbors whose shared rays disagree trace their own, unless there would be more than these."""
 
 CHUNK = 1 << 13
 """Leaves measured at once: their rays take about 30 MB a thread."""
 
 
 class Arrivals:
-    """Remembers what arrives of each leaf's light, leaf by leaf as they appear.
+    """Stores the share of each leaf's light that arrives, as leaves appear.
 
-    Attributes
-    ----------
-    share : (e,) float64
-        Of leaves, what part of their light arrives; of those that never were leaves NaN.
-    escapes : (e,) bool
-        Whether any ray left the scene.
-    rays : (e,) int32
-        How many were asked.
+    share (e,): Of leaves, what part of their light arrives; of those that never were leaves NaN.
+    escapes (e,) bool: Whether any ray left the scene.
+    rays (e,) int32: How many were asked.
     """
 
     def __init__(self, caster: RayCaster, min_area: float, seed: int, threads: int = 0) -> None:
@@ -64,13 +59,13 @@ class Arrivals:
         new = leaves[np.isnan(self.share[leaves])]
         faces = new[new < len(hierarchy.faces)]
         if len(faces):
-            # Neighbours that together are no larger than an element may be share their rays.
+            # Neighbors that together are no larger than an element may be share their rays.
             large = np.flatnonzero(hierarchy.clusters.area > self._min_area)
-            top = TreeTop(hierarchy, large)
-            share, escapes = self._trace(hierarchy, top.tips, RAYS)
-            tip = top.tip[faces] - top.n_inner
-            self.share[faces], self.escapes[faces] = share[tip], escapes[tip]
-            apart = faces[(share[tip] > 0.0) & (share[tip] < 1.0) & (np.bincount(tip)[tip] > 1)]
+            cut = ClusterCut(hierarchy, large)
+            share, escapes = self._trace(hierarchy, cut.nodes, RAYS)
+            node = cut.row_of_face[faces] - cut.n_inner
+            self.share[faces], self.escapes[faces] = share[node], escapes[node]
+            apart = faces[(share[node] > 0.0) & (share[node] < 1.0) & (np.bincount(node)[node] > 1)]
             if len(apart) * RAYS <= MOST_RAYS:
                 self._ask(hierarchy, apart, RAYS)
         self._ask(hierarchy, new[len(faces) :], RAYS)
@@ -80,12 +75,12 @@ class Arrivals:
             self._ask(hierarchy, doubtful[rays == count], int(count))
 
     def _wanted(self, hierarchy: Hierarchy, leaves: Array) -> Array:
-        """Return (n,) how many rays of leaves tell what arrives, where not all does.
+        """Return (n,) the number of rays of leaves whose light does not all arrive.
 
         It depends on nothing but the leaf: the same whenever it appears.
         """
         part = hierarchy.area[leaves] / float(hierarchy.faces.area.sum())
-        # By fours, so that many leaves are asked together.
+        # By powers of four, so that many leaves are traced together.
         power = np.rint(0.5 * np.log2(np.maximum(part * (SPREAD_RAYS / RAYS), 1.0)))
         rays = np.minimum(RAYS * 4 ** power.astype(np.int64), MOST_OF_ONE)
         large = hierarchy.area[leaves] >= self._min_area
@@ -96,18 +91,15 @@ class Arrivals:
         return np.asarray(rays)
 
     def error(self, leaves: Array) -> Array:
-        """Return (n,) the standard error of the share of some leaves."""
+        """Return (n,) the standard error of leaves' shares."""
         share = self.share[leaves]
         return np.asarray(np.sqrt(share * (1.0 - share) / self.rays[leaves]))
 
     def of_faces(self, hierarchy: Hierarchy) -> tuple[Array, Array, Array]:
-        """Return what is known of faces, after `measure`.
+        """Return the results for faces, after `measure`.
 
-        Returns
-        -------
-        share, error : (f,) float64
-            The part of their light that arrives, and its standard error.
-        escapes : (f,) bool
+        Returns share, error (f,): The part of their light that arrives, and its standard error.
+        Returns escapes (f,) bool.
         """
         leaves, count = hierarchy.leaves, len(hierarchy.faces)
         spread = np.zeros((hierarchy.n_elements, 2))
@@ -119,7 +111,7 @@ class Arrivals:
         return share, np.sqrt(share * (1.0 - share) / rays), means[:, 1] > 0.0
 
     def _ask(self, hierarchy: Hierarchy, leaves: Array, rays: int) -> None:
-        """Trace so many rays of each of some leaves."""
+        """Trace a number of rays of each of these leaves."""
         self.share[leaves], self.escapes[leaves] = self._trace(hierarchy, hierarchy.n_clusters + leaves, rays)
         self.rays[leaves] = rays
 
@@ -132,8 +124,9 @@ class Arrivals:
         def measure(rows: slice) -> None:
             chosen = nodes[rows]
             quarter = np.broadcast_to(np.arange(rays) % 4, (len(chosen), rays))
-            points, normals = node_samples(hierarchy, chosen, quarter, chosen, self._seed + 41)
-            unit = stratified_square(chosen, rays, self._seed + 42)
+            streams = Stream.ENCLOSURE_POINTS, Stream.ENCLOSURE_FACE
+            points, normals = node_samples(hierarchy, chosen, quarter, chosen, self._seed, streams)
+            unit = stratified_square(chosen, rays, self._seed + Stream.ENCLOSURE_DIRECTIONS)
             normals = normals.reshape(-1, 3)
             directions = to_world(cosine_hemisphere(unit).reshape(-1, 1, 3), normals)[:, 0]
             start = points.reshape(-1, 3) + self._caster.surface_offset * normals

@@ -1,4 +1,4 @@
-"""What leaves receive, and what they send, over their own links and over those they share.
+"""Sums of what leaves receive and send, over their own links and over those they share.
 
 A leaf hears the links of its ancestors and of the clusters above it besides its own, and is heard
 over theirs. Both sums are 1 where nothing escapes, if the links are right (`conservation`).
@@ -9,28 +9,20 @@ from __future__ import annotations
 import numpy as np
 
 from ...numerics import Array
-from ..hierarchy import LEAF, Hierarchy, TreeTop
+from ..hierarchy import LEAF, ClusterCut, Hierarchy
 from ..links import ClusterLinks, Links, gather, gather_at_clusters, node_radiosity, pull, push, quarters_mean
 
 
 class Arriving:
-    """What the receivers of links to clusters take where they are there, per unit of the source's radiosity.
+    """Light that the receivers of links to clusters take, times opacity, per unit of the source's radiosity.
 
-    Parameters
-    ----------
-    received : (e, 2) float64 or None
-        What the leaves' gathered light is scaled with.
-
-    Attributes
-    ----------
-    power : (l,) float64
-        Σ A_f a_f (n_f·v + g·(x_f − c) + h) over the receiver's faces [m²].
-    area : (l,) float64
-        Σ A_f a_f [m²]
+    received (e, 2): What the leaves' gathered light is scaled with.
+    power (l,): Σ A_f a_f (n_f·v + g·(x_f − c) + h) over the receiver's faces [m²].
+    area (l,): Σ A_f a_f [m²]
     """
 
     def __init__(
-        self, hierarchy: Hierarchy, top: TreeTop, links: ClusterLinks, received: Array | None
+        self, hierarchy: Hierarchy, cut: ClusterCut, links: ClusterLinks, received: Array | None
     ) -> None:
         clusters, faces = hierarchy.clusters, hierarchy.faces
         if received is None and (hierarchy.opacity == 1.0).all():
@@ -38,8 +30,8 @@ class Arriving:
             self.power = self.area * links.factor * links.visibility
             return
         weight = (_taken_below(hierarchy, received)[: len(faces)] * faces.area)[:, None]
-        sums = top.sums(np.concatenate([weight, weight * faces.normal, weight * faces.centre], axis=1))
-        at = sums[top.row[links.receiver]]
+        sums = cut.sums(np.concatenate([weight, weight * faces.normal, weight * faces.centre], axis=1))
+        at = sums[cut.row[links.receiver]]
         self.area = at[:, 0]
         offset = at[:, 4:] - at[:, :1] * clusters.centre[links.receiver]
         self.power = at[:, 0] * links.even + np.einsum("lk,lk->l", at[:, 1:4], links.vector)
@@ -48,62 +40,52 @@ class Arriving:
 
 def sent_by_leaves(
     hierarchy: Hierarchy,
-    top: TreeTop,
+    cut: ClusterCut,
     links: Links,
     cluster_links: ClusterLinks,
     received: Array | None = None,
 ) -> tuple[Array, Array]:
     """Return the shares of leaves' light that own links, and those of ancestors and clusters, carry.
 
-    Parameters
-    ----------
-    received : (e, 2) float64 or None
-        What the leaves' gathered light is scaled with.
-
-    Returns
-    -------
-    own, shared : (e,) float64
-        Of the leaves; other rows mean nothing.
+    received (e, 2): What the leaves' gathered light is scaled with.
+    Returns own, shared (e,): Of the leaves; other rows mean nothing.
     """
     at_links = taken_at_links(hierarchy, links, received)
     sums = sent(hierarchy, links, at_links)
     own = quarters_mean(sums)[:, 0]
-    at_clusters = Arriving(hierarchy, top, cluster_links, received)
+    at_clusters = Arriving(hierarchy, cut, cluster_links, received)
     sums = sums + sent_to_clusters(hierarchy, cluster_links, at_clusters)
-    from_clusters = _from_clusters(hierarchy, top, links, at_links, cluster_links, at_clusters)
+    from_clusters = _from_clusters(hierarchy, cut, links, at_links, cluster_links, at_clusters)
     return own, push(hierarchy, sums + from_clusters)[:, 0] - own
 
 
 def received_by_leaves(
-    hierarchy: Hierarchy, top: TreeTop, links: Links, cluster_links: ClusterLinks, scale: Array
+    hierarchy: Hierarchy, cut: ClusterCut, links: Links, cluster_links: ClusterLinks, scale: Array
 ) -> tuple[Array, Array]:
     """Return ΣFV over own links, and over those of ancestors and clusters, sources scaled by `scale`.
 
-    Returns
-    -------
-    own, shared : (e,) float64
-        Of the leaves; other rows mean nothing.
+    Returns own, shared (e,): Of the leaves; other rows mean nothing.
     """
     there = hierarchy.opacity[:, None]
-    gathered = gather(hierarchy, links, there, scale, top)
+    gathered = gather(hierarchy, links, there, scale, cut)
     own = quarters_mean(gathered)[:, 0]
     shared = push(hierarchy, gathered)[:, 0] - own
     if len(cluster_links):
-        shared += received_over_clusters(hierarchy, top, cluster_links, scale)[hierarchy.face]
+        shared += received_over_clusters(hierarchy, cut, cluster_links, scale)[hierarchy.face]
     return own, shared
 
 
 def received_over_clusters(
-    hierarchy: Hierarchy, top: TreeTop, cluster_links: ClusterLinks, scale: Array
+    hierarchy: Hierarchy, cut: ClusterCut, cluster_links: ClusterLinks, scale: Array
 ) -> Array:
     """Return (f,) ΣFV over links to clusters, sources scaled by `scale`."""
-    means = node_radiosity(hierarchy, pull(hierarchy, scale[:, 1:] * hierarchy.opacity[:, None]), top)
-    return np.asarray(np.maximum(gather_at_clusters(hierarchy, top, cluster_links, means)[:, 0], 0.0))
+    means = node_radiosity(hierarchy, pull(hierarchy, scale[:, 1:] * hierarchy.opacity[:, None]), cut)
+    return np.asarray(np.maximum(gather_at_clusters(hierarchy, cut, cluster_links, means)[:, 0], 0.0))
 
 
 def _from_clusters(
     hierarchy: Hierarchy,
-    top: TreeTop,
+    cut: ClusterCut,
     links: Links,
     at_links: Array,
     cluster_links: ClusterLinks,
@@ -115,22 +97,22 @@ def _from_clusters(
     if count == 0:
         return total
     # Linear in the face's place: (1, y) times four numbers a cluster, as `gather_at_clusters` sends.
-    share = np.zeros((top.n_rows, 4))
+    share = np.zeros((cut.n_rows, 4))
     grouped = np.flatnonzero(links.source < count)
     source = links.source[grouped]
-    share[:, 0] += top.spread(top.rows(source), at_links[grouped] / clusters.area[source])
+    share[:, 0] += cut.spread(cut.rows(source), at_links[grouped] / clusters.area[source])
     grouped = np.flatnonzero(cluster_links.source < count)
     source = cluster_links.source[grouped]
     slope = (arriving.area[grouped] / clusters.area[source])[:, None] * cluster_links.gradient[grouped]
-    rows = top.rows(source)
+    rows = cut.rows(source)
     evenly = arriving.power[grouped] / clusters.area[source]
     evenly += np.einsum("lk,lk->l", slope, clusters.centre[source])
-    share[:, 0] += top.spread(rows, evenly)
+    share[:, 0] += cut.spread(rows, evenly)
     for axis in range(3):
-        share[:, 1 + axis] -= top.spread(rows, slope[:, axis])
+        share[:, 1 + axis] -= cut.spread(rows, slope[:, axis])
     carried = np.zeros(len(faces))
-    for term, pushed in zip((np.ones(1), *faces.centre.T), top.push(share).T, strict=True):
-        carried += term * pushed[top.tip]
+    for term, pushed in zip((np.ones(1), *faces.centre.T), cut.push(share).T, strict=True):
+        carried += term * pushed[cut.row_of_face]
     total[: len(faces)] = np.maximum(carried, 0.0)[:, None, None]
     return total
 
@@ -144,19 +126,16 @@ def sent_to_clusters(hierarchy: Hierarchy, links: ClusterLinks, arriving: Arrivi
 
 
 def taken_at_links(hierarchy: Hierarchy, links: Links, received: Array | None = None) -> Array:
-    """Return (l,) A_r F_rs V_rs [m²] of links to elements, of each receiver's area A_r what is there.
+    """Return (l,) A_r F_rs V_rs [m²] of links to elements, with A_r the opaque area of the receiver.
 
-    Parameters
-    ----------
-    received : (e, 2) float64 or None
-        What the light that leaves gather is scaled with, as from `Conservation.balance`.
+    received (e, 2): What the light that leaves gather is scaled with, as from `Conservation.balance`.
     """
     there = hierarchy.opacity if received is None else hierarchy.opacity * received[:, 0]
     below = _taken_below(hierarchy, received)
     child = hierarchy.first_child[links.receiver]
     inner = np.flatnonzero(child != LEAF)
     share = there[links.receiver]
-    # Quarters take unequal parts of what arrives, and may be covered: each counts with what it takes.
+    # Quarters take unequal parts of what arrives, and may be covered: each is weighted by what it takes.
     share[inner] = 0.0
     for quarter in range(4):
         share[inner] += 0.25 * links.to_quarter[inner, quarter] * below[child[inner] + quarter]
@@ -164,7 +143,7 @@ def taken_at_links(hierarchy: Hierarchy, links: Links, received: Array | None = 
 
 
 def _taken_below(hierarchy: Hierarchy, received: Array | None) -> Array:
-    """Return (e,) what part of their ancestors' light the leaves of elements take where they are there."""
+    """Return (e,) the part of their ancestors' light that the leaves of elements take, times opacity."""
     if received is None:
         return hierarchy.opacity
     return np.asarray(pull(hierarchy, hierarchy.opacity[:, None] * received[:, 1:])[:, 0])
@@ -174,7 +153,7 @@ def sent(hierarchy: Hierarchy, links: Links, at_links: Array | None = None) -> A
     """Return (e, 4, 1): the share of the light of each element's quarters that its own links carry.
 
     The transpose of `gather`, with reciprocity (handout (3.30)): Σ_r A_r F_rs V_rs / A_s, of each
-    receiver's area what is there; `at_links` (l,) are other A_r F_rs V_rs [m²], scaled.
+    receiver's opaque area; `at_links` (l,) are other A_r F_rs V_rs [m²], scaled.
     """
     if at_links is None:
         at_links = taken_at_links(hierarchy, links)
@@ -182,7 +161,7 @@ def sent(hierarchy: Hierarchy, links: Links, at_links: Array | None = None) -> A
     element = links.source[single].astype(np.int64) - hierarchy.n_clusters
     per_element = at_links[single] / hierarchy.area[element]
     inner = np.flatnonzero(hierarchy.first_child[element] != LEAF)
-    # Leaves send alike from all their quarters.
+    # Leaves send equally from all their quarters.
     total = np.bincount(element, per_element, hierarchy.n_elements)[:, None, None]
     total = np.repeat(total, 4, axis=1)
     single, element, per_element = single[inner], element[inner], per_element[inner]

@@ -1,4 +1,4 @@
-"""Correct visibilities that rays only estimate by sums that are known.
+"""Corrects visibilities, which rays only estimate, by known sums.
 
 From a face that nothing escapes from, all light arrives: ΣFV = 1 over what it receives, and over
 what it sends. Form factors are formulas, and a link whose rays all agree is nearly always right.
@@ -18,27 +18,23 @@ from ..hierarchy import Hierarchy
 from ..links import Links
 
 ROUNDS = 6
-"""How often what receivers and what sources lack is shared out in turn."""
+"""How often the lack of receivers and of sources is distributed in turn."""
 
 LIMIT = 1.0
-"""Most that one side adds, or takes, as a part of V (1 − V)."""
+"""Maximum that one side adds or takes, as a part of V (1 − V)."""
 
 LEAST = 1e-9
-"""A face exchanges at least this share over doubtful links, or they cannot help it."""
+"""A face exchanges at least this share over uncertain links; otherwise they cannot be corrected."""
 
 
 def corrected(hierarchy: Hierarchy, links: Links, closed: Array, received: Array, sent: Array) -> Links:
-    """Return the links with visibilities that bring faces' sums to 1, as far as they may be wrong.
+    """Return the links with visibilities that bring faces' sums to 1 within their uncertainty.
 
     V' = V (1 + (1 − V)(a_r + b_s)), kept between 0 and 1, where a and b are numbers of faces.
 
-    Parameters
-    ----------
-    closed : (f,) bool
-        Faces whose sums are known to be 1; those of others stay.
-    received, sent : (f,) float64
-        ΣFV over all links: what each face receives of unit radiosity, and the share of its light
-        that arrives.
+    closed (f,) bool: Faces whose sums are known to be 1; those of others stay.
+    received, sent (f,): ΣFV over all links: what each face receives of unit radiosity, and the share of its
+        light that arrives.
     """
     source = links.source - hierarchy.n_clusters
     rows = np.flatnonzero((source >= 0) & (links.visibility > 0) & (links.visibility < 1))
@@ -47,7 +43,7 @@ def corrected(hierarchy: Hierarchy, links: Links, closed: Array, received: Array
     to, of = hierarchy.face[receiver], hierarchy.face[source]
     visibility = links.visibility[rows].astype(np.float64)
     doubtful = hierarchy.area[receiver] * links.factor[rows] * visibility * (1.0 - visibility)
-    # A surface that is only partly there takes, and sends, only that part.
+    # A partly opaque surface receives and sends only that part.
     arriving, leaving = doubtful * hierarchy.opacity[source], doubtful * hierarchy.opacity[receiver]
     at_receivers, at_sources = np.bincount(to, arriving, faces), np.bincount(of, leaving, faces)
     of_receiver, of_source = np.zeros(faces), np.zeros(faces)
@@ -63,6 +59,6 @@ def corrected(hierarchy: Hierarchy, links: Links, closed: Array, received: Array
 
 
 def _shared_out(lacking: Array, doubtful: Array, closed: Array, area: Array) -> Array:
-    """Return (f,) how much of what faces exchange over doubtful links makes up for what they lack [m²]."""
+    """Return (f,) the correction of each face's exchange over uncertain links [m²]."""
     helps = closed & (doubtful > LEAST * area)
     return np.where(helps, np.clip(lacking / np.where(helps, doubtful, 1.0), -LIMIT, LIMIT), 0.0)

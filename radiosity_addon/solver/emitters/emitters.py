@@ -54,6 +54,8 @@ class EmitterGroup:
         What part of `strength` each face emits; None for all of it.
     """
 
+    STORED = ("strength",)
+
     def __init__(
         self, corners: Array, normals: Array, strength: Array, offset: float, level: Array | None = None
     ) -> None:

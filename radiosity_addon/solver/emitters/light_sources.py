@@ -44,7 +44,13 @@ class LightSources:
         [W/m²], the largest of each channel where it varies.
     emitter : (t,) int32
         The number of each triangle's source less `len(lights)`, or NO_SOURCE.
+    owner : (g,) int64
+        The source of each group, likewise.
+    single : (s − lights,) bool
+        Whether what emits has one group, which is of one color.
     """
+
+    STORED = ("lights", "groups", "strengths", "emitter", "owner", "single")
 
     def __init__(self, scene: Scene, faces: Faces, caster: RayCaster, emitter: Array | None = None) -> None:
         self.lights: tuple[Light, ...] = scene.lights
@@ -59,11 +65,11 @@ class LightSources:
             found = emitter_groups(scene, faces, caster, self.emitter[faces.triangle] == number)
             self.groups += found
             owner += [number] * len(found)
-        self._owner = np.array(owner, dtype=np.int64)
+        self.owner = np.array(owner, dtype=np.int64)
         exitance = np.zeros((count, 3))
         np.maximum.at(exitance, self.emitter[emits], scene.emission[emits])
         self.strengths = np.concatenate([light_strengths(self.lights), exitance])
-        self._single = np.bincount(self._owner, minlength=count) == 1
+        self.single = np.bincount(self.owner, minlength=count) == 1
 
     def __len__(self) -> int:
         return len(self.strengths)
@@ -85,10 +91,10 @@ class LightSources:
         if not (np.isfinite(wanted).all() and (wanted >= 0.0).all()):
             raise SceneError("a strength is negative, NaN or infinite; set it to 0 or more")
         lights = len(self.lights)
-        unknown = ~self._single[:, None] & (self.strengths[lights:] == 0) & (wanted[lights:] > 0)
+        unknown = ~self.single[:, None] & (self.strengths[lights:] == 0) & (wanted[lights:] > 0)
         if unknown.any():
             raise SceneError(
-                "an emission of several colours cannot be given a channel that it did not have; bake again"
+                "an emission of several colors cannot be given a channel that it did not have; bake again"
             )
         return wanted
 
@@ -96,7 +102,7 @@ class LightSources:
         """Return (l + g, 3): what the gains of lights and groups are multiplied with."""
         lights = len(self.lights)
         given = [strengths[:lights]]
-        for group, source in zip(self.groups, self._owner, strict=True):
+        for group, source in zip(self.groups, self.owner, strict=True):
             given.append(self._changed(group.strength[None], source, strengths))
         return np.concatenate(given)
 

@@ -5,7 +5,7 @@ Also refinement by form factors. For the methods that need all elements beforeha
 
 from __future__ import annotations
 
-from .assembly import collocation_steps, galerkin_steps, linear_steps, share_overlaps, with_lamps
+from .assembly import collocation, galerkin, linear, share_overlaps, with_lamps
 from .decomposition import describe_sets, independent_sets
 from .exchange import exchange_areas
 from .fixed_elements import subdivide_evenly
@@ -19,13 +19,13 @@ from .refine_patch import RefinePatch
 __all__ = [
     "LinearSystem",
     "RefinePatch",
-    "collocation_steps",
+    "collocation",
     "corner_factors",
     "describe_sets",
     "exchange_areas",
-    "galerkin_steps",
+    "galerkin",
     "independent_sets",
-    "linear_steps",
+    "linear",
     "matrix_properties",
     "share_overlaps",
     "source_factor_bounds",

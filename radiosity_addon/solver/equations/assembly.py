@@ -1,4 +1,4 @@
-"""Making the linear system: Galerkin or collocation, constant or linear elements (handout §3.2, §3.3).
+"""Assembly of the linear system: Galerkin or collocation, constant or linear elements (handout §3.2, §3.3).
 
 | assembly | K_ij | source |
 |---|---|---|
@@ -7,16 +7,17 @@
 | `linear` | from vertex i to the hat of vertex j | (3.9)–(3.13) |
 
 All return the same `LinearSystem`, of the surfaces' own emission; `with_lamps` adds the lamps'
-light. The `…_steps` yield how far they are, so that a caller may show it or cancel.
+light.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
+from ...base import SILENT, Progress
 from ...form_factors import point_to_polygon
 from ...numerics import Array, for_chunks
 from ...rays import RayCaster
@@ -31,39 +32,87 @@ BLOCK_PAIRS = 1 << 18
 """Pairs between two reports of progress, about half a second's work; their numbers take 4 MB."""
 
 CHUNK_PAIRS = 1 << 16
-"""Pairs of a point and an element that one thread looks at together; about 60 MB."""
+"""Pairs of a point and an element that one thread processes together; about 60 MB."""
 
 FACING = 1e-13
 """A face rises over another's plane if by more than this part of the scene's extent."""
 
 
-Steps = Generator[float, None, LinearSystem]
-
-
-def galerkin(hierarchy: Hierarchy, caster: RayCaster, seed: int = 0, threads: int = 0) -> LinearSystem:
+def galerkin(
+    hierarchy: Hierarchy,
+    caster: RayCaster,
+    basis: Basis | None = None,
+    seed: int = 0,
+    threads: int = 0,
+    progress: Progress = SILENT,
+) -> LinearSystem:
     """Assemble K_ij = δ_ij − ρ_i F_ij with area-averaged F, of constant elements on the leaves (3.26).
 
     Reciprocal: T_ij = A_i F_ij V_ij is computed once for each pair.
+
+    basis: From `constant_basis`, which None calls.
     """
-    return _finish(galerkin_steps(hierarchy, caster, constant_basis(hierarchy), seed, threads))
+    basis = basis or constant_basis(hierarchy)
+    count = len(basis)
+    exchange = np.zeros((count, count))
+    leaf, of_face = basis.leaf, basis.faces(hierarchy)
+    for rows in _blocks(count):
+        first = np.arange(rows.start, rows.stop)
+        seen = _facing(hierarchy.faces, of_face[rows], of_face)
+        seen &= np.arange(count)[None] > first[:, None]
+        one, other = np.nonzero(seen)
+        one += rows.start
+        values = exchange_areas(hierarchy, caster, leaf[one], leaf[other], seed, threads)
+        exchange[one, other] = values
+        exchange[other, one] = values
+        # The rows shorten: what is done grows as the area of the trapezoid above.
+        progress.at(1.0 - (1.0 - rows.stop / count) ** 2)
+    return _system(hierarchy, basis, exchange, reciprocal=True)
 
 
-def collocation(hierarchy: Hierarchy, caster: RayCaster, seed: int = 0, threads: int = 0) -> LinearSystem:
+def collocation(
+    hierarchy: Hierarchy,
+    caster: RayCaster,
+    basis: Basis | None = None,
+    seed: int = 0,
+    threads: int = 0,
+    progress: Progress = SILENT,
+) -> LinearSystem:
     """Assemble K_ij = δ_ij − ρ_i F(x_i, j) V with x_i the centroids of constant elements (3.13)."""
-    return _finish(collocation_steps(hierarchy, caster, constant_basis(hierarchy), seed, threads))
+    basis = basis or constant_basis(hierarchy)
+    exchange, area = np.zeros((len(basis), len(basis))), basis.area
+
+    def put(point: Array, leaf_row: Array, values: Array) -> None:
+        exchange[point, leaf_row] = area[point] * values
+
+    def measure(points: Array, normals: Array, corners: Array, _: Array) -> Array:
+        return point_to_polygon(points, normals, corners)
+
+    _measure_points(hierarchy, caster, basis, measure, put, seed, threads, progress)
+    return _system(hierarchy, basis, exchange)
 
 
 def linear(
-    hierarchy: Hierarchy, caster: RayCaster, basis: Basis | None = None, seed: int = 0, threads: int = 0
+    hierarchy: Hierarchy,
+    caster: RayCaster,
+    basis: Basis | None = None,
+    seed: int = 0,
+    threads: int = 0,
+    progress: Progress = SILENT,
 ) -> LinearSystem:
     """Assemble K_ij = N_j(x_i) − ρ_i ∫ N_j κ V dA with hats N_j at the leaves' vertices (3.9).
 
-    Parameters
-    ----------
-    basis : Basis or None
-        From `vertex_basis`, which None calls; needed again to evaluate the solution.
+    basis: From `vertex_basis`, which None calls; needed again to evaluate the solution.
     """
-    return _finish(linear_steps(hierarchy, caster, basis or vertex_basis(hierarchy), seed, threads))
+    basis = basis or vertex_basis(hierarchy)
+    exchange, area, corner = np.zeros((len(basis), len(basis))), basis.area, basis.corner
+
+    def put(point: Array, leaf_row: Array, values: Array) -> None:
+        for place in range(3):
+            np.add.at(exchange, (point, corner[leaf_row, place]), area[point] * values[:, place])
+
+    _measure_points(hierarchy, caster, basis, corner_factors, put, seed, threads, progress)
+    return _system(hierarchy, basis, exchange)
 
 
 def with_lamps(system: LinearSystem, direct: Array) -> LinearSystem:
@@ -78,17 +127,9 @@ def share_overlaps(system: LinearSystem, opacity: Array) -> tuple[LinearSystem, 
     that is the same system with s ρ for ρ and s E for E, so T stays as it is, and symmetric.
     Of others every row, what an element *receives*, is scaled in place.
 
-    Parameters
-    ----------
-    opacity : (n,) float64
-        Of each unknown's surface: what is not there takes no light.
-
-    Returns
-    -------
-    system : LinearSystem
-        Of the unknowns C.
-    sends : (n,) float64
-        s: B = C / s. 1 throughout where the rows were scaled, and where nothing overlaps.
+    opacity (n,): Of each unknown's surface: what is not there takes no light.
+    Returns system: Of the unknowns C.
+    Returns sends (n,): s: B = C / s. 1 throughout where the rows were scaled, and where nothing overlaps.
     """
     share = shares(arriving(system.exchange, opacity) / system.area)
     if system.reciprocal:
@@ -101,55 +142,7 @@ def share_overlaps(system: LinearSystem, opacity: Array) -> tuple[LinearSystem, 
     return system, np.ones(len(system))
 
 
-def galerkin_steps(hierarchy: Hierarchy, caster: RayCaster, basis: Basis, seed: int, threads: int) -> Steps:
-    """See `galerkin`; yields the fraction done."""
-    count = len(basis)
-    exchange = np.zeros((count, count))
-    leaf, of_face = basis.leaf, basis.faces(hierarchy)
-    for rows in _blocks(count):
-        first = np.arange(rows.start, rows.stop)
-        seen = _facing(hierarchy.faces, of_face[rows], of_face)
-        seen &= np.arange(count)[None] > first[:, None]
-        one, other = np.nonzero(seen)
-        one += rows.start
-        values = exchange_areas(hierarchy, caster, leaf[one], leaf[other], seed, threads)
-        exchange[one, other] = values
-        exchange[other, one] = values
-        # The rows shorten: what is done grows as the area of the trapezoid above.
-        yield 1.0 - (1.0 - rows.stop / count) ** 2
-    return _system(hierarchy, basis, exchange, reciprocal=True)
-
-
-def collocation_steps(
-    hierarchy: Hierarchy, caster: RayCaster, basis: Basis, seed: int, threads: int
-) -> Steps:
-    """See `collocation`; yields the fraction done."""
-    exchange = np.zeros((len(basis), len(basis)))
-
-    def put(point: Array, leaf_row: Array, values: Array) -> None:
-        exchange[point, leaf_row] = basis.area[point] * values
-
-    def measure(points: Array, normals: Array, corners: Array, _: Array) -> Array:
-        return point_to_polygon(points, normals, corners)
-
-    yield from _point_rows(hierarchy, caster, basis, measure, put, seed, threads)
-    return _system(hierarchy, basis, exchange)
-
-
-def linear_steps(hierarchy: Hierarchy, caster: RayCaster, basis: Basis, seed: int, threads: int) -> Steps:
-    """See `linear`; yields the fraction done."""
-    exchange = np.zeros((len(basis), len(basis)))
-
-    def put(point: Array, leaf_row: Array, values: Array) -> None:
-        for corner in range(3):
-            place = (point, basis.corner[leaf_row, corner])
-            np.add.at(exchange, place, basis.area[point] * values[:, corner])
-
-    yield from _point_rows(hierarchy, caster, basis, corner_factors, put, seed, threads)
-    return _system(hierarchy, basis, exchange)
-
-
-def _point_rows(
+def _measure_points(
     hierarchy: Hierarchy,
     caster: RayCaster,
     basis: Basis,
@@ -157,8 +150,9 @@ def _point_rows(
     put: Callable[[Array, Array, Array], None],
     seed: int,
     threads: int,
-) -> Iterator[float]:
-    """Measure all pairs of a node and a leaf, hand them to `put`, and yield the fraction done."""
+    progress: Progress,
+) -> None:
+    """Measure all pairs of a node and a leaf, and hand them to `put`."""
     points, of_face = basis.points(hierarchy), basis.faces(hierarchy)
     leaf_face = hierarchy.face[basis.leaf]
     corners, leaf_normals = hierarchy.corners[basis.leaf], hierarchy.normal[basis.leaf]
@@ -179,7 +173,7 @@ def _point_rows(
 
     for block in _blocks(len(basis), len(leaf_face)):
         for_chunks(_shifted(fill, block.start), block.stop - block.start, step, threads)
-        yield block.stop / len(basis)
+        progress.at(block.stop / len(basis))
 
 
 def _shifted(work: Callable[[slice], None], start: int) -> Callable[[slice], None]:
@@ -210,7 +204,7 @@ def _facing(faces: Faces, one: Array, other: Array) -> Array:
 
 
 def _rise(faces: Faces, base: Array, of: Array) -> Array:
-    """Return (b, o) how far the highest corner of faces `of` rises over the planes of faces `base`."""
+    """Return (b, o) the height of the highest corner of faces `of` over the planes of faces `base`."""
     normal = faces.normal[base]
     ground = np.einsum("bk,bk->b", normal, faces.corners[base, 0])
     height = normal @ faces.corners[of].reshape(-1, 3).T
@@ -221,12 +215,3 @@ def _blocks(count: int, columns: int | None = None) -> list[slice]:
     """Return slices of rows of at most `BLOCK_PAIRS` pairs that cover 0 … count."""
     step = max(BLOCK_PAIRS // max(columns or count, 1), 1)
     return [slice(start, min(start + step, count)) for start in range(0, count, step)]
-
-
-def _finish(steps: Steps) -> LinearSystem:
-    while True:
-        try:
-            next(steps)
-        except StopIteration as done:
-            system: LinearSystem = done.value
-            return system

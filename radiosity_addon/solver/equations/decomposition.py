@@ -1,4 +1,4 @@
-"""Independent sets: parts of a scene that exchange no light, solved each by itself (handout §3.4).
+"""Independent sets: parts of a scene that exchange no light, solved separately (handout §3.4).
 
 They are the connected components of "sees". In their order K is block diagonal: what happens
 in one room is nothing to the other.
@@ -14,18 +14,15 @@ from ...numerics import Array
 from .linear_system import LinearSystem
 
 CHUNK_ROWS = 512
-"""Rows of the matrix looked at together; bounds the temporaries to 512 n bytes."""
+"""Rows of the matrix processed together; bounds the temporaries to 512 n bytes."""
 
 
 def independent_sets(system: LinearSystem) -> tuple[list[Array], Array]:
     """Find the connected components of "sees", the graph of the entries of T and M that are not 0.
 
-    Returns
-    -------
-    sets : list of (k,) int
-        Rows of each component of two unknowns or more, in order; the first row's set first.
-    alone : (a,) int
-        Rows coupled to no other: their B is E.
+    Returns sets list of (k,) int: Rows of each component of two unknowns or more, in order; the first row's
+        set first.
+    Returns alone (a,) int: Rows coupled to no other: their B is E.
     """
     count = len(system)
     unseen = np.ones(count, dtype=bool)
@@ -33,26 +30,26 @@ def independent_sets(system: LinearSystem) -> tuple[list[Array], Array]:
     for first in range(count):
         if not unseen[first]:
             continue
-        found = _reach(system, first, unseen)
-        if len(found) > 1:
-            sets.append(found)
+        reached = _reach(system, first, unseen)
+        if len(reached) > 1:
+            sets.append(reached)
         else:
             alone.append(first)
     return sets, np.array(alone, dtype=np.int64)
 
 
 def _reach(system: LinearSystem, first: int, unseen: Array) -> Array:
-    """Return the sorted rows joined to `first` by any path, and strike them off `unseen`."""
+    """Return the sorted rows joined to `first` by any path, and remove them from `unseen`."""
     unseen[first] = False
-    frontier, found = np.array([first]), [first]
+    frontier, reached = np.array([first]), [first]
     while len(frontier):
         near = np.zeros(len(system), dtype=bool)
         for start in range(0, len(frontier), CHUNK_ROWS):
             near |= _neighbours(system, frontier[start : start + CHUNK_ROWS])
         frontier = np.flatnonzero(near & unseen)
         unseen[frontier] = False
-        found.extend(frontier.tolist())
-    return np.sort(np.array(found))
+        reached.extend(frontier.tolist())
+    return np.sort(np.array(reached))
 
 
 def _neighbours(system: LinearSystem, rows: Array) -> Array:
@@ -70,21 +67,11 @@ def _neighbours(system: LinearSystem, rows: Array) -> Array:
 def describe_sets(sets: list[Array], area: Array, unknown: Array, triangle: Array) -> list[dict[str, Any]]:
     """Describe independent sets for the report, the largest area first.
 
-    Parameters
-    ----------
-    sets : list of (k,) int
-        From `independent_sets`.
-    area : (l,) float
-        Of each leaf element [m²].
-    unknown : (l,) int
-        An unknown of each leaf.
-    triangle : (l,) int
-        The scene triangle of each leaf.
-
-    Returns
-    -------
-    described : list of dict
-        "elements", "area_m2", and "triangles": the rows of the set's triangles, those with the
+    sets list of (k,) int: From `independent_sets`.
+    area (l,): Of each leaf element [m²].
+    unknown (l,) int: An unknown of each leaf.
+    triangle (l,) int: The scene triangle of each leaf.
+    Returns described: "elements", "area_m2", and "triangles": the rows of the set's triangles, those with the
         largest parts in it first.
     """
     label = np.full(1 + max(int(rows.max(initial=0)) for rows in [unknown, *sets]), -1)

@@ -1,4 +1,4 @@
-"""What two elements exchange: one number for each unordered pair.
+"""Exchange areas: one number for each unordered pair of elements.
 
 A_i F_ij V_ij is the same seen from either side (handout (3.30)), so it is computed from one
 side only, always the same one, with rays of its own number. Whoever asks, for a matrix, a
@@ -23,19 +23,10 @@ def exchange_areas(
 ) -> Array:
     """Return A_i F_ij V_ij of pairs of elements, the same for (i, j) and (j, i).
 
-    Parameters
-    ----------
-    one, other : (n,) int
-        Elements; an element and itself exchange nothing, being flat.
-    seed : int
-        Places the rays, together with the pair's own numbers.
-    threads : int
-        0 means all cores; the result does not depend on it.
-
-    Returns
-    -------
-    exchange : (n,) float64 [m²]
-        The form factor is F_ij = exchange / A_i (handout (3.27)).
+    one, other (n,) int: Elements; an element and itself exchange nothing, being flat.
+    seed: Places the rays, together with the pair's own numbers.
+    threads: 0 means all cores; the result does not depend on it.
+    Returns exchange (n,) [m²]: The form factor is F_ij = exchange / A_i (handout (3.27)).
     """
     one, other = np.asarray(one), np.asarray(other)
     exchange = np.zeros(len(one))
@@ -47,9 +38,9 @@ def exchange_areas(
     def measure(rows: slice) -> None:
         factor = element_factors(hierarchy, receiver[rows], source[rows])
         seen = np.flatnonzero(factor > 0)
-        to, of = receiver[rows][seen], source[rows][seen]
-        visibility = pair_visibility(hierarchy, caster, to, hierarchy.n_clusters + of, seed)
-        exchange[rows.start + seen] = hierarchy.area[to] * factor[seen] * visibility
+        receiving, sending = receiver[rows][seen], source[rows][seen]
+        visibility = pair_visibility(hierarchy, caster, receiving, hierarchy.n_clusters + sending, seed)
+        exchange[rows.start + seen] = hierarchy.area[receiving] * factor[seen] * visibility
 
     for_chunks(measure, len(one), CHUNK, threads)
     return exchange

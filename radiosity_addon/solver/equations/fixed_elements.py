@@ -1,4 +1,4 @@
-"""A fixed set of elements, for the methods that need to know them beforehand."""
+"""A fixed set of elements, for methods that need all elements beforehand."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def subdivide_evenly(hierarchy: Hierarchy, count: int) -> None:
     triangles a scene has, its large ones are divided. Never splits beyond that.
     """
     area = hierarchy.area[hierarchy.leaves]
-    # What even a division into `count` could not split.
+    # Elements that even a division into `count` would not split.
     small = int((area < area.sum() / max(count, 1)).sum())
     limit = count + small if len(area) > count else count
     while True:

@@ -1,4 +1,4 @@
-"""Which pairs to link as wholes, by their form factor alone (handout §4.2, Oracle1).
+"""Decides by form factors alone which pairs are linked (handout §4.2, Oracle1).
 
 The handout estimates the fraction of what leaves a source that reaches a receiver, cheaply
 and without occlusion. Here the estimate is a *bound*: no pair accepted by it exchanges more.
@@ -12,7 +12,7 @@ from ...numerics import Array
 from ..hierarchy import Hierarchy
 
 COPLANAR = 1e-9
-"""Heights below this share of the two radii count as none, as in `pairs.element_factors`."""
+"""Heights below this share of the two radii count as 0, as in `pairs.element_factors`."""
 
 CHUNK = 1 << 18
 """Pairs bounded at once; their temporaries take some 100 MB."""
@@ -29,15 +29,8 @@ def source_factor_bounds(hierarchy: Hierarchy, receiver: Array, source: Array) -
     of the highest corner over the other's plane at that distance. Far away this is the disk
     approximation. A_s F_sr = A_r F_rs gives the fraction of the source.
 
-    Parameters
-    ----------
-    receiver, source : (n,) int
-        Elements.
-
-    Returns
-    -------
-    bounds : (n,) float64 in [0, 1]
-        0 exactly where either lies wholly behind the other's plane.
+    receiver, source (n,) int: Elements.
+    Returns bounds (n,) float64 in [0, 1]: 0 exactly where either lies wholly behind the other's plane.
     """
     bounds = np.empty(len(receiver))
     for start in range(0, len(receiver), CHUNK):
@@ -47,18 +40,20 @@ def source_factor_bounds(hierarchy: Hierarchy, receiver: Array, source: Array) -
 
 
 def _chunk_bounds(hierarchy: Hierarchy, receiver: Array, source: Array) -> Array:
-    to, of = hierarchy.corners[receiver], hierarchy.corners[source]
-    centre_to, centre_of = to.mean(axis=1), of.mean(axis=1)
-    sizes = _radius(to, centre_to) + _radius(of, centre_of)
-    over_to = np.einsum("nck,nk->nc", of - centre_to[:, None], hierarchy.normal[receiver])
-    over_of = np.einsum("nck,nk->nc", to - centre_of[:, None], hierarchy.normal[source])
+    receiver_corners, source_corners = hierarchy.corners[receiver], hierarchy.corners[source]
+    centre_to, centre_of = receiver_corners.mean(axis=1), source_corners.mean(axis=1)
+    sizes = _radius(receiver_corners, centre_to) + _radius(source_corners, centre_of)
+    over_to = np.einsum("nck,nk->nc", source_corners - centre_to[:, None], hierarchy.normal[receiver])
+    over_of = np.einsum("nck,nk->nc", receiver_corners - centre_of[:, None], hierarchy.normal[source])
     rise_to, rise_of = over_to.max(axis=1), over_of.max(axis=1)
     mutual = (rise_to > COPLANAR * sizes) & (rise_of > COPLANAR * sizes)
 
     apart = np.linalg.norm(centre_of - centre_to, axis=1) - sizes
-    nearest = np.maximum.reduce([apart, over_to.min(axis=1), over_of.min(axis=1), np.zeros(len(to))])
+    nearest = np.maximum.reduce(
+        [apart, over_to.min(axis=1), over_of.min(axis=1), np.zeros(len(receiver_corners))]
+    )
     area_to, area_of = hierarchy.area[receiver], hierarchy.area[source]
-    # cosθ = height / distance, for the nearest points that there can be.
+    # cosθ = height / distance, for the nearest possible points.
     heights = np.minimum(rise_to, nearest) * np.minimum(rise_of, nearest)
     widest = np.pi * nearest**4
     full = np.maximum(area_to, area_of) * heights
@@ -68,7 +63,7 @@ def _chunk_bounds(hierarchy: Hierarchy, receiver: Array, source: Array) -> Array
 
 
 def _radius(corners: Array, centre: Array) -> Array:
-    """Return (n,) the distance from each centre to its farthest corner."""
+    """Return (n,) the distance from each center to its farthest corner."""
     return np.asarray(np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1))
 
 
@@ -77,15 +72,9 @@ def oracle1(bound: Array, area_to: Array, area_of: Array, error: float, min_area
 
     They are if both sides are smaller than A_ε, or if F_sr < F_ε.
 
-    Parameters
-    ----------
-    bound : (n,) float64
-        F_sr of `source_factor_bounds`.
-    area_to, area_of : (n,) float64 [m²]
-        Of receivers and sources.
-    error : float
-        F_ε.
-    min_area : float
-        A_ε [m²].
+    bound (n,): F_sr of `source_factor_bounds`.
+    area_to, area_of (n,) [m²]: Of receivers and sources.
+    error: F_ε.
+    min_area: A_ε [m²].
     """
     return np.asarray((bound < error) | ((area_to < min_area) & (area_of < min_area)))

@@ -1,4 +1,4 @@
-"""Linear elements: one unknown a vertex of the leaves' mesh, a hat around each (handout §3.1, §3.2.1).
+"""Linear elements: one unknown per vertex of the leaves' mesh, a hat around each (handout §3.1, §3.2.1).
 
 Radiosity jumps at creases, and the kernel κ is discontinuous there. So faces share vertices
 only across edges where nothing but they meet, coplanar and of one material; and the nodes at
@@ -14,7 +14,7 @@ from ...scene import Faces
 from ..hierarchy import Basis, Hierarchy
 
 INWARD = 0.2
-"""Nodes at the rim move this part of the way to the centroid of a leaf beside them."""
+"""Nodes at the boundary move this part of the way to the centroid of an adjacent leaf."""
 
 COPLANAR = 1e-9
 """Faces whose normals' cosine is above 1 less this lie in one plane where they share an edge."""
@@ -24,7 +24,7 @@ ON_EDGE = 1e-9
 
 
 def vertex_basis(hierarchy: Hierarchy) -> Basis:
-    """Return hats over the leaves: one where a vertex is, falling to 0 at its neighbours.
+    """Return hats over the leaves: one where a vertex is, falling to 0 at its neighbors.
 
     Where leaves of different size meet, the vertex on the larger one's edge has a hat on the
     smaller leaves only.
@@ -58,23 +58,15 @@ def vertex_basis(hierarchy: Hierarchy) -> Basis:
 def _across_edges(hierarchy: Hierarchy, node: Array, position: Array) -> tuple[Array, Array]:
     """Join the nodes of faces along smooth edges.
 
-    Parameters
-    ----------
-    node, position : (3 l,) int
-        The face's node and the place in space of every corner of every leaf.
-
-    Returns
-    -------
-    joined : (nodes,) int
-        A new number for every node, consecutive.
-    at_crease : (nodes,) bool
-        Whether it lies on an edge of its face that is not smooth.
+    node, position (3 l,) int: The face's node and the place in space of every corner of every leaf.
+    Returns joined (nodes,) int: A new number for every node, consecutive.
+    Returns at_crease (nodes,) bool: Whether it lies on an edge of its face that is not smooth.
     """
     count = int(node.max(initial=-1)) + 1
-    some = np.zeros(count, dtype=np.int64)
-    some[node] = np.arange(len(node))
-    leaf, face = hierarchy.leaves[some // 3], hierarchy.face[hierarchy.leaves[some // 3]]
-    vertices = hierarchy.corners[leaf, some % 3]
+    any_row = np.zeros(count, dtype=np.int64)
+    any_row[node] = np.arange(len(node))
+    leaf, face = hierarchy.leaves[any_row // 3], hierarchy.face[hierarchy.leaves[any_row // 3]]
+    vertices = hierarchy.corners[leaf, any_row % 3]
     weights = weights_at(hierarchy.faces.corners[face], vertices[:, None])[:, 0]
     edge, smooth = _smooth_edges(hierarchy.faces)
 
@@ -85,7 +77,7 @@ def _across_edges(hierarchy: Hierarchy, node: Array, position: Array) -> tuple[A
         side = (opposite + 1) % 3
         at_crease[on_edge] |= ~smooth[face[on_edge], side]
         shared = on_edge[smooth[face[on_edge], side]]
-        keys.append(np.stack([edge[face[shared], side], position[some[shared]]], axis=1))
+        keys.append(np.stack([edge[face[shared], side], position[any_row[shared]]], axis=1))
         nodes.append(shared)
     key, rows = numbered(np.concatenate(keys)), np.concatenate(nodes)
     order = np.argsort(key, kind="stable")
@@ -97,20 +89,18 @@ def _across_edges(hierarchy: Hierarchy, node: Array, position: Array) -> tuple[A
 def _smooth_edges(faces: Faces) -> tuple[Array, Array]:
     """Find the edges where two coplanar faces of one material meet, and nothing else does.
 
-    Returns
-    -------
-    edge : (f, 3) int
-        The same number for the two faces of a smooth edge; edge k runs from corner k to k + 1.
-    smooth : (f, 3) bool
+    Returns edge (f, 3) int: The same number for the two faces of a smooth edge; edge k runs from corner k to
+        k + 1.
+    Returns smooth (f, 3) bool.
     """
     count = len(faces)
     ends = numbered(faces.corners.reshape(-1, 3) + 0.0).reshape(count, 3)
     ends = np.sort(np.stack([ends, np.roll(ends, -1, axis=1)], axis=-1), axis=-1)
     line = numbered(ends.reshape(-1, 2))
     owner = np.repeat(np.arange(count), 3)
-    # Every triangle has a front: these tell how many triangles meet at an edge.
+    # Every triangle has a front: fronts count the triangles that meet at an edge.
     triangles = np.bincount(line, faces.front[owner], minlength=int(line.max(initial=-1)) + 1)
-    # The two sides of a sheet are apart; a face belongs to that of the first, or to neither.
+    # The two sides of a sheet are separate; a face belongs to the side of the first, or to neither.
     first = np.zeros(len(triangles), dtype=np.int64)
     first[line[::-1]] = owner[::-1]
     cosine = np.einsum("nk,nk->n", faces.normal[owner], faces.normal[first[line]])

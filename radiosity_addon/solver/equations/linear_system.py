@@ -1,4 +1,4 @@
-"""The linear system K B = E that finite elements make of the radiosity equation.
+"""The linear system K B = E of the radiosity equation on finite elements.
 
     K = M − P F                                                     (handout (3.33))
 
@@ -22,19 +22,12 @@ from ...numerics import Array
 class LinearSystem:
     """K B = E for n unknowns and three channels (handout (3.32)).
 
-    Parameters
-    ----------
-    exchange : (n, n) float64
-        T_ij = A_i F_ij V_ij [m²], visibility included.
-    reflectance : (n, 3) float64
-    emission : (n, 3) float64
-        What the elements emit and what they reflect of the lamps' light [W/m²].
-    area : (n,) float64
-        A_i = ∫ N_i dA > 0 [m²], the weight of each unknown and of its equation.
-    mass : (n, n) float64 or None
-        M; None is the identity.
-    reciprocal : bool
-        Whether T is symmetric by construction: area-averaged factors, one for each pair.
+    exchange (n, n): T_ij = A_i F_ij V_ij [m²], visibility included.
+    reflectance (n, 3).
+    emission (n, 3): Emission plus the reflected light of the lamps [W/m²].
+    area (n,): A_i = ∫ N_i dA > 0 [m²], the weight of each unknown and of its equation.
+    mass (n, n): M; None is the identity.
+    reciprocal: Whether T is symmetric by construction: area-averaged factors, one for each pair.
     """
 
     exchange: Array
@@ -61,7 +54,7 @@ class LinearSystem:
 
     @property
     def transport(self) -> Array:
-        """(n, n) float64, made anew: F, the form factors with visibility."""
+        """(n, n) float64, a new array: F, the form factors with visibility."""
         return np.asarray(self.exchange / self.area[:, None])
 
     def gather(self, radiosity: Array) -> Array:
@@ -73,7 +66,7 @@ class LinearSystem:
         return radiosity if self.mass is None else np.asarray(self.mass @ radiosity)
 
     def residual(self, radiosity: Array) -> Array:
-        """Return E − K B [W/m²], (n, 3): what (3.7) weighs; the negative of r(x) at the nodes."""
+        """Return E − K B [W/m²], (n, 3): the residual of (3.7); the negative of r(x) at the nodes."""
         reflected = self.reflectance * self.gather(radiosity)
         return np.asarray(self.emission + reflected - self.weigh(radiosity))
 
@@ -97,7 +90,7 @@ class LinearSystem:
         return np.asarray(matrix)
 
     def take(self, rows: Array) -> LinearSystem:
-        """Return the system of some unknowns among themselves; the others' light is left out.
+        """Return the system of selected unknowns among themselves, without the light of the others.
 
         A copy, but for all rows in order, which is the system itself.
         """

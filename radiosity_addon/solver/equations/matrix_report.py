@@ -1,4 +1,4 @@
-"""What a radiosity matrix is like: size, fill, dominance, spectral radius, condition (handout §3.4)."""
+"""Properties of a radiosity matrix: size, fill, dominance, spectral radius, condition (handout §3.4)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ...numerics import Array
 from .linear_system import LinearSystem
 
 CHUNK_ROWS = 512
-"""Rows looked at together; bounds the temporaries to some 4 KB · n."""
+"""Rows processed together; bounds the temporaries to some 4 KB · n."""
 
 POWER_STEPS = 100
 POWER_TOLERANCE = 1e-6
@@ -21,28 +21,19 @@ POWER_TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 class MatrixProperties:
-    """Properties of K, the least favourable channel's.
+    """Properties of K, the least favorable channel's.
 
-    Parameters
-    ----------
-    size : int
-        n.
-    fill : float
-        Share of K's n² entries that are not 0 in any channel; 0 where ρ_i = 0 or i and j do not
-        see each other.
-    dominance : float
-        min_i (|K_ii| − Σ_{j≠i} |K_ij|) / |K_ii|, see (3.34): 1 − ρ in an enclosure.
-    spectral_radius : float
-        Of Jacobi's iteration matrix, P F for planar elements: what each iteration leaves of the
-        error in the end. At most the largest ρ.
-    condition : float
-        (1 − λ_min) / (1 − λ_max) with the extreme eigenvalues of that matrix: the condition of
-        the symmetrised system, scaled to a diagonal of 1. Infinite if λ_max reaches 1.
-    symmetrised : int
-        Size of the symmetrised system, see `symmetrised`: rows with ρ > 0, in the channel that has
+    size: n.
+    fill: Share of K's n² entries that are not 0 in any channel; 0 where ρ_i = 0 or i and j do not see each
+        other.
+    dominance: min_i (|K_ii| − Σ_{j≠i} |K_ij|) / |K_ii|, see (3.34): 1 − ρ in an enclosure.
+    spectral_radius: Of Jacobi's iteration matrix, P F for planar elements: the factor on the error
+        per iteration in the long run. At most the largest ρ.
+    condition: (1 − λ_min) / (1 − λ_max) with the extreme eigenvalues of that matrix: the condition of the
+        symmetrized system, scaled to a diagonal of 1. Infinite if λ_max reaches 1.
+    symmetrised: Size of the symmetrized system, see `symmetrised`: rows with ρ > 0, in the channel with the
         most. The others are eliminated.
-    asymmetry : float
-        max |T − Tᵀ| / max |T|: 0 where A_i F_ij = A_j F_ji (3.30).
+    asymmetry: max |T − Tᵀ| / max |T|: 0 where A_i F_ij = A_j F_ji (3.30).
     """
 
     size: int
@@ -112,14 +103,11 @@ def extreme_eigenvalues(system: LinearSystem) -> tuple[Array, Array]:
     """Estimate the smallest and largest eigenvalue of Jacobi's iteration matrix I − D⁻¹ K.
 
     By power iteration, from B = 1 for the largest, in the inner product Σ (A/ρ) x y, in which P F
-    is symmetric if reciprocal: the Rayleigh quotient then never exceeds the largest. (Of another
-    system's complex eigenvalues it tells the real part only.) The matrix is not negative for
+    is symmetric if reciprocal: the Rayleigh quotient then never exceeds the largest. (For other
+    systems' complex eigenvalues it estimates the real part only.) The matrix is not negative for
     constant elements, so its largest eigenvalue is its spectral radius.
 
-    Returns
-    -------
-    low, high : (3,) float64
-        Of each channel; 0 where nothing reflects.
+    Returns low, high (3,): Of each channel; 0 where nothing reflects.
     """
     count = len(system)
     if count == 0:
@@ -167,12 +155,10 @@ def asymmetry(matrix: Array) -> float:
 
 
 def reciprocity_error(area: Array, transport: Array) -> float:
-    """Return max |A_i F_ij − A_j F_ji| / max A_i F_ij: how far form factors miss (3.30).
+    """Return max |A_i F_ij − A_j F_ji| / max A_i F_ij: the deviation of form factors from (3.30).
 
-    Parameters
-    ----------
-    area : (n,) float
-    transport : (n, n) float
+    area (n,).
+    transport (n, n).
     """
     return asymmetry(np.asarray(area)[:, None] * transport)
 
@@ -183,12 +169,9 @@ def symmetrised(system: LinearSystem, channel: int) -> tuple[Array, Array, Array
     (The handout scales by A_i alone, which suffices for uniform ρ only.) Rows with ρ = 0 have
     B = E and move to the right side. For constant elements.
 
-    Returns
-    -------
-    matrix : (m, m) float64 [m²]
-    right_side : (m,) float64 [W]
-    rows : (m,) int
-        The unknowns that remain: those with ρ > 0.
+    Returns matrix (m, m) [m²].
+    Returns right_side (m,) [W].
+    Returns rows (m,) int: The unknowns that remain: those with ρ > 0.
     """
     if system.mass is not None:
         raise ValueError("the symmetric form needs constant elements: a mass matrix M = 1")

@@ -1,4 +1,4 @@
-"""What points receive from elements: point-to-polygon factors times visibility by rays.
+"""Light that points receive from elements: point-to-polygon factors times visibility by rays.
 
 The row of a collocation matrix (handout §3.2.1): from one point to every element, whole or
 shared out over the element's three corners.
@@ -13,11 +13,11 @@ from ...numerics import Array, point_on_each_triangle, split_in_four, stratified
 from ...rays import RayCaster
 
 NEAR = ((1.21, 4), (2.07, 2), (4.13, 1))
-"""(Distance over radius, generations): a nearer triangle is split so often before each part is
+"""(Distance over radius, generations): a nearer triangle is split this often before each part is
 shared out among the corners. Odd numbers: on a regular grid rounding must not decide between two."""
 
 CHUNK_PARTS = 1 << 17
-"""Parts looked at together; their arrays take some 50 MB."""
+"""Parts processed together; their arrays take some 50 MB."""
 
 _CUBATURE = np.array([[2.0, 0.5, 0.5], [0.5, 2.0, 0.5], [0.5, 0.5, 2.0]]) / 3.0
 """Points of a triangle whose mean is exact to degree 2."""
@@ -37,13 +37,10 @@ def visible_share(
     A ray from each quarter of the triangle; where the four disagree, sixteen. 1 where no ray
     carries light.
 
-    Parameters
-    ----------
-    points, normals : (n, 3) float64
-    corners : (n, 3, 3) float64
-    source_normals : (n, 3) float64
-    keys : (n,) int
-        With the seed, what places each pair's samples.
+    points, normals (n, 3).
+    corners (n, 3, 3).
+    source_normals (n, 3).
+    keys (n,) int: With the seed, they place each pair's samples.
     """
     lit, total = np.zeros(len(points)), np.zeros(len(points))
     rows, first = np.arange(len(points)), 0
@@ -69,17 +66,12 @@ def corner_factors(points: Array, normals: Array, corners: Array, source_normals
     """Return ∫ N_k κ dA of triangles' three hats N_k, unoccluded, as seen from points (3.13).
 
     The hats sum to 1, so these sum to the factor from the point to the triangle, exactly:
-    only how it is shared out is by cubature, or where the triangle is near by splitting it.
+    only their distribution is by cubature, or by splitting where the triangle is near.
 
-    Parameters
-    ----------
-    points, normals : (n, 3) float64
-    corners : (n, 3, 3) float64
-    source_normals : (n, 3) float64
-
-    Returns
-    -------
-    factors : (n, 3) float64
+    points, normals (n, 3).
+    corners (n, 3, 3).
+    source_normals (n, 3).
+    Returns factors (n, 3).
     """
     factors = np.empty((len(points), 3))
     centre = corners.mean(axis=1)
@@ -90,9 +82,9 @@ def corner_factors(points: Array, normals: Array, corners: Array, source_normals
         rows = np.flatnonzero((ratio >= nearest) & (ratio < farthest))
         step = max(CHUNK_PARTS // 4**generations, 1)
         for start in range(0, len(rows), step):
-            some = rows[start : start + step]
-            factors[some] = _split_factors(
-                points[some], normals[some], corners[some], source_normals[some], generations
+            chunk = rows[start : start + step]
+            factors[chunk] = _split_factors(
+                points[chunk], normals[chunk], corners[chunk], source_normals[chunk], generations
             )
         nearest = farthest
     return factors
@@ -113,7 +105,7 @@ def _split_factors(
     parts, weights = parts.reshape(-1, 3, 3), _CUBATURE @ weights.reshape(-1, 3, 3)
     points, normals, source_normals = (np.repeat(a, count, axis=0) for a in (points, normals, source_normals))
     transfer = kernel(points[:, None], normals[:, None], _CUBATURE @ parts, source_normals[:, None])
-    # Where the horizon leaves all these dark they count alike.
+    # Where all of these are below the horizon, they have equal weights.
     transfer += 1e-30
     transfer *= (point_to_polygon(points, normals, parts) / transfer.sum(axis=1))[:, None]
     return np.asarray(transfer.reshape(-1, 3 * count) @ weights.reshape(-1, 3))

@@ -1,4 +1,4 @@
-"""From every pair of faces to the pairs that are linked (handout §4.2, RefinePatch).
+"""Refines pairs of faces until they can be linked (handout §4.2, RefinePatch).
 
 The handout's recursion treats each pair alone, so the order in which pairs are treated does
 not matter: here one generation of pairs after the other, as arrays.
@@ -13,16 +13,14 @@ from ..hierarchy import LEAF, Hierarchy
 from .form_factor_oracle import oracle1, source_factor_bounds
 
 BLOCK = 1 << 22
-"""Pairs of faces looked at once for whether they face each other; some 100 MB."""
+"""Pairs of faces tested together for facing each other; some 100 MB."""
 
 
 def facing_pairs(hierarchy: Hierarchy) -> tuple[Array, Array]:
     """Return every ordered pair of distinct faces that are not behind each other's planes.
 
-    Returns
-    -------
-    receiver, source : (n,) int32
-        At most k (k − 1) pairs of k faces; every pair comes with its opposite.
+    Returns receiver, source (n,) int32: At most k (k − 1) pairs of k faces; every pair comes with its
+        opposite.
     """
     corners = hierarchy.faces.corners
     count = len(corners)
@@ -34,7 +32,7 @@ def facing_pairs(hierarchy: Hierarchy) -> tuple[Array, Array]:
     normal, centre = hierarchy.faces.normal, corners.mean(axis=1)
     offset = np.einsum("nk,nk->n", centre, normal)
     radius = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
-    # A hair below the plane still counts: the exact bound decides.
+    # Slightly below the plane still counts: the exact bound decides.
     slack = 1e-12 * float(np.abs(corners).max())
     step = max(BLOCK // count, 1)
     receivers, sources = [], []
@@ -56,29 +54,18 @@ def facing_pairs(hierarchy: Hierarchy) -> tuple[Array, Array]:
 
 
 class RefinePatch:
-    """Pairs on their way to becoming links.
+    """Pairs that are refined until they are linked.
 
     A pair that Oracle1 does not accept is replaced by those with the four children of its
     *receiver*; only where the receiver may not get children, by those of its source; where
     neither may, it is linked after all. Pairs behind each other's planes are dropped.
 
-    Parameters
-    ----------
-    hierarchy : Hierarchy
-        Gets children as pairs ask for them.
-    error : float
-        F_ε.
-    min_area : float
-        A_ε [m²]: no element becomes smaller.
-    max_links : int
-        Where the pairs would become more, the largest form factors are refined first.
-
-    Attributes
-    ----------
-    receiver, source : (n,) int32
-        Pairs still to be judged.
-    unrefined : (m, 2) int32
-        Receiver and source of those linked only because of `max_links`.
+    hierarchy: Gets children as pairs need them.
+    error: F_ε.
+    min_area: A_ε [m²]: no element becomes smaller.
+    max_links: Where the pairs would become more, the largest form factors are refined first.
+    receiver, source (n,) int32: Pairs still to be evaluated.
+    unrefined (m, 2) int32: Receiver and source of those linked only because of `max_links`.
     """
 
     def __init__(self, hierarchy: Hierarchy, error: float, min_area: float, max_links: int) -> None:
@@ -91,7 +78,7 @@ class RefinePatch:
         self._links: list[tuple[Array, Array]] = []
 
     def generation(self) -> bool:
-        """Judge all waiting pairs once and replace those refused; return whether any wait now."""
+        """Evaluate all waiting pairs once and replace rejected ones; return whether any are waiting now."""
         hierarchy = self.hierarchy
         bound = source_factor_bounds(hierarchy, self.receiver, self.source)
         seen = bound > 0

@@ -6,16 +6,17 @@ elements that are far brighter than the rest (`bright_patches.py`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
 from dataclasses import dataclass
 
 import numpy as np
 
+from ...base import SILENT, Progress
 from ...lights import SkyTable
-from ...numerics import Array, chunk_steps, cosine_hemisphere, orthonormal_basis, stratified_square
+from ...numerics import Array, Stream, cosine_hemisphere, map_chunks, orthonormal_basis, stratified_square
 from ...rays import Hits, RayCaster
 from .bright_patches import AimedRays, AimedTable, BrightElements
 from .footprints import Footprints
+from .hit_numbers import NOTHING, Resolver, sky_numbers
 
 CHUNK_RAYS = 1 << 16
 """Rays a thread prepares at once; bounds its temporaries to about 10 MB."""
@@ -25,14 +26,6 @@ AIMED_PART = 4
 
 SAME_PLACE = 1e-5
 """Barycentric weights that differ by less are one place on a triangle."""
-
-Resolver = Callable[[Hits], Array]
-"""Hits → (n,) int32: the number under which a hit's radiosity will be looked up."""
-
-NOTHING = -2
-"""A gather ray that left through the surface it started on: it carries no light."""
-SKY = -3
-"""The sky's first cell; the others count down from it (see `SkyTable`). −1 is left to resolvers."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +82,6 @@ class Gathering:
         self._seed, self.threads, self._sky = seed, threads, sky
         self._into: Array | None = None
         self._closeness = at.scratch.empty(len(at))
-        self._aimed: dict[int, AimedRays] = {}
 
     @property
     def sources(self) -> Array:
@@ -102,8 +94,10 @@ class Gathering:
     def sources(self, into: Array) -> None:
         self._into = into
 
-    def steps(self, bright: BrightElements | None, irradiance: Array) -> Generator[float, None, Gathered]:
-        """Trace all; yields the fraction done.
+    def trace(
+        self, bright: BrightElements | None, irradiance: Array, progress: Progress = SILENT
+    ) -> Gathered:
+        """Trace all.
 
         Parameters
         ----------
@@ -114,20 +108,15 @@ class Gathering:
         """
         assert len(self.sources) == len(self._at)
 
-        def trace(part: slice) -> None:
+        def trace(part: slice) -> AimedRays | None:
             rows = np.arange(part.start, part.stop)
             shares = None if bright is None or not len(bright) else self.shares(rows, bright, irradiance)
-            aimed = self.trace_rows(rows, bright, shares)
-            if aimed is not None:
-                self._aimed[part.start] = aimed
+            return self.trace_rows(rows, bright, shares)
 
         aimed, chunk = AimedTable(self._at.scratch), max(CHUNK_RAYS // self._rays, 1)
-        steps = chunk_steps(trace, len(self._at), chunk, self.threads)
-        for start, fraction in zip(range(0, len(self._at), chunk), steps, strict=True):
-            found = self._aimed.pop(start, None)
+        for part, found in map_chunks(trace, len(self._at), chunk, self.threads, progress):
             if found is not None:
-                aimed.extend(found, start)
-            yield fraction
+                aimed.extend(found, part.start)
         return self.gathered(aimed.all())
 
     def gathered(self, aimed: AimedRays) -> Gathered:
@@ -223,7 +212,7 @@ class Gathering:
         """Trace the cosine-distributed rays of some rows, and keep what they hit."""
         rays = self._rays
         directions, upward = self.directions(rows)
-        start = self._starts(rows, rays, self._seed + 4)
+        start = self._starts(rows, rays, self._seed + Stream.GATHER_STARTS)
         hits = self._caster.intersect(start.reshape(-1, 3), directions.reshape(-1, 3))
         found = self._found(hits, directions.reshape(-1, 3)).reshape(len(rows), rays)
         found[~upward] = NOTHING
@@ -236,7 +225,8 @@ class Gathering:
     def _directions(self, rows: Array) -> Array:
         """Return (r, rays, 3) float32: where the cosine-distributed rays of some rows go."""
         normals = self._at.normals[rows]
-        local = cosine_hemisphere(stratified_square(self._at.keys[rows], self._rays, self._seed + 3))
+        seed = self._seed + Stream.GATHER_DIRECTIONS
+        local = cosine_hemisphere(stratified_square(self._at.keys[rows], self._rays, seed))
         frame = np.stack([*orthonormal_basis(normals), normals], axis=1).astype(np.float32)
         return np.asarray(local @ frame)
 
@@ -244,14 +234,14 @@ class Gathering:
         """Return (h,) int32 the numbers of what rays met, the sky where they met nothing."""
         found = self._resolve(hits)
         missed = np.flatnonzero(hits.triangle < 0)
-        found[missed] = SKY - self._sky.cells(directions[missed])
+        found[missed] = sky_numbers(self._sky, directions[missed])
         return found
 
     def _aim(self, rows: Array, bright: BrightElements, shares: Array) -> AimedRays:
         """Trace the rays that some rows aim at bright elements."""
         count = max(self._rays // AIMED_PART, 1)
-        start = self._starts(rows, count, self._seed + 6)
-        unit = stratified_square(self._at.keys[rows], count, self._seed + 5)
+        start = self._starts(rows, count, self._seed + Stream.AIMED_STARTS)
+        unit = stratified_square(self._at.keys[rows], count, self._seed + Stream.AIMED_DIRECTIONS)
         aim = bright.aim(start, self._at.normals[rows], shares, unit)
         hits = self._caster.intersect(start[aim.row].reshape(-1, 3), aim.directions.reshape(-1, 3))
         arrived = self._leaves_of(hits) == aim.element.ravel()
@@ -280,7 +270,7 @@ class Gathering:
         some = min(at.starts or self._rays, self._rays)
         distinct, of = np.unique(rows, return_inverse=True)
         of, place = of.reshape(-1), ray * some // self._rays
-        unit = stratified_square(at.keys[distinct], some, self._seed + 4)
+        unit = stratified_square(at.keys[distinct], some, self._seed + Stream.GATHER_STARTS)
         if len(rows) < some * len(distinct):
             return np.asarray(at.sampler(rows, unit[of, place][:, None])[:, 0] + lift)
         return np.asarray(at.sampler(distinct, unit)[of, place] + lift)

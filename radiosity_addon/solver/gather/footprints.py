@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
-from ...base import scaled
+from ...base import SILENT, Progress
 from ...lights import Lamp
-from ...numerics import Array, Scratch, chunk_steps, marked, row_numbers, stratified_square, trim
+from ...numerics import Array, Scratch, for_chunks, marked, row_numbers, stratified_square, trim
 from ..emitters import EmitterGroup
 
 SPREAD = 4
@@ -123,23 +123,18 @@ class SpreadPoints:
             self._apart[part] = apart
             self._farthest[part] = (apart**2).sum(axis=2).argmax(axis=1)
 
-        for _ in chunk_steps(spread, len(at), CHUNK_POINTS, threads):
-            pass
+        for_chunks(spread, len(at), CHUNK_POINTS, threads)
 
     def points(self, rows: Array | slice) -> Array:
         """Return (r, count, 3) float64: the points of some footprints."""
         return np.asarray(self.at.points[rows, None] + self._apart[rows])
 
-    def gain_steps(self, light: Lamp | EmitterGroup, least: float = 0.0) -> Generator[float, None, Array]:
-        """Compute (n,) the unoccluded irradiance per unit of strength, a mean over the footprint.
+    def gain(self, light: Lamp | EmitterGroup, least: float = 0.0, progress: Progress = SILENT) -> Array:
+        """Return (n,) the unoccluded irradiance per unit of strength, a mean over the footprint.
 
         Where it is no more than `least` in the centre, that stands for all, unless a glowing face is
         no farther than the footprint is wide: it may shine on what is beside the centre only. Without
         `least`, where the farthest point gets the same.
-
-        Yields
-        ------
-        fraction : float
         """
         at = self.at
         gain = at.scratch.empty(len(at))
@@ -159,14 +154,14 @@ class SpreadPoints:
                     jump[part] = np.abs(other - own) > EDGE * np.maximum(own, other)
             gain[part] = own
 
-        yield from scaled(chunk_steps(ask, len(at), CHUNK_POINTS, self._threads), 0.0, 0.5)
+        for_chunks(ask, len(at), CHUNK_POINTS, self._threads, progress.part(0.0, 0.5))
         # Right under a lamp two points may happen to see it alike: their neighbours do not.
         bent = row_numbers(varies if at.near is None or least else at.near(varies))
 
         def average(part: slice) -> None:
             gain[bent[part]] = self._varying(light, bent[part])
 
-        yield from scaled(chunk_steps(average, len(bent), CHUNK_POINTS, self._threads), 0.5, 1.0)
+        for_chunks(average, len(bent), CHUNK_POINTS, self._threads, progress.part(0.5, 1.0))
         if at.near is not None and jump.any():
             # An edge that only cuts a footprint's corner is found from its neighbours.
             lit = marked(len(gain), lambda rows: gain[rows] > 0)

@@ -22,50 +22,57 @@ class LightGains:
         n.
     scratch : Scratch or None
         Makes the arrays; None keeps them in memory.
+
+    Attributes
+    ----------
+    gain_of : dict of int to (rows or None, gain)
+        Of each light: (k,) float32 at the rows that it reaches, (k,) int32; None for all rows.
     """
+
+    STORED = ("count", "gain_of")
 
     _scratch: Scratch | None = None
 
     def __init__(self, count: int, scratch: Scratch | None = None) -> None:
-        self._count = count
+        self.count = count
         self._scratch = scratch
-        self._of: dict[int, tuple[Array | None, Array]] = {}
+        self.gain_of: dict[int, tuple[Array | None, Array]] = {}
 
     def __len__(self) -> int:
-        return self._count
+        return self.count
 
     @property
     def nbytes(self) -> int:
         """What they take in memory."""
-        return sum(gain.nbytes + (0 if rows is None else rows.nbytes) for rows, gain in self._of.values())
+        return sum(gain.nbytes + (0 if rows is None else rows.nbytes) for rows, gain in self.gain_of.values())
 
     def put(self, light: int, gain: Array) -> None:
         """Keep (n,) the gain of a light, which has this number, at all points."""
         scratch = self._scratch or Scratch()
-        if np.count_nonzero(gain) < SPARSE * self._count:
+        if np.count_nonzero(gain) < SPARSE * self.count:
             rows, kept = row_numbers(gain), scratch.rows(1, np.float32)
             for tile in tiles(len(rows)):
                 kept.extend(gain[rows[tile]].astype(np.float32))
-            self._of[light] = rows, kept.all()[:, 0]
+            self.gain_of[light] = rows, kept.all()[:, 0]
         else:
-            single = scratch.empty(self._count, np.float32)
-            for tile in tiles(self._count):
+            single = scratch.empty(self.count, np.float32)
+            for tile in tiles(self.count):
                 single[tile] = gain[tile]
-            self._of[light] = None, single
+            self.gain_of[light] = None, single
 
     def of(self, light: int) -> Array:
         """Return (n,) float32: the gain of a light; 0 of one that was not put in."""
-        rows, gain = self._of.get(light, (np.zeros(0, np.int32), np.zeros(0, np.float32)))
+        rows, gain = self.gain_of.get(light, (np.zeros(0, np.int32), np.zeros(0, np.float32)))
         if rows is None:
             return gain.copy()
-        everywhere = np.zeros(self._count, dtype=np.float32)
+        everywhere = np.zeros(self.count, dtype=np.float32)
         everywhere[rows] = gain
         return everywhere
 
     def take(self, points: Array) -> LightGains:
         """Return those of some points, row numbers or a mask."""
-        result = LightGains(len(np.arange(self._count)[points]))
-        for light in self._of:
+        result = LightGains(len(np.arange(self.count)[points]))
+        for light in self.gain_of:
             result.put(light, self.of(light)[points])
         return result
 
@@ -73,14 +80,14 @@ class LightGains:
     def joined(parts: Sequence[LightGains]) -> LightGains:
         """Put the points of several one after the other."""
         result = LightGains(sum(len(part) for part in parts))
-        for light in sorted({light for part in parts for light in part._of}):
+        for light in sorted({light for part in parts for light in part.gain_of}):
             result.put(light, np.concatenate([part.of(light) for part in parts]))
         return result
 
     def irradiance(self, strengths: Array) -> Array:
         """Return (n, 3) float64 what arrives [W/m²] from lights of (k, 3) strengths, visibility included."""
-        total = (self._scratch or Scratch()).zeros((self._count, 3))
-        for light, (rows, gain) in self._of.items():
+        total = (self._scratch or Scratch()).zeros((self.count, 3))
+        for light, (rows, gain) in self.gain_of.items():
             if not strengths[light].any():
                 continue
             for tile in tiles(len(gain)):

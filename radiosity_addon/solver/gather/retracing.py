@@ -5,23 +5,21 @@ Rays depend on their point's key, their number and the seed alone, so any of the
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...numerics import Array, chunk_steps
+from ...base import SILENT, Progress
+from ...numerics import Array, map_chunks
 from ...rays import RayCaster
 from .boxes import Boxes
 from .bright_patches import AimedRays, BrightElements
 from .final_gather import CHUNK_RAYS, Gathered, Gathering
+from .hit_numbers import UNNUMBERED
 
 RENEWED = 0.3
 """A point whose closeness falls by more than this part is gathered from anew: what single rays take off
 a sum that a few very short ones dominate may leave anything, even less than nothing."""
-
-STALE = -1
-"""A source that is no more, or may be another one now."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +48,7 @@ class Before:
     Attributes
     ----------
     gathered : Gathered
-        Sources numbered as they are now, or STALE.
+        Sources numbered as they are now, or UNNUMBERED.
     aimed_at : (a, k, 3) float64 twice
         Of its aimed rays: the middles of the boxes around the elements aimed at, and half their sizes.
     moved : Moved
@@ -85,25 +83,26 @@ class Retracing:
         self._gathering, self._before = gathering, before
         gathering.take_up(before.gathered)
 
-    def steps(self, bright: BrightElements | None, irradiance: Array) -> Generator[float, None, Gathered]:
-        """Trace what is touched; yields the fraction done. Parameters as of `Gathering.steps`."""
+    def trace(
+        self, bright: BrightElements | None, irradiance: Array, progress: Progress = SILENT
+    ) -> Gathered:
+        """Trace what is touched. Parameters as of `Gathering.trace`."""
         before, gathering = self._before, self._gathering
         count, rays = before.gathered.sources.shape
         whole = np.zeros(count, dtype=bool)
         aims = np.zeros(count, dtype=bool)
         aims[before.gathered.aimed.row] = True
         aims_past = self._aims_past_boxes(count)
-        new: dict[int, AimedRays] = {}
 
-        def trace(part: slice) -> None:
+        def trace(part: slice) -> AimedRays | None:
             rows = np.arange(part.start, part.stop)
-            stale = before.gathered.sources[rows] == STALE
+            stale = before.gathered.sources[rows] == UNNUMBERED
             asked = stale.any(axis=1) | aims_past[rows]
             points, normals = gathering.planes(rows)
             asked |= before.moved.boxes.above(points, normals, before.widen[rows])
             rows, stale = rows[asked], stale[asked]
             if len(rows) == 0:
-                return
+                return None
             directions, upward = gathering.directions(rows)
             points, _ = gathering.planes(rows)
             touched = before.moved.boxes.met_by(points, directions, before.widen[rows])
@@ -128,16 +127,17 @@ class Retracing:
                 again, shares = again[wanted], shares[wanted]
             else:
                 again = rows[renewed | (past & aims[rows])]
-            if len(again):
-                whole[again] = True
-                found = gathering.trace_rows(again, bright, shares)
-                if found is not None:
-                    new[part.start] = replace(found, row=again[found.row])
+            if len(again) == 0:
+                return None
+            whole[again] = True
+            found = gathering.trace_rows(again, bright, shares)
+            return None if found is None else replace(found, row=again[found.row])
 
-        yield from chunk_steps(trace, count, max(CHUNK_RAYS // rays, 1), gathering.threads)
+        chunks = map_chunks(trace, count, max(CHUNK_RAYS // rays, 1), gathering.threads, progress)
+        new = [found for _, found in chunks if found is not None]
         aimed = before.gathered.aimed
         kept = aimed.entries(~whole[aimed.row])
-        parts = [kept, *(new[start] for start in sorted(new))]
+        parts = [kept, *new]
         return gathering.gathered(AimedRays.joined(parts, [0] * len(parts)))
 
     def _aims_past_boxes(self, count: int) -> Array:
@@ -151,5 +151,5 @@ class Retracing:
         middle, half = before.aimed_at
         along = middle - points[:, None]
         found[row] = before.moved.boxes.met_by_fans(points, along, half, before.widen[row]).any(axis=1)
-        found[row] |= (before.gathered.aimed.sources == STALE).any(axis=1)
+        found[row] |= (before.gathered.aimed.sources == UNNUMBERED).any(axis=1)
         return found

@@ -7,12 +7,11 @@ by k^(3/4), so rays as the 4/5th power of the lamps' parts leave the least noise
 
 from __future__ import annotations
 
-from collections.abc import Generator
-
 import numpy as np
 
+from ...base import SILENT, Progress
 from ...lights import Lamp
-from ...numerics import Array, chunk_steps, marked, row_numbers, stratified_square, tiles
+from ...numerics import Array, Stream, for_chunks, marked, row_numbers, stratified_square, tiles
 from ...rays import RayCaster
 from ..emitters import EmitterGroup
 from .footprints import Footprints, SpreadPoints
@@ -63,7 +62,7 @@ class ShadowShare:
         scratch = self._at.scratch
         self._lit, self._total = scratch.zeros(len(self._at)), scratch.zeros(len(self._at))
 
-    def steps(self, gain: Array, rays: int) -> Generator[float, None, Array]:
+    def at_points(self, gain: Array, rays: int, progress: Progress = SILENT) -> Array:
         """Ask where the lamp shines.
 
         Parameters
@@ -72,10 +71,6 @@ class ShadowShare:
             Unoccluded irradiance per unit of the lamp's strength.
         rays : int
             A point, where the lamp is most of the light there is.
-
-        Yields
-        ------
-        fraction : float
 
         Returns
         -------
@@ -90,22 +85,20 @@ class ShadowShare:
             part = self._at.weight_of(gain[some] * strength, some)
             few[some] = _power_of_two(rays * np.sqrt(part / MAIN_PART), rays)
             many[some] = _power_of_two(MORE_RAYS * rays * (part / MAIN_PART) ** 0.8, MORE_RAYS * rays)
-        yield from self._shadow(row_numbers(facing), few, 0.0, 0.5)
+        self._shadow(row_numbers(facing), few, progress.part(0.0, 0.5))
         # Few rays miss the faint ends of a penumbra: where many rays found one, ask around it.
         open_rows = facing & (many > few)
         partial = marked(count, lambda some: facing[some] & _is_partial(self._share(some)))
         if near is not None:
             bright = marked(count, lambda some: facing[some] & (self._share(some) > 0.5))
             partial = near(partial) | (near(bright) & near(facing & ~bright))
-        left = 0.5
-        for _ in range(PENUMBRA_STEPS):
+        for _, turn in zip(range(PENUMBRA_STEPS), progress.part(0.5, 1.0).turns(0.5), strict=False):
             rows = row_numbers(partial & open_rows)
             if len(rows) == 0:
                 break
             open_rows[rows] = False
             self._lit[rows] = self._total[rows] = 0.0
-            yield from self._shadow(rows, many, 1.0 - left, 1.0 - 0.5 * left)
-            left *= 0.5
+            self._shadow(rows, many, turn)
             if near is None:
                 break
             share = self._share(rows)
@@ -120,24 +113,23 @@ class ShadowShare:
         total = self._total[rows]
         return np.asarray(self._lit[rows] / np.where(total > 0, total, 1.0))
 
-    def _shadow(self, rows: Array, counts: Array, begin: float, end: float) -> Generator[float, None, None]:
+    def _shadow(self, rows: Array, counts: Array, progress: Progress) -> None:
         """Add `counts[row]` shadow rays a row to the sums of unblocked and of all weights."""
         each = counts[rows]
         total, done = max(int(each.sum()), 1), 0
         for count in np.unique(each):
             some = rows[each == count]
-            for fraction in self._shadow_alike(some, int(count)):
-                yield begin + (end - begin) * (done + fraction * count * len(some)) / total
-            done += int(count) * len(some)
+            before, done = done, done + int(count) * len(some)
+            self._shadow_alike(some, int(count), progress.part(before / total, done / total))
 
-    def _shadow_alike(self, rows: Array, count: int) -> Generator[float, None, None]:
+    def _shadow_alike(self, rows: Array, count: int, progress: Progress) -> None:
         """Add `count` shadow rays a row."""
         at, caster = self._at, self._caster
 
         def trace(part: slice) -> None:
             chunk = rows[part]
             centre, normal = at.points[chunk], at.normals[chunk]
-            unit = stratified_square(at.keys[chunk], count, self._seed + 1)
+            unit = stratified_square(at.keys[chunk], count, self._seed + Stream.SHADOW_RAYS)
             directions, distances, weights = self._light.shadow_rays(centre, normal, unit)
             # The edge of a spot's cone may cross a footprint and leave its centre dark: then all count alike.
             weights = np.where(weights.any(axis=1, keepdims=True), weights, 1.0)
@@ -162,7 +154,7 @@ class ShadowShare:
             self._lit[chunk] += np.bincount(point, free * weights[ray], minlength=len(chunk))
             self._total[chunk] += weights.sum(axis=1)
 
-        yield from chunk_steps(trace, len(rows), max(CHUNK_RAYS // count, 1), self._threads)
+        for_chunks(trace, len(rows), max(CHUNK_RAYS // count, 1), self._threads, progress)
 
     def _starts(self, rows: Array, count: int) -> Array:
         """Return (r, count, 3) float64 points of the footprints of some rows."""
@@ -171,7 +163,7 @@ class ShadowShare:
             return self._spread.points(rows)[:, :count]
         assert at.sampler is not None
         some = min(count, STARTS)
-        starts = at.sampler(rows, stratified_square(at.keys[rows], some, self._seed + 2))
+        starts = at.sampler(rows, stratified_square(at.keys[rows], some, self._seed + Stream.SHADOW_STARTS))
         return np.asarray(starts[:, np.arange(count) * some // count])
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from .basis import Basis, constant_basis
 from .bounds import NodeShapes
-from .cluster_cut import TreeTop
+from .cluster_cut import ClusterCut
 from .clusters import Clusters
 from .neighbors import neighbours
 from .nodes import LEAF, Hierarchy, node_opacity
@@ -15,10 +15,10 @@ from .nodes import LEAF, Hierarchy, node_opacity
 __all__ = [
     "LEAF",
     "Basis",
+    "ClusterCut",
     "Clusters",
     "Hierarchy",
     "NodeShapes",
-    "TreeTop",
     "constant_basis",
     "neighbours",
     "node_opacity",

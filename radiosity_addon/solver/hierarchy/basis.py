@@ -1,4 +1,4 @@
-"""Basis functions over the leaves: what an approximate radiosity B̂ is made of (handout §3.1).
+"""Basis functions over the leaves, of which the approximate radiosity B̂ is a sum (handout §3.1).
 
     B̂(x) = Σ_i B_i N_i(x)                                            (handout (3.1))
 
@@ -23,18 +23,11 @@ INTERPOLATION_ROUNDS = 24
 class Basis:
     """n basis functions on l leaves, and the node of each.
 
-    Parameters
-    ----------
-    leaf : (l,) int
-        The leaf elements, `Hierarchy.leaves`.
-    corner : (l, 3) int32
-        The unknown at each corner of each leaf.
-    home : (n,) int
-        The row of a leaf that holds node x_i; it gives the unknown's normal, ρ and E.
-    place : (n, 3) float64
-        Barycentric weights of x_i in that leaf.
-    area : (n,) float64
-        ∫ N_i dA [m²]
+    leaf (l,) int: The leaf elements, `Hierarchy.leaves`.
+    corner (l, 3) int32: The unknown at each corner of each leaf.
+    home (n,) int: The row of a leaf that holds node x_i; it gives the unknown's normal, ρ and E.
+    place (n, 3): Barycentric weights of x_i in that leaf.
+    area (n,): ∫ N_i dA [m²]
     """
 
     leaf: Array
@@ -76,18 +69,10 @@ class Basis:
     def evaluate(self, values: Array, row: Array, barycentric: Array) -> Array:
         """Return B̂ at points of leaves (3.1).
 
-        Parameters
-        ----------
-        values : (n, k) float
-            B_i of every unknown.
-        row : (m,) int
-            Rows of `leaf`.
-        barycentric : (m, 3) float
-            Weights of the leaf's corners.
-
-        Returns
-        -------
-        function : (m, k) float64
+        values (n, k): B_i of every unknown.
+        row (m,) int: Rows of `leaf`.
+        barycentric (m, 3): Weights of the leaf's corners.
+        Returns function (m, k).
         """
         return np.asarray(np.einsum("mc,mck->mk", barycentric, values[self.corner[row]]))
 

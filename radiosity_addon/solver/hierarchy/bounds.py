@@ -1,4 +1,4 @@
-"""How large nodes are, where they lie and which way they look: what first links go by."""
+"""Sizes, positions and directions of nodes, which decide initial links."""
 
 from __future__ import annotations
 
@@ -9,20 +9,14 @@ from .nodes import Hierarchy
 
 
 class NodeShapes:
-    """Place, size and directions of every cluster and face, by node number.
+    """Position, size and directions of every cluster and face, by node number.
 
-    Attributes
-    ----------
-    middle : (n, 3) float64
-    radius : (n,) float64
-        Of a sphere around the middle that holds the node [m].
-    half : (n, 3) float64
-        Half the sides of its box [m].
-    axis : (n, 3) float64
-        The mean normal, unit.
-    cone : (n,) float64
-        Largest angle between the axis and a face's normal [rad].
-    area : (n,) float64 [m²]
+    middle (n, 3).
+    radius (n,): Of a sphere around the middle that holds the node [m].
+    half (n, 3): Half the sides of its box [m].
+    axis (n, 3): The mean normal, unit.
+    cone (n,): Largest angle between the axis and a face's normal [rad].
+    area (n,) [m²].
     """
 
     def __init__(self, hierarchy: Hierarchy) -> None:
@@ -43,7 +37,7 @@ class NodeShapes:
         return np.asarray(self.radius[one] + self.radius[other] > size * distance)
 
     def exchange_bound(self, one: Array, other: Array) -> Array:
-        """Return (n,) about how much two nodes exchange at most, A F [m²], whatever lies between."""
+        """Return (n,) an estimate of the maximum exchange of two nodes, A F [m²], ignoring occlusion."""
         distance = np.linalg.norm(self.middle[other] - self.middle[one], axis=1)
         gap = np.maximum(distance - self.radius[one] - self.radius[other], 0.0)
         areas = self.area[one], self.area[other]
@@ -58,14 +52,14 @@ class NodeShapes:
         return np.asarray(self._rises(one, other, along) & self._rises(other, one, -along))
 
     def _rises(self, one: Array, other: Array, along: Array) -> Array:
-        """Return (n,) whether anything of the other may lie before a face of the one."""
+        """Return (n,) whether any part of the other may lie in front of a face of the one."""
         axis, cone = self.axis[one], self.cone[one]
         radii = self.radius[one] + self.radius[other]
         rise = np.einsum("nk,nk->n", along, axis)
-        # Faces of one direction: boxes say it exactly.
+        # Faces of one direction: boxes are exact.
         reach = np.einsum("nk,nk->n", self.half[one] + self.half[other], np.abs(axis))
         flat_rises = rise + reach > 1e-6 * radii
-        # Others: the cone of directions, as wide as the two spheres look from each other.
+        # Others: the cone of directions between the two spheres.
         distance = np.maximum(np.linalg.norm(along, axis=1), 1e-300)
         spread = np.arcsin(np.minimum(radii / distance, 1.0))
         angle = np.arccos(np.clip(rise / distance, -1.0, 1.0))

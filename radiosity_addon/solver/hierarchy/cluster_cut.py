@@ -1,7 +1,7 @@
-"""The top of the cluster tree: as far down as links go.
+"""A cut through the cluster tree at the lowest linked clusters.
 
-Of a million faces most are never told apart: links end at clusters of hundreds. Below such
-a *tip* nothing need be added up cluster by cluster, so sums upwards and pushes downwards
+Of a million faces most are never told apart: links end at clusters of hundreds. Below the nodes of
+the cut nothing need be added up cluster by cluster, so sums upward and pushes downward
 cost one pass over the faces and little more, however deep the tree is.
 """
 
@@ -13,32 +13,21 @@ from ...numerics import Array
 from .nodes import Hierarchy
 
 
-class TreeTop:
-    """The clusters that are linked, those above them, and the tips that tile all faces below.
+class ClusterCut:
+    """The clusters that are linked, those above them, and the nodes of the cut, which tile all faces.
 
-    Parameters
-    ----------
-    hierarchy : Hierarchy
-    linked : (n,) int arrays
-        Nodes; elements among them do not matter.
-
-    Attributes
-    ----------
-    row : (c,) int32
-        Row of each cluster that is linked or above a linked one; −1 elsewhere.
-    n_rows : int
-        Opened clusters first, tips behind.
-    tips : (t,) int64
-        The tips' nodes.
-    tip : (f,) int32
-        Row of the tip each face lies in.
+    linked (n,) int arrays: Nodes; elements among them do not matter.
+    row (c,) int32: Row of each cluster that is linked or above a linked one; −1 elsewhere.
+    n_rows: Of the `n_inner` clusters above the cut first, then of its nodes.
+    nodes (k,) int64: The cut's.
+    row_of_face (f,) int32: Row of the cut's node that each face lies in.
     """
 
     def __init__(self, hierarchy: Hierarchy, *linked: Array) -> None:
         clusters = hierarchy.clusters
         self._clusters, self._area = clusters, hierarchy.faces.area
         self.kept: object = None
-        """Whatever is prepared for links of these clusters, by whoever prepares it."""
+        """Cache for data derived from links to these clusters."""
         count, n_faces = len(clusters), len(hierarchy.faces)
         used = np.zeros(count + n_faces, dtype=bool)
         for nodes in linked:
@@ -49,14 +38,14 @@ class TreeTop:
             used[level] |= opened[level]
         inner = np.flatnonzero(opened)
         self.n_inner = len(inner)
-        # Tips tile the order of the faces: a tip is known by the first slot of its run.
+        # The cut's nodes tile the order of the faces: each is known by the first slot of its run.
         slot = np.empty(count + n_faces, dtype=np.int64)
         slot[:count] = clusters.start
         slot[count + clusters.order] = np.arange(n_faces)
         nodes = np.concatenate([hierarchy.roots, clusters.children[inner].ravel()])
         nodes = nodes[(nodes >= count) | ~opened[np.minimum(nodes, max(count - 1, 0))]] if count else nodes
         nodes = nodes[np.argsort(slot[nodes], kind="stable")]
-        self.tips, self._start = nodes, slot[nodes]
+        self.nodes, self._start = nodes, slot[nodes]
         self.n_rows = self.n_inner + len(nodes)
         row = np.full(count + n_faces, -1, dtype=np.int32)
         row[inner] = np.arange(self.n_inner)
@@ -66,13 +55,9 @@ class TreeTop:
         bounds = np.searchsorted(inner, [level.stop for level in clusters.levels]).tolist()
         self._levels = [slice(a, b) for a, b in zip([0, *bounds], bounds, strict=False) if b > a]
         length = np.diff(self._start, append=n_faces)
-        self.tip = np.empty(n_faces, dtype=np.int32)
-        self.tip[clusters.order] = np.repeat(np.arange(self.n_inner, self.n_rows, dtype=np.int32), length)
-
-    @property
-    def n_tips(self) -> int:
-        """Number of tips: the leaf elements of the linking, as far as faces go."""
-        return self.n_rows - self.n_inner
+        self.row_of_face = np.empty(n_faces, dtype=np.int32)
+        rows = np.arange(self.n_inner, self.n_rows, dtype=np.int32)
+        self.row_of_face[clusters.order] = np.repeat(rows, length)
 
     def sums(self, values: Array) -> Array:
         """Return (n_rows, k): the sums of (f, k) face values, children first.
@@ -105,7 +90,7 @@ class TreeTop:
         return result
 
     def push(self, values: Array) -> Array:
-        """Return (n_rows, k): to every row's values those of all clusters above it added."""
+        """Return (n_rows, k): the values of every row plus those of all clusters above it."""
         total = values.copy()
         for level in self._levels:
             total[self._children[level]] += total[level][:, None]

@@ -1,7 +1,7 @@
 """Clusters: one binary tree above the faces, so that n faces need not link n times n.
 
 The tree is split level by level at the median of the widest axis of (position, a share of
-the cluster's own diagonal · normal): neighbours that face the same way stay together, so that low clusters
+the cluster's own diagonal · normal): neighbors that face the same way stay together, so that low clusters
 are pieces of one wall and only high ones mix directions.
 """
 
@@ -18,43 +18,32 @@ NORMAL_WEIGHT = 0.25
 """Opposite normals count like this share of the cluster's diagonal, twice, …"""
 
 SMALL, SMALL_NORMAL_WEIGHT = 0.002, 2.0
-"""… and more in clusters below this share of all area, whose place hardly matters any more: so a
+"""… and more in clusters below this share of all area, whose position hardly matters: so a
 corner's faces fall into pieces of single walls, which may be linked as wholes."""
 
 
 WITHIN = 1.0 - 1e-9
-"""Places within a run as they are sorted: below 1 however they are rounded."""
+"""Scale of sorted positions within a run: below 1 after rounding."""
 
 
 class Clusters:
     """c clusters as arrays; node numbers of single faces start at c.
 
-    Attributes
-    ----------
-    order : (f,) int32
-        Faces such that every cluster is a run of them.
-    start, end : (c,) int64
-        The cluster's run in `order`.
-    children : (c, 2) int64
-        Nodes: clusters, or n_clusters + face.
-    lower, upper : (c, 3) float64
-        Bounding box [m].
-    area : (c,) float64 [m²]
-    coherence : (c,) float64
-        Length of the area-weighted mean of the unit normals: 1 for a piece of one plane.
-    area_before : (f + 1,) float64
-        Running sum of the faces' areas along `order`.
-    normal : (c, 3) float64
-        Area-weighted mean of the unit normals; its length is the coherence.
-    centre : (c, 3) float64
-        Area-weighted centroid [m].
-    radius : (c,) float64
-        Of a sphere around the middle of the box [m].
-    cone : (c,) float64
-        Largest angle between the mean normal and a face's [rad].
-    levels : list of slice
-        Clusters of each depth, the roots first; children lie one level deeper than parents.
+    order (f,) int32: Faces such that every cluster is a run of them.
+    start, end (c,) int64: The cluster's run in `order`.
+    children (c, 2) int64: Nodes: clusters, or n_clusters + face.
+    lower, upper (c, 3): Bounding box [m].
+    area (c,) [m²].
+    coherence (c,): Length of the area-weighted mean of the unit normals: 1 for a piece of one plane.
+    area_before (f + 1,): Running sum of the faces' areas along `order`.
+    normal (c, 3): Area-weighted mean of the unit normals; its length is the coherence.
+    centre (c, 3): Area-weighted centroid [m].
+    radius (c,): Of a sphere around the middle of the box [m].
+    cone (c,): Largest angle between the mean normal and a face's [rad].
+    levels: Clusters of each depth, the roots first; children lie one level deeper than parents.
     """
+
+    STORED = ("order", "start", "children", "area", "centre", "levels")
 
     def __init__(self, order: Array, start: Array, end: Array, children: Array) -> None:
         self.order, self.start, self.end, self.children = order, start, end, children
@@ -127,17 +116,8 @@ class Clusters:
 def build_clusters(faces: Faces, groups: Sequence[Array]) -> tuple[Clusters, Array]:
     """Build a tree over each group of faces.
 
-    Parameters
-    ----------
-    faces : Faces
-    groups : sequence of (g,) int
-        Disjoint; empty ones are skipped.
-
-    Returns
-    -------
-    clusters : Clusters
-    roots : (r,) int64
-        One node per non-empty group.
+    groups sequence of (g,) int: Disjoint; empty ones are skipped.
+    Returns roots (r,) int64: One node per non-empty group.
     """
     position = np.concatenate([faces.corners.mean(axis=1), faces.normal], axis=1)
 

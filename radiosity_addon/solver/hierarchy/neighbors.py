@@ -1,6 +1,6 @@
-"""Which leaves lie side by side on one smooth surface: what adaptive subdivision compares.
+"""Neighboring leaves on one smooth surface, which adaptive subdivision compares.
 
-Two leaves are neighbours if they meet along an edge, within one face or across two coplanar
+Two leaves are neighbors if they meet along an edge, within one face or across two coplanar
 faces of the same side, and no wall stands on that edge.
 """
 
@@ -13,7 +13,7 @@ from ...rays import RayCaster
 from .nodes import Hierarchy
 
 ACROSS = 0.02
-"""How far beyond an edge's midpoint a leaf looks, as a part of its own height over that edge."""
+"""Distance beyond an edge's midpoint at which neighbors are searched, relative to the leaf's height."""
 
 RISE = 4.0
 """Rays down to a coplanar face start this many surface offsets above the plane."""
@@ -23,7 +23,7 @@ COPLANAR = 1e-3
 
 
 def neighbours(hierarchy: Hierarchy, caster: RayCaster) -> Array:
-    """Return (k, 2) int: the pairs of neighbouring leaves, each once, the smaller number first.
+    """Return (k, 2) int: the pairs of neighboring leaves, each once, the smaller number first.
 
     Every leaf looks across the middle of each of its edges. Where the leaf beyond is finer,
     its own look finds the pair; so all that share a whole edge of the smaller are found.
@@ -44,7 +44,7 @@ def neighbours(hierarchy: Hierarchy, caster: RayCaster) -> Array:
 
 
 def _probes(hierarchy: Hierarchy, leaves: Array) -> tuple[Array, Array, Array]:
-    """Return (3l,) leaves and two (3l, 3): points a little this and that side of each edge's middle."""
+    """Return (3l,) leaves and two (3l, 3): points slightly to either side of each edge's midpoint."""
     corners = hierarchy.corners[leaves]
     middle = 0.5 * (corners[:, [1, 2, 0]] + corners[:, [2, 0, 1]])
     outward = ACROSS * (middle - corners)

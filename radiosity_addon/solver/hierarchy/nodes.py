@@ -20,21 +20,23 @@ LEAF = -1
 
 
 class Hierarchy:
-    """Faces, the clusters above them and the elements below; grows as links ask for it.
+    """Faces, the clusters above them and the elements below; grows as links need it.
 
-    Attributes
-    ----------
-    corners : (e, 3, 3) float64
-    face : (e,) int32
-    parent, first_child : (e,) int32
-        −1 for none. Four children are contiguous: three at the corners, one in the middle.
-    level : (e,) int32
-    area : (e,) float64 [m²]
-    reflectance, emission : (e, 3) float64
-        Area means over each element, multiplied by opacity; emission in W/m².
-    opacity : (e,) float64
-        Area means.
+    corners (e, 3, 3).
+    face (e,) int32.
+    parent, first_child (e,) int32: −1 for none. Four children are contiguous: three at the corners, one in
+        the middle.
+    level (e,) int32.
+    area (e,) [m²].
+    reflectance, emission (e, 3): Area means over each element, multiplied by opacity; emission in W/m².
+    opacity (e,): Area means.
+    roots (r,) int64: The nodes that together hold every face once; first links start from them.
     """
+
+    STORED = (
+        *("faces", "clusters", "roots", "face", "first_child", "level"),
+        *("area", "reflectance", "emission", "opacity"),
+    )
 
     def __init__(self, scene: Scene) -> None:
         self.faces = Faces(scene)
@@ -62,7 +64,7 @@ class Hierarchy:
                 self.faces.front[:, None, None], WHOLE_TRIANGLE, WHOLE_TRIANGLE[[0, 2, 1]]
             )
         emits = self.faces.emission.max(axis=1, initial=0.0) > 0
-        # Emitters are grouped apart: averaged into a cluster of dark faces a small lamp is
+        # Emitters are grouped separately: averaged into a cluster of dark faces a small lamp is
         # missed by a few samples. So are backs: each lies where its front lies, unseen from
         # wherever the front is seen.
         self.clusters: Clusters
@@ -75,7 +77,6 @@ class Hierarchy:
                 np.flatnonzero(emits),
             ],
         )
-        """roots: the nodes that together hold every face once; first links start from them"""
 
     @property
     def n_clusters(self) -> int:
@@ -99,11 +100,11 @@ class Hierarchy:
 
     @property
     def opacity_where_hit(self) -> Array:
-        """(e,) float64: what to divide by for radiosity where a ray found a surface; never 0."""
+        """(e,) float64: the divisor for radiosity at ray hits; never 0."""
         return np.where(self.opacity > 0, self.opacity, 1.0)
 
     def normal_of(self, elements: Array) -> Array:
-        """Return (n, 3) float64: the unit normals of some elements."""
+        """Return (n, 3) float64: the unit normals of elements."""
         return np.asarray(self.faces.normal[self.face[elements]])
 
     def subdivide(self, elements: Array) -> None:
@@ -125,7 +126,7 @@ class Hierarchy:
             self._look_up(elements)
 
     def _look_up(self, elements: Array) -> None:
-        """Take the means over the new children of `elements`, and average them upwards."""
+        """Take the means over the new children of `elements`, and average them upward."""
         weights = split_in_four(self._weights[elements]).reshape(-1, 3, 2)
         self._weights = np.concatenate([self._weights, weights])
         above = elements[self._detailed[self.face[elements]]]
@@ -142,7 +143,7 @@ class Hierarchy:
             above = above[above != LEAF]
 
     def _means(self, elements: Array) -> Array:
-        """Return (n, 7) reflectance, emission and opacity of elements, less what others cover."""
+        """Return (n, 7) reflectance, emission and opacity of elements, less the parts that others cover."""
         triangle, weights = self.faces.triangle[self.face[elements]], self._weights[elements]
         if self._images is None:
             textured = np.zeros(len(elements), dtype=bool)
@@ -167,15 +168,9 @@ class Hierarchy:
     def leaf_at(self, face: Array, barycentric: Array) -> Array:
         """Find the leaf element under points of faces.
 
-        Parameters
-        ----------
-        face : (n,) int
-        barycentric : (n, 2) float
-            Weights of the *triangle's* second and third corner, as ray casting gives them.
-
-        Returns
-        -------
-        element : (n,) int32
+        face (n,) int.
+        barycentric (n, 2): Weights of the *triangle's* second and third corner, as ray casting gives them.
+        Returns element (n,) int32.
         """
         v = np.asarray(barycentric, dtype=np.float64)
         back = ~self.faces.front[face]

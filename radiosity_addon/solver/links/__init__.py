@@ -1,4 +1,4 @@
-"""Links: which node lights which, with form factor and visibility; and moving light over them.
+"""Links between nodes, with form factor and visibility, and the transport of light over them.
 
 Initial linking, refinement (the oracle), links of lamps, gather and push-pull.
 """

@@ -1,4 +1,4 @@
-"""How many elements and links there are on which levels: what the report tells of a hierarchy."""
+"""Number of elements and links per level, for the report."""
 
 from __future__ import annotations
 
@@ -14,43 +14,36 @@ CLUSTER = -1
 
 
 def elements_by_level(hierarchy: Hierarchy) -> list[int]:
-    """Return how many elements each level has, inner ones included; level 0 are the faces."""
+    """Return the number of elements per level, including inner ones; level 0 are the faces."""
     return [int(count) for count in np.bincount(hierarchy.level)]
 
 
 def leaves_by_level(hierarchy: Hierarchy) -> list[int]:
-    """Return how many leaves each level has."""
+    """Return the number of leaves per level."""
     deepest = int(hierarchy.level.max(initial=0))
     return [int(count) for count in np.bincount(hierarchy.level[hierarchy.leaves], minlength=deepest + 1)]
 
 
 def links_by_level(hierarchy: Hierarchy, receiver: Array, source: Array) -> list[dict[str, int]]:
-    """Return how many links join which levels.
+    """Return the number of links by the levels they join.
 
-    Parameters
-    ----------
-    receiver : (l,) int
-        Elements.
-    source : (l,) int
-        Nodes.
-
-    Returns
-    -------
-    counts : list of {"receiver_level", "source_level", "links"}
-        The pairs of levels that have links, in order; a cluster's level is −1.
+    receiver (l,) int: Elements.
+    source (l,) int: Nodes.
+    Returns counts list of {"receiver_level", "source_level", "links"}: The pairs of levels that have links,
+        in order; a cluster's level is −1.
     """
     of_node = np.full(hierarchy.n_clusters + hierarchy.n_elements, CLUSTER)
     of_node[hierarchy.n_clusters :] = hierarchy.level
     levels = np.stack([hierarchy.level[receiver], of_node[source]], axis=1)
     pairs, counts = np.unique(levels.reshape(-1, 2), axis=0, return_counts=True)
     return [
-        {"receiver_level": int(to), "source_level": int(of), "links": int(count)}
-        for (to, of), count in zip(pairs, counts, strict=True)
+        {"receiver_level": int(receiver_level), "source_level": int(source_level), "links": int(count)}
+        for (receiver_level, source_level), count in zip(pairs, counts, strict=True)
     ]
 
 
 def linked_leaves(hierarchy: Hierarchy, links: Links, cluster_links: ClusterLinks) -> int:
-    """Count the leaf elements: the lowest nodes that anything arrives at over links.
+    """Count the leaf elements: the lowest nodes that receive light over links.
 
     Clusters that receive as wholes count once; faces with links of their own count by their leaves.
     """

@@ -1,4 +1,4 @@
-"""Links to clusters: many small faces receive together, each by its own normal and place.
+"""Links to clusters: many small faces receive together, each by its own normal and position.
 
 The faces of a cluster look much the same way and see the same sources, but not equally. So
 such a link carries a vector v and a gradient g in place of one number: a face with normal n
@@ -17,43 +17,37 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ...numerics import Array, for_chunks
-from ..hierarchy import Hierarchy, TreeTop
+from ..hierarchy import ClusterCut, Hierarchy
 
 TERMS = 7
-"""What a cluster passes on is linear in a face's normal and place, and a constant."""
+"""Coefficients of a cluster's light: linear in a face's normal and position, and a constant."""
 
 CHUNK = 1 << 14
-"""Faces that take from their clusters at once: some 3 MB, in the processor's cache."""
+"""Faces processed at once: some 3 MB, in the processor's cache."""
 
 
 @dataclass(frozen=True)
 class ClusterLinks:
     """l links to clusters as arrays, in any order.
 
-    Attributes
-    ----------
-    receiver : (l,) int32
-        Cluster.
-    source : (l,) int32
-        Node: a cluster, or n_clusters + element.
-    factor : (l,) float32
-        Unoccluded form factor, the area mean over the cluster's faces.
-    visibility, doubt : (l,) float32
-        As for `Links`.
-    vector : (l, 3) float32
-        v, visibility included: h and the cluster's mean normal times v make factor · visibility.
-    gradient : (l, 3) float32
-        g [1/m], visibility included.
-    even : (l,) float32
-        h, visibility included: what a face receives whichever way it looks; 0 unless the
+    receiver (l,) int32: Cluster.
+    source (l,) int32: Node: a cluster, or n_clusters + element.
+    factor (l,) float32: Unoccluded form factor, the area mean over the cluster's faces.
+    visibility, error_estimate (l,) float32: As for `Links`.
+    vector (l, 3) float32: v, visibility included: h and the cluster's mean normal times v make factor ·
+        visibility.
+    gradient (l, 3) float32: g [1/m], visibility included.
+    even (l,) float32: h, visibility included: the light that a face receives in any orientation; 0 unless the
         receiver's faces look many ways.
     """
+
+    STORED = ("receiver", "source", "vector", "gradient", "even")
 
     receiver: Array
     source: Array
     factor: Array
     visibility: Array
-    doubt: Array
+    error_estimate: Array
     vector: Array
     gradient: Array
     even: Array
@@ -81,39 +75,31 @@ def join_cluster_links(parts: list[ClusterLinks]) -> ClusterLinks:
 
 
 def gather_at_clusters(
-    hierarchy: Hierarchy, top: TreeTop, links: ClusterLinks, radiosity: Array, threads: int = 1
+    hierarchy: Hierarchy, cut: ClusterCut, links: ClusterLinks, radiosity: Array, threads: int = 1
 ) -> Array:
-    """Collect what arrives over links to clusters, and push it down to the faces.
+    """Collect the light that arrives over links to clusters, and push it down to the faces.
 
-    Parameters
-    ----------
-    top : TreeTop
-        With all clusters of the links. It keeps what the same links need again.
-    radiosity : (n_nodes, k) float64
-        Of every node, the means of clusters included [W/m²].
-    threads : int
-        0 means all cores.
-
-    Returns
-    -------
-    irradiance : (f, k) float64 [W/m²]
-        Linear in the radiosity; below 0 where a face looks past the horizon of what the others see.
+    cut: With all clusters of the links. It keeps what the same links need again.
+    radiosity (n_nodes, k): Of every node, the means of clusters included [W/m²].
+    threads: 0 means all cores.
+    Returns irradiance (f, k) [W/m²]: Linear in the radiosity; below 0 where a face looks past the horizon of
+        what the others see.
     """
     if len(links) == 0:
         return np.zeros((len(hierarchy.faces), radiosity.shape[1]))
-    kept = top.kept
+    kept = cut.kept
     if not isinstance(kept, _ClusterGather) or kept.links is not links:
-        kept = top.kept = _ClusterGather(hierarchy, top, links)
+        kept = cut.kept = _ClusterGather(hierarchy, cut, links)
     return kept(radiosity, threads)
 
 
 class _ClusterGather:
-    """Links to clusters in the order of their receivers, with all that does not change with the light."""
+    """Links to clusters in the order of their receivers, with all data that does not depend on the light."""
 
-    def __init__(self, hierarchy: Hierarchy, top: TreeTop, links: ClusterLinks) -> None:
+    def __init__(self, hierarchy: Hierarchy, cut: ClusterCut, links: ClusterLinks) -> None:
         clusters, faces = hierarchy.clusters, hierarchy.faces
-        self.links, self._top, self._faces = links, top, faces
-        row = top.row[links.receiver]
+        self.links, self._cut, self._faces = links, cut, faces
+        row = cut.row[links.receiver]
         order = np.argsort(row, kind="stable")
         row = row[order]
         self._rows, self._first = _runs(row)
@@ -124,10 +110,10 @@ class _ClusterGather:
         self._weights = [np.ascontiguousarray(weight[order]) for weight in weights]
         grouped = np.flatnonzero(self._source < len(clusters))
         self._slope = [weight[grouped] for weight in self._weights[3:6]]
-        self._source_row = top.row[self._source[grouped]]
+        self._source_row = cut.row[self._source[grouped]]
         self._slanted_rows, self._slanted_first = _runs(row[grouped])
-        self._held = np.flatnonzero(top.row >= 0)
-        self._held_row = top.row[self._held]
+        self._held = np.flatnonzero(cut.row >= 0)
+        self._held_row = cut.row[self._held]
         self._area, self._centre = clusters.area[self._held, None], clusters.centre[self._held]
         self._first_face = len(clusters)
         self._face_order = clusters.order
@@ -136,7 +122,7 @@ class _ClusterGather:
     def __call__(self, radiosity: Array, threads: int) -> Array:
         """Return (f, k): see `gather_at_clusters`."""
         channels = radiosity.shape[1]
-        at_rows = np.zeros((self._top.n_rows, channels, TERMS))
+        at_rows = np.zeros((self._cut.n_rows, channels, TERMS))
         for channel in range(channels):
             of_nodes = np.ascontiguousarray(radiosity[:, channel])
             sent = of_nodes.take(self._source)
@@ -149,14 +135,14 @@ class _ClusterGather:
                     for slope, along in zip(self._slope, moment, strict=True)
                 )
                 at_rows[self._slanted_rows, channel, 6] -= np.add.reduceat(slanted, self._slanted_first)
-        pushed = self._top.push(at_rows.reshape(-1, channels * TERMS))
+        pushed = self._cut.push(at_rows.reshape(-1, channels * TERMS))
         faces = self._faces
         irradiance = np.empty((len(faces), channels))
 
         def arrive(rows: slice) -> None:
             basis = np.ones((rows.stop - rows.start, TERMS))
             basis[:, :3], basis[:, 3:6] = faces.normal[rows], faces.centre[rows]
-            terms = pushed.take(self._top.tip[rows], axis=0).reshape(-1, channels, TERMS)
+            terms = pushed.take(self._cut.row_of_face[rows], axis=0).reshape(-1, channels, TERMS)
             np.einsum("fct,ft->fc", terms, basis, out=irradiance[rows])
 
         for_chunks(arrive, len(faces), CHUNK, threads)
@@ -165,8 +151,8 @@ class _ClusterGather:
     def _moments(self, radiosity: Array) -> list[Array]:
         """Return 3 × (n_rows,) each cluster's mean of (y − c) B over its faces [W/m], of nodes' radiosity."""
         sent = radiosity[self._first_face :].take(self._face_order)
-        sums = self._top.sums_of([sent * arm for arm in self._arm])[self._held_row]
-        moment = np.zeros((self._top.n_rows, 3))
+        sums = self._cut.sums_of([sent * arm for arm in self._arm])[self._held_row]
+        moment = np.zeros((self._cut.n_rows, 3))
         moment[self._held_row] = sums / self._area - self._centre * radiosity[self._held, None]
         return [np.ascontiguousarray(along) for along in moment.T]
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...form_factors import point_to_polygon, visibility_of
-from ...numerics import Array, for_chunks, hash_keys, run_numbers
+from ...numerics import Array, Stream, for_chunks, hash_keys, run_numbers
 from ...rays import RayCaster
 from ..hierarchy import Hierarchy, NodeShapes
 from .cluster_links import ClusterLinks, join_cluster_links
@@ -32,8 +32,8 @@ NEAR = 0.9
 """Pairs whose radii together exceed this part of their distance are near."""
 
 MOST_FACES = 64
-"""A near source of more faces is sampled too, and says nothing of places: such pairs are linked only in
-clutter, where they are too many to be asked face by face."""
+"""A near source of more faces is sampled too, without a gradient: such pairs are linked only in clutter,
+where evaluating them face by face would be too slow."""
 
 
 def measure_cluster_links(
@@ -47,15 +47,8 @@ def measure_cluster_links(
 ) -> ClusterLinks:
     """Compute links to clusters; pairs whose fronts do not see each other are left out.
 
-    Parameters
-    ----------
-    receiver, source : (n,) int
-        Clusters and nodes.
-
-    Returns
-    -------
-    links : ClusterLinks
-        At most n.
+    receiver, source (n,) int: Clusters and nodes.
+    Returns links: At most n.
     """
     near = shapes.looks_large(receiver, source, NEAR)
     wide = shapes.cone[receiver] > WIDE
@@ -79,8 +72,8 @@ def measure_cluster_links(
             samples: int = samples,
             parts: dict[int, ClusterLinks] = parts,
         ) -> None:
-            of = rows[piece]
-            pairs = _ClusterPairs(hierarchy, receiver[of], source[of], samples, seed)
+            chosen_pairs = rows[piece]
+            pairs = _ClusterPairs(hierarchy, receiver[chosen_pairs], source[chosen_pairs], samples, seed)
             parts[piece.start] = pairs.links(caster, kind)
 
         for_chunks(measure, len(rows), CHUNK_SAMPLES // samples, threads)
@@ -102,13 +95,15 @@ class _ClusterPairs:
     def __init__(self, hierarchy: Hierarchy, receiver: Array, source: Array, samples: int, seed: int) -> None:
         self.hierarchy = hierarchy
         pair = receiver.astype(np.int64) << 32 | source.astype(np.int64)
-        turn = hash_keys(pair, seed) & 3
+        turn = hash_keys(pair, seed + Stream.CLUSTER_PAIR_TURN) & 3
         # Column 4a + q joins the receiver's quarter q to the source's quarter q xor (turn + a).
         column = np.arange(samples)
         to_quarter = np.broadcast_to(column % 4, (len(pair), samples))
         of_quarter = to_quarter ^ ((turn[:, None] + column // 4) % 4)
-        x, n_x = node_samples(hierarchy, receiver, to_quarter, pair, seed + 1)
-        y, n_y = node_samples(hierarchy, source, of_quarter, pair, seed + 3)
+        of_receiver = Stream.CLUSTER_PAIR_RECEIVER, Stream.CLUSTER_PAIR_RECEIVER_FACE
+        of_source = Stream.CLUSTER_PAIR_SOURCE, Stream.CLUSTER_PAIR_SOURCE_FACE
+        x, n_x = node_samples(hierarchy, receiver, to_quarter, pair, seed, of_receiver)
+        y, n_y = node_samples(hierarchy, source, of_quarter, pair, seed, of_source)
         along = y - x
         rise_x = np.einsum("nsk,nsk->ns", along, n_x)
         rise_y = -np.einsum("nsk,nsk->ns", along, n_y)
@@ -121,10 +116,10 @@ class _ClusterPairs:
         self.area = node_area(hierarchy, self.source)[:, None]
 
     def links(self, caster: RayCaster, kind: str) -> ClusterLinks:
-        """Return the links of the pairs that exchange anything.
+        """Return the links of the pairs that exchange light.
 
         All are "far" or "near", or "wide" of a receiver that looks many ways; "many" are near ones
-        whose sources have too many faces to be asked one by one.
+        whose sources have too many faces to be evaluated one by one.
         """
         # A sample stands for its share of the source as a disk: bounded however near (Wallace et al. 1989).
         own_disk = 0.0 if kind in ("far", "wide") else self.area / self.faces.shape[1]
@@ -144,9 +139,9 @@ class _ClusterPairs:
         else:
             vector, gradient = self._sampled(scale, transfer)
             if kind == "many":
-                # Samples that nearly touch have no derivative to speak of.
+                # Samples that nearly touch have no usable derivative.
                 gradient = np.zeros_like(gradient)
-            # Where place and normal go together, n·v at their means is not the mean of the transfer.
+            # Where position and normal are correlated, n·v at their means is not the mean of the transfer.
             lacking = mean - np.einsum("nk,nk->n", mean_normal, vector)
             squared = np.maximum(np.einsum("nk,nk->n", mean_normal, mean_normal), LEAST_SQUARE)
             vector += mean_normal * (lacking / squared)[:, None]
@@ -231,14 +226,14 @@ class _ClusterPairs:
 
 
 def _held(hierarchy: Hierarchy, nodes: Array) -> Array:
-    """Return (n,) how many faces nodes hold."""
+    """Return (n,) the number of faces of nodes."""
     clusters = hierarchy.clusters
     cluster = np.where(nodes < hierarchy.n_clusters, nodes, 0)
     return np.where(nodes < hierarchy.n_clusters, (clusters.end - clusters.start)[cluster], 1)
 
 
 def _doubt(transfer: Array, traced: Array, free: Array, factor: Array) -> Array:
-    """Return (n,) how far F·V varies over the samples, joined with what so few rays can have missed."""
+    """Return (n,) the variation of F·V over the samples, combined with what few rays can have missed."""
     rays = traced.sum(axis=1)
     passed = np.where(traced, transfer * free, 0.0)
     mean = passed.sum(axis=1) / np.maximum(rays, 1)

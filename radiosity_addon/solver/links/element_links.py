@@ -1,4 +1,4 @@
-"""Links: which node lights which element, how much, and how sure that is.
+"""Links between elements: form factor, visibility and error estimate.
 
 A link (receiver r, source s) carries the unoccluded form factor F_rs by formula and the
 visibility V_rs by rays, apart. Both are area means. Near pairs get the exact factor, far
@@ -6,7 +6,7 @@ ones Lambert's point-to-polygon formula at a few points; clusters are sampled.
 
 Rays join the quarters of the two sides: at first four, one from each quarter to each
 quarter; where they disagree all sixteen. Four agreeing rays are no proof, so every link
-also carries its *doubt*: how much its F·V may vary or be wrong.
+also carries an *error estimate*: how much its F·V may vary or be wrong.
 """
 
 from __future__ import annotations
@@ -29,28 +29,24 @@ CHUNK = 1 << 15
 class Links:
     """l links as arrays; the multi-level method's are float64, with their visibility in the factor.
 
-    Attributes
-    ----------
-    receiver : (l,) int32
-        Element.
-    source : (l,) int32
-        Node: a cluster, or n_clusters + element.
-    factor : (l,) float32
-        F_rs, the unoccluded fraction of what leaves the receiver that arrives at the source.
-    visibility : (l,) float32
-        Share of F_rs that is not blocked.
-    doubt : (l,) float32
-        Standard deviation of F·V over the samples and what too few rays may have missed.
-    to_quarter, of_quarter : (l, 4) float32
-        How F·V is shared out over the receiver's and the source's quarters, mean 1 each: so
-        leaves below an inner element do not all inherit the same (a cluster's are all 1).
+    receiver (l,) int32: Element.
+    source (l,) int32: Node: a cluster, or n_clusters + element.
+    factor (l,) float32: F_rs, the unoccluded fraction of what leaves the receiver that arrives at the source.
+    visibility (l,) float32: Share of F_rs that is not blocked.
+    error_estimate (l,) float32: Standard deviation of F·V over the samples and what too few rays may have
+        missed.
+    to_quarter, of_quarter (l, 4) float32: How F·V is distributed over the receiver's and the source's
+        quarters, mean 1 each: so leaves below an inner element do not all inherit the same (a cluster's are
+        all 1).
     """
+
+    STORED = ("receiver", "source", "factor", "visibility", "to_quarter", "of_quarter")
 
     receiver: Array
     source: Array
     factor: Array
     visibility: Array
-    doubt: Array
+    error_estimate: Array
     to_quarter: Array
     of_quarter: Array
 
@@ -64,7 +60,7 @@ class Links:
             self.source[rows],
             self.factor[rows],
             self.visibility[rows],
-            self.doubt[rows],
+            self.error_estimate[rows],
             self.to_quarter[rows],
             self.of_quarter[rows],
         )
@@ -87,7 +83,7 @@ def join(parts: list[Links]) -> Links:
         ("source", np.int32, (0,)),
         ("factor", np.float32, (0,)),
         ("visibility", np.float32, (0,)),
-        ("doubt", np.float32, (0,)),
+        ("error_estimate", np.float32, (0,)),
         ("to_quarter", np.float32, (0, 4)),
         ("of_quarter", np.float32, (0, 4)),
     ):
@@ -104,23 +100,12 @@ def measure_links(
     seed: int,
     threads: int = 0,
 ) -> Links:
-    """Compute factor, visibility and doubt of new links; pairs that face away are left out.
+    """Compute factor, visibility and error estimate of new links; pairs that face away are left out.
 
-    Parameters
-    ----------
-    hierarchy : Hierarchy
-    caster : RayCaster
-    receiver, source : (n,) int
-        Elements and nodes.
-    seed : int
-        Places the samples, together with the pair's own numbers.
-    threads : int
-        0 means all cores; the links do not depend on it.
-
-    Returns
-    -------
-    links : Links
-        At most n.
+    receiver, source (n,) int: Elements and nodes.
+    seed: Places the samples, together with the pair's own numbers.
+    threads: 0 means all cores; the links do not depend on it.
+    Returns links: At most n.
     """
     parts: dict[int, Links] = {}
 
@@ -151,18 +136,18 @@ def _measure_chunk(
     traced, free = trace_pairs(caster, samples)
     visibility = open_share(samples, traced, free)
     rays = traced.sum(axis=1)
-    # How far F·V varies over the pair, and what so few rays can have missed.
+    # The variation of F·V over the pair, and the share that few rays can have missed.
     passed = np.where(traced, transfer * free, 0.0)
     mean = passed.sum(axis=1) / np.maximum(rays, 1)
     square = (passed**2).sum(axis=1) / np.maximum(rays, 1)
     spread = np.sqrt(np.maximum(square - mean**2, 0.0))
-    doubt = np.hypot(np.minimum(spread, 1.0), factor / (rays + 2.0))
+    estimate = np.hypot(np.minimum(spread, 1.0), factor / (rays + 2.0))
     links = Links(
         receiver.astype(np.int32),
         source.astype(np.int32),
         factor.astype(np.float32),
         visibility.astype(np.float32),
-        doubt.astype(np.float32),
+        estimate.astype(np.float32),
         *_quarter_shares(hierarchy, receiver, source, samples, transfer * np.where(traced, free, 1.0)),
     )
     return links.take(factor > 0)
@@ -171,7 +156,7 @@ def _measure_chunk(
 def _quarter_shares(
     hierarchy: Hierarchy, receiver: Array, source: Array, samples: PairSamples, passed: Array
 ) -> tuple[Array, Array]:
-    """Share links out over their receiver's and source's quarters: two (n, 4) float32 of mean 1.
+    """Distribute links over their receiver's and source's quarters: two (n, 4) float32 of mean 1.
 
     In proportion to Lambert's factor at the quarters' centroids, times what the samples
     of each quarter saw.

@@ -1,4 +1,4 @@
-"""The first links: from one pair of roots down to pairs that look small from each other.
+"""Initial linking: from one pair of roots down to pairs that look small from each other.
 
 Nowhere are all faces paired with all: a pair of nodes is dropped once one lies behind the
 other, linked once both look small, and opened on its larger side otherwise. Faces far
@@ -27,60 +27,53 @@ MIXED_SIZE = 0.4
 """… or this part where the source's faces look different ways: some may be bright and turned away, …"""
 
 FACE_SIZE = 0.4
-"""… or this part where a single face receives: its links do not know where in the source the light is."""
+"""… or this part where a single face receives: its links have no gradient."""
 
 CONE = 0.35
-"""Faces receive together while none is turned further than this from their mean [rad], or faintly."""
+"""Faces receive together if none deviates more than this from their mean [rad], or if light is faint."""
 
 BUDGET = 0.4
-"""First links may take this part of `SolverSettings.max_links`; refinement needs the rest …"""
+"""Initial links may take this part of `SolverSettings.max_links`; refinement needs the rest …"""
 
 FEWEST = 200_000
-"""… but so many in any case: loosened further they would mean nothing."""
+"""… but at least this many: with fewer, the solution would be meaningless."""
 
 WANTED = 6000.0
-"""Over the square root of BF_ε: more first links than that are not wanted, as refinement adds those that
+"""Divided by the square root of BF_ε: the target number of initial links, as refinement adds those that
 carry light, …"""
 
 COARSEST_FAINT = 8.0
-"""… unless pairs that exchange more than this times BF_ε, as a share of all area, went into one link: then
-only the budget has it. A link's doubt is about an eighth of its factor, and more where it is refined."""
+"""… unless pairs that exchange more than this times BF_ε, as a share of all area, were merged into one
+link: then only the budget limits them. A link's error estimate is about an eighth of its factor, more where
+    it is
+refined."""
 
 FAINT = 1e-7
-"""Where there are more, pairs that exchange less than this share of all area are linked however large
-they look and whichever way their faces do; where that does not do, …"""
+"""Where there are more, pairs that exchange less than this share of all area are linked regardless of size
+and orientation; where that is not enough, …"""
 
 FAINTER = 2.0
-"""… than so many times more, again and again."""
+"""… the share is multiplied by this, repeatedly."""
 
 THINNED = 1 << 14
-"""How many first links there will be is estimated by following so many pairs at a time."""
+"""Pairs followed at a time to estimate the number of initial links."""
 
 SLACK = 1.25
-"""First links may be so many times more than estimated."""
+"""Initial links may exceed the estimate by this factor."""
 
 BLOCK = 1 << 16
-"""Pairs looked at together: their temporaries, some 20 MB, stay near the processor."""
+"""Pairs processed together: their temporaries, some 20 MB, stay near the processor."""
 
 
 def first_links(
     hierarchy: Hierarchy, shapes: NodeShapes, caster: RayCaster, settings: SolverSettings, max_links: int
 ) -> tuple[Links, ClusterLinks, float]:
-    """Link all that may see each other, coarsely.
+    """Link all nodes that may see each other, coarsely.
 
-    Parameters
-    ----------
-    max_links : int
-        The whole budget of links, of which these take `BUDGET`.
-
-    Returns
-    -------
-    links : Links
-        To faces, sorted by receiver.
-    cluster_links : ClusterLinks
-        To clusters.
-    faint : float
-        Pairs that exchange less than this share of all area had to be linked however large they
+    max_links: The whole budget of links, of which these take `BUDGET`.
+    Returns links: To faces, sorted by receiver.
+    Returns cluster_links: To clusters.
+    Returns faint: Pairs that exchange less than this share of all area had to be linked however large they
         look, to keep within the budget; 0 if none.
     """
     most = max(int(BUDGET * max_links), FEWEST)
@@ -97,17 +90,19 @@ def first_links(
         if pairs is not None:
             break
         limits = limits.looser()
-    count, (to, of) = hierarchy.n_clusters, pairs
-    single = to >= count
+    count, (receiver, source) = hierarchy.n_clusters, pairs
+    single = receiver >= count
     seed, threads = settings.seed, settings.threads
-    to_faces = measure_links(hierarchy, caster, to[single] - count, of[single], seed, threads)
-    to_clusters = measure_cluster_links(hierarchy, shapes, caster, to[~single], of[~single], seed, threads)
+    to_faces = measure_links(hierarchy, caster, receiver[single] - count, source[single], seed, threads)
+    to_clusters = measure_cluster_links(
+        hierarchy, shapes, caster, receiver[~single], source[~single], seed, threads
+    )
     return to_faces.sorted_by_receiver(), to_clusters, limits.faint
 
 
 @dataclass(frozen=True)
 class _Limits:
-    """How large, how near and how curved nodes may be that are linked as they are.
+    """Limits of size, distance and curvature for nodes to be linked without opening them.
 
     `area` is all faces' [m²]; `tiny`, of nodes, and `faint`, of what a pair exchanges, are shares of it.
     """
@@ -123,9 +118,9 @@ class _Limits:
 def _first_pairs(
     hierarchy: Hierarchy, shapes: NodeShapes, limits: _Limits, most: int
 ) -> tuple[Array, Array] | None:
-    """Return the (n,) receivers and sources of the first links; None if there are more than `most`."""
+    """Return the (n,) receivers and sources of the initial links; None if there are more than `most`."""
     waiting = [_root_pairs(hierarchy)]
-    to, of, found = [], [], 0
+    receivers, sources, found = [], [], 0
     while waiting:
         # The latest first, block by block: what waits never grows to a whole generation.
         receiver, source = waiting.pop()
@@ -133,18 +128,18 @@ def _first_pairs(
             waiting.append((receiver[BLOCK:], source[BLOCK:]))
             receiver, source = receiver[:BLOCK], source[:BLOCK]
         ready, opened = _judge(hierarchy, shapes, receiver, source, limits)
-        to.append(ready[0].astype(np.int32))
-        of.append(ready[1].astype(np.int32))
+        receivers.append(ready[0].astype(np.int32))
+        sources.append(ready[1].astype(np.int32))
         found += len(ready[0])
         if found > most:
             return None
         if len(opened[0]):
             waiting.append(opened)
-    return np.concatenate(to), np.concatenate(of)
+    return np.concatenate(receivers), np.concatenate(sources)
 
 
 def _estimate(hierarchy: Hierarchy, shapes: NodeShapes, limits: _Limits) -> float:
-    """Estimate how many first links there are, from some of the pairs on the way to them.
+    """Estimate the number of initial links from a sample of pairs.
 
     Whenever more than `THINNED` pairs are to be opened, that many are drawn, and stand for all.
     """
@@ -162,7 +157,7 @@ def _estimate(hierarchy: Hierarchy, shapes: NodeShapes, limits: _Limits) -> floa
 
 
 def _root_pairs(hierarchy: Hierarchy) -> tuple[Array, Array]:
-    """Return the (n,) receivers and sources to begin with: every root with every root."""
+    """Return the (n,) receivers and sources of the start: every root with every root."""
     count = len(hierarchy.roots)
     return np.repeat(hierarchy.roots, count), np.tile(hierarchy.roots, count)
 
@@ -170,7 +165,7 @@ def _root_pairs(hierarchy: Hierarchy) -> tuple[Array, Array]:
 def _judge(
     hierarchy: Hierarchy, shapes: NodeShapes, receiver: Array, source: Array, limits: _Limits
 ) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-    """Return the pairs to link as they are, and those that come of opening the others."""
+    """Return the pairs to link, and those that result from opening the others."""
     may = shapes.may_see(receiver, source)
     receiver, source = receiver[may], source[may]
     coarse = _looks_small(shapes, receiver, source, limits)
@@ -190,7 +185,7 @@ def _looks_small(shapes: NodeShapes, receiver: Array, source: Array, limits: _Li
     size = np.where(of_mixed, MIXED_SIZE, SIZE)
     size = np.where(to_face, np.minimum(size, FACE_SIZE), size)
     far = ~shapes.looks_large(receiver, source, size)
-    # A face beside a cluster is told apart from it: samples would scatter there.
+    # A face next to a cluster is linked separately: samples would scatter there.
     tiny = limits.tiny * limits.area
     small = (shapes.area[receiver] <= tiny) & (shapes.area[source] <= tiny) & ~to_face & ~of_mixed
     return np.asarray(far | small | (to_face & of_face))
@@ -205,7 +200,7 @@ def _open_larger(
 ) -> tuple[Array, Array]:
     """Replace pairs by pairs with the two children of their larger cluster."""
     count, children = hierarchy.n_clusters, hierarchy.clusters.children
-    # What looks many ways is opened rather: it may not receive.
+    # Clusters with many directions are opened instead: they may not receive.
     weight = np.where(shapes.cone[receiver] > CONE, 2.0, 1.0)
     larger = weight * shapes.radius[receiver] >= shapes.radius[source]
     opened = (receiver < count) & ((source >= count) | larger | only_receiver)

@@ -1,4 +1,4 @@
-"""The irradiance straight from lamps and sky at points, for equations asked at points."""
+"""The direct irradiance of lamps and sky at points, for equations at points."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...lights import EnvironmentLight, Lamp, Light
-from ...numerics import Array, for_chunks, irradiance_under_sky, stratified_square
+from ...numerics import LIGHT_STEP, Array, Stream, for_chunks, irradiance_under_sky, stratified_square
 from ...rays import RayCaster
 from .light_links import lamp_light, sky_share
 
@@ -17,20 +17,17 @@ SKY_RAYS = 256
 """From a point to the sky."""
 
 CHUNK = 1 << 11
-"""Points a thread asks for together; their sky rays take about 25 MB."""
+"""Points that a thread processes together; their sky rays take about 25 MB."""
 
 
 def lamp_irradiance(
     lights: Sequence[Light], points: Array, normals: Array, caster: RayCaster, seed: int, threads: int = 0
 ) -> Array:
-    """Return (n, 3) the irradiance at points straight from lamps and sky [W/m²].
+    """Return (n, 3) the direct irradiance of lamps and sky at points [W/m²].
 
     A lamp's closed form times the share of its shadow rays that pass; the sky by rays alone.
 
-    Parameters
-    ----------
-    points, normals : (n, 3) float64
-        On surfaces; unit normals.
+    points, normals (n, 3): On surfaces; unit normals.
     """
     total = np.zeros((len(points), 3))
 
@@ -38,13 +35,13 @@ def lamp_irradiance(
         keys, facing = np.arange(rows.start, rows.stop), normals[rows]
         gain: Array
         for number, light in enumerate(lights):
-            own_seed = seed + 101 * number
+            own_seed = seed + LIGHT_STEP * number
             if isinstance(light, EnvironmentLight):
                 share, _ = sky_share(light, points[rows], facing, SKY_RAYS, caster, keys, own_seed)
                 gain = irradiance_under_sky(1.0) * share
             elif isinstance(light, Lamp):
                 repeated = np.repeat(points[rows, None], SHADOW_RAYS, axis=1)
-                unit = stratified_square(keys, SHADOW_RAYS, own_seed)
+                unit = stratified_square(keys, SHADOW_RAYS, own_seed + Stream.LIGHT_RAYS)
                 open_gain, share = lamp_light(light, repeated, facing, unit, caster)
                 gain = open_gain[:, 0] * share
             else:

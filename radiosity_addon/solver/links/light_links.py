@@ -9,7 +9,9 @@ import numpy as np
 
 from ...lights import EnvironmentLight, Lamp, Light, SpotLight
 from ...numerics import (
+    LIGHT_STEP,
     Array,
+    Stream,
     cosine_hemisphere,
     for_chunks,
     irradiance_under_sky,
@@ -26,14 +28,14 @@ LAMP_SAMPLES = 4
 SKY_RAYS = 16
 """Hemisphere rays of each quarter of an element."""
 COARSEST = 512
-"""An element larger than the scene's area over this is split before light is looked for on it."""
+"""An element larger than the scene's area over this is split before its light is measured."""
 
 NEAR = 0.5
 """So is one that looks larger than this (radius over distance) from the lamp, or than this part
 of a spot's cone."""
 
 SMALL, SMALL_DIVISOR = 2e-5, 4
-"""Elements below this share of all area get so many times fewer samples: there are many of them."""
+"""Elements below this share of all area get fewer samples by this divisor: there are many of them."""
 
 TINY = 2.5e-6
 """Those below this share get a quarter of that, over the whole element."""
@@ -46,13 +48,9 @@ CHUNK = 1 << 13
 class LightLinks:
     """How strongly each light lights each linked element, per unit of its strength.
 
-    Attributes
-    ----------
-    receiver : (l,) int32
-    light : (l,) int32
-        Row of the scene's lights.
-    gain : (l, 4) float32
-        Irradiance per unit of strength on each quarter of the receiver, visibility included.
+    receiver (l,) int32.
+    light (l,) int32: Row of the scene's lights.
+    gain (l, 4) float32: Irradiance per unit of strength on each quarter of the receiver, visibility included.
     """
 
     receiver: Array
@@ -100,16 +98,10 @@ def link_lights(
 ) -> LightLinks:
     """Link every light to the elements it reaches, splitting where its light varies.
 
-    Parameters
-    ----------
-    misplaced_power : float
-        BF_ε [W]: an element is split while (spread of irradiance) × area exceeds it.
-    min_area : float
-        A_ε [m²]: no element becomes smaller.
-    most_elements : int
-        How many the hierarchy may grow to; the largest and most doubtful are split first.
-    as_if : (n_lights,) float64 or None
-        What the lights count for instead of their strengths; those at 0 get no links.
+    misplaced_power: BF_ε [W]: an element is split while (spread of irradiance) × area exceeds it.
+    min_area: A_ε [m²]: no element becomes smaller.
+    most_elements: Limit of the hierarchy's elements; the largest and least certain are split first.
+    as_if (n_lights,): What the lights count for instead of their strengths; those at 0 get no links.
     """
     receivers, numbers, gains = [], [], []
     coarse_area = float(hierarchy.faces.area.sum()) / COARSEST
@@ -121,15 +113,15 @@ def link_lights(
         while len(waiting):
             area = hierarchy.area[waiting]
             may_split = (hierarchy.first_child[waiting] != LEAF) | (area >= 4 * min_area)
-            # Where few samples may miss the light altogether, they are not asked.
+            # Where few samples may miss the light altogether, none are taken.
             blind = may_split & ((area > coarse_area) | too_near(light, hierarchy, waiting))
             blind = _affordable(hierarchy, waiting, blind, area, most_elements)
-            gain, doubt = np.zeros((len(waiting), 4)), np.zeros(len(waiting))
+            gain, error = np.zeros((len(waiting), 4)), np.zeros(len(waiting))
             seeing = np.flatnonzero(~blind)
-            gain[seeing], doubt[seeing] = measure_light(
-                hierarchy, light, caster, waiting[seeing], seed + 101 * number, threads
+            gain[seeing], error[seeing] = measure_light(
+                hierarchy, light, caster, waiting[seeing], seed + LIGHT_STEP * number, threads
             )
-            misplaced = np.where(blind, np.inf, doubt * area * strength)
+            misplaced = np.where(blind, np.inf, error * area * strength)
             split = may_split & (misplaced > misplaced_power)
             split = _affordable(hierarchy, waiting, split, misplaced, most_elements)
             kept = ~split & (gain.max(axis=1) > 0)
@@ -171,7 +163,8 @@ def too_near(light: Light, hierarchy: Hierarchy, elements: Array) -> Array:
     before = np.einsum("nk,nk->n", along, hierarchy.faces.normal[hierarchy.face[elements]]) < 0
     near = radius > NEAR * distance
     if isinstance(light, SpotLight):
-        # The element's bounding sphere, as the lamp sees it, touches the cone and is not small beside it.
+        # The element's bounding sphere, as the lamp sees it, touches the cone and is not small compared with
+        # it.
         seen = np.arcsin(np.clip(radius / np.maximum(distance, 1e-300), 0.0, 1.0))
         axis = np.asarray(light.direction)
         off = np.arccos(np.clip(along @ axis / np.maximum(distance, 1e-300), -1.0, 1.0))
@@ -188,15 +181,12 @@ def measure_light(
     seed: int,
     threads: int = 0,
 ) -> tuple[Array, Array]:
-    """Measure one light's irradiance on the quarters of elements, per unit of strength, and its doubt.
+    """Measure one light's irradiance on the quarters of elements, per unit of strength, and its error.
 
-    Returns
-    -------
-    gain : (n, 4) float64
-        On each quarter.
-    doubt : (n,) float64
+    Returns gain (n, 4): On each quarter.
+    Returns error (n,).
     """
-    gain, doubt = np.empty((len(elements), 4)), np.empty(len(elements))
+    gain, error = np.empty((len(elements), 4)), np.empty(len(elements))
     area = hierarchy.area[elements]
     share = area / float(hierarchy.faces.area.sum())
     tiny, small = share < TINY, share < SMALL
@@ -213,12 +203,12 @@ def measure_light(
             rows = rows_of[piece]
             asked = _pieces(hierarchy, elements[rows], pieces)
             if isinstance(light, EnvironmentLight):
-                gain[rows], doubt[rows] = _measure_sky(asked, light, caster, seed, divisor)
+                gain[rows], error[rows] = _measure_sky(asked, light, caster, seed, divisor)
             else:
-                gain[rows], doubt[rows] = _measure_lamp(asked, light, caster, seed, divisor)
+                gain[rows], error[rows] = _measure_lamp(asked, light, caster, seed, divisor)
 
         for_chunks(measure, len(rows_of), CHUNK, threads)
-    return gain, doubt
+    return gain, error
 
 
 @dataclass(frozen=True)
@@ -245,7 +235,8 @@ def _measure_sky(
 ) -> tuple[Array, Array]:
     """Measure the sky on pieces of elements (see `measure_light`); whole ones have a column only."""
     rays = SKY_RAYS // divisor
-    points = points_on_triangles(asked.corners, stratified_square(asked.keys, rays, seed + 1))
+    unit = stratified_square(asked.keys, rays, seed + Stream.LIGHT_POINTS)
+    points = points_on_triangles(asked.corners, unit)
     share, error = sky_share(light, points, asked.normals, rays, caster, asked.keys, seed)
     values = irradiance_under_sky(share.reshape(-1, asked.count))
     # Expected noise of a quarter's mean is not a difference between quarters.
@@ -258,8 +249,9 @@ def _measure_lamp(
 ) -> tuple[Array, Array]:
     """Measure a lamp on pieces of elements (see `measure_light`); whole ones have a column only."""
     samples = LAMP_SAMPLES // divisor
-    points = points_on_triangles(asked.corners, stratified_square(asked.keys, samples, seed + 1))
-    unit = stratified_square(asked.keys, samples, seed)
+    unit = stratified_square(asked.keys, samples, seed + Stream.LIGHT_POINTS)
+    points = points_on_triangles(asked.corners, unit)
+    unit = stratified_square(asked.keys, samples, seed + Stream.LIGHT_RAYS)
     open_gain, share = lamp_light(light, points, asked.normals, unit, caster)
     values = (open_gain.mean(axis=1) * share).reshape(-1, asked.count)
     missed = open_gain.reshape(len(values), -1).mean(axis=1) / (asked.count * samples + 2.0)
@@ -269,21 +261,13 @@ def _measure_lamp(
 def lamp_light(
     light: Lamp, points: Array, normals: Array, unit: Array, caster: RayCaster
 ) -> tuple[Array, Array]:
-    """Ask for a lamp's light at points, one shadow ray each.
+    """Measure a lamp's light at points, one shadow ray each.
 
-    Parameters
-    ----------
-    points : (n, k, 3) float64
-    normals : (n, 3) float64
-    unit : (n, k, 2) float
-        Places the point of the lamp each ray goes to.
-
-    Returns
-    -------
-    gain : (n, k) float64
-        Unoccluded irradiance per unit of strength.
-    share : (n,) float64
-        How much of it arrives, over the k points together.
+    points (n, k, 3).
+    normals (n, 3).
+    unit (n, k, 2): Places the point of the lamp each ray goes to.
+    Returns gain (n, k): Unoccluded irradiance per unit of strength.
+    Returns share (n,): How much of it arrives, over the k points together.
     """
     flat = points.reshape(-1, 3)
     facing = np.repeat(normals, points.shape[1], axis=0)
@@ -294,7 +278,7 @@ def lamp_light(
     start = flat[rows] + caster.surface_offset * facing[rows]
     lamps = caster.for_lamps
     free = lamps.passing(start, directions[:, 0], distances[:, 0]) if light.casts_shadow else True
-    # A lamp point below the horizon says nothing: the closed form has cut it off already.
+    # A lamp point below the horizon is ignored: the closed form has clipped it already.
     weights[rows] = np.where(above[:, 0] > 0, gain[rows], 0.0)
     passed[rows] = weights[rows] * free
     shape = unit.shape[:2]
@@ -312,22 +296,18 @@ def sky_share(
     keys: Array,
     seed: int,
 ) -> tuple[Array, Array]:
-    """Ask for a sky's light at points, relative to an open sky of its radiance.
+    """Measure a sky's light at points, relative to an open sky of its radiance.
 
     `points` are (n, 3), or (n, rays, 3) to start every ray elsewhere.
 
-    Returns
-    -------
-    share : (n,) float64
-        The cosine-weighted share of each hemisphere that meets no surface, weighted by the
+    Returns share (n,): The cosine-weighted share of each hemisphere that meets no surface, weighted by the
         relative radiance there.
-    error : (n,) float64
-        Its standard error, were the rays independent.
+    Returns error (n,): Its standard error, were the rays independent.
     """
     share, error = np.empty(len(points)), np.empty(len(points))
     for first in range(0, len(points), CHUNK):
         rows = slice(first, first + CHUNK)
-        unit = stratified_square(keys[rows], rays, seed)
+        unit = stratified_square(keys[rows], rays, seed + Stream.LIGHT_RAYS)
         directions = to_world(cosine_hemisphere(unit), normals[rows])
         start = points[rows] if points.ndim == 3 else points[rows, None]
         start = np.broadcast_to(start + caster.surface_offset * normals[rows, None], directions.shape)

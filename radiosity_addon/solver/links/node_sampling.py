@@ -1,10 +1,10 @@
-"""Stratified points on nodes, be they clusters or elements."""
+"""Stratified points on nodes, both clusters and elements."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ...numerics import Array, point_on_each_triangle, split_in_four, stratified_square
+from ...numerics import Array, Stream, point_on_each_triangle, split_in_four, stratified_square
 from ..hierarchy import Hierarchy
 from .pair_factors import sample_clusters
 
@@ -19,32 +19,27 @@ def node_area(hierarchy: Hierarchy, node: Array) -> Array:
 
 
 def node_samples(
-    hierarchy: Hierarchy, node: Array, quarter: Array, keys: Array, seed: int
+    hierarchy: Hierarchy, node: Array, quarter: Array, keys: Array, seed: int, streams: tuple[Stream, Stream]
 ) -> tuple[Array, Array]:
     """Return a point in each of some quarters of nodes.
 
-    Parameters
-    ----------
-    node : (n,) int
-    quarter : (n, k) int
-        Of an element its child's place, of a cluster a fourth of its area in order.
-    keys : (n,) int
-        With the seed, what places the points.
-
-    Returns
-    -------
-    points, normals : (n, k, 3) float64
+    node (n,) int.
+    quarter (n, k) int: Of an element its child's place, of a cluster a fourth of its area in order.
+    keys (n,) int: With the seed, what places the points.
+    streams: Of places within a face, and of the face within a cluster.
+    Returns points, normals (n, k, 3).
     """
     count, samples = quarter.shape
     points, normals = np.empty((count, samples, 3)), np.empty((count, samples, 3))
-    jitter = stratified_square(keys, samples, seed)
+    within, face_stream = streams
+    jitter = stratified_square(keys, samples, seed + within)
     single = np.flatnonzero(node >= hierarchy.n_clusters)
     element = node[single] - hierarchy.n_clusters
     corners = split_in_four(hierarchy.corners[element])[np.arange(len(single))[:, None], quarter[single]]
     points[single] = point_on_each_triangle(corners, jitter[single])
     normals[single] = hierarchy.faces.normal[hierarchy.face[element]][:, None]
     grouped = np.flatnonzero(node < hierarchy.n_clusters)
-    along = stratified_square(keys[grouped], samples, seed + 1)[..., 0]
+    along = stratified_square(keys[grouped], samples, seed + face_stream)[..., 0]
     face = sample_clusters(hierarchy, node[grouped], (quarter[grouped] + along) / 4.0)
     points[grouped] = point_on_each_triangle(hierarchy.faces.corners[face], jitter[grouped])
     normals[grouped] = hierarchy.faces.normal[face]

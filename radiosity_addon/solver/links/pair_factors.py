@@ -11,6 +11,7 @@ import numpy as np
 from ...form_factors import kernel, point_to_polygon, triangle_to_triangle, visibility_of, weighted_sums
 from ...numerics import (
     Array,
+    Stream,
     hash_keys,
     pick_in_runs,
     point_on_each_triangle,
@@ -21,7 +22,7 @@ from ...rays import RayCaster
 from ..hierarchy import Hierarchy
 
 EXACT_WITHIN = 1.0
-"""Pairs nearer than this (distance of centres over the sum of radii) get the exact factor."""
+"""Pairs nearer than this (distance of centers over the sum of radii) get the exact factor."""
 
 
 def _symmetric(weight: float) -> list[list[float]]:
@@ -69,18 +70,10 @@ def pair_visibility(
 def trace_pairs(caster: RayCaster, samples: PairSamples, empty_too: bool = False) -> tuple[Array, Array]:
     """Trace the samples of pairs: four each, all sixteen where those disagree.
 
-    Parameters
-    ----------
-    empty_too : bool
-        All sixteen also where the four carry nothing. Not for links: their doubt is about such
-        pairs, and has them refined.
-
-    Returns
-    -------
-    traced : (n, 16) bool
-        Which samples were asked.
-    free : (n, 16) float64
-        What share of these passes: 0 or 1 where there are no cut-outs.
+    empty_too: All sixteen also where the four carry nothing. Not for links: their error estimate is about
+        such pairs, and has them refined.
+    Returns traced (n, 16) bool: Which samples were asked.
+    Returns free (n, 16): What share of these passes: 0 or 1 where there are no cut-outs.
     """
     traced = np.zeros(samples.transfer.shape, dtype=bool)
     free = np.zeros(samples.transfer.shape)
@@ -142,19 +135,19 @@ class PairSamples:
         count = len(receiver)
         # Column 4a + q joins the receiver's quarter q to the source's quarter q xor (turn + a).
         pair = receiver.astype(np.int64) << 32 | source.astype(np.int64)
-        turn = hash_keys(pair, seed) & 3
+        turn = hash_keys(pair, seed + Stream.PAIR_TURN) & 3
         receiver_quarter = np.tile(np.arange(4), samples // 4)
         turned = turn[:, None] + np.repeat(np.arange(samples // 4), 4)
         source_quarter = receiver_quarter[None] ^ (turned % 4)
         quarters = split_in_four(hierarchy.corners[receiver])
-        jitter = stratified_square(pair, samples, seed + 1)
+        jitter = stratified_square(pair, samples, seed + Stream.PAIR_RECEIVER)
         self.receiver_points = point_on_each_triangle(quarters[:, receiver_quarter], jitter)
         self.receiver_normals = hierarchy.faces.normal[hierarchy.face[receiver]]
 
         self.source_points = np.empty((count, samples, 3))
         self.source_normals = np.empty((count, samples, 3))
-        jitter = stratified_square(pair, samples, seed + 2)
-        along = stratified_square(pair, samples, seed + 3)[..., 0]
+        jitter = stratified_square(pair, samples, seed + Stream.PAIR_SOURCE)
+        along = stratified_square(pair, samples, seed + Stream.PAIR_SOURCE_FACE)[..., 0]
         is_cluster = source < hierarchy.n_clusters
         single = np.flatnonzero(~is_cluster)
         element = source[single] - hierarchy.n_clusters
@@ -183,9 +176,11 @@ class PairSamples:
 
     def by_quarter(self, values: Array) -> tuple[Array, Array]:
         """Average (n, 16) values over each of the receiver's and the source's quarters: two (n, 4)."""
-        to = values.reshape(-1, 4, 4).mean(axis=1)
-        of = [np.where(self._source_quarter == q, values, 0.0).sum(axis=1) / 4.0 for q in range(4)]
-        return to, np.stack(of, axis=1)
+        by_receiver_quarter = values.reshape(-1, 4, 4).mean(axis=1)
+        by_source_quarter = [
+            np.where(self._source_quarter == q, values, 0.0).sum(axis=1) / 4.0 for q in range(4)
+        ]
+        return by_receiver_quarter, np.stack(by_source_quarter, axis=1)
 
 
 def sample_clusters(hierarchy: Hierarchy, cluster: Array, share: Array) -> Array:
@@ -202,28 +197,32 @@ def element_factors(hierarchy: Hierarchy, receiver: Array, source: Array) -> Arr
     0 where either lies behind the other. Near pairs are exact, the others Lambert's formula,
     clipped to the receiver's horizon, averaged over the receiver by a cubature rule.
     """
-    to, of = hierarchy.corners[receiver], hierarchy.corners[source]
-    normal_to, normal_of = (hierarchy.faces.normal[hierarchy.face[of]] for of in (receiver, source))
-    centre_to, centre_of = to.mean(axis=1), of.mean(axis=1)
-    radius_to = np.linalg.norm(to - centre_to[:, None], axis=2).max(axis=1)
-    radius_of = np.linalg.norm(of - centre_of[:, None], axis=2).max(axis=1)
-    sizes = radius_to + radius_of
+    receiver_corners, source_corners = hierarchy.corners[receiver], hierarchy.corners[source]
+    receiver_normal, source_normal = (
+        hierarchy.faces.normal[hierarchy.face[source_corners]] for source_corners in (receiver, source)
+    )
+    receiver_center, source_center = receiver_corners.mean(axis=1), source_corners.mean(axis=1)
+    receiver_radius = np.linalg.norm(receiver_corners - receiver_center[:, None], axis=2).max(axis=1)
+    source_radius = np.linalg.norm(source_corners - source_center[:, None], axis=2).max(axis=1)
+    sizes = receiver_radius + source_radius
     # Exactly behind: no corner of the one rises over the other's plane.
-    rise_of = np.einsum("nck,nk->nc", of - centre_to[:, None], normal_to).max(axis=1)
-    rise_to = np.einsum("nck,nk->nc", to - centre_of[:, None], normal_of).max(axis=1)
+    rise_of = np.einsum("nck,nk->nc", source_corners - receiver_center[:, None], receiver_normal).max(axis=1)
+    rise_to = np.einsum("nck,nk->nc", receiver_corners - source_center[:, None], source_normal).max(axis=1)
     faces = (rise_of > 1e-9 * sizes) & (rise_to > 1e-9 * sizes)
-    ratio = np.linalg.norm(centre_to - centre_of, axis=1) / sizes
+    ratio = np.linalg.norm(receiver_center - source_center, axis=1) / sizes
 
     factor = np.zeros(len(receiver))
     near = np.flatnonzero(faces & (ratio < EXACT_WITHIN))
-    factor[near] = triangle_to_triangle(to[near], of[near])
+    factor[near] = triangle_to_triangle(receiver_corners[near], source_corners[near])
     nearest = EXACT_WITHIN
     for farthest, weights, shares in RULES:
         rows = np.flatnonzero(faces & (ratio >= nearest) & (ratio < farthest))
-        points = (weights @ to[rows]).reshape(-1, 3)
+        points = (weights @ receiver_corners[rows]).reshape(-1, 3)
         repeats = len(weights)
         values = point_to_polygon(
-            points, np.repeat(normal_to[rows], repeats, axis=0), np.repeat(of[rows], repeats, axis=0)
+            points,
+            np.repeat(receiver_normal[rows], repeats, axis=0),
+            np.repeat(source_corners[rows], repeats, axis=0),
         )
         factor[rows] = weighted_sums(values.reshape(-1, repeats), shares)
         nearest = farthest

@@ -1,39 +1,39 @@
-"""Which links to refine, and on which side (handout §4.2.1, Oracle2, weighed by doubt)."""
+"""Selects links to refine, and the side (handout §4.2.1, Oracle2, weighted by error estimate)."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ...numerics import Array
-from ..hierarchy import LEAF, Hierarchy, TreeTop
+from ..hierarchy import LEAF, ClusterCut, Hierarchy
 from .cluster_links import ClusterLinks
 from .element_links import Links
 from .transport import node_radiosity
 
 
 def misplaced_power(
-    hierarchy: Hierarchy, links: Links, radiosity: Array, top: TreeTop | None = None
+    hierarchy: Hierarchy, links: Links, radiosity: Array, cut: ClusterCut | None = None
 ) -> Array:
-    """Estimate the power each link may misplace [W]: B_s · A_r · doubt, the largest channel.
+    """Estimate the power each link may misplace [W]: B_s · A_r · error estimate, the largest channel.
 
     The handout's Oracle2 compares the whole power B_s A_r F_rs with BF_ε. Weighed by its
-    doubt, how much F·V varies or is unknown over the link, a large but certain transfer
+    error estimate, how much F·V varies or is unknown over the link, a large but certain transfer
     stays coarse. A source without radiosity gives 0 and is tested again every round.
 
-    Parameters
-    ----------
-    radiosity : (e, 3) float64
+    radiosity (e, 3).
     """
-    brightest = node_radiosity(hierarchy, radiosity, top).max(axis=1, initial=0.0)
-    return np.asarray(brightest[links.source] * hierarchy.area[links.receiver] * links.doubt)
+    brightest = node_radiosity(hierarchy, radiosity, cut).max(axis=1, initial=0.0)
+    return np.asarray(brightest[links.source] * hierarchy.area[links.receiver] * links.error_estimate)
 
 
 def misplaced_at_clusters(
-    hierarchy: Hierarchy, links: ClusterLinks, radiosity: Array, top: TreeTop | None = None
+    hierarchy: Hierarchy, links: ClusterLinks, radiosity: Array, cut: ClusterCut | None = None
 ) -> Array:
     """Estimate the power each link to a cluster may misplace [W] (see `misplaced_power`)."""
-    brightest = node_radiosity(hierarchy, radiosity, top).max(axis=1, initial=0.0)
-    return np.asarray(brightest[links.source] * hierarchy.clusters.area[links.receiver] * links.doubt)
+    brightest = node_radiosity(hierarchy, radiosity, cut).max(axis=1, initial=0.0)
+    return np.asarray(
+        brightest[links.source] * hierarchy.clusters.area[links.receiver] * links.error_estimate
+    )
 
 
 def choose_side(hierarchy: Hierarchy, links: Links, min_area: float) -> tuple[Array, Array, Array]:
@@ -42,10 +42,8 @@ def choose_side(hierarchy: Hierarchy, links: Links, min_area: float) -> tuple[Ar
     Clusters open first; otherwise the larger side splits, as the link varies most over it,
     or the other one where the larger may not get children.
 
-    Returns
-    -------
-    open_source, split_source, split_receiver : (l,) bool
-        At most one is true per link; none where both sides are too small.
+    Returns open_source, split_source, split_receiver (l,) bool: At most one is true per link; none where both
+        sides are too small.
     """
     open_source = links.source < hierarchy.n_clusters
     element = np.where(open_source, 0, links.source - hierarchy.n_clusters)
@@ -66,11 +64,8 @@ def children_of_links(hierarchy: Hierarchy, links: Links, min_area: float) -> tu
     Elements that have none yet get children. A link whose two sides are too small is not
     replaced (the handout's listing would lose it).
 
-    Returns
-    -------
-    receiver, source : (n,) int
-        The new pairs.
-    replaced : (l,) bool
+    Returns receiver, source (n,) int: The new pairs.
+    Returns replaced (l,) bool.
     """
     open_source, split_source, split_receiver = choose_side(hierarchy, links, min_area)
     n_clusters = hierarchy.n_clusters
@@ -103,10 +98,7 @@ def children_of_links(hierarchy: Hierarchy, links: Links, min_area: float) -> tu
 def children_of_cluster_links(hierarchy: Hierarchy, links: ClusterLinks) -> tuple[Array, Array]:
     """Replace links to clusters by links to or from the two children of their larger cluster.
 
-    Returns
-    -------
-    receiver, source : (n,) int
-        The new pairs, both of them nodes.
+    Returns receiver, source (n,) int: The new pairs, both of them nodes.
     """
     clusters, count = hierarchy.clusters, hierarchy.n_clusters
     of_cluster = links.source < count

@@ -1,11 +1,11 @@
-"""Moving light over the links: gather, push-pull and the residual (handout §4.2)."""
+"""Transport of light over the links: gather, push-pull and the residual (handout §4.2)."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ...numerics import Array
-from ..hierarchy import LEAF, Hierarchy, TreeTop
+from ..hierarchy import LEAF, ClusterCut, Hierarchy
 from .element_links import Links
 
 
@@ -14,33 +14,23 @@ def gather(
     links: Links,
     radiosity: Array,
     scale: Array | None = None,
-    top: TreeTop | None = None,
+    cut: ClusterCut | None = None,
     shared: tuple[Array, Array] | None = None,
 ) -> Array:
     """Collect the irradiance that arrives over each element's own links.
 
-    H_r = Σ_s F_rs V_rs B_s over the links of receiver r (handout §4.2, Gather), shared out
+    H_r = Σ_s F_rs V_rs B_s over the links of receiver r (handout §4.2, Gather), distributed
     over the receiver's quarters. Where the source has children, B_s is the mean over its
     quarters by the link's shares.
 
-    Parameters
-    ----------
-    links : Links
-        Sorted by receiver.
-    radiosity : (e, k) float64
-        Of the leaves [W/m²]; other rows do not count.
-    scale : (e, 2) float64 or None
-        What each leaf's radiosity is multiplied with over its own links, and in its
-        ancestors' means (`conservation`).
-    top : TreeTop or None
-        With all clusters of the links, if it is at hand.
-    shared : (e, k), (n_nodes, k) float64 or None
-        Means by `shared_means`, if they are at hand. The second is overwritten.
-
-    Returns
-    -------
-    irradiance : (e, 4, k) float64
-        Each element's own share on its four quarters [W/m²]; `push` adds its ancestors'.
+    links: Sorted by receiver.
+    radiosity (e, k): Of the leaves [W/m²]; other rows do not count.
+    scale (e, 2): What each leaf's radiosity is multiplied with over its own links, and in its ancestors'
+        means (`conservation`).
+    cut: With all clusters of the links, if it is at hand.
+    shared (e, k), (n_nodes, k): Means by `shared_means`, if they are at hand. The second is overwritten.
+    Returns irradiance (e, 4, k): Each element's own share on its four quarters [W/m²]; `push` adds its
+        ancestors'.
     """
     channels = radiosity.shape[1]
     irradiance = np.zeros((hierarchy.n_elements, 4, channels))
@@ -49,7 +39,7 @@ def gather(
     first = np.flatnonzero(np.diff(links.receiver, prepend=-1))
     receivers = links.receiver[first]
     scale = np.ones((len(radiosity), 2)) if scale is None else scale
-    means, nodes = shared_means(hierarchy, radiosity, scale, top) if shared is None else shared
+    means, nodes = shared_means(hierarchy, radiosity, scale, cut) if shared is None else shared
     leaves = hierarchy.leaves
     nodes[hierarchy.n_clusters + leaves] = scale[leaves, :1] * radiosity[leaves]
     child = np.full(len(nodes), LEAF, dtype=np.int64)
@@ -72,25 +62,18 @@ def gather(
 
 
 def shared_means(
-    hierarchy: Hierarchy, radiosity: Array, scale: Array | None = None, top: TreeTop | None = None
+    hierarchy: Hierarchy, radiosity: Array, scale: Array | None = None, cut: ClusterCut | None = None
 ) -> tuple[Array, Array]:
-    """Return what links to coarse sources see: (e, k) the elements' means, and (n_nodes, k) all nodes'."""
+    """Return radiosities for links to coarse sources: means of elements (e, k) and all nodes (n_nodes, k)."""
     means = pull(hierarchy, radiosity if scale is None else scale[:, 1:] * radiosity)
-    return means, node_radiosity(hierarchy, means, top)
+    return means, node_radiosity(hierarchy, means, cut)
 
 
 def push(hierarchy: Hierarchy, own: Array) -> Array:
     """Add to every element what its ancestors receive; radiosity is per area, so no factors.
 
-    Parameters
-    ----------
-    own : (e, 4, k) float64
-        On the quarters of each element; child q inherits quarter q.
-
-    Returns
-    -------
-    total : (e, k) float64
-        Meaningful at the leaves.
+    own (e, 4, k): On the quarters of each element; child q inherits quarter q.
+    Returns total (e, k): Meaningful at the leaves.
     """
     inherited = np.zeros((len(own), own.shape[2]))
     for parents in inner_by_level(hierarchy):
@@ -105,16 +88,10 @@ def quarters_mean(values: Array) -> Array:
 
 
 def pull(hierarchy: Hierarchy, at_leaves: Array) -> Array:
-    """Average the leaves' values upwards; the four children of an element have equal areas.
+    """Average the leaves' values upward; the four children of an element have equal areas.
 
-    Parameters
-    ----------
-    at_leaves : (e, k) float64
-        Only the leaves' rows count.
-
-    Returns
-    -------
-    everywhere : (e, k) float64
+    at_leaves (e, k): Only the leaves' rows count.
+    Returns everywhere (e, k).
     """
     values = at_leaves.copy()
     for parents in reversed(inner_by_level(hierarchy)):
@@ -132,19 +109,11 @@ def push_pull(
 ) -> tuple[Array, Array]:
     """Push irradiance to the leaves, reflect it there, and pull radiosity up (handout §4.2).
 
-    Parameters
-    ----------
-    lights : (e, 3) float64
-        What the leaves get straight from lamps [W/m²].
-    gathered : (e, 3) float64
-        What the leaves got over links, their ancestors' included [W/m²].
-    emission, reflectance : (e, 3) float64
-
-    Returns
-    -------
-    irradiance : (e, 3) float64
-        Area means over the leaves below every element.
-    radiosity : (e, 3) float64
+    lights (e, 3): What the leaves get straight from lamps [W/m²].
+    gathered (e, 3): What the leaves got over links, their ancestors' included [W/m²].
+    emission, reflectance (e, 3).
+    Returns irradiance (e, 3): Area means over the leaves below every element.
+    Returns radiosity (e, 3).
     """
     irradiance = lights + gathered
     radiosity = pull(hierarchy, emission + reflectance * irradiance)
@@ -158,11 +127,11 @@ def inner_by_level(hierarchy: Hierarchy) -> list[Array]:
     return [inner[level == depth] for depth in range(int(level.max(initial=-1)) + 1)]
 
 
-def node_radiosity(hierarchy: Hierarchy, radiosity: Array, top: TreeTop | None = None) -> Array:
-    """Put the clusters' area means, those in `top` at least, above the elements' radiosity: (n_nodes, 3)."""
+def node_radiosity(hierarchy: Hierarchy, radiosity: Array, cut: ClusterCut | None = None) -> Array:
+    """Put the clusters' area means, those in `cut` at least, above the elements' radiosity: (n_nodes, 3)."""
     of_faces = radiosity[: len(hierarchy.faces)]
-    if top is None:
+    if cut is None:
         clusters = hierarchy.clusters.average(of_faces, hierarchy.faces.area)
     else:
-        clusters = top.means(of_faces)
+        clusters = cut.means(of_faces)
     return np.concatenate([clusters, radiosity])

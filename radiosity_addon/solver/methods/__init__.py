@@ -1,24 +1,20 @@
-"""The solvers, one a file, one interface: `solve_steps(scene, settings)` yields (fraction, state)."""
+"""The solvers, one file each, with one interface: `solve(scene, settings, progress)` returns the state."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from importlib import import_module
 from typing import cast
 
+from ...base import SILENT, Progress
 from ...scene import Scene
 from ..settings import SolverSettings
 from ..state import SolverState
 from .hierarchical import HierarchicalState
 
-__all__ = ["HierarchicalState", "steps_of"]
+__all__ = ["HierarchicalState", "solve_by_method"]
 
 
-def steps_of(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float, SolverState]]:
-    """Begin to solve by the method the settings name.
-
-    Yields the fraction done and the state, which is the same object all along; the last one
-    is the solution.
-    """
+def solve_by_method(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -> SolverState:
+    """Solve by the method in the settings; `progress` receives the state, always the same object."""
     module = import_module("." + settings.method.replace("-", "_"), __name__)
-    return cast(Iterator[tuple[float, SolverState]], module.solve_steps(scene, settings))
+    return cast(SolverState, module.solve(scene, settings, progress))

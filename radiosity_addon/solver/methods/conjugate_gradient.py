@@ -1,4 +1,4 @@
-"""Conjugate gradients on the symmetrised system (Hestenes and Stiefel 1952; handout §3.4)."""
+"""Conjugate gradients on the symmetrized system (Hestenes and Stiefel 1952; handout §3.4)."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...base import UsageError
+from ...base import SILENT, Progress, UsageError
 from ...numerics import Array
 from ...scene import Scene
 from ..equations import LinearSystem
@@ -16,20 +16,13 @@ from .matrix import Iterate, solve_matrix
 
 
 def conjugate_gradient(system: LinearSystem, start: Array | None = None) -> Iterator[Iterate]:
-    """Iterate on (A/ρ − A F) B = A E/ρ, one system a channel, until nothing is left to improve.
+    """Iterate on (A/ρ − A F) B = A E/ρ, one system per channel, until no improvement is possible.
 
     Preconditioned by the diagonal A/ρ. Rows with ρ = 0 are eliminated: they have B = E and
     stand on the right side. See `jacobi.jacobi` for what is yielded.
 
-    Parameters
-    ----------
-    start : (n, 3) float or None
-        None starts from B = E.
-
-    Raises
-    ------
-    UsageError
-        If the system is not reciprocal, so that scaling does not make it symmetric.
+    start (n, 3): None starts from B = E.
+    Raises UsageError if the system is not reciprocal, so that scaling does not make it symmetric.
     """
     if system.mass is not None or not system.reciprocal:
         raise UsageError(
@@ -64,17 +57,14 @@ def _iterate(system: LinearSystem, start: Array | None) -> Iterator[Iterate]:
         direction = residual + ratio * direction
 
 
-def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float, SolverState]]:
-    """Solve step by step: yields (fraction done, state); the last state is the solution.
+def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -> SolverState:
+    """Return the solved state; `progress` receives it on the way.
 
-    Raises
-    ------
-    UsageError
-        If the assembly asked for is not galerkin.
+    Raises UsageError if the assembly is not galerkin.
     """
     if settings.assembly != "galerkin":
         raise UsageError(
             "conjugate gradients need reciprocal form factors, which the "
             f"{settings.assembly} assembly does not give: take galerkin, or the method jacobi or gauss-seidel"
         )
-    yield from solve_matrix(scene, settings, conjugate_gradient, copies=2)
+    return solve_matrix(scene, settings, progress, conjugate_gradient, copies=2)

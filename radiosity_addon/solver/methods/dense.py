@@ -1,4 +1,4 @@
-"""Direct solution: Gaussian elimination, the oracle of truth for all other methods (handout §3.4)."""
+"""Direct solution: Gaussian elimination, the reference for all other methods (handout §3.4)."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...base import BakeError
+from ...base import SILENT, BakeError, Progress
 from ...numerics import Array
 from ...scene import Scene
 from ..equations import LinearSystem
@@ -18,14 +18,8 @@ from .matrix import Iterate, solve_matrix
 def dense(system: LinearSystem) -> Array:
     """Solve K B = E exactly, up to rounding.
 
-    Returns
-    -------
-    radiosity : (n, 3) float64 [W/m²]
-
-    Raises
-    ------
-    BakeError
-        If K is singular: a closed part of the scene reflects all light for ever.
+    Returns radiosity (n, 3) [W/m²].
+    Raises BakeError if K is singular: a closed part of the scene reflects all light.
     """
     radiosity = np.empty((len(system), 3))
     solved = np.zeros(3, dtype=bool)
@@ -38,19 +32,19 @@ def dense(system: LinearSystem) -> Array:
             radiosity[:, same] = np.linalg.solve(system.matrix(channel), system.emission[:, same])
         except np.linalg.LinAlgError:
             raise BakeError(
-                "the radiosity matrix is singular: a closed room of reflectance 1 keeps its light for ever; "
+                "the radiosity matrix is singular: a closed room of reflectance 1 never loses its light; "
                 "lower the reflectance"
             ) from None
         solved |= same
     return radiosity
 
 
-def steps(system: LinearSystem) -> Iterator[Iterate]:
+def iterates(system: LinearSystem) -> Iterator[Iterate]:
     """Yield (B, Σ A |E − K B|) once: there is nothing to iterate."""
     radiosity = dense(system)
     yield radiosity, system.residual_power(radiosity)
 
 
-def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float, SolverState]]:
-    """Solve step by step: yields (fraction done, state); the last state is the solution."""
-    yield from solve_matrix(scene, settings, steps, copies=3)
+def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -> SolverState:
+    """Return the solved state; `progress` receives it on the way."""
+    return solve_matrix(scene, settings, progress, iterates, copies=3)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ...base import SILENT, Progress
 from ...numerics import Array
 from ...scene import Scene
 from ..equations import LinearSystem
@@ -13,14 +14,11 @@ from .matrix import Iterate, solve_matrix
 
 
 def gauss_seidel(system: LinearSystem, start: Array | None = None) -> Iterator[Iterate]:
-    """Iterate B_i ← (E_i − Σ_{j≠i} K_ij B_j) / K_ii without end, with values already updated in this sweep.
+    """Iterate B_i ← (E_i − Σ_{j≠i} K_ij B_j) / K_ii endlessly, with values already updated in this sweep.
 
     One row's update is gathering light to one element. See `jacobi.jacobi` for what is yielded.
 
-    Parameters
-    ----------
-    start : (n, 3) float or None
-        None starts from B = E.
+    start (n, 3): None starts from B = E.
     """
     radiosity = (system.emission if start is None else start).copy()
     while True:
@@ -39,6 +37,6 @@ def sweep(system: LinearSystem, radiosity: Array) -> None:
         radiosity[row] += residual / diagonal[row]
 
 
-def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float, SolverState]]:
-    """Solve step by step: yields (fraction done, state); the last state is the solution."""
-    yield from solve_matrix(scene, settings, gauss_seidel, copies=2)
+def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -> SolverState:
+    """Return the solved state; `progress` receives it on the way."""
+    return solve_matrix(scene, settings, progress, gauss_seidel, copies=2)

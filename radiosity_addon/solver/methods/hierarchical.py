@@ -7,15 +7,15 @@ refined and the residual is small.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ...base import SILENT, Progress
 from ...numerics import Array
 from ...scene import Scene
 from ..balance import Balance, Conservation, received_by_faces
-from ..hierarchy import NodeShapes, TreeTop
+from ..hierarchy import ClusterCut, NodeShapes
 from ..links import (
     ClusterLinks,
     Links,
@@ -55,10 +55,10 @@ COARSENING = (64.0, 16.0, 4.0, 1.0)
 """BF_ε of the rounds, in units of the final one: start coarse, tighten (our addition)."""
 
 ROUGH = 0.03
-"""Residual of the rounds before the last one: enough to tell which links matter."""
+"""Residual of the rounds before the last one: enough to decide which links matter."""
 
 FEW = 1e-3
-"""So small a share of links refined is not worth a gather: their children are judged before it, and
+"""A smaller share of refined links is not worth a gather: their children are evaluated before it, and
 what else it would show is left to the next round, if there is one."""
 
 LIGHT_SHARE = 0.25
@@ -66,7 +66,7 @@ LIGHT_SHARE = 0.25
 
 
 STALLED = 100
-"""Iterations in which the residual must fall by a tenth, or no more follow.
+"""The iteration ends if the residual has not fallen by a tenth in this many iterations.
 
 What a cluster's gradients take from faces below 0 is not taken (`bounce`): where few small faces shine into
 each other, that keeps the residual from falling, or would let plain iteration grow."""
@@ -74,54 +74,55 @@ each other, that keeps the residual from falling, or would let plain iteration g
 
 @dataclass
 class HierarchicalState(SolverState):
-    """What the refined hierarchy works on."""
+    """State of the refined hierarchy."""
+
+    STORED = ("settings", "hierarchy", "links", "cluster_links", "balance")
 
     links: Links = field(default_factory=no_links)
     """To elements, sorted by receiver."""
     cluster_links: ClusterLinks = field(default_factory=no_cluster_links)
     faint: float = 0.0
-    """Above 0 first links had to be made coarser (see `first_links`)."""
-    top: TreeTop | None = None
+    """Above 0, initial links had to be coarser (see `first_links`)."""
+    cut: ClusterCut | None = None
     """The clusters that the links use."""
     conservation: Conservation | None = None
     balance: Balance | None = None
-    """What light was exchanged with at the end."""
+    """The links and factors by which light was exchanged at the end."""
 
     @property
     def n_links(self) -> int:
         """Links between elements and clusters, and from lamps."""
         return len(self.links) + len(self.cluster_links) + len(self.light_links)
 
+    def linked_cut(self) -> ClusterCut:
+        """Return the part of the cluster tree that the current links use."""
+        links, cluster_links = self.links, self.cluster_links
+        return ClusterCut(self.hierarchy, links.source, cluster_links.receiver, cluster_links.source)
+
     def closure(self) -> Array:
         """Return (f,) the area mean over each face's leaves of ΣFV over own and inherited links."""
         return link_closure(self.hierarchy, self.links, self.cluster_links)
 
     def balanced_closure(self) -> Array:
-        """Return (f,) ΣFV as light was sent and received in the end, scaled (see `conservation`)."""
-        if self.balance is None or self.top is None:
+        """Return (f,) ΣFV of the light exchange at the end, scaled (see `conservation`)."""
+        if self.balance is None or self.cut is None:
             return self.closure()
-        return received_by_faces(self.hierarchy, self.top, self.balance, self.cluster_links)
+        return received_by_faces(self.hierarchy, self.cut, self.balance, self.cluster_links)
 
 
-def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float, HierarchicalState]]:
-    """Solve step by step: yields (fraction done, state) so that a caller may show or cancel.
+def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -> HierarchicalState:
+    """Return the solved state; `progress` receives it on the way.
 
-    The last state yielded is the solution.
-
-    Raises
-    ------
-    UsageError
-        If the scene does not fit into the memory limit; nothing is allocated then.
+    Raises UsageError if the scene does not fit into the memory limit; nothing is allocated then.
     """
     refuse_large_scene(scene, settings)
     state = begin(scene, settings, HierarchicalState)
     hierarchy, caster = state.hierarchy, state.caster
     min_area = settings.min_area * float(hierarchy.faces.area.sum())
     state.conservation = Conservation(caster, min_area, settings.seed, settings.threads)
-    yield 0.02, state
+    progress.at(0.02, state)
     if not state.has_light:
-        yield 1.0, state
-        return
+        return state
     light_threshold = LIGHT_SHARE * settings.error * state.power
     state.light_links = link_lights(
         hierarchy,
@@ -134,13 +135,13 @@ def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float,
         most_light_elements(hierarchy, settings),
     )
     state.keep_lamps_within_power()
-    yield 0.1, state
+    progress.at(0.1, state)
     shapes = NodeShapes(hierarchy)
     state.links, state.cluster_links, state.faint = first_links(
         hierarchy, shapes, caster, settings, link_budget(hierarchy, settings, len(state.light_links))
     )
     state.reset()
-    yield 0.3, state
+    progress.at(0.3, state)
 
     rounds: list[dict[str, float]] = []
     for done, coarsening in enumerate(COARSENING):
@@ -150,30 +151,24 @@ def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float,
             iterate(state, settings.tolerance if coarsening == 1.0 else ROUGH)
             refined = 0 if exhausted(state) else settle(state, shapes, error * state.power, min_area)
             links_refined += refined
-            yield 0.3 + 0.65 * (done + 0.5) / len(COARSENING), state
+            progress.at(0.3 + 0.65 * (done + 0.5) / len(COARSENING), state)
             if not refined or (coarsening > 1.0 and refined <= FEW * state.n_links):
                 break
         rounds.append({"error": error, "links_refined": links_refined, "links": len(state.links)})
     iterate(state, settings.tolerance, last=True)
     tell(state, rounds)
-    yield 1.0, state
+    return state
 
 
 def settle(state: HierarchicalState, shapes: NodeShapes, threshold: float, min_area: float) -> int:
-    """Refine links, and few links' children too, by the radiosity there is; return how many."""
+    """Refine links, and the children of few links too, by the current radiosity; return how many."""
     total = 0
     while True:
         refined = refine(state, shapes, threshold, min_area)
         total += refined
         if refined == 0 or refined > FEW * state.n_links:
             return total
-        state.top = _top(state)
-
-
-def _top(state: HierarchicalState) -> TreeTop:
-    """Return the part of the cluster tree that the links use as they are now."""
-    links, cluster_links = state.links, state.cluster_links
-    return TreeTop(state.hierarchy, links.source, cluster_links.receiver, cluster_links.source)
+        state.cut = state.linked_cut()
 
 
 def refine(state: HierarchicalState, shapes: NodeShapes, threshold: float, min_area: float) -> int:
@@ -184,7 +179,7 @@ def refine(state: HierarchicalState, shapes: NodeShapes, threshold: float, min_a
     hierarchy, settings = state.hierarchy, state.settings
     seed, threads = settings.seed, settings.threads
     chosen = _over(
-        state, misplaced_at_clusters(hierarchy, state.cluster_links, state.radiosity, state.top), threshold
+        state, misplaced_at_clusters(hierarchy, state.cluster_links, state.radiosity, state.cut), threshold
     )
     refined = len(chosen)
     new: list[Links] = []
@@ -199,7 +194,7 @@ def refine(state: HierarchicalState, shapes: NodeShapes, threshold: float, min_a
         kept = np.delete(np.arange(len(state.cluster_links)), chosen)
         state.cluster_links = join_cluster_links([state.cluster_links.take(kept), others])
 
-    errors = misplaced_power(hierarchy, state.links, state.radiosity, state.top)
+    errors = misplaced_power(hierarchy, state.links, state.radiosity, state.cut)
     chosen = _over(state, errors, threshold)
     if len(chosen):
         before = hierarchy.n_elements
@@ -231,19 +226,19 @@ def _over(state: HierarchicalState, errors: Array, threshold: float) -> Array:
 
 
 def iterate(state: HierarchicalState, tolerance: float, last: bool = False) -> None:
-    """Gather and push-pull, accelerated, until the residual is below `tolerance`, or falls no more.
+    """Gather and push-pull, accelerated, until the residual is below `tolerance` or no longer falls.
 
-    Each step tells the residual of the radiosity before it; that of the `last` one is measured
+    Each step yields the residual of the radiosity before it; that of the `last` one is measured
     for the radiosity that is left in the state.
     """
     hierarchy, cluster_links = state.hierarchy, state.cluster_links
     assert state.conservation is not None  # set when the state was made
     lights = state.direct()
-    state.top = _top(state)
+    state.cut = state.linked_cut()
     state.balance = state.conservation.balance(
-        hierarchy, state.top, state.links, cluster_links, rough=not last
+        hierarchy, state.cut, state.links, cluster_links, rough=not last
     )
-    top, balance = state.top, state.balance
+    cut, balance = state.cut, state.balance
     links, scale, received = balance.links, balance.sent, balance.received
     leaves = hierarchy.leaves
     least = state.emission[leaves]
@@ -251,33 +246,30 @@ def iterate(state: HierarchicalState, tolerance: float, last: bool = False) -> N
     best, best_at = np.inf, state.iterations
     while not exhausted(state):
         before = state.radiosity[leaves]
-        bounce(state, links, lights, scale, cluster_links, top, received)
+        bounce(state, links, lights, scale, cluster_links, cut, received)
         state.note()
         if state.residual < 0.9 * best:
             best, best_at = state.residual, state.iterations
         if state.residual < tolerance or exhausted(state) or state.iterations - best_at > STALLED:
             break
-        # What a mixture guesses below the emission is no radiosity.
+        # Values of a mixture below the emission are not radiosities.
         state.radiosity[leaves] = np.maximum(mixer.next(before, state.radiosity[leaves]), least)
     if last:
-        _, after = reflect(state, links, lights, scale, cluster_links, top, received)
+        _, after = reflect(state, links, lights, scale, cluster_links, cut, received)
         state.residual = relative_residual(state, after)
         state.history[-1:] = [replace(entry, residual=state.residual) for entry in state.history[-1:]]
 
 
 def exhausted(state: HierarchicalState) -> bool:
-    """Whether all iterations allowed are done: what is not lit by then may not be judged."""
+    """Whether all allowed iterations are done; elements that are not lit by then may not be evaluated."""
     return state.iterations >= state.settings.max_iterations
 
 
 def tell(state: HierarchicalState, rounds: list[dict[str, float]]) -> None:
-    """Put into the report how BF_ε fell, and what lies on which level.
+    """Add to the report how BF_ε fell, and the elements and links per level.
 
-    Parameters
-    ----------
-    rounds : list of {"error", "links_refined", "links"}
-        For each BF_ε, as a share of the light's power: how many links were refined for it, and
-        how many there were afterwards.
+    rounds list of {"error", "links_refined", "links"}: For each BF_ε, as a share of the light's power: how
+        many links were refined for it, and how many there were afterward.
     """
     hierarchy, links = state.hierarchy, state.links
     n_links = len(links) + len(state.cluster_links)
@@ -293,7 +285,7 @@ def tell(state: HierarchicalState, rounds: list[dict[str, float]]) -> None:
 
 
 def closure_figures(state: HierarchicalState) -> dict[str, dict[str, float]]:
-    """Return how far ΣFV is from 1 on faces that light reaches and nothing escapes from.
+    """Return the deviation of ΣFV from 1 on lit faces from which nothing escapes.
 
     Of the "links" as they were measured, and "balanced", as their light was scaled: the area
     "mean", the root of the mean "square" of what is missing, and the share of the area that is

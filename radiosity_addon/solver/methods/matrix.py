@@ -1,21 +1,22 @@
-"""What the matrix methods share: elements, memory, assembly, independent blocks, and the way back."""
+"""Common part of the matrix methods: elements, memory, assembly, independent blocks, and results."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from ...base import Progress
 from ...numerics import Array
 from ...scene import OVERLAP, Scene, arriving
 from ..equations import (
     LinearSystem,
-    collocation_steps,
+    collocation,
     describe_sets,
-    galerkin_steps,
+    galerkin,
     independent_sets,
-    linear_steps,
+    linear,
     matrix_properties,
     share_overlaps,
     subdivide_evenly,
@@ -31,26 +32,26 @@ Iterate = tuple[Array, Array]
 """Radiosity (n, 3) [W/m²], and its residual power Σ A |E − K B| (3,) [W]."""
 
 Solver = Callable[[LinearSystem], Iterator[Iterate]]
-"""Yields one iterate after another, from iteration 0 on; ends when there is no better one."""
+"""Yields the iterates from iteration 0 on; ends when there is no better one."""
 
-ASSEMBLIES = {"galerkin": galerkin_steps, "collocation": collocation_steps, "linear": linear_steps}
+ASSEMBLIES = {"galerkin": galerkin, "collocation": collocation, "linear": linear}
 
 GIB = float(1 << 30)
 
 ASSEMBLY_SHARE = 0.8
-"""Part of the work that is assembly, as progress is shown."""
+"""Share of assembly in the progress."""
 
 
 @dataclass
 class MatrixState(SolverState):
-    """What a matrix method works on."""
+    """State of a matrix method."""
 
     entries: int = 0
     """Form factors that are not 0."""
     share: Array = field(default_factory=lambda: np.zeros(0))
     """(f,) ΣFV of every face, an area mean"""
     basis: Basis | None = None
-    """What the unknowns stand for."""
+    """The basis of the unknowns."""
     values: Array = field(default_factory=lambda: np.zeros((0, 3)))
     """(n, 3) B of the unknowns [W/m²]; `basis.evaluate` gives B̂ at points."""
 
@@ -69,35 +70,21 @@ class MatrixState(SolverState):
 
 
 def solve_matrix(
-    scene: Scene, settings: SolverSettings, solver: Solver, copies: int
-) -> Iterator[tuple[float, MatrixState]]:
+    scene: Scene, settings: SolverSettings, progress: Progress, solver: Solver, copies: int
+) -> MatrixState:
     """Assemble the system of a scene, solve it block by block, and set the state.
 
-    Parameters
-    ----------
-    solver : callable
-        Iterates on one block.
-    copies : int
-        Matrices of n × n numbers that the method holds at once, the system's own included.
-
-    Yields
-    ------
-    fraction : float
-    state : MatrixState
-        The same one all along.
-
-    Raises
-    ------
-    UsageError
-        If the system would need more than the memory limit; nothing is allocated then.
+    progress: Is shown the state, the same one all along.
+    solver: Iterates on one block.
+    copies: Matrices of n × n numbers that the method holds at once, the system's own included.
+    Raises UsageError if the system would need more than the memory limit; nothing is allocated then.
     """
     state = begin(scene, settings, MatrixState)
-    yield 0.0, state
+    progress.at(0.0, state)
     if not state.has_light:
-        yield 1.0, state
-        return
+        return state
     is_linear = settings.assembly == "linear"
-    # With more faces than elements asked for the faces are the elements. A mesh of triangles
+    # With more faces than requested elements, the faces are the elements. A mesh of triangles
     # has half as many vertices at least.
     faces = len(state.hierarchy.faces)
     elements = max(faces, settings.elements)
@@ -107,59 +94,46 @@ def solve_matrix(
     basis = state.basis = vertex_basis(state.hierarchy) if is_linear else constant_basis(state.hierarchy)
     needed = check_memory(len(basis), copies + is_linear, settings, faces)
     state.reset()
-    yield 0.02, state
+    progress.at(0.02, state)
 
-    system, direct = yield from _assemble(state, basis)
+    system, direct = _assemble(state, basis, progress)
     opacity = state.hierarchy.opacity[basis.elements()]
     overlapping = np.count_nonzero(arriving(system.exchange, opacity) > OVERLAP * system.area)
     system, sends = share_overlaps(system, opacity)
     sets, alone = independent_sets(system)
     _describe(state, basis, system, sends, sets, alone, needed)
     state.details["matrix"]["overlapping"] = int(overlapping)
-    # Right for what sees nothing else; the others' blocks have their own first iterate.
+    # Correct for isolated unknowns; the blocks of the others have their own first iterate.
     state.values = system.emission / system.diagonal()
     blocks = [_Block(rows, system.take(rows), sends[rows, None]) for rows in sets]
-    # A block by itself is a copy: the whole matrix need not outlive it.
+    # A block is a copy, so the whole matrix can be released.
     del system
-    yield ASSEMBLY_SHARE, state
-    yield from _solve_blocks(state, basis, blocks, solver)
+    progress.at(ASSEMBLY_SHARE, state)
+    _solve_blocks(state, basis, blocks, solver, progress.part(ASSEMBLY_SHARE, 1.0))
     _finish(state, basis, blocks, direct)
-    yield 1.0, state
+    return state
 
 
 def check_memory(unknowns: int, copies: int, settings: SolverSettings, faces: int) -> float:
     """Return the GiB that `copies` matrices of a system take; refuse more than the limit.
 
-    Parameters
-    ----------
-    faces : int
-        The scene's; there are no fewer elements, whatever is asked for.
-
-    Raises
-    ------
-    UsageError
-        Names the size, what it would need, the limit and the methods that do without.
+    faces: The scene's; the minimum number of elements.
+    Raises UsageError: Names the size, what it would need, the limit and the methods that do without.
     """
     needed = copies * 8.0 * float(unknowns) ** 2
-    fewer = "ask for fewer elements, or " if settings.elements > faces else ""
+    fewer = "use fewer elements, or " if settings.elements > faces else ""
     advice = f"{fewer}take the method hierarchical, or shooting, which needs no matrix"
     refuse_beyond(settings.memory_limit, needed, f"{settings.method} with {unknowns} unknowns", advice)
     return needed / GIB
 
 
-def _assemble(
-    state: MatrixState, basis: Basis
-) -> Generator[tuple[float, MatrixState], None, tuple[LinearSystem, Array]]:
-    """Assemble the system; yields progress, returns it with the lamps' (n, 3) irradiance in it."""
-    settings, hierarchy = state.settings, state.hierarchy
-    steps = ASSEMBLIES[settings.assembly](hierarchy, state.caster, basis, settings.seed, settings.threads)
-    while True:
-        try:
-            fraction = next(steps)
-        except StopIteration as done:
-            direct = _lamps(state, basis)
-            return with_lamps(done.value, direct), direct
-        yield 0.02 + (ASSEMBLY_SHARE - 0.02) * fraction, state
+def _assemble(state: MatrixState, basis: Basis, progress: Progress) -> tuple[LinearSystem, Array]:
+    """Return the system with the lamps' light in it, and that, (n, 3) [W/m²]."""
+    settings, assemble = state.settings, ASSEMBLIES[state.settings.assembly]
+    part = progress.part(0.02, ASSEMBLY_SHARE)
+    system = assemble(state.hierarchy, state.caster, basis, settings.seed, settings.threads, part)
+    direct = _lamps(state, basis)
+    return with_lamps(system, direct), direct
 
 
 def _lamps(state: MatrixState, basis: Basis) -> Array:
@@ -181,7 +155,7 @@ def _describe(
     alone: Array,
     needed: float,
 ) -> None:
-    """Put the matrix's properties and its independent sets into the report."""
+    """Add the matrix's properties and its independent sets to the report."""
     hierarchy = state.hierarchy
     state.entries = int(np.count_nonzero(system.exchange))
     opacity = hierarchy.opacity[basis.elements()]
@@ -204,7 +178,7 @@ def _describe(
 
 @dataclass
 class _Block:
-    """One independent set, and how far its solution is."""
+    """One independent set and the state of its solution."""
 
     rows: Array
     """(k,) int: its unknowns."""
@@ -215,11 +189,11 @@ class _Block:
 
 
 def _solve_blocks(
-    state: MatrixState, basis: Basis, blocks: list[_Block], solver: Solver
-) -> Iterator[tuple[float, MatrixState]]:
+    state: MatrixState, basis: Basis, blocks: list[_Block], solver: Solver, progress: Progress
+) -> None:
     """Run the solver on all independent sets side by side until the residual is small enough."""
     settings = state.settings
-    # Each block may keep its share of the residual allowed, by the light that starts in it.
+    # Each block may keep its share of the allowed residual, in proportion to its light.
     light = np.array([(block.system.area @ block.system.emission).max() for block in blocks])
     allowed = settings.tolerance * state.power * light / max(float(light.sum()), 1e-300)
     waiting = [(block, solver(block.system), limit) for block, limit in zip(blocks, allowed, strict=True)]
@@ -234,8 +208,7 @@ def _solve_blocks(
         first = first or state.residual
         if not waiting or state.iterations >= settings.max_iterations:
             break
-        done = _progress(first, state.residual, settings.tolerance)
-        yield ASSEMBLY_SHARE + (1.0 - ASSEMBLY_SHARE) * done, state
+        progress.at(_converged(first, state.residual, settings.tolerance), state)
         state.iterations += 1
     state.details["matrix"]["converged"] = not waiting
 
@@ -251,17 +224,17 @@ def _advance(state: MatrixState, block: _Block, iterates: Iterator[Iterate], all
 
 
 def _finish(state: MatrixState, basis: Basis, blocks: list[_Block], direct: Array) -> None:
-    """Take the unknowns' radiosities, and the irradiance that goes with them, over to the elements."""
+    """Transfer the unknowns' radiosities and irradiances to the elements."""
     irradiance = direct.copy()
     for block in blocks:
         irradiance[block.rows] += block.system.gather(block.sends * state.values[block.rows])
-    # A hat may dip below 0 between its node and the rim; light does not.
+    # A hat may fall below 0 between its node and the boundary; light does not.
     means = np.maximum(basis.leaf_means(basis.from_nodes(irradiance)), 0.0)
     state.set_leaves(means, np.maximum(basis.leaf_means(state.values), 0.0))
 
 
-def _progress(first: float, now: float, last: float) -> float:
-    """Return how far a residual has come from `first` to `last`, on the scale of its exponent."""
+def _converged(first: float, now: float, last: float) -> float:
+    """Return the progress of a residual from `first` to `last`, on a logarithmic scale."""
     if not 0.0 < last < first:
         return 0.0
     return float(np.clip(np.log(first / max(now, last)) / np.log(first / last), 0.0, 1.0))

@@ -8,11 +8,11 @@ for the light that flows: `hierarchical` does that.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from ...base import SILENT, Progress
 from ...numerics import Array
 from ...scene import Scene, shares
 from ..equations import RefinePatch, exchange_areas, source_factor_bounds
@@ -25,15 +25,15 @@ PAIR_BYTES = 64
 """Memory a pair takes while it is refined, measured and sorted."""
 
 CHUNK = 1 << 18
-"""Pairs measured between two yields."""
+"""Pairs measured between two reports of progress."""
 
 
 @dataclass
 class MultiLevelState(SolverState):
-    """What the multi-level hierarchy works on."""
+    """State of the multi-level hierarchy."""
 
     links: Links = field(default_factory=no_links)
-    """In float64, their visibility in the factor: F_rs V_rs."""
+    """In float64, with visibility in the factor: F_rs V_rs."""
 
     @property
     def n_links(self) -> int:
@@ -45,29 +45,25 @@ class MultiLevelState(SolverState):
         return link_closure(self.hierarchy, self.links)
 
 
-def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float, MultiLevelState]]:
-    """Solve step by step: yields (fraction done, state); the last state is the solution.
+def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -> MultiLevelState:
+    """Return the solved state; `progress` receives it on the way.
 
-    Raises
-    ------
-    UsageError
-        If the pairs of faces alone, before anything is refined, exceed the memory limit.
+    Raises UsageError if the pairs of faces alone, before anything is refined, exceed the memory limit.
     """
     state = begin(scene, settings, MultiLevelState)
     hierarchy = state.hierarchy
     refuse_too_many_faces(len(hierarchy.faces), settings.memory_limit)
-    yield 0.02, state
+    progress.at(0.02, state)
     if not state.has_light:
-        yield 1.0, state
-        return
+        return state
     budget = min(settings.max_links, int(settings.memory_limit * 2**30 / PAIR_BYTES))
     min_area = settings.min_area * float(hierarchy.faces.area.sum())
     refinement = RefinePatch(hierarchy, settings.form_factor_error, min_area, budget)
     while refinement.generation():
-        yield 0.1, state
+        progress.at(0.1, state)
     state.reset()
     state.link_lights_to_leaves()
-    yield 0.15, state
+    progress.at(0.15, state)
 
     receiver, source = refinement.pairs()
     exchange = []
@@ -75,11 +71,11 @@ def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float,
     for start in range(0, len(unordered), CHUNK):
         one, other = unordered[start : start + CHUNK].T
         exchange.append(exchange_areas(hierarchy, state.caster, one, other, settings.seed, settings.threads))
-        yield 0.15 + 0.65 * start / len(unordered), state
+        progress.at(0.15 + 0.65 * start / len(unordered), state)
     state.links = link(hierarchy, receiver, source, np.concatenate([np.zeros(0), *exchange])[of_pair])
     tell(state)
     state.note()
-    yield 0.8, state
+    progress.at(0.8, state)
 
     lights, scale = state.direct(), overlap_scale(hierarchy, state.links)
     while state.iterations < settings.max_iterations:
@@ -87,13 +83,13 @@ def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float,
         state.note()
         if state.residual < settings.tolerance:
             break
-        yield 0.8 + 0.2 * _progress(state), state
+        progress.at(0.8 + 0.2 * _converged(state), state)
     state.over_budget = power_over(state, refinement.unrefined)
-    yield 1.0, state
+    return state
 
 
 def refuse_too_many_faces(count: int, memory_limit: float) -> None:
-    """Refuse scenes whose first pairs, O(k²) of k faces, do not fit into `memory_limit` GiB."""
+    """Refuse scenes whose initial pairs, O(k²) of k faces, do not fit into `memory_limit` GiB."""
     pairs = count * (count - 1)
     what = f"multi-level, which begins with {pairs:,} pairs of {count:,} faces,"
     advice = "use the method hierarchical, or raise the limit"
@@ -110,18 +106,10 @@ def distinct_pairs(receiver: Array, source: Array, count: int) -> tuple[Array, A
 def link(hierarchy: Hierarchy, receiver: Array, source: Array, exchange: Array) -> Links:
     """Make links of pairs (handout §4.2, Link), leaving out those that exchange nothing.
 
-    Parameters
-    ----------
-    receiver, source : (n,) int
-        Elements, sorted by receiver.
-    exchange : (n,) float64
-        A_r F_rs V_rs [m²].
-
-    Returns
-    -------
-    links : Links
-        float64; visibility 1 and doubt 0, since F_rs V_rs is one number; equal quarters, as in
-        the handout: what an element gathers, all leaves below it get alike.
+    receiver, source (n,) int: Elements, sorted by receiver.
+    exchange (n,): A_r F_rs V_rs [m²].
+    Returns links: float64; visibility 1 and error estimate 0, since F_rs V_rs is one number; equal quarters,
+        as in the handout: all leaves below an element get the same share of its gathered light.
     """
     kept = exchange > 0
     receiver, source = receiver[kept].astype(np.int32), source[kept].astype(np.int32)
@@ -139,7 +127,7 @@ def link(hierarchy: Hierarchy, receiver: Array, source: Array, exchange: Array) 
 
 
 def overlap_scale(hierarchy: Hierarchy, links: Links) -> Array | None:
-    """Return (e, 2) what to scale leaves' radiosity with where faces lie in one another, or None.
+    """Return (e, 2) factors on leaves' radiosity where faces coincide, or None.
 
     A leaf's ΣFV may rightly be half too large, inheriting its ancestors' means; that of a whole
     face may not.
@@ -163,7 +151,7 @@ def power_over(state: MultiLevelState, pairs: Array) -> float:
 
 
 def tell(state: MultiLevelState) -> None:
-    """Put into the report what lies on which level."""
+    """Add the elements and links per level to the report."""
     hierarchy, links = state.hierarchy, state.links
     state.details["multi_level"] = {
         "form_factor_error": state.settings.form_factor_error,
@@ -173,7 +161,7 @@ def tell(state: MultiLevelState) -> None:
     }
 
 
-def _progress(state: MultiLevelState) -> float:
-    """Return how far the residual has fallen towards the tolerance, by its logarithm."""
+def _converged(state: MultiLevelState) -> float:
+    """Return the progress of the residual toward the tolerance, by its logarithm."""
     goal = np.log(max(state.settings.tolerance, 1e-16))
     return float(np.clip(np.log(max(state.residual, 1e-300)) / goal, 0.0, 1.0)) if goal < 0 else 1.0

@@ -17,11 +17,11 @@ latest 64 of 500 in the Cornell box 0.2 % were asked for again): that would be t
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from ...base import SILENT, Progress
 from ...numerics import Array
 from ...scene import Scene, arriving, shares
 from ..equations import exchange_areas, subdivide_evenly
@@ -38,17 +38,17 @@ MOST_COLUMNS = 64
 """Columns that may wait for their shot; 3 % are dropped before (a third if 32 may wait)."""
 
 BYTES_AN_ELEMENT = 2000
-"""What an element takes in all: tree, light links, radiosities, its place in the columns."""
+"""Memory of an element: tree, light links, radiosities, its part of the columns."""
 
 
 @dataclass
 class ShootingState(SolverState):
-    """What shooting works on; arrays over the l leaves, in the order of `leaves`."""
+    """State of shooting; arrays over the l leaves, in the order of `leaves`."""
 
     leaves: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     """(l,) int: the elements."""
     received: Array = field(default_factory=lambda: np.zeros((0, 3)))
-    """(l, 3) float64: H, lamps' light and all that was shot here [W/m²]."""
+    """(l, 3) float64: H, the light of lamps and of all shots [W/m²]."""
     unshot: Array = field(default_factory=lambda: np.zeros((0, 3)))
     """(l, 3) float64: ΔB [W/m²]."""
     reach: Array = field(default_factory=lambda: np.zeros(0))
@@ -77,14 +77,14 @@ class ShootingState(SolverState):
         """Return (3,) the ambient radiosity a: the unshot light, spread evenly, with all its bounces.
 
         a = (ΣAΔB / ΣA) / (1 − ρ̄) with the area mean ρ̄ of the reflectance (Cohen, Chen,
-        Wallace and Greenberg 1988); exact where all surfaces of a closed room are alike.
+        Wallace and Greenberg 1988); exact if all surfaces of a closed room are equal.
         """
         area = self.hierarchy.area[self.leaves]
         mean = area @ self.reflectance[self.leaves] / area.sum()
         return np.asarray(self.unshot_power() / area.sum() / (1.0 - mean))
 
     def shown(self) -> Array:
-        """Return (e, 3): B, with the ambient term ρ a where the settings ask for it [W/m²]."""
+        """Return (e, 3): B, with the ambient term ρ a if the settings enable it [W/m²]."""
         if not self.settings.ambient or not len(self.leaves):
             return self.radiosity
         return np.asarray(self.radiosity + self.reflectance * self.ambient())
@@ -99,36 +99,32 @@ class ShootingState(SolverState):
         return np.asarray(per_face / faces.area)
 
 
-def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float, ShootingState]]:
-    """Shoot until little power is unshot: yields (fraction done, state) after every shot.
+def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -> ShootingState:
+    """Shoot until little power is unshot; `progress` receives the state after every shot.
 
     Ends when ΣAΔB / Φ is below `settings.tolerance` in every channel, or after
     `settings.max_iterations` shots. `state.residual` is ΣAΔB / Φ, the residual of S; that of
     B is smaller, by ρ and by what leaves the scene.
 
-    Raises
-    ------
-    UsageError
-        If even the elements alone would not fit into the memory limit.
+    Raises UsageError if even the elements alone would not fit into the memory limit.
     """
     state = begin(scene, settings, ShootingState)
-    yield 0.01, state
+    progress.at(0.01, state)
     if not state.has_light:
-        yield 1.0, state
-        return
+        return state
     refuse_too_many(len(state.hierarchy.faces), settings)
     subdivide_evenly(state.hierarchy, settings.elements)
     state.link_lights_to_leaves()
     start(state)
     state.note()
-    yield 0.05, state
+    progress.at(0.05, state)
     first, next_note = state.residual, 1.0
     while state.residual > settings.tolerance and state.iterations < settings.max_iterations:
         shoot(state)
         if state.iterations >= next_note:
             state.note()
             next_note *= HISTORY_STEP
-        yield 0.05 + 0.94 * _fraction(first, state), state
+        progress.at(0.05 + 0.94 * _fraction(first, state), state)
     if state.history[-1].iteration < state.iterations:
         state.note()
     state.details["shooting"] = {
@@ -136,11 +132,11 @@ def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float,
         "elements_that_shot": int((state.shots_of > 0).sum()),
         "pairs": state.pairs,
     }
-    yield 1.0, state
+    return state
 
 
 def start(state: ShootingState) -> None:
-    """Let lamps and emission shine: B = ΔB = E' = E + ρ H_direct, nothing shot yet."""
+    """Start with the light of lamps and emission: B = ΔB = E' = E + ρ H_direct, nothing shot yet."""
     state.reset()
     state.leaves = state.hierarchy.leaves
     state.received = state.direct()[state.leaves]
@@ -194,7 +190,7 @@ def _make_columns(state: ShootingState, source: int) -> None:
     settings = state.settings
     exchange = exchange_areas(state.hierarchy, state.caster, one, other, settings.seed, settings.threads)
     exchange = exchange.reshape(len(chosen), -1)
-    # What lies in one plane is hit twice: a shot still sends no more than it has (see `overlaps`).
+    # Coplanar faces are hit twice: a shot still sends no more than it has (see `overlaps`).
     taken = arriving(exchange, state.hierarchy.opacity[leaves])
     exchange *= shares(taken / state.hierarchy.area[leaves[chosen]])[:, None]
     factors = exchange / state.hierarchy.area[leaves]
@@ -211,15 +207,15 @@ def _show(state: ShootingState) -> None:
 
 
 def _fraction(first: float, state: ShootingState) -> float:
-    """Return how far the residual has fallen, or the shots have risen: orders of magnitude count."""
+    """Return the progress by the residual or by the number of shots, on a logarithmic scale."""
     target = max(state.settings.tolerance, 1e-16)
     fallen = np.log(first / max(state.residual, target)) / max(np.log(first / target), 1e-9)
     return float(min(max(fallen, state.iterations / state.settings.max_iterations), 1.0))
 
 
 def refuse_too_many(faces: int, settings: SolverSettings) -> None:
-    """Refuse what would exceed the memory limit by its elements alone; faces are the least there are."""
+    """Refuse scenes whose elements alone exceed the memory limit; there is at least one per face."""
     count = max(faces, settings.elements)
     what = f"shooting between {count} elements"
-    advice = "ask for fewer elements, raise the limit, or bake fewer objects"
+    advice = "use fewer elements, raise the limit, or bake fewer objects"
     refuse_beyond(settings.memory_limit, count * BYTES_AN_ELEMENT, what, advice)

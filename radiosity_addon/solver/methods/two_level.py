@@ -6,7 +6,7 @@
 3. From patch to patch by area averages, F_ij = Σ_{q∈i} F_qj A_q / A_i (4.1).
 4. Patches are solved directly, B_i = E_i + ρ_i Σ_j F_ij B_j (4.2).
 5. Elements gather once from the patches: B_q = E_q + ρ_q Σ_j F_qj B_j (4.3).
-6. Where neighbouring elements differ too much they are split; only the new elements' rows are
+6. Where neighboring elements differ too much they are split; only the new elements' rows are
    computed, and (4.3) is applied to them with the patch radiosities of step 4.
 
 E holds the lamps' light as E + ρ H_direct. Sources stay constant over each patch, so the
@@ -15,11 +15,11 @@ result is one gather from the patch solution, not the solution of the elements' 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from ...base import SILENT, Progress
 from ...numerics import Array
 from ...scene import Scene, arriving, shares
 from ..equations import exchange_areas, subdivide_evenly
@@ -36,7 +36,7 @@ BLOCK_PAIRS = 1 << 19
 
 @dataclass
 class TwoLevelState(SolverState):
-    """What the two-level method works on: m patches, l elements."""
+    """State of the two-level method: m patches, l elements."""
 
     patches: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     """(m,) int: nodes of the hierarchy."""
@@ -51,7 +51,7 @@ class TwoLevelState(SolverState):
     sends: Array = field(default_factory=lambda: np.zeros((0, 1)))
     """(m, 1) float64: the share of its radiosity that each patch sends, see `overlaps`."""
     limit: float = np.inf
-    """Difference between neighbours above which they are split [W/m²]."""
+    """Difference between neighbors above which they are split [W/m²]."""
     smallest: float = 0.0
     """Area that subdivision must leave to every element [m²]."""
 
@@ -71,45 +71,37 @@ class TwoLevelState(SolverState):
         return np.asarray(per_face / faces.area)
 
 
-def solve_steps(scene: Scene, settings: SolverSettings) -> Iterator[tuple[float, TwoLevelState]]:
-    """Solve step by step: yields (fraction done, state); the last state is the solution.
+def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -> TwoLevelState:
+    """Return the solved state; `progress` receives it on the way.
 
     About `settings.patches` patches, at most one for each of about `settings.elements`
     elements. `state.residual` is that of the patches' system (4.2), with the form factors that
     the elements of the last round average to: rounding at first, then how far the new rows
-    speak against the patch radiosities, which are kept.
+    disagree with the patch radiosities, which are kept.
 
-    Raises
-    ------
-    UsageError
-        If the n × m matrix would not fit into the memory limit.
+    Raises UsageError if the n × m matrix would not fit into the memory limit.
     """
     state = begin(scene, settings, TwoLevelState)
-    yield 0.01, state
+    progress.at(0.01, state)
     if not state.has_light:
-        yield 1.0, state
-        return
+        return state
     refuse_too_large(len(state.hierarchy.faces), settings)
     divide(state)
     state.link_lights_to_leaves()
-    yield 0.05, state
-    for done in add_rows(state, state.leaves):
-        yield 0.05 + 0.55 * done, state
+    progress.at(0.05, state)
+    add_rows(state, state.leaves, progress.part(0.05, 0.6))
     solve_patches(state)
     gather_elements(state)
     _start_comparing(state)
-    fraction = 0.62
-    yield fraction, state
+    progress.at(0.62, state)
+    rounds = progress.part(0.62, 1.0).turns(0.5)
     while len(new := split(state)):
-        # How many rounds will follow is not known: each takes half of what is left.
-        rest = 0.5 * (1.0 - fraction)
-        for done in add_rows(state, new):
-            yield fraction + rest * done, state
-        fraction += rest
+        part = next(rounds)
+        add_rows(state, new, part)
         gather_elements(state)
-        yield fraction, state
+        part.at(1.0, state)
     _finish(state)
-    yield 1.0, state
+    return state
 
 
 def divide(state: TwoLevelState) -> None:
@@ -124,8 +116,8 @@ def divide(state: TwoLevelState) -> None:
     state.details["two_level"] = {"patches": len(state.patches), "elements": [], "rows": []}
 
 
-def add_rows(state: TwoLevelState, new: Array) -> Iterator[float]:
-    """Compute the rows F_qj of elements `new`, the last of the leaves (step 2); yields the part done."""
+def add_rows(state: TwoLevelState, new: Array, progress: Progress = SILENT) -> None:
+    """Compute the rows F_qj of elements `new`, the last of the leaves (step 2)."""
     hierarchy, patches = state.hierarchy, state.patches
     state.leaves = hierarchy.leaves
     kept = len(state.leaves) - len(new)
@@ -142,7 +134,7 @@ def add_rows(state: TwoLevelState, new: Array) -> Iterator[float]:
         )
         to = kept + start + np.arange(len(block))
         state.factors[to] = exchange.reshape(len(block), -1) / hierarchy.area[block][:, None]
-        yield (start + len(block)) / len(new)
+        progress.at((start + len(block)) / len(new), state)
     state.details["two_level"]["elements"].append(len(state.leaves))
     state.details["two_level"]["rows"].append(len(new))
 
@@ -186,7 +178,7 @@ def patch_residual(state: TwoLevelState) -> float:
 
 
 def contrasts(state: TwoLevelState) -> tuple[Array, Array]:
-    """Return (k, 2) pairs of neighbouring elements and (k,) how much their light differs [W/m²].
+    """Return (k, 2) pairs of neighboring elements and (k,) how much their light differs [W/m²].
 
     Their reflected radiosity under the mean reflectance of the two, the largest channel: so
     lamps and seams between two materials, which no subdivision smooths, do not count.
@@ -198,7 +190,7 @@ def contrasts(state: TwoLevelState) -> tuple[Array, Array]:
 
 
 def split(state: TwoLevelState) -> Array:
-    """Split neighbours that differ by more than the limit, both, and return the new elements (step 6).
+    """Split neighbors that differ by more than the limit, both, and return the new elements (step 6).
 
     None that would fall below `state.smallest`, and no more than the memory limit has room
     for, the largest differences first.
@@ -218,7 +210,7 @@ def split(state: TwoLevelState) -> Array:
     hierarchy.subdivide(chosen)
     state.factors = state.factors[kept]
     state.link_lights_to_leaves()
-    # Until they have their own, children look like their parents.
+    # Until they have their own, children have their parents' values.
     parents = hierarchy.parent[before:]
     state.radiosity = np.concatenate([state.radiosity, state.radiosity[parents]])
     state.irradiance = np.concatenate([state.irradiance, state.irradiance[parents]])
@@ -226,7 +218,7 @@ def split(state: TwoLevelState) -> Array:
 
 
 def _start_comparing(state: TwoLevelState) -> None:
-    """Fix what counts as a difference, before subdivision changes the picture it is measured by."""
+    """Fix the limit of differences before subdivision changes the light it is measured by."""
     hierarchy, leaves = state.hierarchy, state.leaves
     area = hierarchy.area[leaves]
     mean = area @ (state.reflectance[leaves] * state.irradiance[leaves]) / area.sum()
@@ -235,7 +227,7 @@ def _start_comparing(state: TwoLevelState) -> None:
 
 
 def _finish(state: TwoLevelState) -> None:
-    """Tell in the report what is left that differs."""
+    """Add the remaining differences to the report."""
     _, difference = contrasts(state)
     state.details["two_level"] |= {
         "limit_W_m2": state.limit,
@@ -276,7 +268,7 @@ def _patch_of(state: TwoLevelState) -> Array:
 
 
 def _most_elements(patches: int, memory_limit: float) -> int:
-    """Return how many elements' rows fit into the limit beside the patches' own matrices.
+    """Return how many elements' rows fit into the limit next to the patches' own matrices.
 
     Rows are held twice while others are added to them.
     """
@@ -293,5 +285,5 @@ def refuse_too_large(faces: int, settings: SolverSettings) -> None:
     patches = max(faces, min(settings.patches, settings.elements))
     what = f"two-level with {elements} elements and {patches} patches"
     instead = "the method hierarchical, or shooting, which needs no matrix"
-    advice = f"ask for fewer elements or patches, or take {instead}"
+    advice = f"use fewer elements or patches, or take {instead}"
     refuse_beyond(settings.memory_limit, 8 * (2 * elements * patches + 3 * patches**2), what, advice)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...numerics import Array
-from ..hierarchy import TreeTop
+from ..hierarchy import ClusterCut
 from ..links import (
     ClusterLinks,
     Links,
@@ -25,7 +25,7 @@ def reflect(
     lights: Array,
     scale: Array | None = None,
     cluster_links: ClusterLinks | None = None,
-    top: TreeTop | None = None,
+    cut: ClusterCut | None = None,
     received: Array | None = None,
 ) -> tuple[Array, Array]:
     """Gather over all links from the state's radiosity, then push and pull; the state stays.
@@ -40,7 +40,7 @@ def reflect(
         See `transport.gather`.
     cluster_links : ClusterLinks or None
         What the faces of clusters receive together.
-    top : TreeTop or None
+    cut : ClusterCut or None
         With all clusters of both sets of links; needed for the second.
     received : (e, 2) float64 or None
         What the light that leaves gather is scaled with, over own links and over shared ones
@@ -51,13 +51,13 @@ def reflect(
     irradiance, radiosity : (e, 3) float64 [W/m²]
     """
     hierarchy = state.hierarchy
-    means, sent = shared_means(hierarchy, state.radiosity, scale, top)
+    means, sent = shared_means(hierarchy, state.radiosity, scale, cut)
     shared = None
-    if cluster_links is not None and len(cluster_links) and top is not None:
+    if cluster_links is not None and len(cluster_links) and cut is not None:
         threads = state.settings.threads
         # A face that looks past the horizon of what its neighbours see gets nothing, not less.
-        shared = np.maximum(gather_at_clusters(hierarchy, top, cluster_links, sent, threads), 0.0)
-    own = gather(hierarchy, links, state.radiosity, scale, top, (means, sent))
+        shared = np.maximum(gather_at_clusters(hierarchy, cut, cluster_links, sent, threads), 0.0)
+    own = gather(hierarchy, links, state.radiosity, scale, cut, (means, sent))
     gathered = push(hierarchy, own)
     if shared is not None:
         gathered += shared.take(hierarchy.face, axis=0)
@@ -81,14 +81,14 @@ def bounce(
     lights: Array,
     scale: Array | None = None,
     cluster_links: ClusterLinks | None = None,
-    top: TreeTop | None = None,
+    cut: ClusterCut | None = None,
     received: Array | None = None,
 ) -> None:
     """Move the state's irradiance and radiosity on by one step (see `reflect`), and count it.
 
     The step's change at the leaves is taken as the residual, that of the radiosity before.
     """
-    irradiance, radiosity = reflect(state, links, lights, scale, cluster_links, top, received)
+    irradiance, radiosity = reflect(state, links, lights, scale, cluster_links, cut, received)
     state.residual = relative_residual(state, radiosity)
     state.irradiance, state.radiosity = irradiance, radiosity
     state.iterations += 1

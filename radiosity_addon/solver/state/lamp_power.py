@@ -8,7 +8,7 @@ from typing import TypeGuard
 import numpy as np
 
 from ...lights import Emitter, EnvironmentLight, Light, SkyPatch, SunLight
-from ...numerics import Array, irradiance_under_sky, stratified_square
+from ...numerics import LAMP_STEP, Array, Stream, irradiance_under_sky, stratified_square
 from ...rays import NO_HIT, RayCaster
 from ...scene import Faces, Scene
 from ..hierarchy import Hierarchy
@@ -20,7 +20,7 @@ RAYS = 1 << 17
 LEAST_RAYS, MOST_RAYS = 1 << 8, 1 << 14
 """… and of each at least and at most."""
 
-DOUBT = 3.0
+STANDARD_ERRORS = 3.0
 """Standard errors by which more may arrive than these rays say, …"""
 
 SOFT = 0.02
@@ -54,8 +54,8 @@ def lost_by_lamp(
     caster : RayCaster
         Of surfaces; it knows the one for lamps.
     """
-    place = stratified_square(np.zeros(1, np.int64), rays, seed)[0]
-    way = stratified_square(np.zeros(1, np.int64), rays, seed + 1)[0]
+    place = stratified_square(np.zeros(1, np.int64), rays, seed + Stream.LAMP_ORIGINS)[0]
+    way = stratified_square(np.zeros(1, np.int64), rays, seed + Stream.LAMP_DIRECTIONS)[0]
     origins, directions, share = light.emit(place, way)
     start = _off_surfaces(scene, caster, origins, directions)
     black, escaped = fate(hierarchy, caster.for_lamps, start, directions)
@@ -97,8 +97,9 @@ def lamps_within_power(
         assert isinstance(light, Emitter)
         power = float(light.flux.mean())
         said = arriving[number] * float(light.strength.mean())
-        black, escaped, error = lost_by_lamp(light, scene, hierarchy, caster, seed + 21 + 2 * number, rays)
-        most = (1.0 + SOFT) * (1.0 - black - escaped) + DOUBT * (error + 1.0 / rays)
+        own_seed = seed + LAMP_STEP * number
+        black, escaped, error = lost_by_lamp(light, scene, hierarchy, caster, own_seed, rays)
+        most = (1.0 + SOFT) * (1.0 - black - escaped) + STANDARD_ERRORS * (error + 1.0 / rays)
         if said > most * power:
             scale[number] = (1.0 - black - escaped) * power / said
     if (scale == 1.0).all():

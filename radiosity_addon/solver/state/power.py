@@ -10,7 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from ...numerics import (
+    LAMP_STEP,
     Array,
+    Stream,
     cosine_hemisphere,
     pick_in_runs,
     points_on_triangles,
@@ -18,7 +20,7 @@ from ...numerics import (
     stratified_square,
     to_world,
 )
-from ..hierarchy import LEAF, Hierarchy, TreeTop, node_opacity
+from ..hierarchy import LEAF, ClusterCut, Hierarchy, node_opacity
 from ..links import ClusterLinks, Links, gather_at_clusters
 from .lamp_power import fate, is_stopped, lost_by_lamp
 from .state import SolverState
@@ -72,9 +74,10 @@ def _follow_surfaces(state: SolverState) -> tuple[float, float]:
     along = (number + 0.5) / ESCAPE_RAYS
     leaf = leaves[pick_in_runs(running_sums(power), along)[0]]
     seed = state.settings.seed
-    points = points_on_triangles(hierarchy.corners[leaf], stratified_square(number, 1, seed + 11))[:, 0]
+    unit = stratified_square(number, 1, seed + Stream.ESCAPE_POINTS)
+    points = points_on_triangles(hierarchy.corners[leaf], unit)[:, 0]
     normals = hierarchy.normal[leaf]
-    unit = stratified_square(number, 1, seed + 12)
+    unit = stratified_square(number, 1, seed + Stream.ESCAPE_DIRECTIONS)
     directions = to_world(cosine_hemisphere(unit), normals)[:, 0]
     start = points + state.caster.surface_offset * normals
     black, escaped = fate(hierarchy, state.caster, start, directions)
@@ -87,7 +90,7 @@ def _follow_lamps(state: SolverState) -> tuple[float, float]:
     for number, light in enumerate(state.scene.lights):
         if not is_stopped(light) or not light.flux.any():
             continue
-        seed = state.settings.seed + 21 + 2 * number
+        seed = state.settings.seed + LAMP_STEP * number
         black, escaped, _ = lost_by_lamp(light, state.scene, state.hierarchy, state.caster, seed)
         flux = float(light.flux.mean())
         black_total += flux * black
@@ -116,7 +119,7 @@ def link_closure(hierarchy: Hierarchy, links: Links, cluster_links: ClusterLinks
     held = np.bincount(hierarchy.face, own * hierarchy.area, minlength=len(hierarchy.faces))
     per_face = np.asarray(held / hierarchy.faces.area)
     if cluster_links is not None:
-        top = TreeTop(hierarchy, cluster_links.receiver, cluster_links.source)
-        there = gather_at_clusters(hierarchy, top, cluster_links, opacity[:, None])[:, 0]
+        cut = ClusterCut(hierarchy, cluster_links.receiver, cluster_links.source)
+        there = gather_at_clusters(hierarchy, cut, cluster_links, opacity[:, None])[:, 0]
         per_face += np.maximum(there, 0.0)
     return per_face

@@ -43,7 +43,7 @@ class HistoryEntry:
 
 @dataclass
 class SolverState:
-    """A scene being solved; complete when the method's `solve_steps` is exhausted.
+    """A scene being solved; complete when the method's `solve` returns it.
 
     All arrays over elements have a row for inner elements too: their area means.
     """

@@ -1,4 +1,4 @@
-"""Lamps: their shapes, their softness, their colours, and whom they light."""
+"""Lamps: shapes, softness, colors, and which objects they light."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def spot_soft() -> None:
 
 @row("spot-square")
 def spot_square() -> None:
-    """Spot with a square cone, which is round to Cycles."""
+    """Spot with a square cone, which Cycles renders round."""
     stage()
     add_lamp("SPOT", energy=300, spot_size=math.radians(50), spot_blend=0.3, use_square=True)
 
@@ -114,7 +114,7 @@ def area_disk() -> None:
 
 @row("area-ellipse")
 def area_ellipse() -> None:
-    """Elliptic area lamp, stretched once more by its object."""
+    """Elliptic area lamp, stretched further by its object."""
     stage()
     add_lamp("AREA", energy=60, shape="ELLIPSE", size=1.0, size_y=0.3).scale = (1.5, 1.0, 1.0)
 
@@ -158,7 +158,7 @@ def area_near() -> None:
 
 @row("lamp-colour")
 def lamp_colour() -> None:
-    """Three coloured point lamps side by side."""
+    """Three colored point lamps side by side."""
     stage()
     for number in range(3):
         color = [1.0 if number == channel else 0.05 for channel in range(3)]
@@ -194,7 +194,7 @@ def lamp_radiance() -> None:
 
 @row("lamp-no-shadow")
 def lamp_no_shadow() -> None:
-    """Lamp that casts no shadow, beside one that does."""
+    """Lamp that casts no shadow, next to one that does."""
     stage()
     # Where a bottom lies in the floor, Cycles lights it with what the floor has above.
     bpy.data.objects["Box"].location.z -= 0.01
@@ -220,7 +220,7 @@ def lamp_blackbody() -> None:
 
 @row("lamp-nodes")
 def lamp_nodes() -> None:
-    """Lamp with nodes: a colour through mathematics, and a Light Falloff that leaves it as it is."""
+    """Lamp with nodes: a color from math nodes, and a Light Falloff that does not change it."""
     stage()
     tree, emission = _nodes_of(add_lamp("POINT", energy=60, shadow_soft_size=0.05))
     mix = add_node(tree, "ShaderNodeHueSaturation", Hue=0.3, Saturation=0.8, Color=(0.9, 0.3, 0.1, 1.0))
@@ -238,7 +238,7 @@ def _nodes_of(lamp: bpy.types.Object) -> tuple[bpy.types.NodeTree, bpy.types.Nod
 
 @row("lamp-hidden")
 def lamp_hidden() -> None:
-    """Lamps hidden from renders, or from diffuse rays, beside one that shines."""
+    """Lamps hidden from renders or from diffuse rays, next to a visible one."""
     stage()
     add_lamp("POINT", energy=60, shadow_soft_size=0.05)
     add_lamp("POINT", (1.5, -0.4, 1.6), energy=60).hide_render = True

@@ -1,4 +1,4 @@
-"""Materials: what reflects, lets through and glows, and how much of it."""
+"""Materials: reflection, transparency and emission."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def procedural() -> None:
 
 @row("metal", limit=0.045)
 def metal() -> None:
-    """Rough metal wall beside matte ones; its sheen goes everywhere alike here, not where it mirrors to."""
+    """Rough metal wall next to matte ones; here it reflects light evenly, not in the mirror direction."""
     _lit_stage()
     color = (0.9, 0.6, 0.2, 1)
     gold = shader_material("Gold", "ShaderNodeBsdfPrincipled", Base_Color=color, Metallic=1, Roughness=0.6)
@@ -92,14 +92,14 @@ def metal() -> None:
 
 @row("metal-matte")
 def metal_matte() -> None:
-    """Matte wall that reflects as much as the rough metal does, all told."""
+    """Matte wall with the total reflectance of the rough metal."""
     _lit_stage()
     add_quad("Gold", SIDE, NOWHERE, diffuse("Gold", 0.881, 0.554, 0.179))
 
 
 @row("principled")
 def principled() -> None:
-    """Principled wall with its default shine beside matte ones."""
+    """Principled wall with its default gloss next to matte ones."""
     _lit_stage()
     red = shader_material("Lacquer", "ShaderNodeBsdfPrincipled", Base_Color=(0.8, 0.1, 0.05, 1))
     add_quad("Lacquer", SIDE, NOWHERE, red)
@@ -128,7 +128,7 @@ def mix_and_add() -> None:
 
 @row("textured-emission")
 def textured_emission() -> None:
-    """Panel that glows by an image, through Principled's emission."""
+    """Panel that emits an image, through Principled's emission."""
     stage()
     screen = shader_material("Screen", "ShaderNodeBsdfPrincipled", Emission_Strength=6.0)
     shader = next(node for node in screen.node_tree.nodes if node.type == "BSDF_PRINCIPLED")

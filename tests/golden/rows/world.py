@@ -13,7 +13,7 @@ from .stage import add_node, emptied_nodes, stage
 
 @row("world-colour", samples=48)
 def world_colour() -> None:
-    """World of one colour."""
+    """World of one color."""
     _open_stage()
     _, background = _world()
     background.inputs["Color"].default_value = (0.3, 0.5, 1.0, 1.0)

@@ -78,13 +78,14 @@ def slow_down():
 
 
 def remember_pictures():
-    """Note how much light is in every picture on its way to the screen."""
+    """Note how much light is in every picture of elements on its way to the screen."""
     show = live_view.show
 
     def showing(picture):
-        one, other = (picture.corners[:, corner] - picture.corners[:, 0] for corner in (1, 2))
-        area = np.linalg.norm(np.cross(one, other), axis=1) / 2
-        seen["pictures"].append(float(area @ picture.radiosity.sum(axis=1)))
+        if hasattr(picture, "corners"):
+            one, other = (picture.corners[:, corner] - picture.corners[:, 0] for corner in (1, 2))
+            area = np.linalg.norm(np.cross(one, other), axis=1) / 2
+            seen["pictures"].append(float(area @ picture.radiosity.sum(axis=1)))
         show(picture)
 
     live_view.show = showing

@@ -1,4 +1,4 @@
-"""How far a bake is, and pictures of the light so far."""
+"""Pictures of the light so far, for whoever watches a bake."""
 
 from __future__ import annotations
 
@@ -85,17 +85,3 @@ class TexelPicture:
 
     surfaces: TexelSurfaces
     radiosity: Array
-
-
-@dataclass(frozen=True)
-class Progress:
-    """Where a bake is: the stage's name and the overall fraction done, 0 to 1.
-
-    While the scene is being solved some come with a picture of the solution so far, while its texels are
-    being lit with one of these.
-    """
-
-    stage: str
-    fraction: float
-    picture: Picture | None = None
-    texels: TexelPicture | None = None

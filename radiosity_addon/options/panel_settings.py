@@ -1,0 +1,83 @@
+"""The table of the panel's own options: what scripts and the command line give in other ways, or need not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .choices import SCOPES, SIZE_MODES
+from .option_record import PanelRow, option, options_of
+from .sections import LAST_BAKE, OBJECTS, RELIGHTING, VIEWPORT
+
+RELIGHT_GROUP = "radiosity_relight"
+"""The group of properties that files have the options of relighting in."""
+
+
+@dataclass(init=False, repr=False, eq=False)
+class _PanelSettings:
+    scope: str = option(
+        "all",
+        "Which objects get a lightmap; all others still light and block",
+        OBJECTS,
+        choices=SCOPES,
+        panel=PanelRow("Objects", expand=True),
+    )
+    size_mode: str = option(
+        "resolution",
+        "How the size of the lightmaps is chosen",
+        "Size",
+        choices=SIZE_MODES,
+        preset=True,
+        panel=PanelRow("Size", expand=True),
+    )
+    output_folder: str = option(
+        "//lightmaps/",
+        "Where the lightmaps are written. A folder that begins with // is next to the file; while that file "
+        "is not saved, lightmaps are packed into it",
+        "Pages",
+        panel=PanelRow("Folder", subtype="DIR_PATH"),
+    )
+    keep: bool = option(
+        True,
+        "Keep in memory how light travels, so that Relight can apply other strengths and colors of lamps, "
+        "emission and world. Takes about 300 bytes for each pixel that shows a surface: 60 MB at 512 × 512, "
+        "1 GB at 2048 × 2048. Bakes of many lamps take somewhat longer",
+        RELIGHTING,
+        panel=PanelRow("Keep for Relighting", group=RELIGHT_GROUP),
+    )
+    sidecar: bool = option(
+        False,
+        "Also write this data to a file next to the lightmaps, so that the bake can be relit after the scene "
+        "was closed. About half as large as in memory",
+        RELIGHTING,
+        panel=PanelRow("Write Sidecar", group=RELIGHT_GROUP),
+    )
+    only_moved: bool = option(
+        True,
+        "If objects have only moved since a bake that is still in memory, bake only what they affect: the "
+        "same light in less than half of the time. The layout of the lightmaps stays",
+        RELIGHTING,
+        panel=PanelRow("Incremental (Moved Objects)", group=RELIGHT_GROUP),
+    )
+    show_while_solving: bool = option(
+        True,
+        "Draw the light over the objects in the viewports while a bake runs: the elements while it solves, "
+        "then the texels",
+        VIEWPORT,
+        panel=PanelRow("Show While Solving"),
+    )
+    show_result: bool = option(
+        True,
+        "Switch the viewport from solid to material preview when the bake is done",
+        VIEWPORT,
+        panel=PanelRow("Show Result"),
+    )
+    lightmap_only: bool = option(
+        False,
+        "Show only the lightmaps instead of base color × lightmap",
+        LAST_BAKE,
+        panel=PanelRow("Lightmap Only"),
+    )
+
+
+PANEL_OPTIONS = options_of(_PanelSettings)
+"""Every option that only the panel has, by its name."""

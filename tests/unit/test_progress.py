@@ -1,0 +1,67 @@
+"""One object tells how far nested work is, and stops it."""
+
+from __future__ import annotations
+
+import pytest
+
+from radiosity_addon.base.progress import SILENT, Cancelled, Progress, Status
+from radiosity_addon.numerics import for_chunks, map_chunks
+from tests.watched import noting, watching
+
+
+def fractions(noted: list[Status]) -> list[float]:
+    return [status.fraction for status in noted]
+
+
+def test_parts_of_parts_lie_where_they_belong() -> None:
+    noted: list[Status] = []
+    half = noting(noted).part(0.5, 1.0)
+    half.part(0.0, 0.5).at(1.0)
+    for _, part in half.part(0.5, 1.0).each("ab"):
+        part.at(1.0)
+    assert fractions(noted) == [0.75, 0.875, 1.0]
+
+
+def test_turns_take_their_share_of_what_is_left() -> None:
+    noted: list[Status] = []
+    for _, turn in zip(range(3), noting(noted).turns(0.25), strict=False):
+        turn.at(1.0)
+    assert fractions(noted) == pytest.approx([0.25, 0.4375, 0.578125])
+
+
+def test_a_stage_has_a_name_and_its_parts_have_it_too() -> None:
+    noted: list[Status] = []
+    noting(noted).stage("solve", 0.2, 0.4).part(0.5, 1.0).at(0.0)
+    assert noted == [Status("solve", pytest.approx(0.3))]
+
+
+def test_what_work_shows_is_seen_and_nothing_looks_if_nobody_listens() -> None:
+    seen: list[object] = []
+    watching(seen.append).part(0.0, 0.5).at(0.5, "state")
+    Progress(look=seen.append).at(0.5, "unseen")
+    SILENT.at(0.5, "unseen")
+    assert seen == ["state"]
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_chunks_come_in_order_with_their_slices_and_fractions(threads: int) -> None:
+    noted: list[Status] = []
+    found = list(map_chunks(lambda rows: rows.start, 10, 4, threads, noting(noted)))
+    assert found == [(slice(0, 4), 0), (slice(4, 8), 4), (slice(8, 10), 8)]
+    assert fractions(noted) == pytest.approx([1 / 3, 2 / 3, 1.0])
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_a_canceled_job_leaves_the_other_chunks_out(threads: int) -> None:
+    done: list[int] = []
+
+    def cancel(_: Status) -> None:
+        raise Cancelled
+
+    with pytest.raises(Cancelled):
+        for_chunks(lambda rows: done.append(rows.start), 1000, 1, threads, Progress(cancel))
+    assert 1 <= len(done) < 1000
+
+
+def test_cancelling_is_no_error_that_work_could_handle() -> None:
+    assert not issubclass(Cancelled, Exception)
