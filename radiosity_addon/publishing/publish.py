@@ -144,6 +144,22 @@ def replacing(path: Path) -> Iterator[Path]:
         staging.close()
 
 
+def write_text(path: Path, text: str) -> None:
+    """Write a text file, in a folder that is made if need be, over an older one once it is whole.
+
+    Raises
+    ------
+    BakeError
+        If it cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with replacing(path) as aside:
+            aside.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise BakeError(f"cannot write '{path}': {error.strerror}") from error
+
+
 def clean_up(target: Path) -> bool:
     """Undo what killed bakes have left in a folder; True if a half-published result was taken back.
 

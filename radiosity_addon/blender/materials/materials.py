@@ -195,9 +195,7 @@ class _Reader(ShaderTerms[Stack]):
 
     def shader(self, socket: bpy.types.NodeSocket, place: Stack) -> Terms:
         feed = feed_of(socket, place)
-        if feed.socket.type != "SHADER":
-            return self.glow(self.color(socket, place))
-        return nothing() if feed.node is None else self.terms(feed.node, feed.stack)
+        return self.fed_by(feed, socket, place, feed.stack)
 
     def color(self, socket: bpy.types.NodeSocket, place: Stack) -> np.ndarray:
         """Return a socket's constant (3,), with a note where it stands for something else."""

@@ -76,18 +76,17 @@ def delete(unused: Unused) -> int:
 
     Raises
     ------
-    OSError
-        If one cannot be deleted; those before it are gone.
+    OSError, BakeError
+        If one cannot be deleted, or its report cannot be written; those before it are gone.
     """
     from ...files import read_report, text_of, without
-    from ...publishing import replacing
+    from ...publishing import write_text
 
     for report, names in unused.files.items():
         contents = read_report(report)
         for name in names:
             (report.parent / name).unlink()
-        with replacing(report) as aside:
-            aside.write_text(text_of(without(contents, names)), encoding="utf-8")
+        write_text(report, text_of(without(contents, names)))
     return unused.count
 
 
@@ -136,6 +135,9 @@ class RADIOSITY_OT_clean(Conditional, bpy.types.Operator):
             count = delete(found)
         except OSError as error:
             self.report({"ERROR"}, f"Cannot delete '{error.filename}': {error.strerror}")
+            return {"CANCELLED"}
+        except BakeError as error:
+            self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         if not count:
             self.report({"INFO"}, "Nothing to clean up: all lightmaps of this file are used")
