@@ -191,7 +191,7 @@ class LocalPass:
             gathering.sources = into
         if irradiance is None:
             return gathering.trace(None, np.zeros(len(at)), progress)
-        return gathering.trace(self._bright, irradiance, progress)
+        return gathering.trace(self.bright_elements, irradiance, progress)
 
     def regather(
         self,
@@ -210,7 +210,7 @@ class LocalPass:
         retracing = Retracing(self._gathering(at, surface_normals, rays, resolve), before)
         if irradiance is None:
             return retracing.trace(None, np.zeros(len(at)), progress)
-        return retracing.trace(self._bright, irradiance, progress)
+        return retracing.trace(self.bright_elements, irradiance, progress)
 
     def _gathering(self, at: Footprints, surface_normals: Array, rays: int, resolve: Resolver) -> Gathering:
         return Gathering(
@@ -226,14 +226,15 @@ class LocalPass:
         )
 
     @cached_property
-    def _bright(self) -> BrightElements:
+    def bright_elements(self) -> BrightElements:
+        """What rays are aimed at, and how."""
         return BrightElements(self._state.hierarchy, self.reflected(), self._unshadowed)
 
     @property
     def bright(self) -> Array:
         """(e,) bool: the elements that rays are aimed at."""
         found = np.zeros(self.hierarchy.n_elements, dtype=bool)
-        found[self._bright.element] = True
+        found[self.bright_elements.element] = True
         return found
 
     def _unshadowed(self, points: Array, normals: Array) -> Array:
