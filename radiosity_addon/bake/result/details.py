@@ -56,7 +56,7 @@ def details(solution: Solution, links: LinkRecord, geometry: TexelGeometry, ligh
     unit = 0.0
     for rows in tiles(len(geometry), TILE):
         irradiance = (light.direct[rows] + light.indirect[rows]) @ MEANS
-        expected = local.irradiance_at(geometry.triangle[rows], geometry.barycentric[rows])
+        expected = local.elements.irradiance_at(geometry.triangle[rows], geometry.barycentric[rows])
         misfit[rows] = expected - irradiance
         unit = max(unit, float(np.abs(misfit[rows]).max()), float(noise[rows].max()))
     unit = unit or 1.0

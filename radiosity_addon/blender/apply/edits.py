@@ -197,7 +197,7 @@ def _carry(mesh: bpy.types.Mesh, known: StandIn, users: Sequence[bpy.types.Objec
             # The object's mesh was deleted: what the modifiers made of it is all there is.
             mesh[ORIGINAL] = released_copy(mesh, users[0].name)
             set_stand_in(mesh, replace(known, modifiers=(), seal=digest_of_mesh(mesh)))
-            message = f"the mesh of object '{name}' is gone: it keeps what its modifiers made of it"
+            message = f"the mesh of object '{name}' is missing: the result of its modifiers is kept"
             return [BakeWarning(name, f"{message}; they stay switched off")]
         if not edited:
             return []
@@ -209,7 +209,9 @@ def _carry(mesh: bpy.types.Mesh, known: StandIn, users: Sequence[bpy.types.Objec
         kept = released_copy(mesh, f"{name}{EDITED}")
         kept.use_fake_user = True
         _seal_again(mesh, known)
-        message = f"the baked mesh of object '{name}' was edited, but its modifiers or instances make it anew"
+        message = (
+            f"the baked mesh of object '{name}' was edited, but its modifiers or instances generate it again"
+        )
         return [BakeWarning(name, f"{message}: the edited mesh is kept as '{kept.name}'")]
     if not edited and original is not None:
         return []
@@ -263,7 +265,7 @@ def _replace_original(
         kept = released_copy(mesh, f"{original.name if original else name}{EDITED}")
         mesh[ORIGINAL] = kept
         _seal_again(mesh, known)
-        why = "its original is gone" if original is None else "its original is linked or was changed too"
+        why = "its original is missing" if original is None else "its original is linked or was changed too"
         message = f"the mesh of object '{name}' was edited and {why}: the object keeps '{kept.name}'"
         return BakeWarning(name, f"{message} as a mesh of its own")
     if LAYER in original:

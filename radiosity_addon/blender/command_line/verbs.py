@@ -96,7 +96,7 @@ def bake(
             console.progress("plot", 1.0)
             make_folder_of(plot)
             write_history(report.as_dict(), plot.resolve())
-            files.append((str(plot), "how it was solved"))
+            files.append((str(plot), "history of the solution"))
         console.lines(summary(str(output), files, report.as_dict()))
 
 
@@ -179,7 +179,9 @@ def check(
         found = inspect(bpy.context, settings, folder, into, (BLEND_NAME, PREVIEW_NAME))
         lines = [f"  {name:<12} {value}" for name, value in figures(found)]
         odd = [f"  {finding.level.lower():<8} {finding.message}" for finding in found.findings]
-        console.lines(["a bake would be:", *lines, *(["what is odd:", *odd] if odd else ["nothing is odd"])])
+        console.lines(
+            ["estimate of the bake:", *lines, *(["problems:", *odd] if odd else ["no problems found"])]
+        )
         wrong = [finding.message for finding in found.findings if finding.level == ERROR]
         if wrong and console.quiet:
             raise SceneError(wrong[0])
@@ -246,8 +248,8 @@ def written_files(report: dict, preview: bool = True, kept: bool = False) -> lis
             (image, "lightmap" if len(shown) == len(images) else f"{len(images)} lightmaps")
             for image in shown
         ),
-        *([(PREVIEW_NAME, "what it looks like")] if preview else []),
-        *([(SIDECAR_NAME, "what --relight needs")] if kept else []),
+        *([(PREVIEW_NAME, "preview")] if preview else []),
+        *([(SIDECAR_NAME, "data for --relight")] if kept else []),
         (REPORT_NAME, "objects, figures and warnings"),
     ]
 

@@ -197,7 +197,7 @@ def _shape(piece: Piece) -> _Shape:
 def _of_the_file(folder: Path | None) -> Iterator[Finding]:
     """Say where lightmaps go, where that may surprise."""
     if folder is None:
-        message = "the file is not saved: lightmaps will be packed into it; save it to have files beside it"
+        message = "the file is not saved: lightmaps will be packed into it; save it to write them to files"
         yield Finding(INFO, "file", message)
         return
     # `Path.exists` raises for a name that is too long.
@@ -224,7 +224,7 @@ def _of_light(context: bpy.types.Context, collected: Collected, settings: BakeSe
         material = collected.materials[row]
         black = surface.reflectance.max() < BLACK and not surface.emission.any() and not surface.varies
         if material is not None and black and surface.opacity > 0:
-            message = f"material '{material.name}' is black: what has it looks black however it is lit"
+            message = f"material '{material.name}' is black: surfaces with it look black in any light"
             yield Finding(INFO, material.name, message)
 
 
@@ -274,7 +274,7 @@ def _of_layers(chosen: Sequence[Piece], settings: BakeSettings) -> Iterator[Find
     if settings.keep_uvs:
         new = [piece.source.name for piece in chosen if not piece.has_lightmap_layer]
         if new:
-            message = f"{_names(new)} without a UV layer '{LIGHTMAP_UV_LAYER}' to keep: unwrapped anew"
+            message = f"{_names(new)} without a UV layer '{LIGHTMAP_UV_LAYER}' to keep: they are unwrapped"
             yield Finding(WARNING, new[0], message)
 
 
@@ -323,9 +323,7 @@ def _of_shapes(
         if not inside.any():
             inverted.append(piece.source.name)
     if inverted:
-        message = (
-            f"{_names(inverted)} inside out, it seems: normals point inwards, so lightmaps would be black"
-        )
+        message = f"{_names(inverted)} probably inside out: normals point inward, so lightmaps would be black"
         yield Finding(WARNING, inverted[0], message)
     for piece in pieces:
         scale = np.linalg.norm(piece.matrix[:3, :3], axis=0)
@@ -346,7 +344,7 @@ def _of_size(shapes: dict[int, _Shape]) -> Iterator[Finding]:
         yield Finding(
             WARNING,
             "scene",
-            f"the scene is {told} large: lamps and texels count in metres, so check the unit",
+            f"the scene is {told} large: lamps and texels use meters; check the unit",
         )
 
 

@@ -96,9 +96,13 @@ def ray_doubts(material: bpy.types.Material, surface: Surface) -> list[str]:
     said = []
     passes = surface.opacity < 1.0 or (surface.varies and _may_pass(material.node_tree))
     if passes and not getattr(material, "use_transparent_shadow", True):
-        said.append("Transparent Shadows is off, which is ignored: lamps shine through it as it looks")
+        said.append(
+            "Transparent Shadows is off, which is ignored: lamps shine through where it is transparent"
+        )
     if surface.emission.any() and asks_light_path(material.node_tree, tuple(LIGHT_PATHS)):
-        said.append("its emission asks for diffuse rays: it gets them all, where Cycles only counts some")
+        said.append(
+            "its emission depends on Is Diffuse Ray, which is always on here, in Cycles only for some rays"
+        )
     return said
 
 
@@ -219,7 +223,7 @@ class _Reader(ShaderTerms[Stack]):
 
     def not_understood(self, node: bpy.types.Node) -> Terms:
         what = "reflectance" if self.kind == "material" else "radiance"
-        self.warn(f"{node.bl_label} is not understood; {what} {_text(np.zeros(3))} is used")
+        self.warn(f"{node.bl_label} is not supported; {what} {_text(np.zeros(3))} is used")
         return nothing()
 
     def clamped_reflectance(self, reflectance: np.ndarray) -> np.ndarray:

@@ -37,7 +37,7 @@ COLORED = (
 
 _IGNORED_WEIGHTS = (  # Principled sockets that should be 0, and what we do instead
     ("Transmission Weight", "transmission is ignored: the surface is baked opaque"),
-    ("Subsurface Weight", "subsurface scattering is ignored: the base colour is used"),
+    ("Subsurface Weight", "subsurface scattering is ignored: the base color is used"),
     ("Coat Weight", "the coat is ignored"),
     ("Sheen Weight", "the sheen is ignored"),
 )
@@ -184,7 +184,7 @@ class ShaderTerms(ABC, Generic[Place]):
         )
 
     def _as_diffuse(self, node: bpy.types.Node, color: Color) -> Terms:
-        self.warn(f"{node.bl_label} is baked as diffuse; its colour is used")
+        self.warn(f"{node.bl_label} is baked as diffuse; its color is used")
         return Terms(color, np.zeros(3), np.zeros(3))
 
     def _normal_map(self, node: bpy.types.Node) -> None:

@@ -138,7 +138,7 @@ class RADIOSITY_OT_clean(Conditional, bpy.types.Operator):
             self.report({"ERROR"}, f"Cannot delete '{error.filename}': {error.strerror}")
             return {"CANCELLED"}
         if not count:
-            self.report({"INFO"}, "Nothing to clean: every lightmap of this file is shown")
+            self.report({"INFO"}, "Nothing to clean up: all lightmaps of this file are used")
             return {"CANCELLED"}
         self.report({"INFO"}, f"Deleted {count} lightmap files")
         return {"FINISHED"}
@@ -169,7 +169,7 @@ class RADIOSITY_OT_recover(Conditional, bpy.types.Operator):
         for image in bpy.data.images:
             if image.filepath and Path(bpy.path.abspath(image.filepath_raw)).parent.resolve() in done:
                 image.reload()
-        self.report({"INFO"}, "The lightmaps are those of the last whole bake again")
+        self.report({"INFO"}, "Recovered the lightmaps of the last complete bake")
         return {"FINISHED"}
 
 

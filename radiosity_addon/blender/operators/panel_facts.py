@@ -69,13 +69,9 @@ def can_restore(_context: bpy.types.Context) -> bool:
 @fact(unknown="")
 def relight_refusal(context: bpy.types.Context) -> str:
     """Why the scene's bake cannot be relit; empty if it can."""
-    from ..relight.kept_sidecars import can_relight
+    from ..relight.kept_sidecars import refusal
 
-    if not kept_bakes.mark_of(context.scene):
-        return "The scene shows no kept bake: bake with Keep for Relighting"
-    if not can_relight(context.scene):
-        return "The bake is no longer in memory and has no sidecar: bake again"
-    return ""
+    return refusal(context.scene)
 
 
 @fact(unknown=())

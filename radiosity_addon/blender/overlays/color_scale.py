@@ -1,4 +1,4 @@
-"""False colours: numbers as colours, and the numbers that stand beside the scale."""
+"""False colors: numbers as colors, and the numbers that stand beside the scale."""
 
 from __future__ import annotations
 
@@ -33,18 +33,18 @@ _BLUE_TO_RED = (
 _ROUND = (1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12)
 
 NEARLY_ALL = 98.0
-"""Percentile that an automatic scale reaches: a few texels beside a lamp would leave the rest no colours."""
+"""Percentile that an automatic scale reaches: a few texels beside a lamp would leave the rest no colors."""
 
 
 @dataclass(frozen=True)
 class ColorScale:
-    """Colours for numbers from `low` to `high`; what is beyond has the colour of the end.
+    """Colours for numbers from `low` to `high`; what is beyond has the color of the end.
 
     Parameters
     ----------
     low, high : float
     signed : bool
-        Whether 0 is in the middle and has a colour that is neither warm nor cold.
+        Whether 0 is in the middle and has a color that is neither warm nor cold.
     """
 
     low: float

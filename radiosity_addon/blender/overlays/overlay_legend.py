@@ -1,4 +1,4 @@
-"""The legend of an overlay in a viewport's corner: a bar of colours with numbers, or colours with words."""
+"""The legend of an overlay in a viewport's corner: a bar of colors with numbers, or colors with words."""
 
 from __future__ import annotations
 

@@ -25,15 +25,15 @@ from .lightmap_values import (
 from .overlay_properties import overlay_of
 
 STATE_COLORS = {
-    DIVIDED: ((0.90, 0.25, 0.15), "Divided: geometry stands on them"),
-    OCCLUDED: ((0.95, 0.60, 0.10), "Hidden: something is close above"),
-    TOUCHED: ((0.95, 0.90, 0.30), "Touched: they end at geometry"),
-    ENCLOSED: ((0.55, 0.25, 0.75), "Shut in: no light reaches them"),
+    DIVIDED: ((0.90, 0.25, 0.15), "Divided: geometry crosses them"),
+    OCCLUDED: ((0.95, 0.60, 0.10), "Occluded: geometry is close above"),
+    TOUCHED: ((0.95, 0.90, 0.30), "Touched: geometry is at their edge"),
+    ENCLOSED: ((0.55, 0.25, 0.75), "Enclosed: no light reaches them"),
 }
-"""Display colours of the texels that are told apart, and what they are."""
+"""Display colors of the texels that are told apart, and what they are."""
 
 WIDEST = 2048
-"""Pages of more pixels are drawn coarser: as colours they would take a quarter of a gigabyte at 4096."""
+"""Pages of more pixels are drawn coarser: as colors they would take a quarter of a gigabyte at 4096."""
 
 CHECKERS = ((0.25, 0.25, 0.27), (0.85, 0.85, 0.82))
 EDGE = (0.05, 0.05, 0.05, 1.0)
@@ -50,7 +50,7 @@ class Surfaces:
     uv : (t, 3, 2) float32
     page : (t,) int
     pages : sequence of (height, width, 4) float32
-        Display colours; without alpha nothing is drawn.
+        Display colors; without alpha nothing is drawn.
     """
 
     corners: Array
@@ -81,7 +81,7 @@ class Lines:
 
 @dataclass(frozen=True)
 class Legend:
-    """What the colours mean.
+    """What the colors mean.
 
     Attributes
     ----------
@@ -175,7 +175,7 @@ def _false_colors(context: bpy.types.Context, shown: list[ShownLightmap]) -> Ove
 
 
 def _density(context: bpy.types.Context, shown: list[ShownLightmap]) -> OverlayPicture:
-    """Show how dense texels are as a colour of each triangle, or the texels themselves."""
+    """Show how dense texels are as a color of each triangle, or the texels themselves."""
     settings = overlay_of(context)
     sizes = [page_size(context, found.image) for found in shown]
     if settings.show == kinds.CHECKER:
@@ -185,12 +185,12 @@ def _density(context: bpy.types.Context, shown: list[ShownLightmap]) -> OverlayP
     density = np.concatenate(
         [texels_per_metre(found, size) for found, size in zip(shown, sizes, strict=True)]
     )
-    # What most has gets the middle colour: blue is coarser, red finer.
+    # What most has gets the middle color: blue is coarser, red finer.
     usual = float(np.median(density))
     scale = (
         ColorScale(0.0, 2.0 * usual) if settings.automatic and usual > 0 else _scale(context, density, False)
     )
-    # A page of one texel a triangle: each has one colour.
+    # A page of one texel a triangle: each has one color.
     side = int(np.ceil(np.sqrt(len(density))))
     page = np.zeros((side**2, 4), dtype=np.float32)
     page[: len(density)] = _opaque(scale(density))
@@ -220,7 +220,7 @@ def _texels(context: bpy.types.Context, kept: KeptDetails) -> OverlayPicture | N
             table[state] = (*color, 1.0)
         painted = {name: table[thinned(page.state)] for name, page in pages.items()}
         entries = tuple(STATE_COLORS.values())
-        return OverlayPicture(_surfaces(shown, painted), legend=Legend("Doubtful Texels", entries=entries))
+        return OverlayPicture(_surfaces(shown, painted), legend=Legend("Problem Texels", entries=entries))
     signed = settings.error_of == "ELEMENTS"
     errors = {
         name: page.unit * (page.misfit if signed else page.noise).astype(np.float32)
@@ -229,7 +229,7 @@ def _texels(context: bpy.types.Context, kept: KeptDetails) -> OverlayPicture | N
     told = np.concatenate([errors[name][page.state != NO_TEXEL_HERE] for name, page in pages.items()])
     scale = _scale(context, told, signed)
     painted = {name: _opaque(scale(thinned(values))) for name, values in errors.items()}
-    title = "Elements Less Texels" if signed else "Estimated Noise"
+    title = "Elements Minus Texels" if signed else "Estimated Noise"
     return OverlayPicture(_surfaces(shown, painted), legend=Legend(title, "W/m²", scale))
 
 
@@ -307,7 +307,7 @@ def _checker(size: int, squares: int) -> Array:
 
 
 def _opaque(colors: Array) -> Array:
-    """Return (…, 4) for (…, 3) colours."""
+    """Return (…, 4) for (…, 3) colors."""
     return np.concatenate([colors, np.ones((*colors.shape[:-1], 1), dtype=np.float32)], axis=-1)
 
 

@@ -43,7 +43,7 @@ def _draw_over_objects() -> None:
 
 
 def _draw_legend() -> None:
-    """Draw what the colours mean."""
+    """Draw what the colors mean."""
     context = bpy.context
     picture = _current(context)
     if picture is not None and picture.legend is not None:

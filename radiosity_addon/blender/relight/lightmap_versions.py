@@ -87,7 +87,7 @@ def _open(report: Path) -> OutputFolder:
         for own in own_reports(report.parent, scene):
             if own.names.report == report.name:
                 return OutputFolder(report.parent, own.names, owner=own.owner).__enter__()
-    raise BakeError(f"'{report}' is no report of this file's")
+    raise BakeError(f"'{report}' is not a report of this file")
 
 
 def hold(output: OutputFolder) -> None:

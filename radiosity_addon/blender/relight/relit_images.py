@@ -68,7 +68,7 @@ def check_images(images: Images, pages: Sequence[LightmapPage]) -> None:
     for number, page in enumerate(pages):
         image = images.get(number)
         if image is None:
-            raise BakeError(f"lightmap {number + 1} of the bake is not in the file any more: bake again")
+            raise BakeError(f"lightmap {number + 1} of the bake is no longer in the file: bake again")
         height, width = page.pixels.shape[:2]
         if tuple(image.size) != (width, height):
             raise BakeError(f"lightmap '{image.name}' has lost its file, or was scaled: bake again")

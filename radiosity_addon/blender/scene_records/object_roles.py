@@ -22,7 +22,7 @@ BAKE, LIGHT_ONLY, IGNORE = "BAKE", "LIGHT_ONLY", "IGNORE"
 MODES = (
     (BAKE, "Bake", "It gets a lightmap, and lights and blocks"),
     (LIGHT_ONLY, "Light Only", "It lights and blocks but gets no lightmap"),
-    (IGNORE, "Ignore", "It is left out as if it were not there"),
+    (IGNORE, "Ignore", "It is left out entirely"),
 )
 
 BAKEABLE_TYPES = frozenset({"MESH", "CURVE", "SURFACE", "FONT", "META"})
@@ -53,11 +53,11 @@ class Role(NamedTuple):
 def register() -> None:
     """Hang mode and texel scale on every object."""
     bpy.types.Object.radiosity_mode = bpy.props.EnumProperty(
-        name="Mode", description="What the object is there for in a bake", items=MODES, default=BAKE
+        name="Mode", description="Role of the object in a bake", items=MODES, default=BAKE
     )
     bpy.types.Object.radiosity_texel_scale = bpy.props.FloatProperty(
         name="Texel Scale",
-        description="Lightmap pixels per metre, relative to the other objects",
+        description="Lightmap pixels per meter, relative to the other objects",
         default=1.0,
         min=0.01,
         soft_min=0.1,
