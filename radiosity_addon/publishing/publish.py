@@ -91,11 +91,11 @@ class Staging(MarkedFolder):
                 check(name, old)
                 files[name] = _Replaced((known or {}).get(name) or digest_of_file(self.path / name), old)
             _sync_folder(earlier)
-            _write_journal(self.path, files)
+            write_journal(self.path, files)
             for name in names:
                 if not _is_same(found[name], _regular(self.target / name)):
                     raise BakeError(f"'{self.target / name}' was changed while it was being replaced")
-                _rename(self.path / name, self.target / name)
+                rename(self.path / name, self.target / name)
             _sync_folder(self.target)
             (self.path / JOURNAL).unlink()
         except BaseException as error:
@@ -138,7 +138,7 @@ def replacing(path: Path) -> Iterator[Path]:
         aside = staging.path / path.name
         yield aside
         _sync(aside)
-        _rename(aside, path)
+        rename(aside, path)
         _sync_folder(path.parent)
     finally:
         staging.close()
@@ -246,7 +246,7 @@ def _take_back(steps: Sequence[_Step]) -> None:
         if kept is None:
             place.unlink()
         else:
-            _rename(kept, place)
+            rename(kept, place)
     for folder in {place.parent for _, place in steps}:
         _sync_folder(folder)
 
@@ -278,7 +278,7 @@ def _read_journal(staging: Path) -> dict[str, _Replaced]:
     return files
 
 
-def _write_journal(staging: Path, files: Mapping[str, _Replaced]) -> None:
+def write_journal(staging: Path, files: Mapping[str, _Replaced]) -> None:
     """Write the journal so that it is there, whole, even if the machine stops at the next instant."""
     told = {name: {"new": file.new, "old": file.old} for name, file in files.items()}
     aside = staging / f"{JOURNAL}.part"
@@ -286,7 +286,7 @@ def _write_journal(staging: Path, files: Mapping[str, _Replaced]) -> None:
         json.dump({"version": _VERSION, "files": told}, file)
         file.flush()
         os.fsync(file.fileno())
-    _rename(aside, staging / JOURNAL)
+    rename(aside, staging / JOURNAL)
     _sync_folder(staging)
 
 
@@ -300,7 +300,7 @@ def _kept(path: Path, kept: Path) -> str:
     return digest_of_file(kept)
 
 
-def _rename(source: Path, target: Path) -> None:
+def rename(source: Path, target: Path) -> None:
     """Rename a file over another; every renaming of ours is this one."""
     source.replace(target)
 

@@ -11,6 +11,7 @@ from radiosity_addon.solver import PointLight, Scene, SolverSettings, solve
 from radiosity_addon.solver.gather.footprints import Footprints
 from tests.rooms import CEILING, box_room, grey, rectangle
 from tests.textured_rooms import furnace, image, patterned
+from tests.unit.solved_rooms import solved
 from tests.unit.texel_scenes import QUAD_UV
 
 FIXED = ("two-level", "shooting", "conjugate-gradient", "gauss-seidel", "jacobi", "dense")
@@ -217,8 +218,7 @@ def test_patterns_reflect_their_own_colours() -> None:
     """Under uniform light every element's radiosity is the mean of its own part of the image."""
     assert patterned().max() <= 0.95
     scene = furnace(1.0)
-    solution = solve(scene)
-    hierarchy = solution.element_residual._hierarchy
+    hierarchy = solved(scene).hierarchy
     leaves = hierarchy.leaves
     assert hierarchy.level[leaves].max() > 0
     total = hierarchy.area[leaves] @ hierarchy.reflectance[leaves]

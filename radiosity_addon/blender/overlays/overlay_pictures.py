@@ -167,7 +167,7 @@ def _false_colors(context: bpy.types.Context, shown: list[ShownLightmap]) -> Ove
     # Pixels that show no surface are filled from those that do, or 0 farther off.
     values = np.concatenate([page[page != 0.0] for page in measured.values()])
     scale = _scale(context, values, quantity == "residual")
-    painted = {name: _opaque(scale(_thinned(page))) for name, page in measured.items()}
+    painted = {name: _opaque(scale(thinned(page))) for name, page in measured.items()}
     titles = {"residual": "Residual", "radiosity": "Radiosity"}
     title = titles.get(quantity, "Illuminance" if settings.unit == "LUX" else "Irradiance")
     legend = Legend(title, unit_name(quantity, settings.unit), scale)
@@ -218,7 +218,7 @@ def _texels(context: bpy.types.Context, kept: KeptDetails) -> OverlayPicture | N
         table = np.zeros((256, 4), dtype=np.float32)
         for state, (color, _) in STATE_COLORS.items():
             table[state] = (*color, 1.0)
-        painted = {name: table[_thinned(page.state)] for name, page in pages.items()}
+        painted = {name: table[thinned(page.state)] for name, page in pages.items()}
         entries = tuple(STATE_COLORS.values())
         return OverlayPicture(_surfaces(shown, painted), legend=Legend("Problem Texels", entries=entries))
     signed = settings.error_of == "ELEMENTS"
@@ -228,7 +228,7 @@ def _texels(context: bpy.types.Context, kept: KeptDetails) -> OverlayPicture | N
     }
     known = np.concatenate([errors[name][page.state != NO_TEXEL_HERE] for name, page in pages.items()])
     scale = _scale(context, known, signed)
-    painted = {name: _opaque(scale(_thinned(values))) for name, values in errors.items()}
+    painted = {name: _opaque(scale(thinned(values))) for name, values in errors.items()}
     title = "Elements Minus Texels" if signed else "Estimated Noise"
     return OverlayPicture(_surfaces(shown, painted), legend=Legend(title, "W/m²", scale))
 
@@ -291,7 +291,7 @@ def _surfaces(shown: Sequence[ShownLightmap], pages: dict[str, Array]) -> Surfac
     )
 
 
-def _thinned(page: Array) -> Array:
+def thinned(page: Array) -> Array:
     """Return a page of at most `WIDEST` pixels: of more it leaves some out."""
     if len(page) <= WIDEST:
         return page
