@@ -1,4 +1,4 @@
-"""The open scene as a bake sees it: plain triangles with one diffuse colour a material, lamps, an even sky.
+"""The open scene as a bake sees it: plain triangles with one diffuse color a material, lamps, an even sky.
 
 What is approximated on export (images by their means, gloss as matte) would count as our error against Cycles
 although no solver could help it. So both programs bake the scene after this: modifiers applied, instances

@@ -38,14 +38,14 @@ RESULTS = Path(__file__).parent / "results" / "incremental.json"
 
 
 def box() -> tuple[BakeScene, str, Callable[[np.ndarray], np.ndarray]]:
-    """The Cornell box, and its short block a quarter of a metre aside and turned by 15°."""
+    """The Cornell box, and its short block a quarter of a meter aside and turned by 15°."""
     scene = cornell_box()
     parts = bake_scene(scene, ("Walls", 10), ("Short Block", 10), ("Tall Block", 10), ("Lamp", 2))
     return parts, "Short Block", _placed((1.85, 0.0, 1.69), 15.0, 1, (0.25, 0.0, -0.2))
 
 
 def office() -> tuple[BakeScene, str, Callable[[np.ndarray], np.ndarray]]:
-    """The office, and one of its chairs half a metre aside and turned by 25°."""
+    """The office, and one of its chairs half a meter aside and turned by 25°."""
     import bpy
 
     from radiosity_addon.blender.files.files import empty_scene
@@ -57,8 +57,8 @@ def office() -> tuple[BakeScene, str, Callable[[np.ndarray], np.ndarray]]:
     build_office()
     exported = export_scene(bpy.context, BakeSettings()).bake_scene
     chair = next(item for item in exported.objects if item.name == "Chair 2")
-    centre = exported.scene.triangles[chair.rows].mean(axis=(0, 1)) * (1.0, 1.0, 0.0)
-    return exported, chair.name, _placed(centre, 25.0, 2, (0.4, -0.25, 0.0))
+    center = exported.scene.triangles[chair.rows].mean(axis=(0, 1)) * (1.0, 1.0, 0.0)
+    return exported, chair.name, _placed(center, 25.0, 2, (0.4, -0.25, 0.0))
 
 
 SCENES = {"cornell": box, "office": office}

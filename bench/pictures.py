@@ -26,7 +26,7 @@ DPI = 110
 def draw_curves(results: dict[str, Any], path: Path) -> None:
     """Draw error against time of all three, doubly logarithmic."""
     figure, panel = plt.subplots(figsize=(6.4, 4.2), constrained_layout=True)
-    for who, name, colour, style in (
+    for who, name, color, style in (
         ("ours", "ours", BLUE, "o-"),
         ("cycles", "Cycles", ORANGE, "s-"),
         ("cycles_oidn", "Cycles + Open Image Denoise", GREEN, "^-"),
@@ -35,13 +35,13 @@ def draw_curves(results: dict[str, Any], path: Path) -> None:
         if not entries:
             continue
         seconds, errors = [e["seconds"] for e in entries], [max(e["error"], 1e-4) for e in entries]
-        panel.loglog(seconds, errors, style, color=colour, label=name)
+        panel.loglog(seconds, errors, style, color=color, label=name)
         for entry, x, y in zip(entries, seconds, errors, strict=True):
             text = entry["label"] if who == "ours" else f"{entry['samples']}"
-            panel.annotate(text, (x, y), xytext=(4, 4), textcoords="offset points", fontsize=7, color=colour)
+            panel.annotate(text, (x, y), xytext=(4, 4), textcoords="offset points", fontsize=7, color=color)
         if who == "cycles":
             x = np.array([seconds[-1], 30 * seconds[-1]])
-            panel.loglog(x, errors[-1] * (x / x[0]) ** -0.5, "--", color=colour, linewidth=1)
+            panel.loglog(x, errors[-1] * (x / x[0]) ** -0.5, "--", color=color, linewidth=1)
     for row in results["at_equal_error"]:
         panel.axhline(row["error"], color="0.8", linewidth=0.7, zorder=0)
     made = results["context"]

@@ -11,7 +11,7 @@ import numpy as np
 from radiosity_addon.blender.files.cornell import build_cornell_box
 from radiosity_addon.blender.files.files import empty_scene, open_scene
 from radiosity_addon.blender.scene_export.export import export_scene
-from radiosity_addon.lightmap.texels.rasterize import rasterise
+from radiosity_addon.lightmap.texels.rasterization import rasterize
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import LIGHTMAP_UV_LAYER
 from tests.golden import cornell_reference
@@ -44,7 +44,7 @@ def prepare(job: dict[str, Any]) -> dict[str, Any]:
     folder.mkdir(parents=True, exist_ok=True)
     bpy.context.preferences.filepaths.save_version = 0
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / SCENE), compress=True)
-    triangle, uv = _centre_inside(case)
+    triangle, uv = _center_inside(case)
     scene = bpy.context.scene
     cycles.set_up(scene, job["threads"])
     compared = (triangle >= 0) & cycles.covered(scene, case.resolution)
@@ -83,14 +83,14 @@ def _add_lamp(lamp: Lamp) -> None:
     bpy.context.scene.collection.objects.link(obj)
 
 
-def _centre_inside(case: Case) -> tuple[np.ndarray, np.ndarray]:
-    """Return (n, n) the reflecting triangle over a texel's centre, −1 for none; and the triangles' UVs."""
+def _center_inside(case: Case) -> tuple[np.ndarray, np.ndarray]:
+    """Return (n, n) the reflecting triangle over a texel's center, −1 for none; and the triangles' UVs."""
     scene = export_scene(bpy.context, BakeSettings(resolution=case.resolution, keep_uvs=True)).bake_scene
     uv = np.concatenate(
         [np.zeros((item.count, 3, 2), np.float32) if item.uv is None else item.uv for item in scene.objects]
     )
-    texels = rasterise(uv, case.resolution)
-    inside = texels.centre_inside & (scene.scene.reflectance[texels.triangle].min(axis=1) > 0)
+    texels = rasterize(uv, case.resolution)
+    inside = texels.center_inside & (scene.scene.reflectance[texels.triangle].min(axis=1) > 0)
     triangle = np.full((case.resolution, case.resolution), -1, dtype=np.int32)
     triangle[texels.row[inside], texels.column[inside]] = texels.triangle[inside]
     return triangle, uv

@@ -204,7 +204,7 @@ def main() -> None:
     options = parser.parse_args()
     settings = {"resolution": options.resolution, "quality": options.quality}
     white = np.array([(30.0, 22.0, 12.0)])
-    colours = [("the same", white), ("another colour", np.array([(5.0, 40.0, 30.0)]))]
+    colors = [("the same", white), ("another color", np.array([(5.0, 40.0, 30.0)]))]
     lamp_on = BAKED.copy()
     lamp_on[1] = 30.0
     changes = [("the same", BAKED), ("dark lamp on", lamp_on), ("all changed", CHANGED)]
@@ -215,7 +215,7 @@ def main() -> None:
         "case": "relight",
         **settings,
         "scenes": [
-            measure("Cornell box", box, colours, **settings),
+            measure("Cornell box", box, colors, **settings),
             measure("room of all kinds of light", lit_bake, changes + alone, **settings),
         ],
         "panel": measure_panel(options.resolution, options.quality),

@@ -19,7 +19,7 @@ POWER = 400.0
 """Of the lamp, the middle of the ceiling [W], in each channel."""
 
 CEILING = 1
-COLOURS = np.array(
+COLORS = np.array(
     [(0.4, 0.3, 0.2), (0.8, 0.8, 0.8), (0.7, 0.2, 0.1), (0.2, 0.5, 0.2), *[(0.7, 0.7, 0.7)] * 8]
 )
 """Reflectances of the room's six sides and the block's."""
@@ -40,7 +40,7 @@ def room(triangles: int) -> tuple[Scene, np.ndarray]:
         np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
     )
     emission = lamp[:, None] * np.full(3, POWER / area[lamp].sum())
-    scene = Scene(corners, COLOURS[side], emission)
+    scene = Scene(corners, COLORS[side], emission)
     return scene, _uv(corners, side)
 
 

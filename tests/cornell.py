@@ -1,4 +1,4 @@
-"""The Cornell box as arrays, with an emissive lamp: walls in colour, two blocks, one side open."""
+"""The Cornell box as arrays, with an emissive lamp: walls in color, two blocks, one side open."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _BLOCKS = [
 
 
 def cornell_box() -> Scene:
-    """Return the box in metres: 32 one-sided triangles; the blocks have no bottoms."""
+    """Return the box in meters: 32 one-sided triangles; the blocks have no bottoms."""
     quads = list(_WALLS)
     for height, foot in _BLOCKS:
         quads.append((WHITE, [(x, height, z) for x, z in foot]))
@@ -34,9 +34,9 @@ def cornell_box() -> Scene:
             quads.append((WHITE, [(x0, 0, z0), (x0, height, z0), (x1, height, z1), (x1, 0, z1)][::-1]))
     quads.append((LAMP, _LAMP))
     triangles, reflectance = [], []
-    for colour, (a, b, c, d) in quads:
+    for color, (a, b, c, d) in quads:
         triangles += [(a, b, c), (a, c, d)]
-        reflectance += [colour, colour]
+        reflectance += [color, color]
     emission = np.zeros((len(triangles), 3))
     emission[-2:] = EXITANCE
     return Scene(0.01 * np.array(triangles, dtype=float), np.array(reflectance), emission)

@@ -9,7 +9,7 @@ import numpy as np
 
 from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import AreaLight, EnvironmentLight, PointLight, Scene, SunLight
-from tests.rooms import box_room, grey, rectangle, solid_box
+from tests.rooms import box_room, gray, rectangle, solid_box
 from tests.unit.texel_scenes import bake_scene
 
 BOX, PANEL = slice(10, 22), slice(22, 24)
@@ -32,9 +32,9 @@ def room(
     box = size * solid_box((-0.2, -0.2, 0.0), (0.2, 0.2, 0.5)) @ about.T + (*at, 0.0)
     glowing = rectangle((1.9 + panel, 0.3, 1.5), (0, 0.3, 0), (0.3, 0, 0))
     triangles = np.concatenate([walls[surface != 3], box, glowing])
-    reflectance = grey(len(triangles), 0.6)
+    reflectance = gray(len(triangles), 0.6)
     reflectance[BOX] = (0.7, 0.3, 0.2)
-    emission = grey(len(triangles), 0.0)
+    emission = gray(len(triangles), 0.0)
     emission[PANEL] = (14.0, 12.0, 9.0)
     lights = (
         PointLight((1.1, 1.0, 1.3), (22.0, 20.0, 16.0), radius=0.05, name="Bulb"),

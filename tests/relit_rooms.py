@@ -9,14 +9,14 @@ import numpy as np
 from radiosity_addon.lights.environment import SkyPatch, pixel_bounds
 from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import AreaLight, EnvironmentLight, PointLight, Scene
-from tests.rooms import box_room, grey, rectangle, solid_box
+from tests.rooms import box_room, gray, rectangle, solid_box
 from tests.unit.texel_scenes import bake_scene
 
 SUN = pixel_bounds((64, 128))[45 * 128 + 70 : 45 * 128 + 72]
 """Bounds of a bright part of the sky: two cells, 36° above the horizon."""
 
 PANEL, SIGN = slice(10, 12), slice(12, 14)
-"""The emissive triangles: a panel in one colour, and a red sign."""
+"""The emissive triangles: a panel in one color, and a red sign."""
 
 NAMES = ("Bulb", "Window light", "World", "World", "Panel", "Sign")
 """Of the sources."""
@@ -36,9 +36,9 @@ def lit_room(strengths: np.ndarray = BAKED) -> Scene:
     sign = rectangle((0.05, 0.5, 1.0), (0, 0.5, 0), (0, 0, 0.4))
     box = solid_box((1.2, 0.6, 0.0), (1.8, 1.1, 0.7))
     triangles = np.concatenate([room[surface != 3], panel, sign, box])
-    reflectance = grey(len(triangles), 0.6)
+    reflectance = gray(len(triangles), 0.6)
     reflectance[:10][surface[surface != 3] == 2] = (0.7, 0.2, 0.1)
-    emission = grey(len(triangles), 0.0)
+    emission = gray(len(triangles), 0.0)
     emission[PANEL], emission[SIGN] = strengths[4], strengths[5]
     lights = (
         PointLight((2.2, 0.5, 1.4), strengths[0], radius=0.05, name="Bulb"),

@@ -69,7 +69,7 @@ def sphere(subdivisions: int) -> np.ndarray:
     return triangles
 
 
-def grey(count: int, value: float) -> np.ndarray:
+def gray(count: int, value: float) -> np.ndarray:
     """Return (count, 3) rows of one value."""
     return np.full((count, 3), float(value))
 
@@ -79,12 +79,12 @@ def area_mean(values: np.ndarray, areas: np.ndarray) -> np.ndarray:
     return np.asarray(areas @ values / areas.sum())
 
 
-def coloured_room() -> Scene:
-    """A closed room with a box in it, a lamp, and walls of three colours, one of them black."""
+def colored_room() -> Scene:
+    """A closed room with a box in it, a lamp, and walls of three colors, one of them black."""
     room, surface = box_room((3, 2, 2))
     triangles = np.concatenate([room, solid_box((0.5, 0.5, 0.3), (1.2, 1.2, 1.0))])
-    reflectance = grey(len(triangles), 0.6)
+    reflectance = gray(len(triangles), 0.6)
     reflectance[:12][surface == 2] = (0.9, 0.1, 0.0)
     reflectance[:12][surface == 3] = 0.0
     lamp = PointLight((2.5, 1.5, 1.5), 50.0)
-    return Scene(triangles, reflectance, grey(len(triangles), 0.0), lights=[lamp])
+    return Scene(triangles, reflectance, gray(len(triangles), 0.0), lights=[lamp])

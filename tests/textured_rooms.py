@@ -8,7 +8,7 @@ import numpy as np
 
 from radiosity_addon.scene.textures import SurfaceImages
 from radiosity_addon.solver import Scene
-from tests.rooms import box_room, grey, rectangle
+from tests.rooms import box_room, gray, rectangle
 from tests.unit.texel_scenes import QUAD_UV
 
 
@@ -43,7 +43,7 @@ def furnace(level: float = 3.0, opacity: Any = None, seed: int = 0) -> Scene:
     if opacity is None:
         count = len(room)
         return Scene(
-            room, grey(count, 0), grey(count, 0), images=SurfaceImages(values, uv, np.ones(count, bool))
+            room, gray(count, 0), gray(count, 0), images=SurfaceImages(values, uv, np.ones(count, bool))
         )
     triangles = np.concatenate([room, rectangle((1, 0, 0), (0, 1, 0), (0, 0, 1))])
     count = len(triangles)
@@ -55,8 +55,8 @@ def furnace(level: float = 3.0, opacity: Any = None, seed: int = 0) -> Scene:
     two_sided = np.arange(count) >= len(room)
     return Scene(
         triangles,
-        grey(count, 0),
-        grey(count, 0),
+        gray(count, 0),
+        gray(count, 0),
         two_sided=two_sided,
         images=SurfaceImages(both, uv, np.ones(count, bool)),
     )

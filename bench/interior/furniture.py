@@ -8,7 +8,7 @@ from .shapes import Shape, ball, box, cushion, cylinder, grid, join, lathe, poly
 
 
 def desk() -> Shape:
-    """Return a desk of 1.6 m × 0.8 m; who sits there looks towards +y."""
+    """Return a desk of 1.6 m × 0.8 m; who sits there looks toward +y."""
     top = box("Oak", (1.6, 0.8, 0.03)).at(z=0.71)
     legs = [cylinder("Steel", 0.025, 0.71, 12).at(x, y) for x in (-0.74, 0.74) for y in (-0.34, 0.34)]
     drawers = [box("White", (0.42, 0.6, 0.56), bottom=False).at(0.48, 0.02)]
@@ -38,7 +38,7 @@ def office_chair(around: int) -> Shape:
 
 
 def monitor() -> Shape:
-    """Return a screen that shines towards −y."""
+    """Return a screen that shines toward −y."""
     frame = box("Black", (0.6, 0.03, 0.36)).at(0, 0, 0.12)
     screen = polygon(
         "Screen", (-0.28, -0.016, 0.14), (0.28, -0.016, 0.14), (0.28, -0.016, 0.46), (-0.28, -0.016, 0.46)
@@ -76,20 +76,20 @@ def pendant(around: int) -> Shape:
 
 
 def bookcase(random: np.random.Generator, shelves: int = 5) -> Shape:
-    """Return shelves with books, 1 m wide, 2 m high, open towards +y, its back at y = 0."""
+    """Return shelves with books, 1 m wide, 2 m high, open toward +y, its back at y = 0."""
     width, depth, height = 1.0, 0.32, 2.0
     side = [box("Oak", (0.025, depth, height), bottom=False).at(x, depth / 2) for x in (-0.4875, 0.4875)]
     back = [box("Oak", (width, 0.015, height), bottom=False).at(0, 0.0075)]
     levels, books = np.linspace(0.05, height - 0.03, shelves + 1), []
     boards = [box("Oak", (0.95, depth - 0.02, 0.025)).at(0, depth / 2, z) for z in levels]
-    colours = ("Red", "Blue Cloth", "Green", "Paper", "Yellow", "Black")
+    colors = ("Red", "Blue Cloth", "Green", "Paper", "Yellow", "Black")
     for z in levels[:-1]:
         x = -0.46
         while x < random.uniform(0.1, 0.4):
             thickness = random.uniform(0.025, 0.07)
             size = (thickness - 0.002, random.uniform(0.17, 0.24), random.uniform(0.2, 0.31))
-            colour = colours[random.integers(len(colours))]
-            books.append(box(colour, size, bottom=False).at(x + thickness / 2, size[1] / 2 + 0.03, z + 0.025))
+            color = colors[random.integers(len(colors))]
+            books.append(box(color, size, bottom=False).at(x + thickness / 2, size[1] / 2 + 0.03, z + 0.025))
             x += thickness
     return join([*side, *back, *boards, *books])
 
@@ -160,18 +160,18 @@ def waste_bin(around: int) -> Shape:
     return lathe("Black", [(0.1, 0), (0.14, 0.32), (0.132, 0.32), (0.095, 0.01), (0, 0.01)], around)
 
 
-def picture(width: float, height: float, colour: str) -> Shape:
-    """Return a framed picture in the plane y = 0 that looks towards +y."""
+def picture(width: float, height: float, color: str) -> Shape:
+    """Return a framed picture in the plane y = 0 that looks toward +y."""
     frame = box("Black", (width, 0.03, height)).at(0, 0.016)
     x = width / 2 - 0.04
     inside = polygon(
-        colour, (x, 0.032, 0.04), (-x, 0.032, 0.04), (-x, 0.032, height - 0.04), (x, 0.032, height - 0.04)
+        color, (x, 0.032, 0.04), (-x, 0.032, 0.04), (-x, 0.032, height - 0.04), (x, 0.032, height - 0.04)
     )
     return join([frame, inside])
 
 
 def door() -> Shape:
-    """Return a closed door with its frame in the plane y = 0, looking towards +y."""
+    """Return a closed door with its frame in the plane y = 0, looking toward +y."""
     leaf = box("Oak", (0.9, 0.04, 2.0)).at(0, 0.02, 0.005)
     frame = [box("White", (0.08, 0.08, 2.08), bottom=False).at(x, 0.04) for x in (-0.49, 0.49)]
     frame.append(box("White", (0.9, 0.08, 0.075)).at(0, 0.04, 2.005))

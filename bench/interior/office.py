@@ -26,7 +26,7 @@ PANEL_POWER, DESK_LAMP_POWER, BULB_RADIANCE, SCREEN_RADIANCE = 55.0, 4.0, 90.0, 
 LAMP_TURN = -40
 """Of the desk lamps [°]: their heads hang over the desk, away from the monitors' edges."""
 
-COLOURS = {
+COLORS = {
     "Wall": (0.76, 0.74, 0.70),
     "Accent": (0.30, 0.42, 0.50),
     "Ceiling": (0.82, 0.82, 0.82),
@@ -57,7 +57,7 @@ def build_office(detail: float = 1.0) -> bpy.types.Scene:
     """
     scene = bpy.context.scene
     scene.name = "Office"
-    materials = {name: _diffuse(name, colour) for name, colour in COLOURS.items()}
+    materials = {name: _diffuse(name, color) for name, color in COLORS.items()}
     materials |= {name: _glowing(name, radiance) for name, radiance in GLOWS.items()}
     for name, shape in pieces(detail):
         _add_mesh(scene, name, shape, materials)
@@ -118,7 +118,7 @@ def pieces(detail: float) -> Iterator[tuple[str, Shape]]:
 def _room() -> Iterator[tuple[str, Shape]]:
     """Yield the shell, single faces that meet at their edges, seen from inside, and what is built in.
 
-    Nothing lies in the shell's planes: it stands a millimetre off, or goes a centimetre through.
+    Nothing lies in the shell's planes: it stands a millimeter off, or goes a centimeter through.
     """
     x, y, z = WIDTH, DEPTH, HEIGHT
     yield "Floor", polygon("Floor", (0, 0, 0), (x, 0, 0), (x, y, 0), (0, y, 0))
@@ -218,27 +218,27 @@ def _add_camera(scene: bpy.types.Scene) -> None:
     scene.render.resolution_x, scene.render.resolution_y = 960, 600
 
 
-def _diffuse(name: str, colour: tuple[float, float, float]) -> bpy.types.Material:
-    return _material(name, "ShaderNodeBsdfDiffuse", colour)
+def _diffuse(name: str, color: tuple[float, float, float]) -> bpy.types.Material:
+    return _material(name, "ShaderNodeBsdfDiffuse", color)
 
 
 def _glowing(name: str, radiance: float) -> bpy.types.Material:
-    colour = (0.6, 0.8, 1.0) if name == "Screen" else (1.0, 0.78, 0.5)
-    material = _material(name, "ShaderNodeEmission", colour)
+    color = (0.6, 0.8, 1.0) if name == "Screen" else (1.0, 0.78, 0.5)
+    material = _material(name, "ShaderNodeEmission", color)
     next(node for node in material.node_tree.nodes if node.type == "EMISSION").inputs[
         "Strength"
     ].default_value = radiance
     return material
 
 
-def _material(name: str, kind: str, colour: tuple[float, float, float]) -> bpy.types.Material:
+def _material(name: str, kind: str, color: tuple[float, float, float]) -> bpy.types.Material:
     material = bpy.data.materials.new(name)
     if bpy.app.version < (5, 0):
         material.use_nodes = True
-    material.diffuse_color = (*colour, 1.0)
+    material.diffuse_color = (*color, 1.0)
     tree = material.node_tree
     tree.nodes.clear()
     output, shader = tree.nodes.new("ShaderNodeOutputMaterial"), tree.nodes.new(kind)
-    shader.inputs["Color"].default_value = (*colour, 1.0)
+    shader.inputs["Color"].default_value = (*color, 1.0)
     tree.links.new(shader.outputs[0], output.inputs["Surface"])
     return material

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 BLUE, ORANGE, GREEN, RED, VIOLET, BROWN = "#2166ac", "#e08214", "#1b9e77", "#c51b29", "#7b3294", "#8c6d31"
-GREY = "0.55"
+GRAY = "0.55"
 CYCLE = (BLUE, ORANGE, GREEN, RED, VIOLET, BROWN, "0.2", "#17a2b8")
 
 DPI = 130
@@ -50,7 +50,7 @@ def axes(columns: int = 1, width: float = 6.0, height: float = 3.2) -> tuple[Fig
 def slope(panel: Axes, x: tuple[float, float], y: float, order: float, text: str) -> None:
     """Draw a gray line of `order` in a doubly logarithmic panel, from (x[0], y)."""
     end = y * (x[1] / x[0]) ** order
-    panel.plot(x, (y, end), color=GREY, linewidth=1, linestyle="--")
+    panel.plot(x, (y, end), color=GRAY, linewidth=1, linestyle="--")
     panel.annotate(text, (x[1], end), xytext=(4, 0), textcoords="offset points", color="0.4", fontsize=8)
 
 

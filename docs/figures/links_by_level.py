@@ -28,7 +28,7 @@ def figure(small: bool) -> Figure:
     exchange = links.factor * links.visibility * hierarchy.area[links.receiver]
     check(hierarchy, links.receiver, source, exchange, min_area * hierarchy.faces.area.sum())
 
-    centre = hierarchy.corners.mean(axis=1)
+    center = hierarchy.corners.mean(axis=1)
     leaves = hierarchy.leaves
     colors = 0.3 + 0.7 * painting.display(state.radiosity[leaves], exposure=1.5)
     shown = [depth for depth in LEVELS if (level == depth).any()]
@@ -37,7 +37,7 @@ def figure(small: bool) -> Figure:
         chosen = np.flatnonzero(level == depth)
         picked = chosen[np.linspace(0, len(chosen) - 1, min(len(chosen), 500)).astype(int)]
         painting.paint(panel, hierarchy, leaves, colors, edges=0.15)
-        painting.lines(panel, centre[source[picked]], centre[links.receiver[picked]], "#103060", 0.4, 0.5)
+        painting.lines(panel, center[source[picked]], center[links.receiver[picked]], "#103060", 0.4, 0.5)
         share = exchange[chosen].sum() / exchange.sum()
         panel.set_title(f"receivers of level {depth}:\n{len(chosen)} links, {share:.0%} of AFV", fontsize=8)
     drawn.suptitle(f"{len(links)} links, {len(leaves)} leaves (at most 500 links drawn in each)", fontsize=8)

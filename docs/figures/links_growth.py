@@ -26,7 +26,7 @@ def figure(small: bool) -> Figure:
     assert (np.array(links) < 12 * n).all()
     drawn, (panel,) = drawing.axes(1, 5.0, 3.0)
     # Elements that do not face each other make no entry: those of one wall of six.
-    panel.loglog(n, n**2 * 5 / 6, "--", color=drawing.GREY, label=r"entries of the matrix, $\frac{5}{6}n^2$")
+    panel.loglog(n, n**2 * 5 / 6, "--", color=drawing.GRAY, label=r"entries of the matrix, $\frac{5}{6}n^2$")
     panel.loglog(n, links, "o", label=rf"links: $\propto n^{{{exponent:.2f}}}$")
     panel.loglog(
         n, np.exp(np.polyval(np.polyfit(np.log(n), np.log(links), 1), np.log(n))), color=drawing.BLUE

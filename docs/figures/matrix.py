@@ -54,7 +54,7 @@ def figure(small: bool) -> Figure:
     np.testing.assert_allclose(radius, values, rtol=2e-3)
     bound = (1 + values) / (1 - values)
     assert (np.array(condition) <= bound * 1.001).all()
-    right.semilogy(values, bound, "--", color=drawing.GREY, label=r"$(1+\rho)/(1-\rho)$")
+    right.semilogy(values, bound, "--", color=drawing.GRAY, label=r"$(1+\rho)/(1-\rho)$")
     right.semilogy(values, condition, "o-", label="condition, symmetrized")
     right.semilogy(values, np.log(1e-6) / np.log(values), "s-", label="Jacobi iterations for 10⁻⁶")
     right.set(xlabel=r"reflectance $\rho$")

@@ -42,7 +42,7 @@ def figure(small: bool) -> Figure:
     left.legend()
     right.plot(along, floor, "o", markersize=3, label="the solver's lamp")
     right.plot(along, intensity * HEIGHT / distance**3, color=drawing.ORANGE, label=r"$I\cos\theta/r^2$")
-    right.axvline(half, color=drawing.GREY, linestyle="--", linewidth=1)
+    right.axvline(half, color=drawing.GRAY, linestyle="--", linewidth=1)
     right.annotate(
         "half as bright", (half, floor.max() * 0.8), xytext=(4, 0), textcoords="offset points", color="0.4"
     )

@@ -10,7 +10,7 @@ from radiosity_addon.solver import Scene
 
 FLOOR, CEILING, WALLS = 0, 1, 2
 
-METRES_PER_UNIT = 0.01
+METERS_PER_UNIT = 0.01
 WHITE, GREEN, RED = (0.7386, 0.7354, 0.7507), (0.1184, 0.3831, 0.0235), (0.4508, 0.0358, 0.0117)
 LAMP = np.pi * np.array([20.74, 10.86, 2.77])
 """Emission of the Cornell box's lamp [W/m²]."""
@@ -72,7 +72,7 @@ def cube(reflectance: float, n: int = 1, ceiling: float = 1.0) -> tuple[Scene, n
 def cornell_box(gain: float | None = None) -> Scene:
     """Return the Cornell box [m] with its lamp as an emitting rectangle.
 
-    `gain` replaces all reflectances by one grey value.
+    `gain` replaces all reflectances by one gray value.
     """
     parts, colors = [], []
     for color, corners in _WALLS:
@@ -85,7 +85,7 @@ def cornell_box(gain: float | None = None) -> Scene:
     parts.append(quad(_LAMP))
     colors += [(0.0, 0.0, 0.0)] * 2
     # Cornell's x points left and its y up; here x points right, y into the room and z up.
-    triangles = np.concatenate(parts) * METRES_PER_UNIT
+    triangles = np.concatenate(parts) * METERS_PER_UNIT
     triangles = np.stack([2.78 - triangles[..., 0], triangles[..., 2], triangles[..., 1]], axis=-1)
     reflectance = np.array(colors)
     if gain is not None:

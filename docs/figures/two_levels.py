@@ -46,8 +46,8 @@ def figure(small: bool) -> Figure:
 def by_place(state: SolverState) -> np.ndarray:
     """Return the leaves' irradiance (red) in an order that does not depend on when they were made."""
     leaves = state.hierarchy.leaves
-    centre = state.hierarchy.corners[leaves].mean(axis=1).round(9)
-    return np.asarray(state.irradiance[leaves[np.lexsort(centre.T)], 0])
+    center = state.hierarchy.corners[leaves].mean(axis=1).round(9)
+    return np.asarray(state.irradiance[leaves[np.lexsort(center.T)], 0])
 
 
 def difference(one: np.ndarray, other: np.ndarray) -> float:

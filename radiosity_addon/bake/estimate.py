@@ -60,7 +60,7 @@ class LightmappedObject:
     area : float
         In world space [m²].
     scale : float
-        Its texels per metre, relative to the other objects.
+        Its texels per meter, relative to the other objects.
     """
 
     name: str
@@ -195,7 +195,7 @@ def _taken(item: LightmappedObject, density: float, padding: float) -> float:
 
 
 def _density(objects: Sequence[LightmappedObject], resolution: int, padding: float) -> float:
-    """Return the texels per metre at which charts fill a page: Σ c (d √(A/c) + p)² = what there is."""
+    """Return the texels per meter at which charts fill a page: Σ c (d √(A/c) + p)² = what there is."""
     square = sum(item.surface for item in objects)
     if square <= 0.0:
         return 0.0

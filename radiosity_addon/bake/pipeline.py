@@ -1,4 +1,4 @@
-"""The bake as prose: unwrap, rasterise, solve, light the texels, encode.
+"""The bake as prose: unwrap, rasterize, solve, light the texels, encode.
 
 Canceled or failed, nothing outside was touched.
 """
@@ -22,7 +22,7 @@ from ..lightmap.lighting import (
     residual_summary,
     texel_residual,
 )
-from ..lightmap.texels import FOOTPRINT, TexelGeometry, rasterise, texel_materials
+from ..lightmap.texels import FOOTPRINT, TexelGeometry, rasterize, texel_materials
 from ..lightmap.unwrap import Atlas, AtlasInput, AtlasOptions, Limits, build_atlas, padding_for
 from ..numerics import Array, Scratch, tiles
 from ..options import BakeSettings
@@ -59,7 +59,7 @@ class TexelValues:
     materials: tuple[Array, Array] | None = None
 
 
-UNWRAP, RASTERISE, SOLVE, LIGHT, ENCODE = 0.0, 0.02, 0.04, 0.29, 0.98
+UNWRAP, RASTERIZE, SOLVE, LIGHT, ENCODE = 0.0, 0.02, 0.04, 0.29, 0.98
 """How far the whole is when each stage begins: shares of the time of the box and the office at medium quality
 (bench/results), of which the time left is reckoned."""
 
@@ -127,11 +127,11 @@ def _bake(
         raise SceneError("nothing to bake: give the scene a render-visible mesh with faces")
 
     refuse_before_unwrapping(bake_scene, settings)
-    part = progress.stage("unwrap", UNWRAP, RASTERISE)
+    part = progress.stage("unwrap", UNWRAP, RASTERIZE)
     part.at(0.0)
     with timed(seconds, "unwrap"):
         atlas = _unwrap(bake_scene, baked, settings, part)
-    progress.stage("rasterise", RASTERISE, SOLVE).at(0.0)
+    progress.stage("rasterise", RASTERIZE, SOLVE).at(0.0)
     sizes = [page.resolution for page in atlas.pages]
     refuse_too_large(sizes, settings)
     scratch = texel_scratch(sizes, settings)
@@ -263,7 +263,7 @@ def _texels(bake_scene: BakeScene, baked: list[BakeObject], atlas: Atlas, scratc
     # What has no area has no side to be lit from, whatever its UVs say.
     page_of_triangle[bake_scene.scene.areas == 0] = -1
     rows = [np.flatnonzero(page_of_triangle == page) for page in range(len(atlas.pages))]
-    texels = [rasterise(uv[of], page.resolution, scratch) for of, page in zip(rows, atlas.pages, strict=True)]
+    texels = [rasterize(uv[of], page.resolution, scratch) for of, page in zip(rows, atlas.pages, strict=True)]
     return TexelGeometry(bake_scene.scene, uv, page_of_triangle, texels, rows, scratch)
 
 

@@ -30,7 +30,7 @@ FloatArray = npt.NDArray[np.floating[Any]]
 def disk_factor(
     points: FloatArray,
     normals: FloatArray,
-    centres: FloatArray,
+    centers: FloatArray,
     source_normals: FloatArray,
     areas: FloatArray,
 ) -> FloatArray:
@@ -41,11 +41,11 @@ def disk_factor(
     well below 1 % beyond ten radii. Works in the precision of its arguments.
 
     points, normals (n, 3): Receiver points and their unit normals.
-    centres, source_normals (n, 3): Centroids and unit normals of the sources.
+    centers, source_normals (n, 3): Centroids and unit normals of the sources.
     areas (n,): Areas of the sources.
     Returns factors (n,) float in [0, 1), of the arguments' type.
     """
-    x, y, z = (centres[:, axis] - points[:, axis] for axis in range(3))
+    x, y, z = (centers[:, axis] - points[:, axis] for axis in range(3))
     square = x * x + y * y + z * z
     cosine_r = x * normals[:, 0] + y * normals[:, 1] + z * normals[:, 2]
     cosine_s = x * source_normals[:, 0] + y * source_normals[:, 1] + z * source_normals[:, 2]

@@ -59,7 +59,7 @@ def cap_cosine(cosine: npt.ArrayLike, sine_half: npt.ArrayLike) -> Float64Array:
 def point_to_ellipse(
     points: npt.ArrayLike,
     normals: npt.ArrayLike,
-    centre: npt.ArrayLike,
+    center: npt.ArrayLike,
     axis_u: npt.ArrayLike,
     axis_v: npt.ArrayLike,
 ) -> Float64Array:
@@ -72,7 +72,7 @@ def point_to_ellipse(
     the radius stop at `MAX_NODES` and may be off by some 1e-3.
 
     points, normals (n, 3).
-    centre (3,).
+    center (3,).
     axis_u, axis_v (3,): Conjugate half axes; the outline is center + u cosφ + v sinφ and the front is where u
         × v points.
     Returns factors (n,) float64 in [0, 1].
@@ -80,7 +80,7 @@ def point_to_ellipse(
     points, normals = np.asarray(points, dtype=np.float64), np.asarray(normals, dtype=np.float64)
     u, v = np.asarray(axis_u, dtype=np.float64), np.asarray(axis_v, dtype=np.float64)
     factors = np.zeros(len(points))
-    offset = np.asarray(centre, dtype=np.float64) - points
+    offset = np.asarray(center, dtype=np.float64) - points
     height = np.einsum("ij,ij->i", offset, normals)
     swing = np.hypot(normals @ u, normals @ v)
     in_front = offset @ np.cross(u, v) < 0.0
@@ -144,5 +144,5 @@ def _gauss_panels(nodes: int) -> tuple[Float64Array, Float64Array]:
     """Return nodes in (-1, 1) and weights of equal panels of `PANEL` Gauss-Legendre nodes each."""
     panels = nodes // PANEL
     where, weight = np.polynomial.legendre.leggauss(PANEL)  # type: ignore[no-untyped-call, unused-ignore]
-    centres = (2.0 * np.arange(panels) + 1.0) / panels - 1.0
-    return (centres[:, None] + where / panels).ravel(), np.tile(weight / panels, panels)
+    centers = (2.0 * np.arange(panels) + 1.0) / panels - 1.0
+    return (centers[:, None] + where / panels).ravel(), np.tile(weight / panels, panels)

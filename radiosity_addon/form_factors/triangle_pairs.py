@@ -112,9 +112,9 @@ def _chunk_factors(receivers: Float64Array, sources: Float64Array) -> Float64Arr
     outer_normal, inner_normal = np.where(swap, normal_s, normal_r), np.where(swap, normal_r, normal_s)
     outer_area = np.minimum(area_r, area_s)
 
-    centre = outer.mean(axis=1)
-    apart = np.linalg.norm(inner.mean(axis=1) - centre, axis=1)
-    outer_radius = _radius(outer, centre)
+    center = outer.mean(axis=1)
+    apart = np.linalg.norm(inner.mean(axis=1) - center, axis=1)
+    outer_radius = _radius(outer, center)
     inner_radius = _radius(inner, inner.mean(axis=1))
     # Distances to the other's plane; corners within rounding of it lie in it.
     noise = IN_PLANE * (apart + outer_radius + inner_radius)[:, None]
@@ -160,9 +160,9 @@ def _normals(triangles: Float64Array) -> tuple[Float64Array, Float64Array]:
     return cross / np.where(double > 0.0, double, 1.0)[:, None], 0.5 * double
 
 
-def _radius(triangles: Float64Array, centres: Float64Array) -> Float64Array:
+def _radius(triangles: Float64Array, centers: Float64Array) -> Float64Array:
     """Return the distance (m,) from each center to its triangle's farthest corner."""
-    arms = triangles - centres[:, None]
+    arms = triangles - centers[:, None]
     return np.sqrt(np.einsum("ijk,ijk->ij", arms, arms).max(axis=1))
 
 

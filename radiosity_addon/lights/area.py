@@ -94,10 +94,10 @@ class AreaLight(Emitter):
         """Return the irradiance per power, F / area (see `Lamp.unit_irradiance`)."""
         if not self._is_open:
             return self._narrow_irradiance(points, normals)
-        centre, half_u, half_v = self._half_axes()
+        center, half_u, half_v = self._half_axes()
         if self.shape == "ellipse":
-            return point_to_ellipse(points, normals, centre, half_u, half_v) / self.area
-        corners = centre + np.stack([-half_u - half_v, half_u - half_v, half_u + half_v, half_v - half_u])
+            return point_to_ellipse(points, normals, center, half_u, half_v) / self.area
+        corners = center + np.stack([-half_u - half_v, half_u - half_v, half_u + half_v, half_v - half_u])
         return point_to_polygon(points, normals, np.broadcast_to(corners, (len(points), 4, 3))) / self.area
 
     def shadow_rays(self, points: Float64Array, normals: Float64Array, u: Samples) -> Rays:
@@ -115,9 +115,9 @@ class AreaLight(Emitter):
 
     def _points(self, square: Float64Array) -> Float64Array:
         """Map (…, 2) points of the unit square to uniform points of the lamp, (…, 3)."""
-        centre, half_u, half_v = self._half_axes()
+        center, half_u, half_v = self._half_axes()
         across = concentric_disk(square) if self.shape == "ellipse" else 2.0 * square - 1.0
-        return centre + across @ np.stack([half_u, half_v])
+        return center + across @ np.stack([half_u, half_v])
 
     @property
     def _is_open(self) -> bool:
@@ -151,8 +151,8 @@ class AreaLight(Emitter):
 
     def _shines_on(self, points: Float64Array) -> npt.NDArray[np.bool_]:
         """Return (n,) whether a point may be in the beam: its disk meets the circle around the lamp."""
-        centre, half_u, half_v = self._half_axes()
-        above = points - centre
+        center, half_u, half_v = self._half_axes()
+        above = points - center
         height = above @ self._normal
         aside = np.linalg.norm(above - height[:, None] * self._normal, axis=1)
         circle = max(np.linalg.norm(half_u + half_v), np.linalg.norm(half_u - half_v))
@@ -165,8 +165,8 @@ class AreaLight(Emitter):
         The lamp's plane is measured in half axes: s across, where strip after strip is cut out of both
         the disk and the lamp, and t along the strips.
         """
-        centre, half_u, half_v = self._half_axes()
-        above = points - centre
+        center, half_u, half_v = self._half_axes()
+        above = points - center
         height = above @ self._normal
         radius = np.maximum(height, 0.0)[:, None] * np.tan(0.5 * self.spread)
         uu, uv, vv = half_u @ half_u, half_u @ half_v, half_v @ half_v

@@ -56,8 +56,8 @@ class EmbreeCaster:
         if self._empty:
             return
         corners = triangles.reshape(-1, 3)
-        self._centre = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
-        triangles = triangles - self._centre
+        self._center = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+        triangles = triangles - self._center
         if two_sided is not None and not two_sided.all():
             copied, copies = facing_copies(triangles, two_sided, self.surface_offset)
             triangles = np.concatenate([triangles, copies])
@@ -91,7 +91,7 @@ class EmbreeCaster:
             self._own_rays += count
 
         def trace(rows: slice) -> None:
-            start = (origins[rows] - self._centre).astype(np.float32)
+            start = (origins[rows] - self._center).astype(np.float32)
             along = np.ascontiguousarray(directions[rows], dtype=np.float32)
             # A copy on purpose: Embree overwrites the distances it is given.
             reach = np.minimum(distances[rows] * (1.0 - TARGET_SLACK), 1e30).astype(np.float32)
@@ -117,7 +117,7 @@ class EmbreeCaster:
             self._own_rays += count
 
         def trace(rows: slice) -> None:
-            start = (origins[rows] - self._centre).astype(np.float32)
+            start = (origins[rows] - self._center).astype(np.float32)
             along = np.ascontiguousarray(directions[rows], dtype=np.float32)
             found = self._scene.run(start, along, output=True)
             row = found["primID"]

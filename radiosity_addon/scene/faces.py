@@ -17,7 +17,7 @@ class Faces:
     Triangles without area, or out of the bounces, have no faces. Backs exist where `two_sided`.
     """
 
-    STORED = ("triangle", "normal", "centre", "area")
+    STORED = ("triangle", "normal", "center", "area")
 
     def __init__(self, scene: Scene) -> None:
         solid = np.flatnonzero((scene.areas > 0) & scene.in_bounces)
@@ -30,7 +30,7 @@ class Faces:
         corners[~self.front] = corners[~self.front][:, [0, 2, 1]]
         self.corners = corners
         """(f, 3, 3) float64, counter-clockwise as seen from the side's own half-space"""
-        self.centre = corners.mean(axis=1)
+        self.center = corners.mean(axis=1)
         """(f, 3) float64: the centroids [m]"""
         sign = np.where(self.front, 1.0, -1.0)[:, None]
         self.normal = scene.face_normals[self.triangle] * sign

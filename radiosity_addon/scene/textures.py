@@ -137,8 +137,8 @@ class SurfaceImages:
         _refuse(self.textured & outside.any(axis=(1, 2)), "has image coordinates outside [0, 1]")
         self.image_uv[~self.textured] = 0.0
         values = self.values
-        colours = ~(np.isfinite(values) & (values >= 0)).all(axis=2)
-        _refuse(self._meets(colours), "meets a texel that is negative, NaN or infinite")
+        colors = ~(np.isfinite(values) & (values >= 0)).all(axis=2)
+        _refuse(self._meets(colors), "meets a texel that is negative, NaN or infinite")
         above = (values[..., [0, 1, 2, 6]] > 1 + ROUNDING).any(axis=2)
         _refuse(self._meets(above), "meets a texel of a reflectance or opacity above 1")
 

@@ -17,7 +17,7 @@ from radiosity_addon.numerics.sampling import cosine_hemisphere, points_on_trian
 from radiosity_addon.solver import PointLight, Scene, Solution
 from radiosity_addon.solver.methods.hierarchical import HierarchicalState, solve
 from tests.cornell import cornell_box
-from tests.rooms import CEILING, box_room, coloured_room, grey, solid_box
+from tests.rooms import CEILING, box_room, colored_room, gray, solid_box
 
 ON_A_TRIANGLE, OVER_ALL, POWER = 0.01, 0.002, 0.002
 
@@ -27,7 +27,7 @@ def furnished() -> Scene:
     triangles = np.concatenate([box_room((3, 2, 2))[0], solid_box((0.5, 0.5, 0.3), (1.2, 1.2, 1.0))])
     reflectance = np.random.default_rng(5).uniform(0.0, 0.9, (len(triangles), 3))
     lamp = PointLight((2.5, 1.5, 1.5), 50.0)
-    return Scene(triangles, reflectance, grey(len(triangles), 0.0), lights=[lamp])
+    return Scene(triangles, reflectance, gray(len(triangles), 0.0), lights=[lamp])
 
 
 def cornell_with_a_front(two_sided: bool = False) -> Scene:
@@ -36,8 +36,8 @@ def cornell_with_a_front(two_sided: bool = False) -> Scene:
     a, b, c, d = np.array([(0, 0, 0), (5.528, 0, 0), (5.56, 5.488, 0), (0, 5.488, 0)])
     return Scene(
         np.concatenate([box.triangles, [(a, b, c), (a, c, d)]]),
-        np.concatenate([box.reflectance, grey(2, 0.5)]),
-        np.concatenate([box.emission, grey(2, 0.0)]),
+        np.concatenate([box.reflectance, gray(2, 0.5)]),
+        np.concatenate([box.emission, gray(2, 0.0)]),
         two_sided=two_sided,
     )
 
@@ -45,16 +45,16 @@ def cornell_with_a_front(two_sided: bool = False) -> Scene:
 def enclosure() -> Scene:
     """Everything shines alike, and reflects nine tenths, in a room of 300 triangles: B = 10 E everywhere."""
     triangles, _ = box_room((1, 2, 0.5), 5)
-    return Scene(triangles, grey(len(triangles), 0.9), grey(len(triangles), 1.0))
+    return Scene(triangles, gray(len(triangles), 0.9), gray(len(triangles), 1.0))
 
 
 def cube_in_a_cube() -> Scene:
     """One cube in the middle of another of three times its size, whose ceiling shines."""
     outer, surface = box_room((3, 3, 3))
     triangles = np.concatenate([outer, solid_box((1, 1, 1), (2, 2, 2))])
-    emission = grey(len(triangles), 0.0)
+    emission = gray(len(triangles), 0.0)
     emission[: len(outer)][surface == CEILING] = 1.0
-    return Scene(triangles, grey(len(triangles), 0.7), emission)
+    return Scene(triangles, gray(len(triangles), 0.7), emission)
 
 
 def boxes_that_touch() -> Scene:
@@ -66,14 +66,14 @@ def boxes_that_touch() -> Scene:
         solid_box((1, 1, 1), (2, 2, 2)),
     ]
     triangles = np.concatenate([room, *boxes])
-    emission = grey(len(triangles), 0.0)
+    emission = gray(len(triangles), 0.0)
     emission[: len(room)][surface == CEILING] = 1.0
-    return Scene(triangles, grey(len(triangles), 0.6), emission)
+    return Scene(triangles, gray(len(triangles), 0.6), emission)
 
 
 SCENES = {
     "furnished": furnished,
-    "coloured": coloured_room,
+    "colored": colored_room,
     "cornell with a front": cornell_with_a_front,
     "cornell of two sides": lambda: cornell_with_a_front(two_sided=True),
     "enclosure": enclosure,
@@ -137,7 +137,7 @@ def test_where_all_shines_alike_it_is_equally_bright() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["coloured", "room of 300", "room of 1000", "cornell with a front", "cornell of two sides"]
+    "name", ["colored", "room of 300", "room of 1000", "cornell with a front", "cornell of two sides"]
 )
 def test_links_alone_would_not_do(name: str) -> None:
     assert np.abs(solved(name).closure() - 1.0).max() > ON_A_TRIANGLE

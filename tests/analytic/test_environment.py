@@ -19,13 +19,13 @@ from radiosity_addon.lights.environment import (
 from radiosity_addon.lights.sun_and_sky import EnvironmentLight, Light
 from radiosity_addon.numerics.sampling import stratified_square
 from radiosity_addon.solver import Scene, SolverSettings, solve
-from tests.rooms import grey, rectangle
+from tests.rooms import gray, rectangle
 
 SHAPE = (128, 256)
 
 
 def a_sky() -> np.ndarray:
-    """A coloured sky with a bright sun, a window, and dark ground."""
+    """A colored sky with a bright sun, a window, and dark ground."""
     rng = np.random.default_rng(3)
     pixels = 0.2 + 0.1 * rng.random((*SHAPE, 3))
     pixels[64:] += (0.2, 0.4, 0.8)
@@ -82,7 +82,7 @@ def test_a_plane_under_the_sky_receives_all_of_it() -> None:
     """Through the solver's own rays: ∫ L cosθ dω to 0.5 %."""
     plane = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0))
     pixels = a_sky()
-    scene = Scene(plane, grey(2, 0.0), grey(2, 0.0), lights=lights_of(pixels))
+    scene = Scene(plane, gray(2, 0.0), gray(2, 0.0), lights=lights_of(pixels))
     points = np.stack([*np.random.default_rng(0).uniform(0.1, 0.9, (2, 64)), np.zeros(64)], axis=1)
     up = np.broadcast_to([0, 0, 1.0], (64, 3))
     solution = solve(scene, SolverSettings(error=1e-2))
@@ -116,7 +116,7 @@ def test_rays_to_a_patch_integrate_to_its_irradiance() -> None:
     assert np.isinf(distances).all()
 
 
-def test_an_even_sky_is_one_light_and_a_grey_one_too() -> None:
+def test_an_even_sky_is_one_light_and_a_gray_one_too() -> None:
     (plain,) = even_part(np.broadcast_to((0.2, 0.3, 0.4), (*SHAPE, 3)))
     assert type(plain) is EnvironmentLight
     np.testing.assert_allclose(plain.strength, (0.2, 0.3, 0.4), rtol=1e-12)

@@ -261,13 +261,13 @@ def test_cap_is_continuous_where_it_touches_the_horizon(edge: float) -> None:
 
 def test_ellipse_is_the_limit_of_polygons() -> None:
     rng = np.random.default_rng(7)
-    count, centre = 80, np.array([0.3, -0.2, 0.5])
+    count, center = 80, np.array([0.3, -0.2, 0.5])
     u, v = np.array([1.0, 0.2, 0.0]), np.array([-0.1, 0.5, 0.3])
-    points, normals = centre + 1.5 * rng.normal(size=(count, 3)), unit_rows(rng, count)
+    points, normals = center + 1.5 * rng.normal(size=(count, 3)), unit_rows(rng, count)
     angle = np.arange(2048) * (2 * np.pi / 2048)
-    outline = centre + np.cos(angle)[:, None] * u + np.sin(angle)[:, None] * v
+    outline = center + np.cos(angle)[:, None] * u + np.sin(angle)[:, None] * v
     polygons = np.broadcast_to(outline, (count, *outline.shape))
-    ellipse = point_to_ellipse(points, normals, centre, u, v)
+    ellipse = point_to_ellipse(points, normals, center, u, v)
     assert (ellipse > 0).sum() > 15
     np.testing.assert_allclose(ellipse, point_to_polygon(points, normals, polygons), atol=2e-6)
 
@@ -278,21 +278,21 @@ def test_ellipse_is_the_limit_of_polygons() -> None:
 @pytest.mark.parametrize("kind", [np.float32, np.float64])
 def test_disk_factor_approaches_the_exact_one_with_the_square_of_distance(kind: type) -> None:
     triangle = np.array([[0.0, 0, 0], [0, 1, 0], [1, 0.2, 0]])
-    centre = triangle.mean(axis=0)
+    center = triangle.mean(axis=0)
     (normal,), (area,) = normals_of(triangle[None])
     way = np.array([0.3, -0.4, -1.0]) / np.linalg.norm([0.3, -0.4, -1.0])
     facing = -way + np.array([0.2, 0.1, 0])
     facing /= np.linalg.norm(facing)
     errors = []
     for distance in (4.0, 8.0, 16.0):
-        point = centre + distance * way
+        point = center + distance * way
         exact = factor(tuple(point), tuple(facing), triangle)
-        rows = [np.array([row], dtype=kind) for row in (point, facing, centre, normal, area)]
+        rows = [np.array([row], dtype=kind) for row in (point, facing, center, normal, area)]
         estimate = disk_factor(*rows)
         assert estimate.dtype == kind
         errors.append(abs(float(estimate[0]) / exact - 1))
     assert errors[0] < 0.02
     assert errors[1] / errors[2] > 3
-    assert disk_factor(point[None], -facing[None], centre[None], normal[None], np.array([area]))[0] == 0
-    assert disk_factor(point[None], facing[None], centre[None], -normal[None], np.array([area]))[0] == 0
-    assert disk_factor(centre[None], facing[None], centre[None], normal[None], np.array([area]))[0] == 0
+    assert disk_factor(point[None], -facing[None], center[None], normal[None], np.array([area]))[0] == 0
+    assert disk_factor(point[None], facing[None], center[None], -normal[None], np.array([area]))[0] == 0
+    assert disk_factor(center[None], facing[None], center[None], normal[None], np.array([area]))[0] == 0

@@ -10,7 +10,7 @@ from radiosity_addon.lightmap.lighting.sweeps import TexelLight
 from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
 from radiosity_addon.lights.light import Light
 from radiosity_addon.solver import EnvironmentLight, Scene, SolverSettings, SunLight, solve
-from tests.rooms import grey, rectangle
+from tests.rooms import gray, rectangle
 from tests.unit.texel_scenes import QUAD_UV, texel_geometry
 
 SIZE = 24
@@ -28,7 +28,7 @@ def light_of(
     """Bake rectangles, a page each; `others` have no lightmap, and glow or not. All have a reflectance."""
     triangles = np.concatenate([*baked, *others])
     part = np.repeat(np.array(reflectance), 2)[:, None] * np.ones(3)
-    emission = grey(len(triangles), 0.0)
+    emission = gray(len(triangles), 0.0)
     emission[2 * len(baked) :] = float(glowing)
     scene = Scene(triangles, part, emission, lights=lights)
     uv = np.zeros((len(triangles), 3, 2), dtype=np.float32)

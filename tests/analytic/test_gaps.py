@@ -8,7 +8,7 @@ import pytest
 from radiosity_addon.lightmap.lighting.gather_settings import GatherSettings
 from radiosity_addon.lightmap.lighting.reconstruction import reconstruct
 from radiosity_addon.solver import EnvironmentLight, Scene, SolverSettings, solve
-from tests.rooms import grey, rectangle
+from tests.rooms import gray, rectangle
 from tests.unit.texel_scenes import QUAD_UV, texel_geometry
 
 SIZE = 24
@@ -27,8 +27,8 @@ def test_light_reaches_into_a_gap_as_far_as_the_gap_is_high(reflectance: float) 
     triangles = np.concatenate([floor, under, top, edge])
     scene = Scene(
         triangles,
-        grey(len(triangles), reflectance),
-        grey(len(triangles), 0.0),
+        gray(len(triangles), reflectance),
+        gray(len(triangles), 0.0),
         lights=[EnvironmentLight(1.0 / np.pi)],
     )
     uv = np.concatenate([QUAD_UV, QUAD_UV, np.zeros((4, 3, 2), np.float32)])

@@ -15,9 +15,9 @@ from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from radiosity_addon.solver.methods import hierarchical, multi_level
 from radiosity_addon.solver.methods.hierarchical import HierarchicalState
 from radiosity_addon.solver.methods.multi_level import MultiLevelState
-from tests.rooms import CEILING, FLOOR, WALLS, area_mean, box_room, grey, rectangle, solid_box, sphere
+from tests.rooms import CEILING, FLOOR, WALLS, area_mean, box_room, gray, rectangle, solid_box, sphere
 
-# Howell's catalogue, CIE 171:2006 and Galerkin solutions extrapolated over n = 4 … 20 grids.
+# Howell's catalog, CIE 171:2006 and Galerkin solutions extrapolated over n = 4 … 20 grids.
 CUBE_WITH_EMITTING_CEILING = {FLOOR: 0.17122, CEILING: 1.1044, WALLS: 0.18110}
 CIE_5_8_INDIRECT_LX = {0.2: 26.04, 0.5: 104.17, 0.8: 416.67, 0.9: 937.5, 0.95: 1979.17}
 CIE_5_6_WALL_PERCENT = {0.75: 35.901, 1.25: 27.992, 1.75: 21.639, 2.25: 16.716, 2.75: 12.967}
@@ -37,15 +37,15 @@ def solved(scene: Scene, form_factor_error: float, min_area: float, **others: fl
 
 def cube(reflectance: float = 0.5) -> Scene:
     triangles, surface = box_room()
-    emission = grey(12, 1.0) * (surface == CEILING)[:, None]
-    return Scene(triangles, grey(12, reflectance), emission)
+    emission = gray(12, 1.0) * (surface == CEILING)[:, None]
+    return Scene(triangles, gray(12, reflectance), emission)
 
 
 def furnished(lights: list | None = None) -> Scene:
-    """A closed room of several colours with a box in the air, its ceiling shining."""
+    """A closed room of several colors with a box in the air, its ceiling shining."""
     room, surface = box_room((3, 2, 2))
     triangles = np.concatenate([room, solid_box((0.5, 0.5, 0.3), (1.2, 1.2, 1.0))])
-    emission = grey(len(triangles), 0.0)
+    emission = gray(len(triangles), 0.0)
     emission[:12][surface == CEILING] = (1.0, 0.5, 0.25)
     reflectance = np.random.default_rng(5).uniform(0.0, 0.9, (len(triangles), 3))
     return Scene(triangles, reflectance, emission, lights=lights or [])
@@ -172,8 +172,8 @@ def test_links_of_the_refined_hierarchy_grow_like_its_elements() -> None:
     elements, links, floors = [], [], []
     for n in (6, 8, 10, 13):
         triangles, surface = box_room(n=n)
-        emission = grey(len(triangles), 1.0) * (surface == CEILING)[:, None]
-        state = refined(Scene(triangles, grey(len(triangles), 0.5), emission), 1e-2)
+        emission = gray(len(triangles), 1.0) * (surface == CEILING)[:, None]
+        state = refined(Scene(triangles, gray(len(triangles), 0.5), emission), 1e-2)
         elements.append(len(state.hierarchy.leaves))
         links.append(len(state.links))
         floors.append(state.radiosity[: len(triangles)][surface == FLOOR, 0].mean())
@@ -217,7 +217,7 @@ def enclosure(shape: str) -> np.ndarray:
 def test_uniform_enclosure(shape: str, reflectance: float, settings: str) -> None:
     """Every surface emits E and reflects ρ: B = E / (1 − ρ) everywhere."""
     triangles = enclosure(shape)
-    scene = Scene(triangles, grey(len(triangles), reflectance), grey(len(triangles), 2.0))
+    scene = Scene(triangles, gray(len(triangles), reflectance), gray(len(triangles), 2.0))
     solution = solve(scene, multi_level_settings(*SETTINGS[settings]))
     assert_closed(scene, solution, power=0.003)
     np.testing.assert_allclose(solution.triangle_radiosity, 2.0 / (1.0 - reflectance), rtol=0.006)
@@ -244,8 +244,8 @@ def test_parallel_plates() -> None:
     """Two plates much larger than their distance, ρ = 0.5, one emits 1: B = 4/3 and 2/3."""
     below = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0))
     above = rectangle((0, 0, 0.0005), (0, 1, 0), (1, 0, 0))
-    emission = np.concatenate([grey(2, 1.0), grey(2, 0.0)])
-    scene = Scene(np.concatenate([below, above]), grey(4, 0.5), emission)
+    emission = np.concatenate([gray(2, 1.0), gray(2, 0.0)])
+    scene = Scene(np.concatenate([below, above]), gray(4, 0.5), emission)
     solution = solve(scene, multi_level_settings(0.01, 1e-3))
     np.testing.assert_allclose(solution.triangle_radiosity[:2], 4 / 3, rtol=0.002)
     np.testing.assert_allclose(solution.triangle_radiosity[2:], 2 / 3, rtol=0.002)
@@ -256,7 +256,7 @@ def test_cie_171_5_8(reflectance: float) -> None:
     """Closed cube of edge 4 m, isotropic point source of 10 000 lm: mean indirect illuminance."""
     triangles, _ = box_room((4, 4, 4))
     lamp = PointLight((2, 2, 2), 10_000.0)
-    scene = Scene(triangles, grey(12, reflectance), grey(12, 0.0), lights=[lamp])
+    scene = Scene(triangles, gray(12, reflectance), gray(12, 0.0), lights=[lamp])
     solution = solve(scene, multi_level_settings(0.01, 2e-5))
     assert_closed(scene, solution, power=0.001)
     indirect = area_mean(solution.triangle_irradiance, scene.areas) - 10_000.0 / 96.0
@@ -266,8 +266,8 @@ def test_cie_171_5_8(reflectance: float) -> None:
 def test_cie_171_5_6() -> None:
     """A diffuse floor of exitance 100 in a black room: at points, and as means over the elements there."""
     triangles, surface = box_room((4, 4, 3))
-    emission = grey(len(triangles), 100.0) * (surface == FLOOR)[:, None]
-    scene = Scene(triangles, grey(len(triangles), 0.0), emission)
+    emission = gray(len(triangles), 100.0) * (surface == FLOOR)[:, None]
+    scene = Scene(triangles, gray(len(triangles), 0.0), emission)
     solution = solve(scene, multi_level_settings(0.003, 2e-5))
     on_wall = np.array([[2.0, 0.0, z] for z in CIE_5_6_WALL_PERCENT])
     irradiance = solution.irradiance(on_wall, np.tile([0.0, 1.0, 0.0], (len(on_wall), 1)))
@@ -281,8 +281,8 @@ def test_cie_171_5_6() -> None:
 def test_black_walls_gather_the_exact_factors() -> None:
     """In the room of CIE 5.6 a surface's mean illuminance is its factor to the floor (Howell C-11, C-14)."""
     triangles, surface = box_room((1, 1, 1))
-    emission = grey(12, 1.0) * (surface == FLOOR)[:, None]
-    solution = solve(Scene(triangles, grey(12, 0.0), emission), multi_level_settings(0.02, 2e-5))
+    emission = gray(12, 1.0) * (surface == FLOOR)[:, None]
+    solution = solve(Scene(triangles, gray(12, 0.0), emission), multi_level_settings(0.02, 2e-5))
     for number, factor in ((CEILING, 0.1998248957), (WALLS, 0.2000437761)):
         mean = solution.triangle_irradiance[surface == number].mean()
         assert mean == pytest.approx(factor, rel=1e-4)
@@ -303,8 +303,8 @@ def test_an_open_room_loses_what_leaves_it() -> None:
     """Without its ceiling, the floor shining: F through the opening is 0.19982 (Howell C-11)."""
     triangles, surface = box_room()
     kept = surface != CEILING
-    emission = grey(12, 1.0) * (surface == FLOOR)[:, None]
-    scene = Scene(triangles[kept], grey(10, 0.0), emission[kept])
+    emission = gray(12, 1.0) * (surface == FLOOR)[:, None]
+    scene = Scene(triangles[kept], gray(10, 0.0), emission[kept])
     solution = solve(scene, multi_level_settings(0.01, 2e-5))
     np.testing.assert_allclose(solution.triangle_closure[:2], 1 - 0.1998248957, atol=1e-4)
     watts = solution.report["power_W"]

@@ -156,7 +156,7 @@ def test_spot_flux_is_what_arrives_around_it(angle: float, blend: float) -> None
 
 
 def test_a_spread_of_nothing_is_a_parallel_beam() -> None:
-    """Below a lamp of a square metre and a watt lies a square metre with 1 W/m², and darkness around it."""
+    """Below a lamp of a square meter and a watt lies a square meter with 1 W/m², and darkness around it."""
     lamp = AreaLight((0, 0, 2.0), (1, 0, 0), (0, -1, 0), 1.0, spread=0.0)
     points = np.array([[0.0, 0, 0], [0.49, 0.49, 0], [0.51, 0, 0], [0, -0.51, 0]])
     light = lamp.unit_irradiance(points, np.tile([[0.0, 0, 1]], (4, 1)))

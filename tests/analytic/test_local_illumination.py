@@ -9,7 +9,7 @@ from radiosity_addon.bake.pipeline import bake
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeObject, BakeScene
 from radiosity_addon.solver import PointLight, Scene
-from tests.rooms import grey, rectangle
+from tests.rooms import gray, rectangle
 
 REFLECTANCE = np.array([0.7, 0.4, 0.1])
 POWER = np.array([90.0, 40.0, 10.0])
@@ -23,7 +23,7 @@ UV = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], dtype=np.flo
 def baked(quantity: str, light: str, position: tuple[float, float, float]) -> np.ndarray:
     """A square floor under a lamp; texel (row, column) lies at (column, row) of the floor."""
     floor = rectangle((-HALF, -HALF, 0), (2 * HALF, 0, 0), (0, 2 * HALF, 0))
-    scene = Scene(floor, np.tile(REFLECTANCE, (2, 1)), grey(2, 0.0), lights=[PointLight(position, POWER)])
+    scene = Scene(floor, np.tile(REFLECTANCE, (2, 1)), gray(2, 0.0), lights=[PointLight(position, POWER)])
     loops = np.arange(6, dtype=np.int32).reshape(2, 3)
     target = BakeObject("Floor", 0, 2, True, np.zeros(2, dtype=np.int32), loops, UV)
     settings = BakeSettings(quality="draft", resolution=RESOLUTION, quantity=quantity, light=light)
@@ -37,13 +37,13 @@ def test_a_floor_shows_f_times_intensity_times_cosine_over_distance_squared(
     position: tuple[float, float, float],
 ) -> None:
     """L_r = f (Φ/4π) cosθ/r² (2.14, 2.15, 2.17) at every texel, f = ρ/π (2.12), B = πL (2.11)."""
-    centre = ((np.arange(RESOLUTION) + 0.5) / RESOLUTION * 2 - 1) * HALF
-    x, y = np.meshgrid(centre, centre)
+    center = ((np.arange(RESOLUTION) + 0.5) / RESOLUTION * 2 - 1) * HALF
+    x, y = np.meshgrid(center, center)
     square = (x - position[0]) ** 2 + (y - position[1]) ** 2 + position[2] ** 2
     cosine = position[2] / np.sqrt(square)
     radiance = (REFLECTANCE / np.pi) * (POWER / (4 * np.pi)) * (cosine / square)[..., None]
     radiosity = baked("radiosity", "direct", position)
-    # A texel is the mean over a few points of its footprint, which need not lie about its centre.
+    # A texel is the mean over a few points of its footprint, which need not lie about its center.
     np.testing.assert_allclose(radiosity / np.pi, radiance, rtol=0.02)
     assert (radiosity / np.pi / radiance).mean() == pytest.approx(1, abs=2e-4)
 

@@ -15,7 +15,7 @@ from radiosity_addon.solver.methods import solve_by_method
 from radiosity_addon.solver.methods.dense import dense
 from radiosity_addon.solver.methods.matrix import MatrixState
 from tests.cornell import cornell_box
-from tests.rooms import CEILING, FLOOR, WALLS, area_mean, box_room, grey, rectangle, sphere
+from tests.rooms import CEILING, FLOOR, WALLS, area_mean, box_room, gray, rectangle, sphere
 from tests.systems import assembled
 
 ASSEMBLIES = ("galerkin", "collocation", "linear")
@@ -38,8 +38,8 @@ def solved(scene: Scene, method: str = "dense", **settings: object) -> MatrixSta
 
 def shining_cube(n: int = 1, reflectance: float = 0.5) -> tuple[Scene, np.ndarray]:
     triangles, surface = box_room(n=n)
-    emission = grey(len(triangles), 1.0) * (surface == CEILING)[:, None]
-    return Scene(triangles, grey(len(triangles), reflectance), emission), surface
+    emission = gray(len(triangles), 1.0) * (surface == CEILING)[:, None]
+    return Scene(triangles, gray(len(triangles), reflectance), emission), surface
 
 
 def cube_errors(state: MatrixState) -> np.ndarray:
@@ -69,7 +69,7 @@ def test_uniform_enclosure(shape: str, assembly: str, within: float, reflectance
     touching elements have an error of some 1e-5, which bounces 1 / (1 − ρ) times.
     """
     triangles = {"cube": box_room()[0], "long": box_room((1, 3, 0.5))[0], "sphere": sphere(1)}[shape]
-    scene = Scene(triangles, grey(len(triangles), reflectance), grey(len(triangles), 2.0))
+    scene = Scene(triangles, gray(len(triangles), reflectance), gray(len(triangles), 2.0))
     state = solved(scene, assembly=assembly, elements=4 * len(triangles))
     np.testing.assert_allclose(state.values, 2.0 / (1.0 - reflectance), rtol=within)
     np.testing.assert_allclose(state.radiosity, 2.0 / (1.0 - reflectance), rtol=within)
@@ -121,13 +121,13 @@ def test_power_is_conserved_in_the_cube(method: str) -> None:
 
 @pytest.mark.parametrize("assembly", ASSEMBLIES)
 def test_surfaces_in_one_another_make_no_light(assembly: str) -> None:
-    """A closed room modelled twice, in the same place, is lit as if it were there once.
+    """A closed room modeled twice, in the same place, is lit as if it were there once.
 
     ΣFV would be 2 and, with ρ = 0.8, every bounce brighter than the one before. The copies are covered:
     they send nothing, and receive what their covers do.
     """
     room, _ = box_room()
-    twice = Scene(np.concatenate([room, room]), grey(24, 0.8), grey(24, 2.0))
+    twice = Scene(np.concatenate([room, room]), gray(24, 0.8), gray(24, 2.0))
     state = solved(twice, "jacobi", assembly=assembly, tolerance=1e-9)
     covered = state.hierarchy.face >= len(room)
     np.testing.assert_allclose(state.radiosity[~covered], 2.0 / (1.0 - 0.8), rtol=1e-4)
@@ -138,7 +138,7 @@ def test_surfaces_in_one_another_make_no_light(assembly: str) -> None:
     # Of Jacobi's iteration, in which a mass matrix takes part.
     expected = 0.8 if assembly != "linear" else 1.0 - 0.2 / (1.0 - 2.0 * INWARD / 3.0)
     assert details["spectral_radius"] == pytest.approx(expected, rel=1e-4)
-    once = Scene(room, grey(12, 0.8), grey(12, 2.0))
+    once = Scene(room, gray(12, 0.8), gray(12, 2.0))
     assert solved(once, "jacobi", assembly=assembly).details["matrix"]["overlapping"] == 0
 
 
@@ -157,7 +157,7 @@ def test_cie_171_5_8(assembly: str, elements: int, within: float, reflectance: f
     """
     triangles, _ = box_room((4, 4, 4))
     lamp = PointLight((2, 2, 2), 10_000.0)
-    scene = Scene(triangles, grey(12, reflectance), grey(12, 0.0), lights=[lamp])
+    scene = Scene(triangles, gray(12, reflectance), gray(12, 0.0), lights=[lamp])
     state = solved(scene, assembly=assembly, elements=elements)
     mean = area_mean(state.irradiance[:12], state.hierarchy.area[:12])
     indirect = mean - 10_000.0 / 96.0
@@ -170,8 +170,8 @@ def test_cie_171_5_6() -> None:
     Black walls only receive: collocation makes the value at a node exact.
     """
     triangles, surface = box_room((4, 4, 3))
-    emission = grey(12, 100.0) * (surface == FLOOR)[:, None]
-    hierarchy, basis, system = assembled(Scene(triangles, grey(12, 0.0), emission), 768, "linear")
+    emission = gray(12, 100.0) * (surface == FLOOR)[:, None]
+    hierarchy, basis, system = assembled(Scene(triangles, gray(12, 0.0), emission), 768, "linear")
     points, normals = basis.points(hierarchy), hierarchy.faces.normal[basis.faces(hierarchy)]
     floor = np.array([[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0]], dtype=float)
     exact = 100.0 * point_to_polygon(points, normals, np.repeat(floor[None], len(points), axis=0))
@@ -205,8 +205,8 @@ def test_parallel_plates(assembly: str) -> None:
     """Two plates much larger than their distance, ρ = 0.5, one emits 1: B = 4/3 and 2/3."""
     below = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0))
     above = rectangle((0, 0, 0.0005), (0, 1, 0), (1, 0, 0))
-    emission = np.concatenate([grey(2, 1.0), grey(2, 0.0)])
-    scene = Scene(np.concatenate([below, above]), grey(4, 0.5), emission)
+    emission = np.concatenate([gray(2, 1.0), gray(2, 0.0)])
+    scene = Scene(np.concatenate([below, above]), gray(4, 0.5), emission)
     state = solved(scene, assembly=assembly, elements=16)
     inner = 0.03 if assembly == "linear" else 0.01  # hats reach to the open rim
     np.testing.assert_allclose(state.radiosity[:2], 4 / 3, rtol=inner)
@@ -216,7 +216,7 @@ def test_parallel_plates(assembly: str) -> None:
 def test_a_plate_under_a_sky() -> None:
     """H = πL in the open, whatever the assembly."""
     plate = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0))
-    scene = Scene(plate, grey(2, 0.5), grey(2, 0.0), lights=[EnvironmentLight(2.0)])
+    scene = Scene(plate, gray(2, 0.5), gray(2, 0.0), lights=[EnvironmentLight(2.0)])
     for assembly in ASSEMBLIES:
         state = solved(scene, assembly=assembly, elements=32)
         np.testing.assert_allclose(state.irradiance, 2.0 * np.pi, rtol=1e-7)
@@ -230,8 +230,8 @@ def facing_plates() -> Scene:
     """A square that shines and is black, and one that only reflects, 1 above it."""
     below = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0))
     above = rectangle((0, 0, 1), (0, 1, 0), (1, 0, 0))
-    emission = np.concatenate([grey(2, 1.0), grey(2, 0.0)])
-    return Scene(np.concatenate([below, above]), np.concatenate([grey(2, 0.0), grey(2, 0.5)]), emission)
+    emission = np.concatenate([gray(2, 1.0), gray(2, 0.0)])
+    return Scene(np.concatenate([below, above]), np.concatenate([gray(2, 0.0), gray(2, 0.5)]), emission)
 
 
 @cache
@@ -364,7 +364,7 @@ def test_too_large_a_system_is_refused_before_it_is_made(method: str) -> None:
 def test_the_memory_limit_counts_faces_and_is_exact() -> None:
     """More faces than elements asked for: 108 faces, dense holds three matrices."""
     triangles, _ = box_room(n=3)
-    scene = Scene(triangles, grey(108, 0.5), grey(108, 1.0))
+    scene = Scene(triangles, gray(108, 0.5), gray(108, 1.0))
     needed = 3 * 8 * 108**2 / 2**30
     assert solved(scene, elements=1, memory_limit=needed).details["matrix"]["memory_GiB"] == needed
     with pytest.raises(UsageError, match=r"108 unknowns .* GiB: take the method hierarchical"):
@@ -379,7 +379,7 @@ def test_threads_change_nothing(assembly: str) -> None:
     assert one.radiosity.tobytes() == two.radiosity.tobytes()
 
 
-def test_colours_do_not_mix() -> None:
+def test_colors_do_not_mix() -> None:
     """Each channel is a system of its own."""
     state = solved(cornell_box(), elements=64)
     scene = cornell_box()
@@ -389,12 +389,12 @@ def test_colours_do_not_mix() -> None:
             np.repeat(scene.reflectance[:, channel, None], 3, axis=1),
             np.repeat(scene.emission[:, channel, None], 3, axis=1),
         )
-        grey_state = solved(alone, elements=64)
-        np.testing.assert_allclose(grey_state.radiosity[:, 0], state.radiosity[:, channel], rtol=1e-9)
+        gray_state = solved(alone, elements=64)
+        np.testing.assert_allclose(gray_state.radiosity[:, 0], state.radiosity[:, channel], rtol=1e-9)
 
 
 def test_without_light_all_is_black() -> None:
     triangles, _ = box_room()
-    state = solved(Scene(triangles, grey(12, 0.5), grey(12, 0.0)))
+    state = solved(Scene(triangles, gray(12, 0.5), gray(12, 0.0)))
     assert not state.radiosity.any()
     assert state.closure().shape == (12,)

@@ -15,7 +15,7 @@ from radiosity_addon.solver.methods import shooting, solve_by_method
 from radiosity_addon.solver.methods.shooting import ShootingState
 from radiosity_addon.solver.state.state import SolverState
 from tests.cornell import cornell_box
-from tests.rooms import CEILING, FLOOR, box_room, coloured_room, grey
+from tests.rooms import CEILING, FLOOR, box_room, colored_room, gray
 from tests.watched import watching
 
 ELEMENTS = 90
@@ -26,7 +26,7 @@ def by(method: str, scene: Scene, **changes: object) -> SolverState:
     return solve_by_method(scene, settings)
 
 
-@pytest.mark.parametrize("scene", [cornell_box, coloured_room])
+@pytest.mark.parametrize("scene", [cornell_box, colored_room])
 def test_converged_shooting_is_the_dense_solution(scene) -> None:
     """The same elements, the same exchange of each pair: to 1e-6 of the brightest."""
     dense = by("dense", scene())
@@ -41,9 +41,9 @@ def test_converged_shooting_is_the_dense_solution(scene) -> None:
 def test_cube_with_emitting_ceiling() -> None:
     """Area means of radiosity, ρ = 0.5, from exact Galerkin solutions extrapolated over grids."""
     triangles, surface = box_room()
-    emission = grey(12, 1.0) * (surface == CEILING)[:, None]
+    emission = gray(12, 1.0) * (surface == CEILING)[:, None]
     settings = SolverSettings(method="shooting", elements=192, tolerance=1e-4)
-    solution = solve(Scene(triangles, grey(12, 0.5), emission), settings)
+    solution = solve(Scene(triangles, gray(12, 0.5), emission), settings)
     for number in range(6):
         expected = {FLOOR: 0.17122, CEILING: 1.1044}.get(number, 0.18110)
         mean = solution.triangle_radiosity[surface == number].mean(axis=0)
@@ -58,7 +58,7 @@ def test_cie_171_5_8(reflectance: float, indirect: float) -> None:
     """Closed cube of edge 4 m, isotropic point source of 10 000 lm: mean indirect illuminance [lx]."""
     triangles, _ = box_room((4, 4, 4))
     lamp = PointLight((2, 2, 2), 10_000.0)
-    scene = Scene(triangles, grey(12, reflectance), grey(12, 0.0), lights=[lamp])
+    scene = Scene(triangles, gray(12, reflectance), gray(12, 0.0), lights=[lamp])
     solution = solve(scene, SolverSettings(method="shooting", elements=192, tolerance=1e-4))
     mean = solution.triangle_irradiance.mean() - 10_000.0 / 96.0
     assert mean == pytest.approx(indirect, rel=0.002)
@@ -128,7 +128,7 @@ def test_a_shot_is_the_relaxation_of_a_row() -> None:
 
 
 def test_shots_gather_the_bounces_from_below() -> None:
-    """B only rises while shooting, towards the dense solution, and never past it."""
+    """B only rises while shooting, toward the dense solution, and never past it."""
     dense = by("dense", cornell_box()).radiosity
     before = np.zeros_like(dense)
 
@@ -151,8 +151,8 @@ def test_shots_gather_the_bounces_from_below() -> None:
 def test_the_ambient_term_anticipates_the_mean() -> None:
     """In a closed room of one reflectance the mean shown is the solution's from the first picture on."""
     triangles, surface = box_room((3, 3, 2))
-    emission = grey(12, 5.0) * (surface == 1)[:, None]
-    scene = Scene(triangles, grey(12, 0.7), emission)
+    emission = gray(12, 5.0) * (surface == 1)[:, None]
+    scene = Scene(triangles, gray(12, 0.7), emission)
     dense = by("dense", scene)
     area = dense.hierarchy.area[dense.hierarchy.leaves]
     exact = area @ dense.radiosity[dense.hierarchy.leaves] / area.sum()
@@ -174,7 +174,7 @@ def test_the_ambient_term_anticipates_the_mean() -> None:
 
 def test_lamps_are_emission() -> None:
     """The system of the lamps' light as E' = E + ρ H_direct has the same first residual."""
-    scene = coloured_room()
+    scene = colored_room()
     state = shooting.solve(scene, SolverSettings(elements=ELEMENTS, max_iterations=0))
     system = with_lamps(galerkin(state.hierarchy, state.caster), state.received)
     assert state.unshot.tobytes() == system.emission.tobytes()

@@ -19,7 +19,7 @@ from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import PointLight, Scene
 from tests.moved_rooms import ELSEWHERE, PLACE, laid_out_as, room
-from tests.rooms import box_room, grey, solid_box
+from tests.rooms import box_room, gray, solid_box
 from tests.unit.texel_scenes import bake_scene
 
 SETTINGS = BakeSettings(resolution=64, quality="draft", threads=1)
@@ -143,8 +143,8 @@ def sealed(at: float) -> BakeScene:
     block = solid_box((at, 0.4, 0.3), (at + 0.2, 0.6, 0.5))
     triangles = np.concatenate([walls, hollow, block])
     lamp = PointLight((2.0, 1.0, 1.2), 20.0, radius=0.05)
-    dark = grey(len(triangles), 0.0)
-    scene = Scene(triangles, grey(len(triangles), 0.6), dark, lights=(lamp,))
+    dark = gray(len(triangles), 0.0)
+    scene = Scene(triangles, gray(len(triangles), 0.6), dark, lights=(lamp,))
     return bake_scene(scene, ("Room", 12), ("Inside", 12), ("Outside", 12), ("Block", 12))
 
 
@@ -167,10 +167,10 @@ def shelves(at: float) -> BakeScene:
     case = np.concatenate([solid_box((0.02, 0.1, 0.1), (0.06, 1.9, 1.5)), *boards])
     block = solid_box((at, 0.7, 0.4), (at + 0.3, 1.2, 1.0))
     triangles = np.concatenate([walls, case, block])
-    reflectance = grey(len(triangles), 0.6)
+    reflectance = gray(len(triangles), 0.6)
     reflectance[12 : 12 + len(case)] = (0.8, 0.2, 0.1)
     lamp = PointLight((1.5, 1.0, 1.2), 20.0, radius=0.05)
-    scene = Scene(triangles, reflectance, grey(len(triangles), 0.0), lights=(lamp,))
+    scene = Scene(triangles, reflectance, gray(len(triangles), 0.0), lights=(lamp,))
     return bake_scene(scene, ("Room", 12), ("Shelves", len(case), None, False), ("Block", 12))
 
 

@@ -10,7 +10,7 @@ from radiosity_addon.lightmap.images.page import LightmapPage
 from radiosity_addon.lights.sun_and_sky import Light
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, SunLight
-from tests.rooms import box_room, grey, rectangle, solid_box
+from tests.rooms import box_room, gray, rectangle, solid_box
 from tests.unit.texel_scenes import bake_scene
 
 GROUND = rectangle((-4, -4, 0), (8, 0, 0), (0, 8, 0))
@@ -40,7 +40,7 @@ def pages(
 ) -> dict[str, LightmapPage]:
     triangles = turned(np.concatenate([ground, box]), degrees, away)
     count = len(triangles)
-    scene = Scene(triangles, grey(count, 0.5), grey(count, 0.0), lights=[light], two_sided=True)
+    scene = Scene(triangles, gray(count, 0.5), gray(count, 0.0), lights=[light], two_sided=True)
     parts = [("Ground", len(ground)), ("Bottom", 2), ("Box", len(box) - 2)]
     settings = BakeSettings(quality="draft", resolution=32, atlas="per-object", quantity="irradiance")
     result = bake(bake_scene(scene, *parts), settings)
@@ -98,7 +98,7 @@ def test_walls_of_neighboring_rooms_stay_lit() -> None:
 
     def baked(triangles: np.ndarray, lamps: list[PointLight]) -> np.ndarray:
         count = len(triangles)
-        scene = Scene(triangles, grey(count, 0.5), grey(count, 0.0), lights=lamps, two_sided=True)
+        scene = Scene(triangles, gray(count, 0.5), gray(count, 0.0), lights=lamps, two_sided=True)
         settings = BakeSettings(quality="draft", resolution=32, atlas="per-object")
         parts = [(f"Room {number}", 12) for number in range(count // 12)]
         return np.array([values(page).mean() for page in bake(bake_scene(scene, *parts), settings).pages])

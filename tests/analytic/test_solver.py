@@ -14,9 +14,9 @@ from radiosity_addon.solver import (
     SunLight,
     solve,
 )
-from tests.rooms import CEILING, FLOOR, WALLS, area_mean, box_room, grey, rectangle, solid_box, sphere
+from tests.rooms import CEILING, FLOOR, WALLS, area_mean, box_room, gray, rectangle, solid_box, sphere
 
-# Howell's catalogue, CIE 171:2006 and Galerkin solutions extrapolated over n = 4 … 20 grids.
+# Howell's catalog, CIE 171:2006 and Galerkin solutions extrapolated over n = 4 … 20 grids.
 CUBE_WITH_EMITTING_CEILING = {FLOOR: 0.17122, CEILING: 1.1044, WALLS: 0.18110}
 CIE_5_8_INDIRECT_LX = {0.2: 26.04, 0.5: 104.17, 0.8: 416.67, 0.9: 937.5, 0.95: 1979.17}
 CIE_5_6_WALL_PERCENT = {0.75: 35.901, 1.25: 27.992, 1.75: 21.639, 2.25: 16.716, 2.75: 12.967}
@@ -47,7 +47,7 @@ def test_uniform_enclosure(shape: str, reflectance: float) -> None:
              [[1, 1, 1], [-1, -1, 1], [1, -1, -1]], [[1, -1, -1], [-1, -1, 1], [-1, 1, -1]]], dtype=float
         )[:, ::-1],
     }[shape]  # fmt: skip
-    scene = Scene(triangles, grey(len(triangles), reflectance), grey(len(triangles), 2.0))
+    scene = Scene(triangles, gray(len(triangles), reflectance), gray(len(triangles), 2.0))
     solution = solve(scene)
     assert_closed(scene, solution)
     np.testing.assert_allclose(solution.triangle_radiosity, 2.0 / (1.0 - reflectance), rtol=0.02)
@@ -59,8 +59,8 @@ def test_uniform_enclosure(shape: str, reflectance: float) -> None:
 def test_cube_with_emitting_ceiling(n: int) -> None:
     """Area means of radiosity, ρ = 0.5, against exact Galerkin solutions."""
     triangles, surface = box_room(n=n)
-    emission = grey(len(triangles), 1.0) * (surface == CEILING)[:, None]
-    scene = Scene(triangles, grey(len(triangles), 0.5), emission)
+    emission = gray(len(triangles), 1.0) * (surface == CEILING)[:, None]
+    scene = Scene(triangles, gray(len(triangles), 0.5), emission)
     solution = solve(scene)
     assert_closed(scene, solution)
     total = 0.0
@@ -76,8 +76,8 @@ def test_cube_with_emitting_ceiling(n: int) -> None:
 def test_error_falls_with_the_threshold() -> None:
     """A hundredth of BF_ε brings the means several times nearer to the exact solution."""
     triangles, surface = box_room()
-    emission = grey(len(triangles), 1.0) * (surface == CEILING)[:, None]
-    scene = Scene(triangles, grey(len(triangles), 0.5), emission)
+    emission = gray(len(triangles), 1.0) * (surface == CEILING)[:, None]
+    scene = Scene(triangles, gray(len(triangles), 0.5), emission)
     errors = []
     for error in (1e-2, 1e-4):
         solution = solve(scene, SolverSettings(error=error))
@@ -94,8 +94,8 @@ def test_parallel_plates() -> None:
     below = rectangle((0, 0, 0), (size[0], 0, 0), (0, size[1], 0))
     above = rectangle((0, 0, 0.0005), (0, size[1], 0), (size[0], 0, 0))
     triangles = np.concatenate([below, above])
-    emission = np.concatenate([grey(2, 1.0), grey(2, 0.0)])
-    solution = solve(Scene(triangles, grey(4, 0.5), emission))
+    emission = np.concatenate([gray(2, 1.0), gray(2, 0.0)])
+    solution = solve(Scene(triangles, gray(4, 0.5), emission))
     np.testing.assert_allclose(solution.triangle_radiosity[:2], 4 / 3, rtol=0.005)
     np.testing.assert_allclose(solution.triangle_radiosity[2:], 2 / 3, rtol=0.005)
 
@@ -105,7 +105,7 @@ def test_cie_171_5_8(reflectance: float) -> None:
     """Closed cube of edge 4 m, isotropic point source of 10 000 lm: mean indirect illuminance."""
     triangles, _ = box_room((4, 4, 4))
     lamp = PointLight((2, 2, 2), 10_000.0)
-    scene = Scene(triangles, grey(len(triangles), reflectance), grey(len(triangles), 0.0), lights=[lamp])
+    scene = Scene(triangles, gray(len(triangles), reflectance), gray(len(triangles), 0.0), lights=[lamp])
     solution = solve(scene)
     assert_closed(scene, solution)
     direct = 10_000.0 / 96.0
@@ -116,8 +116,8 @@ def test_cie_171_5_8(reflectance: float) -> None:
 def test_cie_171_5_6() -> None:
     """A diffuse floor of exitance 100 in a black room: illuminance at points, in percent of it."""
     triangles, surface = box_room((4, 4, 3))
-    emission = grey(len(triangles), 100.0) * (surface == FLOOR)[:, None]
-    solution = solve(Scene(triangles, grey(len(triangles), 0.0), emission))
+    emission = gray(len(triangles), 100.0) * (surface == FLOOR)[:, None]
+    solution = solve(Scene(triangles, gray(len(triangles), 0.0), emission))
     on_wall = np.array([[2.0, 0.0, z] for z in CIE_5_6_WALL_PERCENT])
     irradiance = solution.irradiance(on_wall, np.tile([0.0, 1.0, 0.0], (len(on_wall), 1)))
     np.testing.assert_allclose(irradiance[:, 0], list(CIE_5_6_WALL_PERCENT.values()), rtol=2e-4)
@@ -127,7 +127,7 @@ def test_cie_171_5_6() -> None:
     np.testing.assert_allclose(irradiance[:, 0], list(CIE_5_6_CEILING_PERCENT.values()), rtol=5e-4)
 
 
-def test_colours_do_not_mix() -> None:
+def test_colors_do_not_mix() -> None:
     """Each channel is a solution of its own."""
     triangles, surface = box_room()
     emission = (surface == CEILING)[:, None] * np.array([1.0, 0.5, 0.0])
@@ -136,7 +136,7 @@ def test_colours_do_not_mix() -> None:
     floor = solution.triangle_radiosity[surface == FLOOR]
     np.testing.assert_allclose(floor[:, 0], CUBE_WITH_EMITTING_CEILING[FLOOR], rtol=0.01)
     assert (floor[:, 2] == 0).all()
-    one = solve(Scene(triangles, grey(len(triangles), 0.2), emission[:, 1:2] * np.ones(3)))
+    one = solve(Scene(triangles, gray(len(triangles), 0.2), emission[:, 1:2] * np.ones(3)))
     np.testing.assert_allclose(floor[:, 1], one.triangle_radiosity[surface == FLOOR, 1], rtol=0.01)
 
 
@@ -147,7 +147,7 @@ def test_the_sides_of_a_wall_are_apart() -> None:
     triangles = np.concatenate([room, wall])
     lamp = PointLight((1.5, 0.5, 0.5), 10.0)
     count = len(triangles)
-    solution = solve(Scene(triangles, grey(count, 0.8), grey(count, 0.0), two_sided=True, lights=[lamp]))
+    solution = solve(Scene(triangles, gray(count, 0.8), gray(count, 0.0), two_sided=True, lights=[lamp]))
     front, back = solution.triangle_irradiance[-2:], solution.back_irradiance[-2:]
     assert (front > 1.0).all()  # the lit side faces +x
     assert back.max() < 1e-4 * front.min()
@@ -160,7 +160,7 @@ def test_the_sides_of_a_wall_are_apart() -> None:
 def test_the_back_of_a_one_sided_triangle_blocks_and_absorbs() -> None:
     """Black backs: a lamp above an upside-down floor lights nothing, and its power is accounted for."""
     floor = rectangle((-50, -50, 0), (0, 100, 0), (100, 0, 0))
-    solution = solve(Scene(floor, grey(2, 0.8), grey(2, 0.0), lights=[PointLight((0, 0, 1), 100.0)]))
+    solution = solve(Scene(floor, gray(2, 0.8), gray(2, 0.0), lights=[PointLight((0, 0, 1), 100.0)]))
     assert (solution.triangle_irradiance == 0).all()
     power = solution.report["power_W"]
     assert power["emitted"] == 100.0
@@ -174,7 +174,7 @@ def test_sun_on_a_plane(elevation: float) -> None:
     floor = rectangle((0, 0, 0), (2, 0, 0), (0, 2, 0))
     angle = np.radians(elevation)
     sun = SunLight((-np.cos(angle), 0, -np.sin(angle)), 3.0)
-    solution = solve(Scene(floor, grey(2, 0.5), grey(2, 0.0), lights=[sun]))
+    solution = solve(Scene(floor, gray(2, 0.5), gray(2, 0.0), lights=[sun]))
     np.testing.assert_allclose(solution.triangle_irradiance, 3.0 * np.sin(angle), rtol=1e-5)
     power = solution.report["power_W"]
     assert power["emitted"] == pytest.approx(4 * 3.0 * np.sin(angle), rel=1e-5)
@@ -187,7 +187,7 @@ def test_sky_over_a_plane_and_a_box() -> None:
     triangles = np.concatenate([floor, solid_box((-0.5, -0.5, 0), (0.5, 0.5, 1))])
     count = len(triangles)
     sky = EnvironmentLight(2.0)
-    solution = solve(Scene(triangles, grey(count, 0.0), grey(count, 0.0), two_sided=True, lights=[sky]))
+    solution = solve(Scene(triangles, gray(count, 0.0), gray(count, 0.0), two_sided=True, lights=[sky]))
     points = np.array([[3.9, 3.9, 0.0], [0, 0, 1.0], [0, 0, 0], [0.45, 0.3, 0]])
     irradiance = solution.irradiance(points, np.tile([0, 0, 1.0], (4, 1)))
     np.testing.assert_allclose(irradiance[1], 2 * np.pi, rtol=1e-6)
@@ -200,7 +200,7 @@ def test_area_lamp_is_one_sided_and_casts_no_shadow() -> None:
     triangles, surface = box_room((2, 2, 2))
     lamp = AreaLight((1, 1, 1.999), (0, 0.5, 0), (0.5, 0, 0), 10.0)
     count = len(triangles)
-    scene = Scene(triangles, grey(count, 0.0), grey(count, 0.0), lights=[lamp])
+    scene = Scene(triangles, gray(count, 0.0), gray(count, 0.0), lights=[lamp])
     solution = solve(scene)
     assert (solution.triangle_irradiance[surface == CEILING] == 0).all()
     assert float(scene.areas @ solution.triangle_irradiance[:, 0]) == pytest.approx(10.0, rel=0.005)
@@ -214,9 +214,9 @@ def test_local_pass_agrees_with_the_elements() -> None:
     triangles, surface = box_room((3, 2, 2))
     triangles = np.concatenate([triangles, solid_box((0.5, 0.5, 0.3), (1.2, 1.2, 1.0))])
     count = len(triangles)
-    emission = grey(count, 0.0)
+    emission = gray(count, 0.0)
     emission[:12][surface == CEILING] = 1.0
-    solution = solve(Scene(triangles, grey(count, 0.6), emission))
+    solution = solve(Scene(triangles, gray(count, 0.6), emission))
     weights = np.random.default_rng(1).dirichlet((1, 1, 1), 400)
     for row in (0, 5, 8):
         a, b, c = triangles[row]
@@ -229,8 +229,8 @@ def test_many_triangles_need_few_links() -> None:
     """A cube room of 20 000 triangles: far fewer first pairs than n², and still the exact means."""
     triangles, surface = box_room(n=41)
     assert len(triangles) == 20_172
-    emission = grey(len(triangles), 1.0) * (surface == CEILING)[:, None]
-    scene = Scene(triangles, grey(len(triangles), 0.5), emission)
+    emission = gray(len(triangles), 1.0) * (surface == CEILING)[:, None]
+    scene = Scene(triangles, gray(len(triangles), 0.5), emission)
     solution = solve(scene, SolverSettings(error=1e-4))
     assert solution.report["links"] < 300 * len(triangles)
     for number in range(6):
@@ -252,7 +252,7 @@ def test_threads_and_repeats_change_nothing() -> None:
     triangles = np.concatenate([triangles, solid_box((0.5, 0.5, 0.3), (1.2, 1.2, 1.0))])
     count = len(triangles)
     lamp = PointLight((2.5, 1.5, 1.5), 50.0, radius=0.1)
-    scene = Scene(triangles, grey(count, 0.6), grey(count, 0.0), two_sided=True, lights=[lamp])
+    scene = Scene(triangles, gray(count, 0.6), gray(count, 0.0), two_sided=True, lights=[lamp])
     points = np.random.default_rng(3).uniform(0.1, 0.29, (50, 3))
     up = np.tile([0, 0, 1.0], (50, 1))
     one, two = (solve(scene, SolverSettings(threads=threads)) for threads in (1, 2))
@@ -265,16 +265,16 @@ def test_threads_and_repeats_change_nothing() -> None:
 
 def test_without_light_all_is_black() -> None:
     triangles, _ = box_room()
-    solution = solve(Scene(triangles, grey(12, 0.5), grey(12, 0.0)))
+    solution = solve(Scene(triangles, gray(12, 0.5), gray(12, 0.0)))
     assert (solution.triangle_radiosity == 0).all()
     assert solution.report["power_W"] == {"emitted": 0.0, "absorbed": 0.0, "escaped": 0.0}
 
 
 def test_far_from_the_origin() -> None:
-    """A room 10 km away is lit like one at the origin: rays are recentred."""
+    """A room 10 km away is lit like one at the origin: rays are recentered."""
     triangles, _ = box_room((4, 4, 4))
     far = np.array([10_000.0, -7_000.0, 300.0])
     lamp = PointLight(far + 2, 10_000.0)
-    solution = solve(Scene(triangles + far, grey(12, 0.5), grey(12, 0.0), lights=[lamp]))
+    solution = solve(Scene(triangles + far, gray(12, 0.5), gray(12, 0.0), lights=[lamp]))
     indirect = solution.triangle_irradiance.mean() - 10_000.0 / 96.0
     assert indirect == pytest.approx(CIE_5_8_INDIRECT_LX[0.5], rel=0.01)

@@ -25,7 +25,7 @@ def all_around() -> np.ndarray:
 
 
 def test_a_stretched_spot_lights_an_ellipse() -> None:
-    """A metre below, its edge is tan(angle/2) away where directions were turned to, and the power fits."""
+    """A meter below, its edge is tan(angle/2) away where directions were turned to, and the power fits."""
     lamp = SpotLight((0, 0, 0), DOWN, 4 * np.pi, angle=1.2, blend=0.0, round_from_world=STRETCHED)
     turn = np.linspace(0, 2 * np.pi, 100)
     rim = np.tan(0.6) * np.stack([np.cos(turn), np.sin(turn)], axis=-1) @ np.linalg.inv(STRETCHED[:2, :2]).T

@@ -241,10 +241,10 @@ def test_tiny_receiver_beside_a_huge_source() -> None:
     size = 1e-4
     tiny = size * np.array([[[1.0, 0, 0], [2, 0, 0], [1, 1, 0]]]) + [0, 0.3, 0]
     wall = np.array([[[0.0, -1, 0], [0, 2, 0], [0, 0.5, 2.0]]])
-    centre = tiny.mean(axis=1)
-    at_centre = point_to_polygon(centre, UP[None], wall)[0]
-    assert triangle_to_triangle(tiny, wall)[0] == pytest.approx(at_centre, abs=1e-5)
-    assert triangle_to_triangle(wall, tiny)[0] == pytest.approx(at_centre * size**2 / 2 / 3, rel=1e-4)
+    center = tiny.mean(axis=1)
+    at_center = point_to_polygon(center, UP[None], wall)[0]
+    assert triangle_to_triangle(tiny, wall)[0] == pytest.approx(at_center, abs=1e-5)
+    assert triangle_to_triangle(wall, tiny)[0] == pytest.approx(at_center * size**2 / 2 / 3, rel=1e-4)
 
 
 def test_kronrod_rule_is_exact_to_degree_22_and_its_gauss_rule_to_13() -> None:

@@ -15,7 +15,7 @@ from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from radiosity_addon.solver.methods import solve_by_method
 from radiosity_addon.solver.state.state import SolverState
 from tests.cornell import cornell_box
-from tests.rooms import CEILING, FLOOR, box_room, coloured_room, grey, rectangle
+from tests.rooms import CEILING, FLOOR, box_room, colored_room, gray, rectangle
 
 NEVER = 1e9
 """A contrast no scene has: nothing is split."""
@@ -45,7 +45,7 @@ def distance(one: SolverState, other: SolverState) -> float:
     return float((one.hierarchy.area[leaves] @ difference).max()) / one.power
 
 
-@pytest.mark.parametrize("scene", [cornell_box, coloured_room])
+@pytest.mark.parametrize("scene", [cornell_box, colored_room])
 def test_one_element_a_patch_is_the_dense_solution(scene: Callable[[], Scene]) -> None:
     dense = by("dense", scene(), 150)
     two = by("two-level", scene(), 150, patches=150)
@@ -55,7 +55,7 @@ def test_one_element_a_patch_is_the_dense_solution(scene: Callable[[], Scene]) -
     np.testing.assert_allclose(two.closure(), dense.closure(), rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("scene", [cornell_box, coloured_room])
+@pytest.mark.parametrize("scene", [cornell_box, colored_room])
 def test_refined_patches_converge_to_the_dense_solution(scene: Callable[[], Scene]) -> None:
     """With the elements fixed, each generation of patches is nearer; the last is the elements."""
     counts = generations(scene(), 260)
@@ -76,7 +76,7 @@ def shadowed() -> tuple[Scene, np.ndarray]:
     emission = np.repeat([0.0, 0.0, 100.0], 2)[:, None] * np.ones(3)
     along = (np.arange(96) + 0.5) / 96 * 4 - 2
     points = np.stack([*np.meshgrid(along, along), np.zeros((96, 96))], axis=-1).reshape(-1, 3)
-    return Scene(triangles, grey(6, 0.5), emission), points
+    return Scene(triangles, gray(6, 0.5), emission), points
 
 
 def direct_light(state: SolverState, points: np.ndarray) -> np.ndarray:
@@ -105,7 +105,7 @@ def floor_error(state: SolverState, points: np.ndarray, truth: np.ndarray, where
 
 
 def test_subdivision_pays_at_shadow_edges() -> None:
-    """Splitting where neighbours differ lowers the error there, and more than as many even elements do."""
+    """Splitting where neighbors differ lowers the error there, and more than as many even elements do."""
     scene, points = shadowed()
     plain = by("two-level", scene, 300, patches=20)
     truth = direct_light(plain, points)
@@ -132,7 +132,7 @@ def test_less_contrast_is_nearer() -> None:
 def test_a_closed_room_of_one_kind_is_exact() -> None:
     """B = E / (1 − ρ) everywhere, whatever the patches: constant sources are exact there."""
     triangles, _ = box_room((1, 2, 0.5))
-    scene = Scene(triangles, grey(12, 0.7), grey(12, 2.0))
+    scene = Scene(triangles, gray(12, 0.7), gray(12, 2.0))
     state = by("two-level", scene, 200, patches=12)
     # A patch is right to what its factors' sum is off, times 1 / (1 − ρ).
     np.testing.assert_allclose(state.patch_radiosity, 2.0 / 0.3, rtol=0.01)
@@ -142,8 +142,8 @@ def test_a_closed_room_of_one_kind_is_exact() -> None:
 def test_cube_with_emitting_ceiling() -> None:
     """Area means of radiosity, ρ = 0.5, against extrapolated Galerkin solutions: nearer with the patches."""
     triangles, surface = box_room()
-    emission = grey(12, 1.0) * (surface == CEILING)[:, None]
-    scene = Scene(triangles, grey(12, 0.5), emission)
+    emission = gray(12, 1.0) * (surface == CEILING)[:, None]
+    scene = Scene(triangles, gray(12, 0.5), emission)
     exact = np.array([{FLOOR: 0.17122, CEILING: 1.1044}.get(number, 0.18110) for number in range(6)])
     errors = []
     for patches in (12, 48, 192):
@@ -165,7 +165,7 @@ def test_cie_171_5_8(reflectance: float, indirect: float) -> None:
     """Closed cube of edge 4 m, isotropic point source of 10 000 lm: mean indirect illuminance [lx]."""
     triangles, _ = box_room((4, 4, 4))
     lamp = PointLight((2, 2, 2), 10_000.0)
-    scene = Scene(triangles, grey(12, reflectance), grey(12, 0.0), lights=[lamp])
+    scene = Scene(triangles, gray(12, reflectance), gray(12, 0.0), lights=[lamp])
     state = by("two-level", scene, 192, patches=48)
     mean = state.irradiance[:12, 0].mean() - 10_000.0 / 96.0
     assert mean == pytest.approx(indirect, rel=0.002)

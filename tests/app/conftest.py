@@ -139,13 +139,13 @@ def add_lamp() -> None:
     bpy.context.scene.collection.objects.link(obj)
 
 
-def painted(name: str, colour: tuple) -> bpy.types.Material:
+def painted(name: str, color: tuple) -> bpy.types.Material:
     """Make a Principled material of a base color."""
     material = bpy.data.materials.new(name)
     if bpy.app.version < (5, 0):
         material.use_nodes = True
     shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
-    shader.inputs["Base Color"].default_value = colour
+    shader.inputs["Base Color"].default_value = color
     return material
 
 

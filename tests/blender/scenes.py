@@ -76,7 +76,7 @@ def add_node(tree: bpy.types.NodeTree, kind: str, **inputs: Any) -> bpy.types.No
 
 
 def set_world(*radiance: float, strength: float = 1.0) -> bpy.types.World:
-    """Give the scene a world of one colour."""
+    """Give the scene a world of one color."""
     world = bpy.data.worlds.new("World")
     tree = with_nodes(world)
     background = add_node(tree, "ShaderNodeBackground", Color=(*radiance, 1.0), Strength=strength)

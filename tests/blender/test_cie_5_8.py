@@ -20,7 +20,7 @@ INDIRECT_LX = {0.2: 26.04, 0.5: 104.17, 0.8: 416.67, 0.9: 937.5, 0.95: 1979.17}
 
 FLUX = 10_000.0
 EDGE = 4.0
-"""A lamp of 10 000 lm in the centre of a closed cube of edge 4 m; watts stand for lumens here."""
+"""A lamp of 10 000 lm in the center of a closed cube of edge 4 m; watts stand for lumens here."""
 
 CORNERS = [(x, y, z) for z in (0.0, EDGE) for y in (0.0, EDGE) for x in (0.0, EDGE)]
 INWARD = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]

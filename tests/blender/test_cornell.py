@@ -65,18 +65,18 @@ def test_its_size_is_the_measured_one(box: Export) -> None:
     assert floor == pytest.approx(0.5 * (5.528 + 5.496) * 5.592, rel=1e-5)
 
 
-def test_colours_are_where_cornell_has_them(box: Export) -> None:
+def test_colors_are_where_cornell_has_them(box: Export) -> None:
     scene = box.bake_scene.scene
-    for name, colour, side in (("Left Wall", "Red", -1), ("Right Wall", "Green", 1)):
+    for name, color, side in (("Left Wall", "Red", -1), ("Right Wall", "Green", 1)):
         rows = _rows(box, name)
-        np.testing.assert_allclose(scene.reflectance[rows], np.tile(REFLECTANCE[colour], (2, 1)), rtol=1e-6)
+        np.testing.assert_allclose(scene.reflectance[rows], np.tile(REFLECTANCE[color], (2, 1)), rtol=1e-6)
         assert np.sign(scene.triangles[rows][..., 0].mean()) == side
     white = np.tile(REFLECTANCE["White"], (12, 1))
     np.testing.assert_allclose(scene.reflectance[_rows(box, "Tall Block")], white, rtol=1e-6)
     assert not scene.emission.any()
 
 
-def test_its_lamp_has_the_measured_radiance_and_hangs_a_millimetre_below_the_ceiling(box: Export) -> None:
+def test_its_lamp_has_the_measured_radiance_and_hangs_a_millimeter_below_the_ceiling(box: Export) -> None:
     (lamp,) = box.bake_scene.scene.lights
     assert isinstance(lamp, AreaLight)
     assert lamp.shape == "rectangle"

@@ -333,9 +333,9 @@ def test_what_only_the_camera_sees_is_left_out_where_colors_vary() -> None:
 @pytest.mark.parametrize("of", ["scene", "view layer"])
 def test_attributes_of_the_view_layer(of: str) -> None:
     owner = bpy.context.scene if of == "scene" else bpy.context.view_layer
-    owner["grey"], owner["note"] = 0.25, "not a number"
+    owner["gray"], owner["note"] = 0.25, "not a number"
     material, node = diffuse_of("ShaderNodeAttribute")
-    node.attribute_type, node.attribute_name = "VIEW_LAYER", "grey"
+    node.attribute_type, node.attribute_name = "VIEW_LAYER", "gray"
     add_mesh("Quad", material=material)
     values, _ = _samples(_images(), 0)
     np.testing.assert_allclose(values[:, :3], 0.25, atol=1e-5)

@@ -36,9 +36,9 @@ def test_triangles_face_outwards_whatever_the_scale(transform: dict[str, Any]) -
     cube = add_cube(**transform)
     export = export_with()
     scene = export.bake_scene.scene
-    centred = scene.triangles - np.array(cube.matrix_world.translation)
+    centered = scene.triangles - np.array(cube.matrix_world.translation)
     assert len(scene) == 12
-    assert signed_volume(centred) == pytest.approx(8 * abs(np.prod(cube.scale)), rel=1e-5)
+    assert signed_volume(centered) == pytest.approx(8 * abs(np.prod(cube.scale)), rel=1e-5)
     np.testing.assert_allclose(scene.normals, np.repeat(scene.face_normals[:, None], 3, axis=1), atol=1e-5)
     assert scene.two_sided.all()
 

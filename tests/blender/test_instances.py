@@ -37,8 +37,8 @@ def test_collection_instances_become_stand_ins_with_their_own_matrices() -> None
         assert source.object_name == "Part"
         assert source.instancer == source.name.split("/")[0]
     np.testing.assert_allclose(triangles_of(export, "Here/Part").mean(axis=(0, 1)), (1, 0, 5), atol=1e-6)
-    centre = np.array((-2, 0, -5))
-    assert signed_volume(triangles_of(export, "There/Part") - centre) == pytest.approx(8 * 8, rel=1e-6)
+    center = np.array((-2, 0, -5))
+    assert signed_volume(triangles_of(export, "There/Part") - center) == pytest.approx(8 * 8, rel=1e-6)
 
 
 def test_instances_share_a_name_only_once() -> None:

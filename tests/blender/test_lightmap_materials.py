@@ -148,7 +148,7 @@ def test_transparency_is_kept(tmp_path: Path) -> None:
     np.testing.assert_allclose(seen, expected, rtol=0.03)
 
 
-def test_a_mesh_without_material_is_grey(tmp_path: Path) -> None:
+def test_a_mesh_without_material_is_gray(tmp_path: Path) -> None:
     plane = add_plane()
     bake_by_hand()
     assert [material.name for material in plane.data.materials] == ["No Material (Lightmap)"]

@@ -36,7 +36,7 @@ def _check(surface: Surface, reflectance: Any, emission: Any = (0, 0, 0)) -> Non
     np.testing.assert_allclose(surface.emission, emission, rtol=1e-6)
 
 
-def test_no_material_is_cycles_grey() -> None:
+def test_no_material_is_cycles_gray() -> None:
     surface = read_material(None)
     _check(surface, (0.8, 0.8, 0.8))
     assert surface.warnings == ()
@@ -102,7 +102,7 @@ def test_muted_links_do_not_count() -> None:
     _check(read_material(material), _RED[:3])
 
 
-def _colour_group() -> bpy.types.NodeTree:
+def _color_group() -> bpy.types.NodeTree:
     """A group: Diffuse of its input `Tint` times blue."""
     group = bpy.data.node_groups.new("Tinted", "ShaderNodeTree")
     group.interface.new_socket("Tint", in_out="INPUT", socket_type="NodeSocketColor")
@@ -126,11 +126,11 @@ def test_node_groups_are_entered_with_their_inputs(linked: bool) -> None:
     material = bpy.data.materials.new("M")
     tree = with_nodes(material)
     group = tree.nodes.new("ShaderNodeGroup")
-    group.node_tree = _colour_group()
+    group.node_tree = _color_group()
     if linked:
-        colour = tree.nodes.new("ShaderNodeRGB")
-        colour.outputs[0].default_value = _RED
-        tree.links.new(colour.outputs[0], group.inputs["Tint"])
+        color = tree.nodes.new("ShaderNodeRGB")
+        color.outputs[0].default_value = _RED
+        tree.links.new(color.outputs[0], group.inputs["Tint"])
     else:
         group.inputs["Tint"].default_value = _RED
     tree.links.new(group.outputs[0], _output(tree).inputs["Surface"])
@@ -142,10 +142,10 @@ def test_node_groups_are_entered_with_their_inputs(linked: bool) -> None:
 def test_cycles_own_output_wins_and_eevees_does_not_count() -> None:
     material = bpy.data.materials.new("M")
     tree = with_nodes(material)
-    for target, colour in (("EEVEE", _BLUE), ("CYCLES", _RED)):
+    for target, color in (("EEVEE", _BLUE), ("CYCLES", _RED)):
         output = _output(tree)
         output.target = target
-        tree.links.new(add_node(tree, "ShaderNodeBsdfDiffuse", Color=colour).outputs[0], output.inputs[0])
+        tree.links.new(add_node(tree, "ShaderNodeBsdfDiffuse", Color=color).outputs[0], output.inputs[0])
     _check(read_material(material), _RED[:3])
 
 
@@ -158,15 +158,15 @@ def test_a_material_without_surface_is_black_and_warns() -> None:
 
 
 @pytest.mark.skipif(bpy.app.version >= (5, 0), reason="materials always have nodes here")
-def test_a_material_without_nodes_has_its_viewport_colour() -> None:
+def test_a_material_without_nodes_has_its_viewport_color() -> None:
     material = bpy.data.materials.new("M")
     material.diffuse_color = _RED
     _check(read_material(material), _RED[:3])
 
 
-def _image(name: str, colour_space: str, *, is_float: bool) -> tuple[bpy.types.Image, np.ndarray]:
+def _image(name: str, color_space: str, *, is_float: bool) -> tuple[bpy.types.Image, np.ndarray]:
     image = bpy.data.images.new(name, 4, 2, float_buffer=is_float)
-    image.colorspace_settings.name = colour_space
+    image.colorspace_settings.name = color_space
     pixels = np.ones((8, 4), dtype=np.float32)
     pixels[:, :3] = np.linspace(0, 1, 24, dtype=np.float32).reshape(8, 3)
     pixels[:, 3] = np.linspace(0, 1, 8, dtype=np.float32)
@@ -176,13 +176,13 @@ def _image(name: str, colour_space: str, *, is_float: bool) -> tuple[bpy.types.I
 
 
 @pytest.mark.parametrize(
-    ("colour_space", "is_float"), [("sRGB", False), ("Non-Color", False), ("Linear Rec.709", True)]
+    ("color_space", "is_float"), [("sRGB", False), ("Non-Color", False), ("Linear Rec.709", True)]
 )
 def test_an_image_that_cannot_be_evaluated_counts_with_its_linear_mean(
-    colour_space: str, is_float: bool
+    color_space: str, is_float: bool
 ) -> None:
-    image, pixels = _image("Bricks", colour_space, is_float=is_float)
-    mean = (linear_from_srgb(pixels) if colour_space == "sRGB" else pixels).mean(axis=0)
+    image, pixels = _image("Bricks", color_space, is_float=is_float)
+    mean = (linear_from_srgb(pixels) if color_space == "sRGB" else pixels).mean(axis=0)
     np.testing.assert_allclose(image_mean(image)[:3], mean, rtol=1e-5)
     material = shader_material("Wall", "ShaderNodeBsdfPrincipled", Specular_IOR_Level=0)
     tree = material.node_tree
@@ -218,7 +218,7 @@ def test_srgb_decodes_as_the_standard_says() -> None:
 
 @pytest.mark.parametrize("kind", ["ShaderNodeTexNoise", "ShaderNodeVertexColor", "ShaderNodeTexImage"])
 def test_what_varies_in_unknown_ways_falls_back_on_the_sockets_value(kind: str) -> None:
-    """Procedural textures and vertex colours, if not evaluated; images that are missing, always."""
+    """Procedural textures and vertex colors, if not evaluated; images that are missing, always."""
     material = shader_material("Odd", "ShaderNodeBsdfDiffuse", Color=_RED)
     tree = material.node_tree
     node = tree.nodes.new(kind)
@@ -256,7 +256,7 @@ def test_a_mix_with_transparent_is_its_solid_shader_where_it_is_there() -> None:
     assert surface.warnings == ()
 
 
-def test_transparent_passes_its_colour_and_reflects_nothing() -> None:
+def test_transparent_passes_its_color_and_reflects_nothing() -> None:
     surface = read_material(shader_material("Gone", "ShaderNodeBsdfTransparent", Color=(0.9, 0.6, 0.3, 1)))
     _check(surface, (0, 0, 0))
     assert surface.opacity == pytest.approx(0.4)
@@ -308,7 +308,7 @@ def test_each_triangle_has_its_slots_material_object_slots_before_mesh_slots() -
     np.testing.assert_allclose(scene.emission, [(0, 0, 0), (1, 1, 1)], rtol=1e-6)
 
 
-def test_an_empty_slot_is_grey_and_warns_and_a_missing_slot_is_the_last() -> None:
+def test_an_empty_slot_is_gray_and_warns_and_a_missing_slot_is_the_last() -> None:
     obj = add_mesh("Bare", ((0, 0, 0), (1, 0, 0), (1, 1, 0), (2, 0, 0)), ((0, 1, 2), (1, 3, 2)))
     obj.data.materials.append(shader_material("Red", "ShaderNodeBsdfDiffuse", Color=_RED))
     obj.data.materials.append(None)

@@ -24,7 +24,7 @@ from tests.blender.scenes import add_lamp, add_mesh, shader_material
 def room(tmp_path: Path) -> Iterator[Path]:
     """A saved room of three objects, baked on one page; the folder of its lightmaps."""
     radiosity_addon.register()
-    add_mesh("Floor", material=shader_material("Grey", "ShaderNodeBsdfDiffuse", Color=(0.5, 0.5, 0.5, 1)))
+    add_mesh("Floor", material=shader_material("Gray", "ShaderNodeBsdfDiffuse", Color=(0.5, 0.5, 0.5, 1)))
     add_mesh("Shelf", location=(0, 0, 1), scale=(0.3, 0.3, 1))
     add_mesh("Box", location=(1, 1, 0.5), scale=(0.2, 0.2, 1))
     add_lamp("POINT", energy=100.0, transform={"location": (0, 0, 2)})
@@ -173,7 +173,7 @@ def test_one_undo_brings_the_bake_before_back(room: Path) -> None:
 
 
 def change_reflectance() -> None:
-    material = bpy.data.materials["Grey"]
+    material = bpy.data.materials["Gray"]
     node = next(node for node in material.node_tree.nodes if node.type == "BSDF_DIFFUSE")
     node.inputs["Color"].default_value = (0.8, 0.1, 0.1, 1)
 

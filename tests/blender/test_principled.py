@@ -12,7 +12,7 @@ from tests.blender.scenes import shader_material
 from tests.blender.test_materials import _BLUE, _RED, _check, _messages
 
 
-def test_principled_reflects_its_base_colour_where_nothing_shines() -> None:
+def test_principled_reflects_its_base_color_where_nothing_shines() -> None:
     surface = read_material(
         shader_material("M", "ShaderNodeBsdfPrincipled", Base_Color=_RED, Specular_IOR_Level=0)
     )
@@ -55,7 +55,7 @@ def test_principled_bounces_what_cycles_measures_in_a_closed_room(
     np.testing.assert_allclose(surface.reflectance, measured, atol=0.017)
 
 
-def test_principled_emits_strength_times_colour() -> None:
+def test_principled_emits_strength_times_color() -> None:
     surface = read_material(
         shader_material(
             "M",
@@ -92,7 +92,7 @@ def test_what_is_transmitted_is_not_reflected_and_warns() -> None:
     assert "material 'Glass': transmission is ignored: the surface is baked opaque" in _messages(surface)
 
 
-def test_alpha_is_opacity_and_leaves_the_colour() -> None:
+def test_alpha_is_opacity_and_leaves_the_color() -> None:
     inputs = {"Base_Color": _RED, "Specular_IOR_Level": 0, "Alpha": 0.25, "Emission_Strength": 2.0}
     surface = read_material(shader_material("Thin", "ShaderNodeBsdfPrincipled", **inputs))
     _check(surface, _RED[:3], np.full(3, 2 * math.pi))

@@ -151,7 +151,7 @@ def test_ray_visibility_as_in_cycles(flags: dict[str, bool]) -> None:
     """A red screen between lamp and meter, and a red wall beside it, both with the flags."""
     red = shader_material("Red", "ShaderNodeBsdfDiffuse", Color=(0.9, 0.1, 0.1, 1.0))
     meter = add_mesh(
-        "Meter", material=shader_material("Grey", "ShaderNodeBsdfDiffuse", Color=(0.5,) * 3 + (1,))
+        "Meter", material=shader_material("Gray", "ShaderNodeBsdfDiffuse", Color=(0.5,) * 3 + (1,))
     )
     screen = add_mesh("Screen", material=red, location=(0.8, 0, 1.5), scale=(0.6, 0.6, 1))
     wall = add_mesh("Wall", material=red, location=(-1.2, 0, 1), rotation_euler=(0, math.pi / 2, 0))

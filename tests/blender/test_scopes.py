@@ -31,14 +31,14 @@ def scenes() -> Iterator[tuple[bpy.types.Scene, bpy.types.Scene]]:
     """Two scenes; one object is in both."""
     radiosity_addon.register()
     first = bpy.context.scene
-    grey = shader_material("Grey", "ShaderNodeBsdfDiffuse", Color=(0.5, 0.5, 0.5, 1))
+    gray = shader_material("Gray", "ShaderNodeBsdfDiffuse", Color=(0.5, 0.5, 0.5, 1))
     for name, x in (("A1", 0), ("A2", 3)):
-        add_mesh(name, material=grey, location=(x, 0, 0))
-    both = add_mesh("Both", material=grey, location=(6, 0, 0))
+        add_mesh(name, material=gray, location=(x, 0, 0))
+    both = add_mesh("Both", material=gray, location=(6, 0, 0))
     add_lamp("POINT", energy=100.0, transform={"location": (0, 0, 2)})
     second = bpy.data.scenes.new("Second")
     for name, x in (("B1", 0), ("B2", 3)):
-        obj = add_mesh(name, material=grey, location=(x, 0, 0))
+        obj = add_mesh(name, material=gray, location=(x, 0, 0))
         bpy.context.view_layer.update()  # or Blender 4.2 does not know where it is before it is exported
         first.collection.objects.unlink(obj)
         second.collection.objects.link(obj)

@@ -41,7 +41,7 @@ def test_no_world_and_a_black_world_are_dark() -> None:
 
 
 @pytest.mark.skipif(bpy.app.version >= (5, 0), reason="worlds always have nodes here")
-def test_a_world_without_nodes_has_its_colour() -> None:
+def test_a_world_without_nodes_has_its_color() -> None:
     meter = add_mesh("Meter", _METER)
     world = bpy.data.worlds.new("Plain")
     world.color = (0.1, 0.2, 0.4)

@@ -13,7 +13,7 @@ from radiosity_addon.options.bake_settings import BakeSettings
 from . import shapes, surfaces
 
 SCALES = (1.0, 1.0, 1.0, 1e-3, 1e4)
-"""Metres that a unit of the generator is long: rooms, pin heads, landscapes."""
+"""Meters that a unit of the generator is long: rooms, pin heads, landscapes."""
 
 SCENES = 500
 """How many the tests try."""
@@ -25,7 +25,7 @@ def build(seed: int) -> BakeSettings:
     """Fill the open file, which is empty, with the scene of a seed; return how to bake it."""
     random = Random(seed)
     scale = random.choice(SCALES)
-    centre = Vector(random.choice(((0, 0, 0), (0, 0, 0), (1e4, -1e4, 1e3)))) * scale
+    center = Vector(random.choice(((0, 0, 0), (0, 0, 0), (1e4, -1e4, 1e3)))) * scale
     surfaces.world(random)
     materials = [surfaces.material(random) for _ in range(random.randint(1, 3))]
     meshes = [_painted(random, shapes.mesh(random), materials) for _ in range(random.randint(1, 4))]
@@ -37,12 +37,12 @@ def build(seed: int) -> BakeSettings:
             data = _painted(random, shapes.other_surface(random), materials)
         else:
             data = random.choice(meshes)
-        obj = _add(random, f"Thing {number}", data, Vector() if inside else centre, scale, inside)
+        obj = _add(random, f"Thing {number}", data, Vector() if inside else center, scale, inside)
         if obj.type == "MESH" and random.random() < 0.2:
             shapes.add_modifier(random, obj)
         things.append(obj)
     for number in range(random.randint(0, 2)):
-        made = _add(random, f"Light {number}", surfaces.lamp(random), centre, scale)
+        made = _add(random, f"Light {number}", surfaces.lamp(random), center, scale)
         if made.data.type != "SUN":
             made.data.energy *= scale**2
             for attribute in ("size", "size_y", "shadow_soft_size"):
@@ -51,7 +51,7 @@ def build(seed: int) -> BakeSettings:
                 setattr(made.data, attribute, getattr(made.data, attribute) * scale)
     if group.objects and random.random() < 0.9:
         for number in range(random.randint(1, 2)):
-            instancer = _add(random, f"Instancer {number}", None, centre, 1.0)
+            instancer = _add(random, f"Instancer {number}", None, center, 1.0)
             instancer.instance_type, instancer.instance_collection = "COLLECTION", group
     bpy.context.scene.unit_settings.scale_length = random.choice((1.0, 1.0, 0.01))
     # While all show, or what is hidden would keep the matrix it never had.
@@ -78,14 +78,14 @@ def _add(
     random: Random,
     name: str,
     data: bpy.types.ID | None,
-    centre: Vector,
+    center: Vector,
     scale: float,
     collection: bpy.types.Collection | None = None,
 ) -> bpy.types.Object:
-    """Put an object somewhere near the centre, turned, mirrored or stretched as it may be."""
+    """Put an object somewhere near the center, turned, mirrored or stretched as it may be."""
     obj = bpy.data.objects.new(name, data)
     (collection or bpy.context.scene.collection).objects.link(obj)
-    place = centre + scale * Vector(random.uniform(-3, 3) for _ in range(3))
+    place = center + scale * Vector(random.uniform(-3, 3) for _ in range(3))
     turn = [random.choice((0.0, 0.0, random.uniform(0, 2 * math.pi))) for _ in range(3)]
     stretch = [random.choice((1.0, 1.0, -1.0, random.uniform(0.2, 2.0))) for _ in range(3)]
     if random.random() < 0.03:

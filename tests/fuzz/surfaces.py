@@ -9,7 +9,7 @@ import bpy
 from tests.blender.scenes import add_node, set_world, shader_material
 
 
-def colour(random: Random, brightest: float = 0.9) -> tuple[float, float, float, float]:
+def color(random: Random, brightest: float = 0.9) -> tuple[float, float, float, float]:
     return (*(random.uniform(0, brightest) for _ in range(3)), 1.0)
 
 
@@ -21,14 +21,14 @@ def material(random: Random) -> bpy.types.Material | None:
     if kind == "none":
         return None
     if kind == "diffuse":
-        return shader_material(kind, "ShaderNodeBsdfDiffuse", Color=colour(random))
+        return shader_material(kind, "ShaderNodeBsdfDiffuse", Color=color(random))
     if kind == "emission":
         strength = random.choice((0.0, 1.0, 30.0))
-        return shader_material(kind, "ShaderNodeEmission", Color=colour(random, 1.0), Strength=strength)
+        return shader_material(kind, "ShaderNodeEmission", Color=color(random, 1.0), Strength=strength)
     made = shader_material(
         kind,
         "ShaderNodeBsdfPrincipled",
-        **{"Base Color": colour(random), "Metallic": random.choice((0.0, 0.0, 1.0))},
+        **{"Base Color": color(random), "Metallic": random.choice((0.0, 0.0, 1.0))},
         Alpha=random.choice((1.0, 1.0, 0.5)),
     )
     tree = made.node_tree
@@ -38,7 +38,7 @@ def material(random: Random) -> bpy.types.Material | None:
         other = random.choice(("ShaderNodeBsdfDiffuse", "ShaderNodeBsdfTransparent", "ShaderNodeEmission"))
         shaders = [socket for socket in mix.inputs if socket.type == "SHADER"]
         tree.links.new(surface.outputs[0], shaders[0])
-        tree.links.new(add_node(tree, other, Color=colour(random)).outputs[0], shaders[1])
+        tree.links.new(add_node(tree, other, Color=color(random)).outputs[0], shaders[1])
         tree.links.new(mix.outputs[0], output.inputs["Surface"])
     elif kind == "image":
         texture = tree.nodes.new(random.choice(("ShaderNodeTexImage", "ShaderNodeTexChecker")))
@@ -53,7 +53,7 @@ def material(random: Random) -> bpy.types.Material | None:
 def lamp(random: Random) -> bpy.types.Light:
     kind = random.choice(("POINT", "SPOT", "SUN", "AREA"))
     made = bpy.data.lights.new(kind.title(), kind)
-    made.color = colour(random, 1.0)[:3]
+    made.color = color(random, 1.0)[:3]
     made.energy = random.choice((0.0, 1.0, 5.0)) if kind == "SUN" else random.choice((0.0, 10.0, 1000.0))
     made.use_shadow = random.random() < 0.9
     if kind == "SUN":
@@ -70,11 +70,11 @@ def lamp(random: Random) -> bpy.types.Light:
 
 
 def world(random: Random) -> None:
-    """Give the scene no world, a colour, or a sky of one."""
-    kind = random.choice(("none", "none", "colour", "texture"))
+    """Give the scene no world, a color, or a sky of one."""
+    kind = random.choice(("none", "none", "color", "texture"))
     if kind == "none":
         return
-    made = set_world(*colour(random, 1.0)[:3], strength=random.choice((0.0, 1.0, 3.0)))
+    made = set_world(*color(random, 1.0)[:3], strength=random.choice((0.0, 1.0, 3.0)))
     if kind == "texture":
         tree = made.node_tree
         texture = tree.nodes.new("ShaderNodeTexChecker")

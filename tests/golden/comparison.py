@@ -13,7 +13,7 @@ from radiosity_addon.bake.pipeline import bake
 from radiosity_addon.bake.result.result import BakeResult
 from radiosity_addon.base.bake_warning import BakeWarning
 from radiosity_addon.blender.scene_export.export import export_scene
-from radiosity_addon.lightmap.texels.rasterize import rasterise
+from radiosity_addon.lightmap.texels.rasterization import rasterize
 from radiosity_addon.options.bake_settings import BakeSettings
 from tests.golden import references
 from tests.golden.rows import Row
@@ -29,7 +29,7 @@ class Comparison:
         H/π [W/m²/sr]; row 0 is v = 0.
     theirs : References
     compared : (n, n) bool
-        The centre is inside a triangle, and Cycles wrote the texel.
+        The center is inside a triangle, and Cycles wrote the texel.
     warnings : tuple of BakeWarning
     """
 
@@ -82,6 +82,6 @@ def compare(row: Row, quality: str = "medium") -> Comparison:
     result = bake_row(row, quality)
     inside = np.zeros((row.resolution, row.resolution), dtype=bool)
     for item in result.objects:
-        texels = rasterise(item.uv, row.resolution)
-        inside[texels.row[texels.centre_inside], texels.column[texels.centre_inside]] = True
+        texels = rasterize(item.uv, row.resolution)
+        inside[texels.row[texels.center_inside], texels.column[texels.center_inside]] = True
     return Comparison(result.pages[0].pixels, theirs, inside & theirs.coverage, result.warnings)

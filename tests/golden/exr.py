@@ -1,6 +1,6 @@
 """OpenEXR files as the golden references need them: half floats in scan lines, zipped.
 
-Read and written here, no version of Blender has a say in their colours. After the format's description,
+Read and written here, no version of Blender has a say in their colors. After the format's description,
 "OpenEXR File Layout" (openexr.com).
 """
 

@@ -66,8 +66,8 @@ def save(row: Row, bakes: tuple[np.ndarray, np.ndarray], coverage: np.ndarray) -
     size = 0
     for path, bake in zip(files(row), bakes, strict=True):
         kept = _rounded(np.where(coverage[..., None], bake, 0.0))
-        grey = (kept[..., :1] == kept).all()
-        channels = {"Y": kept[..., 0]} if grey else {"RGB"[i]: kept[..., i] for i in range(3)}
+        gray = (kept[..., :1] == kept).all()
+        channels = {"Y": kept[..., 0]} if gray else {"RGB"[i]: kept[..., i] for i in range(3)}
         write_exr(path, {**channels, "A": coverage.astype(np.float16)})
         size += path.stat().st_size
     return size

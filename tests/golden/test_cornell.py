@@ -15,7 +15,7 @@ from radiosity_addon.bake.pipeline import bake
 from radiosity_addon.bake.result.result import BakeResult
 from radiosity_addon.blender.files.cornell import build_cornell_box
 from radiosity_addon.blender.scene_export.export import export_scene
-from radiosity_addon.lightmap.texels.rasterize import rasterise
+from radiosity_addon.lightmap.texels.rasterization import rasterize
 from radiosity_addon.options.bake_settings import BakeSettings
 from tests.golden.cornell_reference import FILE, Reference, load
 from tests.golden.pictures import write_png
@@ -35,7 +35,7 @@ class Comparison:
     reference: Reference
     result: BakeResult
     compared: np.ndarray
-    """(n, n) bool: the centre is inside a triangle, and Cycles wrote the texel"""
+    """(n, n) bool: the center is inside a triangle, and Cycles wrote the texel"""
     owner: np.ndarray
     """(n, n) int: row of `result.objects`, −1 for none"""
 
@@ -54,8 +54,8 @@ def comparison(empty_blender: None) -> Comparison:
     size = reference.resolution
     owner, compared = np.full((size, size), -1), np.zeros((size, size), dtype=bool)
     for number, item in enumerate(result.objects):
-        texels = rasterise(item.uv, size)
-        inside = texels.centre_inside
+        texels = rasterize(item.uv, size)
+        inside = texels.center_inside
         owner[texels.row[inside], texels.column[inside]] = number
         compared[texels.row[inside], texels.column[inside]] = True
     return Comparison(reference, result, compared & reference.coverage, owner)

@@ -22,7 +22,7 @@ EYE, TARGET, ANGLE = Vector((1.75, -5.6, 3.4)), Vector((0.0, 0.1, 0.72)), math.r
 """On the stage [m]."""
 
 HIDDEN = 0.99
-"""A layout from here on is a corner of the page without a texel's centre (`rows.materials.NOWHERE`)."""
+"""A layout from here on is a corner of the page without a texel's center (`rows.materials.NOWHERE`)."""
 
 
 def render_view(page: np.ndarray, exposure: float, path: Path) -> np.ndarray:

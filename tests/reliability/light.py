@@ -18,11 +18,11 @@ from .random_scenes import Known
 PARTICLES = 6000
 BOUNCES = 40
 TOGETHER = 1e-6
-"""Metres within which parallel emissive faces are one emitter; or so many spacings of their coordinates."""
+"""Meters within which parallel emissive faces are one emitter; or so many spacings of their coordinates."""
 
 SPACINGS = 8
 HAIR = 1e-3
-"""Metres within which light between emissive faces may be held in: rays start above surfaces."""
+"""Meters within which light between emissive faces may be held in: rays start above surfaces."""
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,7 @@ def build(random: Random) -> None:
     scene.render.resolution_x = scene.render.resolution_y = 16
     scene.world = looks.world(random)
     scale = random.choice((1.0, 1.0, 1.0, 1.0, 0.01, 100.0))
-    centre = Vector(random.choice(((0, 0, 0), (0, 0, 0), (0, 0, 0), (1e4, -1e4, 1e3))))
+    center = Vector(random.choice(((0, 0, 0), (0, 0, 0), (0, 0, 0), (1e4, -1e4, 1e3))))
     materials = [_material(random, number) for number in range(random.randint(1, 4))]
     shared = [_mesh(random, number, materials) for number in range(random.randint(1, 4))]
     group = bpy.data.collections.new(looks.name(random, "Group"))
@@ -55,7 +55,7 @@ def build(random: Random) -> None:
         home = random.choice((scene.collection, scene.collection, scene.collection, inner, group))
         obj = bpy.data.objects.new(looks.name(random, f"Thing {number}"), random.choice(shared))
         home.objects.link(obj)
-        _place(random, obj, centre, scale)
+        _place(random, obj, center, scale)
         if made and random.random() < 0.15:
             obj.parent = random.choice(made)
         if random.random() < 0.25 and len(obj.data.vertices) < MOST_CORNERS:
@@ -67,7 +67,7 @@ def build(random: Random) -> None:
     for number in range(random.randint(0, 2)):
         bulb = bpy.data.objects.new(looks.name(random, f"Lamp {number}"), looks.lamp(random))
         scene.collection.objects.link(bulb)
-        _place(random, bulb, centre, scale)
+        _place(random, bulb, center, scale)
         if random.random() < 0.3:
             bulb.radiosity_light_group = random.choice(("Küche", "A", "x" * 48))
     if group.objects and random.random() < 0.7:
@@ -75,7 +75,7 @@ def build(random: Random) -> None:
             empty = bpy.data.objects.new(f"Instance {number}", None)
             scene.collection.objects.link(empty)
             empty.instance_type, empty.instance_collection = "COLLECTION", group
-            _place(random, empty, centre, 1.0)
+            _place(random, empty, center, 1.0)
     if random.random() < 0.25:
         _second_scene(random, made)
     bpy.context.view_layer.update()
@@ -105,8 +105,8 @@ def _mesh(random: Random, number: int, materials: list) -> bpy.types.Mesh:
     return made
 
 
-def _place(random: Random, obj: bpy.types.Object, centre: Vector, scale: float) -> None:
-    obj.location = centre + scale * Vector(random.uniform(-2, 2) for _ in range(3))
+def _place(random: Random, obj: bpy.types.Object, center: Vector, scale: float) -> None:
+    obj.location = center + scale * Vector(random.uniform(-2, 2) for _ in range(3))
     obj.rotation_euler = Euler(random.choice((0.0, 0.0, math.pi / 2, random.uniform(0, 6))) for _ in range(3))
     stretch = [random.choice((1.0, 1.0, 1.0, -1.0, 0.2, 3.0)) for _ in range(3)]
     if random.random() < 0.03:

@@ -10,7 +10,7 @@ from radiosity_addon.solver.methods import hierarchical
 from radiosity_addon.solver.methods.hierarchical import STALLED, exhausted, iterate
 from radiosity_addon.solver.state.anderson import Anderson
 from radiosity_addon.solver.state.iteration import bounce
-from tests.rooms import box_room, grey
+from tests.rooms import box_room, gray
 from tests.unit.solved_rooms import solved
 
 
@@ -81,7 +81,7 @@ def test_a_bright_closed_room_needs_a_quarter_of_jacobis_gathers() -> None:
     """ρ = 0.95 over the same links, from the same start, to the same residual."""
     triangles, _ = box_room((3, 2, 2), n=3)
     count = len(triangles)
-    scene = Scene(triangles, grey(count, 0.95), grey(count, 0.0), lights=[PointLight((1.0, 1.2, 0.7), 10.0)])
+    scene = Scene(triangles, gray(count, 0.95), gray(count, 0.0), lights=[PointLight((1.0, 1.2, 0.7), 10.0)])
     state = solved(scene, error=3e-3)
     assert len(state.cluster_links) > 0
     assert state.settings == SolverSettings(error=3e-3)
@@ -111,7 +111,7 @@ def test_a_bright_closed_room_needs_a_quarter_of_jacobis_gathers() -> None:
 
 def test_an_iteration_whose_residual_falls_no_more_ends(monkeypatch: pytest.MonkeyPatch) -> None:
     triangles, _ = box_room((1, 1, 1), n=1)
-    scene = Scene(triangles, grey(len(triangles), 0.5), grey(len(triangles), 1.0))
+    scene = Scene(triangles, gray(len(triangles), 0.5), gray(len(triangles), 1.0))
     state = solved(scene, error=1e-2)
     state.reset()
     state.iterations = 0

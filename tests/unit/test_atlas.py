@@ -11,7 +11,7 @@ from radiosity_addon.lightmap.charts.flatten import project_polygons
 from radiosity_addon.lightmap.charts.growers import grow_charts
 from radiosity_addon.lightmap.charts.overlap import overlapping_triangles
 from radiosity_addon.lightmap.images.dilate import dilate
-from radiosity_addon.lightmap.texels.rasterize import coverage_sum, rasterise
+from radiosity_addon.lightmap.texels.rasterization import coverage_sum, rasterize
 from radiosity_addon.lightmap.unwrap.atlas import Atlas, AtlasInput, AtlasOptions, build_atlas, run_atlas
 
 from .lightmap_meshes import area_3d, area_uv, box, cornell, islands, lumpy_ngons, quads, uv_sphere
@@ -81,7 +81,7 @@ def test_charts_are_two_texels_apart(unwrapped):
 
 def assert_gap(uv: np.ndarray, resolution: int, gap: int) -> None:
     """Between texels of different charts lie at least `gap` free ones in every direction."""
-    texels = rasterise(uv, resolution)
+    texels = rasterize(uv, resolution)
     chart = islands(uv)[texels.triangle]
     owner = np.full((resolution + 2 * gap,) * 2, -1)
     owner[texels.row + gap, texels.column + gap] = chart
@@ -118,7 +118,7 @@ def test_curved_charts_are_nearly_to_scale():
 def test_bilinear_filtering_within_a_chart_meets_only_that_charts_light():
     triangles, polygon = lumpy_ngons(4)
     uv = run_atlas(inputs((triangles, polygon)), 256).objects[0].uv
-    texels, chart = rasterise(uv, 256), islands(uv)
+    texels, chart = rasterize(uv, 256), islands(uv)
     pixels = np.full((256, 256, 1), np.nan, dtype=np.float32)
     pixels[texels.row, texels.column, 0] = chart[texels.triangle] + 1
     filled = dilate(pixels, texels.coverage())[..., 0]
@@ -137,7 +137,7 @@ def test_the_cornell_box_fills_its_page():
     atlas = run_atlas(inputs(*cornell()), 256)
     uv = page_uv(atlas)
     assert sum(len(mesh[0]) for mesh in cornell()) == 36
-    assert len(rasterise(uv, 256)) > 51_000
+    assert len(rasterize(uv, 256)) > 51_000
     assert len(atlas.pages) == 1
     assert {placed.page for placed in atlas.objects} == {0}
     assert_gap(uv, 256, 2)
@@ -201,7 +201,7 @@ def test_tiny_pages_work_and_say_that_they_are_crowded(resolution):
     uv = page_uv(atlas)
     assert uv.min() >= 0
     assert uv.max() <= 1
-    assert len(rasterise(uv, resolution)) >= 1
+    assert len(rasterize(uv, resolution)) >= 1
     assert (area_uv(uv) > 0).all()
     assert any("raise the resolution" in warning.message for warning in atlas.warnings)
 
@@ -218,7 +218,7 @@ def test_a_crowded_page_names_the_object_that_takes_it_all():
 
 def test_a_tiny_object_beside_a_huge_one_gets_a_texel():
     atlas = run_atlas(inputs(box((100, 100, 100)), box((1e-3, 1e-3, 1e-3)), box((30, 1e-4, 1e-4))), 128)
-    texels = rasterise(page_uv(atlas), 128)
+    texels = rasterize(page_uv(atlas), 128)
     owner = np.repeat([0, 1, 2], 12)[texels.triangle]
     assert (np.bincount(owner, minlength=3) >= 1).all()
     assert (np.bincount(owner, minlength=3)[2]) >= 30  # the rod keeps its length

@@ -5,7 +5,7 @@ import pytest
 
 from radiosity_addon.base.errors import BakeError
 from radiosity_addon.lightmap.charts.box_charts import box_charts
-from radiosity_addon.lightmap.texels.rasterize import coverage_sum, rasterise
+from radiosity_addon.lightmap.texels.rasterization import coverage_sum, rasterize
 from radiosity_addon.lightmap.unwrap.atlas import Atlas, AtlasInput, run_atlas
 from radiosity_addon.lightmap.unwrap.packing import Limits, padding_for
 
@@ -19,7 +19,7 @@ def inputs(*meshes) -> list[AtlasInput]:
 
 
 def densities(atlas: Atlas, objects: list[AtlasInput]) -> list[float]:
-    """Texels per metre of each object, by area."""
+    """Texels per meter of each object, by area."""
     found = []
     for laid, source in zip(atlas.objects, objects, strict=True):
         edges = source.triangles[:, 1:] - source.triangles[:, :1]
@@ -30,7 +30,7 @@ def densities(atlas: Atlas, objects: list[AtlasInput]) -> list[float]:
 
 
 @pytest.mark.parametrize("density", [None, 40.0])
-def test_an_objects_scale_is_its_share_of_texels_a_metre(density):
+def test_an_objects_scale_is_its_share_of_texels_a_meter(density):
     objects = [AtlasInput(f"box {scale}", *box((1, 1, 1)), scale=scale) for scale in (1.0, 0.5, 2.0)]
     atlas = run_atlas(objects, 256, density)
     found = densities(atlas, objects)
@@ -70,13 +70,13 @@ def test_down_to_the_mip_level_asked_for_no_texel_shows_two_charts(mip_levels):
     # Far apart in space, so that every polygon is a chart.
     triangles = triangles + 10.0 * polygon[:, None, None]
     atlas = run_atlas(inputs((triangles, polygon)), 256, limits=Limits(padding=padding_for(mip_levels)))
-    texels = rasterise(atlas.objects[0].uv, 256)
+    texels = rasterize(atlas.objects[0].uv, 256)
     assert not atlas.warnings
     owner = polygon[texels.triangle]
     size = 2**mip_levels
     reads = set()
     for row, column, chart in zip(texels.row.tolist(), texels.column.tolist(), owner.tolist(), strict=True):
-        # A point of this texel reads its coarse texel and its neighbour on the nearer side.
+        # A point of this texel reads its coarse texel and its neighbor on the nearer side.
         for down in {int((row + at) / size + side) for at in (0.01, 0.99) for side in (-0.5, 0.5)}:
             for right in {int((column + at) / size + side) for at in (0.01, 0.99) for side in (-0.5, 0.5)}:
                 reads.add((down, right, chart))

@@ -7,7 +7,7 @@ import pytest
 
 from bench.interior import furniture, shapes
 from bench.rooms import POWER, SIZE, room
-from radiosity_addon.lightmap.texels.rasterize import coverage_sum
+from radiosity_addon.lightmap.texels.rasterization import coverage_sum
 
 
 @pytest.mark.parametrize("triangles", [100, 1_000, 10_000])

@@ -10,7 +10,7 @@ from radiosity_addon.solver import PointLight, Scene, SolverSettings, solve
 from radiosity_addon.solver.gather import Footprints, Gathered, LocalPass
 from radiosity_addon.solver.gather.bright_patches import CONTRAST, MOST, AimedRays, BrightElements
 from radiosity_addon.solver.gather.hit_numbers import NOTHING
-from tests.rooms import box_room, grey, solid_box
+from tests.rooms import box_room, gray, solid_box
 
 RAYS = 64
 POINTS = 400
@@ -23,7 +23,7 @@ def local() -> LocalPass:
     room, _ = box_room((2, 2, 1))
     triangles = np.concatenate([room, solid_box((1.2, 0.9, 0.0), (1.5, 1.2, 0.55))])
     scene = Scene(
-        triangles, grey(24, 0.7), grey(24, 0.0), lights=[PointLight((1.93, 1.0, 0.5), 10.0, radius=0.01)]
+        triangles, gray(24, 0.7), gray(24, 0.0), lights=[PointLight((1.93, 1.0, 0.5), 10.0, radius=0.01)]
     )
     return solve(scene, SolverSettings(error=5e-4)).local_pass
 
@@ -55,7 +55,7 @@ def test_the_expectation_stays_and_most_noise_goes(local: LocalPass) -> None:
     assert aimed.std() < 0.4 * plain.std()
 
 
-def test_neighbouring_texels_differ_little(local: LocalPass) -> None:
+def test_neighboring_texels_differ_little(local: LocalPass) -> None:
     """No blotches: a smooth floor's points differ by less than 3 % of their value, at 64 rays."""
     aimed = irradiance(local, gathered(local, RAYS, 1e-9, 0))
     assert aimed.std() < 0.03 * aimed.mean()
@@ -97,7 +97,7 @@ def test_nothing_is_aimed_where_chance_does_no_harm(local: LocalPass) -> None:
 
 def test_an_even_enclosure_has_no_bright_elements() -> None:
     triangles, _ = box_room()
-    scene = Scene(triangles, grey(12, 0.5), grey(12, 1.0))
+    scene = Scene(triangles, gray(12, 0.5), gray(12, 1.0))
     local = solve(scene, SolverSettings(error=1e-3)).local_pass
     assert len(BrightElements(local.elements.state.hierarchy, local.elements.reflected())) == 0
 
@@ -115,7 +115,7 @@ def test_rays_aim_at_the_bright_spot_on_a_large_element() -> None:
     """A lamp a hand's breadth off a wall lights a spot that is smaller than the elements may be."""
     room, _ = box_room((2, 2, 1))
     lamp = PointLight((1.93, 1.0, 0.5), 10.0, radius=0.01)
-    scene = Scene(room, grey(12, 0.7), grey(12, 0.0), lights=[lamp])
+    scene = Scene(room, gray(12, 0.7), gray(12, 0.0), lights=[lamp])
     local = solve(scene, SolverSettings(error=1e-2, min_area=2e-3)).local_pass
     even = BrightElements(local.elements.state.hierarchy, local.elements.reflected())
     spot = local.gather._bright

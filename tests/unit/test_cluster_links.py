@@ -17,14 +17,14 @@ from radiosity_addon.solver.links.element_links import Links
 from radiosity_addon.solver.links.initial import CONE, FACE_SIZE, MIXED_SIZE, SIZE, first_links
 from radiosity_addon.solver.links.transport import node_radiosity
 from radiosity_addon.solver.state.power import link_closure
-from tests.rooms import box_room, grey, rectangle, sphere
+from tests.rooms import box_room, gray, rectangle, sphere
 
 MANY = 6_000_000
 """Budget of links that nothing here exhausts."""
 
 
 def prepared(triangles: np.ndarray) -> tuple[Hierarchy, NodeShapes, EmbreeCaster]:
-    scene = Scene(triangles, grey(len(triangles), 0.5), grey(len(triangles), 0.0))
+    scene = Scene(triangles, gray(len(triangles), 0.5), gray(len(triangles), 0.0))
     hierarchy = Hierarchy(scene)
     return hierarchy, NodeShapes(hierarchy), EmbreeCaster(scene.triangles, 1)
 
@@ -74,11 +74,11 @@ def test_gather_is_the_sum_over_links_and_faces(made) -> None:
         to, of = int(links.receiver[row]), int(links.source[row])
         rows, sent = faces_of(hierarchy, to), faces_of(hierarchy, of)
         slope = links.gradient[row].astype(float)
-        weight = faces.normal[rows] @ links.vector[row] + (faces.centre[rows] - clusters.centre[to]) @ slope
+        weight = faces.normal[rows] @ links.vector[row] + (faces.center[rows] - clusters.center[to]) @ slope
         expected[rows] += weight[:, None] * nodes[of]
         if of < count:
             share = faces.area[sent, None] / clusters.area[of]
-            offset = (faces.centre[sent] - clusters.centre[of]) @ slope
+            offset = (faces.center[sent] - clusters.center[of]) @ slope
             expected[rows] -= (share * offset[:, None] * radiosity[sent]).sum(axis=0)
     cut = ClusterCut(hierarchy, links.receiver, links.source)
     np.testing.assert_allclose(
@@ -90,7 +90,7 @@ def test_gather_is_the_sum_over_links_and_faces(made) -> None:
 def exact(hierarchy: Hierarchy, to: np.ndarray, of: np.ndarray, radiosity: np.ndarray) -> np.ndarray:
     """Return what arrives at the centroids of the faces `to` from the faces `of`, by Lambert's formula."""
     faces = hierarchy.faces
-    point, normal = np.repeat(faces.centre[to], len(of), 0), np.repeat(faces.normal[to], len(of), 0)
+    point, normal = np.repeat(faces.center[to], len(of), 0), np.repeat(faces.normal[to], len(of), 0)
     factors = point_to_polygon(point, normal, np.tile(faces.corners[of], (len(to), 1, 1)))
     return np.asarray(factors.reshape(len(to), len(of)) @ radiosity[of])
 
@@ -107,7 +107,7 @@ def errors_of_one_link(size: float) -> tuple[float, float]:
         next(c for c in range(hierarchy.n_clusters) if set(faces_of(hierarchy, c)) == set(patch))
         for patch in (range(32), range(32, 64))
     )
-    rising = 1.0 + (hierarchy.faces.centre[:, 2:] - 0.4) / size
+    rising = 1.0 + (hierarchy.faces.center[:, 2:] - 0.4) / size
     wanted = exact(hierarchy, np.arange(32), np.arange(32, 64), rising[:, 0])
     assert wanted.min() > 0
     got = []
@@ -149,7 +149,7 @@ def test_every_pair_of_faces_is_linked_once(made) -> None:
     for receiver, source in zip(together.receiver, together.source, strict=True):
         held[np.ix_(faces_of(hierarchy, receiver), faces_of(hierarchy, source))] += 1
     assert held.max() == 1
-    rise = np.einsum("ijk,ik->ij", faces.centre[None] - faces.centre[:, None], faces.normal)
+    rise = np.einsum("ijk,ik->ij", faces.center[None] - faces.center[:, None], faces.normal)
     see = (rise > 1e-3) & (rise.T > 1e-3)
     # Pairs of which no sample faced the other exchange next to nothing.
     assert held[see].mean() > 0.995
@@ -172,7 +172,7 @@ def test_nothing_is_dropped_that_is_seen(made) -> None:
     hierarchy, shapes, _, _ = made
     rng = np.random.default_rng(5)
     one, other = rng.integers(0, hierarchy.n_clusters + len(hierarchy.faces), (2, 3000))
-    corners, normal, centre = hierarchy.faces.corners, hierarchy.faces.normal, hierarchy.faces.centre
+    corners, normal, center = hierarchy.faces.corners, hierarchy.faces.normal, hierarchy.faces.center
     dropped = np.flatnonzero(~shapes.may_see(one, other))
     if len(hierarchy.faces) == 512:
         # In a sphere every face sees every other.
@@ -181,8 +181,8 @@ def test_nothing_is_dropped_that_is_seen(made) -> None:
     assert 100 < len(dropped) < 2900
     for pair in dropped[:400]:
         a, b = faces_of(hierarchy, one[pair]), faces_of(hierarchy, other[pair])
-        rise = np.einsum("abck,ak->abc", corners[b][None] - centre[a][:, None, None], normal[a]).max(axis=2)
-        fall = np.einsum("back,bk->abc", corners[a][None] - centre[b][:, None, None], normal[b]).max(axis=2)
+        rise = np.einsum("abck,ak->abc", corners[b][None] - center[a][:, None, None], normal[a]).max(axis=2)
+        fall = np.einsum("back,bk->abc", corners[a][None] - center[b][:, None, None], normal[b]).max(axis=2)
         assert (np.minimum(rise, fall) <= 1e-5).all()
 
 
@@ -219,9 +219,9 @@ def test_what_looks_all_ways_is_lit_all_around() -> None:
     room, _ = box_room((2, 2, 2), n=4)
     ball = 0.1 * sphere(2)[:, ::-1] + 1.0
     triangles = np.concatenate([room, ball])
-    emission = grey(len(triangles), 0.0)
+    emission = gray(len(triangles), 0.0)
     emission[len(room) :] = 1.0  # what shines has a tree of its own
-    hierarchy = Hierarchy(Scene(triangles, grey(len(triangles), 0.5), emission))
+    hierarchy = Hierarchy(Scene(triangles, gray(len(triangles), 0.5), emission))
     shapes, caster = NodeShapes(hierarchy), EmbreeCaster(triangles, 1)
     faces = len(room) + np.arange(len(ball))
     of_ball = hierarchy.roots[-1]
@@ -233,7 +233,7 @@ def test_what_looks_all_ways_is_lit_all_around() -> None:
     assert (links.even > 0).all()
     cut = ClusterCut(hierarchy, links.receiver)
     bright = np.ones((hierarchy.n_elements, 2))
-    bright[: len(room), 1] = hierarchy.faces.centre[: len(room), 2] > 1.99
+    bright[: len(room), 1] = hierarchy.faces.center[: len(room), 2] > 1.99
     got = gather_at_clusters(hierarchy, cut, links, node_radiosity(hierarchy, bright))[faces]
     np.testing.assert_allclose(got[:, 0], 1.0, atol=0.12)
     wanted = exact(hierarchy, faces, np.arange(len(room)), bright[: len(room), 1])

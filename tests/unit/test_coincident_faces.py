@@ -8,7 +8,7 @@ import pytest
 from radiosity_addon.solver import Scene
 from radiosity_addon.solver.methods.hierarchical import HierarchicalState
 from radiosity_addon.solver.state.power import power_balance
-from tests.rooms import CEILING, box_room, grey, rectangle
+from tests.rooms import CEILING, box_room, gray, rectangle
 from tests.unit.solved_rooms import solved
 
 REFLECTANCE = 0.6
@@ -21,10 +21,10 @@ def with_sheets(kind: str) -> HierarchicalState:
     sheet = rectangle((0.4, 0.4, 0.8), (1.2, 0, 0), (0, 1.2, 0), 8)
     sheets = {"single": [sheet], "twice": [sheet, sheet], "back to back": [sheet, sheet[:, ::-1]]}[kind]
     triangles = np.concatenate([room, *sheets])
-    emission = grey(len(triangles), 0.0)
+    emission = gray(len(triangles), 0.0)
     emission[:ROOM][surface == CEILING] = 1.0
     two_sided = np.arange(len(triangles)) >= ROOM if kind != "back to back" else None
-    scene = Scene(triangles, grey(len(triangles), REFLECTANCE), emission, two_sided=two_sided)
+    scene = Scene(triangles, gray(len(triangles), REFLECTANCE), emission, two_sided=two_sided)
     state = solved(scene, error=1e-3)
     assert len(state.cluster_links) > 1000
     return state
@@ -39,7 +39,7 @@ def light(state: HierarchicalState) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     """Return the irradiance of the room's faces, and of the sheets' that look up and down."""
     faces = state.hierarchy.faces
     irradiance = state.irradiance[: len(faces), 0]
-    on_sheet = np.abs(faces.centre[:, 2] - 0.8) < 1e-6
+    on_sheet = np.abs(faces.center[:, 2] - 0.8) < 1e-6
     up = faces.normal[:, 2] > 0.5
     return irradiance[:ROOM], irradiance[on_sheet & up], irradiance[on_sheet & ~up]
 

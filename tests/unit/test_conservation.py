@@ -12,7 +12,7 @@ from radiosity_addon.solver.hierarchy.nodes import LEAF
 from radiosity_addon.solver.links.cluster_links import gather_at_clusters
 from radiosity_addon.solver.links.transport import gather, node_radiosity, pull, push
 from radiosity_addon.solver.methods.hierarchical import HierarchicalState
-from tests.rooms import CEILING, box_room, grey, rectangle
+from tests.rooms import CEILING, box_room, gray, rectangle
 from tests.unit.solved_rooms import corridor, furnished, solved
 
 
@@ -95,9 +95,9 @@ def test_open_scene_sends_less() -> None:
     """Without its ceiling a cube loses what goes up: F to it from the floor is 0.19982."""
     room, surface = box_room()
     kept = surface != CEILING
-    emission = grey(len(room), 0.0)
+    emission = gray(len(room), 0.0)
     emission[surface == 0] = 1.0
-    state = solved(Scene(room[kept], grey(10, 0.5), emission[kept]), error=1e-3)
+    state = solved(Scene(room[kept], gray(10, 0.5), emission[kept]), error=1e-3)
     factor = factors(state)
     share = received(state, factor)
     hierarchy = state.hierarchy
@@ -133,9 +133,9 @@ def cluttered() -> HierarchicalState:
     room, surface = box_room((3, 2, 2), n=6)
     box = box_room((0.8, 0.8, 0.8), n=3)[0][:, ::-1] + (0.6, 0.5, 0.3)
     triangles = np.concatenate([room, box])
-    emission = grey(len(triangles), 0.0)
+    emission = gray(len(triangles), 0.0)
     emission[: len(room)][surface == CEILING] = 1.0
-    return solved(Scene(triangles, grey(len(triangles), 0.7), emission), error=1e-3)
+    return solved(Scene(triangles, gray(len(triangles), 0.7), emission), error=1e-3)
 
 
 def test_every_face_of_a_closed_scene_receives_from_all_around(cluttered: HierarchicalState) -> None:
@@ -182,9 +182,9 @@ def test_own_links_are_not_scaled_down_for_noise() -> None:
     """In an open scene half of the leaves' rays tell less than what arrives; own links know better."""
     room, surface = box_room(n=2)
     kept = surface != CEILING
-    emission = grey(len(room), 0.0)
+    emission = gray(len(room), 0.0)
     emission[surface == 0] = 1.0
-    state = solved(Scene(room[kept], grey(int(kept.sum()), 0.5), emission[kept]), error=0.1)
+    state = solved(Scene(room[kept], gray(int(kept.sum()), 0.5), emission[kept]), error=0.1)
     hierarchy, arrivals = state.hierarchy, state.conservation.arrivals
     leaves = hierarchy.leaves
     own, _ = sent_by_leaves(hierarchy, state.cut, state.links, state.cluster_links)
@@ -201,9 +201,9 @@ def test_what_something_escapes_from_is_not_scaled() -> None:
     """Open above: faces that see the opening receive as their links have it, the others have none to see."""
     room, surface = box_room(n=6)
     kept = surface != CEILING
-    emission = grey(len(room), 0.0)
+    emission = gray(len(room), 0.0)
     emission[surface == 0] = 1.0
-    state = solved(Scene(room[kept], grey(int(kept.sum()), 0.5), emission[kept]), error=1e-3)
+    state = solved(Scene(room[kept], gray(int(kept.sum()), 0.5), emission[kept]), error=1e-3)
     assert len(state.cluster_links) > 0
     open_faces = ~state.conservation.closed(state.hierarchy)
     assert open_faces.mean() > 0.95
@@ -221,10 +221,10 @@ def test_partly_covered_faces_are_sent_what_their_quarters_take() -> None:
     ]
     room, _ = box_room()
     triangles = np.concatenate([room, *panels])
-    emission = grey(len(triangles), 0.0)
+    emission = gray(len(triangles), 0.0)
     emission[:2] = 1.0
     state = solved(
-        Scene(triangles, grey(len(triangles), 0.9), emission, two_sided=True), error=0.02, min_area=1e-3
+        Scene(triangles, gray(len(triangles), 0.9), emission, two_sided=True), error=0.02, min_area=1e-3
     )
     hierarchy, leaves = state.hierarchy, state.hierarchy.leaves
     radiosity = np.zeros((hierarchy.n_elements, len(leaves)))

@@ -10,7 +10,7 @@ from radiosity_addon.rays.coplanar import COPY_LIFT, facing_copies
 from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.scene.opacity import ray_caster
 from radiosity_addon.solver import Scene
-from tests.rooms import box_room, grey, rectangle, solid_box
+from tests.rooms import box_room, gray, rectangle, solid_box
 
 OFFSET = 1e-5
 LOWER = 2 * 5**2
@@ -34,7 +34,7 @@ def two_sheets(order: int) -> np.ndarray:
 
 def caster(triangles: np.ndarray, two_sided: bool | np.ndarray = False) -> RayCaster:
     count = len(triangles)
-    return ray_caster(Scene(triangles, grey(count, 0.5), grey(count, 0.0), two_sided=two_sided))
+    return ray_caster(Scene(triangles, gray(count, 0.5), gray(count, 0.0), two_sided=two_sided))
 
 
 def rays(triangles: np.ndarray, side: int, count: int = 4000) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -108,11 +108,11 @@ def test_nothing_opens_between_boxes_that_touch() -> None:
     boxes = np.concatenate([solid_box((0, 0, 0), (1, 1, 1)), solid_box((0, 0, 1), (1, 1, 2))])
     cast = caster(boxes)
     rng = np.random.default_rng(3)
-    towards = rng.uniform(0, 1, (200_000, 3))
-    towards[:, 2] = 1.0 + rng.normal(size=len(towards)) * 0.5 * surface_offset(boxes)
-    way = rng.normal(size=(len(towards), 3))
+    toward = rng.uniform(0, 1, (200_000, 3))
+    toward[:, 2] = 1.0 + rng.normal(size=len(toward)) * 0.5 * surface_offset(boxes)
+    way = rng.normal(size=(len(toward), 3))
     way /= np.linalg.norm(way, axis=1, keepdims=True)
-    outside = cast.intersect(towards + 4.0 * way, -way)
+    outside = cast.intersect(toward + 4.0 * way, -way)
     assert (outside.triangle != NO_HIT).all()
     assert outside.front.all()
     within = np.linspace(0.2, 0.8, 50)[:, None] * np.ones(3)
@@ -127,7 +127,7 @@ def test_a_caster_of_some_triangles_still_knows_their_rows() -> None:
     count = len(sheets)
     both = np.concatenate([sheets + 5.0, sheets])
     in_bounces = np.arange(2 * count) >= count
-    scene = Scene(both, grey(2 * count, 0.5), grey(2 * count, 0.0), in_bounces=in_bounces)
+    scene = Scene(both, gray(2 * count, 0.5), gray(2 * count, 0.0), in_bounces=in_bounces)
     origins, directions, _ = rays(sheets[:LOWER], 1, 500)
     hits = ray_caster(scene).intersect(origins, directions)
     assert hits.front.all()

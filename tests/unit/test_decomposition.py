@@ -12,7 +12,7 @@ from radiosity_addon.solver.methods import solve_by_method
 from radiosity_addon.solver.methods.dense import dense
 from radiosity_addon.solver.methods.jacobi import jacobi
 from radiosity_addon.solver.methods.matrix import MatrixState
-from tests.rooms import CEILING, box_room, grey, rectangle
+from tests.rooms import CEILING, box_room, gray, rectangle
 from tests.systems import cornell_system, cube_system, iterate, side_by_side
 
 
@@ -110,10 +110,10 @@ def solve(scene: Scene, **settings: object) -> MatrixState:
 @pytest.mark.parametrize("assembly", ["galerkin", "collocation", "linear"])
 def test_rooms_are_reported_as_blocks(assembly: str) -> None:
     triangles, room = two_rooms()
-    emission = grey(24, 0.0)
+    emission = gray(24, 0.0)
     emission[2:4] = 1.0
     emission[14:16] = 3.0
-    state = solve(Scene(triangles, grey(24, 0.5), emission), assembly=assembly)
+    state = solve(Scene(triangles, gray(24, 0.5), emission), assembly=assembly)
     blocks = state.details["independent_sets"]
     assert [block["area_m2"] for block in blocks] == pytest.approx([24.0, 6.0])
     assert sum(block["elements"] for block in blocks) == len(state.hierarchy.leaves)
@@ -127,14 +127,14 @@ def test_rooms_are_reported_as_blocks(assembly: str) -> None:
 def test_rooms_together_are_what_they_are_apart(method: str) -> None:
     """The same elements solved in one scene and in two, to 1e-12."""
     triangles, room = two_rooms()
-    emission = grey(24, 0.0)
+    emission = gray(24, 0.0)
     emission[2:4], emission[14:16] = 1.0, 3.0
     options = {"method": method, "tolerance": 1e-14}
     # Both rooms down to triangles of one size: 192 and 48 of them.
-    together = solve(Scene(triangles, grey(24, 0.7), emission), elements=240, **options)
+    together = solve(Scene(triangles, gray(24, 0.7), emission), elements=240, **options)
     for number, elements in ((0, 192), (1, 48)):
         rows = room == number
-        apart = solve(Scene(triangles[rows], grey(12, 0.7), emission[rows]), elements=elements, **options)
+        apart = solve(Scene(triangles[rows], gray(12, 0.7), emission[rows]), elements=elements, **options)
         assert len(apart.values) == elements
         np.testing.assert_allclose(apart.radiosity[:12], together.radiosity[:24][rows], rtol=1e-12)
         np.testing.assert_allclose(apart.irradiance[:12], together.irradiance[:24][rows], rtol=1e-12)
@@ -144,9 +144,9 @@ def test_rooms_together_are_what_they_are_apart(method: str) -> None:
 def test_the_outside_of_walls_is_alone() -> None:
     """Backs that see nothing are no block: B is what a lamp gives them, here nothing."""
     triangles, surface = box_room()
-    emission = grey(12, 0.0)
+    emission = gray(12, 0.0)
     emission[surface == CEILING] = 1.0
-    scene = Scene(triangles, grey(12, 0.5), emission, two_sided=True)
+    scene = Scene(triangles, gray(12, 0.5), emission, two_sided=True)
     state = solve(scene, elements=96)
     assert state.details["matrix"]["blocks"] == 1
     assert state.details["matrix"]["alone"] == 48
@@ -157,7 +157,7 @@ def test_the_outside_of_walls_is_alone() -> None:
 
 def test_a_plate_by_itself_has_no_block() -> None:
     plate = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0))
-    state = solve(Scene(plate, grey(2, 0.5), grey(2, 1.0)), elements=32, method="jacobi")
+    state = solve(Scene(plate, gray(2, 0.5), gray(2, 1.0)), elements=32, method="jacobi")
     assert state.details["independent_sets"] == []
     assert state.details["matrix"]["converged"]
     assert state.residual == 0.0
@@ -171,9 +171,9 @@ def test_a_thin_wall_parts_two_rooms(assembly: str) -> None:
     wall = rectangle((1, 0, 0), (0, 1, 0), (0, 0, 1))
     triangles = np.concatenate([room, wall])
     left = triangles.mean(axis=1)[:, 0] < 1.0
-    emission = grey(len(triangles), 0.0)
+    emission = gray(len(triangles), 0.0)
     emission[0] = 1.0
-    scene = Scene(triangles, grey(len(triangles), 0.5), emission, two_sided=True)
+    scene = Scene(triangles, gray(len(triangles), 0.5), emission, two_sided=True)
     state = solve(scene, elements=500, assembly=assembly)
     blocks = state.details["independent_sets"]
     # Two cubes of six walls each; the room's outside sees nothing.

@@ -14,11 +14,11 @@ from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from radiosity_addon.solver.links import element_links
 from radiosity_addon.solver.links.element_links import Links, join, measure_links, no_links
 from radiosity_addon.solver.links.pair_factors import element_factors
-from tests.rooms import box_room, grey, rectangle, solid_box
+from tests.rooms import box_room, gray, rectangle, solid_box
 
 
 def scene_of(triangles: np.ndarray) -> Scene:
-    return Scene(triangles, grey(len(triangles), 0.5), grey(len(triangles), 0.0))
+    return Scene(triangles, gray(len(triangles), 0.5), gray(len(triangles), 0.0))
 
 
 def hierarchy_of(triangles: np.ndarray) -> tuple[Hierarchy, EmbreeCaster]:
@@ -31,7 +31,7 @@ def random_rotations(rng: np.random.Generator, count: int) -> np.ndarray:
 
 
 def pairs_at(ratio: float, count: int = 300) -> np.ndarray:
-    """Return (2 count, 3, 3): random pairs whose centres are `ratio` times their radii apart."""
+    """Return (2 count, 3, 3): random pairs whose centers are `ratio` times their radii apart."""
     rng = np.random.default_rng(int(10 * ratio))
     shapes = rng.normal(size=(2 * count, 3, 3))
     shapes -= shapes.mean(axis=1, keepdims=True)

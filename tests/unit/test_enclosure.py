@@ -1,4 +1,4 @@
-"""What arrives of the light of leaves: shared by neighbours, apart where they differ, and black backs."""
+"""What arrives of the light of leaves: shared by neighbors, apart where they differ, and black backs."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from radiosity_addon.solver import Scene
 from radiosity_addon.solver.balance import enclosure
 from radiosity_addon.solver.balance.enclosure import HELD_RAYS, LAMP_RAYS, RAYS, Arrivals
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
-from tests.rooms import CEILING, FLOOR, box_room, grey, rectangle
+from tests.rooms import CEILING, FLOOR, box_room, gray, rectangle
 
 EVERYTHING = 1e9
-"""Smallest area that makes all faces neighbours."""
+"""Smallest area that makes all faces neighbors."""
 
 
 @pytest.fixture
@@ -23,8 +23,8 @@ def alike(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def measured(triangles: np.ndarray, min_area: float, shines: np.ndarray | bool = False) -> Arrivals:
-    emission = grey(len(triangles), 1.0) * np.broadcast_to(shines, len(triangles))[:, None]
-    scene = Scene(triangles, grey(len(triangles), 0.5), emission)
+    emission = gray(len(triangles), 1.0) * np.broadcast_to(shines, len(triangles))[:, None]
+    scene = Scene(triangles, gray(len(triangles), 0.5), emission)
     result = Arrivals(ray_caster(scene), min_area, seed=3)
     result.measure(Hierarchy(scene))
     return result
@@ -42,7 +42,7 @@ def test_in_a_closed_room_all_arrives_without_noise() -> None:
     assert (found.error(np.arange(len(found.share))) == 0).all()
 
 
-def test_neighbours_whose_rays_disagree_ask_their_own() -> None:
+def test_neighbors_whose_rays_disagree_ask_their_own() -> None:
     triangles, surface = open_box()
     shared, alone = measured(triangles, EVERYTHING), measured(triangles, 0.0)
     np.testing.assert_array_equal(shared.share, alone.share)
@@ -87,7 +87,7 @@ def test_what_shines_into_the_open_asks_more() -> None:
 @pytest.mark.usefixtures("alike")
 def test_faces_average_their_leaves() -> None:
     triangles, _ = open_box()
-    scene = Scene(triangles, grey(len(triangles), 0.5), grey(len(triangles), 0.0))
+    scene = Scene(triangles, gray(len(triangles), 0.5), gray(len(triangles), 0.0))
     hierarchy = Hierarchy(scene)
     hierarchy.subdivide(np.arange(5))
     found = Arrivals(ray_caster(scene), 0.0, seed=3)
@@ -107,7 +107,7 @@ def test_large_leaves_ask_more() -> None:
     found = measured(room[kept], 0.0)
     assert found.rays[:10].tolist() == [8192] * 10
     assert found.share[:2].mean() == pytest.approx(1 - 0.19982, abs=0.005)
-    scene = Scene(room[kept], grey(10, 0.5), grey(10, 0.0))
+    scene = Scene(room[kept], gray(10, 0.5), gray(10, 0.0))
     hierarchy = Hierarchy(scene)
     for _ in range(5):
         hierarchy.subdivide(hierarchy.leaves[:4])

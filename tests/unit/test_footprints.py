@@ -48,7 +48,7 @@ def blocker() -> EmbreeCaster:
 
 
 def test_a_gain_is_the_mean_over_the_footprint() -> None:
-    """Where it bends most: the centre alone would be far off right under a lamp."""
+    """Where it bends most: the center alone would be far off right under a lamp."""
     near = PointLight((0.52, 0.48, 0.03), 1.0, radius=0.0)
     at = floor(width=0.05)
     assert at.sampler is not None
@@ -81,18 +81,18 @@ def test_the_threads_change_no_share() -> None:
         np.testing.assert_array_equal(share_of(floor(1.0), blocker(), threads=threads), one)
 
 
-def test_a_glowing_edge_beside_the_centre_shines_on_its_part_of_the_footprint() -> None:
-    """A wide sheet a hair off the surface begins near a footprint's end: the centre gets next to nothing."""
+def test_a_glowing_edge_beside_the_center_shines_on_its_part_of_the_footprint() -> None:
+    """A wide sheet a hair off the surface begins near a footprint's end: the center gets next to nothing."""
     half, begins, height = 0.5, 0.4, 0.02
     sheet = rectangle((begins, -50, height), (0, 100, 0), (100, 0, 0))
     group = EmitterGroup(sheet, np.tile([0.0, 0.0, -1.0], (2, 1)), np.ones(3), 1e-6)
-    centre = np.tile([0.0, 0.0, 0.0], (33, 1))
-    centre[-1, 0] = -3.0
+    center = np.tile([0.0, 0.0, 0.0], (33, 1))
+    center[-1, 0] = -3.0
 
     def across(rows: np.ndarray, u: np.ndarray) -> np.ndarray:
-        return centre[rows, None] + np.concatenate([half * (2 * u - 1), 0 * u[..., :1]], axis=2)
+        return center[rows, None] + np.concatenate([half * (2 * u - 1), 0 * u[..., :1]], axis=2)
 
-    at = Footprints(centre, np.tile([0.0, 0.0, 1.0], (33, 1)), np.arange(33), across)
+    at = Footprints(center, np.tile([0.0, 0.0, 1.0], (33, 1)), np.arange(33), across)
     gain = SpreadPoints(at, 1).gain(group, 0.05)
     # Where x is past the edge: F = (1 + x/√(x² + h²))/2, whose integral is (x + √(x² + h²))/2.
     ends = np.array([-half, half]) - begins
@@ -100,7 +100,7 @@ def test_a_glowing_edge_beside_the_centre_shines_on_its_part_of_the_footprint() 
     assert group.unit_irradiance(at.points[:1], at.normals[:1])[0] < 0.01 * expected
     np.testing.assert_allclose(gain[:-1].mean(), expected, rtol=0.02)
     assert np.abs(gain[:-1] / expected - 1.0).max() < 0.15
-    # Far from it the centre speaks for all.
+    # Far from it the center speaks for all.
     assert gain[-1] == group.unit_irradiance(at.points[-1:], at.normals[-1:])[0]
 
 

@@ -96,8 +96,8 @@ def test_throughput_between_two_squares_adds_up_to_their_form_factor() -> None:
     up, down = np.array([0, 0, 1.0]), np.array([0, 0, -1.0])
     errors = []
     for cells in (4, 8, 16):
-        centre = (np.arange(cells) + 0.5) / cells
-        floor = np.stack([*np.meshgrid(centre, centre), np.zeros((cells, cells))], axis=-1).reshape(-1, 3)
+        center = (np.arange(cells) + 0.5) / cells
+        floor = np.stack([*np.meshgrid(center, center), np.zeros((cells, cells))], axis=-1).reshape(-1, 3)
         geometry = geometry_term(floor[:, None], up, floor[None] + up, down)
         total = throughput(geometry, np.float64(1 / cells**2), np.float64(1 / cells**2)).sum() / np.pi
         errors.append(abs(total - CUBE_FACTOR))

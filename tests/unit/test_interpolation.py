@@ -10,7 +10,7 @@ from radiosity_addon.lightmap.points.point_grid import PER_CELL
 from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
 from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.solver import Scene
-from tests.rooms import grey, rectangle, sphere
+from tests.rooms import gray, rectangle, sphere
 from tests.unit.texel_scenes import QUAD_UV, in_cell, texel_geometry
 
 SIZE = 24
@@ -22,7 +22,7 @@ def caster_of(geometry: TexelGeometry) -> EmbreeCaster:
 
 def geometry_of(*parts: np.ndarray, uv: np.ndarray | None = None) -> TexelGeometry:
     triangles = np.concatenate(parts)
-    scene = Scene(triangles, grey(len(triangles), 0.5), grey(len(triangles), 0.0))
+    scene = Scene(triangles, gray(len(triangles), 0.5), gray(len(triangles), 0.0))
     return texel_geometry(scene, QUAD_UV if uv is None else uv, SIZE)
 
 
@@ -83,7 +83,7 @@ def test_linear_fields_are_nearly_reproduced() -> None:
 
 def test_a_texel_that_is_a_point_of_a_dense_lattice_keeps_nearly_its_value() -> None:
     geometry = geometry_of(PLANE)
-    points = points_of(geometry, 1, closeness=50.0)  # so close to something that no neighbour counts
+    points = points_of(geometry, 1, closeness=50.0)  # so close to something that no neighbor counts
     matrix = weights_of(fit(points, geometry), points, len(geometry))
     np.testing.assert_allclose(matrix[points.texel, np.arange(len(points))], 1.0, atol=1e-6)
 
@@ -108,7 +108,7 @@ def test_nothing_is_carried_through_a_wall(closeness: float) -> None:
     """However far a point in the open may speak, it does not for what it cannot see."""
     wall = rectangle((0.4, -1, -0.5), (0, 3, 0), (0, 0, 1))
     triangles = np.concatenate([rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0)), wall])
-    scene = Scene(triangles, grey(4, 0.5), grey(4, 0.0))
+    scene = Scene(triangles, gray(4, 0.5), gray(4, 0.0))
     uv = np.concatenate([QUAD_UV, np.zeros_like(QUAD_UV)])
     geometry = texel_geometry(scene, uv, SIZE, pages=np.array([0, 0, -1, -1]))
     points = points_of(geometry, 8, 4, closeness=closeness)
@@ -117,13 +117,13 @@ def test_nothing_is_carried_through_a_wall(closeness: float) -> None:
     np.testing.assert_allclose(got[:, 0], left, atol=1e-5)
 
 
-def test_over_a_dome_neighbours_see_each_other() -> None:
+def test_over_a_dome_neighbors_see_each_other() -> None:
     """A bulge between two points is no wall: seen whole, or the eye sees facets."""
     dome = sphere(4)[:, [0, 2, 1]]
     cell = np.stack(np.divmod(np.arange(len(dome)), 46), axis=1)[:, None] / 46
     uv = np.zeros((len(dome), 3, 2))
     uv[:, 1, 0] = uv[:, 2, 1] = 0.99 / 46
-    scene = Scene(dome, grey(len(dome), 0.5), grey(len(dome), 0.0), normals=dome)
+    scene = Scene(dome, gray(len(dome), 0.5), gray(len(dome), 0.0), normals=dome)
     geometry = texel_geometry(scene, (uv + cell).astype(np.float32), 46)
     assert len(geometry) == len(dome)
     points = GatherPoints(geometry, caster_of(geometry), np.zeros(len(geometry), dtype=bool))
@@ -149,7 +149,7 @@ def test_charts_beside_each_other_on_the_page_and_far_apart_in_the_world_do_not_
 
 def test_pages_do_not_mix() -> None:
     triangles = np.concatenate([PLANE, PLANE + np.array([0, 0, 0.01])])
-    scene = Scene(triangles, grey(4, 0.5), grey(4, 0.0))
+    scene = Scene(triangles, gray(4, 0.5), gray(4, 0.0))
     uv = np.concatenate([QUAD_UV, QUAD_UV])
     geometry = texel_geometry(scene, uv, SIZE, pages=np.array([0, 0, 1, 1]))
     points = points_of(geometry, 4, 1)
@@ -189,8 +189,8 @@ def test_a_point_near_something_listens_no_farther_than_it_speaks() -> None:
     np.testing.assert_allclose(again[near[0]], matrix[near[0]], atol=1e-6)
 
 
-def test_a_point_does_not_speak_for_texels_whose_neighbours_see_things_near() -> None:
-    """What a point sees at d metres, a texel s away from it sees at d + s, or nearer: a point in the open
+def test_a_point_does_not_speak_for_texels_whose_neighbors_see_things_near() -> None:
+    """What a point sees at d meters, a texel s away from it sees at d + s, or nearer: a point in the open
     is no longer heard there."""
     geometry = geometry_of(rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0)))
 
@@ -218,7 +218,7 @@ def test_a_texel_that_nothing_reaches_is_an_error() -> None:
 def test_coplanar_surfaces_on_different_pages_share_their_points() -> None:
     """One chart goes on where the other ends: at the seam both take from both."""
     other = PLANE + np.array([1.0, 0, 0])
-    scene = Scene(np.concatenate([PLANE, other]), grey(4, 0.5), grey(4, 0.0))
+    scene = Scene(np.concatenate([PLANE, other]), gray(4, 0.5), gray(4, 0.0))
     geometry = texel_geometry(scene, np.concatenate([QUAD_UV, QUAD_UV]), SIZE, pages=np.array([0, 0, 1, 1]))
     points = points_of(geometry, 4, 1)
     share = fit(points, geometry)((geometry.page[points.texel, None] == 0).astype(float))[:, 0]
@@ -229,7 +229,7 @@ def test_coplanar_surfaces_on_different_pages_share_their_points() -> None:
 
 
 def test_a_tight_bunch_of_points_far_away_cannot_make_light():
-    """Points within 1 mm of each other, 1 m off: their slope is not followed for a metre."""
+    """Points within 1 mm of each other, 1 m off: their slope is not followed for a meter."""
     along = np.array([[1.0, 0, 0], [1.001, 0, 0], [1.0, 0.001, 0]])
     weights = linear_weights(along, np.array([0.2, 0.5, 0.3]), np.array([3]))
     assert weights.sum() == pytest.approx(1.0, rel=1e-5)

@@ -9,13 +9,13 @@ from radiosity_addon.lights.light import Emitter
 from radiosity_addon.solver import AreaLight, PointLight, Scene
 from radiosity_addon.solver.state.lamp_power import lost_by_lamp
 from radiosity_addon.solver.state.power import power_balance
-from tests.rooms import box_room, grey, rectangle, solid_box
+from tests.rooms import box_room, gray, rectangle, solid_box
 from tests.unit.solved_rooms import solved
 
 
 def scene_of(triangles: np.ndarray, lamp: Emitter, two_sided: bool = True) -> Scene:
     count = len(triangles)
-    return Scene(triangles, grey(count, 0.5), grey(count, 0.0), two_sided=two_sided, lights=[lamp])
+    return Scene(triangles, gray(count, 0.5), gray(count, 0.0), two_sided=two_sided, lights=[lamp])
 
 
 def test_few_samples_next_to_a_lamp_make_no_light() -> None:

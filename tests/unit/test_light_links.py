@@ -21,7 +21,7 @@ from radiosity_addon.solver.links.light_links import (
     sky_share,
 )
 from radiosity_addon.solver.links.transport import push
-from tests.rooms import box_room, grey, rectangle, solid_box
+from tests.rooms import box_room, gray, rectangle, solid_box
 
 FLOOR = rectangle((0, 0, 0), (2, 0, 0), (0, 2, 0))
 
@@ -35,7 +35,7 @@ LAMPS = {
 
 
 def setting(triangles: np.ndarray, **changed: Any) -> tuple[Hierarchy, EmbreeCaster]:
-    scene = Scene(triangles, grey(len(triangles), 0.5), grey(len(triangles), 0.0), **changed)
+    scene = Scene(triangles, gray(len(triangles), 0.5), gray(len(triangles), 0.0), **changed)
     return Hierarchy(scene), EmbreeCaster(triangles)
 
 
@@ -44,8 +44,8 @@ def quarter_means(light: Any, triangle: np.ndarray, normal: np.ndarray, fine: in
     parts = split_in_four(triangle[None])[0][:, None]
     for _ in range(fine):
         parts = split_in_four(parts.reshape(-1, 3, 3)).reshape(4, -1, 3, 3)
-    centres = parts.mean(axis=2).reshape(-1, 3)
-    values = light.unit_irradiance(centres, np.tile(normal, (len(centres), 1)))
+    centers = parts.mean(axis=2).reshape(-1, 3)
+    values = light.unit_irradiance(centers, np.tile(normal, (len(centers), 1)))
     return np.asarray(values.reshape(4, -1).mean(axis=1))
 
 

@@ -13,7 +13,7 @@ from radiosity_addon.scene.faces import Faces
 from radiosity_addon.solver import PointLight, Scene
 from radiosity_addon.solver.emitters.light_sources import LightSources
 from radiosity_addon.solver.gather.light_gains import LightGains
-from tests.rooms import box_room, grey
+from tests.rooms import box_room, gray
 
 RED, ORANGE, BLUE = (4.0, 0.0, 0.0), (8.0, 4.0, 0.0), (0.0, 0.0, 2.0)
 
@@ -21,13 +21,13 @@ RED, ORANGE, BLUE = (4.0, 0.0, 0.0), (8.0, 4.0, 0.0), (0.0, 0.0, 2.0)
 def sources(emitter: np.ndarray | None = None) -> tuple[LightSources, Scene]:
     """A lamp; triangles 0 to 3 emit red, orange twice, and blue."""
     triangles, _ = box_room()
-    emission = grey(12, 0.0)
+    emission = gray(12, 0.0)
     emission[:4] = RED, ORANGE, ORANGE, BLUE
-    scene = Scene(triangles, grey(12, 0.5), emission, lights=[PointLight((0.5, 0.5, 0.5), (3.0, 2.0, 1.0))])
+    scene = Scene(triangles, gray(12, 0.5), emission, lights=[PointLight((0.5, 0.5, 0.5), (3.0, 2.0, 1.0))])
     return LightSources(scene, Faces(scene), EmbreeCaster(triangles), emitter), scene
 
 
-def test_every_colour_is_a_source_if_nothing_tells_them_apart() -> None:
+def test_every_color_is_a_source_if_nothing_tells_them_apart() -> None:
     found, scene = sources()
     assert sorted(map(tuple, found.strengths)) == sorted([(3.0, 2.0, 1.0), RED, ORANGE, BLUE])
     assert (found.emitter[4:] == -1).all()
@@ -35,7 +35,7 @@ def test_every_colour_is_a_source_if_nothing_tells_them_apart() -> None:
     np.testing.assert_array_equal(found.of_lamps(found.strengths)[1:], [g.strength for g in found.groups])
 
 
-def test_a_source_of_one_colour_takes_any_other() -> None:
+def test_a_source_of_one_color_takes_any_other() -> None:
     found, scene = sources()
     strengths = found.strengths.copy()
     row = 1 + found.emitter[3]
@@ -48,7 +48,7 @@ def test_a_source_of_one_colour_takes_any_other() -> None:
     np.testing.assert_allclose(found.of_lamps(strengths)[1 + group], (5.0, 6.0, 0.0))
 
 
-def test_a_material_of_two_colours_keeps_their_proportions() -> None:
+def test_a_material_of_two_colors_keeps_their_proportions() -> None:
     material = np.zeros(12, dtype=np.int32)
     material[3] = 1
     found, scene = sources(material)

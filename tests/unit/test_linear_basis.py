@@ -11,11 +11,11 @@ from radiosity_addon.solver.equations.linear_basis import INWARD, vertex_basis
 from radiosity_addon.solver.hierarchy.basis import Basis, constant_basis
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from tests.cornell import cornell_box
-from tests.rooms import box_room, grey, rectangle, sphere
+from tests.rooms import box_room, gray, rectangle, sphere
 
 
 def basis_of(triangles: np.ndarray, elements: int = 0, **scene: object) -> tuple[Hierarchy, Basis]:
-    options = {"reflectance": grey(len(triangles), 0.5), "emission": grey(len(triangles), 0.0), **scene}
+    options = {"reflectance": gray(len(triangles), 0.5), "emission": gray(len(triangles), 0.0), **scene}
     hierarchy = Hierarchy(Scene(triangles, **options))
     subdivide_evenly(hierarchy, elements)
     return hierarchy, vertex_basis(hierarchy)
@@ -65,7 +65,7 @@ def test_a_wall_on_an_edge_parts_the_floor() -> None:
 
 @pytest.mark.parametrize("what", ["reflectance", "emission"])
 def test_materials_part_vertices(what: str) -> None:
-    values = grey(8, 0.5)
+    values = gray(8, 0.5)
     values[:4] = 0.25
     _, basis = basis_of(floor(2), **{what: values})
     joined = np.intersect1d(basis.corner[:4], basis.corner[4:])
@@ -100,7 +100,7 @@ def test_triangles_turned_over_join_with_the_side_they_show() -> None:
 
 def test_hanging_vertices_belong_to_the_smaller_leaves() -> None:
     """Beside a larger leaf a hat stands on the smaller ones only, its node moved off the edge."""
-    hierarchy = Hierarchy(Scene(floor(), grey(2, 0.5), grey(2, 0.0)))
+    hierarchy = Hierarchy(Scene(floor(), gray(2, 0.5), gray(2, 0.0)))
     hierarchy.subdivide(np.array([0]))
     basis = vertex_basis(hierarchy)
     assert len(basis) == 4 + 3  # the square's corners, and the middles of the split triangle's edges

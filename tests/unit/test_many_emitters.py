@@ -12,7 +12,7 @@ from radiosity_addon.solver.emitters.emitters import EmitterGroup
 from radiosity_addon.solver.emitters.merged_faces import merge_flat
 from tests.rooms import rectangle, sphere
 
-CENTRE = np.array([2.5, 2.0, 2.0])
+CENTER = np.array([2.5, 2.0, 2.0])
 
 
 def normals_of(triangles: np.ndarray) -> np.ndarray:
@@ -30,7 +30,7 @@ def panel(n: int = 20) -> np.ndarray:
 
 
 def bulb() -> np.ndarray:
-    return sphere(4)[:, [0, 2, 1]] * 0.3 + CENTRE
+    return sphere(4)[:, [0, 2, 1]] * 0.3 + CENTER
 
 
 def ragged() -> np.ndarray:
@@ -42,7 +42,7 @@ def ragged() -> np.ndarray:
 def places(count: int, apart: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(4)
     points = rng.uniform((0, 0, 0), (5, 4, 2.9), (3 * count, 3))
-    points = points[np.linalg.norm(points - CENTRE, axis=1) > apart][:count]
+    points = points[np.linalg.norm(points - CENTER, axis=1) > apart][:count]
     normals = rng.normal(size=points.shape)
     return points, normals / np.linalg.norm(normals, axis=1, keepdims=True)
 

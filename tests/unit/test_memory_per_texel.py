@@ -23,7 +23,7 @@ from radiosity_addon.solver import PointLight, Scene, SolverSettings, solve
 from radiosity_addon.solver.gather.bright_patches import AimedRays
 from radiosity_addon.solver.gather.footprints import Footprints
 from radiosity_addon.solver.gather.hit_numbers import NOTHING
-from tests.rooms import box_room, grey
+from tests.rooms import box_room, gray
 from tests.unit.test_sweeps import identity, room_with_texels
 
 COUNT = 1 << 16
@@ -102,7 +102,7 @@ def test_aimed_rays_are_kept_in_files(in_files: Scratch) -> None:
     room, _ = box_room((2, 2, 1))
     lamp = PointLight((1.93, 1.0, 0.5), 10.0, radius=0.01)
     local = solve(
-        Scene(room, grey(12, 0.7), grey(12, 0.0), lights=[lamp]), SolverSettings(error=1e-4)
+        Scene(room, gray(12, 0.7), gray(12, 0.0), lights=[lamp]), SolverSettings(error=1e-4)
     ).local_pass
     count, rays = 1 << 9, 192
     found = {}

@@ -10,11 +10,11 @@ from radiosity_addon.solver import Scene
 from radiosity_addon.solver.gather.light_gains import LightGains
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from radiosity_addon.solver.moved_elements import on_scene
-from tests.rooms import box_room, grey
+from tests.rooms import box_room, gray
 
 
 def scene_of(triangles: np.ndarray) -> Scene:
-    return Scene(triangles, grey(len(triangles), 0.5), grey(len(triangles), 0.0), two_sided=True)
+    return Scene(triangles, gray(len(triangles), 0.5), gray(len(triangles), 0.0), two_sided=True)
 
 
 def test_elements_move_with_their_faces() -> None:

@@ -20,13 +20,13 @@ from radiosity_addon.solver.links.transport import gather
 from radiosity_addon.solver.methods import hierarchical, multi_level
 from radiosity_addon.solver.methods.multi_level import MultiLevelState, refuse_too_many_faces
 from radiosity_addon.solver.state import memory
-from tests.rooms import CEILING, box_room, grey
+from tests.rooms import CEILING, box_room, gray
 from tests.unit.solved_rooms import furnished
 from tests.watched import noting
 
 
 def scene_of(triangles: np.ndarray, two_sided: bool = False) -> Scene:
-    return Scene(triangles, grey(len(triangles), 0.5), grey(len(triangles), 1.0), two_sided=two_sided)
+    return Scene(triangles, gray(len(triangles), 0.5), gray(len(triangles), 1.0), two_sided=two_sided)
 
 
 def multi_level_state(scene: Scene, **settings: float) -> MultiLevelState:
@@ -35,7 +35,7 @@ def multi_level_state(scene: Scene, **settings: float) -> MultiLevelState:
 
 def cube() -> Scene:
     triangles, surface = box_room()
-    return Scene(triangles, grey(12, 0.5), grey(12, 1.0) * (surface == CEILING)[:, None])
+    return Scene(triangles, gray(12, 0.5), gray(12, 1.0) * (surface == CEILING)[:, None])
 
 
 # --- links of pairs -----------------------------------------------------------------------------
@@ -245,7 +245,7 @@ def replace_lights(scene: Scene, lights: list) -> Scene:
 @pytest.mark.parametrize("count", [0, 1, 12])
 def test_without_light_all_is_black(count: int) -> None:
     triangles = box_room()[0][:count]
-    scene = Scene(triangles, grey(count, 0.5), grey(count, 0.0))
+    scene = Scene(triangles, gray(count, 0.5), gray(count, 0.0))
     solution = solve(scene, replace(SolverSettings(), method="multi-level"))
     assert not solution.triangle_radiosity.any()
     assert solution.report["links"] == 0

@@ -7,14 +7,14 @@ import pytest
 
 from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.solver import Scene
-from radiosity_addon.solver.hierarchy.neighbors import neighbours
+from radiosity_addon.solver.hierarchy.adjacency import neighbors
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
-from tests.rooms import box_room, grey, rectangle
+from tests.rooms import box_room, gray, rectangle
 
 
 def prepare(triangles: np.ndarray, two_sided: bool = False) -> tuple[Hierarchy, EmbreeCaster]:
     count = len(triangles)
-    scene = Scene(triangles, grey(count, 0.5), grey(count, 0.0), two_sided=two_sided)
+    scene = Scene(triangles, gray(count, 0.5), gray(count, 0.0), two_sided=two_sided)
     return Hierarchy(scene), EmbreeCaster(scene.triangles)
 
 
@@ -22,7 +22,7 @@ def pairs_of(triangles: np.ndarray, levels: int = 0, two_sided: bool = False) ->
     hierarchy, caster = prepare(triangles, two_sided)
     for _ in range(levels):
         hierarchy.subdivide(hierarchy.leaves)
-    return {(int(a), int(b)) for a, b in neighbours(hierarchy, caster)}
+    return {(int(a), int(b)) for a, b in neighbors(hierarchy, caster)}
 
 
 @pytest.mark.parametrize("levels", [0, 1, 2, 3])
@@ -41,19 +41,19 @@ def test_a_grid_of_faces_is_one_surface_however_it_lies(turn: float) -> None:
     assert len(pairs) == (3 * 32 - 16) // 2
 
 
-def test_neighbours_share_an_edge() -> None:
+def test_neighbors_share_an_edge() -> None:
     hierarchy, caster = prepare(rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0)))
     hierarchy.subdivide(hierarchy.leaves)
-    for one, other in neighbours(hierarchy, caster):
+    for one, other in neighbors(hierarchy, caster):
         corners = [{tuple(c) for c in hierarchy.corners[e].round(9)} for e in (one, other)]
         assert len(corners[0] & corners[1]) == 2
 
 
 def test_levels_meet() -> None:
-    """A coarse leaf is neighbour to the finer ones along its edge."""
+    """A coarse leaf is neighbor to the finer ones along its edge."""
     hierarchy, caster = prepare(rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0)))
     hierarchy.subdivide(np.array([0]))
-    pairs = neighbours(hierarchy, caster)
+    pairs = neighbors(hierarchy, caster)
     beside = {int(a + b - 1) for a, b in pairs if 1 in (a, b)}
     # The two corner children on the diagonal, and the one that touches the middle of the edge.
     fine = {int(e) for e in np.arange(2, 6) if (hierarchy.corners[e].round(9) @ [1, -1, 0] == 0).sum() == 2}
@@ -70,7 +70,7 @@ def test_creases_and_sides_are_apart() -> None:
 
 
 def test_a_wall_on_the_edge_keeps_them_apart() -> None:
-    """The floors of two rooms are no neighbours though they are coplanar and touch."""
+    """The floors of two rooms are no neighbors though they are coplanar and touch."""
     floors = np.concatenate([rectangle((x, 0, 0), (1, 0, 0), (0, 1, 0)) for x in (0, 1)])
     wall = rectangle((1, 0, 0), (0, 1, 0), (0, 0, 1))
     assert len(pairs_of(floors)) == 3
@@ -83,7 +83,7 @@ def test_the_backs_of_triangles_find_each_other() -> None:
     hierarchy, caster = prepare(square, two_sided=True)
     for _ in range(2):
         hierarchy.subdivide(hierarchy.leaves)
-    pairs = neighbours(hierarchy, caster)
+    pairs = neighbors(hierarchy, caster)
     front = hierarchy.faces.front[hierarchy.face[pairs]]
     assert (front[:, 0] == front[:, 1]).all()
     places = hierarchy.corners[pairs].mean(axis=2).round(9)

@@ -363,7 +363,7 @@ def test_summary_says_where_how_long_and_what_to_look_at() -> None:
             "closure_area_mean": 0.99871,
         },
         "seconds": {"export": 0.25, "solve": 1.5},
-        "warnings": [{"name": "Glass", "message": "not understood; grey used instead"}],
+        "warnings": [{"name": "Glass", "message": "not understood; gray used instead"}],
     }
     text = "\n".join(summary("out/x", [("baked.blend", "the scene")], report))
     for part in (

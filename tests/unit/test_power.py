@@ -9,7 +9,7 @@ from radiosity_addon.scene.faces import Faces
 from radiosity_addon.solver import AreaLight, EnvironmentLight, PointLight, Scene, SpotLight, SunLight
 from radiosity_addon.solver.state.lamp_power import light_power
 from radiosity_addon.solver.state.power import link_closure, power_balance
-from tests.rooms import CEILING, box_room, grey, rectangle
+from tests.rooms import CEILING, box_room, gray, rectangle
 from tests.unit.solved_rooms import furnished, solved
 
 FLOOR = rectangle((-1, -1, 0), (2, 0, 0), (0, 2, 0))
@@ -19,7 +19,7 @@ SHARE = np.arcsin(0.2) / np.pi
 
 
 def scene_of(triangles: np.ndarray, reflectance: float = 0.5, **changed) -> Scene:
-    return Scene(triangles, grey(len(triangles), reflectance), grey(len(triangles), 0.0), **changed)
+    return Scene(triangles, gray(len(triangles), reflectance), gray(len(triangles), 0.0), **changed)
 
 
 def balance(scene: Scene, **settings: float) -> dict[str, float]:
@@ -36,7 +36,7 @@ def test_unit_of_power() -> None:
         EnvironmentLight((0.0, 1.0, 9.0)),
     ]
     scene = Scene(
-        triangles, grey(4, 0.5), emission, two_sided=np.array([True, False, False, False]), lights=lights
+        triangles, gray(4, 0.5), emission, two_sided=np.array([True, False, False, False]), lights=lights
     )
     green = 3 * (2 + 2 + 2) + 10 + 2 * 4 + np.pi * (4 + 6 + 6)
     blue = 2 * 6 + 0 + 2 * 4 + 9 * np.pi * 16
@@ -98,7 +98,7 @@ def test_light_that_goes_on_behind_a_surface_counts_on_each(
 
 
 def test_emission_counts_over_both_sides() -> None:
-    scene = Scene(FLOOR, grey(2, 0.5), np.tile([1.0, 2.0, 3.0], (2, 1)), two_sided=True)
+    scene = Scene(FLOOR, gray(2, 0.5), np.tile([1.0, 2.0, 3.0], (2, 1)), two_sided=True)
     power = balance(scene)
     assert power["emitted"] == pytest.approx(2 * 4 * 2.0, rel=1e-12)
     assert power["escaped"] == pytest.approx(power["emitted"], rel=1e-12)
@@ -108,10 +108,10 @@ def test_emission_counts_over_both_sides() -> None:
 def test_escaped_is_not_the_remainder() -> None:
     """An open cube: what leaves through the missing ceiling is followed there."""
     room, surface = box_room()
-    emission = grey(12, 0.0)
+    emission = gray(12, 0.0)
     emission[surface == 0] = 1.0
     kept = surface != CEILING
-    scene = Scene(room[kept], grey(10, 0.0), emission[kept])
+    scene = Scene(room[kept], gray(10, 0.0), emission[kept])
     power = balance(scene, error=1e-3)
     assert power["emitted"] == pytest.approx(1.0, rel=1e-12)
     assert power["escaped"] == pytest.approx(0.19982, abs=0.002)
@@ -122,8 +122,8 @@ def test_black_backs_absorb() -> None:
     """A shining one-sided plate above the black back of another: F = 0.19982 of it ends there."""
     shining = rectangle((0, 0, 1), (0, 1, 0), (1, 0, 0))
     upside_down = rectangle((0, 0, 0), (0, 1, 0), (1, 0, 0))
-    emission = np.concatenate([grey(2, 1.0), grey(2, 0.0)])
-    power = balance(Scene(np.concatenate([shining, upside_down]), grey(4, 0.5), emission))
+    emission = np.concatenate([gray(2, 1.0), gray(2, 0.0)])
+    power = balance(Scene(np.concatenate([shining, upside_down]), gray(4, 0.5), emission))
     assert power["absorbed"] == pytest.approx(0.19982, abs=0.002)
     assert power["escaped"] == pytest.approx(1 - 0.19982, abs=0.002)
 

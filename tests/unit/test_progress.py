@@ -63,5 +63,5 @@ def test_a_canceled_job_leaves_the_other_chunks_out(threads: int) -> None:
     assert 1 <= len(done) < 1000
 
 
-def test_cancelling_is_no_error_that_work_could_handle() -> None:
+def test_canceling_is_no_error_that_work_could_handle() -> None:
     assert not issubclass(Cancelled, Exception)

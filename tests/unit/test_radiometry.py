@@ -95,11 +95,11 @@ def test_the_lambert_brdf_reflects_its_reflectance() -> None:
 def test_light_finds_the_same_way_back_over_a_matte_surface() -> None:
     """f(i → r) = f(r → i) (2.3) of what a surface reflects, measured as (2.1) has it: L_r over H."""
 
-    def measured(towards_lamp: float, towards_eye: float) -> float:
+    def measured(toward_lamp: float, toward_eye: float) -> float:
         """f between two cosines, of one lamp and of what B = πL sends to the eye."""
-        arriving = irradiance_from_point(2.0, towards_lamp, 3.0)
-        sent = radiance_of_radiosity(0.6 * arriving) * towards_eye  # per projected area of the surface
-        return float(sent / towards_eye / arriving)
+        arriving = irradiance_from_point(2.0, toward_lamp, 3.0)
+        sent = radiance_of_radiosity(0.6 * arriving) * toward_eye  # per projected area of the surface
+        return float(sent / toward_eye / arriving)
 
     for one, other in [(0.9, 0.2), (1.0, 0.05), (0.5, 0.6)]:
         assert measured(one, other) == pytest.approx(measured(other, one), rel=1e-14)

@@ -9,12 +9,12 @@ from radiosity_addon.solver import Scene
 from radiosity_addon.solver.hierarchy.nodes import LEAF, Hierarchy
 from radiosity_addon.solver.links.element_links import Links
 from radiosity_addon.solver.links.refine import children_of_links, choose_side, misplaced_power
-from tests.rooms import grey
+from tests.rooms import gray
 
 
 def hierarchy_of(count: int = 9) -> Hierarchy:
     rng = np.random.default_rng(3)
-    return Hierarchy(Scene(rng.normal(size=(count, 3, 3)), grey(count, 0.5), grey(count, 0.0)))
+    return Hierarchy(Scene(rng.normal(size=(count, 3, 3)), gray(count, 0.5), gray(count, 0.0)))
 
 
 def links_between(receiver: np.ndarray, source: np.ndarray, error: np.ndarray | float = 0.1) -> Links:

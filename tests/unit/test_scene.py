@@ -10,25 +10,25 @@ import pytest
 from radiosity_addon.base.errors import SceneError
 from radiosity_addon.numerics.radiometry import MAX_REFLECTANCE
 from radiosity_addon.solver import PointLight, Scene
-from tests.rooms import box_room, grey
+from tests.rooms import box_room, gray
 
 TRIANGLES = np.array([[[0.0, 0, 0], [2, 0, 0], [0, 1, 0]], [[0, 0, 1], [1, 1, 2], [2, 2, 3]]])
 
 
 def scene(**changed: Any) -> Scene:
-    given = {"triangles": TRIANGLES, "reflectance": grey(2, 0.5), "emission": grey(2, 1.0), **changed}
+    given = {"triangles": TRIANGLES, "reflectance": gray(2, 0.5), "emission": gray(2, 1.0), **changed}
     return Scene(**given)
 
 
 def with_value(value: float) -> np.ndarray:
-    rows = grey(2, 0.5)
+    rows = gray(2, 0.5)
     rows[1, 2] = value
     return rows
 
 
 @pytest.mark.parametrize("name", ["reflectance", "emission"])
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, -1e-9])
-def test_bad_colours_are_named_with_their_triangle(name: str, value: float) -> None:
+def test_bad_colors_are_named_with_their_triangle(name: str, value: float) -> None:
     with pytest.raises(SceneError, match=f"{name} of triangle 1 is negative, NaN or infinite"):
         scene(**{name: with_value(value)})
 
@@ -82,7 +82,7 @@ def test_areas_and_normals() -> None:
     assert made.face_normals.tolist() == [[0, 0, 1], [0, 0, 0]]
     np.testing.assert_array_equal(made.normals, np.repeat(made.face_normals[:, None], 3, axis=1))
     room, _ = box_room((2, 3, 4))
-    inside = Scene(room, grey(12, 0.5), grey(12, 0.0))
+    inside = Scene(room, gray(12, 0.5), gray(12, 0.0))
     assert inside.areas.sum() == pytest.approx(2 * (6 + 8 + 12), rel=1e-15)
     to_middle = np.array([1, 1.5, 2]) - room.mean(axis=1)
     assert (np.einsum("ti,ti->t", to_middle, inside.face_normals) > 0).all()

@@ -15,7 +15,7 @@ from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
 from radiosity_addon.lightmap.unwrap.atlas import AtlasInput, run_atlas
 from radiosity_addon.rays.caster import BruteForceCaster
 from radiosity_addon.solver import Scene
-from tests.rooms import grey, rectangle, solid_box
+from tests.rooms import gray, rectangle, solid_box
 from tests.unit.lightmap_meshes import quads, uv_sphere
 from tests.unit.texel_scenes import QUAD_UV, in_cell, texel_geometry
 
@@ -24,7 +24,7 @@ Field = Callable[[np.ndarray], np.ndarray]
 
 def plain(triangles: np.ndarray, normals: np.ndarray | None = None) -> Scene:
     count = len(triangles)
-    return Scene(triangles, grey(count, 0.5), grey(count, 0.0), normals=normals)
+    return Scene(triangles, gray(count, 0.5), gray(count, 0.0), normals=normals)
 
 
 def two_tiles(
@@ -74,9 +74,9 @@ def light(position: np.ndarray) -> np.ndarray:
 
 
 def flat_texels(geometry: TexelGeometry) -> np.ndarray:
-    """The covered texels with their centre on the surface, in the pages' flat numbering."""
+    """The covered texels with their center on the surface, in the pages' flat numbering."""
     numbers = np.concatenate([page.ravel() for page in geometry.index])
-    return np.flatnonzero((numbers >= 0) & geometry.centre_inside[numbers])
+    return np.flatnonzero((numbers >= 0) & geometry.center_inside[numbers])
 
 
 def test_tiles_have_a_seam_where_they_meet_and_nowhere_else() -> None:
@@ -145,7 +145,7 @@ def test_only_texels_read_on_seams_change() -> None:
 
 
 @pytest.mark.parametrize("shape", [smooth_sphere, smooth_cylinder, two_tiles])
-def test_a_step_over_a_seam_becomes_smaller_than_between_neighbours(shape: Callable[[], tuple]) -> None:
+def test_a_step_over_a_seam_becomes_smaller_than_between_neighbors(shape: Callable[[], tuple]) -> None:
     """And what is read on the seam comes closer to the truth than it was."""
     scene, geometry = shape()
     seams = find_seams(scene, geometry, BruteForceCaster(scene.triangles))
@@ -259,5 +259,5 @@ def test_radiosity_is_stitched_within_one_material_only() -> None:
     scene, geometry = two_tiles()
     seams = find_seams(scene, geometry)
     assert len(seams.of_one_material(scene)) == len(seams) > 0
-    painted_tile = Scene(scene.triangles, grey(4, 0.5) * [[1], [1], [0.9], [0.9]], grey(4, 0.0))
+    painted_tile = Scene(scene.triangles, gray(4, 0.5) * [[1], [1], [0.9], [0.9]], gray(4, 0.0))
     assert len(seams.of_one_material(painted_tile)) == 0

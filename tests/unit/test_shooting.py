@@ -16,7 +16,7 @@ from radiosity_addon.solver.equations.exchange import exchange_areas
 from radiosity_addon.solver.methods import shooting, solve_by_method
 from radiosity_addon.solver.methods.shooting import LOOK_AHEAD, MOST_COLUMNS, ShootingState, solve
 from tests.cornell import cornell_box
-from tests.rooms import box_room, grey
+from tests.rooms import box_room, gray
 from tests.watched import watching
 
 
@@ -140,7 +140,7 @@ def test_the_ambient_term_is_exact_where_all_surfaces_are_alike() -> None:
     """B + ρ a = E / (1 − ρ) before the first shot, and its area mean stays so after each."""
     corners = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], dtype=float)
     triangles = corners[[[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]]
-    scene = Scene(triangles, np.tile([0.2, 0.5, 0.9], (4, 1)), grey(4, 2.0))
+    scene = Scene(triangles, np.tile([0.2, 0.5, 0.9], (4, 1)), gray(4, 2.0))
     exact = 2.0 / (1.0 - np.array([0.2, 0.5, 0.9]))
 
     def look(state: ShootingState) -> None:
@@ -192,7 +192,7 @@ def test_how_many_columns_are_made_ahead_changes_nothing(monkeypatch: pytest.Mon
 def test_lamps_shine_before_the_first_shot() -> None:
     """E' = E + ρ H_direct is what there is to shoot, and the irradiance holds the lamps' share."""
     triangles, _ = box_room((4, 4, 4))
-    scene = Scene(triangles, grey(12, 0.5), grey(12, 0.0), lights=[PointLight((2, 2, 2), 10_000.0)])
+    scene = Scene(triangles, gray(12, 0.5), gray(12, 0.0), lights=[PointLight((2, 2, 2), 10_000.0)])
     start = run(scene, max_iterations=0)
     mean = start.hierarchy.area[start.leaves] @ start.received / 96.0
     np.testing.assert_allclose(mean, 10_000.0 / 96.0, rtol=0.005)
@@ -205,7 +205,7 @@ def test_lamps_shine_before_the_first_shot() -> None:
 
 
 def test_without_light_nothing_is_shot() -> None:
-    state = run(Scene(box_room()[0], grey(12, 0.5), grey(12, 0.0)))
+    state = run(Scene(box_room()[0], gray(12, 0.5), gray(12, 0.0)))
     assert state.iterations == 0
     assert (state.radiosity == 0).all()
     assert Solution(state).report["power_W"] == {"emitted": 0.0, "absorbed": 0.0, "escaped": 0.0}

@@ -89,9 +89,9 @@ def test_the_layout_of_the_bake_is_stored_with_it(room: tuple[BakeResult, KeptBa
 def test_textures_and_darkness_are_stored_too(tmp_path: Path) -> None:
     """A textured room, once lit and once baked without any light."""
     path = tmp_path / "lightmap.relight"
-    triangles, grey = lit_bake().scene.triangles[:10], np.full((10, 3), 0.5)
+    triangles, gray = lit_bake().scene.triangles[:10], np.full((10, 3), 0.5)
     lamp = PointLight((1.0, 1.0, 1.0), 0.0, radius=0.05, name="Lamp")
-    unlit = bake_scene(Scene(triangles, grey, 0.0 * grey, lights=[lamp]), ("Room", 10))
+    unlit = bake_scene(Scene(triangles, gray, 0.0 * gray, lights=[lamp]), ("Room", 10))
     for scene, strength in ((bake_scene(furnace(3.0), ("Room", 12)), None), (unlit, np.full((1, 3), 9.0))):
         wanted = BakeSettings(resolution=12, quality="draft", quantity="radiosity")
         result, kept = bake_and_keep(scene, wanted)

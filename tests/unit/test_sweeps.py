@@ -15,7 +15,7 @@ from radiosity_addon.lightmap.points.interpolation import Interpolation
 from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
 from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, SolverSettings, solve
 from radiosity_addon.solver.gather.hit_numbers import NOTHING, SKY
-from tests.rooms import box_room, grey, rectangle
+from tests.rooms import box_room, gray, rectangle
 from tests.unit.texel_scenes import QUAD_UV, texel_geometry
 
 
@@ -31,7 +31,7 @@ def reconstructed(scene: Scene, geometry: TexelGeometry, **settings: int) -> Tex
 def room_with_texels(reflectance: float = 0.5, size: int = 18, **changed) -> tuple[Scene, TexelGeometry]:
     """A closed room; its six sides lie in a 3 × 2 pattern of cells on one page."""
     triangles, surface = box_room()
-    scene = Scene(triangles, grey(12, reflectance), **{"emission": grey(12, 0.0), **changed})
+    scene = Scene(triangles, gray(12, reflectance), **{"emission": gray(12, 0.0), **changed})
     cell = np.stack([surface % 3 / 3, surface // 3 / 3], axis=1)[:, None]
     uv = (np.tile(QUAD_UV, (6, 1, 1)) / 3 + cell).astype(np.float32)
     # Both triangles of each rectangle: `rectangle` lists (a, b, c), then (a, c, d).
@@ -80,7 +80,7 @@ def test_the_skys_share_of_the_rays_is_direct_light() -> None:
 @pytest.mark.parametrize("reflectance", [0.0, 0.5, 0.9])
 def test_a_uniform_enclosure_is_uniform(reflectance: float) -> None:
     """Every side emits 1: H = 1 / (1 − ρ), of which 1 is direct."""
-    scene, geometry = room_with_texels(reflectance, emission=grey(12, 1.0))
+    scene, geometry = room_with_texels(reflectance, emission=gray(12, 1.0))
     light = reconstructed(scene, geometry)
     total = light.direct + light.indirect
     # At edges and corners emitters are seen from within a rounding of their planes.
@@ -118,7 +118,7 @@ def test_direct_and_indirect_are_apart() -> None:
     wall = rectangle((0, 0, 0), (0, 2, 0), (0, 0, 2))  # looks along +x, the lamp stands behind its plane
     triangles = np.concatenate([floor, wall])
     lamp = PointLight((-0.5, 1, 3.0), 100.0)
-    scene = Scene(triangles, grey(4, 0.5), grey(4, 0.0), lights=[lamp])
+    scene = Scene(triangles, gray(4, 0.5), gray(4, 0.0), lights=[lamp])
     uv = np.concatenate([QUAD_UV * [0.5, 1], QUAD_UV * [0.5, 1] + np.array([0.5, 0])]).astype(np.float32)
     light = reconstructed(scene, texel_geometry(scene, uv, 16))
     on_wall = texel_geometry(scene, uv, 16).triangle >= 2

@@ -8,7 +8,7 @@ import pytest
 from radiosity_addon.lightmap.texels.texel_geometry import NO_TEXEL, TexelGeometry
 from radiosity_addon.rays.caster import NO_HIT, Hits
 from radiosity_addon.solver import Scene
-from tests.rooms import grey, rectangle
+from tests.rooms import gray, rectangle
 from tests.unit.texel_scenes import QUAD_UV, in_cell, texel_geometry
 
 SIZE = 16
@@ -16,7 +16,7 @@ SIZE = 16
 
 def scene_of(*parts: np.ndarray, normals: np.ndarray | None = None) -> Scene:
     triangles = np.concatenate(parts)
-    return Scene(triangles, grey(len(triangles), 0.5), grey(len(triangles), 0.0), normals=normals)
+    return Scene(triangles, gray(len(triangles), 0.5), gray(len(triangles), 0.0), normals=normals)
 
 
 def slanted(at: float = 0.0) -> np.ndarray:
@@ -24,7 +24,7 @@ def slanted(at: float = 0.0) -> np.ndarray:
 
 
 def test_a_rectangle_over_the_whole_page() -> None:
-    """Each texel's centre where bilinear interpolation of the corners puts it, row 0 at v = 0."""
+    """Each texel's center where bilinear interpolation of the corners puts it, row 0 at v = 0."""
     geometry = texel_geometry(scene_of(slanted()), QUAD_UV, SIZE)
     assert len(geometry) == SIZE * SIZE
     u, v = (geometry.column + 0.5) / SIZE, (geometry.row + 0.5) / SIZE
@@ -48,7 +48,7 @@ def test_texels_lie_in_their_plane_however_far_out(far: float) -> None:
     assert np.abs(off_plane).max() < 1e-9 * max(far, 1.0)
 
 
-def test_samples_stay_in_their_texel_and_average_to_its_centre() -> None:
+def test_samples_stay_in_their_texel_and_average_to_its_center() -> None:
     geometry = texel_geometry(scene_of(slanted()), QUAD_UV, SIZE)
     rows = np.arange(len(geometry))[::-1]
     grid = (np.stack(np.meshgrid(np.arange(16), np.arange(16)), axis=-1).reshape(1, -1, 2) + 0.5) / 16
@@ -114,12 +114,12 @@ def test_misses_and_surfaces_without_a_lightmap_have_no_texel() -> None:
     assert geometry.triangle[found[3]] == 0
 
 
-def test_neighbourhood_grows_by_one_texel_and_stays_on_its_page() -> None:
+def test_neighborhood_grows_by_one_texel_and_stays_on_its_page() -> None:
     geometry = two_pages()
     chosen = np.zeros(len(geometry), dtype=bool)
     picked = geometry.index[0][8, 3]
     chosen[picked] = True
-    grown = geometry.neighbourhood(chosen)
+    grown = geometry.neighborhood(chosen)
     rows, columns = geometry.row[grown], geometry.column[grown]
     assert (geometry.page[grown] == 0).all()
     assert set(zip(rows.tolist(), columns.tolist(), strict=True)) == {
@@ -127,8 +127,8 @@ def test_neighbourhood_grows_by_one_texel_and_stays_on_its_page() -> None:
     }
     corner = np.zeros(len(geometry), dtype=bool)
     corner[geometry.index[1][0, 0]] = True
-    assert geometry.neighbourhood(corner).sum() == 4
-    assert not geometry.neighbourhood(np.zeros(len(geometry), dtype=bool)).any()
+    assert geometry.neighborhood(corner).sum() == 4
+    assert not geometry.neighborhood(np.zeros(len(geometry), dtype=bool)).any()
 
 
 def test_whole_texels_are_sampled_over_the_middle_half_of_their_squares() -> None:

@@ -15,7 +15,7 @@ from radiosity_addon.bake.pipeline import bake
 from radiosity_addon.bake.texel_memory import least_bytes, pages_of, process_bytes, refuse_too_large
 from radiosity_addon.base.errors import UsageError
 from radiosity_addon.options.bake_settings import BakeSettings
-from tests.rooms import box_room, grey
+from tests.rooms import box_room, gray
 from tests.unit.texel_scenes import bake_scene
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -27,7 +27,7 @@ PEAK = """
 import os, sys
 from radiosity_addon.bake.pipeline import bake
 from radiosity_addon.options.bake_settings import BakeSettings
-from tests.rooms import FLOOR, box_room, grey
+from tests.rooms import FLOOR, box_room, gray
 from tests.unit.texel_scenes import bake_scene
 from radiosity_addon.solver import PointLight, Scene
 
@@ -35,7 +35,7 @@ def peak():
     return int(open("/proc/self/status").read().split("VmHWM:")[1].split()[0]) * 1024
 
 triangles, _ = box_room()
-scene = Scene(triangles, grey(12, 0.1), grey(12, 0.0), lights=[PointLight((0.5, 0.4, 0.6), 10.0)])
+scene = Scene(triangles, gray(12, 0.1), gray(12, 0.0), lights=[PointLight((0.5, 0.4, 0.6), 10.0)])
 limit = float(sys.argv[1])
 settings = dict(quality="draft", threads=2, memory_limit=limit)
 bake(bake_scene(scene, ("Room", 12)), BakeSettings(resolution=int(sys.argv[2]), **settings))
@@ -84,7 +84,7 @@ def test_a_bake_is_refused_before_anything_is_unwrapped(
 
     monkeypatch.setattr(pipeline, "build_atlas", unwrapped)
     triangles, _ = box_room()
-    scene = bake_scene(Scene(triangles, grey(12, 0.5), grey(12, 0.0)), ("Room", 12))
+    scene = bake_scene(Scene(triangles, gray(12, 0.5), gray(12, 0.0)), ("Room", 12))
     with pytest.raises(UsageError, match="memory limit"):
         bake(scene, BakeSettings(**size))  # type: ignore[arg-type]
 

@@ -7,7 +7,7 @@ import pytest
 
 from radiosity_addon.scene.textures import SurfaceImages
 from radiosity_addon.solver import AreaLight, PointLight, Scene
-from tests.rooms import box_room, grey, rectangle
+from tests.rooms import box_room, gray, rectangle
 from tests.textured_rooms import furnace, image, patterned
 from tests.unit.test_pipeline import run, texels
 from tests.unit.texel_scenes import QUAD_UV, bake_scene, in_cell
@@ -28,7 +28,7 @@ def test_the_lightmap_of_a_textured_furnace_is_constant(quantity: str) -> None:
 def lit_floor(values: np.ndarray) -> Scene:
     floor = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0))
     images = SurfaceImages(values, QUAD_UV, np.ones(2, bool))
-    return Scene(floor, grey(2, 0), grey(2, 0), lights=[PointLight((0.5, 0.5, 1), 10.0)], images=images)
+    return Scene(floor, gray(2, 0), gray(2, 0), lights=[PointLight((0.5, 0.5, 1), 10.0)], images=images)
 
 
 def test_texels_reflect_and_emit_what_the_image_shows_there() -> None:
@@ -64,17 +64,17 @@ def fenced(cells: np.ndarray, as_geometry: bool) -> Scene:
         solid = np.tile(cells.T.ravel() > 0, 2)
         screen = rectangle(corner, edge_u, edge_v, count)[solid]
         triangles = np.concatenate([room, screen])
-        reflectance = grey(len(triangles), 0.5)
+        reflectance = gray(len(triangles), 0.5)
         sides = np.arange(len(triangles)) >= len(room)
-        return Scene(triangles, reflectance, grey(len(triangles), 0), two_sided=sides, lights=[lamp])
+        return Scene(triangles, reflectance, gray(len(triangles), 0), two_sided=sides, lights=[lamp])
     triangles = np.concatenate([room, rectangle(corner, edge_u, edge_v)])
     textured = np.arange(len(triangles)) >= len(room)
     values = image(16 * count, 0.5, 0.0, cells.repeat(16, 0).repeat(16, 1))
     uv = np.concatenate([np.zeros((len(room), 3, 2)), QUAD_UV])
     return Scene(
         triangles,
-        grey(len(triangles), 0.5),
-        grey(len(triangles), 0),
+        gray(len(triangles), 0.5),
+        gray(len(triangles), 0),
         two_sided=textured,
         lights=[lamp],
         images=SurfaceImages(values, uv, textured),

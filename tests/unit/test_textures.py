@@ -21,7 +21,7 @@ def noise(height, width, seed=0):
     return np.random.default_rng(seed).random((height, width, 7)) * 0.9
 
 
-def test_texel_centres_hold_their_own_values():
+def test_texel_centers_hold_their_own_values():
     values = noise(4, 8)
     images = images_of(values)
     row, column = np.divmod(np.arange(32), 8)

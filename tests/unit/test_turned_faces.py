@@ -8,7 +8,7 @@ import pytest
 from radiosity_addon.lightmap.images.turned_faces import turned_away
 from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import PointLight, Scene
-from tests.rooms import box_room, grey, rectangle, solid_box
+from tests.rooms import box_room, gray, rectangle, solid_box
 from tests.unit.test_pipeline import run
 from tests.unit.texel_scenes import bake_object, bake_scene
 
@@ -24,7 +24,7 @@ def room(turned: bool) -> BakeScene:
     parts = [triangles[surface != 5], wall[:, ::-1] if turned else wall, screen, block]
     everything = np.concatenate(parts)
     count = len(everything)
-    scene = Scene(everything, grey(count, 0.5), grey(count, 0.0), two_sided=True, lights=[LAMP])
+    scene = Scene(everything, gray(count, 0.5), gray(count, 0.0), two_sided=True, lights=[LAMP])
     names = ("Room", "Wall", "Screen", "Block")
     return bake_scene(scene, *((name, len(part)) for name, part in zip(names, parts, strict=True)))
 
@@ -41,7 +41,7 @@ def test_a_wall_whose_normals_point_out_of_its_room_is_warned_of(turned: bool) -
 
 def test_one_wall_of_an_object_counts_but_not_a_scrap_nor_what_is_dark_on_both_sides() -> None:
     areas = np.ones(48)
-    fronts, backs = grey(48, 1.0), grey(48, 0.0)
+    fronts, backs = gray(48, 1.0), gray(48, 0.0)
     fronts[:2], backs[:2] = 0.0, 1.0
     fronts[46:], backs[46:] = 0.0, 0.05
     many = [bake_object("Mostly Right", 0, 30), bake_object("Closet", 46, 2)]
@@ -55,4 +55,4 @@ def test_one_wall_of_an_object_counts_but_not_a_scrap_nor_what_is_dark_on_both_s
 
 def test_without_light_nothing_is_turned_away() -> None:
     objects = [bake_object("Dark", 0, 2)]
-    assert list(turned_away(objects, np.ones(2), grey(2, 0.0), grey(2, 0.0))) == []
+    assert list(turned_away(objects, np.ones(2), gray(2, 0.0), gray(2, 0.0))) == []

@@ -15,7 +15,7 @@ from radiosity_addon.solver.equations.exchange import exchange_areas
 from radiosity_addon.solver.methods import solve_by_method, two_level
 from radiosity_addon.solver.methods.two_level import FINEST, TwoLevelState, contrasts, solve
 from tests.cornell import cornell_box
-from tests.rooms import box_room, grey
+from tests.rooms import box_room, gray
 from tests.watched import noting, watching
 
 NEVER = 1e9
@@ -105,7 +105,7 @@ def test_patch_radiosities_are_kept() -> None:
 
 
 @pytest.mark.parametrize("contrast", [0.4, 1.0])
-def test_neighbours_differ_by_less_than_the_contrast_or_are_finest(contrast: float) -> None:
+def test_neighbors_differ_by_less_than_the_contrast_or_are_finest(contrast: float) -> None:
     state = run(cornell_box(), elements=100, patches=32, contrast=contrast)
     pairs, difference = contrasts(state)
     too_much = pairs[difference > state.limit].ravel()
@@ -122,8 +122,8 @@ def test_neighbours_differ_by_less_than_the_contrast_or_are_finest(contrast: flo
 def test_seams_between_materials_do_not_count() -> None:
     """Across the seam of a checkered floor, all else being black, light differs as on a plain one."""
     triangles, surface = box_room((4, 4, 2))
-    emission = grey(12, 1.0) * (surface == 1)[:, None]
-    plain, checkered = grey(12, 0.0), grey(12, 0.0)
+    emission = gray(12, 1.0) * (surface == 1)[:, None]
+    plain, checkered = gray(12, 0.0), gray(12, 0.0)
     plain[[0, 1]], checkered[[0, 1]] = 0.5, [[0.1] * 3, [0.9] * 3]
     differences = []
     for reflectance in (plain, checkered):
@@ -191,18 +191,18 @@ def test_lamps_light_the_new_elements() -> None:
     """After subdivision the irradiance of a black room is the lamp's own, leaf by leaf."""
     triangles, _ = box_room((4, 4, 3))
     lamp = PointLight((1.0, 1.0, 2.5), 100.0)
-    scene = Scene(triangles, grey(12, 1e-9), grey(12, 0.0), lights=[lamp])
+    scene = Scene(triangles, gray(12, 1e-9), gray(12, 0.0), lights=[lamp])
     state = run(scene, contrast=0.5)
     assert len(state.details["two_level"]["rows"]) > 1
-    centre = state.hierarchy.corners[state.leaves].mean(axis=1)
-    exact = lamp.unit_irradiance(centre, state.hierarchy.normal[state.leaves])[:, None] * lamp.strength
+    center = state.hierarchy.corners[state.leaves].mean(axis=1)
+    exact = lamp.unit_irradiance(center, state.hierarchy.normal[state.leaves])[:, None] * lamp.strength
     np.testing.assert_allclose(state.irradiance[state.leaves], exact, rtol=0.25)
     total = state.hierarchy.area[state.leaves] @ state.irradiance[state.leaves]
     np.testing.assert_allclose(total, 100.0, rtol=0.01)
 
 
 def test_without_light_all_is_black() -> None:
-    state = run(Scene(box_room()[0], grey(12, 0.5), grey(12, 0.0)))
+    state = run(Scene(box_room()[0], gray(12, 0.5), gray(12, 0.0)))
     assert (state.radiosity == 0).all()
     assert Solution(state).report["power_W"] == {"emitted": 0.0, "absorbed": 0.0, "escaped": 0.0}
     empty = run(Scene(np.zeros((0, 3, 3)), np.zeros((0, 3)), np.zeros((0, 3))))
@@ -220,8 +220,8 @@ def test_black_surfaces_are_solved_and_never_split() -> None:
 
 def test_closure_and_power_of_a_closed_room() -> None:
     triangles, surface = box_room()
-    emission = grey(12, 1.0) * (surface == 1)[:, None]
-    state = run(Scene(triangles, grey(12, 0.5), emission), elements=300, patches=48)
+    emission = gray(12, 1.0) * (surface == 1)[:, None]
+    state = run(Scene(triangles, gray(12, 0.5), emission), elements=300, patches=48)
     np.testing.assert_allclose(state.closure(), 1.0, atol=2e-3)
     power = Solution(state).report["power_W"]
     assert power["absorbed"] == pytest.approx(power["emitted"], rel=0.02)

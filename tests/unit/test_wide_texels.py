@@ -9,7 +9,7 @@ from radiosity_addon.lightmap.lighting.gather_settings import GatherSettings
 from radiosity_addon.lightmap.lighting.reconstruction import WIDE, reconstruct
 from radiosity_addon.lights.sun_and_sky import PointLight
 from radiosity_addon.solver import Scene, SolverSettings, solve
-from tests.rooms import grey, rectangle
+from tests.rooms import gray, rectangle
 from tests.unit.texel_scenes import QUAD_UV, in_cell, texel_geometry
 
 SIZE = 24
@@ -19,9 +19,9 @@ def floor_by_a_lit_wall() -> Scene:
     """A black floor of 2 m before a white wall of 4 m, and a lamp that lights one end of the wall only."""
     floor = rectangle((0, 0, 0), (2, 0, 0), (0, 2, 0))
     wall = rectangle((-1, 2, 0), (4, 0, 0), (0, 0, 2))
-    reflectance = np.concatenate([grey(2, 0.0), grey(2, 0.8)])
+    reflectance = np.concatenate([gray(2, 0.0), gray(2, 0.8)])
     return Scene(
-        np.concatenate([floor, wall]), reflectance, grey(4, 0.0), lights=[PointLight((2.6, 1.7, 0.4), 20.0)]
+        np.concatenate([floor, wall]), reflectance, gray(4, 0.0), lights=[PointLight((2.6, 1.7, 0.4), 20.0)]
     )
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from radiosity_addon.lightmap.texels.rasterize import rasterise
+from radiosity_addon.lightmap.texels.rasterization import rasterize
 from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
 from radiosity_addon.scene.bake_scene import BakeObject, BakeScene
 from radiosity_addon.solver import Scene
@@ -25,10 +25,10 @@ def in_cell(low: Sequence[float], high: Sequence[float]) -> np.ndarray:
 def texel_geometry(
     scene: Scene, uv: np.ndarray, resolution: int, pages: np.ndarray | None = None
 ) -> TexelGeometry:
-    """Rasterise a scene; `pages` is each triangle's page, −1 for none, all on one by default."""
+    """Rasterize a scene; `pages` is each triangle's page, −1 for none, all on one by default."""
     pages = np.zeros(len(scene), dtype=np.int32) if pages is None else np.asarray(pages, dtype=np.int32)
     rows = [np.flatnonzero(pages == page) for page in range(int(pages.max()) + 1)]
-    return TexelGeometry(scene, uv, pages, [rasterise(uv[of], resolution) for of in rows], rows)
+    return TexelGeometry(scene, uv, pages, [rasterize(uv[of], resolution) for of in rows], rows)
 
 
 def bake_object(

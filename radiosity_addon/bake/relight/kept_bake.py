@@ -1,7 +1,7 @@
 """A bake kept in memory, and its lightmaps for other strengths of its lights: no ray is traced.
 
 What is kept is light-independent (geometry and reflectance): gather hits, each lamp's gain at each texel,
-the hierarchy's links. Colour and power of lamps, emission, and the world's colour and strength may change;
+the hierarchy's links. Color and power of lamps, emission, and the world's color and strength may change;
 whatever moves, turns or reflects otherwise needs a new bake.
 """
 

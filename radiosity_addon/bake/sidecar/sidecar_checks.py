@@ -169,7 +169,7 @@ def _check_geometry(geometry: TexelGeometry, triangles: int) -> int:
     pages, n = len(instance(geometry.index, list)), len(geometry.page)
     integers(geometry.page, (n,), 0, pages - 1)
     integers(geometry.triangle, (n,), 0, triangles - 1)
-    array_of(geometry.centre_inside, "b", (n,))
+    array_of(geometry.center_inside, "b", (n,))
     numbers(geometry.uv, (triangles, 3, 2), -LARGE)
     integers(geometry.page_of_triangle, (triangles,), -1, pages - 1)
     shown = geometry.uv[geometry.page_of_triangle >= 0]

@@ -1,7 +1,7 @@
 """The bundled scene: the Cornell box, from the data measured at Cornell University.
 
 Geometry: Cornell University Program of Computer Graphics, "The Cornell Box" data, in its
-own units, here at 1 unit = 1 cm: a room of 5.5 m. Reflectances and lamp colour: the
+own units, here at 1 unit = 1 cm: a room of 5.5 m. Reflectances and lamp color: the
 measured spectra integrated to linear sRGB under the box's own lamp.
 """
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from ...numerics import flux_of_radiance
 
-METRES_PER_UNIT = 0.01
+METERS_PER_UNIT = 0.01
 
 REFLECTANCE = {
     "White": (0.7386, 0.7354, 0.7507),
@@ -61,9 +61,9 @@ def build_cornell_box(scene: bpy.types.Scene | None = None) -> bpy.types.Scene:
     bpy.types.Scene
     """
     scene = scene or _scene_to_fill()
-    materials = {name: _diffuse(name, colour) for name, colour in REFLECTANCE.items()}
-    for name, (colour, corners) in _WALLS.items():
-        _add_mesh(scene, name, [_blender(corner) for corner in corners], [(0, 1, 2, 3)], materials[colour])
+    materials = {name: _diffuse(name, color) for name, color in REFLECTANCE.items()}
+    for name, (color, corners) in _WALLS.items():
+        _add_mesh(scene, name, [_blender(corner) for corner in corners], [(0, 1, 2, 3)], materials[color])
     for name, (height, footprint) in _BLOCKS.items():
         vertices, faces = _block(height, footprint)
         _add_mesh(scene, name, vertices, faces, materials["White"])
@@ -95,9 +95,9 @@ def _scene_to_fill() -> bpy.types.Scene:
 
 
 def _blender(corner: Sequence[float]) -> tuple[float, float, float]:
-    """Turn Cornell's coordinates into Blender's metres: X right, Y into the room, Z up."""
+    """Turn Cornell's coordinates into Blender's meters: X right, Y into the room, Z up."""
     x, y, z = corner
-    return (_MIDDLE_X - x) * METRES_PER_UNIT, z * METRES_PER_UNIT, y * METRES_PER_UNIT
+    return (_MIDDLE_X - x) * METERS_PER_UNIT, z * METERS_PER_UNIT, y * METERS_PER_UNIT
 
 
 def _block(height: float, footprint: Sequence[tuple[float, float]]) -> tuple[list, list]:
@@ -105,7 +105,7 @@ def _block(height: float, footprint: Sequence[tuple[float, float]]) -> tuple[lis
     below = [_blender((x, 0.0, z)) for x, z in footprint]
     if _signed_area(below) < 0:
         below.reverse()  # counter-clockwise from above
-    above = [(x, y, height * METRES_PER_UNIT) for x, y, _ in below]
+    above = [(x, y, height * METERS_PER_UNIT) for x, y, _ in below]
     sides = [(i, (i + 1) % 4, 4 + (i + 1) % 4, 4 + i) for i in range(4)]
     return below + above, [(3, 2, 1, 0), (4, 5, 6, 7), *sides]
 
@@ -125,23 +125,23 @@ def _add_mesh(
     scene.collection.objects.link(bpy.data.objects.new(name, mesh))
 
 
-def _diffuse(name: str, colour: tuple[float, float, float]) -> bpy.types.Material:
+def _diffuse(name: str, color: tuple[float, float, float]) -> bpy.types.Material:
     material = bpy.data.materials.new(f"Cornell {name}")
     if bpy.app.version < (5, 0):
         material.use_nodes = True
-    material.diffuse_color = (*colour, 1.0)
+    material.diffuse_color = (*color, 1.0)
     tree = material.node_tree
     tree.nodes.clear()
     output = tree.nodes.new("ShaderNodeOutputMaterial")
     shader = tree.nodes.new("ShaderNodeBsdfDiffuse")
-    shader.inputs["Color"].default_value = (*colour, 1.0)
+    shader.inputs["Color"].default_value = (*color, 1.0)
     shader.location = (-200, 0)
     tree.links.new(shader.outputs["BSDF"], output.inputs["Surface"])
     return material
 
 
 def _lamp_size() -> tuple[float, float]:
-    return (_LAMP_X[1] - _LAMP_X[0]) * METRES_PER_UNIT, (_LAMP_Z[1] - _LAMP_Z[0]) * METRES_PER_UNIT
+    return (_LAMP_X[1] - _LAMP_X[0]) * METERS_PER_UNIT, (_LAMP_Z[1] - _LAMP_Z[0]) * METERS_PER_UNIT
 
 
 def _add_lamp(scene: bpy.types.Scene) -> None:

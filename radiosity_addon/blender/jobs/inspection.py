@@ -307,17 +307,17 @@ def _of_shapes(
 ) -> Iterator[Finding]:
     """Name objects that are inside out, and scales that look forgotten."""
     pieces = [piece for piece in collected.pieces if id(piece) in shapes]
-    centres = np.array([shapes[id(piece)].box.mean(axis=0) for piece in pieces]).reshape(-1, 3)
+    centers = np.array([shapes[id(piece)].box.mean(axis=0) for piece in pieces]).reshape(-1, 3)
     others = [
         obj.matrix_world.translation for obj in context.scene.objects if obj.type in {"LIGHT", "CAMERA"}
     ]
-    centres = np.concatenate([centres, np.array(others, dtype=np.float64).reshape(-1, 3)])
+    centers = np.concatenate([centers, np.array(others, dtype=np.float64).reshape(-1, 3)])
     inverted = []
     for number, piece in enumerate(pieces):
         shape = shapes[id(piece)]
         if shape.volume is None or shape.volume >= -1e-6 * shape.area**1.5:
             continue
-        inside = ((centres > shape.box[0]) & (centres < shape.box[1])).all(axis=1)
+        inside = ((centers > shape.box[0]) & (centers < shape.box[1])).all(axis=1)
         inside[number] = False
         # A room is inside out, and right so: it is seen from within.
         if not inside.any():

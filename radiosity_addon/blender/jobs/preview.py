@@ -87,12 +87,12 @@ def _framing_camera(context: bpy.types.Context, scene: bpy.types.Scene) -> bpy.t
     camera = bpy.data.objects.new("Radiosity Preview", data)
     scene.collection.objects.link(camera)
     scene.camera = camera
-    centre = (corners.min(axis=0) + corners.max(axis=0)) / 2
-    radius = max(float(np.linalg.norm(corners - centre, axis=1).max()), 1e-3)
+    center = (corners.min(axis=0) + corners.max(axis=0)) / 2
+    radius = max(float(np.linalg.norm(corners - center, axis=1).max()), 1e-3)
     aspect = scene.render.resolution_x / scene.render.resolution_y
     narrow = 2 * math.atan(math.tan(data.angle / 2) / max(aspect, 1 / aspect))
     distance = 1.05 * radius / math.sin(narrow / 2)
-    camera.location = Vector(centre) + distance * _VIEW_FROM
+    camera.location = Vector(center) + distance * _VIEW_FROM
     camera.rotation_euler = _VIEW_FROM.to_track_quat("Z", "Y").to_euler()
     data.clip_start = max(distance - 1.1 * radius, 1e-3 * distance)
     data.clip_end = distance + 1.1 * radius

@@ -84,7 +84,7 @@ class LightmapMaterials:
         Parameters
         ----------
         material : Material or None
-            None gives a plain grey.
+            None gives a plain gray.
         image : Image
             The lightmap page.
         pinned : bool

@@ -12,7 +12,7 @@ from ..datablocks.bake_record import is_made
 from ..images.node_group import BASE_COLOR, EMISSION, SHADER
 from ..material_copies.copy_marks import COPY_MARKS, ORIGINAL, STATE
 from ..material_copies.material_digest import digest_of_material
-from ..materials.materials import DEFAULT_GREY
+from ..materials.materials import DEFAULT_GRAY
 from ..materials.shader_nodes import feed_of
 from .stripping import COLORS
 
@@ -196,7 +196,7 @@ def _link(
 def _was_plain_edited(tree: bpy.types.NodeTree, shown: Constants | None) -> bool:
     """Whether a copy of no material was edited; it then gets a shader of the color that it shows."""
     others = [node for node in tree.nodes if node.type != "OUTPUT_MATERIAL"]
-    plain = shown is not None and _are_close(shown, (np.full(3, DEFAULT_GREY), np.zeros(3)))
+    plain = shown is not None and _are_close(shown, (np.full(3, DEFAULT_GRAY), np.zeros(3)))
     outputs = [node for node in tree.nodes if node.type == "OUTPUT_MATERIAL"]
     if shown is not None and outputs and not outputs[0].inputs["Surface"].is_linked:
         shader = tree.nodes.new("ShaderNodeBsdfDiffuse")

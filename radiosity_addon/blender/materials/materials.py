@@ -29,7 +29,7 @@ from .shader_terms import ShaderTerms, Terms, nothing
 from .shading_inputs import LIGHT_PATHS, asks_light_path
 from .surface_terms import surface_of_terms
 
-DEFAULT_GREY = 0.8
+DEFAULT_GRAY = 0.8
 """Reflectance of a face without material, as in Cycles."""
 
 
@@ -69,9 +69,9 @@ class Surface:
 
 
 def read_material(material: bpy.types.Material | None) -> Surface:
-    """Return what a material reflects, emits and covers; None is Cycles' default grey."""
+    """Return what a material reflects, emits and covers; None is Cycles' default gray."""
     if material is None:
-        return Surface(np.full(3, DEFAULT_GREY), np.zeros(3))
+        return Surface(np.full(3, DEFAULT_GRAY), np.zeros(3))
     reader = _Reader(material.name, "material")
     if not uses_nodes(material):
         terms = Terms(np.array(material.diffuse_color[:3], dtype=np.float64), np.zeros(3), np.zeros(3))
@@ -227,7 +227,7 @@ class _Reader(ShaderTerms[Stack]):
     def clamped_reflectance(self, reflectance: np.ndarray) -> np.ndarray:
         """Keep a reflectance where the light in a closed room still dies away."""
         clamped = np.clip(np.nan_to_num(reflectance), 0.0, MAX_REFLECTANCE)
-        # The margin is what single-precision colours round by.
+        # The margin is what single-precision colors round by.
         if (np.abs(clamped - reflectance) > 1e-6).any():
             self.warn(f"reflectance {_text(reflectance)} is clamped to {_text(clamped)}")
         return clamped

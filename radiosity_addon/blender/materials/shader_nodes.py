@@ -56,7 +56,7 @@ class Value:
 
     @property
     def scalar(self) -> float:
-        """The value as Cycles turns a colour into a float: its luminance."""
+        """The value as Cycles turns a color into a float: its luminance."""
         return float(self.rgb @ _LUMINANCE)
 
 

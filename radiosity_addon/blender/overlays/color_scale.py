@@ -38,7 +38,7 @@ NEARLY_ALL = 98.0
 
 @dataclass(frozen=True)
 class ColorScale:
-    """Colours for numbers from `low` to `high`; what is beyond has the color of the end.
+    """Colors for numbers from `low` to `high`; what is beyond has the color of the end.
 
     Parameters
     ----------

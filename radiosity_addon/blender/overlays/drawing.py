@@ -43,7 +43,7 @@ void main()
 
 @cache
 def page_shader() -> Any:
-    """Return the shader that shows texels as they are, none of them smoothed into its neighbours."""
+    """Return the shader that shows texels as they are, none of them smoothed into its neighbors."""
     import gpu
 
     between = gpu.types.GPUStageInterfaceInfo("radiosity_page")

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...bake.result import MEANS
 from ...lightmap.images import LightStatistics, light_statistics, lit_texels
-from ...lightmap.texels import NO_TEXEL_HERE, rasterise
+from ...lightmap.texels import NO_TEXEL_HERE, rasterize
 from ...numerics import Array, irradiance_under_sky, luminous, triangle_areas
 from ...scene import LIGHTMAP_UV_LAYER
 from ..datablocks.bake_record import is_made
@@ -177,7 +177,7 @@ def _summed_up(
     if shown is None:
         return None
     height = len(page.values)
-    texels = rasterise(shown.uv, height)
+    texels = rasterize(shown.uv, height)
     values = page.values[texels.row, texels.column].astype(np.float64)
     of_texel = shown.areas / np.maximum(shown.uv_areas * height**2, 1e-300)
     areas = of_texel[texels.triangle] * texels.area

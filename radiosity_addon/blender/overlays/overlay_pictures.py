@@ -30,7 +30,7 @@ STATE_COLORS = {
     TOUCHED: ((0.95, 0.90, 0.30), "Touched: geometry is at their edge"),
     ENCLOSED: ((0.55, 0.25, 0.75), "Enclosed: no light reaches them"),
 }
-"""Display colours of the states of texels, and what they are."""
+"""Display colors of the states of texels, and what they are."""
 
 WIDEST = 2048
 """Pages of more pixels are drawn coarser: as colors they would take a quarter of a gigabyte at 4096."""
@@ -183,7 +183,7 @@ def _density(context: bpy.types.Context, shown: list[ShownLightmap]) -> OverlayP
         named = [replace(found, image=str(size)) for found, size in zip(shown, sizes, strict=True)]
         return OverlayPicture(_surfaces(named, pages))
     density = np.concatenate(
-        [texels_per_metre(found, size) for found, size in zip(shown, sizes, strict=True)]
+        [texels_per_meter(found, size) for found, size in zip(shown, sizes, strict=True)]
     )
     # What most has gets the middle color: blue is coarser, red finer.
     usual = float(np.median(density))
@@ -202,8 +202,8 @@ def _density(context: bpy.types.Context, shown: list[ShownLightmap]) -> OverlayP
     return OverlayPicture(surfaces, legend=Legend("Texel Density", "px/m", scale))
 
 
-def texels_per_metre(found: ShownLightmap, size: int) -> Array:
-    """Return (t,) lightmap pixels along one metre of each triangle: the root of how many are in 1 m²."""
+def texels_per_meter(found: ShownLightmap, size: int) -> Array:
+    """Return (t,) lightmap pixels along one meter of each triangle: the root of how many are in 1 m²."""
     return np.asarray(np.sqrt(found.uv_areas * size**2 / np.maximum(found.areas, 1e-30)))
 
 

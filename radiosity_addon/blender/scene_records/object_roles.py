@@ -44,7 +44,7 @@ class Role(NamedTuple):
     in_bounces, in_shadows : bool
         Whether light of surfaces and sky meets it, and whether it stops light of lamps.
     texel_scale : float
-        Texels per metre relative to what others get.
+        Texels per meter relative to what others get.
     warnings : tuple of BakeWarning
     """
 

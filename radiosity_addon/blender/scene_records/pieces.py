@@ -10,7 +10,7 @@ from ...base import BakeWarning, SceneError
 from ...lights import Light
 from ...scene import LIGHTMAP_UV_LAYER
 from ..datablocks.mesh_arrays import MeshArrays, RawMesh, all_finite, no_triangles, not_finite_message
-from ..materials.materials import DEFAULT_GREY, Surface
+from ..materials.materials import DEFAULT_GRAY, Surface
 from ..materials.shading_inputs import MeshValues
 from .export_sources import ExportSource, MaterialSource
 from .light_membership import PlaceGroups
@@ -133,7 +133,7 @@ def piece_of(found: Found, mesh: MeshArrays | None, rows: np.ndarray, collected:
         return None
     used = np.unique(np.clip(mesh.material, 0, max(len(found.empty) - 1, 0)))
     if any(found.empty[slot] for slot in used if slot < len(found.empty)):
-        message = f"object '{name}' has an empty material slot; gray {DEFAULT_GREY} is used"
+        message = f"object '{name}' has an empty material slot; gray {DEFAULT_GRAY} is used"
         collected.warnings.append(BakeWarning(name, message))
     can_bake = found.can_bake and role.mode == BAKE
     if can_bake and found.library:

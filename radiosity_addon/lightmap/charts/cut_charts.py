@@ -72,15 +72,15 @@ def _pieces(triangles: Float, polygon: Int) -> Iterator[NDArray[np.intp]]:
     count = int(polygon.max()) + 1 if len(polygon) else 0
     size = np.maximum(np.bincount(polygon, minlength=count), 1)
     middle = triangles.mean(axis=1)
-    centre = np.stack([np.bincount(polygon, middle[:, k], count) for k in range(3)], axis=-1) / size[:, None]
+    center = np.stack([np.bincount(polygon, middle[:, k], count) for k in range(3)], axis=-1) / size[:, None]
     waiting = [np.arange(count)]
     while waiting:
         part = waiting.pop()
         if size[part].sum() <= PIECE or len(part) < 2:
             yield np.flatnonzero(np.isin(polygon, part))
             continue
-        axis = int(np.ptp(centre[part], axis=0).argmax())
-        part = part[np.argsort(centre[part, axis], kind="stable")]
+        axis = int(np.ptp(center[part], axis=0).argmax())
+        part = part[np.argsort(center[part, axis], kind="stable")]
         waiting += [part[len(part) // 2 :], part[: len(part) // 2]]
 
 
@@ -100,7 +100,7 @@ def _unwrap_piece(
     uv = np.zeros((count, 3, 2))
     chart = np.full(count, -1, dtype=np.int64)
     if grow is not None and solid.any():
-        uv[solid], chart[solid] = grow(_normalised(corners, triangles[solid]), faces[solid])
+        uv[solid], chart[solid] = grow(_normalized(corners, triangles[solid]), faces[solid])
     torn = _torn_polygons(uv, chart, faces, polygon, solid)
     own = torn[polygon]
     if own.any():
@@ -158,7 +158,7 @@ def _has_area(triangles: Float) -> NDArray[np.bool_]:
     return np.asarray((longest > 0) & (np.linalg.norm(cross, axis=1) > _FLAT * longest**2))
 
 
-def _normalised(corners: Float, triangles: Float) -> Float:
+def _normalized(corners: Float, triangles: Float) -> Float:
     """Move to the origin and scale to a mean triangle of area 1: the grower's epsilons are absolute."""
     cross = double_area_vectors(triangles)
     size = np.sqrt(0.5 * np.linalg.norm(cross, axis=1).mean())

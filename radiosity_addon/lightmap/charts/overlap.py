@@ -26,7 +26,7 @@ def overlapping_triangles(uv: Float, chart: Int) -> NDArray[np.intp]:
         return np.zeros(0, dtype=np.intp)
     chart = numbered(chart)
     page, resolution = _side_by_side(uv, chart)
-    pairs = list(overlapping_pairs(page, resolution, centres_only=True))
+    pairs = list(overlapping_pairs(page, resolution, centers_only=True))
     if not pairs:
         return np.zeros(0, dtype=np.intp)
     texel = np.concatenate([part.texel for part in pairs])

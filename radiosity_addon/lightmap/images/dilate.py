@@ -17,7 +17,7 @@ Bool = NDArray[np.bool_]
 BAND = 1 << 20
 """Texels that are halved at once; bounds the temporaries to about 40 MB."""
 
-_NEIGHBOURS = tuple(
+_NEIGHBORS = tuple(
     (row, column, 1.0 if row == 0 or column == 0 else 0.5)
     for row in (-1, 0, 1)
     for column in (-1, 0, 1)
@@ -54,14 +54,14 @@ def _grow(pixels: Float32, filled: Bool) -> bool:
     height, width = filled.shape
     padded = np.pad(filled, 1)
     near = np.zeros_like(filled)
-    for row, column, _ in _NEIGHBOURS:
+    for row, column, _ in _NEIGHBORS:
         near |= padded[1 + row : 1 + row + height, 1 + column : 1 + column + width]
     rows, columns = np.nonzero(near & ~filled)
     if not len(rows):
         return False
     total = np.zeros((len(rows), pixels.shape[2]))
     weights = np.zeros(len(rows))
-    for row, column, weight in _NEIGHBOURS:
+    for row, column, weight in _NEIGHBORS:
         y, x = rows + row, columns + column
         known = padded[y + 1, x + 1]
         total[known] += weight * pixels[y[known], x[known]]

@@ -11,7 +11,7 @@ from ...numerics import Array
 from ..texels import NO_TEXEL, TexelGeometry
 from .seams import Seams
 
-NEIGHBOUR = 2.5
+NEIGHBOR = 2.5
 """Texels side by side on the page are neighbors if they lie no farther apart [texels] in the world."""
 
 
@@ -43,9 +43,9 @@ def seam_steps(geometry: TexelGeometry, seams: Seams, pages: Sequence[Array]) ->
         axis=1, dtype=np.float64
     )
     sides = seams.sides(values[:, None])[..., 0]
-    pair = np.concatenate([_neighbours(numbers) for numbers in geometry.index])
+    pair = np.concatenate([_neighbors(numbers) for numbers in geometry.index])
     apart = np.linalg.norm(geometry.position[pair[:, 0]] - geometry.position[pair[:, 1]], axis=1)
-    pair = pair[apart < NEIGHBOUR * geometry.texel_size]
+    pair = pair[apart < NEIGHBOR * geometry.texel_size]
     of_texel = np.empty(len(geometry))
     read = np.zeros(len(values), dtype=bool)
     read[seams.texel[seams.weight > 0]] = True
@@ -61,7 +61,7 @@ def seam_steps(geometry: TexelGeometry, seams: Seams, pages: Sequence[Array]) ->
     return SeamSteps(_relative(sides), steps, steps[near[pair].any(axis=1)])
 
 
-def _neighbours(numbers: Array) -> Array:
+def _neighbors(numbers: Array) -> Array:
     """Return (p, 2): covered texels side by side, along rows and along columns."""
     pairs = np.concatenate(
         [

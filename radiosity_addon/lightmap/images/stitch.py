@@ -56,7 +56,7 @@ def stitch_in_place(pages: Sequence[Float32], geometry: TexelGeometry, seams: Se
         values[on_page] = page[texel[on_page] - first]
         numbers = index.ravel()[texel[on_page] - first]
         covered = numbers != NO_TEXEL
-        inside = geometry.centre_inside[numbers[covered]]
+        inside = geometry.center_inside[numbers[covered]]
         hold[on_page][covered] = np.where(inside, HOLD_COVERED, HOLD_EDGE)
     rows = replace(seams, texel=inverse.reshape(seams.texel.shape))
     values = stitch(values, hold, rows)

@@ -14,7 +14,7 @@ from ...base import SILENT, Progress
 from ...numerics import Array, tiles
 from ...rays import SIGHT_LIFT, Hits, free_segment
 from ...solver.gather import NOTHING, Footprints, LocalPass
-from ..texels import NO_TEXEL, Crossings, TexelCells, TexelGeometry, below_hood, whole_neighbour
+from ..texels import NO_TEXEL, Crossings, TexelCells, TexelGeometry, below_hood, whole_neighbor
 
 WIDE = 4.0
 """Texels this many times wider than the median tell less of the light than leaf elements that are smaller."""
@@ -68,7 +68,7 @@ class HitTable:
         """
         caster, position = self.local.caster, self.geometry.positions_of(hits)
         below = below_hood(self.geometry, caster, texel, position[:, None])[:, 0]
-        found = whole_neighbour(self.crossings, caster, texel, position, below)
+        found = whole_neighbor(self.crossings, caster, texel, position, below)
         return np.where((found == NOTHING) & ~below, NO_TEXEL, found)
 
     def _sees_center(self, texel: Array, hits: Hits) -> Array:

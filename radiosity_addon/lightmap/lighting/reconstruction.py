@@ -122,7 +122,7 @@ def footprints(geometry: TexelGeometry, local: LocalPass) -> Footprints:
         geometry.normal,
         keys,
         geometry.sample,
-        geometry.neighbourhood,
+        geometry.neighborhood,
         expected=expected,
         lift=SmoothLift(geometry),
         scratch=scratch,

@@ -3,8 +3,8 @@
 A gather point may speak for a texel as far as irradiance can be expected to stay the
 same: distance times the mean closeness of what the point sees, plus the turn of the
 normal (the split-sphere estimate of Ward, Rubinstein and Clear 1988). Near a contact that
-reach goes to zero. What neighbours of a texel see d away, it sees no farther away than that and the
-way to them: so no point in the open speaks for texels beside a contact (neighbour clamping, Křivánek,
+reach goes to zero. What neighbors of a texel see d away, it sees no farther away than that and the
+way to them: so no point in the open speaks for texels beside a contact (neighbor clamping, Křivánek,
 Bouatouch, Pattanaik and Žára 2006). A point must also see the texel, just above the surface: in the
 open the reach is long, and a wall thin.
 """
@@ -26,13 +26,13 @@ REACH = 0.35
 """Largest split-sphere change at which a gather point still counts."""
 
 SLOPE_DAMPING = 0.05
-"""Pull of the fitted slopes towards zero, relative to the spread of the points."""
+"""Pull of the fitted slopes toward zero, relative to the spread of the points."""
 
 STEEPEST = 2.0
 """How far a slope may lower a point's weight, as a multiple of it."""
 
 CHUNK = 1 << 13
-"""Texels whose neighbours are weighed at once; bounds the temporaries to some 40 MB a thread."""
+"""Texels whose neighbors are weighed at once; bounds the temporaries to some 40 MB a thread."""
 
 
 class GatherPoints:
@@ -124,7 +124,7 @@ class GatherPoints:
         return np.asarray(weight)
 
     def _own_closeness(self, texels: Array) -> Array:
-        """Return (p,) what texels that are points see themselves; elsewhere what their neighbours expect."""
+        """Return (p,) what texels that are points see themselves; elsewhere what their neighbors expect."""
         number = self._number.take(texels)
         if not len(self):
             return np.zeros(len(texels))
@@ -146,7 +146,7 @@ class GatherPoints:
     def support(self, texels: Array, progress: Progress = SILENT) -> Array:
         """Return (n,) the summed weights around texels: below 1 they need a point of their own.
 
-        From then on no point speaks for them that lies farther off than their neighbours allow.
+        From then on no point speaks for them that lies farther off than their neighbors allow.
         """
         scratch = self._geometry.scratch
         total = scratch.empty(len(texels))
@@ -181,7 +181,7 @@ class GatherPoints:
         mine = run_of(known.texels, texels)
         old = np.zeros(len(run), dtype=bool)
         old[known.texels[mine] - texels.start] = True
-        # What has become a point since has learnt how close things are to it.
+        # What has become a point since has learned how close things are to it.
         old &= self._number[run] < 0
         kept = known.pairs_of(texels)
         still = old[kept[0] - texels.start]

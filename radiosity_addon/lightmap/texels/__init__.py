@@ -6,9 +6,9 @@ No light yet.
 from __future__ import annotations
 
 from .cells import TexelCells
-from .nearest_uncut import whole_neighbour
+from .nearest_uncut import whole_neighbor
 from .occlusion import Crossings, below_hood, find_crossings
-from .rasterize import FOOTPRINT, coverage_sum, overlapping_pairs, rasterise
+from .rasterization import FOOTPRINT, coverage_sum, overlapping_pairs, rasterize
 from .states import DIVIDED, ENCLOSED, NO_TEXEL_HERE, OCCLUDED, TOUCHED
 from .surface_materials import texel_materials
 from .terminator import SmoothLift
@@ -30,7 +30,7 @@ __all__ = [
     "coverage_sum",
     "find_crossings",
     "overlapping_pairs",
-    "rasterise",
+    "rasterize",
     "texel_materials",
-    "whole_neighbour",
+    "whole_neighbor",
 ]

@@ -19,7 +19,7 @@ SAME_SURFACE = 0.9
 _AROUND = np.array([[r, c] for r in (-1, 0, 1) for c in (-1, 0, 1) if r or c])
 
 
-def whole_neighbour(
+def whole_neighbor(
     crossings: Crossings, caster: RayCaster, texel: Array, position: Array, below: Array
 ) -> Array:
     """Return (h,) int32: the nearest whole neighbor of each texel whose center a point sees, or NOTHING.

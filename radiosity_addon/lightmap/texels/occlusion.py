@@ -80,7 +80,7 @@ class Crossings:
     @cached_property
     def beside(self) -> Array:
         """Texels next to a crossed one: geometry there blocks half of their view."""
-        return self.geometry.neighbourhood(self.crossed) & ~self.alone
+        return self.geometry.neighborhood(self.crossed) & ~self.alone
 
 
 def find_crossings(
@@ -114,13 +114,13 @@ def find_crossings(
         corners, ends = square.copy(), np.flatnonzero(~geometry.whole[rows])
         spots = np.broadcast_to(_CORNERS, (len(ends), 4, 2))
         corners[ends] = geometry.sample(rows[ends], spots, 1.0) + lift[ends]
-        centre = geometry.position[rows][:, None] + lift
-        from_centre = corners - centre
-        cut = ~_segments_free(caster, centre + INSET * from_centre, _EDGES)
+        center = geometry.position[rows][:, None] + lift
+        from_center = corners - center
+        cut = ~_segments_free(caster, center + INSET * from_center, _EDGES)
         doubtful = ~_segments_free(caster, middle + OUTSET * (square - middle), _DIAGONALS) & ~cut
         uncertain = np.flatnonzero(doubtful)
         cut[uncertain] = ~_segments_free(
-            caster, centre[uncertain] + INSET * from_centre[uncertain], _DIAGONALS
+            caster, center[uncertain] + INSET * from_center[uncertain], _DIAGONALS
         )
         spots = geometry.sample(rows, np.broadcast_to(_SPOTS, (len(rows), *_SPOTS.shape)), 1.0)
         below = below_hood(geometry, caster, rows, spots)

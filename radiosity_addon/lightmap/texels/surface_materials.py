@@ -6,7 +6,7 @@ import numpy as np
 
 from ...numerics import Array, marked, row_numbers, stratified_square, tiles, trim
 from ...scene import CHANNELS, Scene, where_there
-from .rasterize import FOOTPRINT
+from .rasterization import FOOTPRINT
 from .texel_geometry import TexelGeometry
 
 SAMPLES = 16

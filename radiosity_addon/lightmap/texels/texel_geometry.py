@@ -11,7 +11,7 @@ import numpy as np
 from ...numerics import Array, Scratch, tiles
 from ...rays import Hits, surface_offset
 from ...scene import Scene
-from .rasterize import FOOTPRINT, Texels, sample_footprints
+from .rasterization import FOOTPRINT, Texels, sample_footprints
 
 NO_TEXEL = -1
 
@@ -41,7 +41,7 @@ class TexelGeometry:
     page_start (pages + 1,) int64: The first texel of each page, and n.
     row, column, triangle (n,) int32.
     share (n,) float32: What part of the texel its triangle covers.
-    centre_inside (n,) bool: Whether the texel's center is on its triangle.
+    center_inside (n,) bool: Whether the texel's center is on its triangle.
     whole (n,) bool: Whether all of the texel is.
     barycentric (n, 2) float32: Weights of the triangle's second and third corner at the center of the
         footprint.
@@ -49,7 +49,7 @@ class TexelGeometry:
         triangle's own normal.
     """
 
-    STORED = ("page", "page_start", "triangle", "centre_inside", "index", "uv", "page_of_triangle")
+    STORED = ("page", "page_start", "triangle", "center_inside", "index", "uv", "page_of_triangle")
 
     scratch = Scratch()
 
@@ -95,10 +95,10 @@ class TexelGeometry:
 
     def _joined(self, texels: Sequence[Texels]) -> list[Texels]:
         """Put the pages' texels one after the other; return them as views of the whole."""
-        names = ("row", "column", "centre_inside", "area")
+        names = ("row", "column", "center_inside", "area")
         if len(texels) == 1:
             (only,) = texels
-            self.row, self.column, self.centre_inside, self.share = (getattr(only, name) for name in names)
+            self.row, self.column, self.center_inside, self.share = (getattr(only, name) for name in names)
             return [only]
         whole = {}
         for name in names:
@@ -107,14 +107,14 @@ class TexelGeometry:
             for first, part in zip(self.page_start, parts, strict=False):
                 for tile in tiles(len(part)):
                     whole[name][first + tile.start : first + tile.stop] = part[tile]
-        self.row, self.column, self.centre_inside, self.share = (whole[name] for name in names)
+        self.row, self.column, self.center_inside, self.share = (whole[name] for name in names)
         rows = [slice(first, first + len(page)) for first, page in zip(self.page_start, texels, strict=False)]
         return [
             replace(
                 page,
                 row=self.row[mine],
                 column=self.column[mine],
-                centre_inside=self.centre_inside[mine],
+                center_inside=self.center_inside[mine],
                 area=self.share[mine],
             )
             for mine, page in zip(rows, texels, strict=True)
@@ -247,7 +247,7 @@ class TexelGeometry:
         moved = (inside != weights).any(axis=2, keepdims=True)
         return np.asarray(np.where(moved, inside / inside.sum(axis=2, keepdims=True), weights))
 
-    def neighbourhood(self, chosen: Array) -> Array:
+    def neighborhood(self, chosen: Array) -> Array:
         """Grow a (n,) mask of texels by one texel in all eight directions of their page."""
         grown = np.empty(len(self), dtype=bool)
         for page, (numbers, inside) in enumerate(zip(self.index, self._framed, strict=True)):

@@ -50,7 +50,7 @@ class AtlasInput:
     uv : (n, 3, 2) float32 or None
         UVs to keep; None to unwrap.
     scale : float
-        Its texels per metre, relative to the other objects.
+        Its texels per meter, relative to the other objects.
     """
 
     name: str
@@ -69,7 +69,7 @@ class AtlasOptions:
     resolution : int
         Width and height of a page, if no density is given.
     texel_density : float or None
-        Texels per metre; pages become as large as that needs, multiples of 4.
+        Texels per meter; pages become as large as that needs, multiples of 4.
     shared : bool
         All objects on common pages, or each on its own.
     pages : int
@@ -105,7 +105,7 @@ class AtlasPage:
     resolution : int
         Width and height in texels.
     density : float
-        Texels per metre of objects at scale 1, the mean over all their surface; 0 if there is none.
+        Texels per meter of objects at scale 1, the mean over all their surface; 0 if there is none.
     utilisation : float
         The share of the page that charts cover, 0 to 1.
     """

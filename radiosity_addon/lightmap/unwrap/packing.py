@@ -37,7 +37,7 @@ FEW = 64
 """Up to this many charts several orders, rules and stretches are tried; each costs a packing."""
 
 STRETCHES = (1.0, 0.8, 0.85, 0.9, 0.95, 1.05, 1.1, 1.15, 1.2, 1.25)
-"""Texels per metre along u over those along v, the same for all charts of a page.
+"""Texels per meter along u over those along v, the same for all charts of a page.
 
 A few large charts rarely fill a square; texels up to a quarter longer than wide do no harm and
 bring up to a quarter more of them.
@@ -54,7 +54,7 @@ class Packing:
         In [0, 1].
     resolution : int
     density : float
-        Texels per metre, the geometric mean of those along u and v.
+        Texels per meter, the geometric mean of those along u and v.
     crowded : bool
         Whether the page is too small to keep the charts two texels apart.
     """
@@ -135,7 +135,7 @@ def pack(
     resolution : int
         The page's size, if no density is given.
     density : float or None
-        Texels per metre; the page becomes the smallest square multiple of 4 that holds it.
+        Texels per meter; the page becomes the smallest square multiple of 4 that holds it.
     limits : Limits or None
     progress : Progress
         How many trials there will be is not known: it stays where it is.
@@ -171,7 +171,7 @@ def _job(uv: Float, chart: Int, limits: Limits) -> _Job:
 
 @dataclass(frozen=True)
 class _Scaled:
-    """Cells per metre (count, 2) of each chart and the shapes they have then.
+    """Cells per meter (count, 2) of each chart and the shapes they have then.
 
     For an even and for an odd number of quarter turns.
     """
@@ -181,14 +181,14 @@ class _Scaled:
 
 
 def _scaled(job: _Job, scale: float, cell: int, stretch: float = 1.0) -> _Scaled:
-    """Return the charts at `scale` texels per metre, stretched along the page's u."""
+    """Return the charts at `scale` texels per meter, stretched along the page's u."""
     even = _measured(job, scale * np.array((stretch**0.5, stretch**-0.5)), cell)
     odd = even if stretch == 1.0 else _measured(job, scale * np.array((stretch**-0.5, stretch**0.5)), cell)
     return _Scaled((even[0], odd[0]), (even[1], odd[1]))
 
 
 def _measured(job: _Job, scale: Float, cell: int) -> tuple[Float, Shapes]:
-    """Return cells per metre (count, 2) at `scale` (2,) texels per metre, and the charts' shapes."""
+    """Return cells per meter (count, 2) at `scale` (2,) texels per meter, and the charts' shapes."""
     extent = job.extent * scale
     widen = np.where(extent < SMALLEST, SMALLEST / np.maximum(extent, 1e-30), 1.0)
     cells = scale / cell * widen
@@ -236,7 +236,7 @@ def _pack_into(job: _Job, resolution: int, page: int, progress: Progress) -> Pac
 
 
 def _pack_at(job: _Job, density: float) -> Packing:
-    """Find the smallest page that holds the charts at `density` texels per metre."""
+    """Find the smallest page that holds the charts at `density` texels per meter."""
     largest = job.limits.side
     reach = float(job.extent.max()) * density + 2 * job.limits.border(1)
     guess = max(float(np.sqrt(job.area)) * density, reach if len(job.extent) == 1 else 0.7 * reach)

@@ -95,8 +95,8 @@ class AffectedTexels:
             See `divided`.
         """
         now = np.arange(old.end, dtype=np.int32)
-        # A hit on a divided texel may have been answered by a neighbour.
-        texels = self.texels | self.geometry.neighbourhood(divided)
+        # A hit on a divided texel may have been answered by a neighbor.
+        texels = self.texels | self.geometry.neighborhood(divided)
         now[: old.texel_count][texels] = UNNUMBERED
         now[old.texel_count : old.first_cell][self._cells_near(table.local.elements)] = UNNUMBERED
         cells = old.texel_cells.renumbered(table.texel_cells)

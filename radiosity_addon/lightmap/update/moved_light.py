@@ -37,8 +37,8 @@ def texel_gains(
         gain = kept.of(asked.number)
         touched = affected.texels.copy()
         touched |= moved | affected.boxes.between(geometry.position, asked.light, affected.widen)
-        # One texel more: a penumbra is followed from neighbour to neighbour.
-        around = np.flatnonzero(geometry.neighbourhood(touched))
+        # One texel more: a penumbra is followed from neighbor to neighbor.
+        around = np.flatnonzero(geometry.neighborhood(touched))
         found = local.direct.gain(asked, _footprints(geometry, around, lift), progress=part)
         own = touched[around]
         gain[around[own]] = found[own]
@@ -76,17 +76,17 @@ def _footprints(geometry: TexelGeometry, chosen: Array, lift: SmoothLift) -> Foo
         geometry.normal[chosen],
         chosen,
         partial(sample_of, geometry, chosen),
-        _neighbours(geometry, chosen),
+        _neighbors(geometry, chosen),
         lift=lift.of(chosen),
     )
 
 
-def _neighbours(geometry: TexelGeometry, chosen: Array) -> Callable[[Array], Array]:
-    """Return what grows a mask of some texels by their neighbours among these."""
+def _neighbors(geometry: TexelGeometry, chosen: Array) -> Callable[[Array], Array]:
+    """Return what grows a mask of some texels by their neighbors among these."""
 
     def near(mask: Array) -> Array:
         every = np.zeros(len(geometry), dtype=bool)
         every[chosen] = mask
-        return np.asarray(geometry.neighbourhood(every)[chosen])
+        return np.asarray(geometry.neighborhood(every)[chosen])
 
     return near

@@ -133,7 +133,7 @@ class MovedPoints:
     def _doubted(self, spread: Interpolation, points: GatherPointLayout, closer: Array) -> Array:
         """Return (n,) bool: the texels whose points are to be weighed again."""
         geometry, moved = self._geometry, self._affected
-        doubted = moved.texels | geometry.neighbourhood(self._divided) | spread.any_of(closer)
+        doubted = moved.texels | geometry.neighborhood(self._divided) | spread.any_of(closer)
         # A texel's points are in cells beside its own, no wider than the coarsest lattice.
         farthest = CELLS_ACROSS * max(*self._settings.strides, 1.5) * geometry.texel_size
         some = np.flatnonzero(moved.boxes.near(geometry.position, np.full(len(geometry), farthest)))

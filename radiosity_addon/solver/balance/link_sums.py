@@ -30,10 +30,10 @@ class Arriving:
             self.power = self.area * links.factor * links.visibility
             return
         weight = (_taken_below(hierarchy, received)[: len(faces)] * faces.area)[:, None]
-        sums = cut.sums(np.concatenate([weight, weight * faces.normal, weight * faces.centre], axis=1))
+        sums = cut.sums(np.concatenate([weight, weight * faces.normal, weight * faces.center], axis=1))
         at = sums[cut.row[links.receiver]]
         self.area = at[:, 0]
-        offset = at[:, 4:] - at[:, :1] * clusters.centre[links.receiver]
+        offset = at[:, 4:] - at[:, :1] * clusters.center[links.receiver]
         self.power = at[:, 0] * links.even + np.einsum("lk,lk->l", at[:, 1:4], links.vector)
         self.power += np.einsum("lk,lk->l", offset, links.gradient)
 
@@ -106,12 +106,12 @@ def _from_clusters(
     slope = (arriving.area[grouped] / clusters.area[source])[:, None] * cluster_links.gradient[grouped]
     rows = cut.rows(source)
     evenly = arriving.power[grouped] / clusters.area[source]
-    evenly += np.einsum("lk,lk->l", slope, clusters.centre[source])
+    evenly += np.einsum("lk,lk->l", slope, clusters.center[source])
     share[:, 0] += cut.spread(rows, evenly)
     for axis in range(3):
         share[:, 1 + axis] -= cut.spread(rows, slope[:, axis])
     carried = np.zeros(len(faces))
-    for term, pushed in zip((np.ones(1), *faces.centre.T), cut.push(share).T, strict=True):
+    for term, pushed in zip((np.ones(1), *faces.center.T), cut.push(share).T, strict=True):
         carried += term * pushed[cut.row_of_face]
     total[: len(faces)] = np.maximum(carried, 0.0)[:, None, None]
     return total

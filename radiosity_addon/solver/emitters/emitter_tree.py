@@ -75,19 +75,19 @@ class EmitterTree:
         self._describe(corners, normals, weight)
 
     def _describe(self, corners: Array, normals: Array, weight: Array) -> None:
-        """Find every node's centre, radius, spread of normals, and rectangle."""
+        """Find every node's center, radius, spread of normals, and rectangle."""
         origin = corners.reshape(-1, 3).mean(axis=0)
         local, centroid = corners - origin, corners.mean(axis=1) - origin
         total = self._sums(weight)
         heavy = np.maximum(total, 1e-300)
-        self.centre = self._sums(weight[:, None] * centroid) / heavy[:, None]
+        self.center = self._sums(weight[:, None] * centroid) / heavy[:, None]
         vector = self._sums(weight[:, None] * normals)
         length = np.linalg.norm(vector, axis=1)
         facing = vector / np.maximum(length, 1e-300)[:, None]
         # ∫ x xᵀ over a triangle of area 1: (Σ v vᵀ + 9 c cᵀ) / 12.
         square = np.einsum("mci,mcj->mij", local, local) + 9.0 * centroid[:, :, None] * centroid[:, None]
         moment = self._sums(weight[:, None, None] * square / 12.0) / heavy[:, None, None]
-        moment -= self.centre[:, :, None] * self.centre[:, None]
+        moment -= self.center[:, :, None] * self.center[:, None]
         across = np.eye(3) - facing[:, :, None] * facing[:, None]
         width, axes = np.linalg.eigh(across @ moment @ across)
         half = np.sqrt(3.0 * np.maximum(width[:, 1:], 0.0))
@@ -96,8 +96,8 @@ class EmitterTree:
         turned = np.einsum("ki,ki->k", np.cross(one, other), facing) < 0
         other[turned] *= -1.0
         around = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
-        self.centre += origin
-        self.polygon = self.centre[:, None] + around[:, :1] * one[:, None] + around[:, 1:] * other[:, None]
+        self.center += origin
+        self.polygon = self.center[:, None] + around[:, :1] * one[:, None] + around[:, 1:] * other[:, None]
         self._scale = length / np.maximum(4.0 * half.prod(axis=1), 1e-300)
         single = np.flatnonzero(self._single)
         of = self.begin[single]
@@ -115,12 +115,12 @@ class EmitterTree:
         return np.asarray(running[self.end] - running[self.begin])
 
     def _extremes(self, corners: Array, normals: Array) -> tuple[Array, Array]:
-        """Return (k,) each centre's farthest corner, and the farthest normal's sine; 1 past 90°."""
+        """Return (k,) each center's farthest corner, and the farthest normal's sine; 1 past 90°."""
         radius, cosine = np.zeros((2, len(self.begin)))
         for first, last in zip(self._levels[:-1], self._levels[1:], strict=True):
             held = first + np.flatnonzero(self.end[first:last] > self.begin[first:last])
             of = np.repeat(held, self.end[held] - self.begin[held])
-            apart = np.linalg.norm(corners - self.centre[of][:, None], axis=2).max(axis=1)
+            apart = np.linalg.norm(corners - self.center[of][:, None], axis=2).max(axis=1)
             radius[held] = np.maximum.reduceat(apart, self.begin[held])
             along = np.einsum("mi,mi->m", normals, self.facing[of])
             cosine[held] = np.minimum.reduceat(along, self.begin[held])
@@ -132,7 +132,7 @@ class EmitterTree:
         row, node = np.arange(len(points)), np.zeros(len(points), dtype=np.int64)
         rows, nodes = [], []
         while len(row):
-            along = points.take(row, axis=0) - self.centre.take(node, axis=0)
+            along = points.take(row, axis=0) - self.center.take(node, axis=0)
             distance = np.sqrt(np.einsum("pk,pk->p", along, along))
             radius = self.radius.take(node)
             slant = self._slant.take(node) * distance

@@ -83,28 +83,28 @@ class EmitterGroup:
 
     @staticmethod
     def of_faces(faces: Faces, caster: RayCaster, among: Array | None = None) -> list[EmitterGroup]:
-        """Group the emissive faces, if given those of a (f,) mask, by colour: visibility cannot mix it up."""
+        """Group the emissive faces, if given those of a (f,) mask, by color: visibility cannot mix it up."""
         shines = faces.emission.max(axis=1, initial=0.0) > 0
         rows = np.flatnonzero(shines if among is None else shines & among)
         if len(rows) == 0:
             return []
         rows, corners, level = _uncovered(faces, rows)
-        colours, group = np.unique(faces.exitance[rows], axis=0, return_inverse=True)
+        colors, group = np.unique(faces.exitance[rows], axis=0, return_inverse=True)
         group = group.reshape(-1)
         offset = end_offset(caster)
         lamps = []
-        for number, colour in enumerate(colours):
+        for number, color in enumerate(colors):
             mine = group == number
             whole, dim = np.flatnonzero(mine & (level == 1.0)), np.flatnonzero(mine & (level < 1.0))
             merged, first = merge_flat(corners[whole])
             normals = faces.normal[rows[whole][first]]
             if len(dim) == 0:
-                lamps.append(EmitterGroup(merged, normals, colour, offset))
+                lamps.append(EmitterGroup(merged, normals, color, offset))
                 continue
             merged = np.concatenate([merged, corners[dim]])
             normals = np.concatenate([normals, faces.normal[rows[dim]]])
             levels = np.concatenate([np.ones(len(first)), level[dim]])
-            lamps.append(EmitterGroup(merged, normals, colour, offset, levels))
+            lamps.append(EmitterGroup(merged, normals, color, offset, levels))
         return lamps
 
     def unit_irradiance(self, points: Array, normals: Array) -> Array:

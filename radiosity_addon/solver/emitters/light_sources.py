@@ -1,7 +1,7 @@
 """The sources of a scene's light that can be changed apart: lamps, the sky, and emissive materials.
 
 Everything a bake computes is linear in their strengths, channel by channel. Shadow rays of emissive
-surfaces are asked for groups of faces that cannot be told apart by colour (`textured_emitters.py`);
+surfaces are asked for groups of faces that cannot be told apart by color (`textured_emitters.py`);
 here the groups stay within one source, so that its strength can change alone.
 """
 
@@ -31,7 +31,7 @@ class LightSources:
     caster : RayCaster
     emitter : (t,) int or None
         Which emissive material each triangle has, numbers from 0; those of triangles that emit nothing
-        do not count. None takes every colour of emission for one, and all textures for another.
+        do not count. None takes every color of emission for one, and all textures for another.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class LightSources:
         self.lights: tuple[Light, ...] = scene.lights
         emits = scene.emission.max(axis=1, initial=0.0) > 0
         self.emitter = np.full(len(scene), NO_SOURCE, dtype=np.int32)
-        numbers = _by_colour(scene) if emitter is None else np.asarray(emitter, dtype=np.int32)
+        numbers = _by_color(scene) if emitter is None else np.asarray(emitter, dtype=np.int32)
         self.emitter[emits] = numbers[emits]
         count = int(self.emitter.max(initial=NO_SOURCE)) + 1
         self.groups: list[EmitterGroup] = []
@@ -128,7 +128,7 @@ class LightSources:
         row = len(self.lights) + source
         was, is_now = self.strengths[row], strengths[row]
         known = was > 0
-        # A channel that was dark follows the brightest one: then all parts are of one colour.
+        # A channel that was dark follows the brightest one: then all parts are of one color.
         level = before.max(axis=1, initial=0.0) / was.max()
         return np.where(known, before * (is_now / np.where(known, was, 1.0)), level[:, None] * is_now)
 
@@ -137,8 +137,8 @@ class LightSources:
         return SkyTable(self.lights, strengths[: len(self.lights)])
 
 
-def _by_colour(scene: Scene) -> Array:
-    """Return (t,) a number for each colour of emission, and the last one for all textures."""
+def _by_color(scene: Scene) -> Array:
+    """Return (t,) a number for each color of emission, and the last one for all textures."""
     number = numbered(scene.emission).astype(np.int32)
     if scene.images is not None:
         number[scene.images.textured] = number.max(initial=-1) + 1

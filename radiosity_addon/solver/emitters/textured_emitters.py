@@ -1,7 +1,7 @@
 """Textured emission as lamps: faces cut up where their emission varies.
 
 A face with an image of emission becomes pieces of constant emission. Shadow rays ask what share of a
-lamp is seen, one number for all colours; so where pieces differ in colour each channel is a lamp
+lamp is seen, one number for all colors; so where pieces differ in color each channel is a lamp
 of its own, lest a red half of a screen be hidden by what stands before the green one.
 """
 
@@ -20,14 +20,14 @@ MOST_PIECES = 256
 SMOOTH = 0.002
 """A piece is cut no further when its emission varies by less than this share of all power."""
 
-SAME_COLOUR = 1e-3
+SAME_COLOR = 1e-3
 """Pieces whose channels are in one proportion, to this much, are one lamp."""
 
 
 def emitter_groups(
     scene: Scene, faces: Faces, caster: RayCaster, among: Array | None = None
 ) -> list[EmitterGroup]:
-    """Return the emissive faces, if given those of a (f,) mask, as lamps, those of one colour together."""
+    """Return the emissive faces, if given those of a (f,) mask, as lamps, those of one color together."""
     if scene.images is None:
         return EmitterGroup.of_faces(faces, caster, among)
     among = np.ones(len(faces), dtype=bool) if among is None else among
@@ -93,16 +93,16 @@ def _part_emissions(faces: Faces, face: Array, weights: Array, images: SurfaceIm
 def _of_pieces(
     faces: Faces, face: Array, weights: Array, emission: Array, caster: RayCaster
 ) -> list[EmitterGroup]:
-    """Make lamps of pieces: one if all are of one colour, else one for each channel."""
+    """Make lamps of pieces: one if all are of one color, else one for each channel."""
     shines = emission.max(axis=1, initial=0.0) > 0
     face, weights, emission = face[shines], weights[shines], emission[shines]
     if len(face) == 0:
         return []
     corners = corners_of_parts(faces, face, weights)
     brightest = emission.max(axis=1)
-    colour = emission.sum(axis=0) / emission.sum(axis=0).max()
-    if (np.abs(emission - brightest[:, None] * colour) <= SAME_COLOUR * brightest[:, None]).all():
-        lamps = [(brightest, colour)]
+    color = emission.sum(axis=0) / emission.sum(axis=0).max()
+    if (np.abs(emission - brightest[:, None] * color) <= SAME_COLOR * brightest[:, None]).all():
+        lamps = [(brightest, color)]
     else:
         lamps = [(emission[:, channel], np.eye(3)[channel]) for channel in range(3)]
     return [

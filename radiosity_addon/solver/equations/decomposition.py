@@ -45,14 +45,14 @@ def _reach(system: LinearSystem, first: int, unseen: Array) -> Array:
     while len(frontier):
         near = np.zeros(len(system), dtype=bool)
         for start in range(0, len(frontier), CHUNK_ROWS):
-            near |= _neighbours(system, frontier[start : start + CHUNK_ROWS])
+            near |= _neighbors(system, frontier[start : start + CHUNK_ROWS])
         frontier = np.flatnonzero(near & unseen)
         unseen[frontier] = False
         reached.extend(frontier.tolist())
     return np.sort(np.array(reached))
 
 
-def _neighbours(system: LinearSystem, rows: Array) -> Array:
+def _neighbors(system: LinearSystem, rows: Array) -> Array:
     """Return (n,) whether an entry couples an unknown to any of `rows`, in either direction."""
     near = np.zeros(len(system), dtype=bool)
     for matrix in (system.exchange, system.mass):

@@ -41,14 +41,14 @@ def source_factor_bounds(hierarchy: Hierarchy, receiver: Array, source: Array) -
 
 def _chunk_bounds(hierarchy: Hierarchy, receiver: Array, source: Array) -> Array:
     receiver_corners, source_corners = hierarchy.corners[receiver], hierarchy.corners[source]
-    centre_to, centre_of = receiver_corners.mean(axis=1), source_corners.mean(axis=1)
-    sizes = _radius(receiver_corners, centre_to) + _radius(source_corners, centre_of)
-    over_to = np.einsum("nck,nk->nc", source_corners - centre_to[:, None], hierarchy.normal[receiver])
-    over_of = np.einsum("nck,nk->nc", receiver_corners - centre_of[:, None], hierarchy.normal[source])
+    center_to, center_of = receiver_corners.mean(axis=1), source_corners.mean(axis=1)
+    sizes = _radius(receiver_corners, center_to) + _radius(source_corners, center_of)
+    over_to = np.einsum("nck,nk->nc", source_corners - center_to[:, None], hierarchy.normal[receiver])
+    over_of = np.einsum("nck,nk->nc", receiver_corners - center_of[:, None], hierarchy.normal[source])
     rise_to, rise_of = over_to.max(axis=1), over_of.max(axis=1)
     mutual = (rise_to > COPLANAR * sizes) & (rise_of > COPLANAR * sizes)
 
-    apart = np.linalg.norm(centre_of - centre_to, axis=1) - sizes
+    apart = np.linalg.norm(center_of - center_to, axis=1) - sizes
     nearest = np.maximum.reduce(
         [apart, over_to.min(axis=1), over_of.min(axis=1), np.zeros(len(receiver_corners))]
     )
@@ -62,9 +62,9 @@ def _chunk_bounds(hierarchy: Hierarchy, receiver: Array, source: Array) -> Array
     return np.where(mutual, of_source, 0.0)
 
 
-def _radius(corners: Array, centre: Array) -> Array:
+def _radius(corners: Array, center: Array) -> Array:
     """Return (n,) the distance from each center to its farthest corner."""
-    return np.asarray(np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1))
+    return np.asarray(np.linalg.norm(corners - center[:, None], axis=2).max(axis=1))
 
 
 def oracle1(bound: Array, area_to: Array, area_of: Array, error: float, min_area: float) -> Array:

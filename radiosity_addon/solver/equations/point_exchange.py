@@ -74,9 +74,9 @@ def corner_factors(points: Array, normals: Array, corners: Array, source_normals
     Returns factors (n, 3).
     """
     factors = np.empty((len(points), 3))
-    centre = corners.mean(axis=1)
-    radius = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
-    ratio = np.linalg.norm(centre - points, axis=1) / radius
+    center = corners.mean(axis=1)
+    radius = np.linalg.norm(corners - center[:, None], axis=2).max(axis=1)
+    ratio = np.linalg.norm(center - points, axis=1) / radius
     nearest = 0.0
     for farthest, generations in (*NEAR, (np.inf, 0)):
         rows = np.flatnonzero((ratio >= nearest) & (ratio < farthest))

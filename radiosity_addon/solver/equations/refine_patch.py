@@ -29,9 +29,9 @@ def facing_pairs(hierarchy: Hierarchy) -> tuple[Array, Array]:
         return none, none
     # About their middle, so that rooms far from the origin lose no digits.
     corners = corners - corners.mean(axis=(0, 1))
-    normal, centre = hierarchy.faces.normal, corners.mean(axis=1)
-    offset = np.einsum("nk,nk->n", centre, normal)
-    radius = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
+    normal, center = hierarchy.faces.normal, corners.mean(axis=1)
+    offset = np.einsum("nk,nk->n", center, normal)
+    radius = np.linalg.norm(corners - center[:, None], axis=2).max(axis=1)
     # Slightly below the plane still counts: the exact bound decides.
     slack = 1e-12 * float(np.abs(corners).max())
     step = max(BLOCK // count, 1)

@@ -157,5 +157,5 @@ def _extent(light: Lamp | EmitterGroup) -> tuple[float, Array, Array]:
 
 
 def _opening(half_angle: float) -> Array:
-    """Return (3,) how far off its axis a cone gets for each metre along it."""
+    """Return (3,) how far off its axis a cone gets for each meter along it."""
     return np.full(3, np.tan(half_angle) if half_angle < WIDEST else np.inf)

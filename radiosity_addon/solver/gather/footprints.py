@@ -20,15 +20,15 @@ CHUNK_POINTS = 1 << 14
 """Footprints worked on at once; bounds the temporaries to about 20 MB a thread."""
 
 SAME_GAIN = 0.02
-"""Where a lamp gives the centre of a footprint what it gives its farthest point, up to this
-part, the centre stands for all: what bends that little bends a mean by its square."""
+"""Where a lamp gives the center of a footprint what it gives its farthest point, up to this
+part, the center stands for all: what bends that little bends a mean by its square."""
 
 UNEVEN, MORE_GAINS = 0.02, 64
 """Where the few points differ by more than this part, as beside a lamp and at the rim of a spot's cone,
 so many are asked."""
 
 EDGE = 0.5
-"""Where centre and farthest point differ by more than this part, an edge of the lamp's beam crosses."""
+"""Where center and farthest point differ by more than this part, an edge of the lamp's beam crosses."""
 
 DARKEST = 0.25
 """Noise is measured by the light expected, or by this part of the mean where that is darker."""
@@ -48,13 +48,13 @@ class Footprints:
     Attributes
     ----------
     points, normals : (n, 3) float64
-        Centres of the footprints, unit normals.
+        Centers of the footprints, unit normals.
     keys : (n,) int
         With the seed, what places each point's samples.
     sampler : callable or None
         Spreads the samples over each point's footprint; None keeps them at the point.
     near : callable or None
-        Grows a (n,) mask of doubtful points to their neighbours, which then also get the
+        Grows a (n,) mask of doubtful points to their neighbors, which then also get the
         larger number of rays.
     starts : int or None
         From how many samples a point's gather rays start, each of them a run that is stratified by
@@ -98,19 +98,19 @@ class Footprints:
 
 
 class SpreadPoints:
-    """The centres of footprints and a few points spread over each, which all lamps share.
+    """The centers of footprints and a few points spread over each, which all lamps share.
 
     Attributes
     ----------
     at : Footprints
     count : int
-        Points of each; 1, the centre, without a sampler.
+        Points of each; 1, the center, without a sampler.
     """
 
     def __init__(self, at: Footprints, seed: int, threads: int = 0) -> None:
         self.at, self._seed, self._threads = at, seed, threads
         self.count = SPREAD if at.sampler else 1
-        # From the centre: single precision is too coarse for the place of small things far from the origin.
+        # From the center: single precision is too coarse for the place of small things far from the origin.
         self._apart = at.scratch.zeros((len(at), self.count, 3), np.float32)
         self._farthest = np.zeros(len(at), dtype=np.int8)
 
@@ -132,8 +132,8 @@ class SpreadPoints:
     def gain(self, light: Lamp | EmitterGroup, least: float = 0.0, progress: Progress = SILENT) -> Array:
         """Return (n,) the unoccluded irradiance per unit of strength, a mean over the footprint.
 
-        Where it is no more than `least` in the centre, that stands for all, unless a glowing face is
-        no farther than the footprint is wide: it may shine on what is beside the centre only. Without
+        Where it is no more than `least` in the center, that stands for all, unless a glowing face is
+        no farther than the footprint is wide: it may shine on what is beside the center only. Without
         `least`, where the farthest point gets the same.
         """
         at = self.at
@@ -155,7 +155,7 @@ class SpreadPoints:
             gain[part] = own
 
         for_chunks(ask, len(at), CHUNK_POINTS, self._threads, progress.part(0.0, 0.5))
-        # Right under a lamp two points may happen to see it alike: their neighbours do not.
+        # Right under a lamp two points may happen to see it alike: their neighbors do not.
         bent = row_numbers(varies if at.near is None or least else at.near(varies))
 
         def average(part: slice) -> None:
@@ -163,14 +163,14 @@ class SpreadPoints:
 
         for_chunks(average, len(bent), CHUNK_POINTS, self._threads, progress.part(0.5, 1.0))
         if at.near is not None and jump.any():
-            # An edge that only cuts a footprint's corner is found from its neighbours.
+            # An edge that only cuts a footprint's corner is found from its neighbors.
             lit = marked(len(gain), lambda rows: gain[rows] > 0)
             rows = row_numbers(at.near(jump) | (at.near(lit) & at.near(~lit)))
             gain[rows] = self._many(light, rows)
         return gain
 
     def _width(self, part: slice) -> Array:
-        """Return (r,) how far a footprint reaches from its centre, twice: about its width [m]."""
+        """Return (r,) how far a footprint reaches from its center, twice: about its width [m]."""
         return np.asarray(2.0 * np.sqrt((self._apart[part] ** 2).sum(axis=2).max(axis=1)))
 
     def _varying(self, light: Lamp | EmitterGroup, rows: Array) -> Array:

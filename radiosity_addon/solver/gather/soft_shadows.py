@@ -33,7 +33,7 @@ STARTS = 16
 """Points of a footprint that the many rays start from, each of them a run that is stratified by itself."""
 
 PENUMBRA_STEPS = 32
-"""How far, in neighbours, a penumbra is followed from where few rays found it."""
+"""How far, in neighbors, a penumbra is followed from where few rays found it."""
 
 
 class ShadowShare:
@@ -128,19 +128,19 @@ class ShadowShare:
 
         def trace(part: slice) -> None:
             chunk = rows[part]
-            centre, normal = at.points[chunk], at.normals[chunk]
+            center, normal = at.points[chunk], at.normals[chunk]
             unit = stratified_square(at.keys[chunk], count, self._seed + Stream.SHADOW_RAYS)
-            directions, distances, weights = self._light.shadow_rays(centre, normal, unit)
-            # The edge of a spot's cone may cross a footprint and leave its centre dark: then all count alike.
+            directions, distances, weights = self._light.shadow_rays(center, normal, unit)
+            # The edge of a spot's cone may cross a footprint and leave its center dark: then all count alike.
             weights = np.where(weights.any(axis=1, keepdims=True), weights, 1.0)
-            start = centre[:, None]
+            start = center[:, None]
             if at.sampler is not None:
                 # The same lamp points, seen from points spread over the footprint.
                 start = self._starts(chunk, count)
                 finite = np.isfinite(distances)
                 reach = np.where(finite, distances, 1.0)[..., None]
                 along = np.where(
-                    finite[..., None], directions * reach - (start - centre[:, None]), directions
+                    finite[..., None], directions * reach - (start - center[:, None]), directions
                 )
                 length = np.sqrt(np.einsum("rkc,rkc->rk", along, along))
                 directions = along / np.maximum(length, 1e-300)[..., None]

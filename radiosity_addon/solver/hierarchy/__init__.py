@@ -5,11 +5,11 @@ Also the cut through the clusters that links go down to, and basis functions ove
 
 from __future__ import annotations
 
+from .adjacency import neighbors
 from .basis import Basis, constant_basis
 from .bounds import NodeShapes
 from .cluster_cut import ClusterCut
 from .clusters import Clusters
-from .neighbors import neighbours
 from .nodes import LEAF, Hierarchy, node_opacity
 
 __all__ = [
@@ -20,6 +20,6 @@ __all__ = [
     "Hierarchy",
     "NodeShapes",
     "constant_basis",
-    "neighbours",
+    "neighbors",
     "node_opacity",
 ]

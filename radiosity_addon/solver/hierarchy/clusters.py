@@ -37,20 +37,20 @@ class Clusters:
     coherence (c,): Length of the area-weighted mean of the unit normals: 1 for a piece of one plane.
     area_before (f + 1,): Running sum of the faces' areas along `order`.
     normal (c, 3): Area-weighted mean of the unit normals; its length is the coherence.
-    centre (c, 3): Area-weighted centroid [m].
+    center (c, 3): Area-weighted centroid [m].
     radius (c,): Of a sphere around the middle of the box [m].
     cone (c,): Largest angle between the mean normal and a face's [rad].
     levels: Clusters of each depth, the roots first; children lie one level deeper than parents.
     """
 
-    STORED = ("order", "start", "children", "area", "centre", "levels")
+    STORED = ("order", "start", "children", "area", "center", "levels")
 
     def __init__(self, order: Array, start: Array, end: Array, children: Array) -> None:
         self.order, self.start, self.end, self.children = order, start, end, children
         self.lower = self.upper = np.zeros((0, 3))
         self.area = self.coherence = np.zeros(0)
         self.area_before = np.zeros(1)
-        self.normal = self.centre = np.zeros((0, 3))
+        self.normal = self.center = np.zeros((0, 3))
         self.radius = self.cone = np.zeros(0)
         self.levels: list[slice] = []
 
@@ -72,7 +72,7 @@ class Clusters:
         upper = faces.corners.max(axis=1)[self.order]
         self.normal = self.average(faces.normal, faces.area)
         self.coherence = np.linalg.norm(self.normal, axis=1)
-        self.centre = self.average(faces.corners.mean(axis=1), faces.area)
+        self.center = self.average(faces.corners.mean(axis=1), faces.area)
         # reduceat over start, end pairs: every other result is the run itself.
         bounds = np.stack([self.start, self.end], axis=1).ravel()
         padded = np.minimum(bounds, len(self.order) - 1)

@@ -105,7 +105,7 @@ class _ClusterGather:
         self._rows, self._first = _runs(row)
         self._source = links.source[order]
         # n·v + g·x + h − g·c: linear in (n, x, 1), so seven numbers a cluster and channel.
-        constant = links.even - np.einsum("lk,lk->l", links.gradient, clusters.centre[links.receiver])
+        constant = links.even - np.einsum("lk,lk->l", links.gradient, clusters.center[links.receiver])
         weights = [*links.vector.T, *links.gradient.T, constant]
         self._weights = [np.ascontiguousarray(weight[order]) for weight in weights]
         grouped = np.flatnonzero(self._source < len(clusters))
@@ -114,10 +114,10 @@ class _ClusterGather:
         self._slanted_rows, self._slanted_first = _runs(row[grouped])
         self._held = np.flatnonzero(cut.row >= 0)
         self._held_row = cut.row[self._held]
-        self._area, self._centre = clusters.area[self._held, None], clusters.centre[self._held]
+        self._area, self._center = clusters.area[self._held, None], clusters.center[self._held]
         self._first_face = len(clusters)
         self._face_order = clusters.order
-        self._arm = [(faces.area * along)[self._face_order] for along in faces.centre.T]
+        self._arm = [(faces.area * along)[self._face_order] for along in faces.center.T]
 
     def __call__(self, radiosity: Array, threads: int) -> Array:
         """Return (f, k): see `gather_at_clusters`."""
@@ -141,7 +141,7 @@ class _ClusterGather:
 
         def arrive(rows: slice) -> None:
             basis = np.ones((rows.stop - rows.start, TERMS))
-            basis[:, :3], basis[:, 3:6] = faces.normal[rows], faces.centre[rows]
+            basis[:, :3], basis[:, 3:6] = faces.normal[rows], faces.center[rows]
             terms = pushed.take(self._cut.row_of_face[rows], axis=0).reshape(-1, channels, TERMS)
             np.einsum("fct,ft->fc", terms, basis, out=irradiance[rows])
 
@@ -153,7 +153,7 @@ class _ClusterGather:
         sent = radiosity[self._first_face :].take(self._face_order)
         sums = self._cut.sums_of([sent * arm for arm in self._arm])[self._held_row]
         moment = np.zeros((self._cut.n_rows, 3))
-        moment[self._held_row] = sums / self._area - self._centre * radiosity[self._held, None]
+        moment[self._held_row] = sums / self._area - self._center * radiosity[self._held, None]
         return [np.ascontiguousarray(along) for along in moment.T]
 
 

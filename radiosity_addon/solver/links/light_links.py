@@ -158,9 +158,9 @@ def too_near(light: Light, hierarchy: Hierarchy, elements: Array) -> Array:
     if position is None:
         return np.zeros(len(elements), dtype=bool)
     corners = hierarchy.corners[elements]
-    centre = corners.mean(axis=1)
-    radius = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
-    along = centre - np.asarray(position)
+    center = corners.mean(axis=1)
+    radius = np.linalg.norm(corners - center[:, None], axis=2).max(axis=1)
+    along = center - np.asarray(position)
     distance = np.linalg.norm(along, axis=1)
     before = np.einsum("nk,nk->n", along, hierarchy.faces.normal[hierarchy.face[elements]]) < 0
     near = radius > NEAR * distance

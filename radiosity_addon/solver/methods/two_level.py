@@ -23,7 +23,7 @@ from ...base import SILENT, Progress
 from ...numerics import Array
 from ...scene import Scene, arriving, shares
 from ..equations import exchange_areas, subdivide_evenly
-from ..hierarchy import LEAF, neighbours
+from ..hierarchy import LEAF, neighbors
 from ..settings import SolverSettings
 from ..state import SolverState, begin, refuse_beyond
 
@@ -183,7 +183,7 @@ def contrasts(state: TwoLevelState) -> tuple[Array, Array]:
     Their reflected radiosity under the mean reflectance of the two, the largest channel: so
     lamps and seams between two materials, which no subdivision smooths, do not count.
     """
-    pairs = neighbours(state.hierarchy, state.caster)
+    pairs = neighbors(state.hierarchy, state.caster)
     reflectance = state.reflectance[pairs].mean(axis=1)
     difference = np.abs(state.irradiance[pairs[:, 0]] - state.irradiance[pairs[:, 1]])
     return pairs, (reflectance * difference).max(axis=1, initial=0.0)

@@ -30,7 +30,7 @@ class SolverSettings:
     patches : int
         About how many patches the two-level method groups its elements into.
     contrast : float
-        The two-level method splits neighbouring elements whose reflected light differs by
+        The two-level method splits neighboring elements whose reflected light differs by
         more than this part of the mean over all.
     ambient : bool
         Show the light that shooting has not yet sent as an ambient term.

@@ -55,7 +55,7 @@ def reflect(
     shared = None
     if cluster_links is not None and len(cluster_links) and cut is not None:
         threads = state.settings.threads
-        # A face that looks past the horizon of what its neighbours see gets nothing, not less.
+        # A face that looks past the horizon of what its neighbors see gets nothing, not less.
         shared = np.maximum(gather_at_clusters(hierarchy, cut, cluster_links, sent, threads), 0.0)
     own = gather(hierarchy, links, state.radiosity, scale, cut, (means, sent))
     gathered = push(hierarchy, own)

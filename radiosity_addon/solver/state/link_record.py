@@ -30,7 +30,7 @@ class LinkRecord:
         The scene's triangle that each is a part of, …
     front : (e,) bool
         … and on which side.
-    cluster_centre : (c, 3) float32
+    cluster_center : (c, 3) float32
     cluster_above : (c + f,) int32
         The cluster that every cluster and face is in; −1 for none.
     lamp : (m, 3) float32
@@ -48,7 +48,7 @@ class LinkRecord:
     leaf: Array
     triangle: Array
     front: Array
-    cluster_centre: Array
+    cluster_center: Array
     cluster_above: Array
     lamp: Array
     afar: Array
@@ -64,7 +64,7 @@ class LinkRecord:
     @property
     def n_clusters(self) -> int:
         """The node of element 0."""
-        return len(self.cluster_centre)
+        return len(self.cluster_center)
 
     def reaching(self, elements: Array) -> tuple[Array, Array, Array]:
         """Find the links that bring light to elements, their own and their ancestors'.
@@ -94,12 +94,12 @@ class LinkRecord:
             node = node[node != LEAF]
             asked.append(node)
         rows = np.flatnonzero(np.isin(self.receiver, np.concatenate(asked)))
-        centre = self.corners[own].mean(axis=1)
-        start = np.broadcast_to(centre.mean(axis=0), (len(rows), 3)).copy()
+        center = self.corners[own].mean(axis=1)
+        start = np.broadcast_to(center.mean(axis=0), (len(rows), 3)).copy()
         receiver = self.receiver[rows] - self.n_clusters
         place = np.searchsorted(own, receiver).clip(max=len(own) - 1)
         mine = own[place] == receiver
-        start[mine] = centre[place[mine]]
+        start[mine] = center[place[mine]]
         return start, self._middle(self.source[rows], start), self.arriving[rows]
 
     def _middle(self, node: Array, start: Array) -> Array:
@@ -108,7 +108,7 @@ class LinkRecord:
         middle = np.empty((len(node), 3), dtype=np.float32)
         cluster, lamp = node < self.n_clusters, node >= first_lamp
         element = ~cluster & ~lamp
-        middle[cluster] = self.cluster_centre[node[cluster]]
+        middle[cluster] = self.cluster_center[node[cluster]]
         middle[element] = self.corners[node[element] - self.n_clusters].mean(axis=1)
         middle[lamp] = self.lamp[node[lamp] - first_lamp]
         far = np.flatnonzero(lamp)[self.afar[node[lamp] - first_lamp]]
@@ -146,7 +146,7 @@ def record_links(state: SolverState) -> LinkRecord:
         hierarchy.first_child == LEAF,
         faces.triangle[hierarchy.face],
         faces.front[hierarchy.face],
-        clusters.centre.astype(np.float32),
+        clusters.center.astype(np.float32),
         above,
         np.array([place for place, _ in lamps], dtype=np.float32).reshape(-1, 3),
         np.array([afar for _, afar in lamps], dtype=bool),

@@ -103,11 +103,11 @@ def test_exit_codes_come_through_blender(installed: Installed, cornell_blend: Pa
 
 
 def _lit_mean(path: Path) -> np.ndarray:
-    """Mean colour of the texels that hold light, (3,)."""
+    """Mean color of the texels that hold light, (3,)."""
     image = bpy.data.images.load(str(path))
     image.colorspace_settings.name = "Non-Color"
     values = np.empty(len(image.pixels), dtype=np.float32)
     image.pixels.foreach_get(values)
     bpy.data.images.remove(image)
-    colour = values.reshape(-1, 4)[:, :3]
-    return colour[colour.max(axis=1) > 0].mean(axis=0)
+    color = values.reshape(-1, 4)[:, :3]
+    return color[color.max(axis=1) > 0].mean(axis=0)

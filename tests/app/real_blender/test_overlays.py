@@ -67,7 +67,7 @@ def photograph(seen: dict[str, Any], name: str) -> np.ndarray:
 
 
 def share_of(picture: np.ndarray, color: tuple[float, ...]) -> float:
-    """What part of the viewport shows a colour; it keeps 8 bits of linear light, coarse in the dark."""
+    """What part of the viewport shows a color; it keeps 8 bits of linear light, coarse in the dark."""
     return float((np.abs(picture - np.float32(color)).max(axis=2) < 0.04).mean())
 
 
@@ -91,7 +91,7 @@ def test_each_overlay_has_its_colors(seen: dict[str, Any]) -> None:
     for color in CHECKERS:
         assert share_of(checker, color) > 0.05
     assert share_of(photograph(seen, "texels"), DOUBTFUL) > 0.01
-    # All is as dense: the colour in the middle of the scale, over the whole box.
+    # All is as dense: the color in the middle of the scale, over the whole box.
     assert share_of(photograph(seen, "density"), GREEN) > 0.15
     lux = photograph(seen, "false_color")
     assert share_of(lux, BLUE) > 0.02

@@ -216,15 +216,15 @@ def far_away() -> None:
     moved((7000.0, -7000.0, 1000.0), 1.0)
 
 
-@row("ten-kilometres")
-def ten_kilometres() -> None:
+@row("ten-kilometers")
+def ten_kilometers() -> None:
     """The stage 10 km wide."""
     lit(blockers=True)
     moved((0.0, 0.0, 0.0), 2500.0)
 
 
-@row("a-millimetre")
-def a_millimetre() -> None:
+@row("a-millimeter")
+def a_millimeter() -> None:
     """The stage 1 mm wide."""
     lit(blockers=True)
     moved((0.0, 0.0, 0.0), 0.00025)

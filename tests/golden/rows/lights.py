@@ -156,8 +156,8 @@ def area_near() -> None:
     add_lamp("AREA", location=(0.6, 1.9, 1.0), target=(0.6, 1.0, 0.0), energy=30, shape="SQUARE", size=0.7)
 
 
-@row("lamp-colour")
-def lamp_colour() -> None:
+@row("lamp-color")
+def lamp_color() -> None:
     """Three colored point lamps side by side."""
     stage()
     for number in range(3):

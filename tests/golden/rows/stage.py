@@ -21,7 +21,7 @@ Rect = tuple[float, float, float, float]
 def stage(albedo: float = 0.5, blockers: bool = True) -> None:
     """Build a corner: a floor of 4 × 4 m, two walls 2.2 m high, and a box and a floating slab before them.
 
-    The floor is the lower left of the lightmap, 20 texels a metre. The lamp belongs to the
+    The floor is the lower left of the lightmap, 20 texels a meter. The lamp belongs to the
     front right, where x > 0 and y < 0.
     """
     paint = diffuse("Paint", albedo)

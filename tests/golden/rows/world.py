@@ -11,8 +11,8 @@ from . import row
 from .stage import add_node, emptied_nodes, stage
 
 
-@row("world-colour", samples=48)
-def world_colour() -> None:
+@row("world-color", samples=48)
+def world_color() -> None:
     """World of one color."""
     _open_stage()
     _, background = _world()

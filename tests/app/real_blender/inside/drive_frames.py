@@ -99,7 +99,7 @@ def reached(moment):
 
 def escape(moment):
     """Bake, press Esc at a moment, and wait for the operator to be gone."""
-    view = events.centre("WINDOW")
+    view = events.center("WINDOW")
     before = dump_file()
     bake()
     while not reached(moment):
@@ -128,7 +128,7 @@ def script():
     events.area_3d().spaces.active.overlay.show_overlays = False
     bpy.ops.ed.undo_push(message="Settings")
     yield from events.open_sidebar("Radiosity")
-    yield from events.hover(*events.centre("WINDOW"))
+    yield from events.hover(*events.center("WINDOW"))
     yield 1.0
     frames = Frames()
     yield IDLE_SECONDS

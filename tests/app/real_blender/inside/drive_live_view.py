@@ -124,7 +124,7 @@ def photograph(name):
 
 
 def script():
-    view = events.centre("WINDOW")
+    view = events.center("WINDOW")
     settings = bpy.context.scene.radiosity
     settings.method = "shooting"
     settings.elements = 400
@@ -181,7 +181,7 @@ def script():
     bake()
     yield from events.until(pictured, 60)
     addon_utils.disable(MODULE)
-    yield from events.hover(*events.centre("WINDOW"))
+    yield from events.hover(*events.center("WINDOW"))
     yield 1.0
     seen["active_when_switched_off"] = live_view.is_active()
     seen["running_when_switched_off"] = runtime.running.active

@@ -92,7 +92,7 @@ def photograph(name):
 
 
 def script():
-    view = events.centre("WINDOW")
+    view = events.center("WINDOW")
     settings = bpy.context.scene.radiosity
     settings.show_result = False
     yield from events.open_sidebar("Radiosity")

@@ -118,7 +118,7 @@ def every_panel(overlay):
 
 
 def script():
-    view = events.centre("WINDOW")
+    view = events.center("WINDOW")
     scene = bpy.context.scene
     scene.radiosity.show_result = False
     scene.radiosity.quality = QUALITY

@@ -38,7 +38,7 @@ def lit_objects():
 
 
 def script():
-    view = events.centre("WINDOW")
+    view = events.center("WINDOW")
     bpy.context.scene.radiosity.quality = "draft"
     bpy.ops.ed.undo_push(message="Settings")
     yield from events.open_sidebar("Radiosity")

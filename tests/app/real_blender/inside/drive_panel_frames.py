@@ -49,10 +49,10 @@ def script():
     runtime.running.active = True  # as while a bake runs, but at rest
     yield from after("baking")
     # The mouse is left where the Bake button was pressed: over the progress bar.
-    yield from events.hover(events.centre("UI")[0], events.region("UI").y + events.region("UI").height - 49)
+    yield from events.hover(events.center("UI")[0], events.region("UI").y + events.region("UI").height - 49)
     runtime.running.active = False
     yield from after("canceled")
-    yield from events.hover(*events.centre("WINDOW"))
+    yield from events.hover(*events.center("WINDOW"))
     with bpy.context.temp_override(window=events.window(), area=events.area_3d()):
         bpy.ops.radiosity.bake("EXEC_DEFAULT")
         yield from after("baked")

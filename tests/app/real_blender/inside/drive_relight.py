@@ -77,7 +77,7 @@ def light():
 
 
 def script():
-    view = events.centre("WINDOW")
+    view = events.center("WINDOW")
     bpy.types.SpaceView3D.draw_handler_add(
         lambda: drawn.append(time.perf_counter()), (), "WINDOW", "POST_PIXEL"
     )

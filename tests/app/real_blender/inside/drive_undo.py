@@ -74,7 +74,7 @@ def state():
 
 
 def hit(*keys, **modifiers):
-    yield from events.key(*keys, *events.centre("WINDOW"), **modifiers)
+    yield from events.key(*keys, *events.center("WINDOW"), **modifiers)
     yield 0.7
     yield from events.until(idle, 60)
     yield 0.3

@@ -51,7 +51,7 @@ def photograph(name, part):
 
 
 def script():
-    view = events.centre("WINDOW")
+    view = events.center("WINDOW")
     yield from events.open_sidebar("Radiosity")
     sidebar = events.region("UI")
     beside = (sidebar.x - 10, 80, sidebar.width + 20, 380)

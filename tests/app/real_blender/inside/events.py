@@ -25,7 +25,7 @@ def region(kind):
     return next(region for region in area_3d().regions if region.type == kind)
 
 
-def centre(kind):
+def center(kind):
     place = region(kind)
     return place.x + place.width // 2, place.y + place.height // 2
 

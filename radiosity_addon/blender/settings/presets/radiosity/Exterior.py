@@ -1,4 +1,4 @@
-"""Houses and grounds: as many pages as eight texels a metre take, apart when seen from afar."""
+"""Houses and grounds: as many pages as eight texels a meter take, apart when seen from afar."""
 
 import bpy
 

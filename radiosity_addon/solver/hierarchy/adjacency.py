@@ -22,7 +22,7 @@ COPLANAR = 1e-3
 """Coplanar faces' normals differ by less than this [radians]."""
 
 
-def neighbours(hierarchy: Hierarchy, caster: RayCaster) -> Array:
+def neighbors(hierarchy: Hierarchy, caster: RayCaster) -> Array:
     """Return (k, 2) int: the pairs of neighboring leaves, each once, the smaller number first.
 
     Every leaf looks across the middle of each of its edges. Where the leaf beyond is finer,

@@ -35,7 +35,7 @@ CHUNK = 1 << 17
 UNRESOLVED = 2.0**-23
 """Slivers thinner than this share of the page are rounding of float32 UVs, not coverage."""
 
-_CENTRE = 2.0
+_CENTER = 2.0
 """Added to the overlap of a pair that covers the center, so that it beats every other overlap."""
 
 FOOTPRINT = 0.5
@@ -55,7 +55,7 @@ class Texels:
     triangle (t,) int32: The triangle the texel belongs to.
     area (t,) float32: Area of the footprint as a fraction of the texel, in (0, 1].
     centroid (t, 3) float32: Barycentric coordinates, in the triangle, of the footprint's centroid.
-    centre_inside (t,) bool: Whether the triangle covers the texel's center.
+    center_inside (t,) bool: Whether the triangle covers the texel's center.
     """
 
     resolution: int
@@ -65,7 +65,7 @@ class Texels:
     triangle: Int32
     area: Float32
     centroid: Float32
-    centre_inside: Bool
+    center_inside: Bool
 
     def __len__(self) -> int:
         return len(self.row)
@@ -80,7 +80,7 @@ class Texels:
             self.triangle[selection],
             self.area[selection],
             self.centroid[selection],
-            self.centre_inside[selection],
+            self.center_inside[selection],
         )
 
     def coverage(self) -> Bool:
@@ -105,10 +105,10 @@ class _TexelPairs(NamedTuple):
     texel: NDArray[np.int64]
     triangle: Int32
     area: Float
-    centre: Bool
+    center: Bool
 
 
-def rasterise(uv: Float32, resolution: int, scratch: Scratch | None = None) -> Texels:
+def rasterize(uv: Float32, resolution: int, scratch: Scratch | None = None) -> Texels:
     """Find every texel that a triangle overlaps, and the one triangle it belongs to.
 
     uv (n, 3, 2) float32: Triangles in [0, 1], either orientation; what lies outside the page is cut off and
@@ -121,7 +121,7 @@ def rasterise(uv: Float32, resolution: int, scratch: Scratch | None = None) -> T
     best = np.zeros(resolution * resolution, dtype=np.float32)
     owner = np.full(resolution * resolution, _NOBODY, dtype=np.int32)
     for pairs in overlapping_pairs(uv, resolution):
-        score = (pairs.area + _CENTRE * pairs.centre).astype(np.float32)
+        score = (pairs.area + _CENTER * pairs.center).astype(np.float32)
         before = best[pairs.texel]
         np.maximum.at(best, pairs.texel, score)
         wins = score == best[pairs.texel]
@@ -132,23 +132,23 @@ def rasterise(uv: Float32, resolution: int, scratch: Scratch | None = None) -> T
     count = len(covered)
     row, column, triangle = (scratch.empty(count, np.int32) for _ in range(3))
     area, centroid = scratch.empty(count, np.float32), scratch.empty((count, 3), np.float32)
-    centre_inside = scratch.empty(count, np.bool_)
+    center_inside = scratch.empty(count, np.bool_)
     for tile in tiles(count, CHUNK):
         at = covered[tile]
         row[tile], column[tile] = np.divmod(at, resolution)
         triangle[tile], score = owner[at], best[at]
-        area[tile], centre_inside[tile] = 1.0, score >= _CENTRE
-        whole = score >= _CENTRE + 1
+        area[tile], center_inside[tile] = 1.0, score >= _CENTER
+        whole = score >= _CENTER + 1
         numbers = tile.start + np.flatnonzero(whole)
-        centroid[numbers] = centre_weights(uv, resolution, triangle[numbers], row[numbers], column[numbers])
+        centroid[numbers] = center_weights(uv, resolution, triangle[numbers], row[numbers], column[numbers])
         numbers = tile.start + np.flatnonzero(~whole)
         polygon, origin, _ = _clip(uv, resolution, triangle[numbers], row[numbers], column[numbers])
         area[numbers], middle = polygon_area_centroid(polygon)
         centroid[numbers] = _weights_inside(middle[:, None], origin)[:, 0]
-    return Texels(resolution, uv, row, column, triangle, area, centroid, centre_inside)
+    return Texels(resolution, uv, row, column, triangle, area, centroid, center_inside)
 
 
-def centre_weights(uv: Float32, resolution: int, triangle: Int32, row: Int32, column: Int32) -> Float:
+def center_weights(uv: Float32, resolution: int, triangle: Int32, row: Int32, column: Int32) -> Float:
     """Return (p, 3) the barycentric coordinates, each in its triangle, of texels' centers."""
     origin = _around_texels(uv, resolution, triangle, row, column)
     return _weights_inside(np.full((len(triangle), 1, 2), 0.5), origin)[:, 0]
@@ -183,7 +183,7 @@ def sample_footprints(texels: Texels, u: Float, width: float = FOOTPRINT) -> Flo
     result = np.empty((*u.shape[:2], 3), dtype=np.float32)
     for start in range(0, len(texels), CHUNK):
         part = texels.take(slice(start, start + CHUNK))
-        widths = np.where(part.centre_inside, width, 1.0)
+        widths = np.where(part.center_inside, width, 1.0)
         polygon, origin, whole = _clip(part.uv, part.resolution, part.triangle, part.row, part.column, widths)
         points = np.array(u[start : start + CHUNK], dtype=np.float64)
         cut = np.flatnonzero(~whole)
@@ -193,10 +193,10 @@ def sample_footprints(texels: Texels, u: Float, width: float = FOOTPRINT) -> Flo
     return result
 
 
-def overlapping_pairs(uv: Float32, resolution: int, centres_only: bool = False) -> Iterator[_TexelPairs]:
+def overlapping_pairs(uv: Float32, resolution: int, centers_only: bool = False) -> Iterator[_TexelPairs]:
     """Yield, in chunks and by ascending triangle, every pair that overlaps by a positive area.
 
-    With `centres_only`, and several times as fast, those whose center lies well inside the
+    With `centers_only`, and several times as fast, those whose center lies well inside the
     triangle; their area is given as 1.
     """
     corners = uv.astype(np.float64) * resolution
@@ -207,15 +207,15 @@ def overlapping_pairs(uv: Float32, resolution: int, centres_only: bool = False) 
         for part in run_chunks(count, CHUNK):
             repeat = np.repeat(np.arange(part.start, part.stop), count[part])
             column = run_numbers(count[part], first[part]).astype(np.int32)
-            if centres_only:
-                pairs = _centred(uv, resolution, triangle[repeat], row[repeat], column)
+            if centers_only:
+                pairs = _centered(uv, resolution, triangle[repeat], row[repeat], column)
             else:
                 pairs = _overlaps(uv, resolution, triangle[repeat], row[repeat], column, double_area)
             if len(pairs.texel):
                 yield pairs
 
 
-def _centred(uv: Float32, resolution: int, triangle: Int32, row: Int32, column: Int32) -> _TexelPairs:
+def _centered(uv: Float32, resolution: int, triangle: Int32, row: Int32, column: Int32) -> _TexelPairs:
     """Return those of the candidate pairs whose center is inside, off the triangle's sides."""
     distance, reach = _edge_distances(uv, resolution, triangle, row, column)
     keep = _all_three(distance > 1e-3 * reach)
@@ -228,7 +228,7 @@ def _overlaps(
 ) -> _TexelPairs:
     """Return those of the candidate pairs that overlap, with the exact area."""
     distance, reach = _edge_distances(uv, resolution, triangle, row, column)
-    centre = _all_three(distance >= 0)
+    center = _all_three(distance >= 0)
     touches = _all_three(distance + reach > 0)
     whole = _all_three(distance - reach >= 0)
     area = whole.astype(np.float64)
@@ -236,9 +236,9 @@ def _overlaps(
     area[cut] = overlap_areas(uv, resolution, triangle[cut], row[cut], column[cut])
     # A triangle smaller than the threshold still keeps the texel with most of its area.
     least = np.minimum(UNRESOLVED * resolution, 0.125 * np.abs(double_area[triangle]))
-    keep = touches & (area > 0) & (centre | (area >= least))
+    keep = touches & (area > 0) & (center | (area >= least))
     texel = row[keep].astype(np.int64) * resolution + column[keep]
-    return _TexelPairs(texel, triangle[keep], area[keep], centre[keep])
+    return _TexelPairs(texel, triangle[keep], area[keep], center[keep])
 
 
 def _rows(corners: Float, usable: NDArray[np.intp], resolution: int) -> Iterator[tuple[Int32, Int32]]:
