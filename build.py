@@ -41,8 +41,8 @@ usage: python3 build.py VERB [arguments]
   bake [SCENE] [options]     bake a scene, or the bundled Cornell box (bake --help lists the options)
   restore SCENE [options]    take a bake out of a .blend again
   test [WHICH] ...           run all tests but a few slow ones; what follows goes to pytest instead
-                             --quick: those that need neither bpy nor a window, in a minute, in an
-                             environment without bpy; --full: the slow ones too;
+                             --quick: the fast ones that need neither bpy nor a window, in a minute, in
+                             an environment without bpy; --full: the slow ones too;
                              --bpy 4.2 or 5.2: with that bpy, in an environment of its own
   fuzz [--seeds A:B]         bake random scenes and check what must hold of each (default 0:500)
   bench [--case NAME] ...    measure against Cycles into bench/results and the README; --small tries
@@ -117,8 +117,8 @@ def test(arguments: list[str]) -> int:
     os.chdir(ROOT)
     if rest:
         return environment.hand_over("-m", "pytest", *rest)
-    marks = "not real_blender" if which == "--full" else "not real_blender and not full"
-    code = environment.run("-m", "pytest", *SIDE_BY_SIDE, "-m", marks, *folders)
+    left_out = {"--full": "real_blender", "--quick": "full or slow"}.get(which, "real_blender or full")
+    code = environment.run("-m", "pytest", *SIDE_BY_SIDE, "-m", f"not ({left_out})", *folders)
     if which in ("--quick", "--bpy"):
         return code
     # Windows share one real Blender, of Debian's own version, and are timed: one after the other.

@@ -66,7 +66,7 @@ def solve_room(triangles: int, settings: BakeSettings) -> dict[str, Any]:
     with watch.running():
         solution = solve(scene, quality_of(settings).solver)
         report = solution.report
-    leaves = len(solution.local_pass.hierarchy.leaves)
+    leaves = len(solution.local_pass.elements.hierarchy.leaves)
     return {"triangles": len(scene), **watch.figures, **solver_figures(report, leaves)}
 
 

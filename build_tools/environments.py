@@ -94,7 +94,7 @@ def bench_environment(root: Path) -> Environment:
     if not stamp.is_file() or stamp.read_text() != wanted:
         shutil.rmtree(folder, ignore_errors=True)
         # Their own dependencies would bring another NumPy than Blender's.
-        _install(main.folder, [pins], "--no-deps", "--target", str(folder))
+        install(main.folder, [pins], "--no-deps", "--target", str(folder))
         stamp.write_text(wanted)
     return Environment(root, main.folder, (folder,))
 
@@ -117,20 +117,22 @@ def _ready(
     else:
         python = system.find_python(version)
         system.require(python, version, with_blender)
-        _create(folder, python)
-    _install(folder, pins)
+        create(folder, python)
+    install(folder, pins)
     # Last, so that an interrupted installation is taken up again by the next call.
     stamp.write_text(wanted)
     return Environment(root, folder)
 
 
-def _create(folder: Path, python: str) -> None:
+def create(folder: Path, python: str) -> None:
+    """Make a virtual environment, or make it anew."""
     print(f"making {folder} with {python}", file=sys.stderr, flush=True)
     if subprocess.run([python, "-m", "venv", "--clear", str(folder)], check=False).returncode != 0:
         raise BuildError(f"{python} could not make {folder} (its message is above); mend that, run again")
 
 
-def _install(folder: Path, pins: list[Path], *how: str) -> None:
+def install(folder: Path, pins: list[Path], *how: str) -> None:
+    """Install the packages of files of pins; `how` goes to pip."""
     names = " and ".join(path.name for path in pins)
     size = "1 GB" if any(path.name.startswith("bpy") for path in pins) else "up to 250 MB"
     print(f"installing the pinned packages of {names}, about {size}", file=sys.stderr, flush=True)

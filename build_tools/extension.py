@@ -37,8 +37,8 @@ def build(root: Path, environment: Environment, folder: Path) -> list[Path]:
     for platform in manifest["platforms"]:
         wheels = _download(root, environment, platform)
         name = f"{manifest['id']}-{manifest['version']}-{platform.replace('-', '_')}.zip"
-        contents = _contents(root, platform_manifest(manifest_text, platform, wheels), wheels)
-        zips.append(_write_zip(folder / name, contents))
+        contents = zip_contents(root, platform_manifest(manifest_text, platform, wheels), wheels)
+        zips.append(write_zip(folder / name, contents))
     return zips
 
 
@@ -89,7 +89,7 @@ def _sha256(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def _contents(root: Path, manifest: str, wheels: list[Path]) -> dict[str, bytes]:
+def zip_contents(root: Path, manifest: str, wheels: list[Path]) -> dict[str, bytes]:
     """File name in the zip → bytes. The extension's module is the package, so its files are at the top."""
     package = root / "radiosity_addon"
     sources = [path for path in package.rglob("*") if path.is_file() and "__pycache__" not in path.parts]
@@ -100,7 +100,7 @@ def _contents(root: Path, manifest: str, wheels: list[Path]) -> dict[str, bytes]
     return contents
 
 
-def _write_zip(path: Path, contents: dict[str, bytes]) -> Path:
+def write_zip(path: Path, contents: dict[str, bytes]) -> Path:
     """Write the same bytes for the same contents, whatever the clock and the file system say."""
     unfinished = path.with_suffix(".part")
     with zipfile.ZipFile(unfinished, "w", zipfile.ZIP_DEFLATED) as archive:

@@ -30,6 +30,23 @@ def no_log_to_a_closed_stream() -> Iterator[None]:
         logging.getLogger(name).handlers.clear()
 
 
+SLOW_TESTS = Path(__file__).parent / "slow_tests.txt"
+
+
+def slow_tests() -> set[str]:
+    """Return `FILE::FUNCTION` of all tests that `build.py test --quick` leaves out."""
+    lines = SLOW_TESTS.read_text(encoding="utf-8").splitlines()
+    return {line for line in lines if line and not line.startswith("#")}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the tests of the list."""
+    listed = slow_tests()
+    for item in items:
+        if item.nodeid.partition("[")[0] in listed:
+            item.add_marker(pytest.mark.slow)
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_sessionstart(session: pytest.Session) -> None:
     session.config.stash[_SESSION] = session

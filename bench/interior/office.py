@@ -59,7 +59,7 @@ def build_office(detail: float = 1.0) -> bpy.types.Scene:
     scene.name = "Office"
     materials = {name: _diffuse(name, color) for name, color in COLORS.items()}
     materials |= {name: _glowing(name, radiance) for name, radiance in GLOWS.items()}
-    for name, shape in _pieces(detail):
+    for name, shape in pieces(detail):
         _add_mesh(scene, name, shape, materials)
     _add_lamps(scene, detail)
     _add_sky(scene)
@@ -67,7 +67,7 @@ def build_office(detail: float = 1.0) -> bpy.types.Scene:
     return scene
 
 
-def _pieces(detail: float) -> Iterator[tuple[str, Shape]]:
+def pieces(detail: float) -> Iterator[tuple[str, Shape]]:
     """Yield every object's name and shape."""
     random = np.random.default_rng(4)
     around = max(6, 2 * round(12 * detail**0.5))

@@ -64,7 +64,7 @@ def polygon(paint: str, *corners: Sequence[float]) -> Shape:
 
 
 def box(paint: str, size: Sequence[float], bottom: bool = True) -> Shape:
-    """Return a box that stands on z = 0, centered in x and y; one that stands on something needs no bottom."""
+    """Return a box that stands on z = 0, centered in x and y; one on other things needs no bottom."""
     x, y, z = size[0] / 2, size[1] / 2, size[2]
     vertices = np.array(
         [(i * x, j * y, k * z) for k in (0, 1) for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]

@@ -15,7 +15,7 @@ from radiosity_addon.solver.state.state import begin
 
 def solved(scene: Scene, **settings: Any) -> SolverState:
     """Solve a scene and return the final state; `settings` are fields of `SolverSettings`."""
-    return solve(scene, SolverSettings(**settings)).local_pass.state
+    return solve(scene, SolverSettings(**settings)).local_pass.elements.state
 
 
 def assembled(scene: Scene, elements: int) -> LinearSystem:

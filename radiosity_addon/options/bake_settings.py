@@ -48,12 +48,12 @@ class BakeSettings:
     )
     texel_density: float | None = option(
         None,
-        "Lightmap pixels along one meter of surface; the size of the lightmap follows",
+        "Lightmap pixels per meter of surface; the size of the lightmap follows",
         "Size",
         metavar="PX_PER_M",
         limits=(0, 1e9),
         above=True,
-        unit="pixels a meter",
+        unit="pixels per meter",
         instead_of="resolution",
         preset=True,
         panel=PanelRow(
@@ -75,23 +75,23 @@ class BakeSettings:
     )
     pages: int = option(
         1,
-        "How many images the objects of a shared atlas are distributed over; a density decides this itself",
+        "Number of images for the objects of a shared atlas; set automatically with a density",
         "Pages",
         limits=(1, 64),
         panel=PanelRow("Pages", soft_high=16, only_if=(("atlas", "shared"), *AS_A_WHOLE)),
     )
     max_resolution: int = option(
         MAX_RESOLUTION,
-        "Largest image that a density makes; what does not fit goes to more images",
+        "Largest image that a density makes; objects that do not fit go to more images",
         "Layout",
         limits=(4, MAX_RESOLUTION),
         unit="pixels",
         preset=True,
-        panel=PanelRow("Largest Page", subtype="PIXEL", only_if=BY_DENSITY),
+        panel=PanelRow("Max Page Size", subtype="PIXEL", only_if=BY_DENSITY),
     )
     mip_levels: int = option(
         0,
-        "Down to which mip level the lightmap's charts stay apart: each doubles the padding",
+        "Coarsest mip level at which the lightmap's charts stay apart; each level doubles the padding",
         "Layout",
         limits=(0, 8),
         preset=True,
@@ -99,7 +99,7 @@ class BakeSettings:
     )
     padding: int | None = option(
         None,
-        "Free pixels between charts, in place of those that the mip levels need",
+        "Free pixels between charts, instead of those that the mip levels need",
         "Layout",
         limits=(1, 512),
         unit="pixels",
@@ -107,26 +107,26 @@ class BakeSettings:
     )
     unwrap_seconds: float = option(
         60.0,
-        "Longest time to unwrap one object well; after it the rest is laid out by face direction",
+        "Max time to unwrap one object well; the rest of it is then laid out by face direction",
         "Layout",
         limits=(0, UNBOUNDED),
         unit="seconds",
     )
     quality: str = option(
         "medium",
-        "How fine the light is computed",
+        "Accuracy of the light, and so the time that the bake takes",
         "Quality",
         choices=QUALITIES,
         preset=True,
         panel=PanelRow(
             "Quality",
-            other_choice=Choice(BY_ERROR, "By Error", "As fine as it takes to reach the error below"),
+            other_choice=Choice(BY_ERROR, "By Error", "As accurate as needed to reach the error below"),
         ),
     )
     relative_error: float | None = option(
         None,
-        "How far the light may be off, such as 0.02: RMS, relative to its mean. Texels are lit again, with "
-        "more rays, until the estimate is below it",
+        "Target error of the light, such as 0.02: RMS, relative to the mean. Texels are lit again with more "
+        "rays until the estimate is below it",
         "Quality",
         flag="--error",
         limits=(0.002, 0.2),
@@ -150,31 +150,32 @@ class BakeSettings:
     )
     format: str = option(
         "exr",
-        "Kind of image file",
+        "File format of the images",
         "Image",
         choices=FORMATS,
         panel=PanelRow("Format"),
     )
     objects: tuple[str, ...] | None = option(
         None,
-        "What gets a lightmap, instead of every mesh that shows in renders; the rest still lights and blocks",
+        "Objects that get a lightmap, instead of every mesh that shows in renders; all others still light "
+        "and block",
         "Scene",
         metavar="NAME",
     )
     light_only: tuple[str, ...] = option(
         (),
-        "What lights and blocks but gets no lightmap, also if its own mode differs",
+        "Objects that light and block but get no lightmap, whatever their own mode is",
         "Scene",
         metavar="NAME",
     )
     ignore: tuple[str, ...] = option(
-        (), "What is left out as if it were not there, also if its own mode differs", "Scene", metavar="NAME"
+        (), "Objects that are left out entirely, whatever their own mode is", "Scene", metavar="NAME"
     )
     sky: bool = option(
         False,
-        "Add a plain white sky of strength 1 where the scene has no light at all",
+        "Add a white sky of strength 1 if the scene has no light",
         "Scene",
-        panel=PanelRow("Sky if Dark"),
+        panel=PanelRow("Sky if No Light"),
     )
     keep_uvs: bool = option(
         False,
@@ -184,7 +185,7 @@ class BakeSettings:
     )
     groups: tuple[GroupSetting, ...] = option(
         (),
-        "Bake a lightmap also for these lamps, emissive materials or the world; they win over the scene's",
+        "Also bake a lightmap of these lamps, emissive materials or the world; overrides the scene's groups",
         "Light Groups",
         flag="--light-group",
         metavar="NAME=MEMBER,…",
@@ -192,14 +193,14 @@ class BakeSettings:
     )
     light_groups: bool = option(
         False,
-        "Bake a lightmap for each light group of the scene as well, which the materials mix: colors and "
-        "strengths can then be changed without baking",
+        "Also bake a lightmap for each light group of the scene. Materials mix them, so colors and "
+        "strengths can be changed without baking",
         "Light Groups",
         panel=PanelRow("Light Groups", identifier="use_light_groups"),
     )
     seed: int = option(
         0,
-        "Random seed. Same scene, same seed: the same lightmap to the last bit",
+        "Random seed. The same scene and seed give the same lightmap to the last bit",
         "Computation",
         limits=(0, 2**31 - 1),  # Blender's renders take no larger one
         panel=PanelRow("Seed"),
@@ -213,8 +214,8 @@ class BakeSettings:
     )
     method: str = option(
         "hierarchical",
-        "How the radiosity equation is solved. All come to the same light; Hierarchical is the fastest, the "
-        "others are for study and comparison",
+        "Method of solving the radiosity equation. All methods give the same light; Hierarchical is the "
+        "fastest, the others are for study and comparison",
         "Solver",
         choices=METHOD_CHOICES,
         preset=True,
@@ -222,7 +223,7 @@ class BakeSettings:
     )
     elements: int | None = option(
         None,
-        "About how many elements the surfaces are divided into; a triangle is at least one",
+        "Approximate number of elements that surfaces are divided into; at least one per triangle",
         "Solver",
         limits=(1, MOST),
         methods=("two-level", "shooting", *MATRIX),
@@ -231,7 +232,7 @@ class BakeSettings:
     )
     assembly: str | None = option(
         None,
-        "How the matrix is made; conjugate gradients take galerkin only",
+        "How the matrix is assembled; conjugate gradients need Galerkin",
         "Solver",
         choices=ASSEMBLIES,
         methods=MATRIX,
@@ -240,7 +241,7 @@ class BakeSettings:
     )
     patches: int | None = option(
         None,
-        "About how many patches the elements are grouped into",
+        "Approximate number of patches that elements are grouped into",
         "Solver",
         limits=(1, MOST),
         methods=("two-level",),
@@ -249,7 +250,7 @@ class BakeSettings:
     )
     contrast: float | None = option(
         None,
-        "Neighboring elements are split where their light differs by more than this part of the mean",
+        "Neighboring elements are split where their light differs by more than this fraction of the mean",
         "Solver",
         limits=(0, 1000),
         above=True,
@@ -268,7 +269,7 @@ class BakeSettings:
     )
     error: float | None = option(
         None,
-        "BF_ε: a link is refined while it may misplace more than this part of the light's power",
+        "BF_ε: a link is refined while it may misplace more than this fraction of the light's power",
         "Solver",
         flag="--link-error",
         limits=(0, 1),
@@ -279,26 +280,26 @@ class BakeSettings:
     )
     min_area: float | None = option(
         None,
-        "A_ε: no element becomes smaller than this part of the scene's lit area",
+        "A_ε: no element becomes smaller than this fraction of the scene's lit area",
         "Solver",
         limits=(0, 1),
         above=True,
         methods=LINKS,
         preset=True,
-        panel=PanelRow("Smallest Area", precision=6),
+        panel=PanelRow("Min Area", precision=6),
     )
     max_links: int | None = option(
         None,
-        "Refinement stops at so many links",
+        "Refinement stops at this number of links",
         "Solver",
         limits=(1, 1_000_000_000),
         methods=LINKS,
         preset=True,
-        panel=PanelRow("Most Links"),
+        panel=PanelRow("Max Links"),
     )
     ambient: bool | None = option(
         None,
-        "Show the light that is not sent yet as an even, ambient light; the result does not change",
+        "Show light that was not sent yet as uniform ambient light; the result does not change",
         "Solver",
         methods=("shooting",),
         preset=True,
@@ -306,7 +307,7 @@ class BakeSettings:
     )
     tolerance: float | None = option(
         None,
-        "Residual at which the iteration stops, as a part of the light's power",
+        "Residual at which the iteration stops, as a fraction of the light's power",
         "Solver",
         limits=(0, 1),
         above=True,
@@ -316,16 +317,16 @@ class BakeSettings:
     )
     max_iterations: int | None = option(
         None,
-        "Iterations, or shots, after which it stops anyway",
+        "Max number of iterations, or shots",
         "Solver",
         limits=(1, 1_000_000_000),
         methods=ITERATIVE,
         preset=True,
-        panel=PanelRow("Most Iterations"),
+        panel=PanelRow("Max Iterations"),
     )
     memory_limit: float | None = option(
         None,
-        "Memory that the bake may take, in GiB; what would need more is refused",
+        "Memory that the bake may take, in GiB; bakes that need more are refused",
         "Solver",
         metavar="GIB",
         limits=(0, 1e6),

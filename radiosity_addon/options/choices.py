@@ -42,7 +42,7 @@ QUANTITIES = (
     Choice(
         "radiosity",
         "Radiosity",
-        "The light that leaves: own emission and what is reflected [W/m²]",
+        "The light that leaves: emission and reflected light [W/m²]",
     ),
     Choice(
         "residual",
@@ -53,8 +53,8 @@ QUANTITIES = (
 
 LIGHTS = (
     Choice("all", "All", "Direct and indirect light"),
-    Choice("direct", "Direct", "Only the light that comes straight from lamps, emitters and world"),
-    Choice("indirect", "Indirect", "Only the light that was reflected, for lamps that stay dynamic"),
+    Choice("direct", "Direct", "Only light straight from lamps, emitters and the world"),
+    Choice("indirect", "Indirect", "Only reflected light, for lamps that stay dynamic"),
 )
 
 FORMATS = (

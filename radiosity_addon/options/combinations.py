@@ -26,7 +26,9 @@ def check_combinations(settings: Any, options: Mapping[str, Option]) -> None:
     UsageError
     """
     if settings.pages > 1 and (settings.atlas != "shared" or settings.texel_density is not None):
-        raise UsageError("pages are for a shared atlas of a given resolution; else they are counted")
+        raise UsageError(
+            "pages apply to a shared atlas with a resolution; otherwise their number is automatic"
+        )
     for name in (*settings.light_only, *settings.ignore):
         if name in (settings.objects or ()):
             raise UsageError(f"object '{name}' cannot both get a lightmap and be light only or ignored")
@@ -42,11 +44,11 @@ def _check_residual(settings: Any) -> None:
         raise UsageError("a residual is an error picture: leave --error out, or bake another quantity")
     if settings.format != "exr":
         raise UsageError(
-            f"a residual has negative values, which format {settings.format} cannot hold: take format exr"
+            f"a residual has negative values, which format {settings.format} cannot hold: use format exr"
         )
     if settings.light != "all":
         raise UsageError(
-            f"a residual is of the whole solution, not of its {settings.light} light: take light all"
+            f"a residual is of the whole solution, not of its {settings.light} light: use light all"
         )
 
 
@@ -59,7 +61,7 @@ def _check_groups(settings: Any) -> None:
     for kind, found in (("light group", names), ("member of light groups", inside)):
         twice = next((name for name in found if found.count(name) > 1), None)
         if twice is not None:
-            raise UsageError(f"{kind} '{twice}' is there twice")
+            raise UsageError(f"{kind} '{twice}' is given twice")
     wanted = bool(settings.groups) or settings.light_groups
     if wanted and settings.method != "hierarchical":
         raise UsageError(f"light groups need the hierarchical method; {settings.method} keeps no links")

@@ -28,8 +28,8 @@ METHODS = {
         "Conjugate Gradients", "A full matrix, solved by conjugate gradients on its symmetric form"
     ),
     "gauss-seidel": Method("Gauss-Seidel", "A full matrix, each element gathering the newest radiosities"),
-    "jacobi": Method("Jacobi", "A full matrix, all elements gathering at once: a bounce an iteration"),
-    "dense": Method("Dense", "A full matrix, solved directly: the truth for its elements"),
+    "jacobi": Method("Jacobi", "A full matrix, all elements gathering at once: one bounce per iteration"),
+    "dense": Method("Dense", "A full matrix, solved directly: exact for its elements"),
 }
 
 ALL = tuple(METHODS)

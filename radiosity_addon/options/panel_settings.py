@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from .choices import SCOPES, SIZE_MODES
 from .option_record import PanelRow, option, options_of
-from .sections import LAST_BAKE, OBJECTS, RELIGHTING, VIEWPORT
+from .sections import FILES, LAST_BAKE, OBJECTS, RELIGHTING, VIEWPORT
 
 RELIGHT_GROUP = "radiosity_relight"
 """The group of properties that files have the options of relighting in."""
@@ -33,7 +33,7 @@ class _PanelSettings:
         "//lightmaps/",
         "Where the lightmaps are written. A folder that begins with // is next to the file; while that file "
         "is not saved, lightmaps are packed into it",
-        "Pages",
+        FILES,
         panel=PanelRow("Folder", subtype="DIR_PATH"),
     )
     keep: bool = option(

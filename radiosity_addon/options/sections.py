@@ -6,7 +6,7 @@ MAIN, ADVANCED, GROUPS, SOLVER = "Radiosity Lightmaps", "Advanced", "Light Group
 LAST_BAKE = "Last Bake"
 """Parts of the panel."""
 
-OBJECTS, RELIGHTING, VIEWPORT = "Objects", "Relighting", "Viewport"
+OBJECTS, FILES, RELIGHTING, VIEWPORT = "Objects", "Files", "Relighting", "Viewport"
 """Sections that only the panel has options in."""
 
 SECTIONS = {
@@ -14,6 +14,7 @@ SECTIONS = {
     "Size": MAIN,
     "Quality": MAIN,
     "Pages": MAIN,
+    FILES: MAIN,
     "Image": ADVANCED,
     "Layout": ADVANCED,
     "Scene": ADVANCED,

@@ -6,7 +6,7 @@ Every renaming of a file, and recovery after a kill.
 from __future__ import annotations
 
 from .marked_folders import MarkedFolder, clean_up_folders
-from .publish import Staging, clean_up, is_interrupted, replacing
+from .publish import Staging, clean_up, is_interrupted, replacing, write_text
 
 __all__ = [
     "MarkedFolder",
@@ -15,4 +15,5 @@ __all__ = [
     "clean_up_folders",
     "is_interrupted",
     "replacing",
+    "write_text",
 ]

@@ -91,11 +91,11 @@ class Staging(MarkedFolder):
                 check(name, old)
                 files[name] = _Replaced((known or {}).get(name) or digest_of_file(self.path / name), old)
             _sync_folder(earlier)
-            _write_journal(self.path, files)
+            write_journal(self.path, files)
             for name in names:
                 if not _is_same(found[name], _regular(self.target / name)):
                     raise BakeError(f"'{self.target / name}' was changed while it was being replaced")
-                _rename(self.path / name, self.target / name)
+                rename(self.path / name, self.target / name)
             _sync_folder(self.target)
             (self.path / JOURNAL).unlink()
         except BaseException as error:
@@ -138,10 +138,26 @@ def replacing(path: Path) -> Iterator[Path]:
         aside = staging.path / path.name
         yield aside
         _sync(aside)
-        _rename(aside, path)
+        rename(aside, path)
         _sync_folder(path.parent)
     finally:
         staging.close()
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file, in a folder that is made if need be, over an older one once it is whole.
+
+    Raises
+    ------
+    BakeError
+        If it cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with replacing(path) as aside:
+            aside.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise BakeError(f"cannot write '{path}': {error.strerror}") from error
 
 
 def clean_up(target: Path) -> bool:
@@ -230,7 +246,7 @@ def _take_back(steps: Sequence[_Step]) -> None:
         if kept is None:
             place.unlink()
         else:
-            _rename(kept, place)
+            rename(kept, place)
     for folder in {place.parent for _, place in steps}:
         _sync_folder(folder)
 
@@ -262,7 +278,7 @@ def _read_journal(staging: Path) -> dict[str, _Replaced]:
     return files
 
 
-def _write_journal(staging: Path, files: Mapping[str, _Replaced]) -> None:
+def write_journal(staging: Path, files: Mapping[str, _Replaced]) -> None:
     """Write the journal so that it is there, whole, even if the machine stops at the next instant."""
     told = {name: {"new": file.new, "old": file.old} for name, file in files.items()}
     aside = staging / f"{JOURNAL}.part"
@@ -270,7 +286,7 @@ def _write_journal(staging: Path, files: Mapping[str, _Replaced]) -> None:
         json.dump({"version": _VERSION, "files": told}, file)
         file.flush()
         os.fsync(file.fileno())
-    _rename(aside, staging / JOURNAL)
+    rename(aside, staging / JOURNAL)
     _sync_folder(staging)
 
 
@@ -284,7 +300,7 @@ def _kept(path: Path, kept: Path) -> str:
     return digest_of_file(kept)
 
 
-def _rename(source: Path, target: Path) -> None:
+def rename(source: Path, target: Path) -> None:
     """Rename a file over another; every renaming of ours is this one."""
     source.replace(target)
 

@@ -133,4 +133,4 @@ class Relightable:
     def of(state: SolverState, emitter: Array | None = None) -> Relightable:
         """Keep a state; `emitter` as for `LightSources`, errors as of `ElementTransport.of`."""
         sources = LightSources(state.scene, state.hierarchy.faces, state.caster, emitter)
-        return Relightable(sources, ElementTransport.of(state, sources), LocalPass(state, sources))
+        return Relightable(sources, ElementTransport.of(state, sources), LocalPass.of(state, sources))

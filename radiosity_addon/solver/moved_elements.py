@@ -58,10 +58,10 @@ def carried(solved: Relightable, scene: Scene, emitter: Array | None = None) -> 
         See `LightSources`.
     """
     local = solved.local
-    elements = on_scene(local.hierarchy, scene)
+    elements = on_scene(local.elements.hierarchy, scene)
     caster = ray_caster(scene, local.threads)
     sources = LightSources(scene, elements.faces, caster, emitter)
-    before = local.state
+    before = local.elements.state
     # Without links: those that `elements` solves by are the hierarchy's own.
     state = HierarchicalState(
         scene,
@@ -72,4 +72,4 @@ def carried(solved: Relightable, scene: Scene, emitter: Array | None = None) -> 
         irradiance=before.irradiance,
         radiosity=before.radiosity,
     )
-    return Relightable(sources, solved.elements, LocalPass(state, sources))
+    return Relightable(sources, solved.elements, LocalPass.of(state, sources))

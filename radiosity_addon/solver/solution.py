@@ -76,7 +76,7 @@ class Solution:
     @cached_property
     def local_pass(self) -> LocalPass:
         """The local pass over this solution: direct light and gather rays at points."""
-        return LocalPass(self._state)
+        return LocalPass.of(self._state)
 
     def relightable(self, emitter: Array | None = None) -> Relightable:
         """Return what lights this scene anew.
@@ -121,9 +121,9 @@ class Solution:
         normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
         local = self.local_pass
         at = Footprints(points, normals, np.arange(len(points)))
-        direct = local.direct(at, rays=64)
-        sources = local.gather(at, normals, POINT_RAYS, local.leaves_of).sources
-        radiosity = np.concatenate([local.reflected(), local.beyond()])
+        direct = local.direct.at(at, rays=64)
+        sources = local.gather.at(at, normals, POINT_RAYS, local.elements.leaves_of).sources
+        radiosity = np.concatenate([local.elements.reflected(), local.elements.beyond()])
         return np.asarray(direct + radiosity[sources].mean(axis=1))
 
     def residual(

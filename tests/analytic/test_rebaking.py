@@ -72,7 +72,7 @@ def test_a_bake_that_followed_a_move_is_relit_from_its_sidecar(
     write_sidecar(path, after, result, "bake")
     stored = read_sidecar(path).kept(laid_out_as(room(ELSEWHERE, 30.0), after.geometry.uv))
     wanted = 2.0 * after.strengths
-    fresh = replace(after, lit=replace(after.lit, earlier=after.lit.earlier.first()))
+    fresh = replace(after, lit=replace(after.lit, warm_start=after.lit.warm_start.first()))
     pages = [relight_pages(bake, wanted)[0].pixels for bake in (stored, fresh)]
     np.testing.assert_array_equal(*pages)
 
@@ -178,10 +178,10 @@ def test_parts_that_nothing_meets_any_more_are_left_out() -> None:
     """Else they wrote what they reflect to the row that stands for nothing, and a second move failed."""
     first, kept = bake_and_keep(shelves(1.9), SETTINGS)
     _, after = bake_moved(kept, shelves(0.8))
-    rows = np.concatenate([links.rows for links in after.lit.transport.parts.links])
+    rows = np.concatenate([links.rows for links in after.lit.transport.cells.links])
     assert rows.min() >= len(after.geometry)
-    before = np.concatenate([links.rows for links in kept.lit.transport.parts.links])
-    old, new = (some.moves.traced.numbered(of) for some, of in ((kept, before), (after, rows)))
+    before = np.concatenate([links.rows for links in kept.lit.transport.cells.links])
+    old, new = (some.moves.traced.rows.numbers(of) for some, of in ((kept, before), (after, rows)))
     assert np.setdiff1d(old, new).size > 0
     back, _ = bake_moved(after, shelves(1.9))
     assert relative(pixels(back), pixels(first)) < 0.01

@@ -13,7 +13,7 @@ from radiosity_addon.bake.relight.kept_bake import KeptBake, relight_pages
 from radiosity_addon.bake.relight.source_strengths import strengths_in
 from radiosity_addon.base.errors import SceneError, UsageError
 from radiosity_addon.lightmap.images.page import LightmapPage
-from radiosity_addon.lightmap.lighting.warm_start import EarlierLight
+from radiosity_addon.lightmap.lighting.warm_start import WarmStart
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import PointLight, Scene
@@ -86,16 +86,16 @@ def test_the_same_strengths_give_the_same_lightmap() -> None:
     result, kept = bake_and_keep(lit_bake(), SETTINGS)
     expected = pixels(result.pages)
     assert relative(pixels(relight_pages(kept, BAKED)), expected) < kept.lit.tolerance
-    table = np.zeros((len(expected) + len(kept.lit.transport.parts.start), 3), dtype=np.float32)
-    nothing = EarlierLight(np.zeros_like(BAKED), table)
-    anew = replace(kept, lit=replace(kept.lit, earlier=nothing))
+    table = np.zeros((len(expected) + len(kept.lit.transport.cells.start), 3), dtype=np.float32)
+    nothing = WarmStart(np.zeros_like(BAKED), table)
+    anew = replace(kept, lit=replace(kept.lit, warm_start=nothing))
     assert relative(pixels(relight_pages(anew, BAKED)), expected) < kept.lit.tolerance
 
 
 def test_light_is_linear_and_what_was_solved_before_is_not_solved_again(room: KeptBake) -> None:
     first, second = relight_pages(room, CHANGED), relight_pages(room, BAKED * only(0))
     mixture = 0.5 * CHANGED + 0.25 * BAKED * only(0)
-    assert room.lit.earlier.mixed(mixture) is not None
+    assert room.lit.warm_start.mixed(mixture) is not None
     found = pixels(relight_pages(room, mixture))
     assert relative(found, 0.5 * pixels(first) + 0.25 * pixels(second)) < 1e-3
 
@@ -190,7 +190,7 @@ def test_groups_add_up_before_what_sweeps_leave_is_shared_out(room: KeptBake) ->
 def test_groups_that_cannot_be_are_refused() -> None:
     with pytest.raises(UsageError, match="there is no lamp, emissive material or world 'Moon'"):
         bake(lit_bake(), BakeSettings(resolution=16, quality="draft", groups=(("Night", ("Moon",)),)))
-    with pytest.raises(UsageError, match="'Sun' is there twice"):
+    with pytest.raises(UsageError, match="'Sun' is given twice"):
         BakeSettings(groups=(("Day", ("Sun",)), ("Noon", ("Sun",))))
     with pytest.raises(UsageError, match="shooting keeps no links"):
         BakeSettings(groups=(("Day", ("Sun",)),), method="shooting")

@@ -11,6 +11,7 @@ from radiosity_addon.solver import PointLight, Scene, SolverSettings, solve
 from radiosity_addon.solver.gather.footprints import Footprints
 from tests.rooms import CEILING, box_room, gray, rectangle
 from tests.textured_rooms import furnace, image, patterned
+from tests.unit.solved_rooms import solved
 from tests.unit.texel_scenes import QUAD_UV
 
 FIXED = ("two-level", "shooting", "conjugate-gradient", "gauss-seidel", "jacobi", "dense")
@@ -162,7 +163,7 @@ def test_emission_of_an_image_is_that_of_many_small_emitters() -> None:
     points = np.random.default_rng(4).uniform(0.1, 1.9, (40, 3)) * (1, 1, 0)
     up = np.tile([0, 0, 1.0], (40, 1))
     at = Footprints(points, up, np.arange(40))
-    direct, exact = (solution.local_pass.direct(at) for solution in (textured, reference))
+    direct, exact = (solution.local_pass.direct.at(at) for solution in (textured, reference))
     np.testing.assert_allclose(direct, exact, rtol=0.03)
     assert np.sqrt(((direct / exact - 1) ** 2).mean()) < 0.01
 
@@ -196,12 +197,12 @@ def test_a_bright_spot_in_an_image_of_emission_converges() -> None:
     errors = []
     for error in (1e-3, 1e-4, 1e-5):
         local = solve(scene, SolverSettings(error=error)).local_pass
-        found = local.irradiance_at(np.where(lower, 0, 1), barycentric)
+        found = local.elements.irradiance_at(np.where(lower, 0, 1), barycentric)
         errors.append(float(np.sqrt(((found - exact) ** 2).mean() / (exact**2).mean())))
     assert errors == sorted(errors, reverse=True)
     assert errors[0] > 2 * errors[2]
     assert errors[2] < 0.05
-    direct = solve(scene).local_pass.direct(Footprints(points, up, np.arange(len(points))))[:, 0]
+    direct = solve(scene).local_pass.direct.at(Footprints(points, up, np.arange(len(points))))[:, 0]
     assert np.sqrt(((direct - exact) ** 2).mean() / (exact**2).mean()) < 0.03
 
 
@@ -217,8 +218,7 @@ def test_patterns_reflect_their_own_colors() -> None:
     """Under uniform light every element's radiosity is the mean of its own part of the image."""
     assert patterned().max() <= 0.95
     scene = furnace(1.0)
-    solution = solve(scene)
-    hierarchy = solution.element_residual._hierarchy
+    hierarchy = solved(scene).hierarchy
     leaves = hierarchy.leaves
     assert hierarchy.level[leaves].max() > 0
     total = hierarchy.area[leaves] @ hierarchy.reflectance[leaves]

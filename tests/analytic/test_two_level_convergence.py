@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from radiosity_addon.solver import PointLight, Scene, SolverSettings, solve
+from radiosity_addon.solver.gather import LocalPass
 from radiosity_addon.solver.gather.footprints import Footprints
-from radiosity_addon.solver.gather.local_pass import LocalPass
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from radiosity_addon.solver.methods import solve_by_method
 from radiosity_addon.solver.state.state import SolverState
@@ -82,7 +82,7 @@ def shadowed() -> tuple[Scene, np.ndarray]:
 def direct_light(state: SolverState, points: np.ndarray) -> np.ndarray:
     """(p,) H at points of the floor by exact factors and many shadow rays."""
     up = np.tile([0.0, 0.0, 1.0], (len(points), 1))
-    return LocalPass(state).direct(Footprints(points, up, np.arange(len(points))), rays=64)[:, 0]
+    return LocalPass.of(state).direct(Footprints(points, up, np.arange(len(points))), rays=64)[:, 0]
 
 
 def at_shadow_edges(truth: np.ndarray) -> np.ndarray:

@@ -121,7 +121,7 @@ def test_nothing_in_the_office_lies_in_its_walls() -> None:
     walls.append((2, office.HEIGHT))
     reveals = [(axis, window[i]) for window in office.WINDOWS for axis, i in ((0, 0), (0, 2), (2, 1), (2, 3))]
     found = []
-    for name, shape in office._pieces(1.0):
+    for name, shape in office.pieces(1.0):
         if name in shell:
             continue
         for number, face in enumerate(shape.faces):

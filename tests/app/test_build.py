@@ -86,8 +86,8 @@ def test_a_missing_python_is_named() -> None:
 def test_an_environment_is_made_once(checkout: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made = environments.main_environment(checkout)
     assert made.run("-c", "import pip") == 0
-    monkeypatch.setattr(environments, "_create", _must_not_be_called)
-    monkeypatch.setattr(environments, "_install", _must_not_be_called)
+    monkeypatch.setattr(environments, "create", _must_not_be_called)
+    monkeypatch.setattr(environments, "install", _must_not_be_called)
     assert environments.main_environment(checkout) == made
 
 
@@ -103,7 +103,7 @@ def test_what_only_the_benchmarks_need_lies_beside_the_main_environment(
             (checkout / ".envs" / "bench" / "only_here.py").write_text("raise SystemExit(3)")
             asked.append(how)
 
-    monkeypatch.setattr(environments, "_install", install)
+    monkeypatch.setattr(environments, "install", install)
     made = environments.bench_environment(checkout)
     assert made.folder == environments.main_environment(checkout).folder
     assert made.run("-c", "import only_here") == 3
@@ -115,9 +115,9 @@ def test_changed_pins_and_interrupted_installations_are_brought_up_to_date_in_pl
     checkout: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = environments.main_environment(checkout)
-    monkeypatch.setattr(environments, "_create", _must_not_be_called)
+    monkeypatch.setattr(environments, "create", _must_not_be_called)
     installed: list[Path] = []
-    monkeypatch.setattr(environments, "_install", lambda folder, _pins: installed.append(folder))
+    monkeypatch.setattr(environments, "install", lambda folder, _pins: installed.append(folder))
 
     (checkout / "requirements" / "tools.txt").write_text("# something else\n")
     environments.main_environment(checkout)

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import radiosity_addon
+from radiosity_addon.bake.sidecar.sidecar import FORMAT
 from radiosity_addon.blender.command_line.main import main
 from tests.reliability.folders import broken_result, changes, leftovers, tree
 
@@ -151,6 +152,32 @@ def test_the_baked_file_is_restored(opened: Path) -> None:
     assert bpy.ops.radiosity.restore("EXEC_DEFAULT", True) == {"FINISHED"}
     check_original()
     assert changes(before, tree(opened)) == []
+
+
+@pytest.mark.parametrize("number", range(2, FORMAT + 1))
+def test_each_format_of_sidecars_is_relit_or_refused_by_name_and_restored(
+    number: int, tmp_path: Path
+) -> None:
+    """Version 0.1.0 wrote the first format."""
+    place = tmp_path / "kitchen"
+    shutil.copytree(FIXTURES.parent / f"sidecar-{number}", place)
+    radiosity_addon.register()
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(place / "kitchen.blend"))
+        assert all(shows_lightmap(bpy.data.objects[name]) for name in BAKED)
+        before, light = tree(place), [mean_of(image) for image in lightmaps()]
+        bpy.data.lights["Lamp"].energy *= 3
+        if number == FORMAT:
+            assert bpy.ops.radiosity.relight("EXEC_DEFAULT", True) == {"FINISHED"}
+            assert max(mean_of(image) / old for image, old in zip(lightmaps(), light, strict=True)) > 1.5
+        else:
+            with pytest.raises(RuntimeError, match=f"it has format {number}, .*; bake again"):
+                bpy.ops.radiosity.relight("EXEC_DEFAULT", True)
+            assert changes(before, tree(place)) == []
+        assert bpy.ops.radiosity.restore("EXEC_DEFAULT", True) == {"FINISHED"}
+        check_original()
+    finally:
+        radiosity_addon.unregister()
 
 
 def test_a_preset_is_applied(opened: Path) -> None:

@@ -153,7 +153,7 @@ def test_nodes_that_shine_unevenly_warn(meter: bpy.types.Object) -> None:
     tree.links.new(emission.outputs[0], tree.nodes.new("ShaderNodeOutputLight").inputs["Surface"])
     (warning,) = _exported()[1]
     assert warning.name == "Gobo"
-    assert "shine unevenly" in warning.message
+    assert "depend on direction" in warning.message
     assert len(bpy.data.scenes) == 1
 
 
@@ -225,5 +225,5 @@ def test_nodes_that_change_light_with_distance_warn(meter: bpy.types.Object, out
     tree.links.new(falloff.outputs[output], emission.inputs["Strength"])
     tree.links.new(emission.outputs[0], tree.nodes.new("ShaderNodeOutputLight").inputs["Surface"])
     said = [warning.message for warning in _exported()[1]]
-    message = "lamp 'Lamp': its nodes change its light with distance; what they make of it at 1 m is used"
+    message = "lamp 'Lamp': its nodes change its light with distance; their result at 1 m is used"
     assert said == ([] if output == "Quadratic" else [message])

@@ -173,4 +173,4 @@ def test_the_last_bake_tells_how_it_was_solved() -> None:
     assert figures["Method"] == "Gauss-Seidel"
     assert figures["Iterations"] == "17"
     assert figures["Residual"] == "2.5e-05"
-    assert figures["Separate parts"] == "2"
+    assert figures["Separate Parts"] == "2"

@@ -21,10 +21,10 @@ from radiosity_addon.blender.overlays.overlay_pictures import (
     STATE_COLORS,
     WIDEST,
     OverlayPicture,
-    _thinned,
     chosen_elements,
     missing,
     overlay_picture,
+    thinned,
 )
 from radiosity_addon.blender.session.kept_details import details_of
 from radiosity_addon.blender.session.state import session
@@ -279,10 +279,10 @@ def test_an_unregistered_overlay_leaves_nothing() -> None:
 
 def test_large_pages_are_drawn_coarser() -> None:
     page = np.arange(2 * WIDEST)[:, None] + np.zeros(2 * WIDEST)
-    thin = _thinned(page)
+    thin = thinned(page)
     assert thin.shape == (WIDEST, WIDEST)
     assert np.abs(thin[:, 0] / 2 - np.arange(WIDEST)).max() <= 1.0
-    assert _thinned(thin) is thin
+    assert thinned(thin) is thin
 
 
 def test_scales_end_at_round_numbers_and_clip() -> None:

@@ -190,7 +190,7 @@ def test_undo_brings_the_earlier_light_back(baked: Path) -> None:
     ("change", "message"),
     [
         ("move", "object 'Floor' has moved"),
-        ("paint", "object 'Floor' reflects otherwise"),
+        ("paint", "object 'Floor' has another material"),
         ("add", "object 'More' was not there"),
         ("hide", "object 'Panel' is not there any more"),
         ("move lamp", "lamp 'Bulb' has changed in more than its strength"),

@@ -380,7 +380,12 @@ def test_edits_that_cannot_be_taken_over_are_refused_at_once() -> None:
 def test_objects_with_their_own_mesh_may_be_edited_and_moved() -> None:
     plane = add_plane()
     bake_by_hand()
-    edit_guard._noted.add("Plane")
-    plane.location.x = 3
-    assert edit_guard.refuse(bpy.context) == []
+    bpy.app.handlers.depsgraph_update_post.append(edit_guard.note)
+    try:
+        plane.location.x = 3
+        bpy.context.view_layer.update()
+        assert edit_guard.refuse(bpy.context) == []
+    finally:
+        bpy.app.handlers.depsgraph_update_post.remove(edit_guard.note)
+        edit_guard.forget()
     assert plane.location.x == 3

@@ -9,21 +9,21 @@ from radiosity_addon.bake.quality import LADDER, for_error
 from radiosity_addon.base.errors import UsageError
 from radiosity_addon.base.progress import Progress
 from radiosity_addon.lightmap.lighting import accuracy
-from radiosity_addon.lightmap.lighting.gather_links import StoredLinks
+from radiosity_addon.lightmap.lighting.gather_links import GatherLinks
 from radiosity_addon.lightmap.lighting.gather_settings import GatherSettings
 from radiosity_addon.lightmap.lighting.sweeps import TexelLight, estimated_noise, relative_error
 from radiosity_addon.lightmap.points.interpolation import Interpolation
 from radiosity_addon.options.bake_settings import BakeSettings
 
 
-def links_of(sources: np.ndarray) -> StoredLinks:
+def links_of(sources: np.ndarray) -> GatherLinks:
     """Every texel is a gather point of its own."""
     count = len(sources)
     own = np.arange(count)
-    return StoredLinks(sources.astype(np.int32), Interpolation(own, own, np.ones(count)))
+    return GatherLinks(sources.astype(np.int32), Interpolation(own, own, np.ones(count)))
 
 
-def estimated_error(links: StoredLinks, table: np.ndarray, irradiance: np.ndarray) -> float:
+def estimated_error(links: GatherLinks, table: np.ndarray, irradiance: np.ndarray) -> float:
     return relative_error(estimated_noise(links, table), irradiance)
 
 

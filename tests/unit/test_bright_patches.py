@@ -7,9 +7,9 @@ import pytest
 
 from radiosity_addon.numerics.sampling import stratified_square
 from radiosity_addon.solver import PointLight, Scene, SolverSettings, solve
+from radiosity_addon.solver.gather import Footprints, Gathered, LocalPass
 from radiosity_addon.solver.gather.bright_patches import CONTRAST, MOST, AimedRays, BrightElements
-from radiosity_addon.solver.gather.final_gather import NOTHING
-from radiosity_addon.solver.gather.local_pass import Footprints, Gathered, LocalPass
+from radiosity_addon.solver.gather.hit_numbers import NOTHING
 from tests.rooms import box_room, gray, solid_box
 
 RAYS = 64
@@ -33,12 +33,12 @@ def gathered(local: LocalPass, rays: int, expected: float | None, seed: int, cou
     up = np.tile([0.0, 0.0, 1.0], (count, 1))
     at = Footprints(np.tile(AT, (count, 1)), up, seed + np.arange(count))
     noise = None if expected is None else np.full(count, expected)
-    return local.gather(at, up, rays, local.leaves_of, noise)
+    return local.gather.at(at, up, rays, local.elements.leaves_of, noise)
 
 
 def irradiance(local: LocalPass, found: Gathered) -> np.ndarray:
     """(n,) what the elements' reflected light sends there along the rays."""
-    table = np.append(local.reflected()[:, 0], [0.0, 0.0])
+    table = np.append(local.elements.reflected()[:, 0], [0.0, 0.0])
     total = table[found.sources].mean(axis=1)
     total[found.aimed.row] += (table[found.aimed.sources] * found.aimed.weights).sum(axis=1)
     return total
@@ -62,7 +62,7 @@ def test_neighboring_texels_differ_little(local: LocalPass) -> None:
 
 
 def test_what_is_aimed_at_is_left_out_by_other_rays(local: LocalPass) -> None:
-    bright = BrightElements(local._state.hierarchy, local.reflected())
+    bright = BrightElements(local.elements.state.hierarchy, local.elements.reflected())
     found = gathered(local, RAYS, 1e-9, 0)
     assert len(found.aimed.row) == POINTS
     shares = bright.shares(AT[None], np.array([[0.0, 0.0, 1.0]]), RAYS, np.array([1e-9]))[0]
@@ -77,7 +77,7 @@ def test_what_is_aimed_at_is_left_out_by_other_rays(local: LocalPass) -> None:
 
 
 def test_bright_elements_are_few_and_far_above_the_mean(local: LocalPass) -> None:
-    hierarchy, reflected = local._state.hierarchy, local.reflected()
+    hierarchy, reflected = local.elements.state.hierarchy, local.elements.reflected()
     bright = BrightElements(hierarchy, reflected)
     leaves = hierarchy.leaves
     mean = reflected[leaves, 0] @ hierarchy.area[leaves] / hierarchy.area[leaves].sum()
@@ -99,7 +99,7 @@ def test_an_even_enclosure_has_no_bright_elements() -> None:
     triangles, _ = box_room()
     scene = Scene(triangles, gray(12, 0.5), gray(12, 1.0))
     local = solve(scene, SolverSettings(error=1e-3)).local_pass
-    assert len(BrightElements(local._state.hierarchy, local.reflected())) == 0
+    assert len(BrightElements(local.elements.state.hierarchy, local.elements.reflected())) == 0
 
 
 def test_joined_rays_keep_their_points() -> None:
@@ -117,8 +117,8 @@ def test_rays_aim_at_the_bright_spot_on_a_large_element() -> None:
     lamp = PointLight((1.93, 1.0, 0.5), 10.0, radius=0.01)
     scene = Scene(room, gray(12, 0.7), gray(12, 0.0), lights=[lamp])
     local = solve(scene, SolverSettings(error=1e-2, min_area=2e-3)).local_pass
-    even = BrightElements(local._state.hierarchy, local.reflected())
-    spot = local._bright
+    even = BrightElements(local.elements.state.hierarchy, local.elements.reflected())
+    spot = local.gather._bright
     np.testing.assert_array_equal(even.element, spot.element)
     plain, aimed = (sent_by_the_lamps_wall(bright, lamp) for bright in (even, spot))
     noise = np.hypot(plain.std(), aimed.std()) / np.sqrt(POINTS)

@@ -10,7 +10,8 @@ from radiosity_addon.lightmap.texels.occlusion import find_crossings
 from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
 from radiosity_addon.rays.caster import Hits
 from radiosity_addon.solver import PointLight, Scene, SolverSettings, solve
-from radiosity_addon.solver.gather.local_pass import NOTHING
+from radiosity_addon.solver.gather.direct_light import DirectLight
+from radiosity_addon.solver.gather.hit_numbers import NOTHING
 from tests.rooms import gray, rectangle, solid_box
 from tests.unit.texel_scenes import QUAD_UV, texel_geometry
 
@@ -30,7 +31,7 @@ def cells_of(*others: np.ndarray) -> tuple[TexelCells, TexelGeometry]:
     geometry = texel_geometry(scene, uv, SIZE, pages)
     local = solve(scene, SolverSettings(error=1e-2)).local_pass
     crossings = find_crossings(geometry, local.caster)
-    return TexelCells(local, geometry, crossings), geometry
+    return TexelCells(local.elements, geometry, crossings), geometry
 
 
 def on_floor(x: np.ndarray, y: np.ndarray) -> Hits:
@@ -94,7 +95,7 @@ def test_light_on_one_side_does_not_reach_the_other() -> None:
     """The lamp stands left of the wall: cells on the right get none of it, and their rays see no lit cell."""
     cells, _ = cells_of(wall(5.4), rectangle((0, -1, 2), (0, 3, 0), (1, 0, 0)))
     every = np.arange(len(cells))
-    direct = cells.local.direct(cells.lit(every), 4)
+    direct = DirectLight(cells.elements.state).at(cells.lit(every), 4)
     right = cells.footprints(every).points[:, 0] * SIZE > 5.4
     assert not direct[right].any()
     assert (direct[~right] > 0).all()

@@ -175,7 +175,7 @@ def test_a_face_does_not_light_itself_from_behind() -> None:
     floor, wall = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0)), rectangle((0, 0, 0), (0, 1, 0), (0, 0, 1))
     points = np.array([[0.5, 0.5, 0.0], [0.1, 0.5, 0.0], [0.9, 0.2, 0.0]])
     scene = Scene(np.concatenate([floor, wall]), gray(4, 0.4), gray(4, 0.3), two_sided=True)
-    light = solve(scene, SolverSettings(error=1e-2)).local_pass.direct(
+    light = solve(scene, SolverSettings(error=1e-2)).local_pass.direct.at(
         Footprints(points, np.tile([0, 0, 1.0], (3, 1)), np.arange(3))
     )
     alone = factors(wall, points, np.tile([0, 0, 1.0], (3, 1))).sum(axis=1)

@@ -111,9 +111,9 @@ def test_a_sky_counts_as_what_arrives() -> None:
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"format": "png16"}, "negative values, which format png16 cannot hold: take format exr"),
-        ({"light": "direct"}, "not of its direct light: take light all"),
-        ({"light": "indirect"}, "not of its indirect light: take light all"),
+        ({"format": "png16"}, "negative values, which format png16 cannot hold: use format exr"),
+        ({"light": "direct"}, "not of its direct light: use light all"),
+        ({"light": "indirect"}, "not of its indirect light: use light all"),
     ],
 )
 def test_what_it_cannot_be_is_refused(wrong: dict[str, str], message: str) -> None:

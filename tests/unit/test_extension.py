@@ -42,9 +42,9 @@ def test_the_zip_has_the_package_at_its_root_and_the_same_bytes_each_time(tmp_pa
     wheel = tmp_path / "a-cp311.whl"
     wheel.write_bytes(b"not to be changed")
     text = extension.platform_manifest(MANIFEST, "linux-x64", [wheel])
-    contents = extension._contents(ROOT, text, [wheel])
-    first = extension._write_zip(tmp_path / "first.zip", contents).read_bytes()
-    second = extension._write_zip(tmp_path / "second.zip", dict(reversed(contents.items()))).read_bytes()
+    contents = extension.zip_contents(ROOT, text, [wheel])
+    first = extension.write_zip(tmp_path / "first.zip", contents).read_bytes()
+    second = extension.write_zip(tmp_path / "second.zip", dict(reversed(contents.items()))).read_bytes()
     assert first == second
     with zipfile.ZipFile(tmp_path / "first.zip") as archive:
         names = archive.namelist()

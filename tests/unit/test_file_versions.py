@@ -44,7 +44,7 @@ def test_what_was_changed_or_is_gone_does_not_come_back(tmp_path: Path) -> None:
     with pytest.raises(BakeError, match=r"'back' was changed: bake again"):
         held.copy_to(first, tmp_path / "back")
     assert first not in held
-    with pytest.raises(BakeError, match=r"'back' is not held any more: bake again"):
+    with pytest.raises(BakeError, match=r"'back' is no longer available: bake again"):
         held.copy_to(first, tmp_path / "back")
     assert not held.hold(tmp_path / "nothing", "0" * 64)
 

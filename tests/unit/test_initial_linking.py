@@ -27,8 +27,8 @@ def clutter() -> Scene:
     return Scene(triangles, gray(len(triangles), 0.5), emission)
 
 
-def limits_of(hierarchy: Hierarchy, **given: float) -> initial._Limits:
-    return initial._Limits(float(hierarchy.faces.area.sum()), SolverSettings().min_area, **given)
+def limits_of(hierarchy: Hierarchy, **given: float) -> initial.PairLimits:
+    return initial.PairLimits(float(hierarchy.faces.area.sum()), SolverSettings().min_area, **given)
 
 
 def test_nodes_that_touch_exchange_at_most_the_smaller_area() -> None:
@@ -48,12 +48,12 @@ def test_the_estimate_tells_how_many_links_there_are(
     """Whole if nothing is thinned, and within five standard errors or so if most is."""
     hierarchy = Hierarchy(clutter)
     shapes, limits = NodeShapes(hierarchy), limits_of(hierarchy, faint=faint)
-    pairs = initial._first_pairs(hierarchy, shapes, limits, 10**9)
+    pairs = initial.first_pairs(hierarchy, shapes, limits, 10**9)
     assert pairs is not None
     monkeypatch.setattr(initial, "THINNED", 10**9)
-    assert initial._estimate(hierarchy, shapes, limits) == len(pairs[0])
+    assert initial.estimated_links(hierarchy, shapes, limits) == len(pairs[0])
     monkeypatch.setattr(initial, "THINNED", 1 << 12)
-    assert initial._estimate(hierarchy, shapes, limits) == pytest.approx(len(pairs[0]), rel=0.15)
+    assert initial.estimated_links(hierarchy, shapes, limits) == pytest.approx(len(pairs[0]), rel=0.15)
 
 
 def test_the_order_in_which_pairs_are_walked_changes_none(
@@ -64,7 +64,7 @@ def test_the_order_in_which_pairs_are_walked_changes_none(
     found = []
     for block in (10**9, 1000):
         monkeypatch.setattr(initial, "BLOCK", block)
-        pairs = initial._first_pairs(hierarchy, shapes, limits, 10**9)
+        pairs = initial.first_pairs(hierarchy, shapes, limits, 10**9)
         assert pairs is not None
         found.append(np.sort(pairs[0].astype(np.int64) << 32 | pairs[1]))
     np.testing.assert_array_equal(*found)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap.points.interpolation import GatherPoints, Interpolation, _linear_weights, fit
+from radiosity_addon.lightmap.points.interpolation import GatherPoints, Interpolation, fit, linear_weights
 from radiosity_addon.lightmap.points.point_grid import PER_CELL
 from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
 from radiosity_addon.rays.embree import EmbreeCaster
@@ -231,7 +231,7 @@ def test_coplanar_surfaces_on_different_pages_share_their_points() -> None:
 def test_a_tight_bunch_of_points_far_away_cannot_make_light():
     """Points within 1 mm of each other, 1 m off: their slope is not followed for a meter."""
     along = np.array([[1.0, 0, 0], [1.001, 0, 0], [1.0, 0.001, 0]])
-    weights = _linear_weights(along, np.array([0.2, 0.5, 0.3]), np.array([3]))
+    weights = linear_weights(along, np.array([0.2, 0.5, 0.3]), np.array([3]))
     assert weights.sum() == pytest.approx(1.0, rel=1e-5)
     assert np.abs(weights).sum() <= 3.0 + 1e-5
 

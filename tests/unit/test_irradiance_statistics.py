@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap.images.irradiance_statistics import light_statistics, told_texels
+from radiosity_addon.lightmap.images.irradiance_statistics import light_statistics, lit_texels
 from radiosity_addon.lightmap.texels.states import DIVIDED, ENCLOSED, OCCLUDED, TOUCHED
 from radiosity_addon.numerics.radiometry import luminous
 
@@ -26,8 +26,8 @@ def test_without_area_there_is_nothing_and_the_dark_is_not_even() -> None:
 
 def test_texels_of_two_lights_or_of_none_do_not_count() -> None:
     state = np.array([0, DIVIDED, OCCLUDED, TOUCHED, ENCLOSED], dtype=np.uint8)
-    assert told_texels(state).tolist() == [True, False, False, True, False]
-    assert told_texels(state[[1, 2, 4]]).all()
+    assert lit_texels(state).tolist() == [True, False, False, True, False]
+    assert lit_texels(state[[1, 2, 4]]).all()
 
 
 def test_a_watt_of_white_makes_the_lumens_of_the_efficacy_and_green_most_of_them() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from radiosity_addon.bake.relight.light_groups import split_by_group
 from radiosity_addon.base.errors import SceneError
-from radiosity_addon.lightmap.lighting.warm_start import MOST, EarlierLight
+from radiosity_addon.lightmap.lighting.warm_start import MOST, WarmStart
 from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.scene.faces import Faces
 from radiosity_addon.solver import PointLight, Scene
@@ -84,7 +84,7 @@ def test_mixtures_of_known_light_are_known() -> None:
     def table(strengths: np.ndarray) -> np.ndarray:
         return np.asarray(response.T @ strengths, dtype=np.float32)
 
-    earlier = EarlierLight(known[0], table(known[0]))
+    earlier = WarmStart(known[0], table(known[0]))
     assert earlier.mixed(known[1]) is None
     earlier.add(known[1], table(known[1]))
     mixture = 0.3 * known[0] + known[1] * (1.0, 0.5, 2.0)
@@ -97,7 +97,7 @@ def test_mixtures_of_known_light_are_known() -> None:
 
 def test_the_first_light_is_never_forgotten() -> None:
     one = np.eye(20)[:, :, None] * np.ones(3)
-    earlier = EarlierLight(one[0], np.ones((1, 3), dtype=np.float32))
+    earlier = WarmStart(one[0], np.ones((1, 3), dtype=np.float32))
     for strengths in one[1:]:
         earlier.add(strengths, np.ones((1, 3), dtype=np.float32))
     known = [number for number in range(20) if earlier.mixed(one[number]) is not None]
@@ -113,7 +113,7 @@ def test_parts_are_scaled_to_sum_to_the_whole() -> None:
 
 def test_what_is_known_is_taken_off_and_nothing_falls_below_0() -> None:
     known = np.array([[4.0, 4.0, 0.0], [2.0, 0.0, 0.0]])
-    earlier = EarlierLight(known, np.array([[10.0, 20.0, 0.0]], dtype=np.float32))
+    earlier = WarmStart(known, np.array([[10.0, 20.0, 0.0]], dtype=np.float32))
     table, left = earlier.part_of(np.array([[3.0, 8.0, 1.0], [5.0, 1.0, 0.0]]))
     np.testing.assert_allclose(left, [[0.0, 0.0, 1.0], [3.5, 1.0, 0.0]])
     np.testing.assert_allclose(table, [[7.5, 40.0, 0.0]])

@@ -141,7 +141,7 @@ def test_rays_into_groups_tell_the_share_of_light_that_passes(
     triangles = ragged() if shape == "ragged" else bulb()
     points, normals = places(300, 0.4)
     exact = group(triangles, 10**9, monkeypatch)
-    factors = exact._factors(points, normals)
+    factors = exact.factors(points, normals)
     lit = factors.sum(axis=1) > 0.02
     points, normals, factors = points[lit], normals[lit], factors[lit]
     seen = triangles.mean(axis=1)[:, 0] > 2.5

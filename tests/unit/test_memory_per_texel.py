@@ -11,8 +11,8 @@ import pytest
 
 from radiosity_addon.bake.texel_memory import LIT_BYTES
 from radiosity_addon.lightmap.lighting import gather_links, source_means, sweeps
-from radiosity_addon.lightmap.lighting.gather_links import StoredLinks
-from radiosity_addon.lightmap.lighting.part_links import Parts
+from radiosity_addon.lightmap.lighting.gather_links import GatherLinks
+from radiosity_addon.lightmap.lighting.sub_cells import SubCells
 from radiosity_addon.lightmap.lighting.sweeps import TexelLight, TexelTransport, sweep
 from radiosity_addon.lightmap.points.interpolation import Interpolation
 from radiosity_addon.lightmap.points.point_grid import PointGrid
@@ -21,7 +21,8 @@ from radiosity_addon.numerics import scratch as scratch_module
 from radiosity_addon.numerics.scratch import Scratch, is_in_file, trim
 from radiosity_addon.solver import PointLight, Scene, SolverSettings, solve
 from radiosity_addon.solver.gather.bright_patches import AimedRays
-from radiosity_addon.solver.gather.local_pass import NOTHING, Footprints
+from radiosity_addon.solver.gather.footprints import Footprints
+from radiosity_addon.solver.gather.hit_numbers import NOTHING
 from tests.rooms import box_room, gray
 from tests.unit.test_sweeps import identity, room_with_texels
 
@@ -69,8 +70,8 @@ def swept(scratch: Scratch) -> TexelLight:
     reflectance, start, lamps = (whole(3, np.float64) for _ in range(3))
     reflectance[:], start[:] = 0.5, 0.5
     lamps[:] = random.uniform(0, 1, (COUNT, 1))
-    links = StoredLinks(sources, Interpolation(first, point, weight), rays)
-    transport = TexelTransport(links, Parts(np.zeros((0, 3)), []), reflectance)
+    links = GatherLinks(sources, Interpolation(first, point, weight), rays)
+    transport = TexelTransport(links, SubCells(np.zeros((0, 3)), []), reflectance)
     trim()
     with bytes_taken() as taken:
         light = sweep(transport, start, lamps, np.zeros((3, 3)), 3, threads=1, scratch=scratch)
@@ -110,7 +111,7 @@ def test_aimed_rays_are_kept_in_files(in_files: Scratch) -> None:
             np.tile([0.15, 0.8, 0.0], (count, 1)), np.tile(UP, (count, 1)), np.arange(count), scratch=scratch
         )
         into = scratch.empty((count, rays), np.int32)
-        gathered = local.gather(at, at.normals, rays, local.leaves_of, np.full(count, 1e-9), into)
+        gathered = local.gather.at(at, at.normals, rays, local.elements.leaves_of, np.full(count, 1e-9), into)
         found[scratch] = gathered.aimed
     filed, kept = (found[scratch] for scratch in found)
     assert len(filed.row) == count

@@ -7,7 +7,7 @@ import pytest
 
 from radiosity_addon.lightmap.texels.nearest_uncut import whole_neighbor
 from radiosity_addon.rays.embree import EmbreeCaster
-from radiosity_addon.solver.gather.local_pass import NOTHING
+from radiosity_addon.solver.gather.hit_numbers import NOTHING
 from tests.rooms import rectangle, solid_box
 from tests.unit.test_occlusion import FLOOR, SIZE, crossings_of, slab
 

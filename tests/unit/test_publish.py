@@ -244,7 +244,7 @@ def test_a_recovery_can_be_killed_too(tmp_path: Path, monkeypatch: pytest.Monkey
     for name in (A, B, C):
         (tmp_path / name).write_text("old")
     killed(tmp_path, 3 - 1)
-    rename, count = staging_module._rename, 0
+    rename, count = staging_module.rename, 0
 
     def once(source: Path, target: Path) -> None:
         nonlocal count
@@ -253,10 +253,10 @@ def test_a_recovery_can_be_killed_too(tmp_path: Path, monkeypatch: pytest.Monkey
             raise KeyboardInterrupt
         rename(source, target)
 
-    monkeypatch.setattr(staging_module, "_rename", once)
+    monkeypatch.setattr(staging_module, "rename", once)
     with pytest.raises(KeyboardInterrupt):
         clean_up(tmp_path)
-    monkeypatch.setattr(staging_module, "_rename", rename)
+    monkeypatch.setattr(staging_module, "rename", rename)
     clean_up(tmp_path)
     assert contents(tmp_path) == {A: "old", B: "old", C: "old"}
     assert not list(tmp_path.glob(".*"))
@@ -271,7 +271,7 @@ def test_what_cannot_be_put_back_now_is_put_back_by_the_next_bake(
     staging = Staging(tmp_path)
     for name in (A, B):
         (staging.path / name).write_text("new")
-    rename, count = staging_module._rename, 0
+    rename, count = staging_module.rename, 0
 
     def failing(source: Path, target: Path) -> None:
         nonlocal count
@@ -280,12 +280,12 @@ def test_what_cannot_be_put_back_now_is_put_back_by_the_next_bake(
             raise OSError(errno.EIO, "Input/output error", str(source))
         rename(source, target)
 
-    monkeypatch.setattr(staging_module, "_rename", failing)
+    monkeypatch.setattr(staging_module, "rename", failing)
     with pytest.raises(OSError, match="Input") as caught:
         staging.publish([A, B])
     assert caught.value.filename == str(tmp_path / B)
     staging.close()
-    monkeypatch.setattr(staging_module, "_rename", rename)
+    monkeypatch.setattr(staging_module, "rename", rename)
     assert contents(tmp_path) == {A: "new", B: "old"}
     assert clean_up(tmp_path)
     assert contents(tmp_path) == {A: "old", B: "old"}
@@ -296,13 +296,13 @@ def test_a_file_that_appears_while_publishing_is_not_replaced(
 ) -> None:
     staging = Staging(tmp_path)
     (staging.path / A).write_text("new")
-    write = staging_module._write_journal
+    write = staging_module.write_journal
 
     def and_somebody_else(*given: object) -> None:
         write(*given)
         (tmp_path / A).write_text("mine")
 
-    monkeypatch.setattr(staging_module, "_write_journal", and_somebody_else)
+    monkeypatch.setattr(staging_module, "write_journal", and_somebody_else)
     with pytest.raises(BakeError, match=r"a\.exr"):
         staging.publish([A])
     staging.close()

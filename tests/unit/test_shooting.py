@@ -104,7 +104,7 @@ def test_every_shot_is_shown_and_the_history_is_thinned() -> None:
         shots.append(state.iterations)
 
     progress = Progress(lambda status: fractions.append(status.fraction), look=look)
-    state = solver.solve(cornell_box(), settings(tolerance=0.01), progress).local_pass.state
+    state = solver.solve(cornell_box(), settings(tolerance=0.01), progress).local_pass.elements.state
     assert fractions == sorted(fractions)
     assert fractions[-1] == 1.0
     assert np.diff(shots).max() == 1

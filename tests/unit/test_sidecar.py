@@ -59,7 +59,7 @@ def all_pixels(kept: KeptBake, strengths: np.ndarray) -> bytes:
 
 def fresh(kept: KeptBake) -> KeptBake:
     """A kept bake that has not been lit anew yet."""
-    return replace(kept, lit=replace(kept.lit, earlier=kept.lit.earlier.first()))
+    return replace(kept, lit=replace(kept.lit, warm_start=kept.lit.warm_start.first()))
 
 
 def test_a_stored_bake_gives_the_same_lightmaps_to_the_last_bit(

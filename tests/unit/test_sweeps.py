@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap.lighting.gather_links import StoredLinks
+from radiosity_addon.lightmap.lighting.gather_links import GatherLinks
 from radiosity_addon.lightmap.lighting.gather_settings import GatherSettings
-from radiosity_addon.lightmap.lighting.part_links import SWEEPS, PartLinks, Parts, PartSweeps
 from radiosity_addon.lightmap.lighting.reconstruction import reconstruct
 from radiosity_addon.lightmap.lighting.source_means import Means, mean_of_sources
+from radiosity_addon.lightmap.lighting.sub_cells import SWEEPS, SubCellLinks, SubCells, SubCellSweeps
 from radiosity_addon.lightmap.lighting.sweeps import TexelLight, TexelTransport, sweep
 from radiosity_addon.lightmap.points.interpolation import Interpolation
 from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
 from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, SolverSettings, solve
-from radiosity_addon.solver.gather.local_pass import NOTHING, SKY
+from radiosity_addon.solver.gather.hit_numbers import NOTHING, SKY
 from tests.rooms import box_room, gray, rectangle
 from tests.unit.texel_scenes import QUAD_UV, texel_geometry
 
@@ -51,9 +51,9 @@ def test_sweeps_converge_to_the_solution_of_the_stored_links() -> None:
     sources = rng.integers(0, count, (count, rays)).astype(np.int32)
     sources[rng.uniform(size=sources.shape) < 0.1] = NOTHING
     lamps = rng.uniform(0, 5, (count, 3))
-    links = StoredLinks(sources, identity(count))
-    transport = TexelTransport(links, Parts(np.zeros((0, 3)), []), np.full((count, 3), 0.5))
-    light = sweep(transport, np.zeros((count, 3)), lamps, local.beyond(), 40, tolerance=0.0)
+    links = GatherLinks(sources, identity(count))
+    transport = TexelTransport(links, SubCells(np.zeros((0, 3)), []), np.full((count, 3), 0.5))
+    light = sweep(transport, np.zeros((count, 3)), lamps, local.elements.beyond(), 40, tolerance=0.0)
     matrix = np.zeros((count, count))
     for ray in range(rays):
         hit = sources[:, ray] >= 0
@@ -70,9 +70,9 @@ def test_the_skys_share_of_the_rays_is_direct_light() -> None:
     sources = np.full((count, 4), NOTHING, dtype=np.int32)
     sources[:, :3] = SKY
     lamps = np.zeros((count, 3))
-    links = StoredLinks(sources, identity(count))
-    transport = TexelTransport(links, Parts(np.zeros((0, 3)), []), np.full((count, 3), 0.5))
-    light = sweep(transport, np.zeros((count, 3)), lamps, local.beyond(), sweeps=3)
+    links = GatherLinks(sources, identity(count))
+    transport = TexelTransport(links, SubCells(np.zeros((0, 3)), []), np.full((count, 3), 0.5))
+    light = sweep(transport, np.zeros((count, 3)), lamps, local.elements.beyond(), sweeps=3)
     np.testing.assert_allclose(light.direct, np.tile([0.75 * np.pi, 1.5 * np.pi, 0.0], (count, 1)), rtol=1e-6)
     assert not light.indirect.any()
 
@@ -152,8 +152,8 @@ def test_light_goes_on_along_parts_where_the_last_sweep_ended() -> None:
     sources = np.concatenate([[NOTHING], rows[:-1]]).astype(np.int32)[:, None]
     lamps = np.zeros((length, 3))
     lamps[0] = 1.0
-    links = PartLinks(rows, sources, np.full((length, 3), 0.9), lamps)
-    sweeps = PartSweeps(Parts(np.zeros((length, 3)), [links]), texels, 1)
+    links = SubCellLinks(rows, sources, np.full((length, 3), 0.9), lamps)
+    sweeps = SubCellSweeps(SubCells(np.zeros((length, 3)), [links]), texels, 1)
     table = np.zeros((texels + length + 2, 3), dtype=np.float32)
     for _ in range(length // SWEEPS):
         sweeps.sweep(table, np.zeros(len(table), dtype=bool), 1e-6)

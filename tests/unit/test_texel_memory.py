@@ -82,7 +82,7 @@ def test_a_bake_is_refused_before_anything_is_unwrapped(
     def unwrapped(*_: object) -> None:
         raise AssertionError("it was unwrapped")
 
-    monkeypatch.setattr(pipeline, "_unwrap", unwrapped)
+    monkeypatch.setattr(pipeline, "build_atlas", unwrapped)
     triangles, _ = box_room()
     scene = bake_scene(Scene(triangles, gray(12, 0.5), gray(12, 0.0)), ("Room", 12))
     with pytest.raises(UsageError, match="memory limit"):

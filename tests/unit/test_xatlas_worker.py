@@ -26,7 +26,7 @@ def test_the_other_process_gives_the_same_charts(bowl) -> None:
     found = xatlas_worker.run_apart(*bowl)
     assert found is not None
     atlas, uv, chart = xatlas_worker.run_xatlas(*bowl)
-    growers._resting.keep(atlas)
+    growers.resting.keep(atlas)
     np.testing.assert_array_equal(found[0], uv)
     np.testing.assert_array_equal(found[1], chart)
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...base import SILENT, BakeError, BakeWarning, Progress
 from ...lightmap.images import LightmapPage, Seams, presentable, texel_pages, to_quantity
-from ...lightmap.lighting import LightingRecord, LitTexels, TexelLight, kept_bytes, relight_texels
+from ...lightmap.lighting import LightingRecord, RelightableTexels, TexelLight, kept_bytes, relight_texels
 from ...lightmap.texels import TexelGeometry
 from ...lightmap.unwrap import Atlas
 from ...numerics import Array, Scratch, tiles
@@ -69,7 +69,7 @@ class KeptBake:
     bake_scene, settings
         The bake's.
     solved : Relightable
-    lit : LitTexels
+    lit : RelightableTexels
     geometry, seams, rings
         The texels, what is stitched, and how far pages are dilated [texels].
     reflectance, emission : (n, 3) float64
@@ -83,7 +83,7 @@ class KeptBake:
     bake_scene: BakeScene
     settings: BakeSettings
     solved: Relightable
-    lit: LitTexels
+    lit: RelightableTexels
     geometry: TexelGeometry
     seams: Seams | None
     rings: int

@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from ...lightmap.images import light_statistics, told_texels
+from ...lightmap.images import light_statistics, lit_texels
 from ...lightmap.lighting import TexelLight
 from ...lightmap.texels import ENCLOSED, NO_TEXEL_HERE, TOUCHED, TexelGeometry
 from ...numerics import Array, luminous, tiles
@@ -56,7 +56,7 @@ def details(solution: Solution, links: LinkRecord, geometry: TexelGeometry, ligh
     unit = 0.0
     for rows in tiles(len(geometry), TILE):
         irradiance = (light.direct[rows] + light.indirect[rows]) @ MEANS
-        expected = local.irradiance_at(geometry.triangle[rows], geometry.barycentric[rows])
+        expected = local.elements.irradiance_at(geometry.triangle[rows], geometry.barycentric[rows])
         misfit[rows] = expected - irradiance
         unit = max(unit, float(np.abs(misfit[rows]).max()), float(noise[rows].max()))
     unit = unit or 1.0
@@ -133,8 +133,8 @@ def statistics(
 def light_told(
     texels: Array, parts: Sequence[Array], geometry: TexelGeometry, state: Array
 ) -> tuple[Array, Array, Array]:
-    """Return irradiance, illuminance and area of an object's `told_texels`: (k,) each."""
-    told = told_texels(state[texels]) if len(texels) else np.zeros(0, dtype=bool)
+    """Return irradiance, illuminance and area of an object's `lit_texels`: (k,) each."""
+    told = lit_texels(state[texels]) if len(texels) else np.zeros(0, dtype=bool)
     watts, lumens, areas = (geometry.scratch.empty(np.count_nonzero(told)) for _ in range(3))
     at = 0
     for rows in tiles(len(texels), TILE):

@@ -8,9 +8,9 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from ...base import BakeError, linear_ticks, tick_label
+from ...base import linear_ticks, tick_label
 from ...options import METHODS
-from ...publishing import replacing
+from ...publishing import write_text
 
 WIDTH, HEIGHT = 1200, 800
 COLUMNS = (("seconds", "seconds", 95, 555), ("iteration", "iterations", 690, 1165))
@@ -44,13 +44,7 @@ def write_history(report: Mapping[str, Any], path: Path) -> None:
     if solver.get("residual") is not None:
         parts.append(f"residual {solver['residual']:.1e}")
     title = f"{METHODS[solver['method']].label}: how it was solved"
-    try:
-        with replacing(path) as aside:
-            aside.write_text(
-                history_svg(title, ", ".join(parts), solver.get("history", ())), encoding="utf-8"
-            )
-    except OSError as error:
-        raise BakeError(f"cannot write the plot '{path}': {error.strerror}") from error
+    write_text(path, history_svg(title, ", ".join(parts), solver.get("history", ())))
 
 
 def history_svg(title: str, subtitle: str, history: Sequence[Mapping[str, Any]]) -> str:

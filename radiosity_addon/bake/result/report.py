@@ -13,7 +13,7 @@ import numpy as np
 
 from ...base import BakeError
 from ...files import LISTED, OWNER, sealed, text_of
-from ...publishing import replacing
+from ...publishing import write_text
 from ...scene import LIGHTMAP_UV_LAYER, BakeObject
 from .result import BakeResult
 
@@ -155,11 +155,7 @@ class BakeReport:
         BakeError
             If it cannot be written.
         """
-        try:
-            with replacing(path) as aside:
-                aside.write_text(text_of(self.data), encoding="utf-8")
-        except OSError as error:
-            raise BakeError(f"cannot write the report '{path}': {error.strerror}") from error
+        write_text(path, text_of(self.data))
 
 
 def solver_part(

@@ -17,7 +17,14 @@ from ...base import BakeError, RadiosityError
 from ...files import BAKE, DIGEST, FILE, KEPT
 from ...files import SIDECAR_NAME as SIDECAR_NAME
 from ...lightmap.images import LightmapPage, Seams
-from ...lightmap.lighting import EarlierLight, LitTexels, PartLinks, Parts, StoredLinks, TexelTransport
+from ...lightmap.lighting import (
+    GatherLinks,
+    RelightableTexels,
+    SubCellLinks,
+    SubCells,
+    TexelTransport,
+    WarmStart,
+)
 from ...lightmap.points import Interpolation
 from ...lightmap.texels import TexelGeometry
 from ...lights import AreaLight, EnvironmentImage, EnvironmentLight, PointLight, SkyPatch, SpotLight, SunLight
@@ -48,8 +55,8 @@ KINDS: tuple[type, ...] = (
     *(PointLight, SpotLight, SunLight, AreaLight, EnvironmentLight, EnvironmentImage, SkyPatch),
     *(LightSources, EmitterGroup, SolverSettings, ElementTransport, HierarchicalState),
     *(Hierarchy, Faces, Clusters, Links, ClusterLinks, LightLinks, Balance),
-    *(LitTexels, TexelTransport, StoredLinks, AimedRays, Interpolation, Parts, PartLinks),
-    *(LightGains, EarlierLight, TexelGeometry, Seams),
+    *(RelightableTexels, TexelTransport, GatherLinks, AimedRays, Interpolation, SubCells, SubCellLinks),
+    *(LightGains, WarmStart, TexelGeometry, Seams),
 )
 """The classes that may be stored: those that relighting reads."""
 
@@ -142,7 +149,7 @@ def write_sidecar(path: Path, kept: KeptBake, result: BakeResult, bake_id: str) 
         "pages": [item.page for item in result.objects],
         "report": {"solver": {**result.solver, "history": []}, "atlas": result.atlas},
         "elements": elements,
-        "lit": replace(kept.lit, earlier=kept.lit.earlier.first()),
+        "lit": replace(kept.lit, warm_start=kept.lit.warm_start.first()),
         "geometry": kept.geometry,
         "seams": kept.seams,
         "rings": kept.rings,
@@ -193,7 +200,7 @@ def _solved(elements: ElementTransport) -> Relightable:
     if state.balance is not None:
         state.links = state.balance.links
         state.cut = state.linked_cut()
-    return Relightable(elements.sources, elements, LocalPass(state, elements.sources))
+    return Relightable(elements.sources, elements, LocalPass.of(state, elements.sources))
 
 
 def sidecar_entry(path: Path, bake_id: str) -> dict[str, str]:

@@ -14,14 +14,21 @@ from typing import Any
 import numpy as np
 
 from ...lightmap.images import Seams
-from ...lightmap.lighting import EarlierLight, LitTexels, PartLinks, Parts, StoredLinks, TexelTransport
+from ...lightmap.lighting import (
+    GatherLinks,
+    RelightableTexels,
+    SubCellLinks,
+    SubCells,
+    TexelTransport,
+    WarmStart,
+)
 from ...lightmap.points import Interpolation
 from ...lightmap.texels import TexelGeometry
 from ...lights import Light, SkyPatch, SkyTable
 from ...options import MAX_RESOLUTION, BakeSettings
 from ...solver.element_transport import ElementTransport
 from ...solver.emitters import NO_SOURCE, EmitterGroup, LightSources
-from ...solver.gather import NOTHING, AimedRays, LightGains
+from ...solver.gather import NOTHING, AimedRays, LightGains, lowest_number
 from ..scene_diff import as_object_records
 from .hierarchy_checks import MOST_LEVELS, MOST_THREADS, check_elements
 from .value_checks import LARGE, SLACK, array_of, instance, integers, number, numbers, require, whole
@@ -49,7 +56,7 @@ def check_stored(stored: Any) -> None:
     _check_settings(BakeSettings(**stored["settings"]))
     stored["objects"] = as_object_records(stored["objects"])
     transport = instance(stored["elements"], ElementTransport)
-    lit, geometry = instance(stored["lit"], LitTexels), instance(stored["geometry"], TexelGeometry)
+    lit, geometry = instance(stored["lit"], RelightableTexels), instance(stored["geometry"], TexelGeometry)
     emission = stored["emission"]
     triangles = len(emission)
     numbers(emission, (triangles, 3), 0.0)
@@ -58,8 +65,7 @@ def check_stored(stored: Any) -> None:
     lamps = _check_sources(sources, triangles)
     elements = check_elements(transport, len(sources.lights), triangles)
     texels = _check_geometry(geometry, triangles)
-    cells = len(SkyTable(sources.lights).radiosity)
-    _check_lit(lit, sources, texels, elements, lamps, cells)
+    _check_lit(lit, sources, texels, elements, lamps)
     if stored["seams"] is not None:
         _check_seams(instance(stored["seams"], Seams), geometry, triangles)
     whole(stored["rings"], 0, MOST_RINGS)
@@ -184,13 +190,11 @@ def _check_geometry(geometry: TexelGeometry, triangles: int) -> int:
     return n
 
 
-def _check_lit(
-    lit: LitTexels, sources: LightSources, texels: int, elements: int, lamps: int, cells: int
-) -> None:
+def _check_lit(lit: RelightableTexels, sources: LightSources, texels: int, elements: int, lamps: int) -> None:
     transport = instance(lit.transport, TexelTransport)
-    links, parts = instance(transport.links, StoredLinks), instance(transport.parts, Parts)
-    # Negative numbers count from the table's end, where nothing and the sky's cells are.
-    surfaces, lowest = texels + len(parts.start), -cells - 2
+    links, cells = instance(transport.links, GatherLinks), instance(transport.cells, SubCells)
+    surfaces, lowest = texels + len(cells.start), lowest_number(SkyTable(sources.lights))
+    require(surfaces >= texels + elements, "elements without a row")
     gather = len(links.sources)
     rays = np.shape(links.sources)[1]
     require(rays > 0, "no rays")
@@ -203,11 +207,10 @@ def _check_lit(
     numbers(aimed.weights, shape, 0.0)
     integers(aimed.element, (len(aimed.element), shape[1]), NOTHING, elements - 1)
     numbers(transport.reflectance, (texels, 3), 0.0, 1.0)
-    numbers(parts.start, (surfaces - texels, 3), 0.0)
-    integers(parts.element, (surfaces - texels,), NOTHING, elements - 1)
-    integers(parts.small, (surfaces - texels - elements,), 0, 1 << 62)
-    for some in instance(parts.links, list):
-        count = len(instance(some, PartLinks).rows)
+    numbers(cells.start, (surfaces - texels, 3), 0.0)
+    integers(cells.element, (surfaces - texels,), NOTHING, elements - 1)
+    for some in instance(cells.links, list):
+        count = len(instance(some, SubCellLinks).rows)
         integers(some.rows, (count,), texels, surfaces - 1)
         require(np.shape(some.sources)[1] > 0, "no rays")
         integers(some.sources, (count, np.shape(some.sources)[1]), lowest, surfaces - 1)
@@ -217,7 +220,7 @@ def _check_lit(
     integers(lit.element, (texels,), NOTHING, elements - 1)
     whole(lit.sweeps, 0, MOST_ROUNDS)
     number(lit.tolerance, 0.0)
-    known = instance(instance(lit.earlier, EarlierLight).solutions, list)
+    known = instance(instance(lit.warm_start, WarmStart).solutions, list)
     require(len(known) > 0, "no light")
     for strengths, table in known:
         numbers(strengths, sources.strengths.shape, 0.0)

@@ -109,7 +109,7 @@ class EarlierBake:
         return self.keep | {source_name(block) for block in stay}
 
     def let_stay(self, stand_in: bpy.types.Object) -> None:
-        """Keep a stand-in though the object that makes its instance is shown anew."""
+        """Keep a stand-in though the object that makes its instance is shown again."""
         self._stays.add(stand_in)
 
     def take_off(self, targets: Sequence[bpy.types.Object]) -> None:

@@ -43,8 +43,8 @@ def remember(scene: bpy.types.Scene, export: Export, result: BakeResult, digests
         if obj is None or source.is_instance or not obj.is_property_set("radiosity_bake"):
             continue
         obj.radiosity_bake.fingerprint = digests.objects[baked.object.name]
-        told = result.atlas[baked.page] if result.atlas else {}
-        obj.radiosity_bake.texels_per_metre = told.get("texels_per_metre", 0.0)
+        page = result.atlas[baked.page] if result.atlas else {}
+        obj.radiosity_bake.texels_per_metre = page.get("texels_per_metre", 0.0)
         obj.radiosity_bake.light = digests.light
     scene.radiosity.baked_light = digests.light
     short = {name: digest[:SHORT] for name, digest in digests.objects.items()}

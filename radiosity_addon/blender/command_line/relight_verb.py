@@ -17,8 +17,8 @@ from ...base import BakeWarning, Status, UsageError, staged
 from ...cli import Console, Interrupts, Permissions, summary
 from ...files import BLEND_NAME, PREVIEW_NAME, SIDECAR_NAME
 from ...options import BakeSettings
-from ..files.single_files import check_places, make_folder_of
-from .verbs import carried_out, open_or_build, output_of, registered, same_file, written_files
+from ..files.single_files import check_places
+from .verbs import open_or_build, output_of, registered, run_through, same_file, written_files
 
 if TYPE_CHECKING:
     from ..files.output import OutputFolder
@@ -73,9 +73,8 @@ def relight(
         notes = open_or_build(scene, loaded, allowed)
         folder = output_of(output, source, allowed, report_copy)
         job = relight_into(bpy.context, stored, folder, notes, preview)
-        report = carried_out(job, console, interrupts)
+        report = run_through(job, console, interrupts)
         if report_copy is not None:
-            make_folder_of(report_copy)
             report.write_copy(report_copy)
         files = written_files(report.as_dict(), preview)
         console.lines(summary(str(output), files, report.as_dict()))

@@ -85,23 +85,21 @@ def bake(
             notes=notes,
             with_preview=preview,
         )
-        report = carried_out(job, console, interrupts)
+        report = run_through(job, console, interrupts)
         if report_copy is not None:
-            make_folder_of(report_copy)
             report.write_copy(report_copy)
         files = written_files(report.as_dict(), preview, keep)
         if plot is not None:
             from ...bake.result import write_history
 
             console.progress("plot", 1.0)
-            make_folder_of(plot)
             write_history(report.as_dict(), plot.resolve())
-            files.append((str(plot), "how it was solved"))
+            files.append((str(plot), "history of the solution"))
         console.lines(summary(str(output), files, report.as_dict()))
 
 
-def carried_out(job: BakeJob, console: Console, interrupts: Interrupts) -> BakeReport:
-    """Run a job to its end, show how far it is, and stop it at Ctrl-C; return its report."""
+def run_through(job: BakeJob, console: Console, interrupts: Interrupts) -> BakeReport:
+    """Run a job to its end and return its report; interrupts end it, but not while it writes files."""
     from ..jobs.finish import WRITING_STAGES
 
     try:
@@ -109,7 +107,8 @@ def carried_out(job: BakeJob, console: Console, interrupts: Interrupts) -> BakeR
             try:
                 status = next(job)
             except StopIteration as done:
-                return done.value
+                report: BakeReport = done.value
+                return report
             interrupts.check()
             interrupts.deferred = status.stage in WRITING_STAGES
             console.progress(status.stage, status.fraction)
@@ -179,7 +178,9 @@ def check(
         found = inspect(bpy.context, settings, folder, into, (BLEND_NAME, PREVIEW_NAME))
         lines = [f"  {name:<12} {value}" for name, value in figures(found)]
         odd = [f"  {finding.level.lower():<8} {finding.message}" for finding in found.findings]
-        console.lines(["a bake would be:", *lines, *(["problems:", *odd] if odd else ["no problems found"])])
+        console.lines(
+            ["estimate of the bake:", *lines, *(["problems:", *odd] if odd else ["no problems found"])]
+        )
         wrong = [finding.message for finding in found.findings if finding.level == ERROR]
         if wrong and console.quiet:
             raise SceneError(wrong[0])
@@ -246,8 +247,8 @@ def written_files(report: dict, preview: bool = True, kept: bool = False) -> lis
             (image, "lightmap" if len(shown) == len(images) else f"{len(images)} lightmaps")
             for image in shown
         ),
-        *([(PREVIEW_NAME, "what it looks like")] if preview else []),
-        *([(SIDECAR_NAME, "what --relight needs")] if kept else []),
+        *([(PREVIEW_NAME, "preview")] if preview else []),
+        *([(SIDECAR_NAME, "data for --relight")] if kept else []),
         (REPORT_NAME, "objects, figures and warnings"),
     ]
 

@@ -97,10 +97,10 @@ def _strength(name: str, data: bpy.types.Light, factors: LampFactors) -> tuple[n
     mean, variation = measured
     notes = []
     if _asks_for_distance(data.node_tree):
-        message = "its nodes change its light with distance; what they make of it at 1 m is used"
+        message = "its nodes change its light with distance; their result at 1 m is used"
         notes.append(BakeWarning(name, f"lamp '{name}': {message}"))
     if variation > _EVEN:
-        message = "its nodes shine unevenly; their mean over all directions is used"
+        message = "its nodes depend on direction; their mean over all directions is used"
         notes.append(BakeWarning(name, f"lamp '{name}': {message}"))
     return strength * mean, notes
 

@@ -143,15 +143,11 @@ class _Rewiring(ShaderTerms[_Place]):
     def shader(self, socket: bpy.types.NodeSocket, place: _Place) -> Terms:
         feed = feed_of(socket, enter_groups=False)
         node = feed.node
-        if node is None:
-            return nothing()
-        if node.type == "GROUP" and node.node_tree is not None:
+        if node is not None and node.type == "GROUP" and node.node_tree is not None:
             return self._from_inside(node, feed.socket.identifier, place)
-        if node.type == "GROUP_INPUT" and place.outer is not None:
+        if node is not None and node.type == "GROUP_INPUT" and place.outer is not None:
             return self._from_outside(feed.socket.identifier, place)
-        if feed.socket.type != "SHADER":
-            return self.glow(self.color(socket, place))
-        return self.terms(node, place)
+        return self.fed_by(feed, socket, place, place)
 
     def color(self, socket: bpy.types.NodeSocket, place: _Place) -> Color:
         constant = self._constant(socket, place)

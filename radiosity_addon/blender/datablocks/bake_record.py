@@ -63,13 +63,13 @@ class BakeRecord(bpy.types.PropertyGroup):
         type=ModifierRecord, description="Modifiers that were switched off: their result is in the baked copy"
     )
     fingerprint: bpy.props.StringProperty(  # type: ignore[valid-type]
-        description="What shape and reflectance were when the object was baked"
+        description="Shape and reflectance when the object was baked"
     )
     texels_per_metre: bpy.props.FloatProperty(  # type: ignore[valid-type]
-        description="How fine the lightmap is, for a texel scale of 1"
+        description="Texels per meter at a texel scale of 1"
     )
     light: bpy.props.StringProperty(  # type: ignore[valid-type]
-        description="What the light and the settings were when the object was baked"
+        description="Light and settings when the object was baked"
     )
     scene: bpy.props.StringProperty(  # type: ignore[valid-type]
         description="The scene whose bake the object shows"

@@ -39,7 +39,7 @@ def open_scene(path: str | Path, scripts: bool = False) -> tuple[BakeWarning, ..
     path = Path(path).expanduser().absolute()
     opener = _OPENERS.get(path.suffix.lower())
     if opener is None:
-        raise SceneError(f"{path} is not a scene we can open; give a {', '.join(_OPENERS)} file")
+        raise SceneError(f"{path} is not a supported scene; use a {', '.join(_OPENERS)} file")
     try:
         if not path.exists():
             raise SceneError(f"{path} does not exist; check the path")
@@ -70,7 +70,7 @@ def _open_blend(path: Path, scripts: bool = False) -> None:
         # What Blender says is no help: a newer file is "not a blend file" to it.
         raise SceneError(
             f"{path} cannot be read by Blender {bpy.app.version_string}: "
-            "it is damaged, no .blend, or saved by a newer version"
+            "it is damaged, not a .blend, or saved by a newer version"
         ) from None
 
 

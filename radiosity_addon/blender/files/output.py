@@ -308,7 +308,7 @@ def refuse_special(path: Path) -> None:
     except (OSError, ValueError) as error:
         raise BakeError(f"cannot write '{path}': {error}") from error
     kinds = ((stat.S_ISDIR, "a folder"), (stat.S_ISLNK, "a link"))
-    kind = next((text for test, text in kinds if test(found.st_mode)), "no regular file")
+    kind = next((text for test, text in kinds if test(found.st_mode)), "not a regular file")
     if not stat.S_ISREG(found.st_mode):
         raise BakeError(f"cannot write '{path}': it is {kind}; choose another place")
 

@@ -79,7 +79,7 @@ def report_listing(path: Path, scenes: Iterable[bpy.types.Scene]) -> OwnReport:
     except (OSError, NoReportError) as error:
         if isinstance(error, NoReportError):
             raise BakeError(f"'{path.with_name(REPORT_NAME)}' {error}: bake again") from None
-    raise BakeError(f"'{path}' is no lightmap that a bake of this file and scene has written: bake again")
+    raise BakeError(f"'{path}' is not a lightmap written by a bake of this file and scene: bake again")
 
 
 def is_read(path: Path) -> bool:

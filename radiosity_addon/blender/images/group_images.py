@@ -107,7 +107,7 @@ def _check_fit(images: Sequence[bpy.types.Image], pages: Sequence[LightmapPage])
     for image, page in zip(images, pages, strict=True):
         height, width = page.pixels.shape[:2]
         if tuple(image.size) != (width, height):
-            raise BakeError(f"image '{image.name}' is not {width} × {height} pixels any more: bake again")
+            raise BakeError(f"image '{image.name}' is not {width} × {height} pixels now: bake again")
 
 
 def rescale_materials(image: bpy.types.Image, scale: float) -> None:

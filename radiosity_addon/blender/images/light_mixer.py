@@ -107,7 +107,7 @@ def _wire(
     tree.interface.new_socket(LIGHTMAP, in_out="OUTPUT", socket_type="NodeSocketColor")
     for name in names:
         factor = tree.interface.new_socket(name, in_out="OUTPUT", socket_type="NodeSocketColor")
-        factor.description = "What light of this group is multiplied with"
+        factor.description = "Factor for light of this group"
     given, result = nodes.new("NodeGroupInput"), nodes.new("NodeGroupOutput")
     given.location, result.location = (-250, 0), (700, 0)
     kept = {node[GROUP]: node for node in nodes if node.get(GROUP) is not None}
@@ -169,7 +169,7 @@ def _sliders_tree() -> bpy.types.NodeTree:
     strength.default_value, strength.min_value, strength.max_value = 1.0, 0.0, 1000.0
     texel = declare(TEXEL, "NodeSocketColor", "The texel of this group's lightmap")
     texel.default_value, texel.hide_value = (0.0, 0.0, 0.0, 1.0), True
-    scale = declare(SCALE, "NodeSocketFloat", "What a texel is multiplied with to get the quantity")
+    scale = declare(SCALE, "NodeSocketFloat", "Factor from a texel to the quantity")
     scale.default_value, scale.hide_value = 1.0, True
     for name in (FACTOR, LIGHT):
         tree.interface.new_socket(name, in_out="OUTPUT", socket_type="NodeSocketColor")

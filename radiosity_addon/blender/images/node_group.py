@@ -50,9 +50,9 @@ def _declare_sockets(tree: bpy.types.NodeTree) -> None:
         return socket
 
     _declare_surface(tree)
-    declare(BASE_COLOR, "NodeSocketColor", "What the surface reflects", (1.0, 1.0, 1.0, 1.0))
+    declare(BASE_COLOR, "NodeSocketColor", "Color that the surface reflects", (1.0, 1.0, 1.0, 1.0))
     declare(LIGHTMAP, "NodeSocketColor", "The lightmap's texel", (0.0, 0.0, 0.0, 1.0))
-    declare(EMISSION, "NodeSocketColor", "Light of its own, strength included", (0.0, 0.0, 0.0, 1.0))
+    declare(EMISSION, "NodeSocketColor", "Emission, including its strength", (0.0, 0.0, 0.0, 1.0))
     factor = declare(EMISSION_FACTOR, "NodeSocketColor", "Multiplies the emission", (1.0, 1.0, 1.0, 1.0))
     factor.hide_value = True
     scale = declare(SCALE, "NodeSocketFloat", "Radiance of a white surface per texel value", 1.0)

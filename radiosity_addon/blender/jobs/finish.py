@@ -138,9 +138,7 @@ def finish(
         kept_bakes.note(scene, "" if keeping is None else keeping.mark)
         if output is not None and copies is None:
             whole = report.joined(output.earlier, earlier.kept_sources)
-            output.write_report(_with_sidecar(whole, output, keeping))
-            lightmap_versions.hold(output)
-            output.publish()
+            lightmap_versions.publish(output, _with_sidecar(whole, output, keeping))
         elif output is not None and copies is not None:
             undo.pop_all().close()  # the copy is to hold nothing of the earlier bake
             undo.enter_context(_restored_on_failure(context))

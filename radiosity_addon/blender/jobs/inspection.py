@@ -47,7 +47,7 @@ BLACK = 0.01
 """What reflects less is called black."""
 
 ODD_SCALE = 100.0
-"""Scales that were not applied are told of from here on, and from its inverse down."""
+"""Scales that were not applied are reported from here on, and from its inverse down."""
 
 HUGE, MINUTE = 5000.0, 0.02
 """Sizes of a scene [m] that look like a mistaken unit."""
@@ -56,7 +56,7 @@ CLOSED = 1e-4
 """A surface is taken for closed if the vectors of its areas sum to less than this share of them."""
 
 NOTED_FILES = 1e9
-"""Temporary files are told of from this size on [bytes]."""
+"""Temporary files are reported from this size on [bytes]."""
 
 NAMED = 3
 """So many objects are named in a finding."""
@@ -197,7 +197,7 @@ def _shape(piece: Piece) -> _Shape:
 def _of_the_file(folder: Path | None) -> Iterator[Finding]:
     """Say where lightmaps go, where that may surprise."""
     if folder is None:
-        message = "the file is not saved: lightmaps will be packed into it; save it to get files next to it"
+        message = "the file is not saved: lightmaps will be packed into it; save it to write them to files"
         yield Finding(INFO, "file", message)
         return
     # `Path.exists` raises for a name that is too long.
@@ -224,7 +224,7 @@ def _of_light(context: bpy.types.Context, collected: Collected, settings: BakeSe
         material = collected.materials[row]
         black = surface.reflectance.max() < BLACK and not surface.emission.any() and not surface.varies
         if material is not None and black and surface.opacity > 0:
-            message = f"material '{material.name}' is black: what has it looks black however it is lit"
+            message = f"material '{material.name}' is black: surfaces with it look black in any light"
             yield Finding(INFO, material.name, message)
 
 
@@ -274,7 +274,7 @@ def _of_layers(chosen: Sequence[Piece], settings: BakeSettings) -> Iterator[Find
     if settings.keep_uvs:
         new = [piece.source.name for piece in chosen if not piece.has_lightmap_layer]
         if new:
-            message = f"{_names(new)} without a UV layer '{LIGHTMAP_UV_LAYER}' to keep: unwrapped again"
+            message = f"{_names(new)} without a UV layer '{LIGHTMAP_UV_LAYER}' to keep: they are unwrapped"
             yield Finding(WARNING, new[0], message)
 
 
@@ -323,15 +323,13 @@ def _of_shapes(
         if not inside.any():
             inverted.append(piece.source.name)
     if inverted:
-        message = (
-            f"{_names(inverted)} inside out, it seems: normals point inwards, so lightmaps would be black"
-        )
+        message = f"{_names(inverted)} probably inside out: normals point inward, so lightmaps would be black"
         yield Finding(WARNING, inverted[0], message)
     for piece in pieces:
         scale = np.linalg.norm(piece.matrix[:3, :3], axis=0)
         if not piece.source.is_instance and (scale.max() > ODD_SCALE or scale.min() < 1.0 / ODD_SCALE):
-            told = " × ".join(f"{value:g}" for value in scale)
-            message = f"object '{piece.source.name}' has a scale of {told}: apply it if that is a mistake"
+            factors = " × ".join(f"{value:g}" for value in scale)
+            message = f"object '{piece.source.name}' has a scale of {factors}: apply it if that is a mistake"
             yield Finding(WARNING, piece.source.name, message)
 
 
@@ -342,11 +340,11 @@ def _of_size(shapes: dict[int, _Shape]) -> Iterator[Finding]:
     boxes = np.array([shape.box for shape in shapes.values()])
     size = float((boxes[:, 1].max(axis=0) - boxes[:, 0].min(axis=0)).max())
     if size > HUGE or size < MINUTE:
-        told = f"{size / 1000:.3g} km" if size > HUGE else f"{1000 * size:.3g} mm"
+        extent = f"{size / 1000:.3g} km" if size > HUGE else f"{1000 * size:.3g} mm"
         yield Finding(
             WARNING,
             "scene",
-            f"the scene is {told} large: lamps and texels are measured in meters, so check the unit",
+            f"the scene is {extent} large: lamps and texels are in meters, so check the unit scale",
         )
 
 

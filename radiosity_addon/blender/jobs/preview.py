@@ -21,7 +21,7 @@ SAMPLES = 8
 within 4 of 255 levels of a picture with 256 samples."""
 
 QUICK_SAMPLES = 4
-"""Where a bake is only lit anew: edges are rougher, but the picture costs no more than the light."""
+"""For relighting: edges are rougher, but the picture costs no more than the light."""
 
 MAX_SIDE = 640
 """Pixels."""

@@ -86,7 +86,7 @@ class WindowJob:
         if event.type == "ESC" and event.value == "PRESS":
             self._end(context)
             self._undone(context)
-            self.report({"INFO"}, "Cancelled; everything is as it was")
+            self.report({"INFO"}, "Canceled; nothing was changed")
             return {"CANCELLED"}
         if not event.type.startswith("TIMER"):
             return {"PASS_THROUGH"} if event.type in _NAVIGATION else {"RUNNING_MODAL"}

@@ -46,7 +46,7 @@ class LightShares:
 
     @classmethod
     def shown(cls, scene: bpy.types.Scene, settings: BakeSettings) -> LightShares | None:
-        """Return those of the bake that this file shows, to make materials anew; None without groups."""
+        """Return those of the bake that this file shows, to make materials again; None without groups."""
         images, groups = shown_images()
         found = mixers()
         return cls(scene, images, groups, settings, found[0]) if groups and found else None

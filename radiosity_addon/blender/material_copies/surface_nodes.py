@@ -16,6 +16,7 @@ from ..datablocks.bake_record import mark_made
 from ..datablocks.keyed_paths import is_keyed
 from ..images.node_group import socket_by_identifier
 from ..materials.shader_nodes import default_rgb, feed_of
+from ..materials.shader_terms import ShaderWalk
 from .copy_marks import FOLLOWS, ORIGINAL, SOCKETS, VALUE, is_copied_group
 
 Color: TypeAlias = tuple[float, float, float]
@@ -23,9 +24,6 @@ ColorSource: TypeAlias = Color | bpy.types.NodeSocket
 FloatSource: TypeAlias = float | bpy.types.NodeSocket
 
 BLACK: Color = (0.0, 0.0, 0.0)
-
-_UNREADABLE = {"BSDF_GLASS", "BSDF_REFRACTION", "GROUP_INPUT", "HOLDOUT"}
-"""Shaders whose color is not what they reflect diffusely."""
 
 
 @dataclass(frozen=True)
@@ -64,34 +62,7 @@ def read_surface(
     unknown : Surface
         Taken for shaders that have no base color of their own to read.
     """
-    feed = feed_of(socket, enter_groups=False)
-    node, source = feed.node, feed.socket
-    if node is None:
-        return SurfaceSockets(BLACK)
-    if source.type != "SHADER" and node.type not in ("GROUP", "GROUP_INPUT"):
-        return SurfaceSockets(BLACK, source, glows=True)
-    if node.type == "BSDF_PRINCIPLED":
-        emission, glows = _scaled(tree, node.inputs["Emission Color"], node.inputs["Emission Strength"])
-        return SurfaceSockets(_source(tree, node.inputs["Base Color"]), emission, _alpha(tree, node), glows)
-    if node.type == "BSDF_DIFFUSE":
-        return SurfaceSockets(_source(tree, node.inputs["Color"]))
-    if node.type == "EMISSION":
-        emission, glows = _scaled(tree, node.inputs["Color"], node.inputs["Strength"])
-        return SurfaceSockets(BLACK, emission, glows=glows)
-    if node.type == "BSDF_TRANSPARENT":
-        return SurfaceSockets(BLACK, alpha=0.0)
-    if node.type == "GROUP" and node.node_tree is not None:
-        return _grouped(node, source, unknown)
-    if node.type == "MIX_SHADER":
-        first, second = (read_surface(tree, node.inputs[i], unknown) for i in (1, 2))
-        return _mixed(tree, _source(tree, node.inputs[0]), first, second)
-    if node.type == "ADD_SHADER":
-        first, second = (read_surface(tree, node.inputs[i], unknown) for i in (0, 1))
-        return _added(tree, first, second)
-    if node.type in _UNREADABLE:
-        return unknown
-    color = node.inputs.get("Color") or node.inputs.get("Base Color")
-    return unknown if color is None else SurfaceSockets(_source(tree, color))
+    return _SurfaceReader(unknown).shader(socket, tree)
 
 
 def feed_color(tree: bpy.types.NodeTree, target: bpy.types.NodeSocket, source: ColorSource) -> None:
@@ -110,36 +81,83 @@ def feed_float(tree: bpy.types.NodeTree, target: bpy.types.NodeSocket, source: F
         target.default_value = source
 
 
-def _grouped(node: bpy.types.Node, output: bpy.types.NodeSocket, unknown: SurfaceSockets) -> SurfaceSockets:
-    """Read a shader inside a node group, through outputs added to a copy of the group."""
-    identifier = output.identifier
-    if not any(n.type == "GROUP_OUTPUT" and n.is_active_output for n in node.node_tree.nodes):
-        return unknown
-    if not is_copied_group(node.node_tree):
-        group = node.node_tree.copy()
-        mark_made(group)
-        group[ORIGINAL] = node.node_tree
-        node.node_tree = group
-    group = node.node_tree
-    result = next(n for n in group.nodes if n.type == "GROUP_OUTPUT" and n.is_active_output)
-    inner = read_surface(group, socket_by_identifier(result.inputs, identifier), unknown)
+class _SurfaceReader(ShaderWalk[bpy.types.NodeTree, SurfaceSockets]):
+    """Reads shaders as `read_surface`; places are trees."""
 
-    def outward(source: ColorSource | FloatSource, name: str) -> Any:
-        """Pass an inner socket through the group's border; constants need not."""
-        if not isinstance(source, bpy.types.NodeSocket):
-            return source
-        kind = "NodeSocketFloat" if name == "Alpha" else "NodeSocketColor"
-        declared = group.interface.new_socket(name, in_out="OUTPUT", socket_type=kind)
-        group[SOCKETS] = [*group.get(SOCKETS, ()), declared.identifier]
-        group.links.new(source, socket_by_identifier(result.inputs, declared.identifier))
-        return socket_by_identifier(node.outputs, declared.identifier)
+    def __init__(self, unknown: SurfaceSockets) -> None:
+        self._unknown = unknown
 
-    base, emission, alpha = (
-        outward(inner.base, "Base Color"),
-        outward(inner.emission, "Emission"),
-        outward(inner.alpha, "Alpha"),
-    )
-    return SurfaceSockets(base, emission, alpha, inner.glows)
+    def shader(self, socket: bpy.types.NodeSocket, place: bpy.types.NodeTree) -> SurfaceSockets:
+        feed = feed_of(socket, enter_groups=False)
+        node = feed.node
+        if node is not None and node.type == "GROUP" and node.node_tree is not None:
+            return self._grouped(node, feed.socket.identifier)
+        if node is not None and node.type == "GROUP_INPUT":
+            return self._unknown
+        return self.fed_by(feed, socket, place, place)
+
+    def _nothing(self) -> SurfaceSockets:
+        return SurfaceSockets(BLACK)
+
+    def _glow(self, socket: bpy.types.NodeSocket, place: bpy.types.NodeTree) -> SurfaceSockets:
+        return SurfaceSockets(BLACK, _source(place, socket), glows=True)
+
+    def _principled(self, node: bpy.types.Node, place: bpy.types.NodeTree) -> SurfaceSockets:
+        emission, glows = _scaled(place, node.inputs["Emission Color"], node.inputs["Emission Strength"])
+        return SurfaceSockets(_source(place, node.inputs["Base Color"]), emission, _alpha(place, node), glows)
+
+    def _diffuse(
+        self, _: bpy.types.Node, color: bpy.types.NodeSocket, place: bpy.types.NodeTree
+    ) -> SurfaceSockets:
+        return SurfaceSockets(_source(place, color))
+
+    def _emission(self, node: bpy.types.Node, place: bpy.types.NodeTree) -> SurfaceSockets:
+        emission, glows = _scaled(place, node.inputs["Color"], node.inputs["Strength"])
+        return SurfaceSockets(BLACK, emission, glows=glows)
+
+    def _transparent(self, _: bpy.types.Node, __: bpy.types.NodeTree) -> SurfaceSockets:
+        return SurfaceSockets(BLACK, alpha=0.0)
+
+    def _mixed(self, node: bpy.types.Node, place: bpy.types.NodeTree) -> SurfaceSockets:
+        first, second = (self.shader(socket, place) for socket in node.inputs[1:3])
+        return _mixed(place, _source(place, node.inputs[0]), first, second)
+
+    def _added(self, node: bpy.types.Node, place: bpy.types.NodeTree) -> SurfaceSockets:
+        first, second = (self.shader(socket, place) for socket in node.inputs[:2])
+        return _added(place, first, second)
+
+    def not_understood(self, _: bpy.types.Node) -> SurfaceSockets:
+        return self._unknown
+
+    def _grouped(self, node: bpy.types.Node, identifier: str) -> SurfaceSockets:
+        """Read a shader inside a node group, through outputs added to a copy of the group."""
+        if not any(n.type == "GROUP_OUTPUT" and n.is_active_output for n in node.node_tree.nodes):
+            return self._unknown
+        if not is_copied_group(node.node_tree):
+            group = node.node_tree.copy()
+            mark_made(group)
+            group[ORIGINAL] = node.node_tree
+            node.node_tree = group
+        group = node.node_tree
+        result = next(n for n in group.nodes if n.type == "GROUP_OUTPUT" and n.is_active_output)
+        inner = self.shader(socket_by_identifier(result.inputs, identifier), group)
+
+        def outward(source: ColorSource | FloatSource, name: str) -> Any:
+            """Pass an inner socket through the group's border; constants need not."""
+            if not isinstance(source, bpy.types.NodeSocket):
+                return source
+            kind = "NodeSocketFloat" if name == "Alpha" else "NodeSocketColor"
+            declared = group.interface.new_socket(name, in_out="OUTPUT", socket_type=kind)
+            group[SOCKETS] = [*group.get(SOCKETS, ()), declared.identifier]
+            group.links.new(source, socket_by_identifier(result.inputs, declared.identifier))
+            return socket_by_identifier(node.outputs, declared.identifier)
+
+        base, emission, alpha = (
+            outward(inner.base, "Base Color"),
+            outward(inner.emission, "Emission"),
+            outward(inner.alpha, "Alpha"),
+        )
+        return SurfaceSockets(base, emission, alpha, inner.glows)
 
 
 def _alpha(tree: bpy.types.NodeTree, node: bpy.types.Node) -> FloatSource:

@@ -49,7 +49,7 @@ class Surface:
     varies : bool
         Something it is made of varies over the surface, and means or defaults stand for it.
     fallbacks : tuple of BakeWarning
-        Which; to be told of unless the material is evaluated.
+        Which; reported unless the material is evaluated.
     is_volume : bool
         It has a volume and no surface: fog, through which all light goes.
     """
@@ -96,9 +96,13 @@ def ray_doubts(material: bpy.types.Material, surface: Surface) -> list[str]:
     said = []
     passes = surface.opacity < 1.0 or (surface.varies and _may_pass(material.node_tree))
     if passes and not getattr(material, "use_transparent_shadow", True):
-        said.append("Transparent Shadows is off, which is ignored: lamps shine through it as it looks")
+        said.append(
+            "Transparent Shadows is off, which is ignored: lamps shine through where it is transparent"
+        )
     if surface.emission.any() and asks_light_path(material.node_tree, tuple(LIGHT_PATHS)):
-        said.append("its emission asks for diffuse rays: it gets them all, where Cycles only counts some")
+        said.append(
+            "its emission depends on Is Diffuse Ray, which is always on here, in Cycles only for some rays"
+        )
     return said
 
 
@@ -191,9 +195,7 @@ class _Reader(ShaderTerms[Stack]):
 
     def shader(self, socket: bpy.types.NodeSocket, place: Stack) -> Terms:
         feed = feed_of(socket, place)
-        if feed.socket.type != "SHADER":
-            return self.glow(self.color(socket, place))
-        return nothing() if feed.node is None else self.terms(feed.node, feed.stack)
+        return self.fed_by(feed, socket, place, feed.stack)
 
     def color(self, socket: bpy.types.NodeSocket, place: Stack) -> np.ndarray:
         """Return a socket's constant (3,), with a note where it stands for something else."""
@@ -219,7 +221,7 @@ class _Reader(ShaderTerms[Stack]):
 
     def not_understood(self, node: bpy.types.Node) -> Terms:
         what = "reflectance" if self.kind == "material" else "radiance"
-        self.warn(f"{node.bl_label} is not understood; {what} {_text(np.zeros(3))} is used")
+        self.warn(f"{node.bl_label} is not supported; {what} {_text(np.zeros(3))} is used")
         return nothing()
 
     def clamped_reflectance(self, reflectance: np.ndarray) -> np.ndarray:
@@ -232,10 +234,10 @@ class _Reader(ShaderTerms[Stack]):
 
     def not_negative(self, what: str, values: np.ndarray) -> np.ndarray:
         """Replace negative, infinite and NaN values by 0."""
-        mended = np.where(np.isfinite(values) & (values >= 0), values, 0.0)
-        if (mended != values).any():
-            self.warn(f"{what} {_text(values)} is not possible; {_text(mended)} is used")
-        return mended
+        possible = np.where(np.isfinite(values) & (values >= 0), values, 0.0)
+        if (possible != values).any():
+            self.warn(f"{what} {_text(values)} is not possible; {_text(possible)} is used")
+        return possible
 
     def _varying(self, message: str) -> None:
         self.varies = True

@@ -1,6 +1,7 @@
 """What each shader node reflects, emits and lets through, said once for constants and for nodes.
 
 `materials.py` reads constants by it; `surface_rewiring.py` builds nodes that Cycles evaluates.
+`ShaderWalk` is what they share with display (`material_copies/surface_nodes.py`): which nodes there are.
 """
 
 from __future__ import annotations
@@ -14,12 +15,16 @@ import numpy as np
 
 from . import glossy_albedo
 from .node_algebra import Color, NodeAlgebra, Scalar
-from .shader_nodes import default_rgb
+from .shader_nodes import Feed, default_rgb
 
 Place = TypeVar("Place")
 """Which node group a walk is in."""
 
-COLORED = (
+Seen = TypeVar("Seen")
+"""What a walk returns for a shader."""
+
+DIFFUSE = (
+    "BSDF_DIFFUSE",
     "BSDF_GLOSSY",
     "BSDF_METALLIC",
     "BSDF_ANISOTROPIC",
@@ -33,7 +38,7 @@ COLORED = (
     "BSDF_RAY_PORTAL",
     "EEVEE_SPECULAR",
 )
-"""Shaders that are taken as diffuse ones of their color."""
+"""Shaders that are diffuse, or are taken as diffuse ones of their color."""
 
 _IGNORED_WEIGHTS = (  # Principled sockets that should be 0, and what we do instead
     ("Transmission Weight", "transmission is ignored: the surface is baked opaque"),
@@ -67,12 +72,78 @@ def nothing() -> Terms:
     return Terms(np.zeros(3), np.zeros(3), np.zeros(3))
 
 
-class ShaderTerms(ABC, Generic[Place]):
-    """Comes from shader nodes to their terms; what their sockets hold is for others to say."""
+class ShaderWalk(ABC, Generic[Place, Seen]):
+    """Tells shader nodes apart, for baking and for display; what becomes of each is for others to say."""
 
     @abstractmethod
-    def shader(self, socket: bpy.types.NodeSocket, place: Place) -> Terms:
+    def shader(self, socket: bpy.types.NodeSocket, place: Place) -> Seen:
         """Return what feeds a shader socket comes to."""
+
+    @abstractmethod
+    def _nothing(self) -> Seen:
+        """Return what a black surface comes to."""
+
+    @abstractmethod
+    def _glow(self, socket: bpy.types.NodeSocket, place: Place, /) -> Seen:
+        """Return what a color comes to where a shader is expected: emission of strength 1, as in Cycles."""
+
+    @abstractmethod
+    def _principled(self, node: bpy.types.Node, place: Place, /) -> Seen:
+        """Return what a Principled BSDF comes to."""
+
+    @abstractmethod
+    def _diffuse(self, node: bpy.types.Node, color: bpy.types.NodeSocket, place: Place, /) -> Seen:
+        """Return what a shader comes to that is diffuse, or is taken as diffuse, of a color."""
+
+    @abstractmethod
+    def _emission(self, node: bpy.types.Node, place: Place, /) -> Seen:
+        """Return what a shader with Color and Strength emits."""
+
+    @abstractmethod
+    def _transparent(self, node: bpy.types.Node, place: Place, /) -> Seen:
+        """Return what a Transparent BSDF comes to."""
+
+    @abstractmethod
+    def _mixed(self, node: bpy.types.Node, place: Place, /) -> Seen:
+        """Return what a Mix Shader comes to."""
+
+    @abstractmethod
+    def _added(self, node: bpy.types.Node, place: Place, /) -> Seen:
+        """Return what an Add Shader comes to."""
+
+    @abstractmethod
+    def not_understood(self, node: bpy.types.Node, /) -> Seen:
+        """Return what stands for a shader that is none of the known ones."""
+
+    def fed_by(self, feed: Feed, socket: bpy.types.NodeSocket, place: Place, inside: Place) -> Seen:
+        """Return what the feed of a shader socket comes to; `inside` is where the node that feeds it is."""
+        if feed.socket.type != "SHADER":
+            return self._glow(socket, place)
+        return self._nothing() if feed.node is None else self.node(feed.node, inside)
+
+    def node(self, node: bpy.types.Node, place: Place) -> Seen:
+        """Return what a shader node comes to."""
+        match node.type:
+            case "BSDF_PRINCIPLED":
+                return self._principled(node, place)
+            case "EMISSION" | "BACKGROUND":
+                return self._emission(node, place)
+            case "BSDF_TRANSPARENT":
+                return self._transparent(node, place)
+            case "HOLDOUT":
+                return self._nothing()
+            case "MIX_SHADER":
+                return self._mixed(node, place)
+            case "ADD_SHADER":
+                return self._added(node, place)
+        color = node.inputs.get("Color") or node.inputs.get("Base Color")
+        if node.type in DIFFUSE and color is not None:
+            return self._diffuse(node, color, place)
+        return self.not_understood(node)
+
+
+class ShaderTerms(ShaderWalk[Place, Terms]):
+    """Comes from shader nodes to their terms; what their sockets hold is for others to say."""
 
     @abstractmethod
     def color(self, socket: bpy.types.NodeSocket, place: Place) -> Color:
@@ -90,37 +161,27 @@ class ShaderTerms(ABC, Generic[Place]):
     def warn(self, message: str) -> None:
         """Tell that something is not taken as it is."""
 
-    @abstractmethod
-    def not_understood(self, node: bpy.types.Node, /) -> Terms:
-        """Return what stands for a shader that is none of the known ones."""
+    def _nothing(self) -> Terms:
+        return nothing()
 
-    def glow(self, color: Color) -> Terms:
-        """Return what a color comes to where a shader is asked for: emission of strength 1, as in Cycles."""
-        return Terms(np.zeros(3), color, np.zeros(3))
+    def _glow(self, socket: bpy.types.NodeSocket, place: Place) -> Terms:
+        return Terms(np.zeros(3), self.color(socket, place), np.zeros(3))
 
-    def terms(self, node: bpy.types.Node, place: Place) -> Terms:
-        """Return what a shader node comes to."""
-        if node.type == "BSDF_PRINCIPLED":
-            return self._principled(node, place)
+    def _diffuse(self, node: bpy.types.Node, color: bpy.types.NodeSocket, place: Place) -> Terms:
         if node.type == "BSDF_DIFFUSE":
             self._normal_map(node)
-            return Terms(self.color(node.inputs["Color"], place), np.zeros(3), np.zeros(3))
-        if node.type in ("EMISSION", "BACKGROUND"):
-            strength = self.scalar(node.inputs["Strength"], place)
-            radiance = self.algebra(place).scale(self.color(node.inputs["Color"], place), strength)
-            return Terms(np.zeros(3), radiance, np.zeros(3))
-        if node.type == "BSDF_TRANSPARENT":
-            return Terms(np.zeros(3), np.zeros(3), self.color(node.inputs["Color"], place))
-        if node.type == "HOLDOUT":
-            return nothing()
-        if node.type == "MIX_SHADER":
-            return self._mixed(node, place)
-        if node.type == "ADD_SHADER":
-            return self._added(node, place)
-        color = node.inputs.get("Color") or node.inputs.get("Base Color")
-        if node.type in COLORED and color is not None:
-            return self._as_diffuse(node, self.color(color, place))
-        return self.not_understood(node)
+        reflected = self.color(color, place)
+        if node.type != "BSDF_DIFFUSE":
+            self.warn(f"{node.bl_label} is baked as diffuse; its color is used")
+        return Terms(reflected, np.zeros(3), np.zeros(3))
+
+    def _emission(self, node: bpy.types.Node, place: Place) -> Terms:
+        strength = self.scalar(node.inputs["Strength"], place)
+        radiance = self.algebra(place).scale(self.color(node.inputs["Color"], place), strength)
+        return Terms(np.zeros(3), radiance, np.zeros(3))
+
+    def _transparent(self, node: bpy.types.Node, place: Place) -> Terms:
+        return Terms(np.zeros(3), np.zeros(3), self.color(node.inputs["Color"], place))
 
     def _principled(self, node: bpy.types.Node, place: Place) -> Terms:
         self._normal_map(node)
@@ -182,10 +243,6 @@ class ShaderTerms(ABC, Generic[Place]):
             algebra.add(first.radiance, second.radiance),
             algebra.add(first.passed, second.passed),
         )
-
-    def _as_diffuse(self, node: bpy.types.Node, color: Color) -> Terms:
-        self.warn(f"{node.bl_label} is baked as diffuse; its color is used")
-        return Terms(color, np.zeros(3), np.zeros(3))
 
     def _normal_map(self, node: bpy.types.Node) -> None:
         if node.inputs["Normal"].is_linked:

@@ -133,7 +133,10 @@ def eevee_only(tree: bpy.types.NodeTree) -> list[str]:
     """Say which of a material's nodes Cycles does not know; what they feed counts as not linked there."""
     nodes = (node for node in _all_nodes(tree) if node.type == "SHADERTORGB")
     linked = {node.bl_label for node in nodes if any(output.is_linked for output in node.outputs)}
-    return [f"node '{label}' is EEVEE's: as in Cycles, what it feeds keeps its own value" for label in linked]
+    return [
+        f"node '{label}' is for EEVEE only: as in Cycles, the socket it feeds keeps its own value"
+        for label in linked
+    ]
 
 
 def asks_light_path(tree: bpy.types.NodeTree, names: tuple[str, ...]) -> bool:

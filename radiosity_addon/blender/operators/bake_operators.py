@@ -41,7 +41,7 @@ class RADIOSITY_OT_bake(Conditional, WindowJob, bpy.types.Operator):
         try:
             in_window = not bpy.app.background and context.window is not None
             if in_window and look_first(context):
-                self.report({"INFO"}, "Show problems before this scene is baked for the first time")
+                self.report({"INFO"}, "This scene has problems: see the list before its first bake")
                 bpy.ops.radiosity.check("INVOKE_DEFAULT")
                 return {"CANCELLED"}
         except RadiosityError as error:
@@ -166,10 +166,10 @@ class RADIOSITY_OT_open_folder(Conditional, bpy.types.Operator):
         last = last_bake.read(context.scene)
         folder = bpy.path.abspath(last.folder) if last is not None else ""
         if not Path(folder).is_dir():
-            self.report({"ERROR"}, f"The folder '{folder}' is not there any more")
+            self.report({"ERROR"}, f"The folder '{folder}' no longer exists")
             return {"CANCELLED"}
         if not own_reports(Path(folder), context.scene):
-            self.report({"ERROR"}, f"The folder '{folder}' holds no bake of this scene")
+            self.report({"ERROR"}, f"The folder '{folder}' contains no bake of this scene")
             return {"CANCELLED"}
         _open(folder)
         return {"FINISHED"}

@@ -53,12 +53,12 @@ def unused_lightmaps(context: bpy.types.Context) -> Unused:
     files: dict[Path, list[str]] = {}
     changed: list[Path] = []
     for folder in _folders(context):
-        for report, told in reports_in(folder, owner_of(context.scene).is_source_of).items():
+        for report, contents in reports_in(folder, owner_of(context.scene).is_source_of).items():
             # A copy that the command line wrote shows all that is listed with it.
             copy = folder / BLEND_NAME
-            if BLEND_NAME in told[LISTED] and copy.exists() and copy.resolve() != here:
+            if BLEND_NAME in contents[LISTED] and copy.exists() and copy.resolve() != here:
                 continue
-            for name, of in told[LISTED].items():
+            for name, of in contents[LISTED].items():
                 path = folder / name
                 if path.suffix.lower() not in LIGHTMAPS or name == PREVIEW_NAME or not path.is_file():
                     continue
@@ -76,18 +76,17 @@ def delete(unused: Unused) -> int:
 
     Raises
     ------
-    OSError
-        If one cannot be deleted; those before it are gone.
+    OSError, BakeError
+        If one cannot be deleted, or its report cannot be written; those before it are gone.
     """
     from ...files import read_report, text_of, without
-    from ...publishing import replacing
+    from ...publishing import write_text
 
     for report, names in unused.files.items():
-        told = read_report(report)
+        contents = read_report(report)
         for name in names:
             (report.parent / name).unlink()
-        with replacing(report) as aside:
-            aside.write_text(text_of(without(told, names)), encoding="utf-8")
+        write_text(report, text_of(without(contents, names)))
     return unused.count
 
 
@@ -137,8 +136,11 @@ class RADIOSITY_OT_clean(Conditional, bpy.types.Operator):
         except OSError as error:
             self.report({"ERROR"}, f"Cannot delete '{error.filename}': {error.strerror}")
             return {"CANCELLED"}
+        except BakeError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
         if not count:
-            self.report({"INFO"}, "Nothing to clean: every lightmap of this file is shown")
+            self.report({"INFO"}, "Nothing to clean up: all lightmaps of this file are used")
             return {"CANCELLED"}
         self.report({"INFO"}, f"Deleted {count} lightmap files")
         return {"FINISHED"}
@@ -169,7 +171,7 @@ class RADIOSITY_OT_recover(Conditional, bpy.types.Operator):
         for image in bpy.data.images:
             if image.filepath and Path(bpy.path.abspath(image.filepath_raw)).parent.resolve() in done:
                 image.reload()
-        self.report({"INFO"}, "The lightmaps are those of the last whole bake again")
+        self.report({"INFO"}, "Recovered the lightmaps of the last complete bake")
         return {"FINISHED"}
 
 

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import bpy
 
 from ..relight import kept_bakes
+from ..scene_records.object_roles import has_role
 from ..session.facts import fact
 from ..settings.light_group_properties import ListedGroup, list_groups
 
@@ -58,6 +59,21 @@ def has_meshes(context: bpy.types.Context) -> bool:
     return any(obj.type == "MESH" for obj in context.scene.objects)
 
 
+def copy_targets(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """Return the selected objects that can take the settings of the active one; linked ones cannot."""
+    return [
+        obj
+        for obj in context.selected_objects
+        if obj != context.object and has_role(obj) and obj.library is None
+    ]
+
+
+@fact(unknown=True)
+def has_copy_targets(context: bpy.types.Context) -> bool:
+    """Whether any selected object can take the settings of the active one."""
+    return bool(copy_targets(context))
+
+
 @fact(unknown=False)
 def can_restore(_context: bpy.types.Context) -> bool:
     """Whether the file shows a bake."""
@@ -69,13 +85,9 @@ def can_restore(_context: bpy.types.Context) -> bool:
 @fact(unknown="")
 def relight_refusal(context: bpy.types.Context) -> str:
     """Why the scene's bake cannot be relit; empty if it can."""
-    from ..relight.kept_sidecars import can_relight
+    from ..relight.kept_sidecars import refusal
 
-    if not kept_bakes.mark_of(context.scene):
-        return "The scene shows no kept bake: bake with Keep for Relighting"
-    if not can_relight(context.scene):
-        return "The bake is no longer in memory and has no sidecar: bake again"
-    return ""
+    return refusal(context.scene)
 
 
 @fact(unknown=())

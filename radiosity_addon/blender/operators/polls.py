@@ -58,6 +58,6 @@ class Conditional:
         for condition in cls.conditions:
             reason = condition(context)
             if reason:
-                cls.poll_message_set(reason)  # type: ignore[attr-defined]
+                cls.poll_message_set(reason[0].upper() + reason[1:])  # type: ignore[attr-defined]
                 return False
         return True

@@ -5,7 +5,8 @@ from __future__ import annotations
 import bpy
 
 from ...options import OPTIONS, BakeSettings
-from ..scene_records.object_roles import BAKEABLE_TYPES
+from ..scene_records.object_roles import has_role
+from .panel_facts import copy_targets, has_copy_targets
 from .polls import Conditional, no_bake_runs
 
 OVERRIDES = ("radiosity_mode", "radiosity_texel_scale")
@@ -37,7 +38,10 @@ class RADIOSITY_OT_set_option(Conditional, bpy.types.Operator):
         """Start from the value that the quality gives, or leave it to the quality again."""
         from ...bake.quality import quality_of
 
-        group, option = context.scene.radiosity, OPTIONS[self.option]
+        group, option = context.scene.radiosity, OPTIONS.get(self.option)
+        if option is None or not option.automatic:
+            self.report({"ERROR"}, f"The quality sets no option '{self.option}'")
+            return {"CANCELLED"}
         if getattr(group, option.identifier):
             group.property_unset(option.identifier)
             return {"FINISHED"}
@@ -47,15 +51,10 @@ class RADIOSITY_OT_set_option(Conditional, bpy.types.Operator):
         return {"FINISHED"}
 
 
-def has_role(obj: bpy.types.Object | None) -> bool:
-    """Tell whether an object can light, block or be baked: surfaces, and instances of collections."""
-    return obj is not None and (obj.type in BAKEABLE_TYPES or obj.instance_type == "COLLECTION")
-
-
 def _can_copy(context: bpy.types.Context) -> str:
     if not has_role(getattr(context, "object", None)):
         return "The active object is not a surface and has nothing to copy"
-    return "" if _others(context) else "Select the objects to copy to, and the one to copy from last"
+    return "" if has_copy_targets(context) else "Select the objects to copy to, and the one to copy from last"
 
 
 class RADIOSITY_OT_copy_overrides(Conditional, bpy.types.Operator):
@@ -69,7 +68,7 @@ class RADIOSITY_OT_copy_overrides(Conditional, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Copy."""
-        source, others = context.object, _others(context)
+        source, others = context.object, copy_targets(context)
         for obj in others:
             for name in OVERRIDES:
                 if source.is_property_set(name):
@@ -78,15 +77,6 @@ class RADIOSITY_OT_copy_overrides(Conditional, bpy.types.Operator):
                     obj.property_unset(name)
         self.report({"INFO"}, f"Copied mode and texel scale to {len(others)} objects")
         return {"FINISHED"}
-
-
-def _others(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The selected objects that can take what the active one has; linked ones cannot."""
-    return [
-        obj
-        for obj in context.selected_objects
-        if obj != context.object and has_role(obj) and obj.library is None
-    ]
 
 
 CLASSES = (RADIOSITY_OT_set_option, RADIOSITY_OT_copy_overrides)

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ...bake.result import MEANS
-from ...lightmap.images import LightStatistics, light_statistics, told_texels
+from ...lightmap.images import LightStatistics, light_statistics, lit_texels
 from ...lightmap.texels import NO_TEXEL_HERE, rasterize
 from ...numerics import Array, irradiance_under_sky, luminous, triangle_areas
 from ...scene import LIGHTMAP_UV_LAYER
@@ -173,12 +173,12 @@ def _summed_up(
     of_texel = shown.areas / np.maximum(shown.uv_areas * height**2, 1e-300)
     areas = of_texel[texels.triangle] * texels.area
     kept = kept_details.details_of(scene)
-    known = None if kept is None else kept.page_of(image.name)
-    if known is not None:
-        state = known.state[texels.row, texels.column]
-        told = told_texels(np.where(state == NO_TEXEL_HERE, 0, state))
+    details = None if kept is None else kept.page_of(image.name)
+    if details is not None:
+        state = details.state[texels.row, texels.column]
+        has_value = lit_texels(np.where(state == NO_TEXEL_HERE, 0, state))
     else:
-        told = values.any(axis=1) if values.any() else np.ones(len(values), dtype=bool)
-    of_watts = light_statistics(values[told] @ MEANS, areas[told])
-    of_lumens = light_statistics(luminous(values[told], 1.0), areas[told])
+        has_value = values.any(axis=1) if values.any() else np.ones(len(values), dtype=bool)
+    of_watts = light_statistics(values[has_value] @ MEANS, areas[has_value])
+    of_lumens = light_statistics(luminous(values[has_value], 1.0), areas[has_value])
     return None if of_watts is None or of_lumens is None else (of_watts, of_lumens)

@@ -25,12 +25,12 @@ from .lightmap_values import (
 from .overlay_properties import overlay_of
 
 STATE_COLORS = {
-    DIVIDED: ((0.90, 0.25, 0.15), "Divided: geometry stands on them"),
-    OCCLUDED: ((0.95, 0.60, 0.10), "Hidden: something is close above"),
-    TOUCHED: ((0.95, 0.90, 0.30), "Touched: they end at geometry"),
-    ENCLOSED: ((0.55, 0.25, 0.75), "Shut in: no light reaches them"),
+    DIVIDED: ((0.90, 0.25, 0.15), "Divided: geometry crosses them"),
+    OCCLUDED: ((0.95, 0.60, 0.10), "Occluded: geometry is close above"),
+    TOUCHED: ((0.95, 0.90, 0.30), "Touched: geometry is at their edge"),
+    ENCLOSED: ((0.55, 0.25, 0.75), "Enclosed: no light reaches them"),
 }
-"""Display colors of the texels that are told apart, and what they are."""
+"""Display colors of the states of texels, and what they are."""
 
 WIDEST = 2048
 """Pages of more pixels are drawn coarser: as colors they would take a quarter of a gigabyte at 4096."""
@@ -167,7 +167,7 @@ def _false_colors(context: bpy.types.Context, shown: list[ShownLightmap]) -> Ove
     # Pixels that show no surface are filled from those that do, or 0 farther off.
     values = np.concatenate([page[page != 0.0] for page in measured.values()])
     scale = _scale(context, values, quantity == "residual")
-    painted = {name: _opaque(scale(_thinned(page))) for name, page in measured.items()}
+    painted = {name: _opaque(scale(thinned(page))) for name, page in measured.items()}
     titles = {"residual": "Residual", "radiosity": "Radiosity"}
     title = titles.get(quantity, "Illuminance" if settings.unit == "LUX" else "Irradiance")
     legend = Legend(title, unit_name(quantity, settings.unit), scale)
@@ -183,7 +183,7 @@ def _density(context: bpy.types.Context, shown: list[ShownLightmap]) -> OverlayP
         named = [replace(found, image=str(size)) for found, size in zip(shown, sizes, strict=True)]
         return OverlayPicture(_surfaces(named, pages))
     density = np.concatenate(
-        [texels_per_metre(found, size) for found, size in zip(shown, sizes, strict=True)]
+        [texels_per_meter(found, size) for found, size in zip(shown, sizes, strict=True)]
     )
     # What most has gets the middle color: blue is coarser, red finer.
     usual = float(np.median(density))
@@ -202,7 +202,7 @@ def _density(context: bpy.types.Context, shown: list[ShownLightmap]) -> OverlayP
     return OverlayPicture(surfaces, legend=Legend("Texel Density", "px/m", scale))
 
 
-def texels_per_metre(found: ShownLightmap, size: int) -> Array:
+def texels_per_meter(found: ShownLightmap, size: int) -> Array:
     """Return (t,) lightmap pixels along one meter of each triangle: the root of how many are in 1 m²."""
     return np.asarray(np.sqrt(found.uv_areas * size**2 / np.maximum(found.areas, 1e-30)))
 
@@ -218,18 +218,18 @@ def _texels(context: bpy.types.Context, kept: KeptDetails) -> OverlayPicture | N
         table = np.zeros((256, 4), dtype=np.float32)
         for state, (color, _) in STATE_COLORS.items():
             table[state] = (*color, 1.0)
-        painted = {name: table[_thinned(page.state)] for name, page in pages.items()}
+        painted = {name: table[thinned(page.state)] for name, page in pages.items()}
         entries = tuple(STATE_COLORS.values())
-        return OverlayPicture(_surfaces(shown, painted), legend=Legend("Doubtful Texels", entries=entries))
+        return OverlayPicture(_surfaces(shown, painted), legend=Legend("Problem Texels", entries=entries))
     signed = settings.error_of == "ELEMENTS"
     errors = {
         name: page.unit * (page.misfit if signed else page.noise).astype(np.float32)
         for name, page in pages.items()
     }
-    told = np.concatenate([errors[name][page.state != NO_TEXEL_HERE] for name, page in pages.items()])
-    scale = _scale(context, told, signed)
-    painted = {name: _opaque(scale(_thinned(values))) for name, values in errors.items()}
-    title = "Elements Less Texels" if signed else "Estimated Noise"
+    known = np.concatenate([errors[name][page.state != NO_TEXEL_HERE] for name, page in pages.items()])
+    scale = _scale(context, known, signed)
+    painted = {name: _opaque(scale(thinned(values))) for name, values in errors.items()}
+    title = "Elements Minus Texels" if signed else "Estimated Noise"
     return OverlayPicture(_surfaces(shown, painted), legend=Legend(title, "W/m²", scale))
 
 
@@ -291,7 +291,7 @@ def _surfaces(shown: Sequence[ShownLightmap], pages: dict[str, Array]) -> Surfac
     )
 
 
-def _thinned(page: Array) -> Array:
+def thinned(page: Array) -> Array:
     """Return a page of at most `WIDEST` pixels: of more it leaves some out."""
     if len(page) <= WIDEST:
         return page

@@ -14,7 +14,7 @@ NONE, FALSE_COLOR, DENSITY, CHECKER, TEXELS, ELEMENTS, LINKS, ERROR = (
 )
 
 OF_THE_BAKE = frozenset({TEXELS, ELEMENTS, LINKS, ERROR})
-"""What needs the bake in memory; the others are told from lightmaps and UVs alone."""
+"""What needs the bake in memory; the others need lightmaps and UVs alone."""
 
 
 def _redraw(_settings: RadiosityOverlay, _context: bpy.types.Context) -> None:
@@ -31,16 +31,16 @@ class RadiosityOverlay(bpy.types.PropertyGroup):
         items=[
             (NONE, "None", "Nothing"),
             (FALSE_COLOR, "False Color", "The light that the lightmaps hold, as colors with a scale"),
-            (DENSITY, "Texel Density", "Lightmap pixels along one meter of surface, as colors with a scale"),
+            (DENSITY, "Texel Density", "Lightmap pixels per meter of surface, as colors with a scale"),
             (CHECKER, "Texel Checker", "The lightmap's pixels themselves, light and dark in turn"),
             (
                 TEXELS,
-                "Doubtful Texels",
-                "Texels that geometry divides or hides, which hold no light of the open",
+                "Problem Texels",
+                "Texels that geometry divides, occludes or encloses",
             ),
             (ELEMENTS, "Elements", "The elements that the solver divided the surfaces into"),
-            (LINKS, "Links", "From where light comes to a face, and how much"),
-            (ERROR, "Error", "How far the light may be off, texel by texel"),
+            (LINKS, "Links", "Where the light on a face comes from, and how much"),
+            (ERROR, "Error", "Estimated error of each texel"),
         ],
         default=NONE,
         update=_redraw,
@@ -49,7 +49,7 @@ class RadiosityOverlay(bpy.types.PropertyGroup):
         name="Unit",
         description="What light is measured in",
         items=[
-            ("LUX", "Lux", "Illuminance: how bright the light looks to the eye, weighed by its color [lx]"),
+            ("LUX", "Lux", "Illuminance: how bright the light looks to the eye, weighted by its color [lx]"),
             ("WATT", "W/m²", "Irradiance: the power that arrives, the mean of red, green and blue [W/m²]"),
         ],
         default="LUX",
@@ -57,8 +57,8 @@ class RadiosityOverlay(bpy.types.PropertyGroup):
     )
     efficacy: bpy.props.FloatProperty(  # type: ignore[valid-type]
         name="Efficacy",
-        description="Lumens that a watt of white light makes. 683 is the most there is, and what glTF's "
-        "lamps are read with; where powers are those of real lamps take theirs: a filament's 15, LEDs' 100",
+        description="Lumens per watt of white light. 683 is the maximum, and what glTF lamps use. If powers "
+        "are those of real lamps, use theirs: about 15 for a filament, 100 for LEDs",
         default=EFFICACY,
         min=1.0,
         max=EFFICACY,
@@ -66,18 +66,18 @@ class RadiosityOverlay(bpy.types.PropertyGroup):
     )
     automatic: bpy.props.BoolProperty(  # type: ignore[valid-type]
         name="Automatic Range",
-        description="Let the colors reach from zero to nearly all of what is shown",
+        description="Fit the range of colors to the values that are shown",
         default=True,
         update=_redraw,
     )
     low: bpy.props.FloatProperty(  # type: ignore[valid-type]
-        name="From", description="The value that has the first color", default=0.0, update=_redraw
+        name="From", description="Value of the first color", default=0.0, update=_redraw
     )
     high: bpy.props.FloatProperty(  # type: ignore[valid-type]
-        name="To", description="The value that has the last color", default=500.0, update=_redraw
+        name="To", description="Value of the last color", default=500.0, update=_redraw
     )
     squares: bpy.props.IntProperty(  # type: ignore[valid-type]
-        name="Texels a Square",
+        name="Texels per Square",
         description="Width of the checker's squares in lightmap pixels",
         default=1,
         min=1,
@@ -96,15 +96,15 @@ class RadiosityOverlay(bpy.types.PropertyGroup):
             (
                 "FACE",
                 "Active Face",
-                "The elements on the active object's active face, which edit mode chooses",
+                "The elements on the active face of the active object, which is chosen in Edit Mode",
             ),
         ],
         default="CURSOR",
         update=_redraw,
     )
     most_links: bpy.props.IntProperty(  # type: ignore[valid-type]
-        name="Most Links",
-        description="Only so many links are shown, those that bring the most light",
+        name="Max Links",
+        description="Number of links shown: those that carry the most light",
         default=300,
         min=1,
         soft_max=5000,
@@ -115,12 +115,12 @@ class RadiosityOverlay(bpy.types.PropertyGroup):
         name="Error Of",
         description="Which error is shown",
         items=[
-            ("NOISE", "Lightmap", "Estimated noise of a texel's light: what more rays would lessen"),
+            ("NOISE", "Lightmap", "Estimated noise of a texel's light: more rays reduce it"),
             (
                 "ELEMENTS",
                 "Elements",
-                "How far the solver's element is brighter or darker than the texels on it: what more "
-                "elements would lessen",
+                "How far the solver's element is brighter or darker than the texels on it: more elements "
+                "reduce it",
             ),
         ],
         default="NOISE",

@@ -19,7 +19,7 @@ _handlers: list[tuple[Any, str]] = []
 
 
 def changed() -> None:
-    """Make the overlay anew: lightmaps or objects have changed."""
+    """Redraw the overlay: lightmaps or objects have changed."""
     forget()
     redraw_viewports()
 
@@ -53,7 +53,7 @@ def _draw_legend() -> None:
 
 
 def _current(context: bpy.types.Context) -> OverlayPicture | None:
-    """Return the picture to draw, made anew if anything it depends on has changed."""
+    """Return the picture to draw, made again if anything it depends on has changed."""
     settings = overlay_of(context)
     if settings.show == NONE or session.running.active:
         return None
@@ -71,7 +71,7 @@ def _current(context: bpy.types.Context) -> OverlayPicture | None:
 
 
 def _key(context: bpy.types.Context) -> tuple[object, ...]:
-    """Return what a picture depends on, but for objects and lightmaps, whose changes are told."""
+    """Return what a picture depends on, but for objects and lightmaps, whose changes are reported."""
     settings, scene = overlay_of(context), context.scene
     names = [
         prop.identifier for prop in settings.bl_rna.properties if prop.type not in ("POINTER", "COLLECTION")

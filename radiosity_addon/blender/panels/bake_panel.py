@@ -9,8 +9,8 @@ import bpy
 from ...options import ADVANCED, LAST_BAKE, MAIN, SOLVER
 from ..jobs.progress_text import progress_text
 from ..operators.panel_facts import can_restore, has_meshes
-from ..operators.setting_operators import has_role
 from ..relight import kept_bakes
+from ..scene_records.object_roles import has_role
 from ..session import last_bake
 from ..session.state import session
 from ..settings.preferences import is_packed

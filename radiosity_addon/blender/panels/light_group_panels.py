@@ -44,7 +44,7 @@ class LightGroupSection(Section):
         for group in groups:
             _draw_group(column.row(align=True), group)
         if not groups:
-            layout.label(text="No light group yet: select lamps", icon="INFO")
+            layout.label(text="No light groups yet: select lamps", icon="INFO")
         row = layout.row(align=True)
         row.operator("radiosity.light_group_assign", text="New Group", icon="ADD").group = ""
         row.operator("radiosity.light_group_remove", text="Ungroup", icon="REMOVE")

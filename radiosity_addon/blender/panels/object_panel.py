@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..operators.setting_operators import has_role
-from ..scene_records.object_roles import BAKE
+from ..scene_records.object_roles import BAKE, has_role
 from ..session.state import session
 
 

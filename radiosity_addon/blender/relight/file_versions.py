@@ -76,7 +76,7 @@ class HeldFiles:
             If it is not held, was changed, or the copy cannot be written.
         """
         if self._folder is None or digest not in self._sizes:
-            raise BakeError(f"the earlier version of '{target.name}' is not held any more: bake again")
+            raise BakeError(f"the earlier version of '{target.name}' is no longer available: bake again")
         found = hashlib.sha256()
         try:
             with (self._folder / digest).open("rb") as source, target.open("wb") as copy:

@@ -10,6 +10,9 @@ from ...files import FileNames
 from ..files.lightmap_reports import bake_kept_by, report_of
 from . import kept_bakes
 
+NO_BAKE = "the scene shows no kept bake: bake with Keep for Relighting"
+NO_DATA = "the bake is no longer in memory and has no sidecar: bake again"
+
 
 def sidecar_of(mark: str) -> Path | None:
     """Return the sidecar next to a bake's lightmaps, if there is one."""
@@ -21,12 +24,14 @@ def sidecar_of(mark: str) -> Path | None:
     return path if path.is_file() else None
 
 
-def can_relight(scene: bpy.types.Scene) -> bool:
-    """Return whether the scene's bake is in memory or in a sidecar of its own; fast, for panels."""
+def refusal(scene: bpy.types.Scene) -> str:
+    """Return why the scene's bake cannot be relit; empty if it is in memory or in a sidecar of its own."""
     mark = kept_bakes.mark_of(scene)
-    if not mark or kept_bakes.find(scene) is not None:
-        return bool(mark)
+    if not mark:
+        return NO_BAKE
+    if kept_bakes.find(scene) is not None:
+        return ""
     if sidecar_of(mark) is None:
-        return False
+        return NO_DATA
     images = kept_bakes.images_of(mark)
-    return bake_kept_by(report_of(images[min(images)])) in ("", mark)
+    return "" if bake_kept_by(report_of(images[min(images)])) in ("", mark) else NO_DATA

@@ -30,6 +30,7 @@ from ..session.redraw import redraw_sidebars, redraw_viewports
 from ..session.state import session
 
 if TYPE_CHECKING:
+    from ...bake.result import BakeReport
     from ..files.output import OutputFolder
 
 TICK = 0.02
@@ -87,10 +88,17 @@ def _open(report: Path) -> OutputFolder:
         for own in own_reports(report.parent, scene):
             if own.names.report == report.name:
                 return OutputFolder(report.parent, own.names, owner=own.owner).__enter__()
-    raise BakeError(f"'{report}' is no report of this file's")
+    raise BakeError(f"'{report}' is not a report of this file")
 
 
-def hold(output: OutputFolder) -> None:
+def publish(output: OutputFolder, report: BakeReport) -> None:
+    """Publish a folder's staged files with their report; what they replace is held for undo."""
+    output.write_report(report)
+    _hold(output)
+    output.publish()
+
+
+def _hold(output: OutputFolder) -> None:
     """Hold what is about to be replaced in a folder, with what its report says of it."""
     from .file_versions import MOST_FILES, HeldFiles  # needed when something is replaced
 
@@ -193,9 +201,7 @@ class _Swap:
     def publish(self) -> None:
         """Put the files in their places, with the reports that they had."""
         for report, output in self.outputs.items():
-            hold(output)
-            _stage_report(output, [one for one in self.wanted if one.report == report])
-            output.publish()
+            publish(output, _report_with(output, [one for one in self.wanted if one.report == report]))
 
     def close(self) -> None:
         """Remove what was not published."""
@@ -242,8 +248,8 @@ def _cancel() -> None:
         swap.close()
 
 
-def _stage_report(output: OutputFolder, wanted: Sequence[Wanted]) -> None:
-    """Write the report that the files had, with all that lies in the folder now."""
+def _report_with(output: OutputFolder, wanted: Sequence[Wanted]) -> BakeReport:
+    """Return the report that the files had, with all that lies in the folder now."""
     from ...bake.result import BakeReport
 
     now = output.earlier or {}
@@ -252,7 +258,7 @@ def _stage_report(output: OutputFolder, wanted: Sequence[Wanted]) -> None:
     if before.get(output.names.sidecar) != listed.get(output.names.sidecar):
         # Its sidecar is not there any more.
         told = {key: value for key, value in told.items() if key != KEPT}
-    output.write_report(BakeReport(dict(told)))
+    return BakeReport(dict(told))
 
 
 def _is_stale(image: bpy.types.Image) -> bool:

@@ -237,13 +237,13 @@ class LiveRelight:
     def _of_scene(self) -> bpy.types.Scene:
         scene = bpy.data.scenes.get(self._scene)
         if scene is None:
-            raise BakeError("the scene is not there any more")
+            raise BakeError("the scene no longer exists")
         return scene
 
     def _held(self) -> kept_bakes.InMemory:
         held = kept_bakes.find(self._of_scene())
         if held is None:
-            raise BakeError("the bake that was kept is not there any more")
+            raise BakeError("the kept bake is no longer available")
         return held
 
 

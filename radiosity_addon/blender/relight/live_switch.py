@@ -26,8 +26,8 @@ def register() -> None:
     """Hang the switch on the session."""
     bpy.types.WindowManager.radiosity_live = bpy.props.BoolProperty(
         name="Live",
-        description="Light the scene anew while power and color of lamps, emission or world are being "
-        "changed. Anything else that changes switches it off",
+        description="Update the lightmaps while power and color of lamps, emission or world are being "
+        "changed. Any other change switches it off",
         default=False,
         update=_switched,
         options={"SKIP_SAVE"},

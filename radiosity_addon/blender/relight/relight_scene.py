@@ -21,7 +21,7 @@ from ..scene_export.export import export_steps
 from ..session.background import in_thread
 from . import kept_bakes, lightmap_versions
 from .kept_bakes import InMemory
-from .kept_sidecars import sidecar_of
+from .kept_sidecars import NO_BAKE, NO_DATA, sidecar_of
 from .relight_properties import relight_of
 from .relit_images import rewrite
 from .relit_materials import refresh
@@ -104,10 +104,10 @@ def stored_bake(scene: bpy.types.Scene) -> StoredBake:
     mark = kept_bakes.mark_of(scene)
     images = kept_bakes.images_of(mark) if mark else {}
     if not images:
-        raise BakeError("the scene shows no bake that was kept: bake with Keep for Relighting")
+        raise BakeError(NO_BAKE)
     path = sidecar_of(mark)
     if path is None:
-        raise BakeError("the bake is not in memory any more, and has no sidecar: bake again")
+        raise BakeError(NO_DATA)
     stored = read_sidecar(path)
     if stored.bake_id != mark:
         raise BakeError(f"'{path}' belongs to another bake: bake again")

@@ -68,7 +68,7 @@ def check_images(images: Images, pages: Sequence[LightmapPage]) -> None:
     for number, page in enumerate(pages):
         image = images.get(number)
         if image is None:
-            raise BakeError(f"lightmap {number + 1} of the bake is not in the file any more: bake again")
+            raise BakeError(f"lightmap {number + 1} of the bake is no longer in the file: bake again")
         height, width = page.pixels.shape[:2]
         if tuple(image.size) != (width, height):
             raise BakeError(f"lightmap '{image.name}' has lost its file, or was scaled: bake again")
@@ -100,9 +100,7 @@ def store(images: Sequence[bpy.types.Image], seconds: float) -> None:
         with OutputFolder(folder, report.names, owner=report.owner) as output:
             for image in inside:
                 _save_into(output.staging, image)
-            _report(output, inside, seconds)
-            lightmap_versions.hold(output)
-            output.publish()
+            lightmap_versions.publish(output, _report(output, inside, seconds))
             lightmap_versions.mark(inside, report.names.report)
     lightmap_versions.check()
 
@@ -122,8 +120,8 @@ def _save_into(folder: Path, image: bpy.types.Image) -> None:
         image.filepath_raw = stored
 
 
-def _report(output: OutputFolder, images: Sequence[bpy.types.Image], seconds: float) -> None:
-    """Bring the report in the folder up to date."""
+def _report(output: OutputFolder, images: Sequence[bpy.types.Image], seconds: float) -> BakeReport:
+    """Return the report in the folder, brought up to date."""
     told: dict[str, Any] = dict(output.earlier or {})
     try:
         scales = {Path(bpy.path.abspath(image.filepath_raw)).name: image_scale(image) for image in images}
@@ -137,7 +135,7 @@ def _report(output: OutputFolder, images: Sequence[bpy.types.Image], seconds: fl
     except (KeyError, TypeError, AttributeError):
         raise BakeError(f"'{output.path / output.names.report}' is damaged: bake again") from None
     told["relit"] = {"seconds": round(seconds, 4)}
-    output.write_report(BakeReport(told))
+    return BakeReport(told)
 
 
 @contextmanager

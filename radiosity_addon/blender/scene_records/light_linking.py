@@ -1,4 +1,4 @@
-"""Light and shadow linking, which a bake does not follow: who is told, and of what.
+"""Light and shadow linking, which a bake does not follow, and the warnings about them.
 
 As Cycles takes a linked collection: what it excludes is spared; where it includes anything, all
 that is not included is spared too. A collection without objects links nothing.
@@ -13,7 +13,7 @@ import bpy
 from ...base import BakeWarning
 
 NAMED = 3
-"""As many objects are named; of more, the number is told."""
+"""So many objects are named; of more, the number is given."""
 
 
 def linking_warnings(obj: bpy.types.Object, what: str) -> list[BakeWarning]:
@@ -21,12 +21,12 @@ def linking_warnings(obj: bpy.types.Object, what: str) -> list[BakeWarning]:
     linking = getattr(obj, "light_linking", None)
     if linking is None:
         return []
-    told = (
+    links = (
         (linking.receiver_collection, "light linking is ignored: it lights everything"),
         (linking.blocker_collection, "shadow linking is ignored: everything blocks it"),
     )
     warnings = []
-    for collection, message in told:
+    for collection, message in links:
         limits = _limits(collection) if collection is not None else ""
         if limits:
             warnings.append(BakeWarning(obj.name, f"{what} '{obj.name}': {message}, {limits}"))

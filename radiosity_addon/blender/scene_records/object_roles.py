@@ -22,11 +22,16 @@ BAKE, LIGHT_ONLY, IGNORE = "BAKE", "LIGHT_ONLY", "IGNORE"
 MODES = (
     (BAKE, "Bake", "It gets a lightmap, and lights and blocks"),
     (LIGHT_ONLY, "Light Only", "It lights and blocks but gets no lightmap"),
-    (IGNORE, "Ignore", "It is left out as if it were not there"),
+    (IGNORE, "Ignore", "It is left out entirely"),
 )
 
 BAKEABLE_TYPES = frozenset({"MESH", "CURVE", "SURFACE", "FONT", "META"})
 """All but a mesh are shown as a mesh copy once they are baked."""
+
+
+def has_role(obj: bpy.types.Object | None) -> bool:
+    """Tell whether an object can light, block or be baked: surfaces, and instances of collections."""
+    return obj is not None and (obj.type in BAKEABLE_TYPES or obj.instance_type == "COLLECTION")
 
 
 class Role(NamedTuple):
@@ -53,7 +58,7 @@ class Role(NamedTuple):
 def register() -> None:
     """Hang mode and texel scale on every object."""
     bpy.types.Object.radiosity_mode = bpy.props.EnumProperty(
-        name="Mode", description="What the object is there for in a bake", items=MODES, default=BAKE
+        name="Mode", description="Role of the object in a bake", items=MODES, default=BAKE
     )
     bpy.types.Object.radiosity_texel_scale = bpy.props.FloatProperty(
         name="Texel Scale",
@@ -106,11 +111,11 @@ def role_of(
         mode = IGNORE
     warnings = []
     if mode == BAKE:
-        told = {
+        reasons = {
             "a holdout": held_out or any(obj.is_holdout for obj in both),
             "a shadow catcher": any(obj.is_shadow_catcher for obj in both),
         }
-        for what, is_so in told.items():
+        for what, is_so in reasons.items():
             if is_so:
                 mode = LIGHT_ONLY
                 message = f"object '{shown.name}' is {what}: it lights and blocks but gets no lightmap"

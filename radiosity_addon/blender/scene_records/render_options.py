@@ -56,14 +56,14 @@ def _still_as_in_the_viewport(objects: Iterable[bpy.types.Object]) -> Iterator[B
     known: dict[str, bool] = {}
     for obj in objects:
         if obj.hide_viewport:
-            message = "its visibility in viewports is driven, and taken for that in renders"
+            message = "its viewport visibility is driven, and used for renders too"
             yield BakeWarning(obj.name, f"object '{obj.name}': {message}")
         for modifier in obj.modifiers:
             if modifier.show_viewport != modifier.show_render:
-                message = f"modifier '{modifier.name}' is driven in viewports, and taken as there"
+                message = f"modifier '{modifier.name}' is driven in viewports, and used as there"
                 yield BakeWarning(obj.name, f"object '{obj.name}': {message}")
             if modifier.type == "NODES" and modifier.show_render and _asks(modifier.node_group, known):
-                message = "its geometry nodes use 'Is Viewport', which is true here; renders may differ"
+                message = "its geometry nodes use 'Is Viewport', which is on in an export; renders may differ"
                 yield BakeWarning(obj.name, f"object '{obj.name}': {message}")
 
 

@@ -97,10 +97,10 @@ def _parse(text: str) -> LastBake | None:
             figures.append(("Residual", f"{solver['residual']:.1e}"))
         if len(solver.get("independent_sets", ())) > 1:
             # Parts that exchange no light, such as closed rooms, each solved by itself.
-            figures.append(("Separate parts", f"{len(solver['independent_sets']):,}"))
+            figures.append(("Separate Parts", f"{len(solver['independent_sets']):,}"))
         if solver.get("closure_area_mean") is not None:
             # The share of light that meets a surface: 1 in a closed scene, less where it may leave.
-            figures.append(("Meets a surface", f"{solver['closure_area_mean']:.2%}"))
+            figures.append(("Light Kept", f"{solver['closure_area_mean']:.2%}"))
         return LastBake(
             figures=tuple(figures),
             warnings=tuple((str(name), str(message)) for name, message in record["warnings"]),

@@ -48,7 +48,7 @@ class RADIOSITY_AP_preferences(bpy.types.AddonPreferences):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        column = layout.column(heading="For Scenes That Set Nothing Else")
+        column = layout.column(heading="Defaults")
         column.prop(self, "output_folder")
         column.prop(self, "memory_limit")
         column.prop(self, "threads")

@@ -25,12 +25,12 @@ class RadiositySettings(OptionProperties, bpy.types.PropertyGroup):
     )
     baked_light: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Baked Light",
-        description="What lamps and settings were at the last bake",
+        description="Lamps and settings of the last bake",
         options={"HIDDEN"},
     )
     baked_objects: bpy.props.StringProperty(  # type: ignore[valid-type]
         name="Baked Objects",
-        description="The objects of the last bake, and what their shapes were",
+        description="Objects of the last bake, and their shapes",
         options={"HIDDEN"},
     )
     last_bake: bpy.props.StringProperty(  # type: ignore[valid-type]
@@ -51,7 +51,7 @@ def settings_of(context: bpy.types.Context) -> BakeSettings:
     group = context.scene.radiosity
     objects = selected_meshes(context) if group.scope == "selected" else None
     if objects == ():
-        raise UsageError("no mesh is selected: select what is to get a lightmap, or switch to All")
+        raise UsageError("no mesh is selected: select the objects to bake, or switch to All")
     preferred = {"memory_limit": memory_limit_of(context)}
     chosen = {**preferred, **chosen_options(group), "threads": threads_of(context)}
     return BakeSettings(objects=objects, **chosen)

@@ -19,7 +19,7 @@ from ..scene_records.export_sources import ExportSource
 from .followers import nearly_equal
 from .mesh_digest import digest_of_mesh
 from .stand_in_names import note_names
-from .stand_ins import EVALUATED, OWN, StandIn, seal, seal_object, set_stand_in, stand_in_of
+from .stand_ins import EVALUATED, OWN, StandIn, record_object, record_shapes, set_stand_in, stand_in_of
 
 STAND_IN_COLLECTION = "Radiosity Lightmaps"
 
@@ -34,7 +34,7 @@ class Replacement:
     ----------
     source : ExportSource
     baked : BakedObject or None
-        None for what is only shown anew because its instancer will be hidden.
+        None for what is only shown again because its instancer will be hidden.
     stand_in : bool
         A new object shows it; otherwise the source's own object does.
     mesh : Mesh
@@ -117,7 +117,7 @@ def _fill_stand_in(replacement: Replacement) -> None:
                 copies[slot] = stands_for[slot] = own.materials[slot]
     set_materials(mesh, copies)
     stands_for += [None] * (len(mesh.materials) - len(stands_for))
-    seal(mesh, kind, stands_for, replacement.known)
+    record_shapes(mesh, kind, stands_for, replacement.known)
 
 
 def shown_by(source: ExportSource) -> str:
@@ -149,7 +149,7 @@ def show(context: bpy.types.Context, replacements: Sequence[Replacement]) -> Non
         obj = replacement.obj
         if obj is None:
             name = replacement.source.name
-            raise BakeError(f"object '{name}' went away while it was being baked: bake again")
+            raise BakeError(f"object '{name}' was removed while it was being baked: bake again")
         record_baked(obj, context.scene)
         if replacement.in_place:
             _show_in_place(obj, replacement)
@@ -217,5 +217,5 @@ def _new_stand_in(replacement: Replacement) -> bpy.types.Object:
         if known is not None:
             set_stand_in(mesh, replace(known, seal=digest_of_mesh(mesh)))
     instancer = bpy.data.objects.get((shown_by(replacement.source), None))
-    seal_object(stand_in, instancer, replacement.source.name)
+    record_object(stand_in, instancer, replacement.source.name)
     return stand_in

@@ -72,14 +72,14 @@ def stand_in_of(mesh: bpy.types.ID | None) -> StandIn | None:
     if mesh is None or STAND_IN not in mesh or not is_made(mesh):
         return None
     try:
-        told = json.loads(mesh[STAND_IN])
-        told["modifiers"] = tuple((str(name), bool(v), bool(r)) for name, v, r in told["modifiers"])
-        told["object_slots"] = tuple(told["object_slots"])
-        names = told.pop("names", {})
+        stored = json.loads(mesh[STAND_IN])
+        stored["modifiers"] = tuple((str(name), bool(v), bool(r)) for name, v, r in stored["modifiers"])
+        stored["object_slots"] = tuple(stored["object_slots"])
+        names = stored.pop("names", {})
         if names:
             groups = tuple((str(name), bool(lock)) for name, lock in names.pop("groups"))
-            told["names"] = Names(**{**names, "groups": groups, "roles": tuple(names["roles"])})
-        return StandIn(**told)
+            stored["names"] = Names(**{**names, "groups": groups, "roles": tuple(names["roles"])})
+        return StandIn(**stored)
     except (ValueError, TypeError, KeyError):
         return StandIn()
 
@@ -89,7 +89,7 @@ def set_stand_in(mesh: bpy.types.Mesh, known: StandIn) -> None:
     mesh[STAND_IN] = json.dumps(asdict(known))
 
 
-def seal(
+def record_shapes(
     mesh: bpy.types.Mesh,
     kind: str,
     stands_for: Sequence[bpy.types.Material | None],
@@ -145,7 +145,7 @@ def released_copy(mesh: bpy.types.Mesh, name: str) -> bpy.types.Mesh:
     return copy
 
 
-def seal_object(obj: bpy.types.Object, instancer: bpy.types.Object | None, source: str) -> None:
+def record_object(obj: bpy.types.Object, instancer: bpy.types.Object | None, source: str) -> None:
     """Remember how a stand-in object was made, of which source, and whose instance it stands for."""
     if instancer is not None:
         obj[INSTANCER] = instancer
@@ -154,30 +154,30 @@ def seal_object(obj: bpy.types.Object, instancer: bpy.types.Object | None, sourc
 
 def source_name(obj: bpy.types.Object) -> str:
     """Return the name by which a bake knows an object: for a stand-in, that of the instance."""
-    return str(_told(obj).get("source", obj.name)) if is_made(obj) else obj.name
+    return str(_stored(obj).get("source", obj.name)) if is_made(obj) else obj.name
 
 
 def placed(obj: bpy.types.Object) -> list[list[float]] | None:
     """Return the rows of the transform a stand-in object was made with."""
-    place = _told(obj).get("place")
+    place = _stored(obj).get("place")
     return None if place is None else [place[row : row + 4] for row in range(0, 16, 4)]
 
 
 def moved_place(obj: bpy.types.Object) -> list[float] | None:
     """Return where a stand-in object is if that is not where it was put; None if it is there."""
-    place = _told(obj).get("place")
+    place = _stored(obj).get("place")
     return _place(obj) if place is not None and place != _place(obj) else None
 
 
 def place_again(obj: bpy.types.Object) -> None:
     """Remember where a stand-in object is now as the place it was put."""
-    obj[STAND_IN] = json.dumps({**_told(obj), "place": _place(obj)})
+    obj[STAND_IN] = json.dumps({**_stored(obj), "place": _place(obj)})
 
 
 def is_edited_object(obj: bpy.types.Object) -> bool:
     """Whether the user has moved a stand-in object, renamed it, or added anything to it."""
-    told = _told(obj)
-    return bool(told) and (told.get("place") != _place(obj) or told.get("state") != _state(obj))
+    stored = _stored(obj)
+    return bool(stored) and (stored.get("place") != _place(obj) or stored.get("state") != _state(obj))
 
 
 def release_object(obj: bpy.types.Object) -> None:
@@ -188,7 +188,7 @@ def release_object(obj: bpy.types.Object) -> None:
             del obj[key]
 
 
-def _told(obj: bpy.types.Object) -> dict:
+def _stored(obj: bpy.types.Object) -> dict:
     try:
         return dict(json.loads(obj[STAND_IN])) if STAND_IN in obj else {}
     except (ValueError, TypeError):

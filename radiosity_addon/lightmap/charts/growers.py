@@ -14,7 +14,7 @@ from .xatlas_worker import WORTH_A_PROCESS, run_apart, run_xatlas
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
-_resting = Resting()
+resting = Resting()
 """The latest of xatlas' atlases: destroyed right after their work they may hang."""
 
 
@@ -32,7 +32,7 @@ def grow_charts(vertices: Float, faces: Int, in_window: bool = False) -> tuple[F
         if grown is not None:
             return grown
     atlas, uv, chart = run_xatlas(vertices, faces)
-    _resting.keep(atlas)
+    resting.keep(atlas)
     return uv, chart
 
 

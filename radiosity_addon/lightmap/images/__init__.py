@@ -6,7 +6,7 @@ No rays, no solver.
 from __future__ import annotations
 
 from .encode import encode_png16, png16_scale, presentable, to_quantity
-from .irradiance_statistics import LightStatistics, light_statistics, told_texels
+from .irradiance_statistics import LightStatistics, light_statistics, lit_texels
 from .page import LightmapPage
 from .page_assembly import texel_pages
 from .seams import Seams, find_seams
@@ -23,10 +23,10 @@ __all__ = [
     "lay_out_again",
     "lay_out_surfaces",
     "light_statistics",
+    "lit_texels",
     "png16_scale",
     "presentable",
     "texel_pages",
     "to_quantity",
-    "told_texels",
     "turned_away",
 ]

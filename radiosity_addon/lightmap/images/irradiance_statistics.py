@@ -49,7 +49,7 @@ def light_statistics(values: Array, areas: Array) -> LightStatistics | None:
     return LightStatistics(least, weighed / total, largest) if total > 0 else None
 
 
-def told_texels(state: Array) -> Array:
+def lit_texels(state: Array) -> Array:
     """Return which of (n,) texels show the visible surface: those that are not divided, hidden or enclosed.
 
     The others show a mean over two sides, or light that nobody sees. All texels, if there are no others.

@@ -7,42 +7,42 @@ from __future__ import annotations
 
 from .accuracy import light_within
 from .error_picture import residual_summary, texel_residual
-from .gather_links import StoredLinks
+from .gather_links import GatherLinks
 from .gather_settings import GatherSettings
-from .part_links import HitNumbers, PartHits, PartLinks, Parts, gather_parts, lit_footprints
+from .hit_table import HitTable, TableRows
 from .partial_light import LightSoFar
-from .reconstruction import STARTS, gather_at, gather_footprints, on_lattice, reconstruct, resolver, sample_of
+from .reconstruction import STARTS, gather_at, gather_footprints, on_lattice, reconstruct, sample_of
 from .relighting import kept_bytes, relight_texels
-from .sweeps import LitTexels, TexelLight, TexelTransport, sweep
+from .sub_cells import SubCellHits, SubCellLinks, SubCells, gather_sub_cells
+from .sweeps import RelightableTexels, TexelLight, TexelTransport, sweep
 from .traced_texels import GatherPointLayout, LightingRecord
-from .warm_start import EarlierLight
+from .warm_start import WarmStart
 
 __all__ = [
     "STARTS",
-    "EarlierLight",
+    "GatherLinks",
     "GatherPointLayout",
     "GatherSettings",
-    "HitNumbers",
+    "HitTable",
     "LightSoFar",
     "LightingRecord",
-    "LitTexels",
-    "PartHits",
-    "PartLinks",
-    "Parts",
-    "StoredLinks",
+    "RelightableTexels",
+    "SubCellHits",
+    "SubCellLinks",
+    "SubCells",
+    "TableRows",
     "TexelLight",
     "TexelTransport",
+    "WarmStart",
     "gather_at",
     "gather_footprints",
-    "gather_parts",
+    "gather_sub_cells",
     "kept_bytes",
     "light_within",
-    "lit_footprints",
     "on_lattice",
     "reconstruct",
     "relight_texels",
     "residual_summary",
-    "resolver",
     "sample_of",
     "sweep",
     "texel_residual",

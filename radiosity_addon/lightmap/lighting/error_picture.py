@@ -33,11 +33,11 @@ def texel_residual(
         Positive where the elements are brighter than the light they send there makes the surface.
     """
     local, residual = solution.local_pass, solution.element_residual
-    direct = local.direct(footprints(geometry, local), progress=progress.part(0.0, DIRECT))
+    direct = local.direct.at(footprints(geometry, local), progress=progress.part(0.0, DIRECT))
     part = progress.part(DIRECT, CROSSED)
     crossings = find_crossings(geometry, local.caster, local.threads, progress=part)
     part = progress.part(CROSSED, GATHERED)
-    links, _ = gather_texels(local, geometry, settings, crossings, local.leaves_of, progress=part)
+    links, _ = gather_texels(local, geometry, settings, crossings, local.elements.leaves_of, progress=part)
     part = progress.part(GATHERED, 1.0)
     direct += links.irradiance(residual.gathered(local), local.threads, progress=part)
     return _residual_at(residual, geometry, direct)

@@ -17,14 +17,14 @@ AIMED_ROWS = 1 << 14
 
 
 @dataclass(frozen=True)
-class StoredLinks:
+class GatherLinks:
     """What the gather points saw, and how they speak for the texels.
 
     Attributes
     ----------
     sources : (g, rays) int32
         Rows of the table of radiosity: texels by number, parts of elements and cells of texels after them
-        (see `HitNumbers` for what they are before the table is made); NOTHING and the sky negative.
+        (see `HitTable` for what they are before the table is made); NOTHING and the sky negative.
     spread : Interpolation
     aimed : AimedRays
         What some of the points ask apart.

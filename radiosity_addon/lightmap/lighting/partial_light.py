@@ -12,7 +12,7 @@ import numpy as np
 from ...numerics import Array
 from ...solver.gather import NOTHING, Gathered, LocalPass, values_of
 from ..texels import NO_TEXEL, TexelGeometry
-from .part_links import HitNumbers
+from .hit_table import HitTable
 
 EVERY = 4
 """One of so many gather rays is looked up: a picture needs no more, and is to cost next to nothing."""
@@ -35,7 +35,7 @@ class LightSoFar:
         self.version = 0
         self.geometry: TexelGeometry | None = None
         self._local: LocalPass | None = None
-        self._numbers: HitNumbers | None = None
+        self._table: HitTable | None = None
         self._element = np.zeros(0, dtype=np.int32)
         self._direct = self._reflectance = self._emission = np.zeros((0, 3))
         self._waiting: list[tuple[Array, Gathered, int]] = []
@@ -72,10 +72,10 @@ class LightSoFar:
         """Note that another lamp has been asked everywhere."""
         self.version += 1
 
-    def met(self, numbers: HitNumbers, rows: Array, gathered: Gathered, stride: int) -> None:
+    def met(self, table: HitTable, rows: Array, gathered: Gathered, stride: int) -> None:
         """Note what (g,) texels gathered that lie `stride` texels apart."""
         if len(rows):
-            self._numbers = numbers
+            self._table = table
             self._waiting.append((rows, gathered, stride))
             self.version += 1
 
@@ -92,7 +92,7 @@ class LightSoFar:
     def _irradiance(self) -> Array:
         if self._expected is None:
             assert self._local is not None
-            self._expected = values_of(self._local.irradiance, self._element)
+            self._expected = values_of(self._local.elements.irradiance, self._element)
         # The elements' light, spread over their texels as the direct light is: its mean stays theirs.
         detail = self._direct - self._means_of_elements(self._direct)
         light = np.maximum(self._expected + detail, self._direct) if detail.any() else self._expected.copy()
@@ -148,17 +148,9 @@ class LightSoFar:
 
     def _values_at(self, sources: Array) -> Array:
         """Return (g, k, 3) the radiosity of (g, k) hits as they are numbered before the table is made."""
-        local, numbers = self._local, self._numbers
-        assert local is not None
-        assert numbers is not None
-        flat = sources.ravel()
-        texel = flat[(flat >= 0) & (flat < numbers.texel_count)]
-        part = flat[(flat >= numbers.texel_count) & (flat < numbers.first_cell)] - numbers.texel_count
-        cell = flat[flat >= numbers.first_cell] - numbers.first_cell
-        element = np.full(len(flat), NOTHING, dtype=np.int64)
-        element[(flat >= 0) & (flat < numbers.texel_count)] = self._element[texel]
-        element[(flat >= numbers.texel_count) & (flat < numbers.first_cell)] = local.parts.leaf_of(part)
-        element[flat >= numbers.first_cell] = self._element[numbers.cells.texel_of(cell)]
-        values = values_of(local.reflected(), element)
-        values[flat < 0] = local.beyond()[flat[flat < 0]]
+        table = self._table
+        assert table is not None
+        elements, flat = table.local.elements, sources.ravel()
+        values = values_of(elements.reflected(), table.elements_of(flat, self._element))
+        values[flat < 0] = elements.beyond()[flat[flat < 0]]
         return np.asarray(values.reshape(*sources.shape, 3))

@@ -16,28 +16,24 @@ import numpy as np
 
 from ...base import SILENT, Progress
 from ...numerics import Array, marked, row_numbers, tiles
-from ...rays import SIGHT_LIFT, Hits, free_segment
 from ...scene import Scene
-from ...solver.gather import NOTHING, AimedRays, Footprints, Gathered, LocalPass, Resolver, values_of
+from ...solver.gather import AimedRays, Footprints, Gathered, LocalPass, Resolver, values_of
 from ..points import GatherPoints, fit
 from ..texels import (
-    NO_TEXEL,
     Crossings,
     SmoothLift,
-    TexelCells,
     TexelGeometry,
-    below_hood,
     find_crossings,
     texel_materials,
-    whole_neighbor,
 )
-from .gather_links import StoredLinks
+from .gather_links import GatherLinks
 from .gather_settings import GatherSettings
-from .part_links import HitNumbers, gather_parts
+from .hit_table import HitTable
 from .partial_light import LightSoFar
-from .sweeps import LitTexels, TexelLight, TexelTransport, sweep
+from .sub_cells import gather_sub_cells
+from .sweeps import RelightableTexels, TexelLight, TexelTransport, sweep
 from .traced_texels import GatherPointLayout, LightingRecord
-from .warm_start import EarlierLight
+from .warm_start import WarmStart
 
 DIRECT, CROSSED, GATHERED, PARTS = 0.25, 0.3, 0.8, 0.9
 """How much is done when a part ends; rough, from rooms at medium quality."""
@@ -50,9 +46,6 @@ STARTS = 16
 
 FIT = 0.15
 """The part of gathering that weighs the points."""
-
-WIDE = 4.0
-"""Texels this many times wider than the median tell less of the light than leaf elements that are smaller."""
 
 
 def reconstruct(
@@ -69,7 +62,7 @@ def reconstruct(
     known on the way.
     """
     scratch = geometry.scratch
-    gains = local.new_gains(len(geometry), scratch)
+    gains = local.direct.new_gains(len(geometry), scratch)
     lamps = scratch.zeros((len(geometry), 3))
     reflectance, emission = texel_materials(scene, geometry)
     element = elements_below(local, geometry)
@@ -77,23 +70,21 @@ def reconstruct(
         so_far.begin(local, geometry, element, lamps, (reflectance, emission))
     tell = None if so_far is None else so_far.asked
     at, part = footprints(geometry, local), progress.part(0.0, DIRECT)
-    lamps = local.direct(at, gains=gains, total=lamps, tell=tell, progress=part)
+    lamps = local.direct.at(at, gains=gains, total=lamps, tell=tell, progress=part)
     del at
     part = progress.part(DIRECT, CROSSED)
     crossings = find_crossings(geometry, local.caster, local.threads, progress=part)
-    cells = TexelCells(local, geometry, crossings)
-    numbers = HitNumbers(local, cells, len(geometry))
-    resolve = resolver(geometry, crossings, numbers)
-    met = None if so_far is None else partial(so_far.met, numbers)
+    table = HitTable(local, geometry, crossings)
+    met = None if so_far is None else partial(so_far.met, table)
     part = progress.part(CROSSED, GATHERED)
-    links, points = gather_texels(local, geometry, settings, crossings, resolve, met, part)
+    links, points = gather_texels(local, geometry, settings, crossings, table.number, met, part)
     chosen = GatherPointLayout.of(points) if gains is not None else None
     # How points are found takes more than what they met says.
     del points
     part = progress.part(GATHERED, PARTS)
-    links, parts = gather_parts(numbers, links, resolve, element, reflectance, progress=part)
-    transport = TexelTransport(links, parts, reflectance)
-    start, reflected = scratch.empty((len(geometry), 3), np.float32), local.reflected()
+    cells, rows = gather_sub_cells(table, links, element, reflectance, progress=part)
+    transport = TexelTransport(links, cells, reflectance)
+    start, reflected = scratch.empty((len(geometry), 3), np.float32), local.elements.reflected()
     for tile in tiles(len(geometry)):
         start[tile] = values_of(reflected, element[tile])
     seen = None if so_far is None else so_far.swept
@@ -101,7 +92,7 @@ def reconstruct(
         transport,
         start,
         lamps,
-        local.beyond(),
+        local.elements.beyond(),
         sweeps=settings.sweeps,
         tolerance=settings.tolerance,
         threads=local.threads,
@@ -111,11 +102,11 @@ def reconstruct(
     )
     light = replace(light, state=crossings.state)
     progress.at(1.0)
-    if gains is None or chosen is None or local.sources is None or light.table is None:
+    if gains is None or chosen is None or local.direct.sources is None or light.table is None:
         return light
-    earlier = EarlierLight(local.sources.strengths, light.table)
-    lit = LitTexels(transport, gains, element, settings.sweeps, settings.tolerance, earlier)
-    traced = LightingRecord(settings, crossings, numbers, chosen, parts.small, local.bright, light.error)
+    warm_start = WarmStart(local.direct.sources.strengths, light.table)
+    lit = RelightableTexels(transport, gains, element, settings.sweeps, settings.tolerance, warm_start)
+    traced = LightingRecord(settings, table, chosen, rows, local.gather.bright, light.error)
     return replace(light, kept=lit, traced=traced)
 
 
@@ -125,7 +116,7 @@ def footprints(geometry: TexelGeometry, local: LocalPass) -> Footprints:
     keys, expected = scratch.empty(len(geometry), np.int32), scratch.empty(len(geometry))
     for tile in tiles(len(geometry), CHUNK):
         keys[tile] = np.arange(tile.start, tile.stop)
-        expected[tile] = local.irradiance_at(geometry.triangle[tile], geometry.barycentric[tile])
+        expected[tile] = local.elements.irradiance_at(geometry.triangle[tile], geometry.barycentric[tile])
     return Footprints(
         geometry.position,
         geometry.normal,
@@ -142,7 +133,7 @@ def elements_below(local: LocalPass, geometry: TexelGeometry) -> Array:
     """Return (n,) int32 the leaf elements below the texels, or NOTHING."""
     element = geometry.scratch.empty(len(geometry), np.int32)
     for tile in tiles(len(geometry), CHUNK):
-        element[tile] = local.leaf_at_fronts(geometry.triangle[tile], geometry.barycentric[tile])
+        element[tile] = local.elements.leaf_at_fronts(geometry.triangle[tile], geometry.barycentric[tile])
     return element
 
 
@@ -154,7 +145,7 @@ def gather_texels(
     resolve: Resolver,
     met: Callable[[Array, Gathered, int], None] | None = None,
     progress: Progress = SILENT,
-) -> tuple[StoredLinks, GatherPoints]:
+) -> tuple[GatherLinks, GatherPoints]:
     """Gather at few texels, densely where others do not reach.
 
     `met` is told of texels that have gathered, and how far they are apart.
@@ -191,7 +182,7 @@ def gather_texels(
         points.add(stride, np.concatenate([chosen[~edge], chosen[edge]]), np.concatenate(closeness))
     spread = fit(points, geometry, progress.part(1.0 - FIT, 1.0))
     aimed = AimedRays.joined(found, first, geometry.scratch)
-    return StoredLinks(sources.all(), spread, aimed), points
+    return GatherLinks(sources.all(), spread, aimed), points
 
 
 def gather_at(
@@ -209,9 +200,9 @@ def gather_at(
     expected, upright = (geometry.scratch.empty((len(chosen), *of)) for of in ((), (3,)))
     for tile in tiles(len(chosen), CHUNK):
         some = chosen[tile]
-        expected[tile] = local.irradiance_at(geometry.triangle[some], geometry.barycentric[some])
+        expected[tile] = local.elements.irradiance_at(geometry.triangle[some], geometry.barycentric[some])
         upright[tile] = geometry.surface_normal[some]
-    return local.gather(at, upright, rays, resolve, expected, into, progress)
+    return local.gather.at(at, upright, rays, resolve, expected, into, progress)
 
 
 def gather_footprints(geometry: TexelGeometry, chosen: Array, starts: int | None) -> Footprints:
@@ -255,49 +246,3 @@ def on_lattice(geometry: TexelGeometry, stride: int) -> Array:
     """Return (n,) bool: the texels in every so many rows and columns of their page."""
     row, column = geometry.row, geometry.column
     return marked(len(geometry), lambda tile: (row[tile] % stride == 0) & (column[tile] % stride == 0))
-
-
-def resolver(geometry: TexelGeometry, crossings: Crossings, numbers: HitNumbers) -> Resolver:
-    """Number hits: texels by their own number, then parts of leaf elements, then cells of divided texels."""
-    wide = geometry.texel_area > (WIDE * geometry.texel_size) ** 2
-    local, cells = numbers.local, numbers.cells
-
-    def resolve(hits: Hits) -> Array:
-        texel = geometry.texel_at(hits)
-        found = texel.copy()
-        divided = np.flatnonzero((texel != NO_TEXEL) & crossings.crossed[texel])
-        # What a touched texel ends at hides a corner of it: who hits that corner is not its own.
-        touched = np.flatnonzero((texel != NO_TEXEL) & crossings.touched[texel])
-        apart = touched[~_sees_center(local, geometry, texel[touched], hits.take(touched))]
-        divided = np.concatenate([divided, apart])
-        cell = cells.at(texel[divided], hits.take(divided))
-        found[divided] = cell + numbers.first_cell
-        without = divided[cell == NOTHING]
-        found[without] = _beside(crossings, local, texel[without], hits.take(without))
-        doubtful = np.flatnonzero((found >= 0) & wide[hits.triangle])
-        finer = local.leaf_areas(hits.take(doubtful)) < geometry.texel_area[hits.triangle[doubtful]]
-        found[doubtful[finer]] = NO_TEXEL
-        elsewhere = found == NO_TEXEL
-        part = local.parts_of(hits.take(elsewhere))
-        found[elsewhere] = np.where(part == NOTHING, NOTHING, part + len(geometry))
-        return found
-
-    return resolve
-
-
-def _beside(crossings: Crossings, local: LocalPass, texel: Array, hits: Hits) -> Array:
-    """Return (h,) what answers hits on texels without a cell for them: a neighbor, or NO_TEXEL.
-
-    NOTHING below a hood: elements do not know of hoods, and their light would be that of the open.
-    """
-    geometry, caster = crossings.geometry, local.caster
-    position = geometry.positions_of(hits)
-    below = below_hood(geometry, caster, texel, position[:, None])[:, 0]
-    found = whole_neighbor(crossings, caster, texel, position, below)
-    return np.where((found == NOTHING) & ~below, NO_TEXEL, found)
-
-
-def _sees_center(local: LocalPass, geometry: TexelGeometry, texel: Array, hits: Hits) -> Array:
-    """Return (h,) whether nothing is between hits and the centers of their texels."""
-    lift = SIGHT_LIFT * local.caster.surface_offset * geometry.surface_normal[texel]
-    return free_segment(local.caster, geometry.positions_of(hits) + lift, geometry.position[texel] + lift)

@@ -14,15 +14,15 @@ import numpy as np
 from ...base import SILENT, Progress
 from ...numerics import Array, Scratch, tiles
 from ...solver.element_transport import Relightable
-from ...solver.gather import values_of
-from .sweeps import LitTexels, TexelLight, sweep
+from ...solver.gather import table_end, values_of
+from .sweeps import RelightableTexels, TexelLight, sweep
 
 SOLVED = 0.3
 """How much is done when the hierarchy is solved; rough."""
 
 
 def relight_texels(
-    kept: LitTexels,
+    kept: RelightableTexels,
     solved: Relightable,
     strengths: Array,
     scratch: Scratch | None = None,
@@ -32,7 +32,7 @@ def relight_texels(
 
     Parameters
     ----------
-    kept : LitTexels
+    kept : RelightableTexels
     solved : Relightable
     strengths : (s, 3) float64
         See `LightSources.strengths` for units.
@@ -42,27 +42,27 @@ def relight_texels(
     progress.at(0.0)
     sources, local = solved.sources, solved.local
     given = sources.of_lamps(strengths)
-    parts = kept.transport.parts
+    cells = kept.transport.cells
     links = [
-        replace(some, lamps=some.gains.irradiance(given)) for some in parts.links if some.gains is not None
+        replace(some, lamps=some.gains.irradiance(given)) for some in cells.links if some.gains is not None
     ]
-    assert len(links) == len(parts.links)  # a kept bake keeps them all
-    known = kept.earlier.mixed(strengths)
+    assert len(links) == len(cells.links)  # a kept bake keeps them all
+    known = kept.warm_start.mixed(strengths)
     if known is None:
-        table, left = kept.earlier.part_of(strengths)
-        reflected = local.reflected(solved.elements.irradiance(left))
+        table, left = kept.warm_start.part_of(strengths)
+        reflected = local.elements.reflected(solved.elements.irradiance(left))
         first, count = table, len(kept.element)
         for rows in tiles(len(table)):
             after = slice(max(rows.start - count, 0), max(rows.stop - count, 0))
-            of = np.concatenate([kept.element[rows], parts.element[after]])
+            of = np.concatenate([kept.element[rows], cells.element[after]])
             first[rows] = table[rows] + values_of(reflected, of)
     else:
         first = known
-    start, of_parts = first[: len(kept.element)], first[len(kept.element) :]
+    start, of_cells = first[: len(kept.element)], first[len(kept.element) :]
     progress.at(SOLVED)
-    transport = replace(kept.transport, parts=replace(parts, start=of_parts, links=links))
+    transport = replace(kept.transport, cells=replace(cells, start=of_cells, links=links))
     lamps = kept.gains.irradiance(given)
-    beyond = local.beyond(sources.sky(strengths))
+    beyond = table_end(sources.sky(strengths))
     light = sweep(
         transport,
         start,
@@ -76,15 +76,15 @@ def relight_texels(
         progress=progress.part(SOLVED, 1.0),
     )
     if known is None and light.table is not None:
-        kept.earlier.add(strengths, light.table)
+        kept.warm_start.add(strengths, light.table)
     return light
 
 
-def kept_bytes(kept: LitTexels) -> int:
+def kept_bytes(kept: RelightableTexels) -> int:
     """Return what kept links and gains take in memory [bytes]."""
-    links, parts = kept.transport.links, kept.transport.parts
+    links, cells = kept.transport.links, kept.transport.cells
     total = links.sources.nbytes + links.aimed.sources.nbytes + links.aimed.weights.nbytes
     total += kept.gains.nbytes + kept.element.nbytes + kept.transport.reflectance.nbytes
-    for some in parts.links:
+    for some in cells.links:
         total += some.sources.nbytes + (0 if some.gains is None else some.gains.nbytes)
     return int(np.int64(total))

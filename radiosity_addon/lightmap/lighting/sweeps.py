@@ -1,6 +1,6 @@
 """Jacobi sweeps over the texels along stored gather hits: no ray is traced.
 
-The unknowns are the texels and the parts that gather rays met where no texel answers (`part_links.py`).
+The unknowns are the texels and the parts that gather rays met where no texel answers (`sub_cells.py`).
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ import numpy as np
 from ...base import SILENT, Progress
 from ...numerics import Array, Scratch, row_numbers, tiles, trim
 from ...solver.gather import LightGains
-from .gather_links import StoredLinks
-from .part_links import Parts, PartSweeps
+from .gather_links import GatherLinks
 from .source_means import CHUNK_HITS, Means, by_channel, mean_of_sources
+from .sub_cells import SubCells, SubCellSweeps
 from .traced_texels import LightingRecord
-from .warm_start import EarlierLight
+from .warm_start import WarmStart
 
 TOLERANCE = 2e-4
 """Largest change of any texel, relative to the mean, at which the sweeps end by default. Most texels are
@@ -43,8 +43,8 @@ class TexelLight:
     error : float
         Estimate of the whole's RMS error, relative to its mean; 0 if it was not asked for.
     table : (surfaces, 3) float32 or None [W/m²]
-        What texels and parts reflected in the end.
-    kept : LitTexels or None
+        What texels and cells reflected in the end.
+    kept : RelightableTexels or None
         What lights them anew, if it is kept, …
     traced : LightingRecord or None
         … and how they were lit.
@@ -58,7 +58,7 @@ class TexelLight:
     indirect: Array
     error: float = 0.0
     table: Array | None = None
-    kept: LitTexels | None = None
+    kept: RelightableTexels | None = None
     traced: LightingRecord | None = None
     noise: Array | None = None
     state: Array | None = None
@@ -70,32 +70,32 @@ class TexelTransport:
 
     Attributes
     ----------
-    links : StoredLinks
-    parts : Parts
+    links : GatherLinks
+    cells : SubCells
     reflectance : (n, 3) float64
         Of the texels.
     """
 
-    links: StoredLinks
-    parts: Parts
+    links: GatherLinks
+    cells: SubCells
     reflectance: Array
 
 
 @dataclass(frozen=True)
-class LitTexels:
+class RelightableTexels:
     """How light gets to n texels from each light, and on from texel to texel.
 
     Attributes
     ----------
     transport : TexelTransport
-        Its parts keep gains as well.
+        Its cells keep gains as well.
     gains : LightGains
         Of the texels.
     element : (n,) int32
         The leaf element below each, whose light the sweeps start with, or NOTHING.
     sweeps, tolerance
         As for `sweep`.
-    earlier : EarlierLight
+    warm_start : WarmStart
         What was solved before, the bake's own light first.
     """
 
@@ -104,7 +104,7 @@ class LitTexels:
     element: Array
     sweeps: int
     tolerance: float
-    earlier: EarlierLight
+    warm_start: WarmStart
 
 
 def sweep(
@@ -129,8 +129,8 @@ def sweep(
         What the texels reflect, by the hierarchy.
     lamps : (n, 3) float64 [W/m²]
         Irradiance of the texels straight from lamps and emissive surfaces.
-    beyond : (cells + 2, 3) float64 [W/m²]
-        Radiosity of the sky and of nothing, see `LocalPass.beyond`.
+    beyond : (sky cells + 2, 3) float64 [W/m²]
+        Radiosity of the sky and of nothing, see `table_end`.
     sweeps : int
         At most so many, …
     tolerance : float
@@ -143,9 +143,9 @@ def sweep(
         Makes the texels' arrays; None keeps them in memory.
     """
     links, reflectance, texel_count = transport.links, transport.reflectance, len(lamps)
-    parts = PartSweeps(transport.parts, texel_count, threads)
+    cells = SubCellSweeps(transport.cells, texel_count, threads)
     # Columns lie one after the other in memory.
-    surfaces = texel_count + len(transport.parts.start)
+    surfaces = texel_count + len(transport.cells.start)
     table = np.zeros((surfaces + len(beyond), 3), dtype=np.float32, order="F")
     table[surfaces:] = beyond
     direct, scratch = lamps, scratch or Scratch()
@@ -158,8 +158,8 @@ def sweep(
     for rows in tiles(texel_count):
         table[rows] = start[rows]
     del start
-    table[texel_count:surfaces] = transport.parts.start
-    reached = _reached(links, parts, direct, len(beyond))
+    table[texel_count:surfaces] = transport.cells.start
+    reached = _reached(links, cells, direct, len(beyond))
     for rows in tiles(surfaces):
         table[rows][~reached[rows]] = 0.0
     del reached
@@ -168,7 +168,7 @@ def sweep(
     means = Means(links.sources, table.shape[1], threads, scratch)
     still = STILL * tolerance * float(table[:texel_count].mean()) if texel_count else 0.0
     for _, turn in zip(range(sweeps), progress.part(0.1, 1.0).turns(SWEPT), strict=False):
-        parts.sweep(table, changed, still)
+        cells.sweep(table, changed, still)
         table[surfaces:] = 0.0
         mean = means.of(table, changed, turn)
         del indirect
@@ -214,7 +214,7 @@ def relative_error(noise: Array, *irradiance: Array) -> float:
 
 
 def estimated_noise(
-    links: StoredLinks, table: Array, threads: int = 0, scratch: Scratch | None = None
+    links: GatherLinks, table: Array, threads: int = 0, scratch: Scratch | None = None
 ) -> Array:
     """Estimate (n, 3) the error of texels' irradiance: the noise of the gather rays [W/m²].
 
@@ -224,7 +224,7 @@ def estimated_noise(
 
     Parameters
     ----------
-    links : StoredLinks
+    links : GatherLinks
     table : (rows, 3) float32
         The radiosity that the links' sources had in the end, the sky's among it.
     """
@@ -237,13 +237,13 @@ def estimated_noise(
     return links.spread(part, scratch=scratch)
 
 
-def _reached(links: StoredLinks, parts: PartSweeps, direct: Array, beyond: int) -> Array:
+def _reached(links: GatherLinks, cells: SubCellSweeps, direct: Array, beyond: int) -> Array:
     """Return (table rows − beyond,) bool: what light can get to along the links, after any number of bounces.
 
     The sweeps' fixed point is 0 elsewhere. Found outright, because from what the hierarchy leaked into
     a sealed box they would only fade, by the reflectance a sweep.
     """
-    reached = parts.lit_or_unknown(direct)
+    reached = cells.lit_or_unknown(direct)
     padded = np.append(reached, np.zeros(beyond, dtype=bool))  # nothing, and the sky, whose light is direct
     aims = np.zeros(len(links.sources), dtype=bool)
     while True:
@@ -255,5 +255,5 @@ def _reached(links: StoredLinks, parts: PartSweeps, direct: Array, beyond: int) 
         links.mark_aims(aims, padded)
         more = ~padded[: len(direct)] & links.spread.any_of(aims)
         padded[: len(direct)] |= more
-        if not (parts.reach(padded) or more.any()):
+        if not (cells.reach(padded) or more.any()):
             return padded[: len(reached)]

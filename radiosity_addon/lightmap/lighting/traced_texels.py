@@ -5,12 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from ...numerics import Array
 from ..points import GatherPoints
-from ..texels import Crossings
-from .part_links import HitNumbers
+from .hit_table import HitTable, TableRows
 
 if TYPE_CHECKING:
     from .gather_settings import GatherSettings
@@ -45,13 +42,12 @@ class LightingRecord:
     Attributes
     ----------
     settings : GatherSettings
-    crossings : Crossings
-    numbers : HitNumbers
+    table : HitTable
         What hits were numbered by.
     points : GatherPointLayout
         Parallel to the stored links' rows.
-    small : (s,) int64
-        The parts that the table's last rows are, see `Parts`.
+    rows : TableRows
+        Of the table of radiosity.
     bright : (e,) bool
         The elements that rays were aimed at.
     error : float
@@ -59,22 +55,8 @@ class LightingRecord:
     """
 
     settings: GatherSettings
-    crossings: Crossings
-    numbers: HitNumbers
+    table: HitTable
     points: GatherPointLayout
-    small: Array
+    rows: TableRows
     bright: Array
     error: float
-
-    def numbered(self, rows: Array) -> Array:
-        """Return the numbers that rows of the table had as hits; negative ones stay."""
-        first = self.numbers.elements
-        if len(self.small) == 0:
-            return rows
-        number = self.numbers.texel_count + self.small.take(np.maximum(rows - first, 0), mode="clip")
-        return np.asarray(np.where(rows >= first, number, rows))
-
-    @property
-    def row_count(self) -> int:
-        """Rows of the table: texels, elements and smaller parts."""
-        return self.numbers.elements + len(self.small)

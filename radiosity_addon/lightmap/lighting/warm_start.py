@@ -17,7 +17,7 @@ MIXED = 1e-6
 """Strengths are a mixture of earlier ones if all but this part of them is."""
 
 
-class EarlierLight:
+class WarmStart:
     """Remembers the strengths of light's sources, and what surfaces reflected then.
 
     Parameters
@@ -46,9 +46,9 @@ class EarlierLight:
         first, *others = self.solutions
         self.solutions = [first, *others[-(MOST - 2) :], (strengths.copy(), table)]
 
-    def first(self) -> EarlierLight:
+    def first(self) -> WarmStart:
         """Return what remembers the first solution alone."""
-        return EarlierLight(*self.solutions[0])
+        return WarmStart(*self.solutions[0])
 
     def mixed(self, strengths: Array) -> Array | None:
         """Return (r, 3) what surfaces reflect at (s, 3) strengths; None if they are no such mixture."""

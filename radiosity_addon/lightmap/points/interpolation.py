@@ -264,7 +264,7 @@ def fit(points: GatherPoints, geometry: TexelGeometry, progress: Progress = SILE
                 "a texel has no gather point in reach: the last level must take all that lack one"
             )
         along = geometry.position[points.texel[point]] - geometry.position[row + rows.start]
-        return count, point.astype(np.int32), _linear_weights(along, kernel, count)
+        return count, point.astype(np.int32), linear_weights(along, kernel, count)
 
     scratch = geometry.scratch
     first = scratch.empty(len(geometry), np.int64)
@@ -303,13 +303,13 @@ def refit(points: GatherPoints, geometry: TexelGeometry, texels: Array) -> tuple
         along = geometry.position[points.texel[point]] - geometry.position[texel]
         counts.append(count)
         numbers.append(point.astype(np.int32))
-        weights.append(_linear_weights(along, kernel, count))
+        weights.append(linear_weights(along, kernel, count))
     if not counts:
         return np.zeros(0, np.int64), np.zeros(0, np.int32), np.zeros(0, np.float32)
     return np.concatenate(counts), np.concatenate(numbers), np.concatenate(weights)
 
 
-def _linear_weights(along: Array, kernel: Array, count: Array) -> Array:
+def linear_weights(along: Array, kernel: Array, count: Array) -> Array:
     """Return (p,) float32 weights that reproduce linear functions of the position as far as damping allows.
 
     Parameters

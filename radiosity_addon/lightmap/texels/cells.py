@@ -5,7 +5,7 @@ holds, as it should. Light that comes back from it must not be the mean: a ray f
 box would then bring the lit floor outside. Nor can a whole neighbor answer, for the strip beside a
 frame is darker than what lies a texel farther in the open. So a divided texel answers in cells,
 each as those of its points that see the cell's *anchor* in a straight line just above the surface;
-a hit asks the nearest cell whose anchor it sees (`solver/gather/sub_cells.py` does the same for elements).
+a hit asks the nearest cell whose anchor it sees (`element_cells.py` does the same for elements).
 Through a gap the line of sight is free: what is below a hood asks what is below it, the rest what is not.
 """
 
@@ -13,10 +13,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base import SILENT, Progress
 from ...numerics import Array, for_chunks
 from ...rays import SIGHT_LIFT, Hits, free_segment
-from ...solver.gather import NOTHING, Footprints, LocalPass, Resolver
+from ...solver.gather import NOTHING, ElementLookup, Footprints
 from .occlusion import Crossings, below_hood
 from .texel_geometry import TexelGeometry
 
@@ -47,8 +46,8 @@ class TexelCells:
     crossings: Those have cells that are crossed or touched.
     """
 
-    def __init__(self, local: LocalPass, geometry: TexelGeometry, crossings: Crossings) -> None:
-        self.local, self._geometry = local, geometry
+    def __init__(self, elements: ElementLookup, geometry: TexelGeometry, crossings: Crossings) -> None:
+        self.elements, self._geometry = elements, geometry
         self._rim, divided = crossings.rim, crossings.crossed | crossings.touched
         self.texel = np.flatnonzero(divided).astype(np.int32)
         """(d,) The divided texels."""
@@ -65,7 +64,7 @@ class TexelCells:
             self._anchors[part] = spread + self._lift(texel)[:, None]
             self._below[part] = self._below_hood(texel, spread)
 
-        for_chunks(place, len(self.texel), CHUNK_TEXELS, local.threads)
+        for_chunks(place, len(self.texel), CHUNK_TEXELS, elements.threads)
 
     def __len__(self) -> int:
         return CELLS * len(self.texel)
@@ -82,7 +81,7 @@ class TexelCells:
 
     def at(self, texel: Array, hits: Hits) -> Array:
         """Return (h,) int32: the nearest cell of its `texel` whose anchor each hit sees, or NOTHING."""
-        geometry, caster = self._geometry, self.local.caster
+        geometry, caster = self._geometry, self.elements.caster
         found = np.full(len(texel), NOTHING, dtype=np.int32)
         normal = geometry.surface_normal[texel]
         # On the page a texel may extend beyond its triangle onto one with another normal.
@@ -108,7 +107,7 @@ class TexelCells:
 
     def footprints(self, cell: Array) -> Footprints:
         """Return cells as footprints: their samples see the anchor."""
-        geometry, caster = self._geometry, self.local.caster
+        geometry, caster = self._geometry, self.elements.caster
         texel, first = self.texel_of(cell), _FIRST[cell % CELLS]
         lift, below = self._lift(texel), self._below[cell // CELLS, cell % CELLS]
         anchor = self._anchors[cell // CELLS, cell % CELLS] - lift
@@ -129,15 +128,10 @@ class TexelCells:
         """Return (p, 3) the normals of the triangles that cells are on."""
         return np.asarray(self._geometry.surface_normal[self.texel_of(cell)])
 
-    def gather(self, cell: Array, rays: int, resolve: Resolver, progress: Progress = SILENT) -> Array:
-        """Gather over cells; return (p, rays) sources."""
-        at, upright = self.footprints(cell), self.upright(cell)
-        return self.local.gather(at, upright, rays, resolve, progress=progress).sources
-
     def lit(self, cell: Array) -> Footprints:
         """Return cells as footprints for the light of lamps: their anchors alone."""
         texel, geometry = self.texel_of(cell), self._geometry
-        expected = self.local.irradiance_at(geometry.triangle[texel], geometry.barycentric[texel])
+        expected = self.elements.irradiance_at(geometry.triangle[texel], geometry.barycentric[texel])
         anchor = self._anchors[cell // CELLS, cell % CELLS] - self._lift(texel)
         return Footprints(anchor, geometry.normal[texel], self._keys(cell), expected=expected)
 
@@ -150,9 +144,9 @@ class TexelCells:
         """Return (n, k) whether (n, k, 3) points of texels at a rim are below the hood; False elsewhere."""
         below = np.zeros(points.shape[:2], dtype=bool)
         at_rim = np.flatnonzero(self._rim[texel])
-        below[at_rim] = below_hood(self._geometry, self.local.caster, texel[at_rim], points[at_rim])
+        below[at_rim] = below_hood(self._geometry, self.elements.caster, texel[at_rim], points[at_rim])
         return below
 
     def _lift(self, texel: Array) -> Array:
-        offset = SIGHT_LIFT * self.local.caster.surface_offset
+        offset = SIGHT_LIFT * self.elements.caster.surface_offset
         return np.asarray(offset * self._geometry.surface_normal[texel])

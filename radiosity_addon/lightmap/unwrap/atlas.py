@@ -20,7 +20,7 @@ from ..charts import Charts, PatientGrower, rescale_to_area, unwrap
 from ..texels import coverage_sum
 from .dominant_object import greedy_object, share_of
 from .packing import Limits, Packing, pack
-from .page_assignment import assign_pages, least_pages
+from .page_assignment import assign_pages, least_pages, texels_needed
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -196,8 +196,11 @@ def _lay_on_pages(layouts: list[_Layout], options: AtlasOptions, progress: Progr
         count = options.pages
         if density is not None:
             count = least_pages(sum(surfaces), density, options.limits.largest)
+    extents = [_extents(layout.charts) for layout in layouts]
     while True:
-        groups = assign_pages(surfaces, count) if options.shared else [[each] for each in range(count)]
+        texels = float(count * options.resolution**2)
+        needs = texels_needed(surfaces, extents, options.limits.padding, density, texels)
+        groups = assign_pages(needs, count) if options.shared else [[each] for each in range(count)]
         laid: _Laid = []
         try:
             for group in groups:
@@ -211,9 +214,20 @@ def _lay_on_pages(layouts: list[_Layout], options: AtlasOptions, progress: Progr
         return laid
 
 
+def _extents(charts: Charts) -> Float:
+    """Return (c, 2) width and height of each chart [m]."""
+    inside = charts.chart >= 0
+    corners, owner = charts.uv[inside].reshape(-1, 2), np.repeat(charts.chart[inside], 3)
+    low, high = np.full((charts.count, 2), np.inf), np.full((charts.count, 2), -np.inf)
+    np.minimum.at(low, owner, corners)
+    np.maximum.at(high, owner, corners)
+    extents: Float = high - low
+    return extents
+
+
 def _pack_group(group: list[_Layout], options: AtlasOptions, progress: Progress) -> Packing:
     """Lay out one page, its kept UVs as they are where that is possible."""
-    kept = _kept_as_they_are(group, options.resolution, options.texel_density, options.limits.largest)
+    kept = _kept_as_they_are(group, options.resolution, options.texel_density, options.limits.side)
     if kept is not None:
         return kept
     return _pack_page(group, options.resolution, options.texel_density, options.limits, progress)

@@ -80,6 +80,11 @@ class Limits:
     largest: int = MAX_RESOLUTION
     padding: int = GAP
 
+    @property
+    def side(self) -> int:
+        """Width and height at most of pages whose size comes from a density: a multiple of 4."""
+        return max(4, 4 * (self.largest // 4))
+
     def gap(self, cell: int) -> int:
         """Free cells of `cell` texels between charts."""
         return -(-self.padding // cell)
@@ -232,7 +237,7 @@ def _pack_into(job: _Job, resolution: int, page: int, progress: Progress) -> Pac
 
 def _pack_at(job: _Job, density: float) -> Packing:
     """Find the smallest page that holds the charts at `density` texels per meter."""
-    largest = job.limits.largest
+    largest = job.limits.side
     reach = float(job.extent.max()) * density + 2 * job.limits.border(1)
     guess = max(float(np.sqrt(job.area)) * density, reach if len(job.extent) == 1 else 0.7 * reach)
     if not guess <= largest:

@@ -12,8 +12,8 @@ import numpy as np
 
 from ...numerics import Array
 from ...rays import SIGHT_LIFT, EmbreeCaster, RayCaster
-from ...solver.gather import STALE, Boxes, Moved
-from ..lighting import HitNumbers, LightingRecord
+from ...solver.gather import UNNUMBERED, Boxes, ElementLookup, Moved
+from ..lighting import HitTable
 from ..texels import Crossings, SmoothLift, TexelGeometry
 
 NEAR = 1.5
@@ -84,8 +84,8 @@ class AffectedTexels:
         split = one.crossed | one.touched | one.occluded | other.crossed | other.touched | other.occluded
         return np.asarray(self.near & ~self.texels & split)
 
-    def renumbered(self, traced: LightingRecord, numbers: HitNumbers, divided: Array) -> Array:
-        """Return (numbers,) int32: what each hit of before is numbered now, or STALE.
+    def renumbered(self, old: HitTable, table: HitTable, divided: Array) -> Array:
+        """Return (numbers,) int32: what each hit of before is numbered now, or UNNUMBERED.
 
         Stale is what moved, what is beside it, and parts of leaves that it may cut.
 
@@ -94,24 +94,22 @@ class AffectedTexels:
         divided : (n,) bool
             See `divided`.
         """
-        old, count = traced.numbers, traced.numbers.texel_count
         now = np.arange(old.end, dtype=np.int32)
         # A hit on a divided texel may have been answered by a neighbor.
         texels = self.texels | self.geometry.neighborhood(divided)
-        now[:count][texels] = STALE
-        now[count : old.first_cell][self._parts_near(numbers)] = STALE
-        cells = old.cells.renumbered(numbers.cells)
-        of = old.cells.texel_of(np.arange(len(cells)))
+        now[: old.texel_count][texels] = UNNUMBERED
+        now[old.texel_count : old.first_cell][self._cells_near(table.local.elements)] = UNNUMBERED
+        cells = old.texel_cells.renumbered(table.texel_cells)
+        of = old.texel_cells.texel_of(np.arange(len(cells)))
         stale = (cells < 0) | texels[of]
-        now[old.first_cell :] = np.where(stale, STALE, cells + numbers.first_cell)
+        now[old.first_cell :] = np.where(stale, UNNUMBERED, cells + table.first_cell)
         return now
 
-    def _parts_near(self, numbers: HitNumbers) -> Array:
-        """Return (parts,) bool: those of leaves that moved, or that a box touches."""
-        local = numbers.local
-        hierarchy, offset = local.hierarchy, SIGHT_LIFT * local.caster.surface_offset
-        elements = np.arange(hierarchy.n_elements)
-        low, high = local.parts.bounds(elements)
+    def _cells_near(self, elements: ElementLookup) -> Array:
+        """Return (cells,) bool: those of elements that moved, or that a box touches."""
+        hierarchy, cells = elements.hierarchy, elements.cells
+        offset = SIGHT_LIFT * elements.caster.surface_offset
+        low, high = cells.bounds(np.arange(hierarchy.n_elements))
         touched = self.boxes.touching(low - offset, high + offset)
         touched |= self.moved[hierarchy.faces.triangle[hierarchy.face]]
-        return np.asarray(touched[local.parts.leaf_of(np.arange(len(local.parts)))])
+        return np.asarray(touched[cells.leaf_of(np.arange(len(cells)))])

@@ -10,16 +10,16 @@ import numpy as np
 from ...base import Progress
 from ...numerics import Array
 from ...solver.gather import Boxes, Footprints, LightGains, LightQuery, LocalPass
-from ..lighting import HitNumbers, PartHits, lit_footprints, sample_of
+from ..lighting import HitTable, SubCellHits, sample_of
 from ..texels import SmoothLift, TexelGeometry
 from .affected import AffectedTexels
 
 
 def changed_lights(local: LocalPass, before: LocalPass) -> list[tuple[LightQuery, bool]]:
     """Pair the lights that shine on points with whether they themselves moved."""
-    old = {asked.number: asked.light for asked in before.lights()}
+    old = {asked.number: asked.light for asked in before.direct.lights()}
     result = []
-    for asked in local.lights():
+    for asked in local.direct.lights():
         was = old.get(asked.number)
         same_as = getattr(asked.light, "same_as", None)
         result.append((asked, was is None or (same_as is not None and not same_as(was))))
@@ -39,32 +39,32 @@ def texel_gains(
         touched |= moved | affected.boxes.between(geometry.position, asked.light, affected.widen)
         # One texel more: a penumbra is followed from neighbor to neighbor.
         around = np.flatnonzero(geometry.neighborhood(touched))
-        found = local.gain(asked, _footprints(geometry, around, lift), progress=part)
+        found = local.direct.gain(asked, _footprints(geometry, around, lift), progress=part)
         own = touched[around]
         gain[around[own]] = found[own]
         gains.put(asked.number, gain)
     return gains
 
 
-def part_gains(
-    parts: PartHits,
-    numbers: HitNumbers,
+def sub_cell_gains(
+    hits: SubCellHits,
+    table: HitTable,
     before: LocalPass,
     boxes: Boxes,
     at: Array,
     widen: Array,
     progress: Progress,
 ) -> LightGains:
-    """Ask for every light at those parts, at (p, 3) anchors, where it may have changed."""
-    assert parts.gains is not None  # kept parts keep them
-    local = numbers.local
+    """Ask for every light at those cells, at (p, 3) anchors, where it may have changed."""
+    assert hits.gains is not None  # kept cells keep them
+    local = table.local
     lights = changed_lights(local, before)
-    gains = LightGains(len(parts.part))
+    gains = LightGains(len(hits.number))
     for (asked, moved), part in progress.each(lights):
-        gain = parts.gains.of(asked.number)
+        gain = hits.gains.of(asked.number)
         rows = np.flatnonzero(moved | boxes.between(at, asked.light, widen))
-        some = PartHits(parts.is_leaf, parts.part[rows], parts.sources[rows])
-        gain[rows] = local.gain(asked, lit_footprints(numbers, some), some.shadow_rays, part)
+        points = table.lit_footprints(hits.number[rows], hits.of_element)
+        gain[rows] = local.direct.gain(asked, points, hits.shadow_rays, part)
         gains.put(asked.number, gain)
     return gains
 

@@ -17,9 +17,9 @@ from ...rays import SAGITTA, SIGHT_LIFT
 from ...solver.gather import AimedRays, Before, Gathered, LocalPass, Resolver
 from ..lighting import (
     STARTS,
+    GatherLinks,
     GatherPointLayout,
     GatherSettings,
-    StoredLinks,
     gather_at,
     gather_footprints,
     on_lattice,
@@ -66,25 +66,25 @@ class MovedPoints:
         resolve: Resolver,
         bright: Array,
     ) -> None:
-        self._local, self._before, self._disturbance = local, before, affected
+        self._local, self._before, self._affected = local, before, affected
         self._moved = affected.traced(before.caster)
         self._settings, self._crossings, self._resolve = settings, crossings, resolve
         self._divided, self._bright = divided, bright
         self._geometry = affected.geometry
 
     def gather(
-        self, links: StoredLinks, points: GatherPointLayout, progress: Progress
-    ) -> tuple[StoredLinks, GatherPoints]:
+        self, links: GatherLinks, points: GatherPointLayout, progress: Progress
+    ) -> tuple[GatherLinks, GatherPoints]:
         """Gather where it is needed.
 
         Parameters
         ----------
-        links : StoredLinks
-            Of before, sources numbered as they are now, or STALE.
+        links : GatherLinks
+            Of before, sources numbered as they are now, or UNNUMBERED.
         points : GatherPointLayout
             Of before.
         """
-        stays = ~(self._disturbance.texels | self._divided)[points.texel]
+        stays = ~(self._affected.texels | self._divided)[points.texel]
         rows = np.flatnonzero(stays)
         kept = self._again(links, points, rows, progress.part(0.0, 0.5))
         closer = ~stays
@@ -93,10 +93,10 @@ class MovedPoints:
         found, new, number = self._choose(points, rows, kept, doubted, progress.part(0.5, 0.9))
         spread = _merged(links.spread, number, doubted, refit(new, self._geometry, np.flatnonzero(doubted)))
         progress.at(1.0)
-        return StoredLinks(found.sources, spread, found.aimed), new
+        return GatherLinks(found.sources, spread, found.aimed), new
 
     def _again(
-        self, links: StoredLinks, points: GatherPointLayout, rows: Array, progress: Progress
+        self, links: GatherLinks, points: GatherPointLayout, rows: Array, progress: Progress
     ) -> Gathered:
         """Trace again what is touched of the rays of some points."""
         sources, closeness = links.sources[rows], points.closeness[rows].copy()
@@ -117,22 +117,22 @@ class MovedPoints:
 
     def _regather(self, before: Gathered, texel: Array, starts: int | None, progress: Progress) -> Gathered:
         geometry, local = self._geometry, self._local
-        corners = self._before.hierarchy.corners[before.aimed.element]
+        corners = self._before.elements.hierarchy.corners[before.aimed.element]
         low, high = corners.min(axis=2), corners.max(axis=2)
         aimed_at = 0.5 * (low + high), 0.5 * (high - low)
-        hierarchy = local.hierarchy
+        hierarchy = local.elements.hierarchy
         hosts = np.zeros(len(geometry.triangles), dtype=bool)
         hosts[hierarchy.faces.triangle[hierarchy.face[self._bright]]] = True
-        widen = self._disturbance.widen[texel]
+        widen = self._affected.widen[texel]
         earlier = Before(before, aimed_at, self._moved, widen, self._bright, hosts)
-        expected = local.irradiance_at(geometry.triangle[texel], geometry.barycentric[texel])
+        expected = local.elements.irradiance_at(geometry.triangle[texel], geometry.barycentric[texel])
         at = gather_footprints(geometry, texel, starts)
         upright = geometry.surface_normal[texel]
-        return local.regather(at, upright, self._resolve, earlier, expected, progress)
+        return local.gather.again_at(at, upright, self._resolve, earlier, expected, progress)
 
     def _doubted(self, spread: Interpolation, points: GatherPointLayout, closer: Array) -> Array:
         """Return (n,) bool: the texels whose points are to be weighed again."""
-        geometry, moved = self._geometry, self._disturbance
+        geometry, moved = self._geometry, self._affected
         doubted = moved.texels | geometry.neighborhood(self._divided) | spread.any_of(closer)
         # A texel's points are in cells beside its own, no wider than the coarsest lattice.
         farthest = CELLS_ACROSS * max(*self._settings.strides, 1.5) * geometry.texel_size

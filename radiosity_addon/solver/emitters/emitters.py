@@ -119,7 +119,7 @@ class EmitterGroup:
         step = max(CHUNK_PAIRS // len(self._corners), 1)
         for first in range(0, len(points), step):
             rows = slice(first, first + step)
-            gain[rows] = self._factors(points[rows], normals[rows]).sum(axis=1)
+            gain[rows] = self.factors(points[rows], normals[rows]).sum(axis=1)
         return gain
 
     def beside(self, points: Array, reach: Array) -> Array:
@@ -147,7 +147,7 @@ class EmitterGroup:
         """
         if self._tree is not None:
             return self._rays_by_tree(self._tree, points, normals, u)
-        factors = self._factors(points, normals)
+        factors = self.factors(points, normals)
         face, along = pick_in_rows(factors, u[..., 0])
         chosen = np.take_along_axis(factors, face, axis=1)
         inside = np.stack([along, u[..., 1]], axis=-1)
@@ -196,7 +196,7 @@ class EmitterGroup:
         cos_s = -np.einsum("nkc,nkc->nk", directions, self._normals[face])
         return directions, distances, throughput(ray_geometry_term(cos_r, cos_s, distances), 1.0, 1.0)
 
-    def _factors(self, points: Array, normals: Array) -> Array:
+    def factors(self, points: Array, normals: Array) -> Array:
         """Return (n, m) form factors from points to faces, times the faces' levels.
 
         0 where not even the start of a ray, lifted off the surface, is in front of a face.

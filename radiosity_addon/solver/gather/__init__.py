@@ -7,20 +7,27 @@ from __future__ import annotations
 
 from .boxes import Boxes
 from .bright_patches import AimedRays
-from .final_gather import NOTHING, Gathered, Resolver
+from .direct_light import DirectLight, LightQuery
+from .element_lookup import ElementLookup
+from .final_gather import Gathered
 from .footprints import Footprints
+from .gather_rays import Gather
+from .hit_numbers import NOTHING, UNNUMBERED, Resolver, lowest_number, table_end, values_of
 from .light_gains import LightGains
-from .local_pass import LightQuery, LocalPass, values_of
+from .local_pass import LocalPass
 from .residual import Residual
-from .retracing import STALE, Before, Moved
+from .retracing import Before, Moved
 
 __all__ = [
     "NOTHING",
-    "STALE",
+    "UNNUMBERED",
     "AimedRays",
     "Before",
     "Boxes",
+    "DirectLight",
+    "ElementLookup",
     "Footprints",
+    "Gather",
     "Gathered",
     "LightGains",
     "LightQuery",
@@ -28,5 +35,7 @@ __all__ = [
     "Moved",
     "Residual",
     "Resolver",
+    "lowest_number",
+    "table_end",
     "values_of",
 ]

@@ -6,7 +6,6 @@ elements that are far brighter than the rest (`bright_patches.py`).
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +16,7 @@ from ...numerics import Array, Stream, cosine_hemisphere, map_chunks, orthonorma
 from ...rays import Hits, RayCaster
 from .bright_patches import AimedRays, AimedTable, BrightElements
 from .footprints import Footprints
+from .hit_numbers import NOTHING, Resolver, sky_numbers
 
 CHUNK_RAYS = 1 << 16
 """Rays a thread prepares at once; bounds its temporaries to about 10 MB."""
@@ -26,14 +26,6 @@ AIMED_PART = 4
 
 SAME_PLACE = 1e-5
 """Barycentric weights that differ by less are one place on a triangle."""
-
-Resolver = Callable[[Hits], Array]
-"""Hits → (n,) int32: the number under which a hit's radiosity will be looked up."""
-
-NOTHING = -2
-"""A gather ray that left through the surface it started on: it carries no light."""
-SKY = -3
-"""The sky's first cell; the others count down from it (see `SkyTable`). −1 is left to resolvers."""
 
 
 @dataclass(frozen=True)
@@ -242,7 +234,7 @@ class Gathering:
         """Return (h,) int32 the numbers of what rays met, the sky where they met nothing."""
         found = self._resolve(hits)
         missed = np.flatnonzero(hits.triangle < 0)
-        found[missed] = SKY - self._sky.cells(directions[missed])
+        found[missed] = sky_numbers(self._sky, directions[missed])
         return found
 
     def _aim(self, rows: Array, bright: BrightElements, shares: Array) -> AimedRays:

@@ -97,11 +97,11 @@ class Residual:
         What emissive faces send out themselves is integrated exactly, like lamps. Elements count
         with their means, linear ones too. Other parameters as for `at`.
         """
-        local = LocalPass(self._state) if local is None else local
+        local = LocalPass.of(self._state) if local is None else local
         points, normals = self.position(face, barycentric), self._hierarchy.faces.normal[face]
         at = Footprints(points, normals, np.arange(len(face)))
-        direct = local.direct(at, rays=SHADOW_RAYS)
-        sources = local.gather(at, normals, rays, local.leaves_of).sources
+        direct = local.direct.at(at, rays=SHADOW_RAYS)
+        sources = local.gather.at(at, normals, rays, local.elements.leaves_of).sources
         indirect = self.gathered(local)[sources].mean(axis=1)
         return self.given(face, barycentric, direct + indirect)
 
@@ -110,7 +110,7 @@ class Residual:
 
         Elements without their own emission, which is direct light.
         """
-        beyond = local.beyond()
+        beyond = local.elements.beyond()
         table = np.zeros((self._hierarchy.n_elements + len(beyond), 3))
         leaf = self._basis.leaf
         table[leaf] = self._basis.leaf_means(self._values) - self._hierarchy.emission[leaf]

@@ -15,13 +15,11 @@ from ...rays import RayCaster
 from .boxes import Boxes
 from .bright_patches import AimedRays, BrightElements
 from .final_gather import CHUNK_RAYS, Gathered, Gathering
+from .hit_numbers import UNNUMBERED
 
 RENEWED = 0.3
 """A point whose closeness falls by more than this part is gathered from anew: what single rays take off
 a sum that a few very short ones dominate may leave anything, even less than nothing."""
-
-STALE = -1
-"""A source that is no more, or may be another one now."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +48,7 @@ class Before:
     Attributes
     ----------
     gathered : Gathered
-        Sources numbered as they are now, or STALE.
+        Sources numbered as they are now, or UNNUMBERED.
     aimed_at : (a, k, 3) float64 twice
         Of its aimed rays: the middles of the boxes around the elements aimed at, and half their sizes.
     moved : Moved
@@ -98,7 +96,7 @@ class Retracing:
 
         def trace(part: slice) -> AimedRays | None:
             rows = np.arange(part.start, part.stop)
-            stale = before.gathered.sources[rows] == STALE
+            stale = before.gathered.sources[rows] == UNNUMBERED
             asked = stale.any(axis=1) | aims_past[rows]
             points, normals = gathering.planes(rows)
             asked |= before.moved.boxes.above(points, normals, before.widen[rows])
@@ -153,5 +151,5 @@ class Retracing:
         middle, half = before.aimed_at
         along = middle - points[:, None]
         found[row] = before.moved.boxes.met_by_fans(points, along, half, before.widen[row]).any(axis=1)
-        found[row] |= (before.gathered.aimed.sources == STALE).any(axis=1)
+        found[row] |= (before.gathered.aimed.sources == UNNUMBERED).any(axis=1)
         return found

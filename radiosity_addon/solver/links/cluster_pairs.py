@@ -15,8 +15,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...base import SILENT, Progress
 from ...form_factors import point_to_polygon, visibility_of
-from ...numerics import Array, Stream, for_chunks, hash_keys, run_numbers
+from ...numerics import Array, Stream, hash_keys, map_chunks, run_numbers
 from ...rays import RayCaster
 from ..hierarchy import Hierarchy, NodeShapes
 from .cluster_links import ClusterLinks, join_cluster_links
@@ -44,6 +45,7 @@ def measure_cluster_links(
     source: Array,
     seed: int,
     threads: int = 0,
+    progress: Progress = SILENT,
 ) -> ClusterLinks:
     """Compute links to clusters; pairs whose fronts do not see each other are left out.
 
@@ -62,7 +64,6 @@ def measure_cluster_links(
         ("wide and many", many & wide),
     ):
         rows = np.flatnonzero(chosen)
-        parts: dict[int, ClusterLinks] = {}
         samples = FAR_SAMPLES if kind in ("far", "wide") else NEAR_SAMPLES
 
         def measure(
@@ -70,14 +71,13 @@ def measure_cluster_links(
             rows: Array = rows,
             kind: str = kind,
             samples: int = samples,
-            parts: dict[int, ClusterLinks] = parts,
-        ) -> None:
+        ) -> ClusterLinks:
             chosen_pairs = rows[piece]
             pairs = _ClusterPairs(hierarchy, receiver[chosen_pairs], source[chosen_pairs], samples, seed)
-            parts[piece.start] = pairs.links(caster, kind)
+            return pairs.links(caster, kind)
 
-        for_chunks(measure, len(rows), CHUNK_SAMPLES // samples, threads)
-        result += [parts[start] for start in sorted(parts)]
+        chunks = map_chunks(measure, len(rows), CHUNK_SAMPLES // samples, threads, progress)
+        result += [links for _, links in chunks]
     return join_cluster_links(result)
 
 

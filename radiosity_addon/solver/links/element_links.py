@@ -15,8 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...base import SILENT, Progress
 from ...form_factors import point_to_polygon
-from ...numerics import Array, for_chunks, split_in_four
+from ...numerics import Array, map_chunks, split_in_four
 from ...rays import RayCaster
 from ..hierarchy import Hierarchy
 from .pair_factors import PairSamples, element_factors, open_share, trace_pairs
@@ -99,6 +100,7 @@ def measure_links(
     source: Array,
     seed: int,
     threads: int = 0,
+    progress: Progress = SILENT,
 ) -> Links:
     """Compute factor, visibility and error estimate of new links; pairs that face away are left out.
 
@@ -107,13 +109,11 @@ def measure_links(
     threads: 0 means all cores; the links do not depend on it.
     Returns links: At most n.
     """
-    parts: dict[int, Links] = {}
 
-    def measure(rows: slice) -> None:
-        parts[rows.start] = _measure_chunk(hierarchy, caster, receiver[rows], source[rows], seed)
+    def measure(rows: slice) -> Links:
+        return _measure_chunk(hierarchy, caster, receiver[rows], source[rows], seed)
 
-    for_chunks(measure, len(receiver), CHUNK, threads)
-    return join([parts[start] for start in sorted(parts)])
+    return join([links for _, links in map_chunks(measure, len(receiver), CHUNK, threads, progress)])
 
 
 def _measure_chunk(

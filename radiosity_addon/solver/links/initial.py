@@ -78,15 +78,15 @@ def first_links(
     """
     most = max(int(BUDGET * max_links), FEWEST)
     wanted = WANTED / max(settings.error, 1e-9) ** 0.5
-    limits, pairs = _Limits(float(hierarchy.faces.area.sum()), settings.min_area), None
+    limits, pairs = PairLimits(float(hierarchy.faces.area.sum()), settings.min_area), None
     while True:
         while True:
-            count = _estimate(hierarchy, shapes, limits)
+            count = estimated_links(hierarchy, shapes, limits)
             may_be_coarser = FAINTER * limits.faint <= COARSEST_FAINT * settings.error
             if count <= min(wanted, most) or (count <= most and not may_be_coarser):
                 break
             limits = limits.looser()
-        pairs = _first_pairs(hierarchy, shapes, limits, int(SLACK * most))
+        pairs = first_pairs(hierarchy, shapes, limits, int(SLACK * most))
         if pairs is not None:
             break
         limits = limits.looser()
@@ -101,7 +101,7 @@ def first_links(
 
 
 @dataclass(frozen=True)
-class _Limits:
+class PairLimits:
     """Limits of size, distance and curvature for nodes to be linked without opening them.
 
     `area` is all faces' [m²]; `tiny`, of nodes, and `faint`, of what a pair exchanges, are shares of it.
@@ -111,12 +111,13 @@ class _Limits:
     tiny: float
     faint: float = 0.0
 
-    def looser(self) -> _Limits:
+    def looser(self) -> PairLimits:
+        """Return limits of fewer pairs: `faint` grows."""
         return replace(self, faint=FAINTER * self.faint if self.faint > 0.0 else FAINT)
 
 
-def _first_pairs(
-    hierarchy: Hierarchy, shapes: NodeShapes, limits: _Limits, most: int
+def first_pairs(
+    hierarchy: Hierarchy, shapes: NodeShapes, limits: PairLimits, most: int
 ) -> tuple[Array, Array] | None:
     """Return the (n,) receivers and sources of the initial links; None if there are more than `most`."""
     waiting = [_root_pairs(hierarchy)]
@@ -138,7 +139,7 @@ def _first_pairs(
     return np.concatenate(receivers), np.concatenate(sources)
 
 
-def _estimate(hierarchy: Hierarchy, shapes: NodeShapes, limits: _Limits) -> float:
+def estimated_links(hierarchy: Hierarchy, shapes: NodeShapes, limits: PairLimits) -> float:
     """Estimate the number of initial links from a sample of pairs.
 
     Whenever more than `THINNED` pairs are to be opened, that many are drawn, and stand for all.
@@ -163,7 +164,7 @@ def _root_pairs(hierarchy: Hierarchy) -> tuple[Array, Array]:
 
 
 def _judge(
-    hierarchy: Hierarchy, shapes: NodeShapes, receiver: Array, source: Array, limits: _Limits
+    hierarchy: Hierarchy, shapes: NodeShapes, receiver: Array, source: Array, limits: PairLimits
 ) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
     """Return the pairs to link, and those that result from opening the others."""
     may = shapes.may_see(receiver, source)
@@ -178,7 +179,7 @@ def _judge(
     return (receiver[ready], source[ready]), opened
 
 
-def _looks_small(shapes: NodeShapes, receiver: Array, source: Array, limits: _Limits) -> Array:
+def _looks_small(shapes: NodeShapes, receiver: Array, source: Array, limits: PairLimits) -> Array:
     """Return (n,) which pairs are linked as they are, if the receiver's faces look much the same way."""
     to_face, of_face = receiver >= shapes.count, source >= shapes.count
     of_mixed = shapes.cone[source] > CONE

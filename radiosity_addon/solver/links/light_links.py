@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...base import SILENT, Progress
 from ...lights import EnvironmentLight, Lamp, Light, SpotLight
 from ...numerics import (
     LIGHT_STEP,
@@ -95,6 +96,7 @@ def link_lights(
     threads: int = 0,
     most_elements: int = 1 << 30,
     as_if: Array | None = None,
+    progress: Progress = SILENT,
 ) -> LightLinks:
     """Link every light to the elements it reaches, splitting where its light varies.
 
@@ -105,7 +107,7 @@ def link_lights(
     """
     receivers, numbers, gains = [], [], []
     coarse_area = float(hierarchy.faces.area.sum()) / COARSEST
-    for number, light in enumerate(lights):
+    for (number, light), part in progress.each(list(enumerate(lights))):
         strength = float(np.max(light.strength)) if as_if is None else float(as_if[number])
         if strength <= 0.0 or not isinstance(light, Lamp | EnvironmentLight):
             continue
@@ -119,7 +121,7 @@ def link_lights(
             gain, error = np.zeros((len(waiting), 4)), np.zeros(len(waiting))
             seeing = np.flatnonzero(~blind)
             gain[seeing], error[seeing] = measure_light(
-                hierarchy, light, caster, waiting[seeing], seed + LIGHT_STEP * number, threads
+                hierarchy, light, caster, waiting[seeing], seed + LIGHT_STEP * number, threads, part
             )
             misplaced = np.where(blind, np.inf, error * area * strength)
             split = may_split & (misplaced > misplaced_power)
@@ -180,6 +182,7 @@ def measure_light(
     elements: Array,
     seed: int,
     threads: int = 0,
+    progress: Progress = SILENT,
 ) -> tuple[Array, Array]:
     """Measure one light's irradiance on the quarters of elements, per unit of strength, and its error.
 
@@ -207,7 +210,7 @@ def measure_light(
             else:
                 gain[rows], error[rows] = _measure_lamp(asked, light, caster, seed, divisor)
 
-        for_chunks(measure, len(rows_of), CHUNK, threads)
+        for_chunks(measure, len(rows_of), CHUNK, threads, progress.part(0.0, 0.0))
     return gain, error
 
 

@@ -13,8 +13,8 @@ import numpy as np
 from ...numerics import Array, points_at, points_on_triangles, split_in_sixteen
 from ...rays import SIGHT_LIFT, Hits, RayCaster, free_segment
 from ..hierarchy import Hierarchy
-from .final_gather import NOTHING
 from .footprints import Footprints
+from .hit_numbers import NOTHING
 
 CELLS = 16
 """Smaller parts of a leaf: two levels of its quadtree further down."""
@@ -26,7 +26,7 @@ STARTS = 16
 """Points of a part that its gather rays start from: each costs a ray to the anchor."""
 
 
-class LeafParts:
+class ElementCells:
     """Numbers the parts of all leaves: the e elements first, then sixteen cells of each.
 
     hierarchy: Is not refined any more.

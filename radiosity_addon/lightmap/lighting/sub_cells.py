@@ -1,0 +1,272 @@
+"""What gather rays met where no texel answers, and what it sees in turn.
+
+Cells of leaf elements answer on backs and surfaces without a lightmap, cells of texels where geometry
+divides a texel. They gather as texels do, so that what the coarse hierarchy smeared across a wall's
+foot or into a closed box does not come back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...base import SILENT, Progress
+from ...numerics import Array, marked, tiles
+from ...solver.gather import LightGains, values_of
+from .gather_links import GatherLinks
+from .hit_table import TILE_HITS, HitTable, TableRows
+from .source_means import Means
+
+OFTEN = 32
+"""A cell that so many rays met matters: …"""
+
+RAYS, MANY_RAYS = 16, 64
+"""… it gathers with more rays. Cells that few rays met answer few, and their noise averages out."""
+
+SHADOW_RAYS = 4
+"""Of a cell to each lamp for `RAYS` gather rays; in proportion for more."""
+
+ROUNDS = 3
+"""Rounds of asking the cells that cells met; beyond, the hierarchy's values stand for elements."""
+
+SWEEPS = 4
+"""Sweeps among the cells for each over the texels, at most: the next one goes on where they ended."""
+
+
+@dataclass(frozen=True)
+class SubCellLinks:
+    """What p cells of one kind, that gather with as many rays, see.
+
+    rows (p,) int64: Theirs in the table of radiosity.
+    sources (p, rays) int32: Rows of the table, and negative numbers as in `GatherLinks`.
+    reflectance (p, 3) float64
+    lamps (p, 3) float64: Irradiance straight from lamps and emissive faces [W/m²].
+    gains: The same for each light apart, if it is kept.
+    """
+
+    STORED = ("rows", "sources", "reflectance", "gains")
+
+    rows: Array
+    sources: Array
+    reflectance: Array
+    lamps: Array
+    gains: LightGains | None = None
+
+
+@dataclass(frozen=True)
+class SubCells:
+    """The table's rows after the n texels': all elements, then every smaller cell that was met.
+
+    start (r, 3) float64: What they reflect by the hierarchy's light [W/m²].
+    element (r,) int: Whose light `start` is, or NOTHING.
+    """
+
+    start: Array
+    links: Sequence[SubCellLinks]
+    element: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+
+@dataclass(frozen=True)
+class SubCellHits:
+    """Cells of one kind that have gathered.
+
+    of_element: Whether they are of elements, or of texels.
+    number (p,) int: Theirs in a `HitTable`.
+    sources (p, rays) int32: Numbers of what they hit.
+    gains: What lights add, if that is known as well.
+    """
+
+    of_element: bool
+    number: Array
+    sources: Array
+    gains: LightGains | None = None
+
+    @property
+    def rays(self) -> int:
+        """That each gathers with."""
+        return int(self.sources.shape[1])
+
+    @property
+    def shadow_rays(self) -> int:
+        """Of each to every lamp."""
+        return SHADOW_RAYS * self.rays // RAYS
+
+    def take(self, chosen: Array) -> SubCellHits:
+        """Return those of some cells, row numbers or a mask."""
+        gains = None if self.gains is None else self.gains.take(chosen)
+        return SubCellHits(self.of_element, self.number[chosen], self.sources[chosen], gains)
+
+
+def gather_sub_cells(
+    table: HitTable,
+    links: GatherLinks,
+    below: Array,
+    reflectance: Array,
+    known: Sequence[SubCellHits] = (),
+    progress: Progress = SILENT,
+) -> tuple[SubCells, TableRows]:
+    """Gather from the cells that links met, and from those that these met; return them, and all rows.
+
+    links: Their sources are numbers of the table's, which become rows where they are, for they take more
+        memory than all else.
+    below (n,) int32: The leaf elements below the texels, or NOTHING.
+    reflectance (n, 3): Of the texels.
+    known: Those that need not gather. Those that nothing meets are left out.
+    """
+    gathering = _SubCellGather(table, known)
+    gathering.count(links.sources)
+    gathering.count(links.aimed.sources)
+    gathering.take_known()
+    for _, part in progress.part(0.0, 0.7).each(range(ROUNDS)):
+        gathering.gather_new(part)
+        gathering.take_known()
+    small = gathering.small()
+    rows = TableRows(table.first_small, small)
+    made = gathering.links(rows, reflectance, progress.part(0.7, 1.0))
+    for sources in (links.sources, links.aimed.sources):
+        rows.to_rows(sources)
+    number = np.concatenate([np.arange(table.texel_count, table.first_small), small])
+    element = table.elements_of(number, below)
+    return SubCells(values_of(table.local.elements.reflected(), element), made, element), rows
+
+
+class _SubCellGather:
+    """Gathers round by round from cells that were met. Their counts start with the first element's."""
+
+    def __init__(self, table: HitTable, known: Sequence[SubCellHits] = ()) -> None:
+        self._table, self._first = table, table.texel_count
+        self._met = np.zeros(table.end - self._first, dtype=np.int32)
+        self._gathered = np.zeros(len(self._met), dtype=bool)
+        self._found: list[SubCellHits] = []
+        self._known = [(hits, np.zeros(len(hits.number), dtype=bool)) for hits in known]
+
+    def count(self, sources: Array) -> None:
+        """Note which cells were met."""
+        for tile in tiles(len(sources), max(TILE_HITS // max(sources.shape[1], 1), 1)):
+            number = sources[tile]
+            cells = number[number >= self._first] - self._first
+            self._met += np.bincount(cells, minlength=len(self._met)).astype(np.int32)
+
+    def take_known(self) -> None:
+        """Take the known cells that were met, and those that these met in turn.
+
+        What nobody meets any more has no row in the table.
+        """
+        more = True
+        while more:
+            more = False
+            for hits, taken in self._known:
+                cell = hits.number - self._first
+                met = np.flatnonzero(~taken & (self._met[cell] > 0))
+                if len(met):
+                    more = taken[met] = self._gathered[cell[met]] = True
+                    self.count(hits.sources[met])
+
+    def gather_new(self, progress: Progress) -> None:
+        """Gather from the cells that were met and have not gathered yet."""
+        new = np.flatnonzero((self._met > 0) & ~self._gathered)
+        self._gathered[new] = True
+        number, often = new + self._first, self._met[new] >= OFTEN
+        is_elements = number < self._table.first_cell
+        groups = [
+            (of_element, rays, number[(is_elements == of_element) & (often == (rays > RAYS))])
+            for of_element in (True, False)
+            for rays in (RAYS, MANY_RAYS)
+        ]
+        for (of_element, rays, cells), part in progress.each(groups):
+            if len(cells) == 0:
+                continue
+            sources = self._table.gather(cells, of_element, rays, part)
+            self.count(sources)
+            self._found.append(SubCellHits(of_element, cells, sources))
+
+    def small(self) -> Array:
+        """Return (s,) int64, ascending: smaller cells of elements that were met, and of texels that gathered.
+
+        Where nobody gathered, the hierarchy's values stand; a cell of a texel has none.
+        """
+        table = self._table
+        first, first_cell = table.first_small - self._first, table.first_cell - self._first
+        met = np.flatnonzero(self._met[first:first_cell]) + table.first_small
+        return np.concatenate([met, np.flatnonzero(self._gathered[first_cell:]) + table.first_cell])
+
+    def links(self, rows: TableRows, reflectance: Array, progress: Progress) -> list[SubCellLinks]:
+        """Make the links of the cells that gathered, (n, 3) being the reflectance of the texels."""
+        table, direct = self._table, self._table.local.direct
+        gathered = [*(hits.take(taken) for hits, taken in self._known if taken.any()), *self._found]
+        made = []
+        for hits, part in progress.each(gathered):
+            if hits.gains is None:
+                gains = direct.new_gains(len(hits.number))
+                at = table.lit_footprints(hits.number, hits.of_element)
+                lamps = direct.at(at, hits.shadow_rays, gains, progress=part)
+            else:
+                gains, lamps = hits.gains, direct.lit_by(hits.gains)
+            of_cells = table.reflectance(hits.number, hits.of_element, reflectance)
+            links = SubCellLinks(rows.rows(hits.number), rows.rows(hits.sources), of_cells, lamps, gains)
+            made.append(links)
+        return made
+
+
+class SubCellSweeps:
+    """Updates the cells' rows of a table of reflected radiosity.
+
+    Parameters
+    ----------
+    cells : SubCells
+    texel_count, threads : int
+    """
+
+    def __init__(self, cells: SubCells, texel_count: int, threads: int) -> None:
+        self._links, self._surfaces = cells.links, texel_count + len(cells.start)
+        self._texel_count = texel_count
+        self._means = [Means(links.sources, links.lamps.shape[1], threads) for links in cells.links]
+        self._unseen: Array | None = None
+
+    def lit_or_unknown(self, direct: Array) -> Array:
+        """Return (table rows − beyond,) bool: what direct light (n, 3) meets, and cells that gather none."""
+        lit = np.ones(self._surfaces, dtype=bool)
+        lit[: self._texel_count] = marked(self._texel_count, lambda rows: direct[rows].any(axis=1))
+        for links in self._links:
+            lit[links.rows] = links.lamps.any(axis=1)
+        return lit
+
+    def reach(self, reached: Array) -> bool:
+        """Mark the cells that see something marked in a (table rows,) mask; False if they all were."""
+        more = False
+        for links in self._links:
+            dark = np.flatnonzero(~reached[links.rows])
+            seen = dark[reached[links.sources[dark]].any(axis=1)]
+            reached[links.rows[seen]] = True
+            more |= len(seen) > 0
+        return more
+
+    def sweep(self, table: Array, changed: Array, still: float) -> None:
+        """Update the cells' rows, among themselves until they rest, in `SWEEPS` sweeps at most.
+
+        Parameters
+        ----------
+        changed : (table rows,) bool
+            What changed since the last call; rows that change now are added.
+        still : float
+            Rows that would change by less stay as they are.
+        """
+        fresh = changed.copy() if self._unseen is None else changed | self._unseen
+        for _ in range(SWEEPS):
+            news = []
+            for links, means in zip(self._links, self._means, strict=True):
+                irradiance = links.lamps + means.of(table, fresh)
+                reflected = (links.reflectance * irradiance).astype(np.float32)
+                moved = np.abs(reflected - table[links.rows]).max(axis=1) > still
+                if moved.any():
+                    news.append((links.rows[moved], reflected[moved]))
+            fresh[:] = False
+            for rows, values in news:
+                table[rows] = values
+                fresh[rows] = changed[rows] = True
+            if not news:
+                break
+        # What changed last no cell has seen yet: the next call begins with it.
+        self._unseen = fresh

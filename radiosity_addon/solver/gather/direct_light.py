@@ -1,0 +1,125 @@
+"""Direct light at points of a solved scene, of all lights together or of each apart.
+
+It is the exact unoccluded factor times a visibility from shadow rays: no noise where a lamp is fully seen or
+fully hidden.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from ...base import SILENT, Progress
+from ...lights import Lamp
+from ...numerics import SHADOW_STEP, Array, Scratch, Stream, tiles
+from ..emitters import EmitterGroup, LightSources, emitter_groups
+from ..state import SolverState
+from .footprints import Footprints, SpreadPoints
+from .light_gains import LightGains
+from .soft_shadows import ShadowShare
+
+NEAR = 0.05
+"""Form factor beyond which emissive faces are so near that it may change over a texel."""
+
+
+@dataclass(frozen=True)
+class LightQuery:
+    """A lamp or emissive group, its number among `LightGains`, and what places its shadow rays."""
+
+    light: Lamp | EmitterGroup
+    number: int
+    seed: int
+
+
+class DirectLight:
+    """Light straight from lamps and emissive surfaces; the sky's is gathered.
+
+    sources: Given, gains of every light can be kept apart (`LightGains`), for relighting.
+    """
+
+    def __init__(self, state: SolverState, sources: LightSources | None = None) -> None:
+        self._state, self.sources = state, sources
+        self.emitters = (
+            emitter_groups(state.scene, state.hierarchy.faces, state.caster)
+            if sources is None
+            else sources.groups
+        )
+
+    def at(
+        self,
+        points: Footprints,
+        rays: int | None = None,
+        gains: LightGains | None = None,
+        total: Array | None = None,
+        tell: Callable[[], None] | None = None,
+        progress: Progress = SILENT,
+    ) -> Array:
+        """Return (n, 3) float64 the irradiance at points [W/m²].
+
+        rays: Shadow rays a point and lamp; None takes the settings'.
+        gains: If given, takes what every light adds: lamps by their number among the scene's lights, those
+            without strength too, then emissive groups. Each is measured as if it were the only one, which
+            it may become.
+        total (n, 3): If given, all 0, the result grows in it, one light after the other, …
+        tell: … and this is called after each.
+        """
+        total = points.scratch.zeros((len(points), 3)) if total is None else total
+        lights = self.lights(include_dark_lights=gains is not None)
+        if gains is not None:
+            points = replace(points, expected=None)
+        spread = self._spread(points)
+        for asked, part in progress.each(lights):
+            arriving = self._arriving(asked, spread, rays, part)
+            for rows in tiles(len(total)):
+                total[rows] += arriving[rows, None] * asked.light.strength
+            if gains is not None:
+                gains.put(asked.number, arriving)
+            if tell is not None:
+                tell()
+        return total
+
+    def lights(self, include_dark_lights: bool = True) -> list[LightQuery]:
+        """Return the lamps and emissive groups that shine on points."""
+        lamps = [
+            (number, lit)
+            for number, lit in enumerate(self._state.scene.lights)
+            if isinstance(lit, Lamp) and (include_dark_lights or lit.strength.any())
+        ]
+        first, seed, step = len(self._state.scene.lights), self._state.settings.seed, SHADOW_STEP
+        of_lamps, of_groups = seed + Stream.LAMP_SHADOWS, seed + Stream.EMITTER_SHADOWS
+        asked = [LightQuery(lit, row, of_lamps + step * place) for place, (row, lit) in enumerate(lamps)]
+        groups = enumerate(self.emitters)
+        return asked + [LightQuery(lit, first + place, of_groups + step * place) for place, lit in groups]
+
+    def gain(
+        self, asked: LightQuery, points: Footprints, rays: int | None = None, progress: Progress = SILENT
+    ) -> Array:
+        """Return (n,) what one light adds per unit of its strength, as if it were the only one."""
+        return self._arriving(asked, self._spread(replace(points, expected=None)), rays, progress)
+
+    def _spread(self, points: Footprints) -> SpreadPoints:
+        settings = self._state.settings
+        return SpreadPoints(points, settings.seed + Stream.FOOTPRINT, settings.threads)
+
+    def _arriving(
+        self, asked: LightQuery, spread: SpreadPoints, rays: int | None, progress: Progress
+    ) -> Array:
+        """Return (n,) unoccluded irradiance per unit of a light's strength times visibility."""
+        light, settings = asked.light, self._state.settings
+        glows = isinstance(light, EmitterGroup)
+        caster = self._state.caster if glows else self._state.caster.for_lamps
+        gain = spread.gain(light, NEAR if glows else 0.0, progress.part(0.0, 0.1))
+        share = ShadowShare(caster, light, spread, asked.seed, settings.threads)
+        unblocked = share.at_points(gain, rays or settings.shadow_rays, progress.part(0.1, 1.0))
+        for rows in tiles(len(gain)):
+            gain[rows] *= unblocked[rows]
+        return gain
+
+    def lit_by(self, gains: LightGains) -> Array:
+        """Return (n, 3) what arrives [W/m²] by gains, of the strengths that the sources have."""
+        assert self.sources is not None  # else there are no gains
+        return gains.irradiance(self.sources.of_lamps(self.sources.strengths))
+
+    def new_gains(self, count: int, scratch: Scratch | None = None) -> LightGains | None:
+        """Return where `count` points keep each light apart; None if lights are not kept apart."""
+        return None if self.sources is None else LightGains(count, scratch)
