@@ -14,6 +14,7 @@ from radiosity_addon.blender.materials.materials import Surface, read_material
 from radiosity_addon.blender.scene_export.export import export_scene
 from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.scenes import add_mesh, add_node, measure_irradiance, shader_material, with_nodes
+from tests.wording import one_says, says
 
 RED = (0.6, 0.2, 0.1, 1.0)
 BLUE = (0.1, 0.2, 0.8, 1.0)
@@ -154,7 +155,7 @@ def test_a_material_without_surface_is_black_and_warns() -> None:
     _output(with_nodes(material))
     surface = read_material(material)
     assert_surface(surface, (0, 0, 0))
-    assert "material 'Hollow': it has no surface shader" in messages_of(surface)
+    assert says(messages_of(surface), "Hollow", "no surface shader")
 
 
 @pytest.mark.skipif(bpy.app.version >= (5, 0), reason="materials always have nodes here")
@@ -195,7 +196,7 @@ def test_an_image_that_cannot_be_evaluated_counts_with_its_linear_mean(
     assert surface.warnings == ()
     (warning,) = surface.fallbacks
     assert warning.name == "Wall"
-    assert warning.message.startswith("material 'Wall': Base Color comes from image 'Bricks'; the mean (")
+    assert says(warning.message, "Wall", "Base Color", "Bricks", "mean")
 
 
 def test_a_checker_that_cannot_be_evaluated_is_half_and_half() -> None:
@@ -207,7 +208,7 @@ def test_a_checker_that_cannot_be_evaluated_is_half_and_half() -> None:
     surface = read_material(material)
     assert_surface(surface, (0.35, 0.2, 0.45))
     assert surface.varies
-    assert "Color comes from node 'Checker Texture'; the mean (" in _fallbacks(surface)
+    assert says(_fallbacks(surface), "Color", "Checker Texture", "mean")
 
 
 def test_srgb_decodes_as_the_standard_says() -> None:
@@ -229,19 +230,19 @@ def test_what_varies_in_unknown_ways_falls_back_on_the_sockets_value(kind: str) 
     (warning,) = surface.warnings if missing else surface.fallbacks
     assert surface.varies == (not missing)
     assert warning.name == "Odd"
-    assert "(0.6, 0.2, 0.1) is used" in warning.message
+    assert "(0.6, 0.2, 0.1)" in warning.message
 
 
 def test_reflectance_of_one_is_clamped_and_named() -> None:
     surface = read_material(shader_material("White", "ShaderNodeBsdfDiffuse", Color=(1, 1, 0.5, 1)))
     assert_surface(surface, (0.99, 0.99, 0.5))
-    assert messages_of(surface) == "material 'White': reflectance (1, 1, 0.5) is clamped to (0.99, 0.99, 0.5)"
+    assert says(messages_of(surface), "White", "(1, 1, 0.5)", "clamped", "(0.99, 0.99, 0.5)")
 
 
 def test_negative_emission_is_none() -> None:
     surface = read_material(shader_material("Thief", "ShaderNodeEmission", Strength=-1.0))
     assert_surface(surface, (0, 0, 0))
-    assert "material 'Thief': emission (-1, -1, -1) is not possible" in messages_of(surface)
+    assert says(messages_of(surface), "Thief", "emission (-1, -1, -1)")
 
 
 def test_a_mix_with_transparent_is_its_solid_shader_where_it_is_there() -> None:
@@ -316,7 +317,7 @@ def test_an_empty_slot_is_gray_and_warns_and_a_missing_slot_is_the_last() -> Non
     baked = export_scene(bpy.context, BakeSettings(sky=True)).bake_scene
     np.testing.assert_allclose(baked.scene.reflectance, [RED[:3], (0.8, 0.8, 0.8)], rtol=1e-6)
     (warning,) = baked.warnings
-    assert (warning.name, "empty material slot" in warning.message) == ("Bare", True)
+    assert (warning.name, "empty" in warning.message) == ("Bare", True)
 
 
 @pytest.mark.parametrize("kind", ["ShaderNodeRGB", "ShaderNodeValue"])
@@ -359,8 +360,7 @@ def test_shader_to_rgb_is_unknown_to_cycles_and_told(target: str) -> None:
     floor = add_mesh("Floor")
     add_mesh("Toon", material=material, location=(0, 0, 1))
     export = export_scene(bpy.context, BakeSettings(sky=True)).bake_scene
-    said = "material 'Toon': node 'Shader to RGB' is for EEVEE only"
-    assert any(warning.message.startswith(said) for warning in export.warnings)
+    assert one_says((warning.message for warning in export.warnings), "Toon", "Shader to RGB", "EEVEE")
     ours = export.scene.emission.max(axis=0)
     np.testing.assert_allclose(ours, [0.0, 2 * np.pi if target == "Color" else 0.0, 0.0], rtol=1e-6)
     np.testing.assert_allclose(measure_irradiance(floor, samples=64), 0.4153 * ours, rtol=0.02)
@@ -376,7 +376,7 @@ def test_transparent_shadows_that_are_off_are_told() -> None:
 
     assert "Transparent Shadows" not in said()
     material.use_transparent_shadow = False
-    assert "material 'Pane': Transparent Shadows is off, which is ignored" in said()
+    assert says(said(), "Pane", "Transparent Shadows")
 
 
 def test_emission_for_diffuse_rays_is_told() -> None:
@@ -389,4 +389,4 @@ def test_emission_for_diffuse_rays_is_told() -> None:
         add_mesh("Glow", material=material)
         export = export_scene(bpy.context, BakeSettings(sky=True)).bake_scene
         assert export.scene.emission.any() == told
-        assert any("depends on Is Diffuse Ray" in warning.message for warning in export.warnings) == told
+        assert any("Is Diffuse Ray" in warning.message for warning in export.warnings) == told
