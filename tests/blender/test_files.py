@@ -74,8 +74,8 @@ def test_obj_comes_into_an_empty_scene_standing_upright(tmp_path: Path) -> None:
         ("empty.gltf", json.dumps({"asset": {"version": "2.0"}}).encode(), "cannot be read"),
         ("broken.obj", b"\xff\xfe\x00 hello\n", "no object was found"),
         ("empty.obj", b"", "is empty"),
-        ("scene.fbx", b"Kaydara", "is not a scene we can open"),
-        ("scene", b"?", "is not a scene we can open"),
+        ("scene.fbx", b"Kaydara", "is not a supported scene"),
+        ("scene", b"?", "is not a supported scene"),
     ],
 )
 def test_what_cannot_be_opened_is_an_error_of_one_line(
