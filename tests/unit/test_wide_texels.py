@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from radiosity_addon.lightmap.lighting.gather_settings import GatherSettings
-from radiosity_addon.lightmap.lighting.reconstruction import WIDE, reconstruct
+from radiosity_addon.lightmap.lighting.hit_table import WIDE
+from radiosity_addon.lightmap.lighting.reconstruction import reconstruct
 from radiosity_addon.lights.sun_and_sky import PointLight
 from radiosity_addon.solver import Scene, SolverSettings, solve
 from tests.rooms import gray, rectangle
