@@ -164,7 +164,7 @@ def test_a_ninth_layer_is_refused_before_anything_changes() -> None:
 
 def test_an_attribute_called_lightmap_is_refused() -> None:
     add_plane().data.attributes.new("Lightmap", "FLOAT", "POINT")
-    with pytest.raises(SceneError, match="'Plane' has an attribute 'Lightmap'"):
+    with pytest.raises(SceneError, match=r"'Plane'.*'Lightmap'"):
         check_targets(export_scene(bpy.context, BakeSettings()))
 
 

@@ -49,7 +49,7 @@ class Gather:
             gathering.sources = into
         if irradiance is None:
             return gathering.trace(None, np.zeros(len(points)), progress)
-        return gathering.trace(self._bright, irradiance, progress)
+        return gathering.trace(self.bright_elements, irradiance, progress)
 
     def again_at(
         self,
@@ -68,17 +68,18 @@ class Gather:
         retracing = Retracing(self._gathering(points, surface_normals, rays, resolve), before)
         if irradiance is None:
             return retracing.trace(None, np.zeros(len(points)), progress)
-        return retracing.trace(self._bright, irradiance, progress)
+        return retracing.trace(self.bright_elements, irradiance, progress)
 
     @property
     def bright(self) -> Array:
         """(e,) bool: the elements that rays are aimed at."""
         found = np.zeros(self._elements.hierarchy.n_elements, dtype=bool)
-        found[self._bright.element] = True
+        found[self.bright_elements.element] = True
         return found
 
     @cached_property
-    def _bright(self) -> BrightElements:
+    def bright_elements(self) -> BrightElements:
+        """What rays are aimed at, in proportion to what it sends."""
         return BrightElements(self._elements.hierarchy, self._elements.reflected(), self._unshadowed)
 
     def _unshadowed(self, points: Array, normals: Array) -> Array:
