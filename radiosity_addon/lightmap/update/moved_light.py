@@ -10,8 +10,8 @@ import numpy as np
 from ...base import Progress
 from ...numerics import Array
 from ...solver.gather import Boxes, Footprints, LightGains, LightQuery, LocalPass
-from ..lighting import HitTable, SubCellHits, sample_of
 from ..texels import SmoothLift, TexelGeometry
+from ..transport import HitTable, SubCellHits, sample_of
 from .affected import AffectedTexels
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from ...base import Progress
 from ...numerics import Array
 from ...solver.gather import UNNUMBERED, AimedRays, Before, Gathered, LightGains, LocalPass
-from ..lighting import HitTable, SubCellHits, SubCellLinks, TableRows
+from ..transport import HitTable, SubCellHits, SubCellLinks, TableRows
 from .affected import AffectedTexels
 from .moved_light import sub_cell_gains
 
