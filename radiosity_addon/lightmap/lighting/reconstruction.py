@@ -35,7 +35,7 @@ from ..transport import (
     gather_texels,
     sweep,
 )
-from ..update import PreviousLight, StandingHits
+from ..update import PreviousLight, StandingHits, kept_cells, kept_points, texel_gains
 from .partial_light import LightSoFar
 
 DIRECT, CROSSED, PARTS = 0.25, 0.3, 0.9
@@ -135,7 +135,7 @@ def _direct_light(
 ) -> LightGains | None:
     """Add what lamps and emissive surfaces give texels to `lamps`, (n, 3); return gains if they are kept."""
     if previous is not None:
-        gains = previous.gains(local, progress)
+        gains = texel_gains(previous, local, progress)
         lamps += local.direct.lit_by(gains)
         return gains
     kept = local.direct.new_gains(len(geometry), geometry.scratch)
@@ -161,14 +161,14 @@ def _trace(
     gathering, parts = progress.part(0.0, GATHERED), progress.part(GATHERED, 1.0)
     kept, known = None, []
     if standing is not None:
-        kept = standing.points(gathering.part(0.0, RETRACED))
+        kept = kept_points(standing, gathering.part(0.0, RETRACED))
         gathering = gathering.part(RETRACED, 1.0)
     links, points = gather_texels(table.local, table.crossings, settings, table.number, kept, met, gathering)
     layout = None if table.local.direct.sources is None else GatherPointLayout.of(points)
     # How points are found takes more than what they met says.
     del points, kept
     if standing is not None:
-        known = standing.cells(parts.part(0.0, RETRACED))
+        known = kept_cells(standing, parts.part(0.0, RETRACED))
         parts = parts.part(RETRACED, 1.0)
     cells, rows = gather_sub_cells(table, links, element, reflectance, known, parts)
     return TexelTransport(links, cells, reflectance), layout, rows

@@ -19,6 +19,7 @@ from ..points import GatherPoints, Interpolation, fit, refit
 from ..texels import Crossings, TexelGeometry
 from .gather_links import GatherLinks
 from .gather_settings import GatherSettings
+from .traced_texels import GatherPointLayout
 
 CHUNK = 1 << 16
 """Texels whose elements are looked up at once; bounds the temporaries to about 20 MB."""
@@ -35,45 +36,34 @@ Met = Callable[[Array, Gathered, int], None]
 
 @dataclass(frozen=True, eq=False)
 class KeptPoints:
-    """The k gather points that stay of an earlier bake.
+    """The gather points that stay of an earlier bake.
 
-    Attributes
-    ----------
-    texel, level : (k,) int32, int8
-        See `GatherPoints`.
-    gathered : Gathered
-        What they meet now.
-    unsure : (n,) bool
-        Texels whose points are weighed again; further points are chosen among them.
-    farthest : (n,) float64 [m]
-        See `GatherPoints`; of the earlier bake.
-    spread : Interpolation
-        Of the earlier bake, …
-    old : (g,) int32
-        … and the texels of all of its points; −1 of those that do not stay.
+    before: All of its g points, and …
+    spread: … how they speak for its texels.
+    rows (k,) int: Those that stay.
+    gathered: What these meet now.
+    unsure (n,) bool: Texels whose points are weighed again; further points are chosen among them.
     """
 
-    texel: Array
-    level: Array
+    before: GatherPointLayout
+    spread: Interpolation
+    rows: Array
     gathered: Gathered
     unsure: Array
-    farthest: Array
-    spread: Interpolation
-    old: Array
 
     def of_level(self, level: int) -> tuple[Array, Gathered]:
         """Return the texels of a level's points, and what they meet."""
-        mine = self.level == level
-        found = self.gathered
+        mine, found = self.before.level[self.rows] == level, self.gathered
         kept = Gathered(found.sources[mine], found.closeness[mine], found.aimed.of_points(mine))
-        return self.texel[mine], kept
+        return self.before.texel[self.rows[mine]], kept
 
     def refitted(self, points: GatherPoints, geometry: TexelGeometry) -> Interpolation:
         """Return how `points`, these and further ones, speak for the texels."""
-        number = np.full(len(geometry), -1, dtype=np.int32)
-        number[points.texel] = np.arange(len(points))
-        renumbered = np.where(self.old >= 0, number[self.old], -1)
-        return refit(points, geometry, self.spread, renumbered, self.unsure)
+        of_texel = np.full(len(geometry), -1, dtype=np.int32)
+        of_texel[points.texel] = np.arange(len(points))
+        number = np.full(len(self.before.texel), -1, dtype=np.int32)
+        number[self.rows] = of_texel[self.before.texel[self.rows]]
+        return refit(points, geometry, self.spread, number, self.unsure)
 
 
 def gather_texels(
@@ -89,7 +79,7 @@ def gather_texels(
     geometry = crossings.geometry
     points = GatherPoints(geometry, local.caster, crossings.alone, local.threads)
     if kept is not None:
-        points.farthest = np.where(kept.unsure, np.inf, kept.farthest)
+        points.farthest = np.where(kept.unsure, np.inf, kept.before.farthest)
     aimed: list[AimedRays] = []
     first: list[int] = []
     sources = geometry.scratch.rows(settings.rays, np.int32)
@@ -174,7 +164,7 @@ def _choose(
     candidates = _on_lattice(crossings.geometry, stride)
     if kept is not None:
         candidates &= kept.unsure
-        candidates[kept.texel] = False
+        candidates[kept.before.texel[kept.rows]] = False
     if len(points):
         candidates[points.texel] = False
     candidates = row_numbers(candidates)
