@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from radiosity_addon.lightmap.lighting.gather_settings import GatherSettings
-from radiosity_addon.lightmap.lighting.hit_table import WIDE
 
+from radiosity_addon.lightmap.lighting.reconstruction import light_texels
+from radiosity_addon.lightmap.transport.gather_settings import GatherSettings
+from radiosity_addon.lightmap.transport.hit_table import WIDE
 from radiosity_addon.lights.sun_and_sky import PointLight
 from radiosity_addon.solver import Scene, SolverSettings, solve
 from tests.rooms import gray, rectangle
