@@ -14,15 +14,14 @@ import numpy as np
 from ..base import SILENT, BakeError, Progress, SceneError, UsageError
 from ..lightmap.images import LightmapPage, Seams, find_seams, texel_pages, turned_away
 from ..lightmap.lighting import (
-    GatherSettings,
     LightSoFar,
-    TexelLight,
+    light_texels,
     light_within,
-    reconstruct,
     residual_summary,
     texel_residual,
 )
 from ..lightmap.texels import FOOTPRINT, TexelGeometry, rasterize, texel_materials
+from ..lightmap.transport import GatherSettings, TexelLight
 from ..lightmap.unwrap import Atlas, AtlasInput, AtlasOptions, Limits, build_atlas, padding_for
 from ..numerics import Array, Scratch, tiles
 from ..options import BakeSettings
@@ -307,7 +306,7 @@ def _texel_values(
     relightable = solution.relightable(bake_scene.emitter) if keep else None
     local = solution.local_pass if relightable is None else relightable.local
     if settings.relative_error is None:
-        light = reconstruct(bake_scene.scene, local, geometry, gather, so_far, progress)
+        light = light_texels(bake_scene.scene, local, geometry, gather, so_far=so_far, progress=progress)
     else:
         light = light_within(
             bake_scene.scene,

@@ -1,7 +1,8 @@
 """A solved scene whose triangles have moved, by the elements that it was solved with.
 
 What rays met is numbered by these elements, so they move with their faces. Their light is not solved
-again: texels bring what has changed (`lightmap/update/moved.py`), and the hierarchy is where they start.
+again: texels bring what has changed (`lightmap/lighting/reconstruction.py`), and the hierarchy is where they
+start.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ from radiosity_addon.bake.relight.kept_bake import KeptBake, relight_pages
 from radiosity_addon.bake.relight.source_strengths import strengths_in
 from radiosity_addon.base.errors import SceneError, UsageError
 from radiosity_addon.lightmap.images.page import LightmapPage
-from radiosity_addon.lightmap.lighting.warm_start import WarmStart
+from radiosity_addon.lightmap.transport.warm_start import WarmStart
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import PointLight, Scene

@@ -7,7 +7,7 @@ import pytest
 
 from radiosity_addon.bake.relight.light_groups import split_by_group
 from radiosity_addon.base.errors import SceneError
-from radiosity_addon.lightmap.lighting.warm_start import MOST, WarmStart
+from radiosity_addon.lightmap.transport.warm_start import MOST, WarmStart
 from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.scene.faces import Faces
 from radiosity_addon.solver import PointLight, Scene

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from radiosity_addon.bake.texel_memory import LIT_BYTES
-from radiosity_addon.lightmap.lighting import gather_links, source_means, sweeps
-from radiosity_addon.lightmap.lighting.gather_links import GatherLinks
-from radiosity_addon.lightmap.lighting.sub_cells import SubCells
-from radiosity_addon.lightmap.lighting.sweeps import TexelLight, TexelTransport, sweep
 from radiosity_addon.lightmap.points.interpolation import Interpolation
 from radiosity_addon.lightmap.points.point_grid import PointGrid
 from radiosity_addon.lightmap.texels.occlusion import Crossings
+from radiosity_addon.lightmap.transport import gather_links, source_means, sweeps
+from radiosity_addon.lightmap.transport.gather_links import GatherLinks
+from radiosity_addon.lightmap.transport.sub_cells import SubCells
+from radiosity_addon.lightmap.transport.sweeps import TexelLight, TexelTransport, sweep
 from radiosity_addon.numerics import scratch as scratch_module
 from radiosity_addon.numerics.scratch import Scratch, is_in_file, trim
 from radiosity_addon.solver import PointLight, SolverSettings, solve

@@ -9,8 +9,8 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from ...lightmap.images import light_statistics, lit_texels
-from ...lightmap.lighting import TexelLight
 from ...lightmap.texels import ENCLOSED, NO_TEXEL_HERE, TOUCHED, TexelGeometry
+from ...lightmap.transport import TexelLight
 from ...numerics import Array, luminous, tiles
 from ...options import EFFICACY
 from ...scene import BakeObject

@@ -278,37 +278,6 @@ def fit(points: GatherPoints, geometry: TexelGeometry, progress: Progress = SILE
     return Interpolation(first, point.all()[:, 0], weight.all()[:, 0])
 
 
-def refit(points: GatherPoints, geometry: TexelGeometry, texels: Array) -> tuple[Array, Array, Array]:
-    """Weigh the gather points around some texels, in ascending order, as `fit` does.
-
-    Returns
-    -------
-    count : (k,) int
-        Entries of each texel.
-    point, weight : (m,) int32, float32
-        Texel by texel.
-
-    Raises
-    ------
-    ValueError
-        If nothing speaks for a texel.
-    """
-    counts, numbers, weights = [], [], []
-    for start in range(0, len(texels), CHUNK):
-        some = texels[start : start + CHUNK]
-        texel, point, kernel = points.weighed(some)
-        count = np.bincount(np.searchsorted(some, texel), minlength=len(some))
-        if not count.all():
-            raise ValueError("a texel has no gather point in reach: it should have become one")
-        along = geometry.position[points.texel[point]] - geometry.position[texel]
-        counts.append(count)
-        numbers.append(point.astype(np.int32))
-        weights.append(linear_weights(along, kernel, count))
-    if not counts:
-        return np.zeros(0, np.int64), np.zeros(0, np.int32), np.zeros(0, np.float32)
-    return np.concatenate(counts), np.concatenate(numbers), np.concatenate(weights)
-
-
 def linear_weights(along: Array, kernel: Array, count: Array) -> Array:
     """Return (p,) float32 weights that reproduce linear functions of the position as far as damping allows.
 
