@@ -15,13 +15,9 @@ from radiosity_addon.solver.emitters.emitters import EmitterGroup
 from radiosity_addon.solver.gather.footprints import Footprints, SpreadPoints
 from radiosity_addon.solver.gather.soft_shadows import ShadowShare
 from tests.rooms import gray_scene, rectangle
+from tests.vectors import normals_of
 
 OFFSET = 1e-6
-
-
-def normals_of(triangles: np.ndarray) -> np.ndarray:
-    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    return cross / np.linalg.norm(cross, axis=1, keepdims=True)
 
 
 def group_of(triangles: np.ndarray, offset: float = OFFSET) -> EmitterGroup:
