@@ -201,7 +201,7 @@ def finish(
         solver=report,
         warnings=warnings,
         seconds=seconds,
-        atlas=_told(atlas, pages),
+        atlas=_page_facts(atlas, pages),
         groups=groups,
         light=light,
         details=details,
@@ -347,7 +347,7 @@ def _check(report: dict[str, Any], pages: tuple[LightmapPage, ...]) -> None:
         )
 
 
-def _told(atlas: Atlas, pages: tuple[LightmapPage, ...]) -> tuple[dict[str, float], ...]:
+def _page_facts(atlas: Atlas, pages: tuple[LightmapPage, ...]) -> tuple[dict[str, float], ...]:
     """Return what the report says of each page."""
     return tuple(
         {
