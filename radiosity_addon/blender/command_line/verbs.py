@@ -57,7 +57,7 @@ def bake(
     plot : Path or None
         Where the history is drawn to.
     keep : bool
-        Whether a sidecar is written, by which the bake can be lit anew.
+        Whether a sidecar is written, by which the bake can be relit.
     allowed : Permissions
     console : Console
     interrupts : Interrupts

@@ -38,7 +38,7 @@ def rewrite(mark: str, pages: Sequence[LightmapPage], groups: Sequence[LightGrou
     groups : sequence of LightGroup
         Of its light groups, if it has any.
     seconds : float
-        How long lighting anew took, for the report.
+        How long relighting took, for the report.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def check_images(images: Images, pages: Sequence[LightmapPage]) -> None:
 
 
 def store(images: Sequence[bpy.types.Image], seconds: float) -> None:
-    """Write the images to their files, and to the report beside them; pack anew those that are packed.
+    """Write the images to their files, and to the report beside them; pack those that are packed again.
 
     Only files that a report of their scene lists are replaced, wherever the images point.
 

@@ -26,10 +26,10 @@ from ..materials.materials import Surface, ray_doubts, read_material, uses_nodes
 from ..materials.shading_inputs import (
     MeshValues,
     asked_by_material,
-    doubts,
     eevee_only,
     read_mesh_inputs,
     read_object_inputs,
+    unreliable_nodes,
 )
 from ..scene_records.export_sources import MaterialSource
 from ..scene_records.light_linking import linking_warnings
@@ -295,8 +295,8 @@ class _Collector:
                 warnings += _warnings_of(material, ray_doubts(material, surface))
             if material is not None and surface.varies:
                 asked = asked_by_material(material.node_tree)
-                doubted = _warnings_of(material, doubts(material.node_tree))
-                warnings += doubted if can_evaluate() else surface.fallbacks
+                unreliable = _warnings_of(material, unreliable_nodes(material.node_tree))
+                warnings += unreliable if can_evaluate() else surface.fallbacks
             self._surface_of[key] = len(self._surfaces)
             of = (
                 None if material is None else MaterialSource.of(material.original, name_on(material.original))

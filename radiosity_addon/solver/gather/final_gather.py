@@ -177,7 +177,7 @@ class Gathering:
             In order of the rows.
         directions : (p, 3) float32
         stale : (p,) bool
-            Whether what was hit must be numbered anew even if it is hit again.
+            Whether what was hit must be numbered again even if it is hit again.
         casters : RayCaster twice
             Of what moved alone, where it was and where it is: who meets none of it has not changed. And of
             the scene as it was: it tells how far rays went.

@@ -18,7 +18,7 @@ from .final_gather import CHUNK_RAYS, Gathered, Gathering
 from .hit_numbers import UNNUMBERED
 
 RENEWED = 0.3
-"""A point whose closeness falls by more than this part is gathered from anew: what single rays take off
+"""A point whose closeness falls by more than this part is gathered again: what single rays take off
 a sum that a few very short ones dominate may leave anything, even less than nothing."""
 
 
@@ -70,7 +70,7 @@ class Retracing:
     """Traces again what the boxes touch.
 
     Which bright elements a point aims at decides what its other rays leave out. So where an aimed ray is
-    touched, or another one meets a bright element now, the point is gathered from anew as a whole.
+    touched, or another one meets a bright element now, the point is gathered again as a whole.
 
     Parameters
     ----------
