@@ -19,7 +19,7 @@ from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import PointLight, Scene
 from tests.cornell import cornell_box
 from tests.relit_rooms import BAKED, CHANGED, NAMES, lit_bake
-from tests.rooms import box_room, gray
+from tests.rooms import box_room, gray_scene
 from tests.textured_rooms import furnace
 from tests.unit.texel_scenes import bake_scene
 
@@ -119,7 +119,7 @@ def test_a_room_baked_in_the_dark_can_be_lit() -> None:
 
     def lit(power: float) -> BakeScene:
         lamp = PointLight((0.5, 0.4, 0.6), power, radius=0.05)
-        return bake_scene(Scene(triangles, gray(12, 0.6), gray(12, 0.0), lights=[lamp]), ("Room", 12))
+        return bake_scene(gray_scene(triangles, 0.6, lights=[lamp]), ("Room", 12))
 
     _, kept = bake_and_keep(lit(0.0), SETTINGS)
     found = pixels(relight_pages(kept, np.full((1, 3), 12.0)))

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 
-import radiosity_addon
 from radiosity_addon.base.errors import BakeError, SceneError
 from radiosity_addon.blender.datablocks.bake_record import is_baked, shows_lightmap
 from radiosity_addon.blender.files.cornell import build_cornell_box
@@ -26,14 +24,12 @@ QUICK = BakeSettings(resolution=32, quality="draft")
 
 
 @pytest.fixture(autouse=True)
-def box() -> Iterator[bpy.types.Scene]:
+def box(registered: None) -> bpy.types.Scene:
     """The Cornell box, with the panel set to a quick bake."""
-    radiosity_addon.register()
     scene = build_cornell_box()
     scene.radiosity.resolution = QUICK.resolution
     scene.radiosity.quality = QUICK.quality
-    yield scene
-    radiosity_addon.unregister()
+    return scene
 
 
 def bake() -> set[str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
@@ -37,14 +36,12 @@ def baked(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def room(baked: Path, tmp_path: Path) -> Iterator[Path]:
+def room(registered: None, baked: Path, tmp_path: Path) -> Path:
     """The folder of a room that was baked and saved, and is open."""
     folder = tmp_path / "room"
     shutil.copytree(baked, folder)
-    radiosity_addon.register()
     bpy.ops.wm.open_mainfile(filepath=str(folder / "room.blend"))
-    yield folder
-    radiosity_addon.unregister()
+    return folder
 
 
 def files(folder: Path) -> list[str]:

@@ -6,7 +6,7 @@ Made by `tests/fixtures/make_fixtures.py` with Blender 4.2. Either way nothing i
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import bpy
@@ -35,14 +35,12 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def opened(folder: Path) -> Iterator[Path]:
+def opened(registered: None, folder: Path) -> Path:
     """The file that was baked from the panel, open."""
-    radiosity_addon.register()
     before = tree(folder)
     bpy.ops.wm.open_mainfile(filepath=str(folder / "kitchen.blend"))
     assert changes(before, tree(folder)) == [], "opening the file changed something on disk"
-    yield folder
-    radiosity_addon.unregister()
+    return folder
 
 
 def done_or_refused(operator: Callable[..., set[str]], *names: str) -> bool:

@@ -12,7 +12,6 @@ from unittest.mock import MagicMock
 import bpy
 import pytest
 
-import radiosity_addon
 from radiosity_addon.bake.keep import KeepOptions
 from radiosity_addon.base.errors import BakeError, RadiosityError
 from radiosity_addon.blender.datablocks.bake_record import recorded_objects
@@ -28,13 +27,11 @@ QUICK = BakeSettings(resolution=16, quality="draft")
 
 
 @pytest.fixture(autouse=True)
-def box() -> Iterator[bpy.types.Scene]:
-    radiosity_addon.register()
+def box(registered: None) -> bpy.types.Scene:
     scene = build_cornell_box()
     textured("Floor")
     bpy.ops.ed.undo_push(message="Box")
-    yield scene
-    radiosity_addon.unregister()
+    return scene
 
 
 def textured(name: str) -> None:

@@ -6,14 +6,12 @@ import json
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import bpy
 import pytest
 
-import radiosity_addon
 from radiosity_addon.base.errors import BakeError
 from radiosity_addon.base.steps import drain
 from radiosity_addon.blender.files.cornell import build_cornell_box
@@ -27,18 +25,13 @@ from radiosity_addon.files.file_names import BLEND_NAME, PREVIEW_NAME
 from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.scenes import QUAD, add_lamp, add_mesh, set_world
 
+pytestmark = pytest.mark.usefixtures("registered")
+
 ROOT = Path(__file__).resolve().parents[2]
 SETTINGS = BakeSettings(resolution=256)
 
 CUBE = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
 CUBE_FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-
-
-@pytest.fixture(autouse=True)
-def registered() -> Iterator[None]:
-    radiosity_addon.register()
-    yield
-    radiosity_addon.unregister()
 
 
 def look(tmp_path: Path, settings: BakeSettings = SETTINGS) -> Inspection:

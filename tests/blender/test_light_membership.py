@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import bpy
 import pytest
 
-import radiosity_addon
 from radiosity_addon.blender.scene_export.export import export_scene
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
@@ -16,11 +13,8 @@ from tests.wording import says
 
 
 @pytest.fixture(autouse=True)
-def floor() -> Iterator[None]:
-    radiosity_addon.register()
+def floor(registered: None) -> None:
     add_mesh("Floor")
-    yield
-    radiosity_addon.unregister()
 
 
 def collection(

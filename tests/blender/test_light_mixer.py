@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 
-import radiosity_addon
 from radiosity_addon.base.errors import BakeError
 from radiosity_addon.blender.apply.restore import restore
 from radiosity_addon.blender.datablocks.bake_record import made_datablocks
@@ -35,10 +33,8 @@ from tests.blender.hand_bake import BASE, add_plane, bake_by_hand, principled_ma
 
 
 @pytest.fixture(autouse=True)
-def plane() -> Iterator[bpy.types.Object]:
-    radiosity_addon.register()
-    yield lit_plane()
-    radiosity_addon.unregister()
+def plane(registered: None) -> bpy.types.Object:
+    return lit_plane()
 
 
 def seen(folder: Path) -> np.ndarray:

@@ -148,7 +148,6 @@ def test_undo_takes_the_light_back_with_the_lamp(live: bpy.types.WindowManager) 
 
 
 def test_a_slider_may_move_before_the_first_exact_light_is_there(saved: Path) -> None:
-    """It died of arrays that did not fit each other."""
     bpy.ops.wm.open_mainfile(filepath=str(saved))
     bpy.context.window_manager.radiosity_live = True
     assert session.live.step(in_background=True), session.live_message

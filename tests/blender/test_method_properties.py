@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from types import SimpleNamespace
 
 import bpy
 import pytest
 
-import radiosity_addon
 from radiosity_addon.blender.panels import bake_panel
 from radiosity_addon.blender.panels.option_rows import draw_options
 from radiosity_addon.blender.settings.properties import settings_of
@@ -44,11 +42,9 @@ class Layout:
 
 
 @pytest.fixture(autouse=True)
-def group() -> Iterator[bpy.types.PropertyGroup]:
+def group(registered: None) -> bpy.types.PropertyGroup:
     """The panel's settings."""
-    radiosity_addon.register()
-    yield bpy.context.scene.radiosity
-    radiosity_addon.unregister()
+    return bpy.context.scene.radiosity
 
 
 def drawn() -> list[str]:

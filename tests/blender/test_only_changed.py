@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 
-import radiosity_addon
 from radiosity_addon.base.errors import BakeError
 from radiosity_addon.blender.datablocks.bake_record import mark_made, recorded_objects
 from radiosity_addon.blender.material_copies.copy_marks import ADDED
@@ -22,9 +20,8 @@ from tests.wording import one_says
 
 
 @pytest.fixture(autouse=True)
-def room(tmp_path: Path) -> Iterator[Path]:
+def room(registered: None, tmp_path: Path) -> Path:
     """A saved room of three objects, baked on one page; the folder of its lightmaps."""
-    radiosity_addon.register()
     add_mesh("Floor", material=shader_material("Gray", "ShaderNodeBsdfDiffuse", Color=(0.5, 0.5, 0.5, 1)))
     add_mesh("Shelf", location=(0, 0, 1), scale=(0.3, 0.3, 1))
     add_mesh("Box", location=(1, 1, 0.5), scale=(0.2, 0.2, 1))
@@ -34,8 +31,7 @@ def room(tmp_path: Path) -> Iterator[Path]:
     bpy.context.scene.radiosity_relight.only_moved = False
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
     assert bake() == {"FINISHED"}
-    yield tmp_path / "lightmaps"
-    radiosity_addon.unregister()
+    return tmp_path / "lightmaps"
 
 
 def bake() -> set[str]:

@@ -9,7 +9,6 @@ import bpy
 import numpy as np
 import pytest
 
-import radiosity_addon
 from radiosity_addon.bake.pipeline import bake
 from radiosity_addon.base.errors import UsageError
 from radiosity_addon.base.steps import drain
@@ -26,13 +25,6 @@ from tests.blender.scenes import (
     set_world,
     shader_material,
 )
-
-
-@pytest.fixture
-def registered():
-    radiosity_addon.register()
-    yield
-    radiosity_addon.unregister()
 
 
 def other_surface(kind: str) -> bpy.types.Object:

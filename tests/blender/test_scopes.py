@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
 import pytest
 
-import radiosity_addon
 from radiosity_addon.base.errors import BakeError
 from radiosity_addon.blender.apply.restore import restore
 from radiosity_addon.blender.apply.scopes import files_of
@@ -27,9 +25,8 @@ QUICK = BakeSettings(resolution=32, quality="draft")
 
 
 @pytest.fixture(autouse=True)
-def scenes() -> Iterator[tuple[bpy.types.Scene, bpy.types.Scene]]:
+def scenes(registered: None) -> tuple[bpy.types.Scene, bpy.types.Scene]:
     """Two scenes; one object is in both."""
-    radiosity_addon.register()
     first = bpy.context.scene
     gray = shader_material("Gray", "ShaderNodeBsdfDiffuse", Color=(0.5, 0.5, 0.5, 1))
     for name, x in (("A1", 0), ("A2", 3)):
@@ -43,8 +40,7 @@ def scenes() -> Iterator[tuple[bpy.types.Scene, bpy.types.Scene]]:
         first.collection.objects.unlink(obj)
         second.collection.objects.link(obj)
     second.collection.objects.link(both)
-    yield first, second
-    radiosity_addon.unregister()
+    return first, second
 
 
 def bake(scene: bpy.types.Scene, output: Path | None = None, **settings: object) -> list[tuple[str, str]]:

@@ -15,7 +15,7 @@ from radiosity_addon.lightmap.transport.sub_cells import SWEEPS, SubCellLinks, S
 from radiosity_addon.lightmap.transport.sweeps import TexelLight, TexelTransport, sweep
 from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, SolverSettings, solve
 from radiosity_addon.solver.gather.hit_numbers import NOTHING, SKY
-from tests.rooms import box_room, gray, rectangle
+from tests.rooms import box_room, gray, gray_scene, rectangle
 from tests.unit.texel_scenes import QUAD_UV, texel_geometry
 
 
@@ -118,7 +118,7 @@ def test_direct_and_indirect_are_apart() -> None:
     wall = rectangle((0, 0, 0), (0, 2, 0), (0, 0, 2))  # looks along +x, the lamp stands behind its plane
     triangles = np.concatenate([floor, wall])
     lamp = PointLight((-0.5, 1, 3.0), 100.0)
-    scene = Scene(triangles, gray(4, 0.5), gray(4, 0.0), lights=[lamp])
+    scene = gray_scene(triangles, lights=[lamp])
     uv = np.concatenate([QUAD_UV * [0.5, 1], QUAD_UV * [0.5, 1] + np.array([0.5, 0])]).astype(np.float32)
     light = reconstructed(scene, texel_geometry(scene, uv, 16))
     on_wall = texel_geometry(scene, uv, 16).triangle >= 2
