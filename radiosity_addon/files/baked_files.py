@@ -13,14 +13,14 @@ import stat
 from collections.abc import Callable, Generator, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
+from ..base import drain
 from .file_names import BLEND_NAME, REPORT_NAME, is_bake_name
 
 LISTED, OWNER, SEAL = "files", "baked", "seal"
 """Keys of a report."""
 
-T = TypeVar("T")
 
 _CHUNK = 1 << 20
 _MAX_REPORT = 256 * 2**20
@@ -123,7 +123,7 @@ def entry(path: Path) -> dict[str, Any]:
 
 def digest_of_file(path: Path) -> str:
     """Return a file's SHA-256."""
-    return _drained(digest_steps(path))
+    return drain(digest_steps(path))
 
 
 def digest_steps(path: Path) -> Generator[None, None, str]:
@@ -149,7 +149,7 @@ def entries(new: Iterable[Path], folder: Path, earlier: Report | None) -> dict[s
 
 def is_as_written(path: Path, listed: Mapping[str, Any]) -> bool:
     """Return whether a file is, to the byte, what a bake wrote."""
-    return _drained(is_as_written_steps(path, listed))
+    return drain(is_as_written_steps(path, listed))
 
 
 def is_as_written_steps(path: Path, listed: Mapping[str, Any]) -> Generator[None, None, bool]:
@@ -169,16 +169,6 @@ def without(report: Report, names: Iterable[str]) -> dict[str, Any]:
     return sealed(
         {**report, LISTED: {name: listed for name, listed in report[LISTED].items() if name not in gone}}
     )
-
-
-def _drained(steps: Generator[None, None, T]) -> T:
-    """Run steps to their end and return their result."""
-    while True:
-        try:
-            next(steps)
-        except StopIteration as done:
-            result: T = done.value
-            return result
 
 
 def _seal_of(report: Report) -> str:
