@@ -231,9 +231,9 @@ def test_other_changes_are_refused(kept: KeptBake) -> None:
     uv = kept.geometry.uv
     laid_out = laid_out_as(plain, uv)
     assert moved_objects(kept, laid_out) == ("Box",)
-    with pytest.raises(SceneError, match="'Room' has other lightmap coordinates"):
+    with pytest.raises(SceneError, match=r"'Room'.*coordinates"):
         moved_objects(kept, laid_out_as(plain, 0.5 * uv))
-    with pytest.raises(SceneError, match="'Room' has other lightmap coordinates"):
+    with pytest.raises(SceneError, match=r"'Room'.*coordinates"):
         moved_objects(replace(kept, bake_scene=laid_out), plain)
     mesh = replace(plain.objects[1], polygon=plain.objects[1].polygon[::-1])
     with pytest.raises(SceneError, match="'Box' has another mesh"):

@@ -141,7 +141,7 @@ def test_strengths_are_read_from_a_changed_scene(room: KeptBake) -> None:
     other = lit_bake(CHANGED)
     lights = other.scene.lights
     other.scene.lights = (PointLight((2.2, 0.6, 1.4), 5.0, radius=0.05, name="Bulb"), *lights[1:])
-    with pytest.raises(SceneError, match="'Bulb' has changed in more than its strength"):
+    with pytest.raises(SceneError, match=r"'Bulb'.*strength"):
         strengths_in(room, other)
 
 
@@ -188,7 +188,7 @@ def test_groups_add_up_before_what_sweeps_leave_is_shared_out(room: KeptBake) ->
 
 
 def test_groups_that_cannot_be_are_refused() -> None:
-    with pytest.raises(UsageError, match="there is no lamp, emissive material or world 'Moon'"):
+    with pytest.raises(UsageError, match="'Moon'"):
         bake(lit_bake(), BakeSettings(resolution=16, quality="draft", groups=(("Night", ("Moon",)),)))
     with pytest.raises(UsageError, match="'Sun' is given twice"):
         BakeSettings(groups=(("Day", ("Sun",)), ("Noon", ("Sun",))))

@@ -171,7 +171,7 @@ def test_each_method_silences_its_own_weights() -> None:
     quadratures = np.array([area.norm("constant", points=points)[0] for points in (1, 2, 3)])
     assert (quadratures[1:] < 0.4 * quadratures[:-1]).all()
     assert quadratures[-1] < 0.05 * point.norm("constant", points=3)[0]
-    with pytest.raises(ValueError, match="'cubic' are not 'constant' or 'delta'"):
+    with pytest.raises(ValueError, match="'cubic'"):
         point.norm("cubic")
 
 
@@ -225,5 +225,5 @@ def test_a_solution_tells_its_residual_at_either_side() -> None:
     found = solution.residual(triangle, weights)
     np.testing.assert_allclose(found, Residual(state).at(triangle, weights), atol=1e-15)
     np.testing.assert_allclose(solution.residual(triangle, weights, rays=1024), found, atol=0.02)
-    with pytest.raises(ValueError, match="triangle 0 has no area or no such side"):
+    with pytest.raises(ValueError, match="triangle 0"):
         solution.residual(triangle, weights, front=False)

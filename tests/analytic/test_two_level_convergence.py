@@ -82,7 +82,7 @@ def shadowed() -> tuple[Scene, np.ndarray]:
 def direct_light(state: SolverState, points: np.ndarray) -> np.ndarray:
     """(p,) H at points of the floor by exact factors and many shadow rays."""
     up = np.tile([0.0, 0.0, 1.0], (len(points), 1))
-    return LocalPass.of(state).direct(Footprints(points, up, np.arange(len(points))), rays=64)[:, 0]
+    return LocalPass.of(state).direct.at(Footprints(points, up, np.arange(len(points))), rays=64)[:, 0]
 
 
 def at_shadow_edges(truth: np.ndarray) -> np.ndarray:

@@ -255,7 +255,7 @@ def test_only_the_folder_of_a_bake_of_this_scene_is_opened(
     from radiosity_addon.blender.operators import bake_operators
 
     opened = []
-    monkeypatch.setattr(bake_operators, "_open", lambda folder: opened.append(folder))
+    monkeypatch.setattr(bake_operators, "show_folder", opened.append)
     assert bpy.ops.radiosity.open_folder() == {"FINISHED"}
     (room / "lightmaps" / "room_Scene_report.json").rename(room / "lightmaps" / "notes.json")
     with pytest.raises(RuntimeError, match="no bake of this scene"):

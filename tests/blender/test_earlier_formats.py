@@ -171,7 +171,7 @@ def test_each_format_of_sidecars_is_relit_or_refused_by_name_and_restored(
             assert bpy.ops.radiosity.relight("EXEC_DEFAULT", True) == {"FINISHED"}
             assert max(mean_of(image) / old for image, old in zip(lightmaps(), light, strict=True)) > 1.5
         else:
-            with pytest.raises(RuntimeError, match=f"it has format {number}, .*; bake again"):
+            with pytest.raises(RuntimeError, match=f"format {number}.*bake again"):
                 bpy.ops.radiosity.relight("EXEC_DEFAULT", True)
             assert changes(before, tree(place)) == []
         assert bpy.ops.radiosity.restore("EXEC_DEFAULT", True) == {"FINISHED"}

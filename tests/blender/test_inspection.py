@@ -124,7 +124,7 @@ def test_files_of_the_last_bake_are_replaced_and_not_odd(tmp_path: Path) -> None
     assert ERROR not in {finding.level for finding in found.findings}
     (tmp_path / "lightmap.exr").write_text("changed")
     found = inspect(bpy.context, settings, tmp_path, OutputFolder(tmp_path))
-    assert "was changed since it was baked" in found.findings[0].message
+    assert "changed" in found.findings[0].message
 
 
 def test_darkness_is_told_of(tmp_path: Path) -> None:
@@ -140,7 +140,7 @@ def test_hidden_objects_are_told_of(tmp_path: Path) -> None:
     add_mesh("Left out", location=(3, 0, 0)).hide_render = True
     add_mesh("Unseen", location=(6, 0, 0)).hide_set(True)
     found = odd(look(tmp_path))
-    assert "left out of the bake" in found["Left out"]
+    assert "left out" in found["Left out"]
     assert "part of the bake" in found["Unseen"]
 
 

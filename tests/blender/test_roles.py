@@ -90,7 +90,7 @@ def test_the_users_modes(registered: None) -> None:
         "Gone": (False, 0),
     }
     assert found["Floor"].texel_scale == 2.5
-    with pytest.raises(UsageError, match="'Lighting' is light only or ignored"):
+    with pytest.raises(UsageError, match=r"'Lighting'.*ignored"):
         export_with(objects=("Lighting",))
 
 
@@ -103,7 +103,7 @@ def test_modes_on_the_command_line_win_and_unknown_names_are_refused() -> None:
         (False, 12),
         (False, 0),
     ]
-    with pytest.raises(UsageError, match="--ignore: no object 'Chairs'; did you mean 'Chair'"):
+    with pytest.raises(UsageError, match=r"--ignore.*'Chairs'.*'Chair'"):
         export_with(ignore=("Chairs",))
     with pytest.raises(UsageError, match="both"):
         BakeSettings(objects=("Wall",), light_only=("Wall",))

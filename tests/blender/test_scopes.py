@@ -180,7 +180,7 @@ def test_a_failed_bake_of_another_scene_changes_nothing(scenes, monkeypatch: pyt
     def fail(*_: object) -> None:
         raise BakeError("the disk is full")
 
-    monkeypatch.setattr("radiosity_addon.blender.jobs.finish._report", fail)
+    monkeypatch.setattr("radiosity_addon.blender.jobs.finish.lightmap_files", fail)
     with pytest.raises(BakeError, match="full"):
         list(run_bake(bpy.context, QUICK, None))
     assert differences_since(before, dump_file()) == []

@@ -118,7 +118,7 @@ def test_rays_aim_at_the_bright_spot_on_a_large_element() -> None:
     scene = Scene(room, gray(12, 0.7), gray(12, 0.0), lights=[lamp])
     local = solve(scene, SolverSettings(error=1e-2, min_area=2e-3)).local_pass
     even = BrightElements(local.elements.state.hierarchy, local.elements.reflected())
-    spot = local.gather._bright
+    spot = local.gather.bright_elements
     np.testing.assert_array_equal(even.element, spot.element)
     plain, aimed = (sent_by_the_lamps_wall(bright, lamp) for bright in (even, spot))
     noise = np.hypot(plain.std(), aimed.std()) / np.sqrt(POINTS)

@@ -38,7 +38,7 @@ from radiosity_addon.solver import Scene, SolverSettings
 from radiosity_addon.solver.methods.hierarchical import solve
 from tests.rooms import box_room, gray, sphere
 
-def solve(triangles, **more):
+def solve_room(triangles, **more):
     emission = gray(len(triangles), 0.0)
     emission[:2] = 1.0
     scene = Scene(triangles, gray(len(triangles), 0.5), emission)
@@ -53,11 +53,11 @@ def peak():
         pass
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**30 if sys.platform == "darwin" else 2**20)
 
-solve(box_room()[0], error=0.01)
+solve_room(box_room()[0], error=0.01)
 before = peak()
 chance = np.random.default_rng(5)
 balls = [0.05 * sphere(3)[:, ::-1] + chance.uniform(0.1, 0.9, 3) for _ in range(8)]
-state = solve(np.concatenate([box_room()[0], *balls]), error=1e-6, memory_limit=float(sys.argv[1]))
+state = solve_room(np.concatenate([box_room()[0], *balls]), error=1e-6, memory_limit=float(sys.argv[1]))
 print(peak() - before, state.n_links, state.over_budget)
 sys.stdout.flush()
 os._exit(0)

@@ -163,7 +163,7 @@ def follow() -> None:
         _reload_stale()
         _begin(wanted)
         flush()
-    elif not bpy.app.timers.is_registered(_tick):
+    elif not is_at_work():
         bpy.app.timers.register(_tick, first_interval=0.0, persistent=True)
 
 
@@ -283,6 +283,11 @@ def _reload(image: bpy.types.Image) -> None:
             session.live.look_again()
 
 
+def is_at_work() -> bool:
+    """Tell whether files or images are still being brought to what undo asked for."""
+    return bpy.app.timers.is_registered(_tick)
+
+
 def _tick() -> float | None:
     """Carry on with what undo began; nothing may be raised."""
     try:
@@ -315,7 +320,7 @@ def before_saving(*_: Any) -> None:
 
 def forget(*_: Any) -> None:
     """Hold nothing any more: another file is being opened, or the extension is switched off."""
-    if bpy.app.timers.is_registered(_tick):
+    if is_at_work():
         bpy.app.timers.unregister(_tick)
     _cancel()
     if state.held is not None:

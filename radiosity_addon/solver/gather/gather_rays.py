@@ -47,7 +47,7 @@ class Gather:
         gathering = self._gathering(points, surface_normals, rays, resolve)
         if irradiance is None:
             return gathering.trace(None, np.zeros(len(points)), into, progress)
-        return gathering.trace(self._bright, irradiance, into, progress)
+        return gathering.trace(self.bright_elements, irradiance, into, progress)
 
     def again_at(
         self,
@@ -66,17 +66,18 @@ class Gather:
         gathering = self._gathering(points, surface_normals, rays, resolve)
         if irradiance is None:
             return retrace(gathering, before, None, np.zeros(len(points)), progress)
-        return retrace(gathering, before, self._bright, irradiance, progress)
+        return retrace(gathering, before, self.bright_elements, irradiance, progress)
 
     @property
     def bright(self) -> Array:
         """(e,) bool: the elements that rays are aimed at."""
         found = np.zeros(self._elements.hierarchy.n_elements, dtype=bool)
-        found[self._bright.element] = True
+        found[self.bright_elements.element] = True
         return found
 
     @cached_property
-    def _bright(self) -> BrightElements:
+    def bright_elements(self) -> BrightElements:
+        """What rays are aimed at, in proportion to what it sends."""
         return BrightElements(self._elements.hierarchy, self._elements.reflected(), self._unshadowed)
 
     def _unshadowed(self, points: Array, normals: Array) -> Array:
