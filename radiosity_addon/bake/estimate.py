@@ -1,4 +1,4 @@
-"""What a bake will be, told before it begins: pages, texels, memory and time, by rule of thumb.
+"""Estimates of a bake before it begins: pages, texels, memory and time, by rule of thumb.
 
 Nothing is unwrapped and no ray is traced. The rules were fitted to the Cornell box, the office and rooms of
 a thousand to a million triangles (bench/results), two cores; tests hold them to a factor of 2.5 there.

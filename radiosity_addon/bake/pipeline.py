@@ -86,7 +86,7 @@ def bake(bake_scene: BakeScene, settings: BakeSettings, progress: Progress = SIL
 def bake_and_keep(
     bake_scene: BakeScene, settings: BakeSettings, progress: Progress = SILENT
 ) -> tuple[BakeResult, KeptBake]:
-    """Bake lightmaps, and keep what lights them anew (`kept_bake.py`).
+    """Bake lightmaps, and keep what relighting needs (`kept_bake.py`).
 
     Every lamp is asked for with all its shadow rays, those that are dark now too, so that scenes of
     many lamps take longer than by `bake`. Parameters and errors are those of `bake`.
@@ -101,7 +101,7 @@ def bake_and_keep(
 def _bake(
     bake_scene: BakeScene, settings: BakeSettings, keep: bool, progress: Progress
 ) -> tuple[BakeResult, KeptBake | None]:
-    """Bake, and keep what lights the scene anew if asked to."""
+    """Bake, and keep what relighting needs if asked to."""
     if keep and settings.quantity == "residual":
         raise UsageError("a residual is of all light together: bake another quantity to relight it")
     if are_wanted(bake_scene, settings):
@@ -201,7 +201,7 @@ def finish(
         solver=report,
         warnings=warnings,
         seconds=seconds,
-        atlas=_told(atlas, pages),
+        atlas=_page_facts(atlas, pages),
         groups=groups,
         light=light,
         details=details,
@@ -347,7 +347,7 @@ def _check(report: dict[str, Any], pages: tuple[LightmapPage, ...]) -> None:
         )
 
 
-def _told(atlas: Atlas, pages: tuple[LightmapPage, ...]) -> tuple[dict[str, float], ...]:
+def _page_facts(atlas: Atlas, pages: tuple[LightmapPage, ...]) -> tuple[dict[str, float], ...]:
     """Return what the report says of each page."""
     return tuple(
         {

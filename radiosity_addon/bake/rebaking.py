@@ -64,11 +64,11 @@ def bake_moved(
     report = moves.solved.report
     ever = dict.fromkeys([*report.get("moved", ()), *names])
     report = {**report, "rays": local.caster.rays, "moved": list(ever)}
-    told = HierarchyReport(report, moves.solved.warnings)
+    facts = HierarchyReport(report, moves.solved.warnings)
     baked = baked_objects(bake_scene)
     more = statistics(baked, geometry, light, settings.light), None
     result, after = finish(
-        bake_scene, settings, moves.atlas, geometry, told, lit, more, seconds, progress.part(LIT, 1.0)
+        bake_scene, settings, moves.atlas, geometry, facts, lit, more, seconds, progress.part(LIT, 1.0)
     )
     assert after is not None  # it keeps what it was given
     warnings = (*result.warnings, *_resized(moved, kept.bake_scene.scene, bake_scene.scene))

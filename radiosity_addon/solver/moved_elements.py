@@ -49,7 +49,7 @@ def on_scene(hierarchy: Hierarchy, scene: Scene) -> Hierarchy:
 
 
 def carried(solved: Relightable, scene: Scene, emitter: Array | None = None) -> Relightable:
-    """Return what lights a scene anew after triangles of it have moved, its elements' light as it was.
+    """Return what relights a scene after triangles of it have moved, its elements' light as it was.
 
     Parameters
     ----------

@@ -44,7 +44,7 @@ class HierarchyReport:
 
 @dataclass(frozen=True, eq=False)
 class IncrementalState:
-    """What baking anew needs of a kept bake after some objects moved (`rebaking.py`).
+    """What an incremental bake needs of a kept bake after some objects moved (`rebaking.py`).
 
     Attributes
     ----------

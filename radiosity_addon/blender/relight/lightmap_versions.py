@@ -102,10 +102,10 @@ def _hold(output: OutputFolder) -> None:
     """Hold what is about to be replaced in a folder, with what its report says of it."""
     from .file_versions import MOST_FILES, HeldFiles  # needed when something is replaced
 
-    told = output.earlier
-    if told is None:
+    report = output.earlier
+    if report is None:
         return
-    listed = told[LISTED]
+    listed = report[LISTED]
     names = {path.name for path in output.staging.iterdir() if path.is_file()}
     if state.held is None:
         state.held = HeldFiles(Path(bpy.app.tempdir))
@@ -113,8 +113,8 @@ def _hold(output: OutputFolder) -> None:
         # What relighting needs is large, and in memory as well.
         if name != output.names.sidecar:
             state.held.hold(output.path / name, str(listed[name]["sha256"]))
-    for name in images_described(told) & listed.keys():
-        state.reports[str(listed[name]["sha256"])] = told
+    for name in images_described(report) & listed.keys():
+        state.reports[str(listed[name]["sha256"])] = report
         state.reports.move_to_end(str(listed[name]["sha256"]))
     while len(state.reports) > MOST_FILES:
         state.reports.popitem(last=False)
@@ -253,12 +253,12 @@ def _report_with(output: OutputFolder, wanted: Sequence[Wanted]) -> BakeReport:
     from ...bake.result import BakeReport
 
     now = output.earlier or {}
-    told = next((state.reports[one.version] for one in wanted if one.version in state.reports), now)
-    before, listed = (report.get(LISTED, {}) for report in (told, now))
+    stored = next((state.reports[one.version] for one in wanted if one.version in state.reports), now)
+    before, listed = (report.get(LISTED, {}) for report in (stored, now))
     if before.get(output.names.sidecar) != listed.get(output.names.sidecar):
         # Its sidecar is not there any more.
-        told = {key: value for key, value in told.items() if key != KEPT}
-    return BakeReport(dict(told))
+        stored = {key: value for key, value in stored.items() if key != KEPT}
+    return BakeReport(dict(stored))
 
 
 def _is_stale(image: bpy.types.Image) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -67,17 +66,13 @@ def _footprints(geometry: TexelGeometry, chosen: Array, lift: SmoothLift) -> Foo
         geometry.normal[chosen],
         chosen,
         partial(sample_of, geometry, chosen),
-        _neighbors(geometry, chosen),
+        partial(_neighbors, geometry, chosen),
         lift=lift.of(chosen),
     )
 
 
-def _neighbors(geometry: TexelGeometry, chosen: Array) -> Callable[[Array], Array]:
-    """Return what grows a mask of some texels by their neighbors among these."""
-
-    def near(mask: Array) -> Array:
-        every = np.zeros(len(geometry), dtype=bool)
-        every[chosen] = mask
-        return np.asarray(geometry.neighborhood(every)[chosen])
-
-    return near
+def _neighbors(geometry: TexelGeometry, chosen: Array, mask: Array) -> Array:
+    """Grow a mask of some texels by their neighbors among these."""
+    every = np.zeros(len(geometry), dtype=bool)
+    every[chosen] = mask
+    return np.asarray(geometry.neighborhood(every)[chosen])
