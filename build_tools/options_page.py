@@ -35,7 +35,7 @@ underscores, except: {exceptions}."""
 
 METHODS_TEXT = """\
 A setting that the method does not have is a usage error. What is not given comes from the quality; in the
-panel, 0 leaves a number to it."""
+panel, such a number shows *set by quality* until a value is entered."""
 
 
 def page() -> str:

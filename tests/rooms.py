@@ -74,6 +74,13 @@ def gray(count: int, value: float) -> np.ndarray:
     return np.full((count, 3), float(value))
 
 
+def gray_scene(triangles: np.ndarray, reflectance: float = 0.5, emission: Any = 0.0, **more: Any) -> Scene:
+    """Return a scene of one reflectance, and of one emission or the (t, 3) emission given."""
+    count = len(triangles)
+    emission = gray(count, emission) if np.ndim(emission) == 0 else emission
+    return Scene(triangles, gray(count, reflectance), emission, **more)
+
+
 def area_mean(values: np.ndarray, areas: np.ndarray) -> np.ndarray:
     """Return the (3,) area-weighted mean of (t, 3) values."""
     return np.asarray(areas @ values / areas.sum())

@@ -17,7 +17,7 @@ from radiosity_addon.solver.equations.linear_system import LinearSystem
 from radiosity_addon.solver.hierarchy.basis import Basis, constant_basis
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from tests.cornell import cornell_box
-from tests.rooms import CEILING, box_room, gray
+from tests.published import shining_cube
 
 
 def assembled(scene: Scene, elements: int, assembly: str) -> tuple[Hierarchy, Basis, LinearSystem]:
@@ -41,9 +41,7 @@ def cornell_system(assembly: str = "galerkin", elements: int = 200) -> LinearSys
 @cache
 def cube_system(assembly: str = "galerkin", elements: int = 192) -> LinearSystem:
     """A closed unit cube, ρ = 0.5, its ceiling shining."""
-    triangles, surface = box_room()
-    emission = gray(len(triangles), 1.0) * (surface == CEILING)[:, None]
-    return assembled(Scene(triangles, gray(len(triangles), 0.5), emission), elements, assembly)[2]
+    return assembled(shining_cube(), elements, assembly)[2]
 
 
 def with_reflectance(system: LinearSystem, value: float) -> LinearSystem:

@@ -8,7 +8,7 @@ import numpy as np
 
 from radiosity_addon.scene.textures import SurfaceImages
 from radiosity_addon.solver import Scene
-from tests.rooms import box_room, gray, rectangle
+from tests.rooms import box_room, gray_scene, rectangle
 from tests.unit.texel_scenes import QUAD_UV
 
 
@@ -42,9 +42,7 @@ def furnace(level: float = 3.0, opacity: Any = None, seed: int = 0) -> Scene:
     uv = np.tile(QUAD_UV, (6, 1, 1))
     if opacity is None:
         count = len(room)
-        return Scene(
-            room, gray(count, 0), gray(count, 0), images=SurfaceImages(values, uv, np.ones(count, bool))
-        )
+        return gray_scene(room, 0, images=SurfaceImages(values, uv, np.ones(count, bool)))
     triangles = np.concatenate([room, rectangle((1, 0, 0), (0, 1, 0), (0, 0, 1))])
     count = len(triangles)
     # The walls take the left half of the image, the screen the right one.
@@ -53,10 +51,4 @@ def furnace(level: float = 3.0, opacity: Any = None, seed: int = 0) -> Scene:
     inset = np.array([30 / 64, 1.0]), np.array([33 / 64, 0.0])
     uv = np.concatenate([uv * inset[0], QUAD_UV * inset[0] + inset[1]])
     two_sided = np.arange(count) >= len(room)
-    return Scene(
-        triangles,
-        gray(count, 0),
-        gray(count, 0),
-        two_sided=two_sided,
-        images=SurfaceImages(both, uv, np.ones(count, bool)),
-    )
+    return gray_scene(triangles, 0, two_sided=two_sided, images=SurfaceImages(both, uv, np.ones(count, bool)))

@@ -1,4 +1,4 @@
-"""What a bake will be, told before it begins: pages, texels, memory and time, by rule of thumb.
+"""Estimates of a bake before it begins: pages, texels, memory and time, by rule of thumb.
 
 Nothing is unwrapped and no ray is traced. The rules were fitted to the Cornell box, the office and rooms of
 a thousand to a million triangles (bench/results), two cores; tests hold them to a factor of 2.5 there.
@@ -10,14 +10,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..lightmap.unwrap import assign_pages, least_pages, padding_for
+import numpy as np
+
+from ..lightmap.unwrap import ChartTotals, Limits, assign_pages, padding_for, page_size
 from ..numerics import thread_count
 from ..options import BakeSettings
 from ..scene import BakeScene
 from .texel_memory import least_bytes, pages_of, refuse_too_large, room
-
-FILLED = 0.85
-"""What charts and the padding around them take of a page, of what there is."""
 
 CHARTS = 6.0
 """Charts of an object whose faces look all ways; a heavy mesh has more: one for so many …"""
@@ -141,46 +140,28 @@ def refuse_before_unwrapping(bake_scene: BakeScene, settings: BakeSettings) -> N
 def _pages(objects: Sequence[LightmappedObject], settings: BakeSettings) -> tuple[list[int], list[float]]:
     """Return the size of each page, and about how many texels each object gets."""
     padding = padding_for(settings.mip_levels) if settings.padding is None else settings.padding
-    density = settings.texel_density
-    surfaces = [item.surface for item in objects]
-    if settings.atlas == "per-object":
-        groups = [[number] for number in range(len(objects))]
-    elif density is None:
-        groups = assign_pages(surfaces, settings.pages)
-    else:
-        taken = sum(_taken(item, density, padding) for item in objects) / FILLED
-        count = max(least_pages(sum(surfaces), density, settings.max_resolution), 1)
-        count = max(count, math.ceil(taken / settings.max_resolution**2))
-        groups = assign_pages(surfaces, count)
+    largest, density = Limits(settings.max_resolution, padding).side, settings.texel_density
+    totals, count = _totals(objects, padding), settings.pages
+    taken = totals.texels(totals.density(count * settings.resolution**2) if density is None else density)
+    if density is not None:
+        count = math.ceil(float(taken.sum()) / largest**2)
+    shared = settings.atlas != "per-object"
+    groups = assign_pages(taken, count) if shared else [[number] for number in range(len(objects))]
     pages, texels = [], [0.0] * len(objects)
     for group in groups:
-        of_page = [objects[number] for number in group]
-        if density is None:
-            size, finest = settings.resolution, _density(of_page, settings.resolution, padding)
+        size, finest = settings.resolution, density
+        if finest is None:
+            finest = _totals([objects[number] for number in group], padding).density(size**2)
         else:
-            finest = density
-            side = math.sqrt(sum(_taken(item, density, padding) for item in of_page) / FILLED)
-            size = min(max(4, 4 * math.ceil(side / 4)), settings.max_resolution)
+            size = min(page_size(math.sqrt(float(taken[group].sum()))), largest)
         pages.append(size)
         for number in group:
             texels[number] = objects[number].surface * finest**2
     return pages, texels
 
 
-def _taken(item: LightmappedObject, density: float, padding: float) -> float:
-    """Return what the charts of an object take of a page, the padding around them included [texels]."""
-    side = density * math.sqrt(item.surface / item.charts) if item.charts else 0.0
-    return item.charts * (side + padding) ** 2
-
-
-def _density(objects: Sequence[LightmappedObject], resolution: int, padding: float) -> float:
-    """Return the texels per meter at which charts fill a page: Σ c (d √(A/c) + p)² = what there is."""
-    square = sum(item.surface for item in objects)
-    if square <= 0.0:
-        return 0.0
-    linear = padding * sum(math.sqrt(item.surface * item.charts) for item in objects)
-    rest = padding**2 * sum(item.charts for item in objects) - FILLED * resolution**2
-    if rest >= 0.0:
-        # Not even the padding fits; a bake shrinks it.
-        return math.sqrt(0.25 * FILLED * resolution**2 / square)
-    return (math.sqrt(linear**2 - square * rest) - linear) / square
+def _totals(objects: Sequence[LightmappedObject], padding: int) -> ChartTotals:
+    """Take each object's charts for squares of the same size."""
+    area = np.array([item.surface for item in objects], dtype=np.float64)
+    count = np.array([item.charts for item in objects], dtype=np.float64)
+    return ChartTotals(area, 2.0 * np.sqrt(area * count), count, padding)

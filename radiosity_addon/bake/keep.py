@@ -1,4 +1,4 @@
-"""A bake of which is kept what lights it anew, if that is asked for: in memory, or in a sidecar."""
+"""Bakes that are kept for relighting, if that is asked for: in memory, or in a sidecar."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class KeepOptions:
 
 
 def can_keep(settings: BakeSettings) -> bool:
-    """Tell whether bakes of these settings can be lit anew."""
+    """Tell whether bakes of these settings can be relit."""
     return settings.method == "hierarchical" and settings.quantity != "residual"
 
 

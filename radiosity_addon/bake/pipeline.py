@@ -14,15 +14,14 @@ import numpy as np
 from ..base import SILENT, BakeError, Progress, SceneError, UsageError
 from ..lightmap.images import LightmapPage, Seams, find_seams, texel_pages, turned_away
 from ..lightmap.lighting import (
-    GatherSettings,
     LightSoFar,
-    TexelLight,
+    light_texels,
     light_within,
-    reconstruct,
     residual_summary,
     texel_residual,
 )
 from ..lightmap.texels import FOOTPRINT, TexelGeometry, rasterize, texel_materials
+from ..lightmap.transport import GatherSettings, TexelLight
 from ..lightmap.unwrap import Atlas, AtlasInput, AtlasOptions, Limits, build_atlas, padding_for
 from ..numerics import Array, Scratch, tiles
 from ..options import BakeSettings
@@ -87,7 +86,7 @@ def bake(bake_scene: BakeScene, settings: BakeSettings, progress: Progress = SIL
 def bake_and_keep(
     bake_scene: BakeScene, settings: BakeSettings, progress: Progress = SILENT
 ) -> tuple[BakeResult, KeptBake]:
-    """Bake lightmaps, and keep what lights them anew (`kept_bake.py`).
+    """Bake lightmaps, and keep what relighting needs (`kept_bake.py`).
 
     Every lamp is asked for with all its shadow rays, those that are dark now too, so that scenes of
     many lamps take longer than by `bake`. Parameters and errors are those of `bake`.
@@ -102,7 +101,7 @@ def bake_and_keep(
 def _bake(
     bake_scene: BakeScene, settings: BakeSettings, keep: bool, progress: Progress
 ) -> tuple[BakeResult, KeptBake | None]:
-    """Bake, and keep what lights the scene anew if asked to."""
+    """Bake, and keep what relighting needs if asked to."""
     if keep and settings.quantity == "residual":
         raise UsageError("a residual is of all light together: bake another quantity to relight it")
     if are_wanted(bake_scene, settings):
@@ -202,7 +201,7 @@ def finish(
         solver=report,
         warnings=warnings,
         seconds=seconds,
-        atlas=_told(atlas, pages),
+        atlas=_page_facts(atlas, pages),
         groups=groups,
         light=light,
         details=details,
@@ -307,7 +306,7 @@ def _texel_values(
     relightable = solution.relightable(bake_scene.emitter) if keep else None
     local = solution.local_pass if relightable is None else relightable.local
     if settings.relative_error is None:
-        light = reconstruct(bake_scene.scene, local, geometry, gather, so_far, progress)
+        light = light_texels(bake_scene.scene, local, geometry, gather, so_far=so_far, progress=progress)
     else:
         light = light_within(
             bake_scene.scene,
@@ -348,7 +347,7 @@ def _check(report: dict[str, Any], pages: tuple[LightmapPage, ...]) -> None:
         )
 
 
-def _told(atlas: Atlas, pages: tuple[LightmapPage, ...]) -> tuple[dict[str, float], ...]:
+def _page_facts(atlas: Atlas, pages: tuple[LightmapPage, ...]) -> tuple[dict[str, float], ...]:
     """Return what the report says of each page."""
     return tuple(
         {

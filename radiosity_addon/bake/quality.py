@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ..lightmap.lighting import GatherSettings
+from ..lightmap.transport import GatherSettings
 from ..options import BakeSettings, options_of_method
 from ..solver.settings import SolverSettings
 

@@ -11,7 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..base import SILENT, BakeWarning, Progress, SceneError
-from ..lightmap.update import AffectedTexels, PreviousLight, light_after_move
+from ..lightmap.lighting import light_texels, lit_as_texels
+from ..lightmap.update import AffectedTexels, PreviousLight
 from ..numerics import Array
 from ..scene import BakeObject, BakeScene, Scene
 from ..solver.moved_elements import carried
@@ -53,19 +54,21 @@ def bake_moved(
         rows = [np.arange(item.first, item.first + item.count) for item in moved]
         offset = solved.local.caster.surface_offset
         affected = AffectedTexels.of(kept.geometry, geometry, rows, offset)
-        before = PreviousLight(kept.lit, moves.traced, kept.solved.local)
-        light, local = light_after_move(before, solved.local, affected, lighting)
+        before = PreviousLight(kept.lit, moves.traced, kept.solved.local, affected)
+        gather = moves.traced.settings
+        light = light_texels(bake_scene.scene, solved.local, geometry, gather, before, progress=lighting)
+        local = lit_as_texels(solved.local, kept.lit.element, light)
     values = shown(light, kept.reflectance, kept.emission, settings, geometry.scratch)
     materials = kept.reflectance, kept.emission
     lit = TexelValues(values, local.caster, light, replace(solved, local=local), materials)
     report = moves.solved.report
     ever = dict.fromkeys([*report.get("moved", ()), *names])
     report = {**report, "rays": local.caster.rays, "moved": list(ever)}
-    told = HierarchyReport(report, moves.solved.warnings)
+    facts = HierarchyReport(report, moves.solved.warnings)
     baked = baked_objects(bake_scene)
     more = statistics(baked, geometry, light, settings.light), None
     result, after = finish(
-        bake_scene, settings, moves.atlas, geometry, told, lit, more, seconds, progress.part(LIT, 1.0)
+        bake_scene, settings, moves.atlas, geometry, facts, lit, more, seconds, progress.part(LIT, 1.0)
     )
     assert after is not None  # it keeps what it was given
     warnings = (*result.warnings, *_resized(moved, kept.bake_scene.scene, bake_scene.scene))

@@ -39,7 +39,7 @@ def _first_of(alike: Sequence[dict[str, str]]) -> dict[str, str]:
     """Return the first of a kind, with how many others there are and whose some of them are."""
     first, *others = alike
     names = list(dict.fromkeys(warning["name"] for warning in others if warning["name"] != first["name"]))
-    told = f"{len(others)} more like this in the report"
+    rest = f"{len(others)} more like this in the report"
     if names:
-        told += f", of {', '.join(names[:NAMED])}{' …' if len(names) > NAMED else ''}"
-    return {"name": first["name"], "message": f"{first['message']} ({told})"}
+        rest += f", of {', '.join(names[:NAMED])}{' …' if len(names) > NAMED else ''}"
+    return {"name": first["name"], "message": f"{first['message']} ({rest})"}

@@ -1,4 +1,4 @@
-"""How long a bake will still take, told by how far it is and how long that took."""
+"""Estimate of the time that a bake still takes, from its progress and the time so far."""
 
 from __future__ import annotations
 

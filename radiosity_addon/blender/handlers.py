@@ -41,7 +41,7 @@ WITH_A_WINDOW: tuple[tuple[str, Callable[..., None]], ...] = (
     ("depsgraph_update_post", overlay_view.note_change),
     ("depsgraph_update_post", edit_guard.note),
 )
-"""In the background nothing is drawn, and nobody could be told."""
+"""In the background nothing is drawn, and nobody would see a message."""
 
 
 def register() -> None:

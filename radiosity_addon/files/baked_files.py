@@ -13,14 +13,14 @@ import stat
 from collections.abc import Callable, Generator, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
+from ..base import drain
 from .file_names import BLEND_NAME, REPORT_NAME, is_bake_name
 
 LISTED, OWNER, SEAL = "files", "baked", "seal"
 """Keys of a report."""
 
-T = TypeVar("T")
 
 _CHUNK = 1 << 20
 _MAX_REPORT = 256 * 2**20
@@ -39,7 +39,7 @@ class Owner:
     source: str
     scene: str
 
-    def told(self, folder: Path) -> dict[str, str]:
+    def recorded(self, folder: Path) -> dict[str, str]:
         """Return what a report in `folder` says: a path relative to it, so that both can be moved."""
         return {"file": _relative(self.source, folder), "scene": self.scene}
 
@@ -53,7 +53,7 @@ class Owner:
     def is_source_of(self, report: Report, folder: Path) -> bool:
         """Return whether a report that lies in `folder` is of any scene of this file."""
         said = report[OWNER]
-        mine = self.told(folder)["file"]
+        mine = self.recorded(folder)["file"]
         if _is_same_path(folder, said["file"], mine):
             return True
         return BLEND_NAME in report[LISTED] and _is_same_path(folder, BLEND_NAME, mine)
@@ -123,7 +123,7 @@ def entry(path: Path) -> dict[str, Any]:
 
 def digest_of_file(path: Path) -> str:
     """Return a file's SHA-256."""
-    return _drained(digest_steps(path))
+    return drain(digest_steps(path))
 
 
 def digest_steps(path: Path) -> Generator[None, None, str]:
@@ -143,22 +143,22 @@ def entries(new: Iterable[Path], folder: Path, earlier: Report | None) -> dict[s
     earlier: The report to be replaced.
     """
     before = {} if earlier is None else earlier[LISTED]
-    kept = {name: told for name, told in before.items() if (folder / name).is_file()}
+    kept = {name: listed for name, listed in before.items() if (folder / name).is_file()}
     return {**kept, **{path.name: entry(path) for path in new}}
 
 
-def is_as_written(path: Path, told: Mapping[str, Any]) -> bool:
+def is_as_written(path: Path, listed: Mapping[str, Any]) -> bool:
     """Return whether a file is, to the byte, what a bake wrote."""
-    return _drained(is_as_written_steps(path, told))
+    return drain(is_as_written_steps(path, listed))
 
 
-def is_as_written_steps(path: Path, told: Mapping[str, Any]) -> Generator[None, None, bool]:
+def is_as_written_steps(path: Path, listed: Mapping[str, Any]) -> Generator[None, None, bool]:
     """Return whether a file is, to the byte, what a bake wrote; yields every few milliseconds."""
     try:
         found = path.lstat()
-        if not stat.S_ISREG(found.st_mode) or found.st_size != told["bytes"]:
+        if not stat.S_ISREG(found.st_mode) or found.st_size != listed["bytes"]:
             return False
-        return bool((yield from digest_steps(path)) == told["sha256"])
+        return bool((yield from digest_steps(path)) == listed["sha256"])
     except OSError:
         return False
 
@@ -167,18 +167,8 @@ def without(report: Report, names: Iterable[str]) -> dict[str, Any]:
     """Return a report that does not list these files any more."""
     gone = set(names)
     return sealed(
-        {**report, LISTED: {name: told for name, told in report[LISTED].items() if name not in gone}}
+        {**report, LISTED: {name: listed for name, listed in report[LISTED].items() if name not in gone}}
     )
-
-
-def _drained(steps: Generator[None, None, T]) -> T:
-    """Run steps to their end and return their result."""
-    while True:
-        try:
-            next(steps)
-        except StopIteration as done:
-            result: T = done.value
-            return result
 
 
 def _seal_of(report: Report) -> str:

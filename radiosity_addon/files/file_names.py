@@ -118,8 +118,8 @@ def sanitized(name: str, longest: int = MAX_PART) -> str:
     """
     stem = _FORBIDDEN.sub("_", unicodedata.normalize("NFC", name)).strip(" .")
     if len(stem.encode()) > longest:
-        told = hashlib.sha256(name.encode("utf-8", "surrogatepass")).hexdigest()[:8]
-        stem = f"{stem.encode()[: longest - 9].decode('utf-8', 'ignore').strip(' .')}-{told}"
+        digest = hashlib.sha256(name.encode("utf-8", "surrogatepass")).hexdigest()[:8]
+        stem = f"{stem.encode()[: longest - 9].decode('utf-8', 'ignore').strip(' .')}-{digest}"
     return f"_{stem}" if not stem or _DEVICES.fullmatch(stem) else stem
 
 

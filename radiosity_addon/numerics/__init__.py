@@ -9,7 +9,7 @@ from .arrays import Array
 from .bilinear import texels_around
 from .discrete import pick_in_rows, pick_in_runs, running_sums
 from .meshes import connected_components, connected_faces, numbered, weld
-from .parallel import for_chunks, map_chunks, thread_count
+from .parallel import fill_chunks, map_chunks, thread_count
 from .polygons import areas, clip_half_plane, edge_distances
 from .radiometry import (
     HEMISPHERE,
@@ -78,9 +78,9 @@ __all__ = [
     "cosine_hemisphere",
     "double_area_vectors",
     "edge_distances",
+    "fill_chunks",
     "flux_of_radiance",
     "folder",
-    "for_chunks",
     "hash_keys",
     "intensity_of_flux",
     "irradiance_from_point",

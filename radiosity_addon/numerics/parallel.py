@@ -1,8 +1,10 @@
-"""Run one function over fixed chunks of rows on a few threads.
+"""Run a kernel over fixed chunks of rows on a few threads.
 
-The chunks do not depend on the number of threads and each writes its own rows, so the
-result is the same bytes whatever the machine. NumPy and embreex release the GIL, so
-threads are enough.
+A kernel is a function of a module: it takes what it reads and, last, a slice of rows, and returns what it
+found for these rows. It writes nothing. Callers pass it as `partial(kernel, …)`.
+
+The chunks do not depend on the number of threads, so the result is the same bytes whatever the machine. NumPy
+and embreex release the GIL, so threads are enough.
 """
 
 from __future__ import annotations
@@ -10,9 +12,11 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import TypeVar
 
 from ..base import SILENT, Progress
+from .arrays import Array
 from .scratch import trim
 
 T = TypeVar("T")
@@ -27,12 +31,37 @@ def thread_count(threads: int) -> int:
     return os.cpu_count() or 1
 
 
-def for_chunks(
-    work: Callable[[slice], None], rows: int, chunk: int, threads: int, progress: Progress = SILENT
+def fill_chunks(
+    work: Callable[[slice], Array | tuple[Array, ...]],
+    into: Array | tuple[Array, ...],
+    rows: int,
+    chunk: int,
+    threads: int,
+    progress: Progress = SILENT,
+    at: Array | None = None,
 ) -> None:
-    """Call `work` on slices of at most `chunk` rows that cover 0 … rows (see `map_chunks`)."""
-    for _ in map_chunks(work, rows, chunk, threads, progress):
+    """Call `work` on slices of at most `chunk` rows that cover 0 … rows, and store its arrays.
+
+    into: Arrays that take what `work` returns, each one of its results.
+    at (rows,) int: In which of their rows; None for the same ones.
+    """
+    for _ in map_chunks(partial(_store, work, into, at), rows, chunk, threads, progress):
         pass
+
+
+def _store(
+    work: Callable[[slice], Array | tuple[Array, ...]],
+    into: Array | tuple[Array, ...],
+    at: Array | None,
+    rows: slice,
+) -> None:
+    found = work(rows)
+    place = rows if at is None else at[rows]
+    if not isinstance(into, tuple):
+        into[place] = found
+        return
+    for array, values in zip(into, found, strict=True):
+        array[place] = values
 
 
 def map_chunks(
@@ -42,7 +71,7 @@ def map_chunks(
 
     Canceled, it lets the slices in hand end and leaves out the others.
 
-    work: Takes a slice of rows; must touch nothing another slice writes.
+    work: A kernel; takes a slice of rows.
     threads: 0 means all cores.
     """
     slices = [slice(start, min(start + chunk, rows)) for start in range(0, rows, chunk)]

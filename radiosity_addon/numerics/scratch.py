@@ -106,6 +106,9 @@ class Rows:
         self._count = self._waiting = 0
         self._file: BinaryIO | None = None
 
+    def __len__(self) -> int:
+        return self._count + self._waiting
+
     def more(self, count: int) -> Array:
         """Return the next `count` rows, uninitialized."""
         start, row = self._count, self._width * self._dtype.itemsize

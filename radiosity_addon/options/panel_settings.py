@@ -56,7 +56,7 @@ class _PanelSettings:
         "If objects have only moved since a bake that is still in memory, bake only what they affect: the "
         "same light in less than half of the time. The layout of the lightmaps stays",
         RELIGHTING,
-        panel=PanelRow("Incremental (Moved Objects)", group=RELIGHT_GROUP),
+        panel=PanelRow("Incremental Moves", group=RELIGHT_GROUP),
     )
     show_while_solving: bool = option(
         True,

@@ -266,11 +266,11 @@ def _read_journal(staging: Path) -> dict[str, _Replaced]:
         raise ValueError(path)
     if not (is_own(found) and is_own(earlier)):
         raise ValueError(path)
-    told = json.loads(path.read_text(encoding="utf-8"))
-    if told["version"] != _VERSION:
+    journal = json.loads(path.read_text(encoding="utf-8"))
+    if journal["version"] != _VERSION:
         raise ValueError(path)
     files = {}
-    for name, of in told["files"].items():
+    for name, of in journal["files"].items():
         new, old = of["new"], of["old"]
         if not is_bake_name(name) or not isinstance(new, str) or not isinstance(old, str | None):
             raise ValueError(name)
@@ -280,10 +280,10 @@ def _read_journal(staging: Path) -> dict[str, _Replaced]:
 
 def write_journal(staging: Path, files: Mapping[str, _Replaced]) -> None:
     """Write the journal so that it is there, whole, even if the machine stops at the next instant."""
-    told = {name: {"new": file.new, "old": file.old} for name, file in files.items()}
+    journal = {name: {"new": file.new, "old": file.old} for name, file in files.items()}
     aside = staging / f"{JOURNAL}.part"
     with aside.open("w", encoding="utf-8") as file:
-        json.dump({"version": _VERSION, "files": told}, file)
+        json.dump({"version": _VERSION, "files": journal}, file)
         file.flush()
         os.fsync(file.fileno())
     rename(aside, staging / JOURNAL)

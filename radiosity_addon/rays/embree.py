@@ -7,11 +7,13 @@ what lies back to back with a black back (`coincident`).
 
 from __future__ import annotations
 
+from functools import partial
 from threading import Lock
+from typing import Any
 
 import numpy as np
 
-from ..numerics import Array, double_area_vectors, for_chunks
+from ..numerics import Array, double_area_vectors, fill_chunks
 from .caster import NO_HIT, Hits, RayCaster, surface_offset
 from .coplanar import facing_copies
 
@@ -89,15 +91,8 @@ class EmbreeCaster:
             return free
         with self._counting:
             self._own_rays += count
-
-        def trace(rows: slice) -> None:
-            start = (origins[rows] - self._center).astype(np.float32)
-            along = np.ascontiguousarray(directions[rows], dtype=np.float32)
-            # A copy on purpose: Embree overwrites the distances it is given.
-            reach = np.minimum(distances[rows] * (1.0 - TARGET_SLACK), 1e30).astype(np.float32)
-            free[rows] = self._scene.run(start, along, dists=reach, query="OCCLUDED") != 0
-
-        for_chunks(trace, count, CHUNK, self._threads)
+        trace = partial(_unoccluded, self._scene, self._center, origins, directions, distances)
+        fill_chunks(trace, free, count, CHUNK, self._threads)
         return free
 
     def passing(self, origins: Array, directions: Array, distances: Array, least: float = 0.0) -> Array:  # noqa: ARG002
@@ -115,18 +110,43 @@ class EmbreeCaster:
             return Hits(triangle, barycentric, front, distance)
         with self._counting:
             self._own_rays += count
-
-        def trace(rows: slice) -> None:
-            start = (origins[rows] - self._center).astype(np.float32)
-            along = np.ascontiguousarray(directions[rows], dtype=np.float32)
-            found = self._scene.run(start, along, output=True)
-            row = found["primID"]
-            hit = row >= 0
-            triangle[rows] = row if self._rows is None else np.where(hit, self._rows[row], NO_HIT)
-            barycentric[rows, 0] = np.where(hit, found["u"], 0)
-            barycentric[rows, 1] = np.where(hit, found["v"], 0)
-            distance[rows] = np.where(hit, found["tfar"], np.inf)
-            front[rows] = np.einsum("nk,nk->n", along, self._normals[row]) < 0
-
-        for_chunks(trace, count, CHUNK, self._threads)
+        trace = partial(
+            _first_hits, self._scene, self._center, self._rows, self._normals, origins, directions
+        )
+        into = (triangle, barycentric[:, 0], barycentric[:, 1], front, distance)
+        fill_chunks(trace, into, count, CHUNK, self._threads)
         return Hits(triangle, barycentric, front, distance)
+
+
+def _unoccluded(
+    scene: Any, center: Array, origins: Array, directions: Array, distances: Array, rows: slice
+) -> Array:
+    start = (origins[rows] - center).astype(np.float32)
+    along = np.ascontiguousarray(directions[rows], dtype=np.float32)
+    # A copy on purpose: Embree overwrites the distances it is given.
+    reach = np.minimum(distances[rows] * (1.0 - TARGET_SLACK), 1e30).astype(np.float32)
+    return scene.run(start, along, dists=reach, query="OCCLUDED") != 0
+
+
+def _first_hits(
+    scene: Any,
+    center: Array,
+    numbers: Array | None,
+    normals: Array,
+    origins: Array,
+    directions: Array,
+    rows: slice,
+) -> tuple[Array, ...]:
+    """Return the columns of `Hits`, barycentric coordinates one by one."""
+    start = (origins[rows] - center).astype(np.float32)
+    along = np.ascontiguousarray(directions[rows], dtype=np.float32)
+    found = scene.run(start, along, output=True)
+    row = found["primID"]
+    hit = row >= 0
+    return (
+        row if numbers is None else np.where(hit, numbers[row], NO_HIT),
+        np.where(hit, found["u"], 0),
+        np.where(hit, found["v"], 0),
+        np.einsum("nk,nk->n", along, normals[row]) < 0,
+        np.where(hit, found["tfar"], np.inf),
+    )

@@ -1,4 +1,4 @@
-"""The hierarchy's links kept, to solve them anew for other light without a ray.
+"""The hierarchy's links, kept to solve them again for other light without tracing a ray.
 
 Links, and what keeps their light conserved, are of geometry and reflectance alone; only how finely the
 hierarchy was refined, and where, came from the light that it was solved for.
@@ -115,7 +115,7 @@ class ElementTransport:
 
 @dataclass(frozen=True, eq=False)
 class Relightable:
-    """A solved scene that can be lit anew.
+    """A solved scene that can be relit.
 
     Attributes
     ----------

@@ -1,7 +1,8 @@
 """A solved scene whose triangles have moved, by the elements that it was solved with.
 
 What rays met is numbered by these elements, so they move with their faces. Their light is not solved
-again: texels bring what has changed (`lightmap/update/moved.py`), and the hierarchy is where they start.
+again: texels bring what has changed (`lightmap/lighting/reconstruction.py`), and the hierarchy is where they
+start.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ def on_scene(hierarchy: Hierarchy, scene: Scene) -> Hierarchy:
 
 
 def carried(solved: Relightable, scene: Scene, emitter: Array | None = None) -> Relightable:
-    """Return what lights a scene anew after triangles of it have moved, its elements' light as it was.
+    """Return what relights a scene after triangles of it have moved, its elements' light as it was.
 
     Parameters
     ----------

@@ -79,7 +79,7 @@ class Solution:
         return LocalPass.of(self._state)
 
     def relightable(self, emitter: Array | None = None) -> Relightable:
-        """Return what lights this scene anew.
+        """Return what relighting this scene needs.
 
         Parameters
         ----------

@@ -17,7 +17,7 @@ from radiosity_addon.numerics.sampling import cosine_hemisphere, points_on_trian
 from radiosity_addon.solver import PointLight, Scene, Solution
 from radiosity_addon.solver.methods.hierarchical import HierarchicalState, solve
 from tests.cornell import cornell_box
-from tests.rooms import CEILING, box_room, colored_room, gray, solid_box
+from tests.rooms import CEILING, box_room, colored_room, gray, gray_scene, solid_box
 
 ON_A_TRIANGLE, OVER_ALL, POWER = 0.01, 0.002, 0.002
 
@@ -45,7 +45,7 @@ def cornell_with_a_front(two_sided: bool = False) -> Scene:
 def enclosure() -> Scene:
     """Everything shines alike, and reflects nine tenths, in a room of 300 triangles: B = 10 E everywhere."""
     triangles, _ = box_room((1, 2, 0.5), 5)
-    return Scene(triangles, gray(len(triangles), 0.9), gray(len(triangles), 1.0))
+    return gray_scene(triangles, 0.9, 1.0)
 
 
 def cube_in_a_cube() -> Scene:
@@ -54,7 +54,7 @@ def cube_in_a_cube() -> Scene:
     triangles = np.concatenate([outer, solid_box((1, 1, 1), (2, 2, 2))])
     emission = gray(len(triangles), 0.0)
     emission[: len(outer)][surface == CEILING] = 1.0
-    return Scene(triangles, gray(len(triangles), 0.7), emission)
+    return gray_scene(triangles, 0.7, emission)
 
 
 def boxes_that_touch() -> Scene:
@@ -68,7 +68,7 @@ def boxes_that_touch() -> Scene:
     triangles = np.concatenate([room, *boxes])
     emission = gray(len(triangles), 0.0)
     emission[: len(room)][surface == CEILING] = 1.0
-    return Scene(triangles, gray(len(triangles), 0.6), emission)
+    return gray_scene(triangles, 0.6, emission)
 
 
 SCENES = {

@@ -13,8 +13,8 @@ import pytest
 from radiosity_addon.bake.pipeline import bake
 from radiosity_addon.lightmap.images.page import LightmapPage
 from radiosity_addon.options.bake_settings import BakeSettings
-from radiosity_addon.solver import PointLight, Scene
-from tests.rooms import box_room, gray, rectangle
+from radiosity_addon.solver import PointLight
+from tests.rooms import box_room, gray_scene, rectangle
 from tests.unit.texel_scenes import bake_scene
 
 FLOOR = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0))
@@ -30,9 +30,8 @@ def pages(twin: np.ndarray | None = None, baked: bool = True) -> dict[str, Light
     """Bake a cube with a lamp in it, and another floor in its floor."""
     room, _ = box_room()
     triangles = room if twin is None else np.concatenate([room, twin])
-    count = len(triangles)
     lamp = PointLight((0.3, 0.6, 0.4), 10.0, radius=0.05)
-    scene = Scene(triangles, gray(count, 0.7), gray(count, 0.0), lights=[lamp], two_sided=True)
+    scene = gray_scene(triangles, 0.7, lights=[lamp], two_sided=True)
     parts = [("Floor", 2), ("Ceiling", 2), ("Walls", 8)]
     twins = [] if twin is None else [("Twin", len(twin), None, baked)]
     settings = BakeSettings(quality="medium", resolution=32, atlas="per-object")

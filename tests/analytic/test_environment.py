@@ -18,8 +18,8 @@ from radiosity_addon.lights.environment import (
 )
 from radiosity_addon.lights.sun_and_sky import EnvironmentLight, Light
 from radiosity_addon.numerics.sampling import stratified_square
-from radiosity_addon.solver import Scene, SolverSettings, solve
-from tests.rooms import gray, rectangle
+from radiosity_addon.solver import SolverSettings, solve
+from tests.rooms import gray_scene, rectangle
 
 SHAPE = (128, 256)
 
@@ -82,7 +82,7 @@ def test_a_plane_under_the_sky_receives_all_of_it() -> None:
     """Through the solver's own rays: ∫ L cosθ dω to 0.5 %."""
     plane = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0))
     pixels = a_sky()
-    scene = Scene(plane, gray(2, 0.0), gray(2, 0.0), lights=lights_of(pixels))
+    scene = gray_scene(plane, 0.0, lights=lights_of(pixels))
     points = np.stack([*np.random.default_rng(0).uniform(0.1, 0.9, (2, 64)), np.zeros(64)], axis=1)
     up = np.broadcast_to([0, 0, 1.0], (64, 3))
     solution = solve(scene, SolverSettings(error=1e-2))

@@ -14,6 +14,7 @@ from radiosity_addon.form_factors.formulas import (
     point_to_polygon,
     triangle_to_triangle,
 )
+from tests.vectors import areas_of, normals_of, random_rotation, unit_rows
 
 SQUARE_ABOVE = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 1.0], [1.0, 1.0, 1.0], [1.0, 0.0, 1.0]])
 """Unit square at height 1 whose front looks down."""
@@ -27,23 +28,6 @@ def factor(
     return float(
         point_to_polygon(np.array([point], float), unit, np.asarray(polygon, float)[None], both_sides)[0]
     )
-
-
-def normals_of(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return unit normals and areas."""
-    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    double = np.linalg.norm(cross, axis=1)
-    return cross / double[:, None], double / 2
-
-
-def random_rotation(rng: np.random.Generator) -> np.ndarray:
-    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    return turn * np.sign(np.linalg.det(turn))
-
-
-def unit_rows(rng: np.random.Generator, count: int) -> np.ndarray:
-    rows = rng.normal(size=(count, 3))
-    return rows / np.linalg.norm(rows, axis=1)[:, None]
 
 
 def quadrature(point: np.ndarray, normal: np.ndarray, polygon: np.ndarray, steps: int = 300) -> float:
@@ -279,7 +263,7 @@ def test_ellipse_is_the_limit_of_polygons() -> None:
 def test_disk_factor_approaches_the_exact_one_with_the_square_of_distance(kind: type) -> None:
     triangle = np.array([[0.0, 0, 0], [0, 1, 0], [1, 0.2, 0]])
     center = triangle.mean(axis=0)
-    (normal,), (area,) = normals_of(triangle[None])
+    (normal,), (area,) = normals_of(triangle[None]), areas_of(triangle[None])
     way = np.array([0.3, -0.4, -1.0]) / np.linalg.norm([0.3, -0.4, -1.0])
     facing = -way + np.array([0.2, 0.1, 0])
     facing /= np.linalg.norm(facing)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from radiosity_addon.lightmap.lighting.gather_settings import GatherSettings
-from radiosity_addon.lightmap.lighting.reconstruction import reconstruct
-from radiosity_addon.lightmap.lighting.sweeps import TexelLight
+from radiosity_addon.lightmap.lighting.reconstruction import light_texels
 from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
+from radiosity_addon.lightmap.transport.gather_settings import GatherSettings
+from radiosity_addon.lightmap.transport.sweeps import TexelLight
 from radiosity_addon.lights.light import Light
 from radiosity_addon.solver import EnvironmentLight, Scene, SolverSettings, SunLight, solve
 from tests.rooms import gray, rectangle
@@ -36,7 +36,7 @@ def light_of(
     pages = np.repeat(np.append(np.arange(len(baked)), [-1] * len(others)), 2)
     geometry = texel_geometry(scene, uv, SIZE, pages)
     local = solve(scene, SolverSettings(error=1e-3)).local_pass
-    return geometry, reconstruct(scene, local, geometry, GatherSettings(rays=256))
+    return geometry, light_texels(scene, local, geometry, GatherSettings(rays=256))
 
 
 def test_beside_a_bar_the_sky_is_hidden_as_the_closed_form_says() -> None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap.lighting.gather_settings import GatherSettings
-from radiosity_addon.lightmap.lighting.reconstruction import reconstruct
-from radiosity_addon.solver import EnvironmentLight, Scene, SolverSettings, solve
-from tests.rooms import gray, rectangle
+from radiosity_addon.lightmap.lighting.reconstruction import light_texels
+from radiosity_addon.lightmap.transport.gather_settings import GatherSettings
+from radiosity_addon.solver import EnvironmentLight, SolverSettings, solve
+from tests.rooms import gray_scene, rectangle
 from tests.unit.texel_scenes import QUAD_UV, texel_geometry
 
 SIZE = 24
@@ -25,16 +25,11 @@ def test_light_reaches_into_a_gap_as_far_as_the_gap_is_high(reflectance: float) 
     top = rectangle((RIM, -1, GAP + THICKNESS), (2, 0, 0), (0, 4, 0))
     edge = rectangle((RIM, -1, GAP), (0, 0, THICKNESS), (0, 4, 0))
     triangles = np.concatenate([floor, under, top, edge])
-    scene = Scene(
-        triangles,
-        gray(len(triangles), reflectance),
-        gray(len(triangles), 0.0),
-        lights=[EnvironmentLight(1.0 / np.pi)],
-    )
+    scene = gray_scene(triangles, reflectance, lights=[EnvironmentLight(1.0 / np.pi)])
     uv = np.concatenate([QUAD_UV, QUAD_UV, np.zeros((4, 3, 2), np.float32)])
     geometry = texel_geometry(scene, uv, SIZE, np.array([0, 0, 1, 1, -1, -1, -1, -1]))
     local = solve(scene, SolverSettings(error=1e-3)).local_pass
-    light = reconstruct(scene, local, geometry, GatherSettings(rays=256))
+    light = light_texels(scene, local, geometry, GatherSettings(rays=256))
     irradiance = (light.direct + light.indirect).mean(axis=1)
     depth = geometry.position[:, 0] - RIM
     # The sky shines up past the floor's own borders as well.

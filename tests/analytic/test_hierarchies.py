@@ -15,13 +15,29 @@ from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from radiosity_addon.solver.methods import hierarchical, multi_level
 from radiosity_addon.solver.methods.hierarchical import HierarchicalState
 from radiosity_addon.solver.methods.multi_level import MultiLevelState
-from tests.rooms import CEILING, FLOOR, WALLS, area_mean, box_room, gray, rectangle, solid_box, sphere
-
-# Howell's catalog, CIE 171:2006 and Galerkin solutions extrapolated over n = 4 … 20 grids.
-CUBE_WITH_EMITTING_CEILING = {FLOOR: 0.17122, CEILING: 1.1044, WALLS: 0.18110}
-CIE_5_8_INDIRECT_LX = {0.2: 26.04, 0.5: 104.17, 0.8: 416.67, 0.9: 937.5, 0.95: 1979.17}
-CIE_5_6_WALL_PERCENT = {0.75: 35.901, 1.25: 27.992, 1.75: 21.639, 2.25: 16.716, 2.75: 12.967}
-CIE_5_6_CEILING_PERCENT = {0.25: 26.80, 0.75: 30.94, 1.25: 33.98, 1.75: 35.57}
+from tests.published import (
+    CIE_5_6_CEILING_PERCENT,
+    CIE_5_6_WALL_PERCENT,
+    CIE_5_8_INDIRECT_LX,
+    CUBE_MEANS,
+    CUBE_WITH_EMITTING_CEILING,
+    cie_5_6,
+    cie_5_8,
+    cie_5_8_indirect,
+    parallel_plates,
+    shining_cube,
+    wall_means,
+)
+from tests.rooms import (
+    CEILING,
+    FLOOR,
+    WALLS,
+    box_room,
+    gray,
+    gray_scene,
+    solid_box,
+    sphere,
+)
 
 
 def multi_level_settings(form_factor_error: float, min_area: float, **others: float) -> SolverSettings:
@@ -33,12 +49,6 @@ def multi_level_settings(form_factor_error: float, min_area: float, **others: fl
 def solved(scene: Scene, form_factor_error: float, min_area: float, **others: float) -> MultiLevelState:
     settings = multi_level_settings(form_factor_error, min_area, **others)
     return multi_level.solve(scene, settings)
-
-
-def cube(reflectance: float = 0.5) -> Scene:
-    triangles, surface = box_room()
-    emission = gray(12, 1.0) * (surface == CEILING)[:, None]
-    return Scene(triangles, gray(12, reflectance), emission)
 
 
 def furnished(lights: list | None = None) -> Scene:
@@ -57,7 +67,7 @@ def furnished(lights: list | None = None) -> Scene:
 def test_without_error_it_is_the_dense_solution_on_its_leaves() -> None:
     """F_ε = 0 and a minimum area: all links join finest leaves, (I − ρ F) B = E + ρ H_lamps."""
     lamp = PointLight((2.5, 1.5, 1.5), 20.0)
-    for scene in (cube(0.8), furnished(), furnished([lamp])):
+    for scene in (shining_cube(reflectance=0.8), furnished(), furnished([lamp])):
         state = solved(scene, 0.0, 5e-3, tolerance=1e-13)
         hierarchy, leaves = state.hierarchy, state.hierarchy.leaves
         finest = 5e-3 * hierarchy.faces.area.sum()
@@ -78,7 +88,7 @@ def test_without_error_it_is_the_dense_solution_on_its_leaves() -> None:
 
 def test_it_is_what_the_dense_method_finds() -> None:
     """The method of that name, on the same 192 elements."""
-    scene = cube()
+    scene = shining_cube()
     ours = solve(scene, multi_level_settings(0.0, 0.9 / 192, tolerance=1e-13))
     dense = solve(scene, SolverSettings(method="dense", elements=192))
     np.testing.assert_allclose(ours.triangle_radiosity, dense.triangle_radiosity, rtol=1e-10)
@@ -95,7 +105,7 @@ def leaf_points(state: MultiLevelState) -> tuple[np.ndarray, np.ndarray]:
     return face, (np.linalg.pinv(edges) @ arm[..., None])[..., 0]
 
 
-@pytest.mark.parametrize("scene", [cube(), furnished()], ids=["cube", "furnished"])
+@pytest.mark.parametrize("scene", [shining_cube(), furnished()], ids=["cube", "furnished"])
 def test_error_falls_with_the_form_factor_error(scene: Scene) -> None:
     """∫ |B − B_dense| dA falls faster than F_ε, here below F_ε of the power, and ends at 0."""
     min_area, tolerance = 2.5e-3, 1e-12
@@ -122,7 +132,7 @@ def test_error_falls_with_the_area_of_the_elements() -> None:
     """With F_ε = 0 the cube's means approach the exact ones as the elements' size, or faster."""
     errors = []
     for level in range(3):
-        state = solved(cube(), 0.0, 0.9 / (12 * 4**level))
+        state = solved(shining_cube(), 0.0, 0.9 / (12 * 4**level))
         assert len(state.hierarchy.leaves) == 12 * 4**level
         errors.append(abs(state.radiosity[:2, 0].mean() - CUBE_WITH_EMITTING_CEILING[FLOOR]))
     assert errors[-1] < 0.005 * CUBE_WITH_EMITTING_CEILING[FLOOR]
@@ -138,7 +148,7 @@ def growth(elements: list[int], links: list[int]) -> float:
     return float(np.polyfit(np.log(elements), np.log(links), 1)[0])
 
 
-@pytest.mark.parametrize("scene", [cube(), furnished()], ids=["cube", "furnished"])
+@pytest.mark.parametrize("scene", [shining_cube(), furnished()], ids=["cube", "furnished"])
 def test_links_of_the_multi_level_hierarchy_grow_like_its_elements(scene: Scene) -> None:
     """As F_ε falls, with A_ε out of its way: a few links an element, where a matrix has n."""
     elements, links = [], []
@@ -156,7 +166,7 @@ def test_links_at_a_fixed_finest_level_are_the_matrix() -> None:
     """With F_ε = 0 there is nothing to gain: n² links between faces that see each other."""
     elements, links = [], []
     for level in range(3):
-        state = solved(cube(), 0.0, 0.9 / (12 * 4**level), max_iterations=1)
+        state = solved(shining_cube(), 0.0, 0.9 / (12 * 4**level), max_iterations=1)
         elements.append(len(state.hierarchy.leaves))
         links.append(len(state.links))
     assert growth(elements, links) == pytest.approx(2.0, abs=0.01)
@@ -171,12 +181,10 @@ def test_links_of_the_refined_hierarchy_grow_like_its_elements() -> None:
     """At one BF_ε, as the scene itself is made of more and more triangles: clusters see to that."""
     elements, links, floors = [], [], []
     for n in (6, 8, 10, 13):
-        triangles, surface = box_room(n=n)
-        emission = gray(len(triangles), 1.0) * (surface == CEILING)[:, None]
-        state = refined(Scene(triangles, gray(len(triangles), 0.5), emission), 1e-2)
+        state = refined(shining_cube(n), 1e-2)
         elements.append(len(state.hierarchy.leaves))
         links.append(len(state.links))
-        floors.append(state.radiosity[: len(triangles)][surface == FLOOR, 0].mean())
+        floors.append(state.radiosity[: 2 * n * n, 0].mean())
     assert growth(elements, links) <= 1.15
     np.testing.assert_allclose(floors, CUBE_WITH_EMITTING_CEILING[FLOOR], rtol=0.015)
 
@@ -217,7 +225,7 @@ def enclosure(shape: str) -> np.ndarray:
 def test_uniform_enclosure(shape: str, reflectance: float, settings: str) -> None:
     """Every surface emits E and reflects ρ: B = E / (1 − ρ) everywhere."""
     triangles = enclosure(shape)
-    scene = Scene(triangles, gray(len(triangles), reflectance), gray(len(triangles), 2.0))
+    scene = gray_scene(triangles, reflectance, 2.0)
     solution = solve(scene, multi_level_settings(*SETTINGS[settings]))
     assert_closed(scene, solution, power=0.003)
     np.testing.assert_allclose(solution.triangle_radiosity, 2.0 / (1.0 - reflectance), rtol=0.006)
@@ -228,47 +236,32 @@ def test_uniform_enclosure(shape: str, reflectance: float, settings: str) -> Non
 )
 def test_cube_with_emitting_ceiling(settings: tuple[float, float], rtol: float) -> None:
     """Area means of radiosity, ρ = 0.5: as good as one radiosity a sending face, or as the elements."""
-    scene = cube()
+    scene = shining_cube()
     solution = solve(scene, multi_level_settings(*settings))
     assert_closed(scene, solution, power=0.001)
-    surface = box_room()[1]
-    means = [
-        area_mean(solution.triangle_radiosity[surface == s], scene.areas[surface == s])[0] for s in range(6)
-    ]
-    expected = [CUBE_WITH_EMITTING_CEILING[min(s, WALLS)] for s in range(6)]
-    np.testing.assert_allclose(means, expected, rtol=rtol)
-    assert sum(means) == pytest.approx(2.0, rel=1e-3)
+    means = wall_means(solution.triangle_radiosity, scene.areas)[:, 0]
+    np.testing.assert_allclose(means, CUBE_MEANS, rtol=rtol)
+    assert means.sum() == pytest.approx(2.0, rel=1e-3)
 
 
 def test_parallel_plates() -> None:
-    """Two plates much larger than their distance, ρ = 0.5, one emits 1: B = 4/3 and 2/3."""
-    below = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0))
-    above = rectangle((0, 0, 0.0005), (0, 1, 0), (1, 0, 0))
-    emission = np.concatenate([gray(2, 1.0), gray(2, 0.0)])
-    scene = Scene(np.concatenate([below, above]), gray(4, 0.5), emission)
-    solution = solve(scene, multi_level_settings(0.01, 1e-3))
+    solution = solve(parallel_plates(), multi_level_settings(0.01, 1e-3))
     np.testing.assert_allclose(solution.triangle_radiosity[:2], 4 / 3, rtol=0.002)
     np.testing.assert_allclose(solution.triangle_radiosity[2:], 2 / 3, rtol=0.002)
 
 
 @pytest.mark.parametrize("reflectance", CIE_5_8_INDIRECT_LX)
 def test_cie_171_5_8(reflectance: float) -> None:
-    """Closed cube of edge 4 m, isotropic point source of 10 000 lm: mean indirect illuminance."""
-    triangles, _ = box_room((4, 4, 4))
-    lamp = PointLight((2, 2, 2), 10_000.0)
-    scene = Scene(triangles, gray(12, reflectance), gray(12, 0.0), lights=[lamp])
+    scene = cie_5_8(reflectance)
     solution = solve(scene, multi_level_settings(0.01, 2e-5))
     assert_closed(scene, solution, power=0.001)
-    indirect = area_mean(solution.triangle_irradiance, scene.areas) - 10_000.0 / 96.0
+    indirect = cie_5_8_indirect(solution.triangle_irradiance, scene.areas)
     np.testing.assert_allclose(indirect, CIE_5_8_INDIRECT_LX[reflectance], rtol=0.002)
 
 
 def test_cie_171_5_6() -> None:
-    """A diffuse floor of exitance 100 in a black room: at points, and as means over the elements there."""
-    triangles, surface = box_room((4, 4, 3))
-    emission = gray(len(triangles), 100.0) * (surface == FLOOR)[:, None]
-    scene = Scene(triangles, gray(len(triangles), 0.0), emission)
-    solution = solve(scene, multi_level_settings(0.003, 2e-5))
+    """Illuminance at points."""
+    solution = solve(cie_5_6(), multi_level_settings(0.003, 2e-5))
     on_wall = np.array([[2.0, 0.0, z] for z in CIE_5_6_WALL_PERCENT])
     irradiance = solution.irradiance(on_wall, np.tile([0.0, 1.0, 0.0], (len(on_wall), 1)))
     np.testing.assert_allclose(irradiance[:, 0], list(CIE_5_6_WALL_PERCENT.values()), rtol=2e-4)
@@ -282,7 +275,7 @@ def test_black_walls_gather_the_exact_factors() -> None:
     """In the room of CIE 5.6 a surface's mean illuminance is its factor to the floor (Howell C-11, C-14)."""
     triangles, surface = box_room((1, 1, 1))
     emission = gray(12, 1.0) * (surface == FLOOR)[:, None]
-    solution = solve(Scene(triangles, gray(12, 0.0), emission), multi_level_settings(0.02, 2e-5))
+    solution = solve(gray_scene(triangles, 0.0, emission), multi_level_settings(0.02, 2e-5))
     for number, factor in ((CEILING, 0.1998248957), (WALLS, 0.2000437761)):
         mean = solution.triangle_irradiance[surface == number].mean()
         assert mean == pytest.approx(factor, rel=1e-4)
@@ -304,7 +297,7 @@ def test_an_open_room_loses_what_leaves_it() -> None:
     triangles, surface = box_room()
     kept = surface != CEILING
     emission = gray(12, 1.0) * (surface == FLOOR)[:, None]
-    scene = Scene(triangles[kept], gray(10, 0.0), emission[kept])
+    scene = gray_scene(triangles[kept], 0.0, emission[kept])
     solution = solve(scene, multi_level_settings(0.01, 2e-5))
     np.testing.assert_allclose(solution.triangle_closure[:2], 1 - 0.1998248957, atol=1e-4)
     watts = solution.report["power_W"]

@@ -17,8 +17,8 @@ from radiosity_addon.bake.result.result import BakedObject, BakeResult
 from radiosity_addon.lightmap.images.page import LightmapPage
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
-from radiosity_addon.solver import EnvironmentLight, PointLight, Scene
-from tests.rooms import CEILING, box_room, gray, rectangle, solid_box
+from radiosity_addon.solver import EnvironmentLight, PointLight
+from tests.rooms import CEILING, box_room, gray, gray_scene, rectangle, solid_box
 from tests.unit.texel_scenes import bake_scene
 
 ON_FLOOR = (1.03, 0.97, 0.0), (1.97, 2.11, 1.0)
@@ -53,7 +53,7 @@ def sealed_box(
     every = np.concatenate(triangles)
     glow = np.zeros((len(every), 3))
     glow[: len(room)] = emission
-    scene = Scene(every, gray(len(every), 0.8), glow, two_sided=True, lights=lights)
+    scene = gray_scene(every, 0.8, glow, two_sided=True, lights=lights)
     return bake_scene(scene, *parts)
 
 
@@ -152,9 +152,8 @@ def test_a_box_that_reaches_through_the_floor_is_dark_above_it() -> None:
     (left, front, _), (right, back, _) = ON_FLOOR
     box = solid_box((left, front, -0.4), (right, back, 0.6))[2:]
     triangles = np.concatenate([room, box])
-    count = len(triangles)
     sky = [EnvironmentLight(1.0)]
-    scene = Scene(triangles, gray(count, 0.8), gray(count, 0.0), two_sided=True, lights=sky)
+    scene = gray_scene(triangles, 0.8, two_sided=True, lights=sky)
     whole = bake_scene(scene, ("Room", len(room)), ("Box", len(box)))
     result = run(whole, "draft")
     assert result.pages[0].pixels.max() > 0.5
@@ -166,7 +165,6 @@ def _ceilings(ends: Sequence[float], around: np.ndarray) -> tuple[LightmapPage, 
     above = [rectangle((x, 0, 1), (0, 1, 0), (end - x, 0, 0)) for x, end in pairwise(ends)]
     triangles = np.concatenate([around, *above])
     lamp = PointLight((0.3, 0.6, 0.4), 10.0, radius=0.05)
-    count = len(triangles)
-    scene = Scene(triangles, gray(count, 0.7), gray(count, 0.0), lights=[lamp], two_sided=True)
+    scene = gray_scene(triangles, 0.7, lights=[lamp], two_sided=True)
     parts = [("Around", len(around), None, False), *((f"Ceiling {x}", 2) for x in ends[:-1])]
     return run(bake_scene(scene, *parts), "draft").pages

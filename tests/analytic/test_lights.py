@@ -17,6 +17,7 @@ from radiosity_addon.lights.sun_and_sky import (
     SunLight,
 )
 from radiosity_addon.numerics.sampling import points_on_triangles, stratified_square
+from tests.vectors import unit_rows
 
 DOWN = (0.0, 0.0, -1.0)
 
@@ -40,11 +41,6 @@ LAMPS: dict[str, Lamp] = {
         (0.3, 0.2, 0.8), (1.0, 0.1, 0.2), (0.0, -0.6, 0.1), 10.0, shape="ellipse", spread=1.2
     ),
 }
-
-
-def unit_rows(rng: np.random.Generator, count: int) -> np.ndarray:
-    rows = rng.normal(size=(count, 3))
-    return rows / np.linalg.norm(rows, axis=1)[:, None]
 
 
 def below(count: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:

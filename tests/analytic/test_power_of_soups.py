@@ -11,7 +11,7 @@ from radiosity_addon.bake.pipeline import bake
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.solver import Scene, SolverSettings, solve
 from tests.analytic.soup_tracer import Soup, measure
-from tests.rooms import CEILING, box_room, gray, rectangle, solid_box
+from tests.rooms import CEILING, box_room, gray_scene, rectangle, solid_box
 from tests.unit.texel_scenes import bake_scene
 
 TOLERANCE = 0.005
@@ -148,10 +148,10 @@ def test_lightmaps_absorb_what_glowing_panels_in_a_ceiling_send() -> None:
     panel = rectangle((0.5, 0.5, 2.0), Y, X)
     panels = [panel - 1e-6 * number * Z for number in range(5)]
     triangles = np.concatenate([room[surface != CEILING], room[surface == CEILING], *panels])
-    count, emission = len(triangles), np.zeros(len(triangles))
+    emission = np.zeros(len(triangles))
     emission[12:] = 1.0
     reflectance = 0.5
-    scene = Scene(triangles, gray(count, reflectance), emission[:, None] * np.ones(3), two_sided=True)
+    scene = gray_scene(triangles, reflectance, emission[:, None] * np.ones(3), two_sided=True)
     parts = [("Walls", 10), ("Ceiling", 2), *((f"Panel {number}", 2) for number in range(5))]
     settings = BakeSettings(quality="medium", resolution=64, atlas="per-object", quantity="irradiance")
     result = bake(bake_scene(scene, *parts), settings)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from radiosity_addon.rays.embree import EmbreeCaster
-from radiosity_addon.solver import PointLight, Scene, SolverSettings, solve
+from radiosity_addon.solver import Scene, SolverSettings, solve
 from radiosity_addon.solver.equations.assembly import galerkin, with_lamps
 from radiosity_addon.solver.equations.fixed_elements import subdivide_evenly
 from radiosity_addon.solver.equations.linear_system import LinearSystem
@@ -15,7 +15,15 @@ from radiosity_addon.solver.methods import shooting, solve_by_method
 from radiosity_addon.solver.methods.shooting import ShootingState
 from radiosity_addon.solver.state.state import SolverState
 from tests.cornell import cornell_box
-from tests.rooms import CEILING, FLOOR, box_room, colored_room, gray
+from tests.published import (
+    CIE_5_8_INDIRECT_LX,
+    CUBE_MEANS,
+    cie_5_8,
+    cie_5_8_indirect,
+    shining_cube,
+    wall_means,
+)
+from tests.rooms import box_room, colored_room, gray, gray_scene
 from tests.watched import watching
 
 ELEMENTS = 90
@@ -40,28 +48,21 @@ def test_converged_shooting_is_the_dense_solution(scene) -> None:
 
 def test_cube_with_emitting_ceiling() -> None:
     """Area means of radiosity, ρ = 0.5, from exact Galerkin solutions extrapolated over grids."""
-    triangles, surface = box_room()
-    emission = gray(12, 1.0) * (surface == CEILING)[:, None]
-    settings = SolverSettings(method="shooting", elements=192, tolerance=1e-4)
-    solution = solve(Scene(triangles, gray(12, 0.5), emission), settings)
-    for number in range(6):
-        expected = {FLOOR: 0.17122, CEILING: 1.1044}.get(number, 0.18110)
-        mean = solution.triangle_radiosity[surface == number].mean(axis=0)
-        np.testing.assert_allclose(mean, expected, rtol=0.004)
+    scene = shining_cube()
+    solution = solve(scene, SolverSettings(method="shooting", elements=192, tolerance=1e-4))
+    means = wall_means(solution.triangle_radiosity, scene.areas)
+    np.testing.assert_allclose(means, np.tile(CUBE_MEANS, (3, 1)).T, rtol=0.004)
     power = solution.report["power_W"]
     # What is not yet absorbed is unshot.
     assert power["absorbed"] == pytest.approx(power["emitted"], rel=3e-4)
 
 
-@pytest.mark.parametrize(("reflectance", "indirect"), [(0.2, 26.04), (0.5, 104.17)])
-def test_cie_171_5_8(reflectance: float, indirect: float) -> None:
-    """Closed cube of edge 4 m, isotropic point source of 10 000 lm: mean indirect illuminance [lx]."""
-    triangles, _ = box_room((4, 4, 4))
-    lamp = PointLight((2, 2, 2), 10_000.0)
-    scene = Scene(triangles, gray(12, reflectance), gray(12, 0.0), lights=[lamp])
+@pytest.mark.parametrize("reflectance", [0.2, 0.5])
+def test_cie_171_5_8(reflectance: float) -> None:
+    scene = cie_5_8(reflectance)
     solution = solve(scene, SolverSettings(method="shooting", elements=192, tolerance=1e-4))
-    mean = solution.triangle_irradiance.mean() - 10_000.0 / 96.0
-    assert mean == pytest.approx(indirect, rel=0.002)
+    indirect = cie_5_8_indirect(solution.triangle_irradiance, scene.areas)
+    np.testing.assert_allclose(indirect, CIE_5_8_INDIRECT_LX[reflectance], rtol=0.002)
 
 
 def cornell_system() -> LinearSystem:
@@ -152,7 +153,7 @@ def test_the_ambient_term_anticipates_the_mean() -> None:
     """In a closed room of one reflectance the mean shown is the solution's from the first picture on."""
     triangles, surface = box_room((3, 3, 2))
     emission = gray(12, 5.0) * (surface == 1)[:, None]
-    scene = Scene(triangles, gray(12, 0.7), emission)
+    scene = gray_scene(triangles, 0.7, emission)
     dense = by("dense", scene)
     area = dense.hierarchy.area[dense.hierarchy.leaves]
     exact = area @ dense.radiosity[dense.hierarchy.leaves] / area.sum()

@@ -19,7 +19,7 @@ from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import PointLight, Scene
 from tests.moved_rooms import ELSEWHERE, PLACE, laid_out_as, room
-from tests.rooms import box_room, gray, solid_box
+from tests.rooms import box_room, gray, gray_scene, solid_box
 from tests.unit.texel_scenes import bake_scene
 
 SETTINGS = BakeSettings(resolution=64, quality="draft", threads=1)
@@ -144,7 +144,7 @@ def sealed(at: float) -> BakeScene:
     triangles = np.concatenate([walls, hollow, block])
     lamp = PointLight((2.0, 1.0, 1.2), 20.0, radius=0.05)
     dark = gray(len(triangles), 0.0)
-    scene = Scene(triangles, gray(len(triangles), 0.6), dark, lights=(lamp,))
+    scene = gray_scene(triangles, 0.6, dark, lights=(lamp,))
     return bake_scene(scene, ("Room", 12), ("Inside", 12), ("Outside", 12), ("Block", 12))
 
 
@@ -231,9 +231,9 @@ def test_other_changes_are_refused(kept: KeptBake) -> None:
     uv = kept.geometry.uv
     laid_out = laid_out_as(plain, uv)
     assert moved_objects(kept, laid_out) == ("Box",)
-    with pytest.raises(SceneError, match="'Room' has other lightmap coordinates"):
+    with pytest.raises(SceneError, match=r"'Room'.*coordinates"):
         moved_objects(kept, laid_out_as(plain, 0.5 * uv))
-    with pytest.raises(SceneError, match="'Room' has other lightmap coordinates"):
+    with pytest.raises(SceneError, match=r"'Room'.*coordinates"):
         moved_objects(replace(kept, bake_scene=laid_out), plain)
     mesh = replace(plain.objects[1], polygon=plain.objects[1].polygon[::-1])
     with pytest.raises(SceneError, match="'Box' has another mesh"):

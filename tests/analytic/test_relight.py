@@ -13,13 +13,13 @@ from radiosity_addon.bake.relight.kept_bake import KeptBake, relight_pages
 from radiosity_addon.bake.relight.source_strengths import strengths_in
 from radiosity_addon.base.errors import SceneError, UsageError
 from radiosity_addon.lightmap.images.page import LightmapPage
-from radiosity_addon.lightmap.lighting.warm_start import WarmStart
+from radiosity_addon.lightmap.transport.warm_start import WarmStart
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import PointLight, Scene
 from tests.cornell import cornell_box
 from tests.relit_rooms import BAKED, CHANGED, NAMES, lit_bake
-from tests.rooms import box_room, gray
+from tests.rooms import box_room, gray_scene
 from tests.textured_rooms import furnace
 from tests.unit.texel_scenes import bake_scene
 
@@ -119,7 +119,7 @@ def test_a_room_baked_in_the_dark_can_be_lit() -> None:
 
     def lit(power: float) -> BakeScene:
         lamp = PointLight((0.5, 0.4, 0.6), power, radius=0.05)
-        return bake_scene(Scene(triangles, gray(12, 0.6), gray(12, 0.0), lights=[lamp]), ("Room", 12))
+        return bake_scene(gray_scene(triangles, 0.6, lights=[lamp]), ("Room", 12))
 
     _, kept = bake_and_keep(lit(0.0), SETTINGS)
     found = pixels(relight_pages(kept, np.full((1, 3), 12.0)))
@@ -141,7 +141,7 @@ def test_strengths_are_read_from_a_changed_scene(room: KeptBake) -> None:
     other = lit_bake(CHANGED)
     lights = other.scene.lights
     other.scene.lights = (PointLight((2.2, 0.6, 1.4), 5.0, radius=0.05, name="Bulb"), *lights[1:])
-    with pytest.raises(SceneError, match="'Bulb' has changed in more than its strength"):
+    with pytest.raises(SceneError, match=r"'Bulb'.*strength"):
         strengths_in(room, other)
 
 
@@ -188,7 +188,7 @@ def test_groups_add_up_before_what_sweeps_leave_is_shared_out(room: KeptBake) ->
 
 
 def test_groups_that_cannot_be_are_refused() -> None:
-    with pytest.raises(UsageError, match="there is no lamp, emissive material or world 'Moon'"):
+    with pytest.raises(UsageError, match="'Moon'"):
         bake(lit_bake(), BakeSettings(resolution=16, quality="draft", groups=(("Night", ("Moon",)),)))
     with pytest.raises(UsageError, match="'Sun' is given twice"):
         BakeSettings(groups=(("Day", ("Sun",)), ("Noon", ("Sun",))))

@@ -21,7 +21,7 @@ from radiosity_addon.solver.gather.residual import Residual
 from radiosity_addon.solver.hierarchy.basis import Basis, constant_basis
 from radiosity_addon.solver.methods.matrix import MatrixState
 from radiosity_addon.solver.state.state import begin
-from tests.rooms import CEILING, box_room, gray, rectangle, solid_box
+from tests.rooms import CEILING, box_room, gray, gray_scene, rectangle, solid_box
 
 
 def prepared(scene: Scene, elements: int, basis: str = "constant", **settings: int) -> MatrixState:
@@ -73,7 +73,7 @@ def lit_from_above(reflectance: float = 0.5) -> Scene:
     room, surface = box_room()
     emission = gray(12, 0.0)
     emission[surface == CEILING] = (1.0, 0.5, 0.2)
-    return Scene(room, gray(12, reflectance), emission)
+    return gray_scene(room, reflectance, emission)
 
 
 def with_a_box(reflectance: float = 0.5) -> Scene:
@@ -81,7 +81,7 @@ def with_a_box(reflectance: float = 0.5) -> Scene:
     room = lit_from_above()
     triangles = np.concatenate([room.triangles, solid_box((0.2, 0.3, 0.2), (0.6, 0.7, 0.6))])
     emission = np.concatenate([room.emission, gray(12, 0.0)])
-    return Scene(triangles, gray(24, reflectance), emission)
+    return gray_scene(triangles, reflectance, emission)
 
 
 def test_the_exact_solution_of_an_enclosure_leaves_nothing() -> None:
@@ -106,13 +106,7 @@ def test_light_that_was_never_sent_on_is_missing() -> None:
 def test_a_dark_plane_lacks_what_a_lamp_reflects_off_it() -> None:
     """Local illumination (2.14 – 2.17): the plane ought to show f (Φ/4π) cosθ/r²; its back nothing."""
     lamp = PointLight((0.3, 0.2, 0.8), (100.0, 50.0, 10.0))
-    plane = Scene(
-        rectangle((-1, -1, 0), (2, 0, 0), (0, 2, 0)),
-        gray(2, 0.6),
-        gray(2, 0.0),
-        two_sided=True,
-        lights=[lamp],
-    )
+    plane = gray_scene(rectangle((-1, -1, 0), (2, 0, 0), (0, 2, 0)), 0.6, two_sided=True, lights=[lamp])
     state = prepared(plane, 16)
     face, weights = anywhere(state)
     residual = Residual(state)
@@ -130,7 +124,7 @@ def test_an_open_plane_lacks_what_it_reflects_of_the_sky() -> None:
     """r = −ρπL."""
     lights = [EnvironmentLight((1.0, 2.0, 3.0)), SpotLight((0, 0, -1), (0, 0, -1), 5.0, 1.0)]
     triangles = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0))
-    state = prepared(Scene(triangles, gray(2, 0.3), gray(2, 0.0), lights=lights), 8)
+    state = prepared(gray_scene(triangles, 0.3, lights=lights), 8)
     expected = np.tile(-0.3 * np.pi * np.array([1.0, 2, 3]), (60, 1))
     np.testing.assert_allclose(Residual(state).at(*anywhere(state)), expected, rtol=1e-12)
     np.testing.assert_allclose(Residual(state).by_rays(*anywhere(state), rays=32), expected, rtol=1e-12)
@@ -171,7 +165,7 @@ def test_each_method_silences_its_own_weights() -> None:
     quadratures = np.array([area.norm("constant", points=points)[0] for points in (1, 2, 3)])
     assert (quadratures[1:] < 0.4 * quadratures[:-1]).all()
     assert quadratures[-1] < 0.05 * point.norm("constant", points=3)[0]
-    with pytest.raises(ValueError, match="'cubic' are not 'constant' or 'delta'"):
+    with pytest.raises(ValueError, match="'cubic'"):
         point.norm("cubic")
 
 
@@ -181,7 +175,7 @@ def test_galerkin_leaves_no_power_on_any_element() -> None:
     ceiling = rectangle((0, 0, 1.5), (0, 1, 0), (1, 0, 0))
     emission = gray(4, 0.0)
     emission[2:] = 1.0
-    state = solved(Scene(np.concatenate([floor, ceiling]), gray(4, 0.7), emission), 64, "galerkin")
+    state = solved(gray_scene(np.concatenate([floor, ceiling]), 0.7, emission), 64, "galerkin")
     residual = Residual(state)
     whole, quarters = residual.norm("constant", points=3)[0], residual.norm("constant", splits=1, points=2)[0]
     assert whole < 5e-3 * quarters
@@ -225,5 +219,5 @@ def test_a_solution_tells_its_residual_at_either_side() -> None:
     found = solution.residual(triangle, weights)
     np.testing.assert_allclose(found, Residual(state).at(triangle, weights), atol=1e-15)
     np.testing.assert_allclose(solution.residual(triangle, weights, rays=1024), found, atol=0.02)
-    with pytest.raises(ValueError, match="triangle 0 has no area or no such side"):
+    with pytest.raises(ValueError, match="triangle 0"):
         solution.residual(triangle, weights, front=False)

@@ -9,8 +9,8 @@ from radiosity_addon.bake.pipeline import bake
 from radiosity_addon.lightmap.images.page import LightmapPage
 from radiosity_addon.lights.sun_and_sky import Light
 from radiosity_addon.options.bake_settings import BakeSettings
-from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, SunLight
-from tests.rooms import box_room, gray, rectangle, solid_box
+from radiosity_addon.solver import EnvironmentLight, PointLight, SunLight
+from tests.rooms import box_room, gray_scene, rectangle, solid_box
 from tests.unit.texel_scenes import bake_scene
 
 GROUND = rectangle((-4, -4, 0), (8, 0, 0), (0, 8, 0))
@@ -39,8 +39,7 @@ def pages(
     box: np.ndarray, ground: np.ndarray = GROUND, light: Light = SKY, degrees: float = 0.0, away: float = 0.0
 ) -> dict[str, LightmapPage]:
     triangles = turned(np.concatenate([ground, box]), degrees, away)
-    count = len(triangles)
-    scene = Scene(triangles, gray(count, 0.5), gray(count, 0.0), lights=[light], two_sided=True)
+    scene = gray_scene(triangles, lights=[light], two_sided=True)
     parts = [("Ground", len(ground)), ("Bottom", 2), ("Box", len(box) - 2)]
     settings = BakeSettings(quality="draft", resolution=32, atlas="per-object", quantity="irradiance")
     result = bake(bake_scene(scene, *parts), settings)
@@ -98,7 +97,7 @@ def test_walls_of_neighboring_rooms_stay_lit() -> None:
 
     def baked(triangles: np.ndarray, lamps: list[PointLight]) -> np.ndarray:
         count = len(triangles)
-        scene = Scene(triangles, gray(count, 0.5), gray(count, 0.0), lights=lamps, two_sided=True)
+        scene = gray_scene(triangles, lights=lamps, two_sided=True)
         settings = BakeSettings(quality="draft", resolution=32, atlas="per-object")
         parts = [(f"Room {number}", 12) for number in range(count // 12)]
         return np.array([values(page).mean() for page in bake(bake_scene(scene, *parts), settings).pages])

@@ -14,13 +14,30 @@ from radiosity_addon.solver import (
     SunLight,
     solve,
 )
-from tests.rooms import CEILING, FLOOR, WALLS, area_mean, box_room, gray, rectangle, solid_box, sphere
-
-# Howell's catalog, CIE 171:2006 and Galerkin solutions extrapolated over n = 4 … 20 grids.
-CUBE_WITH_EMITTING_CEILING = {FLOOR: 0.17122, CEILING: 1.1044, WALLS: 0.18110}
-CIE_5_8_INDIRECT_LX = {0.2: 26.04, 0.5: 104.17, 0.8: 416.67, 0.9: 937.5, 0.95: 1979.17}
-CIE_5_6_WALL_PERCENT = {0.75: 35.901, 1.25: 27.992, 1.75: 21.639, 2.25: 16.716, 2.75: 12.967}
-CIE_5_6_CEILING_PERCENT = {0.25: 26.80, 0.75: 30.94, 1.25: 33.98, 1.75: 35.57}
+from tests.published import (
+    CIE_5_6_CEILING_PERCENT,
+    CIE_5_6_WALL_PERCENT,
+    CIE_5_8_INDIRECT_LX,
+    CUBE_MEANS,
+    CUBE_WITH_EMITTING_CEILING,
+    cie_5_6,
+    cie_5_8,
+    cie_5_8_indirect,
+    parallel_plates,
+    shining_cube,
+    wall_means,
+)
+from tests.rooms import (
+    CEILING,
+    FLOOR,
+    area_mean,
+    box_room,
+    gray_scene,
+    rectangle,
+    solid_box,
+    sphere,
+)
+from tests.unit.solved_rooms import furnished
 
 
 def assert_closed(scene: Scene, solution, per_triangle: float = 0.01, overall: float = 0.002) -> None:
@@ -47,7 +64,7 @@ def test_uniform_enclosure(shape: str, reflectance: float) -> None:
              [[1, 1, 1], [-1, -1, 1], [1, -1, -1]], [[1, -1, -1], [-1, -1, 1], [-1, 1, -1]]], dtype=float
         )[:, ::-1],
     }[shape]  # fmt: skip
-    scene = Scene(triangles, gray(len(triangles), reflectance), gray(len(triangles), 2.0))
+    scene = gray_scene(triangles, reflectance, 2.0)
     solution = solve(scene)
     assert_closed(scene, solution)
     np.testing.assert_allclose(solution.triangle_radiosity, 2.0 / (1.0 - reflectance), rtol=0.02)
@@ -58,66 +75,43 @@ def test_uniform_enclosure(shape: str, reflectance: float) -> None:
 @pytest.mark.parametrize("n", [1, 6])
 def test_cube_with_emitting_ceiling(n: int) -> None:
     """Area means of radiosity, ρ = 0.5, against exact Galerkin solutions."""
-    triangles, surface = box_room(n=n)
-    emission = gray(len(triangles), 1.0) * (surface == CEILING)[:, None]
-    scene = Scene(triangles, gray(len(triangles), 0.5), emission)
+    scene = shining_cube(n)
     solution = solve(scene)
     assert_closed(scene, solution)
-    total = 0.0
-    for number in range(6):
-        rows = surface == number
-        mean = area_mean(solution.triangle_radiosity[rows], scene.areas[rows])
-        expected = CUBE_WITH_EMITTING_CEILING[min(number, WALLS)]
-        np.testing.assert_allclose(mean, expected, rtol=0.006)
-        total += mean[0]
-    assert total == pytest.approx(2.0, rel=0.003)
+    means = wall_means(solution.triangle_radiosity, scene.areas)
+    np.testing.assert_allclose(means, np.tile(CUBE_MEANS, (3, 1)).T, rtol=0.006)
+    assert means[:, 0].sum() == pytest.approx(2.0, rel=0.003)
 
 
 def test_error_falls_with_the_threshold() -> None:
     """A hundredth of BF_ε brings the means several times nearer to the exact solution."""
-    triangles, surface = box_room()
-    emission = gray(len(triangles), 1.0) * (surface == CEILING)[:, None]
-    scene = Scene(triangles, gray(len(triangles), 0.5), emission)
+    scene = shining_cube()
     errors = []
     for error in (1e-2, 1e-4):
         solution = solve(scene, SolverSettings(error=error))
-        rows = [surface == s for s in range(6)]
-        means = [area_mean(solution.triangle_radiosity[r], scene.areas[r])[0] for r in rows]
-        exact = [CUBE_WITH_EMITTING_CEILING[min(s, WALLS)] for s in range(6)]
-        errors.append(np.abs(np.array(means) - exact).max())
+        means = wall_means(solution.triangle_radiosity, scene.areas)[:, 0]
+        errors.append(np.abs(means - CUBE_MEANS).max())
     assert errors[1] < 0.4 * errors[0]
 
 
 def test_parallel_plates() -> None:
-    """Two plates much larger than their distance, ρ = 0.5, one emits 1: B = 4/3 and 2/3."""
-    size = np.array([1.0, 1.0, 1.0])
-    below = rectangle((0, 0, 0), (size[0], 0, 0), (0, size[1], 0))
-    above = rectangle((0, 0, 0.0005), (0, size[1], 0), (size[0], 0, 0))
-    triangles = np.concatenate([below, above])
-    emission = np.concatenate([gray(2, 1.0), gray(2, 0.0)])
-    solution = solve(Scene(triangles, gray(4, 0.5), emission))
+    solution = solve(parallel_plates())
     np.testing.assert_allclose(solution.triangle_radiosity[:2], 4 / 3, rtol=0.005)
     np.testing.assert_allclose(solution.triangle_radiosity[2:], 2 / 3, rtol=0.005)
 
 
 @pytest.mark.parametrize("reflectance", CIE_5_8_INDIRECT_LX)
 def test_cie_171_5_8(reflectance: float) -> None:
-    """Closed cube of edge 4 m, isotropic point source of 10 000 lm: mean indirect illuminance."""
-    triangles, _ = box_room((4, 4, 4))
-    lamp = PointLight((2, 2, 2), 10_000.0)
-    scene = Scene(triangles, gray(len(triangles), reflectance), gray(len(triangles), 0.0), lights=[lamp])
+    scene = cie_5_8(reflectance)
     solution = solve(scene)
     assert_closed(scene, solution)
-    direct = 10_000.0 / 96.0
-    indirect = area_mean(solution.triangle_irradiance, scene.areas) - direct
+    indirect = cie_5_8_indirect(solution.triangle_irradiance, scene.areas)
     np.testing.assert_allclose(indirect, CIE_5_8_INDIRECT_LX[reflectance], rtol=0.01)
 
 
 def test_cie_171_5_6() -> None:
-    """A diffuse floor of exitance 100 in a black room: illuminance at points, in percent of it."""
-    triangles, surface = box_room((4, 4, 3))
-    emission = gray(len(triangles), 100.0) * (surface == FLOOR)[:, None]
-    solution = solve(Scene(triangles, gray(len(triangles), 0.0), emission))
+    """Illuminance at points."""
+    solution = solve(cie_5_6())
     on_wall = np.array([[2.0, 0.0, z] for z in CIE_5_6_WALL_PERCENT])
     irradiance = solution.irradiance(on_wall, np.tile([0.0, 1.0, 0.0], (len(on_wall), 1)))
     np.testing.assert_allclose(irradiance[:, 0], list(CIE_5_6_WALL_PERCENT.values()), rtol=2e-4)
@@ -136,7 +130,7 @@ def test_colors_do_not_mix() -> None:
     floor = solution.triangle_radiosity[surface == FLOOR]
     np.testing.assert_allclose(floor[:, 0], CUBE_WITH_EMITTING_CEILING[FLOOR], rtol=0.01)
     assert (floor[:, 2] == 0).all()
-    one = solve(Scene(triangles, gray(len(triangles), 0.2), emission[:, 1:2] * np.ones(3)))
+    one = solve(gray_scene(triangles, 0.2, emission[:, 1:2] * np.ones(3)))
     np.testing.assert_allclose(floor[:, 1], one.triangle_radiosity[surface == FLOOR, 1], rtol=0.01)
 
 
@@ -146,8 +140,7 @@ def test_the_sides_of_a_wall_are_apart() -> None:
     wall = rectangle((1, 0, 0), (0, 1, 0), (0, 0, 1))
     triangles = np.concatenate([room, wall])
     lamp = PointLight((1.5, 0.5, 0.5), 10.0)
-    count = len(triangles)
-    solution = solve(Scene(triangles, gray(count, 0.8), gray(count, 0.0), two_sided=True, lights=[lamp]))
+    solution = solve(gray_scene(triangles, 0.8, two_sided=True, lights=[lamp]))
     front, back = solution.triangle_irradiance[-2:], solution.back_irradiance[-2:]
     assert (front > 1.0).all()  # the lit side faces +x
     assert back.max() < 1e-4 * front.min()
@@ -160,7 +153,7 @@ def test_the_sides_of_a_wall_are_apart() -> None:
 def test_the_back_of_a_one_sided_triangle_blocks_and_absorbs() -> None:
     """Black backs: a lamp above an upside-down floor lights nothing, and its power is accounted for."""
     floor = rectangle((-50, -50, 0), (0, 100, 0), (100, 0, 0))
-    solution = solve(Scene(floor, gray(2, 0.8), gray(2, 0.0), lights=[PointLight((0, 0, 1), 100.0)]))
+    solution = solve(gray_scene(floor, 0.8, lights=[PointLight((0, 0, 1), 100.0)]))
     assert (solution.triangle_irradiance == 0).all()
     power = solution.report["power_W"]
     assert power["emitted"] == 100.0
@@ -174,7 +167,7 @@ def test_sun_on_a_plane(elevation: float) -> None:
     floor = rectangle((0, 0, 0), (2, 0, 0), (0, 2, 0))
     angle = np.radians(elevation)
     sun = SunLight((-np.cos(angle), 0, -np.sin(angle)), 3.0)
-    solution = solve(Scene(floor, gray(2, 0.5), gray(2, 0.0), lights=[sun]))
+    solution = solve(gray_scene(floor, lights=[sun]))
     np.testing.assert_allclose(solution.triangle_irradiance, 3.0 * np.sin(angle), rtol=1e-5)
     power = solution.report["power_W"]
     assert power["emitted"] == pytest.approx(4 * 3.0 * np.sin(angle), rel=1e-5)
@@ -185,9 +178,8 @@ def test_sky_over_a_plane_and_a_box() -> None:
     """H = πL in the open; what a closed box covers stays dark."""
     floor = rectangle((-4, -4, 0), (8, 0, 0), (0, 8, 0))
     triangles = np.concatenate([floor, solid_box((-0.5, -0.5, 0), (0.5, 0.5, 1))])
-    count = len(triangles)
     sky = EnvironmentLight(2.0)
-    solution = solve(Scene(triangles, gray(count, 0.0), gray(count, 0.0), two_sided=True, lights=[sky]))
+    solution = solve(gray_scene(triangles, 0.0, two_sided=True, lights=[sky]))
     points = np.array([[3.9, 3.9, 0.0], [0, 0, 1.0], [0, 0, 0], [0.45, 0.3, 0]])
     irradiance = solution.irradiance(points, np.tile([0, 0, 1.0], (4, 1)))
     np.testing.assert_allclose(irradiance[1], 2 * np.pi, rtol=1e-6)
@@ -199,8 +191,7 @@ def test_area_lamp_is_one_sided_and_casts_no_shadow() -> None:
     """A lamp close below the ceiling lights the floor as Lambert says, and the ceiling not directly."""
     triangles, surface = box_room((2, 2, 2))
     lamp = AreaLight((1, 1, 1.999), (0, 0.5, 0), (0.5, 0, 0), 10.0)
-    count = len(triangles)
-    scene = Scene(triangles, gray(count, 0.0), gray(count, 0.0), lights=[lamp])
+    scene = gray_scene(triangles, 0.0, lights=[lamp])
     solution = solve(scene)
     assert (solution.triangle_irradiance[surface == CEILING] == 0).all()
     assert float(scene.areas @ solution.triangle_irradiance[:, 0]) == pytest.approx(10.0, rel=0.005)
@@ -211,12 +202,8 @@ def test_area_lamp_is_one_sided_and_casts_no_shadow() -> None:
 
 def test_local_pass_agrees_with_the_elements() -> None:
     """The mean of point irradiances over a triangle is the triangle's own."""
-    triangles, surface = box_room((3, 2, 2))
-    triangles = np.concatenate([triangles, solid_box((0.5, 0.5, 0.3), (1.2, 1.2, 1.0))])
-    count = len(triangles)
-    emission = gray(count, 0.0)
-    emission[:12][surface == CEILING] = 1.0
-    solution = solve(Scene(triangles, gray(count, 0.6), emission))
+    scene = furnished()
+    triangles, solution = scene.triangles, solve(scene)
     weights = np.random.default_rng(1).dirichlet((1, 1, 1), 400)
     for row in (0, 5, 8):
         a, b, c = triangles[row]
@@ -227,16 +214,12 @@ def test_local_pass_agrees_with_the_elements() -> None:
 
 def test_many_triangles_need_few_links() -> None:
     """A cube room of 20 000 triangles: far fewer first pairs than n², and still the exact means."""
-    triangles, surface = box_room(n=41)
-    assert len(triangles) == 20_172
-    emission = gray(len(triangles), 1.0) * (surface == CEILING)[:, None]
-    scene = Scene(triangles, gray(len(triangles), 0.5), emission)
+    scene = shining_cube(41)
+    assert len(scene) == 20_172
     solution = solve(scene, SolverSettings(error=1e-4))
-    assert solution.report["links"] < 300 * len(triangles)
-    for number in range(6):
-        rows = surface == number
-        mean = area_mean(solution.triangle_radiosity[rows], scene.areas[rows])
-        np.testing.assert_allclose(mean, CUBE_WITH_EMITTING_CEILING[min(number, WALLS)], rtol=0.01)
+    assert solution.report["links"] < 300 * len(scene)
+    means = wall_means(solution.triangle_radiosity, scene.areas)
+    np.testing.assert_allclose(means, np.tile(CUBE_MEANS, (3, 1)).T, rtol=0.01)
     power = solution.report["power_W"]
     assert power["absorbed"] == pytest.approx(power["emitted"], rel=0.005)
 
@@ -250,9 +233,8 @@ def test_threads_and_repeats_change_nothing() -> None:
     """The same seed gives the same numbers bit for bit, on one thread and on many."""
     triangles, _ = box_room((3, 2, 2))
     triangles = np.concatenate([triangles, solid_box((0.5, 0.5, 0.3), (1.2, 1.2, 1.0))])
-    count = len(triangles)
     lamp = PointLight((2.5, 1.5, 1.5), 50.0, radius=0.1)
-    scene = Scene(triangles, gray(count, 0.6), gray(count, 0.0), two_sided=True, lights=[lamp])
+    scene = gray_scene(triangles, 0.6, two_sided=True, lights=[lamp])
     points = np.random.default_rng(3).uniform(0.1, 0.29, (50, 3))
     up = np.tile([0, 0, 1.0], (50, 1))
     one, two = (solve(scene, SolverSettings(threads=threads)) for threads in (1, 2))
@@ -263,18 +245,11 @@ def test_threads_and_repeats_change_nothing() -> None:
     assert other.triangle_radiosity.tobytes() != one.triangle_radiosity.tobytes()
 
 
-def test_without_light_all_is_black() -> None:
-    triangles, _ = box_room()
-    solution = solve(Scene(triangles, gray(12, 0.5), gray(12, 0.0)))
-    assert (solution.triangle_radiosity == 0).all()
-    assert solution.report["power_W"] == {"emitted": 0.0, "absorbed": 0.0, "escaped": 0.0}
-
-
 def test_far_from_the_origin() -> None:
     """A room 10 km away is lit like one at the origin: rays are recentered."""
     triangles, _ = box_room((4, 4, 4))
     far = np.array([10_000.0, -7_000.0, 300.0])
     lamp = PointLight(far + 2, 10_000.0)
-    solution = solve(Scene(triangles + far, gray(12, 0.5), gray(12, 0.0), lights=[lamp]))
+    solution = solve(gray_scene(triangles + far, 0.5, lights=[lamp]))
     indirect = solution.triangle_irradiance.mean() - 10_000.0 / 96.0
     assert indirect == pytest.approx(CIE_5_8_INDIRECT_LX[0.5], rel=0.01)

@@ -9,7 +9,7 @@ from radiosity_addon.form_factors.formulas import point_to_polygon
 from radiosity_addon.scene.textures import SurfaceImages
 from radiosity_addon.solver import PointLight, Scene, SolverSettings, solve
 from radiosity_addon.solver.gather.footprints import Footprints
-from tests.rooms import CEILING, box_room, gray, rectangle
+from tests.rooms import CEILING, box_room, gray, gray_scene, rectangle
 from tests.textured_rooms import furnace, image, patterned
 from tests.unit.solved_rooms import solved
 from tests.unit.texel_scenes import QUAD_UV
@@ -91,7 +91,7 @@ def test_a_screen_of_many_faces_does_not_disturb_the_furnace() -> None:
     )
     uv = corner[:, None] + QUAD_UV[0] * (0.1, 0.05)
     images = SurfaceImages(values, uv, np.ones(count, bool))
-    scene = Scene(triangles, gray(count, 0), gray(count, 0), two_sided=screen, images=images)
+    scene = gray_scene(triangles, 0, two_sided=screen, images=images)
     solution = solve(scene)
     assert solution.report["closure_area_mean"] == pytest.approx(1.0, abs=0.01)
     power = solution.report["power_W"]
@@ -117,7 +117,7 @@ def under_a_screen(opacity: float, light: PointLight) -> Scene:
     images = SurfaceImages(
         image(4, 0.0, 0.0, opacity), np.tile(QUAD_UV, (2, 1, 1)), np.array([False, False, True, True])
     )
-    return Scene(triangles, gray(4, 0.5), gray(4, 0), two_sided=True, lights=[light], images=images)
+    return gray_scene(triangles, two_sided=True, lights=[light], images=images)
 
 
 @pytest.mark.parametrize("opacity", [0.0, 0.25, 0.5, 1.0])
@@ -146,7 +146,7 @@ def test_emission_of_an_image_is_that_of_many_small_emitters() -> None:
     # rectangle's grid runs over edge_u first; each field has a triangle in both halves.
     of_fields = np.tile(fields.reshape(-1, 3), (2, 1))
     emission = np.concatenate([gray(len(kept), 0), of_fields])
-    reference = solve(Scene(cut, gray(len(cut), 0.5), emission))
+    reference = solve(gray_scene(cut, 0.5, emission))
 
     # The image's u runs along edge_u, y in the world; so rows are fields along v.
     values = image(64, 0.5)
@@ -154,7 +154,7 @@ def test_emission_of_an_image_is_that_of_many_small_emitters() -> None:
     whole = np.concatenate([kept, rectangle((0, 0, 1), (0, 2, 0), (2, 0, 0))])
     uv = np.concatenate([np.zeros((len(kept), 3, 2)), QUAD_UV])
     images = SurfaceImages(values, uv, np.arange(len(whole)) >= len(kept))
-    textured = solve(Scene(whole, gray(len(whole), 0.5), gray(len(whole), 0), images=images))
+    textured = solve(gray_scene(whole, images=images))
 
     np.testing.assert_allclose(textured.triangle_irradiance[:2], reference.triangle_irradiance[:2], rtol=0.01)
     emitted = reference.report["power_W"]["emitted"]
@@ -177,7 +177,7 @@ def test_a_bright_spot_in_an_image_of_emission_converges() -> None:
     images = SurfaceImages(
         values, np.concatenate([0 * QUAD_UV, QUAD_UV]), np.array([False, False, True, True])
     )
-    scene = Scene(np.concatenate([floor, above]), gray(4, 0), gray(4, 0), images=images)
+    scene = gray_scene(np.concatenate([floor, above]), 0, images=images)
     # u runs along y, v along x.
     spot = np.array([[0.25, -0.5, 0.5], [0.25, -0.25, 0.5], [0.5, -0.25, 0.5], [0.5, -0.5, 0.5]])
     steps = (np.arange(64) + 0.5) / 32 - 1

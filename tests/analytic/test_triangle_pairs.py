@@ -9,25 +9,9 @@ from radiosity_addon.form_factors import triangle_pairs
 from radiosity_addon.form_factors.formulas import point_to_polygon, triangle_to_triangle
 from radiosity_addon.numerics.sampling import points_on_triangles, stratified_square
 from tests.rooms import FLOOR, box_room
+from tests.vectors import areas_of, normals_of, random_rotation, unit_rows
 
 UP = np.array([0.0, 0.0, 1.0])
-
-
-def normals_of(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return unit normals and areas."""
-    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    double = np.linalg.norm(cross, axis=1)
-    return cross / double[:, None], double / 2
-
-
-def random_rotation(rng: np.random.Generator) -> np.ndarray:
-    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    return turn * np.sign(np.linalg.det(turn))
-
-
-def unit_rows(rng: np.random.Generator, count: int) -> np.ndarray:
-    rows = rng.normal(size=(count, 3))
-    return rows / np.linalg.norm(rows, axis=1)[:, None]
 
 
 def halves(quad: np.ndarray) -> np.ndarray:
@@ -38,7 +22,7 @@ def halves(quad: np.ndarray) -> np.ndarray:
 def quad_factor(receiver: list[tuple[float, ...]], source: list[tuple[float, ...]]) -> float:
     """Return the factor between two quads from those of their halves."""
     receivers, sources = np.repeat(halves(receiver), 2, axis=0), np.tile(halves(source), (2, 1, 1))
-    area = normals_of(receivers)[1]
+    area = areas_of(receivers)
     return float(area @ triangle_to_triangle(receivers, sources) / area[::2].sum())
 
 
@@ -100,7 +84,7 @@ def test_reciprocity(kind: str) -> None:
     first, second = pairs(kind, np.random.default_rng(11), 500)
     there, back = triangle_to_triangle(first, second), triangle_to_triangle(second, first)
     assert (there > 0).mean() > 0.1
-    np.testing.assert_allclose(normals_of(first)[1] * there, normals_of(second)[1] * back, atol=1e-12)
+    np.testing.assert_allclose(areas_of(first) * there, areas_of(second) * back, atol=1e-12)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -108,7 +92,7 @@ def test_mean_of_the_point_factor_over_the_receiver(kind: str) -> None:
     first, second = pairs(kind, np.random.default_rng(12), 60)
     samples = 1 << 13
     points = points_on_triangles(first, stratified_square(np.arange(60), samples).astype(float))
-    normals = np.repeat(normals_of(first)[0], samples, axis=0)
+    normals = np.repeat(normals_of(first), samples, axis=0)
     factors = point_to_polygon(points.reshape(-1, 3), normals, np.repeat(second, samples, axis=0))
     np.testing.assert_allclose(
         triangle_to_triangle(first, second), factors.reshape(60, -1).mean(axis=1), atol=1.5e-3

@@ -12,6 +12,7 @@ import pytest
 from build_tools import environments, system
 from build_tools.environments import Environment
 from build_tools.errors import BuildError
+from tests.wording import says
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -57,10 +58,8 @@ def test_all_that_is_missing_is_named_with_its_packages(
     monkeypatch.setattr(system, "DEBIAN_PACKAGE_OF_LIBRARY", libraries)
     with pytest.raises(BuildError) as missing:
         system.require(str(python), (3, 11))
-    assert str(missing.value) == (
-        f"this machine lacks libnowhere.so.6, libgone.so.1, the venv module of {python}; "
-        "on Debian run: apt-get install -y libnowhere6 libgone1 python3.11-venv"
-    )
+    assert says(str(missing.value), "libnowhere.so.6", "libgone.so.1", f"venv module of {python}")
+    assert str(missing.value).endswith(" install -y libnowhere6 libgone1 python3.11-venv")
 
 
 def test_an_environment_that_is_there_needs_no_venv_module(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -79,7 +78,7 @@ def test_the_documentation_needs_no_library_of_blenders(
 
 
 def test_a_missing_python_is_named() -> None:
-    with pytest.raises(BuildError, match=r"^no python3\.99 found; install it"):
+    with pytest.raises(BuildError, match=r"python3\.99"):
         system.find_python((3, 99))
 
 
@@ -139,13 +138,13 @@ def test_a_half_made_environment_is_made_anew(checkout: Path) -> None:
 
 def test_pip_that_fails_is_an_error_and_leaves_no_stamp(checkout: Path) -> None:
     (checkout / "requirements" / "tools.txt").write_text("--no-index\nthere-is-no-such-package==1\n")
-    with pytest.raises(BuildError, match="pip could not install"):
+    with pytest.raises(BuildError, match="pip"):
         environments.main_environment(checkout)
     assert not (checkout / ".venv" / "pins.sha256").exists()
 
 
 def test_a_version_without_pins_is_an_error(checkout: Path) -> None:
-    with pytest.raises(BuildError, match=r"no pins for bpy 3\.6; there are 4\.2"):
+    with pytest.raises(BuildError, match=r"3\.6.*4\.2"):
         environments.bpy_environment(checkout, "3.6")
 
 

@@ -15,6 +15,8 @@ from pathlib import Path
 import bpy
 import pytest
 
+from tests.wording import says
+
 from .conftest import QUICK, ROOT, Baked, add_lamp, add_quad, digest, read_report, save, start
 
 Run = Callable[..., object]
@@ -192,7 +194,7 @@ def test_ctrl_c_leaves_the_previous_result_whole(stage: str, baked: Baked, tmp_p
             break
     _, err = job.communicate(timeout=300)
     assert job.returncode == 130
-    assert err.splitlines()[-1] == "error: interrupted; nothing was written"
+    assert says(err.splitlines()[-1], "error: ", "interrupted")
     assert "Traceback" not in err
     assert digest(out) == before
 
@@ -207,7 +209,9 @@ def test_ctrl_c_waits_while_blender_is_imported(baked: Baked, tmp_path: Path) ->
         time.sleep(0.001)
     os.killpg(job.pid, signal.SIGINT)
     _, err = job.communicate(timeout=300)
-    assert (job.returncode, err) == (130, "error: interrupted; nothing was written\n")
+    assert job.returncode == 130
+    assert err.count("\n") == 1
+    assert says(err, "error: ", "interrupted")
     assert digest(out) == before
 
 

@@ -13,7 +13,7 @@ import radiosity_addon
 from radiosity_addon.blender.files.files import open_scene
 from radiosity_addon.blender.jobs.job import run_bake
 from radiosity_addon.options.bake_settings import BakeSettings
-from tests.blender.file_dump import differences, dump_file
+from tests.blender.file_dump import differences_since, tidy_dump
 
 QUICK = BakeSettings(resolution=64, quality="draft")
 
@@ -49,7 +49,7 @@ def registered() -> Iterator[None]:
 def test_a_bake_succeeds_and_restore_leaves_no_difference(shared_scenes: Path, name: str) -> None:
     open_scene(shared_scenes / name)
     _add_lamp(*LAMPS[name])
-    before = _tidy_dump()
+    before = tidy_dump()
     report = _bake()
 
     assert report["solver"]["residual"] < 1e-3
@@ -67,7 +67,7 @@ def test_a_bake_succeeds_and_restore_leaves_no_difference(shared_scenes: Path, n
         assert min(values.min() for values in texels.values()) > 0
 
     assert bpy.ops.radiosity.restore() == {"FINISHED"}
-    assert _without_counts(differences(before, _tidy_dump())) == []
+    assert differences_since(before, tidy_dump()) == []
 
 
 @pytest.mark.parametrize("name", UNDER_A_SKY)
@@ -151,17 +151,3 @@ def _set_sky(radiance: float) -> None:
     background = next(node for node in bpy.context.scene.world.node_tree.nodes if node.type == "BACKGROUND")
     background.inputs["Color"].default_value = (radiance, radiance, radiance, 1.0)
     background.inputs["Strength"].default_value = 1.0
-
-
-def _tidy_dump() -> dict:
-    """Dump after what Blender puts off until somebody looks is done."""
-    bpy.context.view_layer.update()
-    dump_file()
-    return dump_file()
-
-
-def _without_counts(found: list[str]) -> list[str]:
-    """Before 5.0 Material.copy() counts what its nodes use twice until the next load."""
-    if bpy.app.version >= (5, 0):
-        return found
-    return [line for line in found if not line.endswith("users") and "/users: " not in line]

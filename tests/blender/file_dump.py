@@ -30,6 +30,13 @@ def dump_file() -> dict[str, Any]:
     }
 
 
+def tidy_dump() -> dict[str, Any]:
+    """Dump after what Blender puts off until somebody looks is done."""
+    bpy.context.view_layer.update()
+    dump_file()
+    return dump_file()
+
+
 def differences_since(before: dict[str, Any], after: dict[str, Any] | None = None) -> list[str]:
     """What is other in the open file, or in a later dump, than before, save for what Blender counts twice."""
     found = differences(before, dump_file() if after is None else after)

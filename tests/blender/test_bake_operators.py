@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 
-import radiosity_addon
 from radiosity_addon.base.errors import BakeError, SceneError
 from radiosity_addon.blender.datablocks.bake_record import is_baked, shows_lightmap
 from radiosity_addon.blender.files.cornell import build_cornell_box
@@ -26,14 +24,12 @@ QUICK = BakeSettings(resolution=32, quality="draft")
 
 
 @pytest.fixture(autouse=True)
-def box() -> Iterator[bpy.types.Scene]:
+def box(registered: None) -> bpy.types.Scene:
     """The Cornell box, with the panel set to a quick bake."""
-    radiosity_addon.register()
     scene = build_cornell_box()
     scene.radiosity.resolution = QUICK.resolution
     scene.radiosity.quality = QUICK.quality
-    yield scene
-    radiosity_addon.unregister()
+    return scene
 
 
 def bake() -> set[str]:
@@ -103,21 +99,19 @@ def test_a_folder_whose_name_is_too_long_is_one_line(
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
     box.radiosity.output_folder = folder
     assert interrupted_folders(bpy.context) == []
-    with pytest.raises(
-        RuntimeError, match=r"cannot write to the output folder .* (too long|longer)"
-    ) as refusal:
+    with pytest.raises(RuntimeError, match=r"output folder.*(too long|longer)") as refusal:
         bpy.ops.radiosity.bake()
     assert len(str(refusal.value).strip().splitlines()) == 1
     assert [path.name for path in tmp_path.iterdir()] == ["room.blend"]
     found = look(bpy.context)
-    assert any("cannot write to the output folder" in finding.message for finding in found.findings)
+    assert any("output folder" in finding.message for finding in found.findings)
 
 
 def test_an_unwritable_folder_is_an_error_message(box: bpy.types.Scene, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
     box.radiosity.output_folder = str(tmp_path / "file")
     before = made()
-    with pytest.raises(RuntimeError, match="cannot write to the output folder"):
+    with pytest.raises(RuntimeError, match="output folder"):
         bake()
     assert made() == before
 

@@ -66,13 +66,13 @@ def test_names_that_cannot_be_baked_say_why() -> None:
 def test_coordinates_that_are_no_numbers_are_an_error(value: float) -> None:
     cube = add_cube("Broken")
     cube.data.vertices[3].co.x = value
-    with pytest.raises(SceneError, match=r"object 'Broken' has NaN or infinite coordinates"):
+    with pytest.raises(SceneError, match=r"'Broken'.*NaN"):
         export_with()
 
 
 def test_a_transform_that_is_no_number_is_an_error() -> None:
     add_cube("Broken").location = (math.nan, 0, 0)
-    with pytest.raises(SceneError, match=r"object 'Broken' has NaN or infinite coordinates"):
+    with pytest.raises(SceneError, match=r"'Broken'.*NaN"):
         export_with()
 
 
@@ -81,27 +81,25 @@ def test_triangles_without_area_warn() -> None:
     export = export_with(sky=True)
     assert len(export.bake_scene.scene) == 2
     (warning,) = export.bake_scene.warnings
-    assert (warning.name, warning.message) == (
-        "Sliver",
-        "object 'Sliver': a triangle without area; no light falls there",
-    )
+    assert warning.name == "Sliver"
+    assert "without area" in warning.message
 
 
 def test_nothing_to_bake_is_an_error() -> None:
-    with pytest.raises(SceneError, match=r"scene 'Scene' has nothing to bake"):
+    with pytest.raises(SceneError, match=r"'Scene'.*nothing"):
         export_with()
     add_lamp("POINT", energy=1.0)
-    with pytest.raises(SceneError, match=r"scene 'Scene' has nothing to bake"):
+    with pytest.raises(SceneError, match=r"'Scene'.*nothing"):
         export_with()
     add_cube("Flat", scale=(0, 0, 0))
-    with pytest.raises(SceneError, match=r"scene 'Scene' has nothing to bake"):
+    with pytest.raises(SceneError, match=r"'Scene'.*nothing"):
         export_with()
 
 
 def test_no_light_at_all_warns() -> None:
     add_cube()
     (warning,) = export_with().bake_scene.warnings
-    assert "no light at all" in warning.message
+    assert "no light" in warning.message
 
 
 @pytest.fixture
@@ -124,15 +122,13 @@ def _link(library: Path) -> bpy.types.Collection:
 
 def test_linked_objects_light_and_block_but_cannot_be_baked(library: Path) -> None:
     bpy.context.scene.collection.children.link(_link(library))
-    with pytest.raises(SceneError, match=r"object 'Chair' is linked from .*library\.blend"):
+    with pytest.raises(SceneError, match=r"'Chair'.*library\.blend"):
         export_with()
     add_cube("Mine")
     export = export_with()
     assert {obj.name: obj.bake for obj in export.bake_scene.objects} == {"Chair": False, "Mine": True}
-    assert ("Chair", True) in [
-        (w.name, "linked from a library" in w.message) for w in export.bake_scene.warnings
-    ]
-    with pytest.raises(SceneError, match=r"object 'Chair' is linked"):
+    assert ("Chair", True) in [(w.name, "linked" in w.message) for w in export.bake_scene.warnings]
+    with pytest.raises(SceneError, match=r"'Chair'.*linked"):
         export_with(objects=("Chair",))
 
 

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import bpy
 import numpy as np
 import pytest
 
-import radiosity_addon
 from radiosity_addon.blender.jobs.job import run_bake
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import LIGHTMAP_UV_LAYER
 from tests.blender.scenes import add_lamp, add_mesh, shader_material
+
+pytestmark = pytest.mark.usefixtures("registered")
 
 INDIRECT_LX = {0.2: 26.04, 0.5: 104.17, 0.8: 416.67, 0.9: 937.5, 0.95: 1979.17}
 """(Φ / S) ρ / (1 − ρ) as the CIE prints it, by the reflectance of all walls."""
@@ -28,13 +28,6 @@ INWARD = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), 
 # Where each wall is looked up: the middles of 16 × 16 cells, in parts of its two edges.
 _CELLS = (np.arange(16) + 0.5) / 16
 _S, _T = (grid.ravel()[:, None] for grid in np.meshgrid(_CELLS, _CELLS))
-
-
-@pytest.fixture(scope="module", autouse=True)
-def registered() -> Iterator[None]:
-    radiosity_addon.register()
-    yield
-    radiosity_addon.unregister()
 
 
 def _room(reflectance: float) -> bpy.types.Object:

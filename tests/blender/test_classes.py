@@ -21,11 +21,9 @@ PANELS = [cls for cls in registration.CLASSES if issubclass(cls, bpy.types.Panel
 
 
 @pytest.fixture(autouse=True)
-def registered() -> Iterator[None]:
-    radiosity_addon.register()
+def registered(registered: None) -> Iterator[None]:
     yield
     session.running.active = False
-    radiosity_addon.unregister()
 
 
 def property_groups() -> list[type]:

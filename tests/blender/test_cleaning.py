@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
@@ -37,14 +36,12 @@ def baked(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def room(baked: Path, tmp_path: Path) -> Iterator[Path]:
+def room(registered: None, baked: Path, tmp_path: Path) -> Path:
     """The folder of a room that was baked and saved, and is open."""
     folder = tmp_path / "room"
     shutil.copytree(baked, folder)
-    radiosity_addon.register()
     bpy.ops.wm.open_mainfile(filepath=str(folder / "room.blend"))
-    yield folder
-    radiosity_addon.unregister()
+    return folder
 
 
 def files(folder: Path) -> list[str]:
@@ -255,7 +252,7 @@ def test_only_the_folder_of_a_bake_of_this_scene_is_opened(
     from radiosity_addon.blender.operators import bake_operators
 
     opened = []
-    monkeypatch.setattr(bake_operators, "_open", lambda folder: opened.append(folder))
+    monkeypatch.setattr(bake_operators, "show_folder", opened.append)
     assert bpy.ops.radiosity.open_folder() == {"FINISHED"}
     (room / "lightmaps" / "room_Scene_report.json").rename(room / "lightmaps" / "notes.json")
     with pytest.raises(RuntimeError, match="no bake of this scene"):

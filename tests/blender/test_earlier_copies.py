@@ -21,7 +21,7 @@ pytestmark = pytest.mark.usefixtures("record")
 
 
 EARLIER = Path(__file__).parent / "files" / "lightmaps_without_records.blend"
-"""Baked at d331b48, which noted nothing on copies."""
+"""Baked by a version that noted nothing on copies."""
 
 
 @pytest.fixture

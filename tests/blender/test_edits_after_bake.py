@@ -10,7 +10,7 @@ import pytest
 
 from radiosity_addon.blender.apply.restore import restore
 from radiosity_addon.blender.datablocks import bake_record
-from tests.blender.file_dump import differences_since, dump_file
+from tests.blender.file_dump import differences_since, tidy_dump
 from tests.blender.hand_bake import add_plane, bake_by_hand, principled_material
 
 pytestmark = pytest.mark.usefixtures("record")
@@ -37,12 +37,6 @@ def _plane() -> bpy.types.Object:
     plane.data.attributes.new("Tint", "FLOAT_COLOR", "CORNER")
     plane.vertex_groups.new(name="Some").add([0], 0.5, "REPLACE")
     return plane
-
-
-def _tidy_dump() -> dict:
-    bpy.context.view_layer.update()
-    dump_file()
-    return dump_file()
 
 
 def move_vertex(plane: bpy.types.Object) -> None:
@@ -100,7 +94,7 @@ def test_an_edit_on_a_baked_object_is_as_if_it_was_never_baked(
     edit: Callable[[bpy.types.Object], None], rebaked: bool
 ) -> None:
     edit(_plane())
-    expected = _tidy_dump()
+    expected = tidy_dump()
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     plane = _plane()
     bake_by_hand()
@@ -109,7 +103,7 @@ def test_an_edit_on_a_baked_object_is_as_if_it_was_never_baked(
         _again()
         assert "Lightmap" in plane.data.uv_layers
     restore(bpy.context)
-    assert differences_since(expected, _tidy_dump()) == []
+    assert differences_since(expected, tidy_dump()) == []
 
 
 @AFTER
@@ -220,23 +214,23 @@ def test_a_layer_of_the_user_s_by_our_name_comes_back(layers: list[str]) -> None
     values = np.arange(8, dtype=np.float32) / 3
     plane.data.attributes["Lightmap"].data.foreach_set("vector", values)
     plane.data.uv_layers["Lightmap"].active_render = True
-    before = _tidy_dump()
+    before = tidy_dump()
     original = plane.data
     bake_by_hand()
     assert plane.data == original
     assert len(plane.data.uv_layers) == min(len(layers) + 1, 8)
     bake_by_hand(colors=((9, 9, 9),))
     restore(bpy.context)
-    assert differences_since(before, _tidy_dump()) == []
+    assert differences_since(before, tidy_dump()) == []
 
 
 def test_kept_uvs_are_the_user_s_own_layer() -> None:
     plane = add_plane()
     plane.data.uv_layers.new(name="Lightmap")
-    before = _tidy_dump()
+    before = tidy_dump()
     bake_by_hand(keep_uvs=True)
     restore(bpy.context)
-    assert differences_since(before, _tidy_dump()) == []
+    assert differences_since(before, tidy_dump()) == []
 
 
 def test_a_baked_object_that_was_appended_is_restored_there(tmp_path) -> None:

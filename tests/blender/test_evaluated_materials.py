@@ -15,8 +15,10 @@ from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.scene import Scene
 from radiosity_addon.scene.textures import SurfaceImages
 from tests.blender.exporting import CUBE, CUBE_FACES, add_cube, add_instance
+from tests.blender.file_dump import differences_since, tidy_dump
 from tests.blender.material_zoo import BLUE, RED, ZOO, cut_out, diffuse_of, feed, make_all_vary
 from tests.blender.scenes import add_mesh, add_node, shader_material
+from tests.blender.zoo import build_zoo
 
 
 def _scene(resolution: int = 128) -> Scene:
@@ -307,17 +309,14 @@ def test_a_shadow_ray_switch_lets_light_pass_and_reflects_all_the_same() -> None
 
 
 def test_the_file_is_the_same_afterwards() -> None:
-    from tests.blender.test_restore import _differences_since, _tidy_dump
-    from tests.blender.zoo import build_zoo
-
     build_zoo(bpy.context)
     for number, make in enumerate(ZOO.values()):
         material = make()
         make_all_vary(material.node_tree)
         add_mesh(f"Evaluated {number}", material=material, location=(0, 0, 5 + number))
-    before = _tidy_dump()
+    before = tidy_dump()
     assert _scene().images is not None
-    assert _differences_since(before) == []
+    assert differences_since(before, tidy_dump()) == []
 
 
 def test_what_only_the_camera_sees_is_left_out_where_colors_vary() -> None:

@@ -140,7 +140,7 @@ def test_a_ninth_uv_layer_is_an_error_unless_lightmap_is_there() -> None:
     cube = add_cube("Full")
     for index in range(8):
         cube.data.uv_layers.new(name=f"UV{index}")
-    with pytest.raises(SceneError, match=r"object 'Full' already has 8 UV layers"):
+    with pytest.raises(SceneError, match=r"'Full'.*UV layers"):
         export_with()
     add_cube("Other")
     assert not objects_by_name(export_with(objects=("Other",)))["Full"].bake

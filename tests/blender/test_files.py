@@ -67,15 +67,15 @@ def test_obj_comes_into_an_empty_scene_standing_upright(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [
-        ("broken.blend", b"BLENDER" + b"?" * 400, "cannot be read by Blender"),
-        ("text.blend", b"hello\n" * 100, "cannot be read by Blender"),
+        ("broken.blend", b"BLENDER" + b"?" * 400, "cannot be read"),
+        ("text.blend", b"hello\n" * 100, "cannot be read"),
         ("broken.glb", b"glTF" + b"?" * 400, "cannot be read"),
         ("broken.gltf", b'{"asset":', "cannot be read"),
         ("empty.gltf", json.dumps({"asset": {"version": "2.0"}}).encode(), "cannot be read"),
-        ("broken.obj", b"\xff\xfe\x00 hello\n", "no object was found"),
+        ("broken.obj", b"\xff\xfe\x00 hello\n", "no object"),
         ("empty.obj", b"", "is empty"),
-        ("scene.fbx", b"Kaydara", "is not a scene we can open"),
-        ("scene", b"?", "is not a scene we can open"),
+        ("scene.fbx", b"Kaydara", "supported"),
+        ("scene", b"?", "supported"),
     ],
 )
 def test_what_cannot_be_opened_is_an_error_of_one_line(
@@ -131,10 +131,10 @@ def test_the_cause_is_told_and_nothing_is_printed(
 
 
 def test_a_missing_file_and_a_folder_are_errors(tmp_path: Path) -> None:
-    with pytest.raises(SceneError, match=r"missing\.blend does not exist"):
+    with pytest.raises(SceneError, match=r"missing\.blend.*exist"):
         open_scene(tmp_path / "missing.blend")
     (tmp_path / "folder.blend").mkdir()
-    with pytest.raises(SceneError, match=r"folder\.blend is not a file"):
+    with pytest.raises(SceneError, match=r"folder\.blend.*file"):
         open_scene(tmp_path / "folder.blend")
 
 

@@ -14,6 +14,7 @@ from radiosity_addon.blender.scene_export.export import export_scene
 from radiosity_addon.lights.sun_and_sky import AreaLight, Lamp
 from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.scenes import add_lamp, add_mesh, add_node, add_object, measure_irradiance, with_nodes
+from tests.wording import says
 
 # A quad so small that the light hardly changes over it, tilted so that the cosine matters.
 _METER = [(x * 0.0005, y * 0.0005, 0.0) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
@@ -129,7 +130,7 @@ def test_a_lamp_hidden_from_renders_does_not_light(meter: bpy.types.Object) -> N
     add_lamp("POINT", energy=7.0).hide_render = True
     lamps, warnings = _exported()
     assert lamps == []
-    assert "no light at all" in warnings[0].message
+    assert "no light" in warnings[0].message
 
 
 def test_a_lamp_hidden_in_the_viewport_only_lights(meter: bpy.types.Object) -> None:
@@ -173,7 +174,7 @@ def test_a_lamp_at_an_infinite_place_is_an_error(meter: bpy.types.Object) -> Non
 
 def test_an_area_lamp_without_area_is_an_error(meter: bpy.types.Object) -> None:
     add_lamp("AREA", "Flat", energy=7.0, transform={"scale": (0, 1, 1)})
-    with pytest.raises(SceneError, match=r"lamp 'Flat' has no area"):
+    with pytest.raises(SceneError, match=r"'Flat'.*area"):
         _exported()
 
 
@@ -202,7 +203,7 @@ def test_a_lamps_own_limit_of_bounces_warns(meter: bpy.types.Object) -> None:
     assert not _exported()[1]
     lamp.data.cycles.max_bounces = 2
     (warning,) = _exported()[1]
-    assert warning.message == "lamp 'Short': its limit of bounces is ignored: all its light is followed"
+    assert says(warning.message, "Short", "bounces")
 
 
 def test_an_area_lamp_keeps_its_power_when_scaled() -> None:
@@ -225,5 +226,5 @@ def test_nodes_that_change_light_with_distance_warn(meter: bpy.types.Object, out
     tree.links.new(falloff.outputs[output], emission.inputs["Strength"])
     tree.links.new(emission.outputs[0], tree.nodes.new("ShaderNodeOutputLight").inputs["Surface"])
     said = [warning.message for warning in _exported()[1]]
-    message = "lamp 'Lamp': its nodes change its light with distance; their result at 1 m is used"
-    assert said == ([] if output == "Quadratic" else [message])
+    assert len(said) == (output != "Quadratic")
+    assert all(says(message, "Lamp", "nodes", "distance") for message in said)

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 
-import radiosity_addon
 from radiosity_addon.blender.files.output import OutputFolder
 from radiosity_addon.blender.images.light_mixer import mixers, sliders_of
 from radiosity_addon.blender.jobs.job import run_bake
@@ -21,9 +19,8 @@ QUICK = {"resolution": 32, "quality": "draft", "atlas": "per-object", "light_gro
 
 
 @pytest.fixture(autouse=True)
-def room() -> Iterator[None]:
+def room(registered: None) -> None:
     """A floor and a wall, lit by two lamps, a sign and the world."""
-    radiosity_addon.register()
     add_mesh("Floor")
     add_mesh("Wall", location=(0, 1, 1), rotation_euler=(1.5707963, 0, 0))
     add_lamp("POINT", "Bulb", {"location": (0.5, -0.3, 1.2)}, energy=40.0).radiosity_light_group = "Küche: 1"
@@ -33,8 +30,6 @@ def room() -> Iterator[None]:
     sign.radiosity_light_group = "küche_ 1"
     sign.radiosity_mode = "LIGHT_ONLY"
     set_world(0.2, 0.3, 0.5)
-    yield
-    radiosity_addon.unregister()
 
 
 def texels(folder: Path, told: dict) -> np.ndarray:

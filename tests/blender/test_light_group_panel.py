@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import bpy
 import pytest
 
-import radiosity_addon
 from radiosity_addon.blender.images.light_mixer import mixers, sliders_of
 from radiosity_addon.blender.panels import light_group_panels
 from radiosity_addon.blender.scene_records.light_membership import NAME
@@ -18,10 +15,8 @@ from tests.blender.scenes import add_lamp, add_mesh, set_world, shader_material
 
 
 @pytest.fixture(autouse=True)
-def lamps() -> Iterator[dict[str, bpy.types.Object]]:
-    radiosity_addon.register()
-    yield {name: add_lamp("POINT", name) for name in ("one", "two", "three")}
-    radiosity_addon.unregister()
+def lamps(registered: None) -> dict[str, bpy.types.Object]:
+    return {name: add_lamp("POINT", name) for name in ("one", "two", "three")}
 
 
 def select(*objects: bpy.types.Object) -> None:

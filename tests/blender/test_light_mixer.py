@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 
-import radiosity_addon
 from radiosity_addon.base.errors import BakeError
 from radiosity_addon.blender.apply.restore import restore
 from radiosity_addon.blender.datablocks.bake_record import made_datablocks
@@ -35,10 +33,8 @@ from tests.blender.hand_bake import BASE, add_plane, bake_by_hand, principled_ma
 
 
 @pytest.fixture(autouse=True)
-def plane() -> Iterator[bpy.types.Object]:
-    radiosity_addon.register()
-    yield lit_plane()
-    radiosity_addon.unregister()
+def plane(registered: None) -> bpy.types.Object:
+    return lit_plane()
 
 
 def seen(folder: Path) -> np.ndarray:
@@ -183,7 +179,7 @@ def test_light_that_does_not_fit_the_images_is_refused() -> None:
     with pytest.raises(BakeError, match="other light groups"):
         update_images(images, (page(LAMP),), groups)
     images[0].scale(4, 4)
-    with pytest.raises(BakeError, match="8 × 4 pixels any more"):
+    with pytest.raises(BakeError, match="8 × 4 pixels"):
         update_images(images, (page(LAMP),), groups, light_groups())
 
 
@@ -194,7 +190,7 @@ def test_materials_that_read_many_images_are_warned_of() -> None:
     bake_groups({f"group {number}": LAMP for number in range(MANY_IMAGES + 1)})
     (warning,) = crowded_materials()
     assert warning.name == "Paint (Lightmap)"
-    assert f"reads {MANY_IMAGES + 1} images" in warning.message
+    assert f"{MANY_IMAGES + 1} images" in warning.message
 
 
 def test_materials_can_be_made_anew_from_what_is_shown(tmp_path: Path, plane: bpy.types.Object) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,6 @@ import bpy
 import numpy as np
 import pytest
 
-import radiosity_addon
 from radiosity_addon.blender.datablocks.image_marks import REPORT, VERSION
 from radiosity_addon.blender.relight.relight_scene import kept_bakes, lightmap_versions
 from radiosity_addon.blender.session.state import session
@@ -25,9 +23,8 @@ Array = np.ndarray[Any, Any]
 
 
 @pytest.fixture
-def room(tmp_path: Path) -> Iterator[Path]:
+def room(registered: None, tmp_path: Path) -> Path:
     """A saved file with two objects and a lamp."""
-    radiosity_addon.register()
     add_mesh("Floor")
     add_mesh("Wall", rotation_euler=(1.57, 0, 0), location=(0, 1, 0.5), scale=(1, 0.5, 1))
     add_lamp("POINT", "Bulb", {"location": (-0.5, 0.3, 1.2)}, energy=40.0, shadow_soft_size=0.1)
@@ -35,8 +32,7 @@ def room(tmp_path: Path) -> Iterator[Path]:
     scene.radiosity.resolution, scene.radiosity.quality = 16, "draft"
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
     bpy.ops.ed.undo_push(message="saved")
-    yield tmp_path
-    radiosity_addon.unregister()
+    return tmp_path
 
 
 def bake(**settings: Any) -> None:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from itertools import pairwise
 
 import bpy
 import numpy as np
 import pytest
 
-import radiosity_addon
 from radiosity_addon.bake.result.pictures import Picture
 from radiosity_addon.blender.files.cornell import build_cornell_box
 from radiosity_addon.blender.jobs import live_view
@@ -18,14 +17,9 @@ from radiosity_addon.blender.jobs.live_picture import corner_arrays, display_col
 from radiosity_addon.blender.scene_export.export import export_scene
 from radiosity_addon.options.bake_settings import BakeSettings
 
+pytestmark = pytest.mark.usefixtures("registered")
+
 QUICK = BakeSettings(resolution=32, quality="draft", method="shooting", elements=60, max_iterations=5)
-
-
-@pytest.fixture(autouse=True)
-def registered() -> Iterator[None]:
-    radiosity_addon.register()
-    yield
-    radiosity_addon.unregister()
 
 
 def pictures(in_background: bool = False) -> list[Picture]:

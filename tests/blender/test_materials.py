@@ -14,12 +14,13 @@ from radiosity_addon.blender.materials.materials import Surface, read_material
 from radiosity_addon.blender.scene_export.export import export_scene
 from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.scenes import add_mesh, add_node, measure_irradiance, shader_material, with_nodes
+from tests.wording import one_says, says
 
-_RED = (0.6, 0.2, 0.1, 1.0)
-_BLUE = (0.1, 0.2, 0.8, 1.0)
+RED = (0.6, 0.2, 0.1, 1.0)
+BLUE = (0.1, 0.2, 0.8, 1.0)
 
 
-def _messages(surface: Surface) -> str:
+def messages_of(surface: Surface) -> str:
     return "\n".join(warning.message for warning in surface.warnings)
 
 
@@ -31,28 +32,28 @@ def _fallbacks(surface: Surface) -> str:
     return "\n".join(warning.message for warning in surface.fallbacks)
 
 
-def _check(surface: Surface, reflectance: Any, emission: Any = (0, 0, 0)) -> None:
+def assert_surface(surface: Surface, reflectance: Any, emission: Any = (0, 0, 0)) -> None:
     np.testing.assert_allclose(surface.reflectance, reflectance, rtol=1e-6)
     np.testing.assert_allclose(surface.emission, emission, rtol=1e-6)
 
 
 def test_no_material_is_cycles_gray() -> None:
     surface = read_material(None)
-    _check(surface, (0.8, 0.8, 0.8))
+    assert_surface(surface, (0.8, 0.8, 0.8))
     assert surface.warnings == ()
 
 
 def test_diffuse() -> None:
-    surface = read_material(shader_material("M", "ShaderNodeBsdfDiffuse", Color=_RED))
-    _check(surface, _RED[:3])
+    surface = read_material(shader_material("M", "ShaderNodeBsdfDiffuse", Color=RED))
+    assert_surface(surface, RED[:3])
     assert surface.warnings == ()
 
 
 def test_emission_is_radiance_times_pi_and_black() -> None:
-    _check(
-        read_material(shader_material("M", "ShaderNodeEmission", Color=_BLUE, Strength=3.0)),
+    assert_surface(
+        read_material(shader_material("M", "ShaderNodeEmission", Color=BLUE, Strength=3.0)),
         (0, 0, 0),
-        3 * math.pi * np.array(_BLUE[:3]),
+        3 * math.pi * np.array(BLUE[:3]),
     )
 
 
@@ -61,10 +62,10 @@ def test_mixed_shaders(share: float) -> None:
     material = shader_material("M", "ShaderNodeMixShader", Fac=share)
     tree = material.node_tree
     mix = next(node for node in tree.nodes if node.type == "MIX_SHADER")
-    tree.links.new(add_node(tree, "ShaderNodeBsdfDiffuse", Color=_RED).outputs[0], mix.inputs[1])
-    tree.links.new(add_node(tree, "ShaderNodeEmission", Color=_BLUE, Strength=2.0).outputs[0], mix.inputs[2])
+    tree.links.new(add_node(tree, "ShaderNodeBsdfDiffuse", Color=RED).outputs[0], mix.inputs[1])
+    tree.links.new(add_node(tree, "ShaderNodeEmission", Color=BLUE, Strength=2.0).outputs[0], mix.inputs[2])
     surface = read_material(material)
-    _check(surface, (1 - share) * np.array(_RED[:3]), share * 2 * math.pi * np.array(_BLUE[:3]))
+    assert_surface(surface, (1 - share) * np.array(RED[:3]), share * 2 * math.pi * np.array(BLUE[:3]))
     assert surface.warnings == ()
 
 
@@ -72,15 +73,15 @@ def test_added_shaders() -> None:
     material = shader_material("M", "ShaderNodeAddShader")
     tree = material.node_tree
     add = next(node for node in tree.nodes if node.type == "ADD_SHADER")
-    tree.links.new(add_node(tree, "ShaderNodeBsdfDiffuse", Color=_RED).outputs[0], add.inputs[0])
-    tree.links.new(add_node(tree, "ShaderNodeEmission", Color=_BLUE).outputs[0], add.inputs[1])
-    _check(read_material(material), _RED[:3], math.pi * np.array(_BLUE[:3]))
+    tree.links.new(add_node(tree, "ShaderNodeBsdfDiffuse", Color=RED).outputs[0], add.inputs[0])
+    tree.links.new(add_node(tree, "ShaderNodeEmission", Color=BLUE).outputs[0], add.inputs[1])
+    assert_surface(read_material(material), RED[:3], math.pi * np.array(BLUE[:3]))
 
 
 def test_reroutes_and_muted_nodes_are_seen_through() -> None:
     material = bpy.data.materials.new("M")
     tree = with_nodes(material)
-    diffuse = add_node(tree, "ShaderNodeBsdfDiffuse", Color=_RED)
+    diffuse = add_node(tree, "ShaderNodeBsdfDiffuse", Color=RED)
     other = add_node(tree, "ShaderNodeEmission", Strength=9.0)
     muted = tree.nodes.new("ShaderNodeMixShader")
     reroute = tree.nodes.new("NodeReroute")
@@ -89,17 +90,17 @@ def test_reroutes_and_muted_nodes_are_seen_through() -> None:
     tree.links.new(muted.outputs[0], reroute.inputs[0])
     tree.links.new(reroute.outputs[0], _output(tree).inputs["Surface"])
     muted.mute = True
-    _check(read_material(material), _RED[:3])
+    assert_surface(read_material(material), RED[:3])
 
 
 def test_muted_links_do_not_count() -> None:
-    material = shader_material("M", "ShaderNodeBsdfDiffuse", Color=_RED)
+    material = shader_material("M", "ShaderNodeBsdfDiffuse", Color=RED)
     tree = material.node_tree
     link = tree.links.new(
         add_node(tree, "ShaderNodeRGB").outputs[0], tree.nodes["Diffuse BSDF"].inputs["Color"]
     )
     link.is_muted = True
-    _check(read_material(material), _RED[:3])
+    assert_surface(read_material(material), RED[:3])
 
 
 def _color_group() -> bpy.types.NodeTree:
@@ -112,7 +113,7 @@ def _color_group() -> bpy.types.NodeTree:
     mix.data_type, mix.blend_type = "RGBA", "MULTIPLY"
     sockets = {socket.identifier: socket for socket in mix.inputs}
     sockets["Factor_Float"].default_value = 1.0
-    sockets["B_Color"].default_value = _BLUE
+    sockets["B_Color"].default_value = BLUE
     group.links.new(entry.outputs["Tint"], sockets["A_Color"])
     diffuse = group.nodes.new("ShaderNodeBsdfDiffuse")
     result = next(socket for socket in mix.outputs if socket.identifier == "Result_Color")
@@ -129,39 +130,39 @@ def test_node_groups_are_entered_with_their_inputs(linked: bool) -> None:
     group.node_tree = _color_group()
     if linked:
         color = tree.nodes.new("ShaderNodeRGB")
-        color.outputs[0].default_value = _RED
+        color.outputs[0].default_value = RED
         tree.links.new(color.outputs[0], group.inputs["Tint"])
     else:
-        group.inputs["Tint"].default_value = _RED
+        group.inputs["Tint"].default_value = RED
     tree.links.new(group.outputs[0], _output(tree).inputs["Surface"])
     surface = read_material(material)
-    _check(surface, np.array(_RED[:3]) * _BLUE[:3])
+    assert_surface(surface, np.array(RED[:3]) * BLUE[:3])
     assert surface.warnings == ()
 
 
 def test_cycles_own_output_wins_and_eevees_does_not_count() -> None:
     material = bpy.data.materials.new("M")
     tree = with_nodes(material)
-    for target, color in (("EEVEE", _BLUE), ("CYCLES", _RED)):
+    for target, color in (("EEVEE", BLUE), ("CYCLES", RED)):
         output = _output(tree)
         output.target = target
         tree.links.new(add_node(tree, "ShaderNodeBsdfDiffuse", Color=color).outputs[0], output.inputs[0])
-    _check(read_material(material), _RED[:3])
+    assert_surface(read_material(material), RED[:3])
 
 
 def test_a_material_without_surface_is_black_and_warns() -> None:
     material = bpy.data.materials.new("Hollow")
     _output(with_nodes(material))
     surface = read_material(material)
-    _check(surface, (0, 0, 0))
-    assert "material 'Hollow': it has no surface shader" in _messages(surface)
+    assert_surface(surface, (0, 0, 0))
+    assert says(messages_of(surface), "Hollow", "no surface shader")
 
 
 @pytest.mark.skipif(bpy.app.version >= (5, 0), reason="materials always have nodes here")
 def test_a_material_without_nodes_has_its_viewport_color() -> None:
     material = bpy.data.materials.new("M")
-    material.diffuse_color = _RED
-    _check(read_material(material), _RED[:3])
+    material.diffuse_color = RED
+    assert_surface(read_material(material), RED[:3])
 
 
 def _image(name: str, color_space: str, *, is_float: bool) -> tuple[bpy.types.Image, np.ndarray]:
@@ -190,24 +191,24 @@ def test_an_image_that_cannot_be_evaluated_counts_with_its_linear_mean(
     texture.image = image
     tree.links.new(texture.outputs["Color"], tree.nodes["Principled BSDF"].inputs["Base Color"])
     surface = read_material(material)
-    _check(surface, mean)
+    assert_surface(surface, mean)
     assert surface.varies
     assert surface.warnings == ()
     (warning,) = surface.fallbacks
     assert warning.name == "Wall"
-    assert warning.message.startswith("material 'Wall': Base Color comes from image 'Bricks'; the mean (")
+    assert says(warning.message, "Wall", "Base Color", "Bricks", "mean")
 
 
 def test_a_checker_that_cannot_be_evaluated_is_half_and_half() -> None:
     material = shader_material("Floor", "ShaderNodeBsdfDiffuse", Color=(1, 1, 1, 1))
     tree = material.node_tree
     checker = tree.nodes.new("ShaderNodeTexChecker")
-    checker.inputs["Color1"].default_value, checker.inputs["Color2"].default_value = _RED, _BLUE
+    checker.inputs["Color1"].default_value, checker.inputs["Color2"].default_value = RED, BLUE
     tree.links.new(checker.outputs["Color"], tree.nodes["Diffuse BSDF"].inputs["Color"])
     surface = read_material(material)
-    _check(surface, (0.35, 0.2, 0.45))
+    assert_surface(surface, (0.35, 0.2, 0.45))
     assert surface.varies
-    assert "Color comes from node 'Checker Texture'; the mean (" in _fallbacks(surface)
+    assert says(_fallbacks(surface), "Color", "Checker Texture", "mean")
 
 
 def test_srgb_decodes_as_the_standard_says() -> None:
@@ -219,29 +220,29 @@ def test_srgb_decodes_as_the_standard_says() -> None:
 @pytest.mark.parametrize("kind", ["ShaderNodeTexNoise", "ShaderNodeVertexColor", "ShaderNodeTexImage"])
 def test_what_varies_in_unknown_ways_falls_back_on_the_sockets_value(kind: str) -> None:
     """Procedural textures and vertex colors, if not evaluated; images that are missing, always."""
-    material = shader_material("Odd", "ShaderNodeBsdfDiffuse", Color=_RED)
+    material = shader_material("Odd", "ShaderNodeBsdfDiffuse", Color=RED)
     tree = material.node_tree
     node = tree.nodes.new(kind)
     tree.links.new(node.outputs["Color"], tree.nodes["Diffuse BSDF"].inputs["Color"])
     surface = read_material(material)
-    _check(surface, _RED[:3])
+    assert_surface(surface, RED[:3])
     missing = kind == "ShaderNodeTexImage"
     (warning,) = surface.warnings if missing else surface.fallbacks
     assert surface.varies == (not missing)
     assert warning.name == "Odd"
-    assert "(0.6, 0.2, 0.1) is used" in warning.message
+    assert "(0.6, 0.2, 0.1)" in warning.message
 
 
 def test_reflectance_of_one_is_clamped_and_named() -> None:
     surface = read_material(shader_material("White", "ShaderNodeBsdfDiffuse", Color=(1, 1, 0.5, 1)))
-    _check(surface, (0.99, 0.99, 0.5))
-    assert _messages(surface) == "material 'White': reflectance (1, 1, 0.5) is clamped to (0.99, 0.99, 0.5)"
+    assert_surface(surface, (0.99, 0.99, 0.5))
+    assert says(messages_of(surface), "White", "(1, 1, 0.5)", "clamped", "(0.99, 0.99, 0.5)")
 
 
 def test_negative_emission_is_none() -> None:
     surface = read_material(shader_material("Thief", "ShaderNodeEmission", Strength=-1.0))
-    _check(surface, (0, 0, 0))
-    assert "material 'Thief': emission (-1, -1, -1) is not possible" in _messages(surface)
+    assert_surface(surface, (0, 0, 0))
+    assert says(messages_of(surface), "Thief", "emission (-1, -1, -1)")
 
 
 def test_a_mix_with_transparent_is_its_solid_shader_where_it_is_there() -> None:
@@ -249,16 +250,16 @@ def test_a_mix_with_transparent_is_its_solid_shader_where_it_is_there() -> None:
     tree = material.node_tree
     mix = next(node for node in tree.nodes if node.type == "MIX_SHADER")
     tree.links.new(tree.nodes.new("ShaderNodeBsdfTransparent").outputs[0], mix.inputs[1])
-    tree.links.new(add_node(tree, "ShaderNodeBsdfDiffuse", Color=_RED).outputs[0], mix.inputs[2])
+    tree.links.new(add_node(tree, "ShaderNodeBsdfDiffuse", Color=RED).outputs[0], mix.inputs[2])
     surface = read_material(material)
-    _check(surface, _RED[:3])
+    assert_surface(surface, RED[:3])
     assert surface.opacity == pytest.approx(0.3)
     assert surface.warnings == ()
 
 
 def test_transparent_passes_its_color_and_reflects_nothing() -> None:
     surface = read_material(shader_material("Gone", "ShaderNodeBsdfTransparent", Color=(0.9, 0.6, 0.3, 1)))
-    _check(surface, (0, 0, 0))
+    assert_surface(surface, (0, 0, 0))
     assert surface.opacity == pytest.approx(0.4)
     assert surface.warnings == ()
 
@@ -270,23 +271,23 @@ def test_what_glows_but_hides_nothing_keeps_its_light() -> None:
     add = next(node for node in tree.nodes if node.type == "ADD_SHADER")
     clear = add_node(tree, "ShaderNodeBsdfTransparent", Color=(1, 1, 1, 1))
     tree.links.new(clear.outputs[0], add.inputs[0])
-    tree.links.new(add_node(tree, "ShaderNodeEmission", Color=_BLUE).outputs[0], add.inputs[1])
+    tree.links.new(add_node(tree, "ShaderNodeEmission", Color=BLUE).outputs[0], add.inputs[1])
     surface = read_material(material)
     assert 0 < surface.opacity < 0.02
-    np.testing.assert_allclose(surface.emission * surface.opacity, math.pi * np.array(_BLUE[:3]), rtol=1e-6)
+    np.testing.assert_allclose(surface.emission * surface.opacity, math.pi * np.array(BLUE[:3]), rtol=1e-6)
 
 
 @pytest.mark.parametrize(
     ("shader", "reflectance"),
     [
-        ("ShaderNodeBsdfAnisotropic", _RED[:3]),
-        ("ShaderNodeBsdfTranslucent", _RED[:3]),
+        ("ShaderNodeBsdfAnisotropic", RED[:3]),
+        ("ShaderNodeBsdfTranslucent", RED[:3]),
         ("ShaderNodeBsdfGlass", (0, 0, 0)),
     ],
 )
 def test_other_shaders_warn_with_the_value_used(shader: str, reflectance: Any) -> None:
-    surface = read_material(shader_material("Odd", shader, Color=_RED))
-    _check(surface, reflectance)
+    surface = read_material(shader_material("Odd", shader, Color=RED))
+    assert_surface(surface, reflectance)
     (warning,) = surface.warnings
     assert warning.name == "Odd"
     assert "is used" in warning.message
@@ -297,26 +298,26 @@ def test_each_triangle_has_its_slots_material_object_slots_before_mesh_slots() -
         "Two",
         ((0, 0, 0), (1, 0, 0), (1, 1, 0), (2, 0, 0)),
         ((0, 1, 2), (1, 3, 2)),
-        material=shader_material("Red", "ShaderNodeBsdfDiffuse", Color=_RED),
+        material=shader_material("Red", "ShaderNodeBsdfDiffuse", Color=RED),
     )
-    obj.data.materials.append(shader_material("Blue", "ShaderNodeBsdfDiffuse", Color=_BLUE))
+    obj.data.materials.append(shader_material("Blue", "ShaderNodeBsdfDiffuse", Color=BLUE))
     obj.data.polygons.foreach_set("material_index", [1, 0])
     obj.material_slots[0].link = "OBJECT"
     obj.material_slots[0].material = shader_material("Own", "ShaderNodeEmission", Strength=1 / math.pi)
     scene = export_scene(bpy.context, BakeSettings()).bake_scene.scene
-    np.testing.assert_allclose(scene.reflectance, [_BLUE[:3], (0, 0, 0)], rtol=1e-6)
+    np.testing.assert_allclose(scene.reflectance, [BLUE[:3], (0, 0, 0)], rtol=1e-6)
     np.testing.assert_allclose(scene.emission, [(0, 0, 0), (1, 1, 1)], rtol=1e-6)
 
 
 def test_an_empty_slot_is_gray_and_warns_and_a_missing_slot_is_the_last() -> None:
     obj = add_mesh("Bare", ((0, 0, 0), (1, 0, 0), (1, 1, 0), (2, 0, 0)), ((0, 1, 2), (1, 3, 2)))
-    obj.data.materials.append(shader_material("Red", "ShaderNodeBsdfDiffuse", Color=_RED))
+    obj.data.materials.append(shader_material("Red", "ShaderNodeBsdfDiffuse", Color=RED))
     obj.data.materials.append(None)
     obj.data.polygons.foreach_set("material_index", [0, 7])
     baked = export_scene(bpy.context, BakeSettings(sky=True)).bake_scene
-    np.testing.assert_allclose(baked.scene.reflectance, [_RED[:3], (0.8, 0.8, 0.8)], rtol=1e-6)
+    np.testing.assert_allclose(baked.scene.reflectance, [RED[:3], (0.8, 0.8, 0.8)], rtol=1e-6)
     (warning,) = baked.warnings
-    assert (warning.name, "empty material slot" in warning.message) == ("Bare", True)
+    assert (warning.name, "empty" in warning.message) == ("Bare", True)
 
 
 @pytest.mark.parametrize("kind", ["ShaderNodeRGB", "ShaderNodeValue"])
@@ -344,7 +345,7 @@ def _through_shader_to_rgb(target: str) -> bpy.types.Material:
     material = bpy.data.materials.new("Toon")
     tree = with_nodes(material)
     color = tree.nodes.new("ShaderNodeShaderToRGB")
-    tree.links.new(add_node(tree, "ShaderNodeBsdfDiffuse", Color=_RED).outputs[0], color.inputs[0])
+    tree.links.new(add_node(tree, "ShaderNodeBsdfDiffuse", Color=RED).outputs[0], color.inputs[0])
     glow = add_node(tree, "ShaderNodeEmission", Color=(0.0, 1.0, 0.0, 1.0), Strength=2.0)
     surface = _output(tree).inputs["Surface"]
     if target == "Color":
@@ -359,8 +360,7 @@ def test_shader_to_rgb_is_unknown_to_cycles_and_told(target: str) -> None:
     floor = add_mesh("Floor")
     add_mesh("Toon", material=material, location=(0, 0, 1))
     export = export_scene(bpy.context, BakeSettings(sky=True)).bake_scene
-    said = "material 'Toon': node 'Shader to RGB' is for EEVEE only"
-    assert any(warning.message.startswith(said) for warning in export.warnings)
+    assert one_says((warning.message for warning in export.warnings), "Toon", "Shader to RGB", "EEVEE")
     ours = export.scene.emission.max(axis=0)
     np.testing.assert_allclose(ours, [0.0, 2 * np.pi if target == "Color" else 0.0, 0.0], rtol=1e-6)
     np.testing.assert_allclose(measure_irradiance(floor, samples=64), 0.4153 * ours, rtol=0.02)
@@ -376,7 +376,7 @@ def test_transparent_shadows_that_are_off_are_told() -> None:
 
     assert "Transparent Shadows" not in said()
     material.use_transparent_shadow = False
-    assert "material 'Pane': Transparent Shadows is off, which is ignored" in said()
+    assert says(said(), "Pane", "Transparent Shadows")
 
 
 def test_emission_for_diffuse_rays_is_told() -> None:
@@ -389,4 +389,4 @@ def test_emission_for_diffuse_rays_is_told() -> None:
         add_mesh("Glow", material=material)
         export = export_scene(bpy.context, BakeSettings(sky=True)).bake_scene
         assert export.scene.emission.any() == told
-        assert any("depends on Is Diffuse Ray" in warning.message for warning in export.warnings) == told
+        assert any("Is Diffuse Ray" in warning.message for warning in export.warnings) == told

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from types import SimpleNamespace
 
 import bpy
 import pytest
 
-import radiosity_addon
 from radiosity_addon.blender.panels import bake_panel
 from radiosity_addon.blender.panels.option_rows import draw_options
+from radiosity_addon.blender.settings.preferences import Defaults
 from radiosity_addon.blender.settings.properties import settings_of
 from radiosity_addon.options import METHODS, OPTIONS, PANEL_OPTIONS, SECTIONS, BakeSettings, options_of_method
 
@@ -37,18 +36,16 @@ class Layout:
         pass
 
     def operator(self, _name: str, text: str, **_: object) -> SimpleNamespace:
-        properties = SimpleNamespace()
+        properties = SimpleNamespace(text=text)
         if text:
             self.by_quality.append(properties)
         return properties
 
 
 @pytest.fixture(autouse=True)
-def group() -> Iterator[bpy.types.PropertyGroup]:
+def group(registered: None) -> bpy.types.PropertyGroup:
     """The panel's settings."""
-    radiosity_addon.register()
-    yield bpy.context.scene.radiosity
-    radiosity_addon.unregister()
+    return bpy.context.scene.radiosity
 
 
 def drawn() -> list[str]:
@@ -94,9 +91,11 @@ def test_a_number_left_to_the_quality_is_a_button_until_it_is_set(
     group.method = method
     layout = Layout()
     bake_panel.SolverSection.draw(layout, bpy.context)
-    names = [properties.option for properties in layout.by_quality]
+    buttons = {properties.option: properties.text for properties in layout.by_quality}
+    names = list(buttons)
     assert set(names) == {name for name in options_of_method(method) if SETTINGS[name].automatic}
     assert not set(names) & set(layout.drawn)
+    assert {name for name in names if buttons[name].endswith("preferences")} == {"memory_limit"}
     for name in names:
         bpy.ops.radiosity.set_option(option=name)
         value = getattr(group, name)
@@ -104,6 +103,15 @@ def test_a_number_left_to_the_quality_is_a_button_until_it_is_set(
         assert settings_of(bpy.context).method_settings()[name] == pytest.approx(value)
         bpy.ops.radiosity.set_option(option=name)
         assert not group.is_property_set(name)
+
+
+@pytest.mark.parametrize(("preferred", "entered"), [(0.0, 4.0), (9.5, 9.5)])
+def test_a_memory_limit_starts_from_the_preferences_one(
+    group: bpy.types.PropertyGroup, monkeypatch: pytest.MonkeyPatch, preferred: float, entered: float
+) -> None:
+    monkeypatch.setattr(Defaults, "memory_limit", preferred)
+    bpy.ops.radiosity.set_option(option="memory_limit")
+    assert group.memory_limit == entered
 
 
 def test_a_row_that_is_not_shown_has_no_effect(group: bpy.types.PropertyGroup) -> None:

@@ -4,26 +4,24 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 
-import radiosity_addon
 from radiosity_addon.base.errors import BakeError
 from radiosity_addon.blender.datablocks.bake_record import mark_made, recorded_objects
 from radiosity_addon.blender.material_copies.copy_marks import ADDED
 from radiosity_addon.blender.session import last_bake
 from tests.blender.file_dump import differences_since, dump_file
 from tests.blender.scenes import add_lamp, add_mesh, shader_material
+from tests.wording import one_says
 
 
 @pytest.fixture(autouse=True)
-def room(tmp_path: Path) -> Iterator[Path]:
+def room(registered: None, tmp_path: Path) -> Path:
     """A saved room of three objects, baked on one page; the folder of its lightmaps."""
-    radiosity_addon.register()
     add_mesh("Floor", material=shader_material("Gray", "ShaderNodeBsdfDiffuse", Color=(0.5, 0.5, 0.5, 1)))
     add_mesh("Shelf", location=(0, 0, 1), scale=(0.3, 0.3, 1))
     add_mesh("Box", location=(1, 1, 0.5), scale=(0.2, 0.2, 1))
@@ -33,8 +31,7 @@ def room(tmp_path: Path) -> Iterator[Path]:
     bpy.context.scene.radiosity_relight.only_moved = False
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
     assert bake() == {"FINISHED"}
-    yield tmp_path / "lightmaps"
-    radiosity_addon.unregister()
+    return tmp_path / "lightmaps"
 
 
 def bake() -> set[str]:
@@ -108,7 +105,7 @@ def test_a_moved_object_gets_a_new_lightmap_and_others_keep_theirs(room: Path) -
         "Shelf": 1,
     }
     last = last_bake.read(bpy.context.scene)
-    assert any("2 unchanged objects kept their lightmaps" in message for _, message in last.warnings)
+    assert one_says((message for _, message in last.warnings), "2 unchanged")
     # About as fine as before.
     densities = [page["texels_per_metre"] for page in report["pages"]]
     assert densities[0] == pytest.approx(densities[1], rel=0.3)
@@ -227,7 +224,7 @@ def test_an_object_that_is_gone_is_named(room: Path, capfd: pytest.CaptureFixtur
     bpy.data.objects["Box"].location.x -= 0.5
     assert bake() == {"FINISHED"}
     last = last_bake.read(bpy.context.scene)
-    assert any("gone since the last bake: 'Shelf'" in message for _, message in last.warnings)
+    assert one_says((message for _, message in last.warnings), "gone", "Shelf")
 
 
 def test_a_cancelled_one_leaves_the_earlier_bake(room: Path) -> None:

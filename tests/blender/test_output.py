@@ -132,7 +132,7 @@ def test_files_that_no_bake_has_written_are_never_replaced(tmp_path: Path, name:
 def test_a_lightmap_that_somebody_changed_is_not_replaced(tmp_path: Path) -> None:
     _bake(tmp_path, one="light")
     (tmp_path / "one.exr").write_text("paint")
-    with pytest.raises(BakeError, match=r"one\.exr' was changed since"), OutputFolder(tmp_path) as output:
+    with pytest.raises(BakeError, match=r"one\.exr'.*changed"), OutputFolder(tmp_path) as output:
         output.expect(["one.exr"])
     with pytest.raises(BakeError, match=r"one\.exr"):
         _bake(tmp_path, one="new")
@@ -148,7 +148,7 @@ def test_another_scene_or_file_does_not_get_the_folder(tmp_path: Path) -> None:
     _bake(out, one="old")
     before = digests(out)
     bpy.context.scene.name = "Other"
-    with pytest.raises(BakeError, match=r"report\.json' is of scene 'Scene' of '\.\./one\.blend'"):
+    with pytest.raises(BakeError, match=r"report\.json'.*'Scene'.*one\.blend'"):
         _bake(out, one="new")
     bpy.context.scene.name = "Scene"
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "two.blend"))
@@ -163,7 +163,7 @@ def test_another_scene_or_file_does_not_get_the_folder(tmp_path: Path) -> None:
 def test_a_report_of_an_earlier_version_is_refused_by_name(tmp_path: Path) -> None:
     old = {"version": 1, "objects": [], "solver": {}, "files": {}}
     (tmp_path / REPORT_NAME).write_text(json.dumps(old))
-    with pytest.raises(BakeError, match=r"report\.json' was written by an earlier version"):
+    with pytest.raises(BakeError, match=r"report\.json'.*earlier"):
         _bake(tmp_path, one="new")
 
 
@@ -307,7 +307,7 @@ def test_the_scene_itself_is_never_overwritten(tmp_path: Path) -> None:
     path = tmp_path / BLEND_NAME
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     before = path.read_bytes()
-    with OutputFolder(tmp_path) as output, pytest.raises(BakeError, match="is the scene itself"):
+    with OutputFolder(tmp_path) as output, pytest.raises(BakeError, match="scene itself"):
         save_copy(output)
     assert path.read_bytes() == before
 

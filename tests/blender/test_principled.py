@@ -9,14 +9,15 @@ import pytest
 
 from radiosity_addon.blender.materials.materials import read_material
 from tests.blender.scenes import shader_material
-from tests.blender.test_materials import _BLUE, _RED, _check, _messages
+from tests.blender.test_materials import BLUE, RED, assert_surface, messages_of
+from tests.wording import says
 
 
 def test_principled_reflects_its_base_color_where_nothing_shines() -> None:
     surface = read_material(
-        shader_material("M", "ShaderNodeBsdfPrincipled", Base_Color=_RED, Specular_IOR_Level=0)
+        shader_material("M", "ShaderNodeBsdfPrincipled", Base_Color=RED, Specular_IOR_Level=0)
     )
-    _check(surface, _RED[:3])
+    assert_surface(surface, RED[:3])
     assert surface.warnings == ()
 
 
@@ -60,41 +61,41 @@ def test_principled_emits_strength_times_color() -> None:
         shader_material(
             "M",
             "ShaderNodeBsdfPrincipled",
-            Base_Color=_RED,
+            Base_Color=RED,
             Specular_IOR_Level=0,
-            Emission_Color=_BLUE,
+            Emission_Color=BLUE,
             Emission_Strength=2.0,
         )
     )
-    _check(surface, _RED[:3], 2 * math.pi * np.array(_BLUE[:3]))
+    assert_surface(surface, RED[:3], 2 * math.pi * np.array(BLUE[:3]))
 
 
 @pytest.mark.parametrize(
-    ("socket", "value", "words"),
+    ("socket", "value", "word"),
     [
-        ("Subsurface_Weight", 0.3, "subsurface scattering is ignored"),
-        ("Coat_Weight", 0.3, "the coat is ignored"),
-        ("Sheen_Weight", 0.3, "the sheen is ignored"),
+        ("Subsurface_Weight", 0.3, "subsurface"),
+        ("Coat_Weight", 0.3, "coat"),
+        ("Sheen_Weight", 0.3, "sheen"),
     ],
 )
-def test_what_principled_does_beyond_diffuse_warns(socket: str, value: float, words: str) -> None:
-    inputs = {"Base_Color": _RED, "Specular_IOR_Level": 0, socket: value}
+def test_what_principled_does_beyond_diffuse_warns(socket: str, value: float, word: str) -> None:
+    inputs = {"Base_Color": RED, "Specular_IOR_Level": 0, socket: value}
     surface = read_material(shader_material("Odd", "ShaderNodeBsdfPrincipled", **inputs))
-    _check(surface, _RED[:3])
-    assert f"material 'Odd': {words}" in _messages(surface)
+    assert_surface(surface, RED[:3])
+    assert says(messages_of(surface), "Odd", word)
 
 
 def test_what_is_transmitted_is_not_reflected_and_warns() -> None:
-    inputs = {"Base_Color": _RED, "Specular_IOR_Level": 0, "Transmission_Weight": 0.75}
+    inputs = {"Base_Color": RED, "Specular_IOR_Level": 0, "Transmission_Weight": 0.75}
     surface = read_material(shader_material("Glass", "ShaderNodeBsdfPrincipled", **inputs))
-    _check(surface, 0.25 * np.array(_RED[:3]))
+    assert_surface(surface, 0.25 * np.array(RED[:3]))
     assert surface.opacity == 1
-    assert "material 'Glass': transmission is ignored: the surface is baked opaque" in _messages(surface)
+    assert says(messages_of(surface), "Glass", "transmission", "opaque")
 
 
 def test_alpha_is_opacity_and_leaves_the_color() -> None:
-    inputs = {"Base_Color": _RED, "Specular_IOR_Level": 0, "Alpha": 0.25, "Emission_Strength": 2.0}
+    inputs = {"Base_Color": RED, "Specular_IOR_Level": 0, "Alpha": 0.25, "Emission_Strength": 2.0}
     surface = read_material(shader_material("Thin", "ShaderNodeBsdfPrincipled", **inputs))
-    _check(surface, _RED[:3], np.full(3, 2 * math.pi))
+    assert_surface(surface, RED[:3], np.full(3, 2 * math.pi))
     assert surface.opacity == pytest.approx(0.25)
     assert surface.warnings == ()

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import bpy
 import numpy as np
 import pytest
 
-import radiosity_addon
 from radiosity_addon.bake.result.result import BakedObject, BakeResult
 from radiosity_addon.blender.apply.apply import apply_lightmaps
 from radiosity_addon.blender.apply.rebake import originals_shown, replacing_earlier
@@ -25,9 +23,8 @@ SETTINGS = BakeSettings(resolution=4)
 
 
 @pytest.fixture(autouse=True)
-def scene() -> Iterator[None]:
+def scene(registered: None) -> None:
     """A plain cube, one with a modifier, one with a material of its own, and an instanced one."""
-    radiosity_addon.register()
     cubes = []
     for index, name in enumerate(("Plain", "Bevelled", "Own Material", "Instanced")):
         bpy.ops.mesh.primitive_cube_add(location=(3 * index, 0, 0))
@@ -45,8 +42,6 @@ def scene() -> Iterator[None]:
     empty.instance_type, empty.instance_collection = "COLLECTION", collection
     bpy.context.scene.collection.objects.link(empty)
     bpy.context.view_layer.update()
-    yield
-    radiosity_addon.unregister()
 
 
 def result_of(scene: BakeScene, value: float) -> BakeResult:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Iterator
 from dataclasses import fields
 from pathlib import Path
 
@@ -21,13 +20,6 @@ ROOT = Path(__file__).resolve().parents[2]
 
 OURS = str(["base", "blender", "files", "options"])
 """What registering imports beside Blender's side; none of it is heavy."""
-
-
-@pytest.fixture
-def registered() -> Iterator[None]:
-    radiosity_addon.register()
-    yield
-    radiosity_addon.unregister()
 
 
 def traces() -> set[str]:

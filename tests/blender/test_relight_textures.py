@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 
-import radiosity_addon
 from tests.blender.scenes import add_lamp, add_mesh, shader_material
 
-
-@pytest.fixture(autouse=True)
-def registered() -> Iterator[None]:
-    radiosity_addon.register()
-    yield
-    radiosity_addon.unregister()
+pytestmark = pytest.mark.usefixtures("registered")
 
 
 @pytest.mark.parametrize("change", ["flipped", "swapped"])

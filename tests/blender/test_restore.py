@@ -15,7 +15,7 @@ from radiosity_addon.blender.files.files import open_scene
 from radiosity_addon.blender.images.images import write_pages
 from radiosity_addon.blender.scene_export.export import export_scene
 from radiosity_addon.options.bake_settings import BakeSettings
-from tests.blender.file_dump import differences, differences_since, dump_file
+from tests.blender.file_dump import differences, differences_since, dump_file, tidy_dump
 from tests.blender.hand_bake import SMALL, hand_result
 from tests.blender.zoo import build_zoo
 
@@ -29,24 +29,13 @@ def _bake(folder: Path | None, **settings: str) -> None:
     apply_lightmaps(bpy.context, export, result, write_pages(result, wanted, folder), wanted)
 
 
-def _tidy_dump() -> dict:
-    """Dump after what Blender puts off until somebody looks is done."""
-    bpy.context.view_layer.update()
-    dump_file()
-    return dump_file()
-
-
-def _differences_since(before: dict) -> list[str]:
-    return differences_since(before, _tidy_dump())
-
-
 def test_restore_leaves_no_difference(tmp_path: Path) -> None:
     build_zoo(bpy.context)
-    before = _tidy_dump()
+    before = tidy_dump()
     _bake(tmp_path)
     assert len(differences(before, dump_file())) > 100
     assert restore(bpy.context) > 0
-    assert _differences_since(before) == []
+    assert differences_since(before, tidy_dump()) == []
     assert not bake_record.is_baked()
 
 
@@ -55,16 +44,16 @@ def test_restore_after_save_and_reload_leaves_no_difference(tmp_path: Path) -> N
     path = str(tmp_path / "zoo.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.open_mainfile(filepath=path)
-    before = _tidy_dump()
+    before = tidy_dump()
     _bake(None)
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.open_mainfile(filepath=path)
     assert bake_record.is_baked()
     restore(bpy.context)
-    assert differences(before, _tidy_dump()) == []
+    assert differences(before, tidy_dump()) == []
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.open_mainfile(filepath=path)
-    assert differences(before, _tidy_dump()) == []
+    assert differences(before, tidy_dump()) == []
 
 
 @pytest.mark.parametrize(
@@ -79,17 +68,17 @@ def test_restore_after_save_and_reload_leaves_no_difference(tmp_path: Path) -> N
 )
 def test_restore_leaves_no_difference_in_other_people_s_scenes(shared_scenes: Path, scene: str) -> None:
     open_scene(shared_scenes / scene)
-    before = _tidy_dump()
+    before = tidy_dump()
     _bake(None)
     assert restore(bpy.context) > 0
-    assert _differences_since(before) == []
+    assert differences_since(before, tidy_dump()) == []
 
 
 def test_restore_of_an_unbaked_file_does_nothing() -> None:
     build_zoo(bpy.context)
-    before = _tidy_dump()
+    before = tidy_dump()
     assert restore(bpy.context) == 0
-    assert differences(before, _tidy_dump()) == []
+    assert differences(before, tidy_dump()) == []
 
 
 def _cube() -> bpy.types.Object:

@@ -9,7 +9,6 @@ import bpy
 import numpy as np
 import pytest
 
-import radiosity_addon
 from radiosity_addon.bake.pipeline import bake
 from radiosity_addon.base.errors import UsageError
 from radiosity_addon.base.steps import drain
@@ -26,13 +25,6 @@ from tests.blender.scenes import (
     set_world,
     shader_material,
 )
-
-
-@pytest.fixture
-def registered():
-    radiosity_addon.register()
-    yield
-    radiosity_addon.unregister()
 
 
 def other_surface(kind: str) -> bpy.types.Object:
@@ -90,7 +82,7 @@ def test_the_users_modes(registered: None) -> None:
         "Gone": (False, 0),
     }
     assert found["Floor"].texel_scale == 2.5
-    with pytest.raises(UsageError, match="'Lighting' is light only or ignored"):
+    with pytest.raises(UsageError, match=r"'Lighting'.*ignored"):
         export_with(objects=("Lighting",))
 
 
@@ -103,7 +95,7 @@ def test_modes_on_the_command_line_win_and_unknown_names_are_refused() -> None:
         (False, 12),
         (False, 0),
     ]
-    with pytest.raises(UsageError, match="--ignore: no object 'Chairs'; did you mean 'Chair'"):
+    with pytest.raises(UsageError, match=r"--ignore.*'Chairs'.*'Chair'"):
         export_with(ignore=("Chairs",))
     with pytest.raises(UsageError, match="both"):
         BakeSettings(objects=("Wall",), light_only=("Wall",))

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
 import pytest
 
-import radiosity_addon
 from radiosity_addon.base.errors import BakeError
 from radiosity_addon.blender.apply.restore import restore
 from radiosity_addon.blender.apply.scopes import files_of
@@ -27,9 +25,8 @@ QUICK = BakeSettings(resolution=32, quality="draft")
 
 
 @pytest.fixture(autouse=True)
-def scenes() -> Iterator[tuple[bpy.types.Scene, bpy.types.Scene]]:
+def scenes(registered: None) -> tuple[bpy.types.Scene, bpy.types.Scene]:
     """Two scenes; one object is in both."""
-    radiosity_addon.register()
     first = bpy.context.scene
     gray = shader_material("Gray", "ShaderNodeBsdfDiffuse", Color=(0.5, 0.5, 0.5, 1))
     for name, x in (("A1", 0), ("A2", 3)):
@@ -43,8 +40,7 @@ def scenes() -> Iterator[tuple[bpy.types.Scene, bpy.types.Scene]]:
         first.collection.objects.unlink(obj)
         second.collection.objects.link(obj)
     second.collection.objects.link(both)
-    yield first, second
-    radiosity_addon.unregister()
+    return first, second
 
 
 def bake(scene: bpy.types.Scene, output: Path | None = None, **settings: object) -> list[tuple[str, str]]:
@@ -180,7 +176,7 @@ def test_a_failed_bake_of_another_scene_changes_nothing(scenes, monkeypatch: pyt
     def fail(*_: object) -> None:
         raise BakeError("the disk is full")
 
-    monkeypatch.setattr("radiosity_addon.blender.jobs.finish._report", fail)
+    monkeypatch.setattr("radiosity_addon.blender.jobs.finish.lightmap_files", fail)
     with pytest.raises(BakeError, match="full"):
         list(run_bake(bpy.context, QUICK, None))
     assert differences_since(before, dump_file()) == []

@@ -8,13 +8,13 @@ from pathlib import Path
 import bpy
 import pytest
 
-from radiosity_addon.blender.apply.rebake import originals_shown
 from radiosity_addon.blender.apply.restore import restore_scene
 from radiosity_addon.blender.datablocks import bake_record
 from radiosity_addon.blender.datablocks.bake_record import is_made
 from radiosity_addon.blender.operators import edit_guard
 from tests.blender.exporting import add_instance
 from tests.blender.hand_bake import add_plane, bake_by_hand, principled_material
+from tests.blender.stand_in_ends import AFTER, restored
 
 pytestmark = pytest.mark.usefixtures("record")
 
@@ -26,20 +26,6 @@ def _pair() -> tuple[bpy.types.Object, bpy.types.Object]:
     second.location.x = 4
     bpy.context.scene.collection.objects.link(second)
     return first, second
-
-
-def _restore() -> list[str]:
-    return [warning.name for warning in restore_scene(bpy.context, None).warnings]
-
-
-def _bake_again_and_restore() -> list[str]:
-    with originals_shown(bpy.context) as warnings:
-        names = [warning.name for warning in warnings]
-    bake_by_hand(colors=((9, 9, 9),))
-    return [*names, *_restore()]
-
-
-AFTER = pytest.mark.parametrize("then", [_restore, _bake_again_and_restore], ids=["restored", "baked again"])
 
 
 @AFTER
@@ -224,7 +210,7 @@ def test_what_refers_to_a_stand_in_goes_on_doing_so() -> None:
     bpy.data.collections["Radiosity Lightmaps"].objects.link(other)
     bpy.context.view_layer.update()
     place = child.matrix_world.copy()
-    _restore()
+    restored()
     bpy.context.view_layer.update()
     assert child.matrix_world == place
     assert other.modifiers["Boolean"].object == stand_in
@@ -239,7 +225,7 @@ def test_the_user_s_objects_in_our_collection_stay() -> None:
     mine, inner = bpy.data.objects.new("Mine", None), bpy.data.collections.new("Inner")
     collection.objects.link(mine)
     collection.children.link(inner)
-    _restore()
+    restored()
     assert "Mine" in bpy.context.scene.objects
     assert inner.name in bpy.context.scene.collection.children
 
@@ -253,7 +239,7 @@ def test_lightmaps_in_the_user_s_own_materials_stay() -> None:
     curve = bpy.data.objects.new("Curve", bpy.data.curves.new("Curve", "CURVE"))
     curve.data.materials.append(plane.data.materials[0])
     bpy.context.scene.collection.objects.link(curve)
-    _restore()
+    restored()
     assert not is_made(bpy.data.images["lightmap.exr"])
     assert [material.name for material in curve.data.materials] == ["Paint"]
     assert sorted(material.name for material in bpy.data.materials) == ["Mine", "Paint"]
@@ -263,7 +249,7 @@ def test_what_is_marked_as_an_asset_stays_one() -> None:
     plane = add_plane(material=principled_material())
     bake_by_hand()
     plane.data.materials[0].asset_mark()
-    _restore()
+    restored()
     (asset,) = (material for material in bpy.data.materials if material.asset_data is not None)
     assert asset.name.startswith("Paint")
     assert not is_made(asset)
@@ -319,7 +305,7 @@ def test_an_edit_on_an_override_becomes_a_mesh_of_its_own(tmp_path: Path) -> Non
     bpy.context.scene.collection.objects.link(chair)
     bake_by_hand()
     chair.data.vertices[0].co.z = 0.5
-    assert _restore() == ["Chair"]
+    assert restored() == ["Chair"]
     assert chair.data.library is None
     assert chair.data.vertices[0].co.z == 0.5
 
@@ -347,7 +333,7 @@ def test_a_material_assigned_to_an_override_survives_reloads(tmp_path: Path, aga
     if again:
         bake_by_hand()
         reload()
-    _restore()
+    restored()
     (slot,) = reload().material_slots
     assert slot.link == "OBJECT"
     assert slot.material is not None
@@ -373,7 +359,7 @@ def test_edits_that_cannot_be_taken_over_are_refused_at_once() -> None:
     assert sorted(message.split("'")[1] for message in messages) == [STAND_IN, "Modified"]
     assert stand_in.matrix_basis == place
     assert modified.mode == "OBJECT"
-    assert _restore() == []
+    assert restored() == []
     assert not instancer.hide_render
 
 

@@ -7,10 +7,9 @@ from collections.abc import Callable
 import bpy
 import pytest
 
-from radiosity_addon.blender.apply.rebake import originals_shown
-from radiosity_addon.blender.apply.restore import restore_scene
 from radiosity_addon.blender.datablocks.bake_record import is_made
 from tests.blender.hand_bake import add_plane, bake_by_hand, principled_material
+from tests.blender.stand_in_ends import AFTER, restored
 
 pytestmark = pytest.mark.usefixtures("record")
 
@@ -36,18 +35,6 @@ def _with_keys(name: str) -> bpy.types.Object:
     return obj
 
 
-def _restore() -> list[str]:
-    return [warning.name for warning in restore_scene(bpy.context, None).warnings]
-
-
-def _bake_again_and_restore() -> list[str]:
-    with originals_shown(bpy.context) as warnings:
-        names = [warning.name for warning in warnings]
-    bake_by_hand(colors=((9, 9, 9),))
-    return [*names, *_restore()]
-
-
-AFTER = pytest.mark.parametrize("then", [_restore, _bake_again_and_restore], ids=["restored", "baked again"])
 KINDS = pytest.mark.parametrize("make", [_shared, _modified], ids=["shared", "modified"])
 
 
@@ -112,7 +99,7 @@ def test_a_renamed_bone_moves_its_vertices_still() -> None:
     assert before == pytest.approx(3)
     bake_by_hand()
     armature.bones["Bone"].name = "Spine"
-    assert _restore() == []
+    assert restored() == []
     assert _groups(obj) == [("Spine", False)]
     assert height() == pytest.approx(before)
 

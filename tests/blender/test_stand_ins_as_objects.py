@@ -7,25 +7,10 @@ from collections.abc import Callable
 import bpy
 import pytest
 
-from radiosity_addon.blender.apply.rebake import originals_shown
-from radiosity_addon.blender.apply.restore import restore_scene
 from tests.blender.hand_bake import add_plane, bake_by_hand, principled_material
+from tests.blender.stand_in_ends import AFTER
 
 pytestmark = pytest.mark.usefixtures("record")
-
-
-def _restore() -> list[str]:
-    return [warning.name for warning in restore_scene(bpy.context, None).warnings]
-
-
-def _bake_again_and_restore() -> list[str]:
-    with originals_shown(bpy.context) as warnings:
-        names = [warning.name for warning in warnings]
-    bake_by_hand(colors=((9, 9, 9),))
-    return [*names, *_restore()]
-
-
-AFTER = pytest.mark.parametrize("then", [_restore, _bake_again_and_restore], ids=["restored", "baked again"])
 
 
 def _link(obj: bpy.types.Object) -> bpy.types.Object:

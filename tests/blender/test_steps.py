@@ -90,10 +90,7 @@ def _times_of_steps(of_blender: Timed) -> tuple[list[float], Export]:
 
 @pytest.mark.parametrize("textured", [0, 20, 60])
 def test_no_step_of_an_export_of_300_objects_takes_long(textured: int, of_blender: Timed) -> None:
-    """At d331b48 the export was one step, of 0.7 s without textures.
-
-    Other processes slow single steps, also in processor time: a long one is long every time.
-    """
+    """Other processes slow single steps, also in processor time: a long one is long every time."""
     many_objects(textured=textured)
     for _ in range(3):
         taken, export = _times_of_steps(of_blender)

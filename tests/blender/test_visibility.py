@@ -157,8 +157,8 @@ def test_what_cannot_be_read_is_named() -> None:
     tufted.modifiers.new("Hair", "PARTICLE_SYSTEM").particle_system.settings.type = "HAIR"
     add_object("Fog", bpy.data.volumes.new("Fog"))
     export = export_with(sky=True)
-    assert {warning.name: warning.message for warning in export.bake_scene.warnings} == {
-        "Tufted": "object 'Tufted' is a mesh with hair; that is left out: it neither lights nor blocks",
-        "Fog": "object 'Fog' is a volume; that is left out: it neither lights nor blocks",
-    }
+    told = {warning.name: warning.message for warning in export.bake_scene.warnings}
+    assert told.keys() == {"Tufted", "Fog"}
+    assert "hair" in told["Tufted"]
+    assert "volume" in told["Fog"]
     assert not export.sources[0].needs_evaluated_mesh

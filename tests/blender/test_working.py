@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -11,21 +10,15 @@ from typing import Any
 import bpy
 import pytest
 
-import radiosity_addon
 from radiosity_addon.blender.settings import preferences, preset_menu
 from radiosity_addon.blender.settings.preferences import output_folder
 from radiosity_addon.blender.settings.preset_menu import FOLDER, PRESET_PROPERTIES
 from radiosity_addon.blender.settings.properties import settings_of
 from tests.blender.scenes import add_lamp, add_mesh
 
+pytestmark = pytest.mark.usefixtures("registered")
+
 PRESETS = sorted((Path(preset_menu.__file__).parent / "presets" / FOLDER).glob("*.py"))
-
-
-@pytest.fixture(autouse=True)
-def registered() -> Iterator[None]:
-    radiosity_addon.register()
-    yield
-    radiosity_addon.unregister()
 
 
 def values() -> dict[str, Any]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import os
 import sys
 import time
 import traceback
 
 import radiosity_addon
+from tests.reliability.quiet import quiet
 
 from .checks import check
 from .scenes import SCENES
@@ -28,7 +28,7 @@ def main() -> int:
     seeds = range(int(first), int(last))
     for seed in seeds:
         try:
-            with _silence():
+            with quiet():
                 baked += check(seed)
         except Exception:  # noqa: BLE001 (whatever it is, it is what we look for)
             wrong.append(seed)
@@ -40,20 +40,6 @@ def main() -> int:
     sys.stdout.write(f"{told} {wrong or ''}\n")
     sys.stdout.flush()
     return 1 if wrong else 0
-
-
-@contextlib.contextmanager
-def _silence():
-    """Keep Blender's own words off the terminal."""
-    sys.stdout.flush()
-    kept, null = os.dup(1), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(null, 1)
-    try:
-        yield
-    finally:
-        os.dup2(kept, 1)
-        os.close(kept)
-        os.close(null)
 
 
 if __name__ == "__main__":

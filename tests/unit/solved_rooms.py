@@ -6,7 +6,7 @@ import numpy as np
 
 from radiosity_addon.solver import Scene, SolverSettings
 from radiosity_addon.solver.methods.hierarchical import HierarchicalState, solve
-from tests.rooms import CEILING, WALLS, box_room, gray, solid_box
+from tests.rooms import CEILING, WALLS, box_room, gray, gray_scene, solid_box
 
 
 def furnished(reflectance: float = 0.6) -> Scene:
@@ -15,7 +15,7 @@ def furnished(reflectance: float = 0.6) -> Scene:
     triangles = np.concatenate([room, solid_box((0.5, 0.5, 0.3), (1.2, 1.2, 1.0))])
     emission = gray(len(triangles), 0.0)
     emission[:12][surface == CEILING] = (1.0, 0.5, 0.25)
-    return Scene(triangles, gray(len(triangles), reflectance), emission)
+    return gray_scene(triangles, reflectance, emission)
 
 
 def corridor() -> Scene:
@@ -23,7 +23,7 @@ def corridor() -> Scene:
     triangles, surface = box_room((6, 1, 1), n=3)
     emission = gray(len(triangles), 0.0)
     emission[surface == WALLS] = 1.0
-    return Scene(triangles, gray(len(triangles), 0.5), emission)
+    return gray_scene(triangles, 0.5, emission)
 
 
 def solved(scene: Scene, **settings: float) -> HierarchicalState:

@@ -9,10 +9,10 @@ from radiosity_addon.bake.quality import LADDER, for_error
 from radiosity_addon.base.errors import UsageError
 from radiosity_addon.base.progress import Progress
 from radiosity_addon.lightmap.lighting import accuracy
-from radiosity_addon.lightmap.lighting.gather_links import GatherLinks
-from radiosity_addon.lightmap.lighting.gather_settings import GatherSettings
-from radiosity_addon.lightmap.lighting.sweeps import TexelLight, estimated_noise, relative_error
 from radiosity_addon.lightmap.points.interpolation import Interpolation
+from radiosity_addon.lightmap.transport.gather_links import GatherLinks
+from radiosity_addon.lightmap.transport.gather_settings import GatherSettings
+from radiosity_addon.lightmap.transport.sweeps import TexelLight, estimated_noise, relative_error
 from radiosity_addon.options.bake_settings import BakeSettings
 
 
@@ -73,12 +73,12 @@ def test_it_looks_harder_until_the_error_is_reached(monkeypatch: pytest.MonkeyPa
     """Errors that fall like rays^-1/2, but are three times those of the table."""
     asked = []
 
-    def light(_scene, _local, _geometry, settings, _so_far, progress):  # type: ignore[no-untyped-def]
+    def light(_scene, _local, _geometry, settings, so_far, progress):  # type: ignore[no-untyped-def]
         asked.append(settings.rays)
         progress.at(0.5)
         return TexelLight(np.ones((1, 3)), np.ones((1, 3)), 0.48 / settings.rays**0.5)
 
-    monkeypatch.setattr(accuracy, "reconstruct", light)
+    monkeypatch.setattr(accuracy, "light_texels", light)
     fractions: list[float] = []
     result = accuracy.light_within(
         None,

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.solver import PointLight, Scene, SolverSettings
+from radiosity_addon.solver import PointLight, SolverSettings
 from radiosity_addon.solver.methods import hierarchical
 from radiosity_addon.solver.methods.hierarchical import STALLED, exhausted, iterate
 from radiosity_addon.solver.state.anderson import Anderson
 from radiosity_addon.solver.state.iteration import bounce
-from tests.rooms import box_room, gray
+from tests.rooms import box_room, gray_scene
 from tests.unit.solved_rooms import solved
 
 
@@ -80,8 +80,7 @@ def test_growth_is_forgotten() -> None:
 def test_a_bright_closed_room_needs_a_quarter_of_jacobis_gathers() -> None:
     """ρ = 0.95 over the same links, from the same start, to the same residual."""
     triangles, _ = box_room((3, 2, 2), n=3)
-    count = len(triangles)
-    scene = Scene(triangles, gray(count, 0.95), gray(count, 0.0), lights=[PointLight((1.0, 1.2, 0.7), 10.0)])
+    scene = gray_scene(triangles, 0.95, lights=[PointLight((1.0, 1.2, 0.7), 10.0)])
     state = solved(scene, error=3e-3)
     assert len(state.cluster_links) > 0
     assert state.settings == SolverSettings(error=3e-3)
@@ -111,7 +110,7 @@ def test_a_bright_closed_room_needs_a_quarter_of_jacobis_gathers() -> None:
 
 def test_an_iteration_whose_residual_falls_no_more_ends(monkeypatch: pytest.MonkeyPatch) -> None:
     triangles, _ = box_room((1, 1, 1), n=1)
-    scene = Scene(triangles, gray(len(triangles), 0.5), gray(len(triangles), 1.0))
+    scene = gray_scene(triangles, 0.5, 1.0)
     state = solved(scene, error=1e-2)
     state.reset()
     state.iterations = 0

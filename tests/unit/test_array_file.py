@@ -66,7 +66,7 @@ def test_a_flipped_bit_is_noticed(path: Path, at: int) -> None:
 def test_other_kinds_and_formats_are_refused(path: Path) -> None:
     with pytest.raises(ArrayFileError, match="no such file"):
         read_arrays(path, b"OTHERS", 3)
-    with pytest.raises(ArrayFileError, match="has format 3, and this version reads format 4"):
+    with pytest.raises(ArrayFileError, match=r"format 3.*format 4"):
         read_arrays(path, MAGIC, 4)
 
 

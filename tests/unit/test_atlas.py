@@ -207,7 +207,7 @@ def test_tiny_pages_work_and_say_that_they_are_crowded(resolution):
 
 
 def test_a_crowded_page_names_the_object_that_takes_it_all():
-    """At d331b48 the resolution was blamed, which would have to be a thousand times as large."""
+    """Not the resolution, which would have to be a thousand times as large."""
     small = [box((0.01, 0.01, 0.01)) for _ in range(40)]
     (warning,) = run_atlas(inputs(box((1000, 1000, 0.001)), *small), 16).warnings
     assert warning.name == "object 0"

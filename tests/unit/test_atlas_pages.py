@@ -52,17 +52,6 @@ def test_a_density_that_needs_more_than_the_largest_page_makes_more_pages():
         run_atlas(objects, texel_density=50, limits=Limits(largest=64))
 
 
-def test_pages_asked_for_are_about_equally_full():
-    sizes = [(1, 1, 1), (2, 1, 1), (1, 1, 0.5), (3, 1, 1), (0.3, 0.3, 0.3), (1, 2, 2)]
-    atlas = run_atlas(inputs(*map(box, sizes)), 128, pages=3)
-    assert len(atlas.pages) == 3
-    assert {page.resolution for page in atlas.pages} == {128}
-    areas = [2 * (a * b + b * c + c * a) for a, b, c in sizes]
-    per_page = np.bincount([laid.page for laid in atlas.objects], areas)
-    assert per_page.max() < 1.5 * per_page.min()
-    assert len(run_atlas(inputs(box((1, 1, 1))), 64, pages=5).pages) == 1
-
-
 @pytest.mark.parametrize("mip_levels", [0, 1, 2, 3])
 def test_down_to_the_mip_level_asked_for_no_texel_shows_two_charts(mip_levels):
     """Bilinear filtering at level L reads whole texels of that level; one may hold one chart only."""

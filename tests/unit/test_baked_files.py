@@ -24,7 +24,7 @@ from radiosity_addon.files.baked_files import (
 def written(folder: Path, owner: Owner, name: str = "report.json", *files: str) -> Path:
     """A report with its seal."""
     listed = entries([folder / file for file in files], folder, None)
-    report = {"version": 2, "baked": owner.told(folder), "files": listed, "seconds": {"solve": 0.1}}
+    report = {"version": 2, "baked": owner.recorded(folder), "files": listed, "seconds": {"solve": 0.1}}
     (folder / name).write_text(text_of(sealed(report)), encoding="utf-8")
     return folder / name
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from radiosity_addon.numerics.sampling import stratified_square
-from radiosity_addon.solver import PointLight, Scene, SolverSettings, solve
+from radiosity_addon.solver import PointLight, SolverSettings, solve
 from radiosity_addon.solver.gather import Footprints, Gathered, LocalPass
 from radiosity_addon.solver.gather.bright_patches import CONTRAST, MOST, AimedRays, BrightElements
 from radiosity_addon.solver.gather.hit_numbers import NOTHING
-from tests.rooms import box_room, gray, solid_box
+from tests.rooms import box_room, gray_scene, solid_box
 
 RAYS = 64
 POINTS = 400
@@ -22,9 +22,7 @@ def local() -> LocalPass:
     """A room with a lamp a hand's breadth off a wall, and a block that hides part of the bright spot."""
     room, _ = box_room((2, 2, 1))
     triangles = np.concatenate([room, solid_box((1.2, 0.9, 0.0), (1.5, 1.2, 0.55))])
-    scene = Scene(
-        triangles, gray(24, 0.7), gray(24, 0.0), lights=[PointLight((1.93, 1.0, 0.5), 10.0, radius=0.01)]
-    )
+    scene = gray_scene(triangles, 0.7, lights=[PointLight((1.93, 1.0, 0.5), 10.0, radius=0.01)])
     return solve(scene, SolverSettings(error=5e-4)).local_pass
 
 
@@ -97,7 +95,7 @@ def test_nothing_is_aimed_where_chance_does_no_harm(local: LocalPass) -> None:
 
 def test_an_even_enclosure_has_no_bright_elements() -> None:
     triangles, _ = box_room()
-    scene = Scene(triangles, gray(12, 0.5), gray(12, 1.0))
+    scene = gray_scene(triangles, 0.5, 1.0)
     local = solve(scene, SolverSettings(error=1e-3)).local_pass
     assert len(BrightElements(local.elements.state.hierarchy, local.elements.reflected())) == 0
 
@@ -115,10 +113,10 @@ def test_rays_aim_at_the_bright_spot_on_a_large_element() -> None:
     """A lamp a hand's breadth off a wall lights a spot that is smaller than the elements may be."""
     room, _ = box_room((2, 2, 1))
     lamp = PointLight((1.93, 1.0, 0.5), 10.0, radius=0.01)
-    scene = Scene(room, gray(12, 0.7), gray(12, 0.0), lights=[lamp])
+    scene = gray_scene(room, 0.7, lights=[lamp])
     local = solve(scene, SolverSettings(error=1e-2, min_area=2e-3)).local_pass
     even = BrightElements(local.elements.state.hierarchy, local.elements.reflected())
-    spot = local.gather._bright
+    spot = local.gather.bright_elements
     np.testing.assert_array_equal(even.element, spot.element)
     plain, aimed = (sent_by_the_lamps_wall(bright, lamp) for bright in (even, spot))
     noise = np.hypot(plain.std(), aimed.std()) / np.sqrt(POINTS)

@@ -8,13 +8,9 @@ import pytest
 from radiosity_addon.rays.caster import NO_HIT, BruteForceCaster, RayCaster, surface_offset
 from radiosity_addon.rays.embree import EmbreeCaster
 from tests.rooms import box_room, rectangle, solid_box, sphere
+from tests.vectors import unit_rows
 
 CASTERS = (BruteForceCaster, EmbreeCaster)
-
-
-def unit_rows(rng: np.random.Generator, count: int) -> np.ndarray:
-    rows = rng.normal(size=(count, 3))
-    return rows / np.linalg.norm(rows, axis=1, keepdims=True)
 
 
 def soup(seed: int, count: int = 150) -> np.ndarray:

@@ -9,10 +9,10 @@ from radiosity_addon.lightmap.texels.cells import ALONG, CELLS, TexelCells
 from radiosity_addon.lightmap.texels.occlusion import find_crossings
 from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
 from radiosity_addon.rays.caster import Hits
-from radiosity_addon.solver import PointLight, Scene, SolverSettings, solve
+from radiosity_addon.solver import PointLight, SolverSettings, solve
 from radiosity_addon.solver.gather.direct_light import DirectLight
 from radiosity_addon.solver.gather.hit_numbers import NOTHING
-from tests.rooms import gray, rectangle, solid_box
+from tests.rooms import gray_scene, rectangle, solid_box
 from tests.unit.texel_scenes import QUAD_UV, texel_geometry
 
 SIZE = 8
@@ -23,7 +23,7 @@ LAMP = PointLight((0.2, 0.5, 1.0), 10.0)
 def cells_of(*others: np.ndarray) -> tuple[TexelCells, TexelGeometry]:
     """The cells of all crossed texels of a floor of 8 × 8 over the unit square, with other things on it."""
     triangles = np.concatenate([FLOOR, *others])
-    scene = Scene(triangles, gray(len(triangles), 0.5), gray(len(triangles), 0.0), lights=[LAMP])
+    scene = gray_scene(triangles, lights=[LAMP])
     uv = np.zeros((len(triangles), 3, 2), dtype=np.float32)
     uv[:2] = QUAD_UV
     pages = np.full(len(triangles), -1)

@@ -13,8 +13,7 @@ from radiosity_addon.lightmap.texels.occlusion import HOOD, OUTSET, find_crossin
 from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
 from radiosity_addon.rays.caster import SIGHT_LIFT
 from radiosity_addon.rays.embree import EmbreeCaster
-from radiosity_addon.solver import Scene
-from tests.rooms import gray, rectangle, solid_box, sphere
+from tests.rooms import gray_scene, rectangle, solid_box, sphere
 from tests.unit.texel_scenes import QUAD_UV, texel_geometry
 
 SIZE = 48
@@ -37,7 +36,7 @@ def setting(*others: np.ndarray, n: int = 1, seed: int | None = None) -> tuple[T
     pages[: len(floor)] = 0
     if seed is not None:
         triangles = turned(triangles, seed)
-    scene = Scene(triangles, gray(len(triangles), 0.5), gray(len(triangles), 0.0))
+    scene = gray_scene(triangles)
     return texel_geometry(scene, uv, SIZE, pages), EmbreeCaster(triangles)
 
 
@@ -92,7 +91,7 @@ def test_a_floor_whose_corners_are_rounded_is_clear_still() -> None:
     floor = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0), 40)
     uv = floor[:, :, :2].astype(np.float32)
     triangles = turned(floor, 1).astype(np.float32).astype(np.float64)
-    scene = Scene(triangles, gray(len(floor), 0.5), gray(len(floor), 0.0))
+    scene = gray_scene(triangles)
     assert np.ptp(scene.face_normals, axis=0).max() > 1e-6
     geometry = texel_geometry(scene, uv, SIZE, np.zeros(len(floor), dtype=int))
     assert clear(geometry, EmbreeCaster(triangles)).mean() > 0.9

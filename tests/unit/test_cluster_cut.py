@@ -5,17 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.solver import Scene
 from radiosity_addon.solver.hierarchy.cluster_cut import ClusterCut
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
-from tests.rooms import box_room, gray
+from tests.rooms import box_room, gray, gray_scene
 
 
 @pytest.fixture(scope="module")
 def hierarchy() -> Hierarchy:
     triangles, surface = box_room((3, 2, 1), n=3)
     emission = gray(len(triangles), 1.0) * (surface == 1)[:, None]
-    return Hierarchy(Scene(triangles, gray(len(triangles), 0.5), emission, two_sided=surface == 0))
+    return Hierarchy(gray_scene(triangles, 0.5, emission, two_sided=surface == 0))
 
 
 def faces_of(hierarchy: Hierarchy, cluster: int) -> np.ndarray:
@@ -70,6 +69,6 @@ def test_push_is_the_transpose_of_sums(hierarchy: Hierarchy, linked: np.ndarray)
 
 def test_a_scene_of_one_face_has_one_tip() -> None:
     triangle = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], dtype=float)
-    cut = ClusterCut(Hierarchy(Scene(triangle, gray(1, 0.5), gray(1, 1.0))), np.zeros(0, dtype=int))
+    cut = ClusterCut(Hierarchy(gray_scene(triangle, 0.5, 1.0)), np.zeros(0, dtype=int))
     assert (cut.n_inner, len(cut.nodes), cut.row_of_face.tolist()) == (0, 1, [0])
     np.testing.assert_array_equal(cut.sums(np.array([[3.0]])), [[3.0]])

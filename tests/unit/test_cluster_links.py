@@ -7,7 +7,7 @@ import pytest
 
 from radiosity_addon.form_factors.formulas import point_to_polygon
 from radiosity_addon.rays.embree import EmbreeCaster
-from radiosity_addon.solver import Scene, SolverSettings
+from radiosity_addon.solver import SolverSettings
 from radiosity_addon.solver.hierarchy.bounds import NodeShapes
 from radiosity_addon.solver.hierarchy.cluster_cut import ClusterCut
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
@@ -17,14 +17,14 @@ from radiosity_addon.solver.links.element_links import Links
 from radiosity_addon.solver.links.initial import CONE, FACE_SIZE, MIXED_SIZE, SIZE, first_links
 from radiosity_addon.solver.links.transport import node_radiosity
 from radiosity_addon.solver.state.power import link_closure
-from tests.rooms import box_room, gray, rectangle, sphere
+from tests.rooms import box_room, gray, gray_scene, rectangle, sphere
 
 MANY = 6_000_000
 """Budget of links that nothing here exhausts."""
 
 
 def prepared(triangles: np.ndarray) -> tuple[Hierarchy, NodeShapes, EmbreeCaster]:
-    scene = Scene(triangles, gray(len(triangles), 0.5), gray(len(triangles), 0.0))
+    scene = gray_scene(triangles)
     hierarchy = Hierarchy(scene)
     return hierarchy, NodeShapes(hierarchy), EmbreeCaster(scene.triangles, 1)
 
@@ -221,7 +221,7 @@ def test_what_looks_all_ways_is_lit_all_around() -> None:
     triangles = np.concatenate([room, ball])
     emission = gray(len(triangles), 0.0)
     emission[len(room) :] = 1.0  # what shines has a tree of its own
-    hierarchy = Hierarchy(Scene(triangles, gray(len(triangles), 0.5), emission))
+    hierarchy = Hierarchy(gray_scene(triangles, 0.5, emission))
     shapes, caster = NodeShapes(hierarchy), EmbreeCaster(triangles, 1)
     faces = len(room) + np.arange(len(ball))
     of_ball = hierarchy.roots[-1]

@@ -9,7 +9,7 @@ from radiosity_addon.scene.faces import Faces
 from radiosity_addon.solver import Scene
 from radiosity_addon.solver.hierarchy.clusters import Clusters, build_clusters
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
-from tests.rooms import box_room, gray, rectangle
+from tests.rooms import box_room, gray, gray_scene, rectangle
 
 
 def random_faces(count: int, seed: int = 0) -> Faces:
@@ -103,7 +103,7 @@ def test_average_is_area_weighted() -> None:
 def test_low_clusters_are_pieces_of_one_wall() -> None:
     """Neighbors that face the same way stay together: only clusters along edges mix two walls."""
     triangles, surface = box_room(n=8)
-    faces = Faces(Scene(triangles, gray(len(triangles), 0.5), gray(len(triangles), 0.0)))
+    faces = Faces(gray_scene(triangles))
     clusters, _ = build_clusters(faces, [np.arange(len(faces))])
     mixed = np.array([len(set(surface[members(clusters, c)])) > 1 for c in range(len(clusters))])
     np.testing.assert_allclose(clusters.coherence[~mixed], 1.0, atol=1e-12)
@@ -114,7 +114,7 @@ def test_low_clusters_are_pieces_of_one_wall() -> None:
 
 def test_faces_in_one_place_do_not_stop_the_tree() -> None:
     triangles = np.repeat(rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0)), 8, axis=0)
-    faces = Faces(Scene(triangles, gray(16, 0.5), gray(16, 0.0)))
+    faces = Faces(gray_scene(triangles))
     clusters, roots = build_clusters(faces, [np.arange(16)])
     assert len(clusters) == 15
     assert sorted(members(clusters, roots[0])) == list(range(16))
@@ -125,7 +125,7 @@ def test_tiny_faces_keep_their_means_beside_large_ones() -> None:
     large = rectangle((0, 0, 0), (1e3, 0, 0), (0, 1e3, 0))
     tiny = rectangle((0, 0, 1), (1e-7, 0, 0), (0, 1e-7, 0), 2)
     triangles = np.concatenate([large, tiny])
-    hierarchy = Hierarchy(Scene(triangles, gray(len(triangles), 0.5), gray(len(triangles), 0.0)))
+    hierarchy = Hierarchy(gray_scene(triangles))
     values = np.where(np.arange(len(triangles))[:, None] < 2, 1e6, [1.0, 2.0, 3.0])
     means = hierarchy.clusters.average(values, hierarchy.faces.area)
     clusters = hierarchy.clusters

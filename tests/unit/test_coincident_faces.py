@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.solver import Scene
 from radiosity_addon.solver.methods.hierarchical import HierarchicalState
 from radiosity_addon.solver.state.power import power_balance
-from tests.rooms import CEILING, box_room, gray, rectangle
+from tests.rooms import CEILING, box_room, gray, gray_scene, rectangle
 from tests.unit.solved_rooms import solved
 
 REFLECTANCE = 0.6
@@ -24,7 +23,7 @@ def with_sheets(kind: str) -> HierarchicalState:
     emission = gray(len(triangles), 0.0)
     emission[:ROOM][surface == CEILING] = 1.0
     two_sided = np.arange(len(triangles)) >= ROOM if kind != "back to back" else None
-    scene = Scene(triangles, gray(len(triangles), REFLECTANCE), emission, two_sided=two_sided)
+    scene = gray_scene(triangles, REFLECTANCE, emission, two_sided=two_sided)
     state = solved(scene, error=1e-3)
     assert len(state.cluster_links) > 1000
     return state

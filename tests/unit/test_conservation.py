@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.solver import Scene
 from radiosity_addon.solver.balance.conservation import LIMIT, LIMIT_CLOSED, LIMIT_RECEIVED, Conservation
 from radiosity_addon.solver.balance.link_sums import sent, sent_by_leaves
 from radiosity_addon.solver.hierarchy.nodes import LEAF
 from radiosity_addon.solver.links.cluster_links import gather_at_clusters
 from radiosity_addon.solver.links.transport import gather, node_radiosity, pull, push
 from radiosity_addon.solver.methods.hierarchical import HierarchicalState
-from tests.rooms import CEILING, box_room, gray, rectangle
+from tests.rooms import CEILING, box_room, gray, gray_scene, rectangle
 from tests.unit.solved_rooms import corridor, furnished, solved
 
 
@@ -97,7 +96,7 @@ def test_open_scene_sends_less() -> None:
     kept = surface != CEILING
     emission = gray(len(room), 0.0)
     emission[surface == 0] = 1.0
-    state = solved(Scene(room[kept], gray(10, 0.5), emission[kept]), error=1e-3)
+    state = solved(gray_scene(room[kept], 0.5, emission[kept]), error=1e-3)
     factor = factors(state)
     share = received(state, factor)
     hierarchy = state.hierarchy
@@ -135,7 +134,7 @@ def cluttered() -> HierarchicalState:
     triangles = np.concatenate([room, box])
     emission = gray(len(triangles), 0.0)
     emission[: len(room)][surface == CEILING] = 1.0
-    return solved(Scene(triangles, gray(len(triangles), 0.7), emission), error=1e-3)
+    return solved(gray_scene(triangles, 0.7, emission), error=1e-3)
 
 
 def test_every_face_of_a_closed_scene_receives_from_all_around(cluttered: HierarchicalState) -> None:
@@ -184,7 +183,7 @@ def test_own_links_are_not_scaled_down_for_noise() -> None:
     kept = surface != CEILING
     emission = gray(len(room), 0.0)
     emission[surface == 0] = 1.0
-    state = solved(Scene(room[kept], gray(int(kept.sum()), 0.5), emission[kept]), error=0.1)
+    state = solved(gray_scene(room[kept], 0.5, emission[kept]), error=0.1)
     hierarchy, arrivals = state.hierarchy, state.conservation.arrivals
     leaves = hierarchy.leaves
     own, _ = sent_by_leaves(hierarchy, state.cut, state.links, state.cluster_links)
@@ -203,7 +202,7 @@ def test_what_something_escapes_from_is_not_scaled() -> None:
     kept = surface != CEILING
     emission = gray(len(room), 0.0)
     emission[surface == 0] = 1.0
-    state = solved(Scene(room[kept], gray(int(kept.sum()), 0.5), emission[kept]), error=1e-3)
+    state = solved(gray_scene(room[kept], 0.5, emission[kept]), error=1e-3)
     assert len(state.cluster_links) > 0
     open_faces = ~state.conservation.closed(state.hierarchy)
     assert open_faces.mean() > 0.95
@@ -223,9 +222,7 @@ def test_partly_covered_faces_are_sent_what_their_quarters_take() -> None:
     triangles = np.concatenate([room, *panels])
     emission = gray(len(triangles), 0.0)
     emission[:2] = 1.0
-    state = solved(
-        Scene(triangles, gray(len(triangles), 0.9), emission, two_sided=True), error=0.02, min_area=1e-3
-    )
+    state = solved(gray_scene(triangles, 0.9, emission, two_sided=True), error=0.02, min_area=1e-3)
     hierarchy, leaves = state.hierarchy, state.hierarchy.leaves
     radiosity = np.zeros((hierarchy.n_elements, len(leaves)))
     radiosity[leaves, np.arange(len(leaves))] = 1.0

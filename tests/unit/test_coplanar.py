@@ -9,8 +9,7 @@ from radiosity_addon.rays.caster import NO_HIT, RayCaster, surface_offset
 from radiosity_addon.rays.coplanar import COPY_LIFT, facing_copies
 from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.scene.opacity import ray_caster
-from radiosity_addon.solver import Scene
-from tests.rooms import box_room, gray, rectangle, solid_box
+from tests.rooms import box_room, gray_scene, rectangle, solid_box
 
 OFFSET = 1e-5
 LOWER = 2 * 5**2
@@ -33,8 +32,7 @@ def two_sheets(order: int) -> np.ndarray:
 
 
 def caster(triangles: np.ndarray, two_sided: bool | np.ndarray = False) -> RayCaster:
-    count = len(triangles)
-    return ray_caster(Scene(triangles, gray(count, 0.5), gray(count, 0.0), two_sided=two_sided))
+    return ray_caster(gray_scene(triangles, two_sided=two_sided))
 
 
 def rays(triangles: np.ndarray, side: int, count: int = 4000) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -127,7 +125,7 @@ def test_a_caster_of_some_triangles_still_knows_their_rows() -> None:
     count = len(sheets)
     both = np.concatenate([sheets + 5.0, sheets])
     in_bounces = np.arange(2 * count) >= count
-    scene = Scene(both, gray(2 * count, 0.5), gray(2 * count, 0.0), in_bounces=in_bounces)
+    scene = gray_scene(both, in_bounces=in_bounces)
     origins, directions, _ = rays(sheets[:LOWER], 1, 500)
     hits = ray_caster(scene).intersect(origins, directions)
     assert hits.front.all()

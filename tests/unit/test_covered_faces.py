@@ -13,7 +13,7 @@ from radiosity_addon.scene.textures import SurfaceImages
 from radiosity_addon.solver import Scene
 from radiosity_addon.solver.emitters.textured_emitters import emitter_groups
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
-from tests.rooms import box_room, gray, rectangle, solid_box, sphere
+from tests.rooms import box_room, gray_scene, rectangle, solid_box, sphere
 
 X, Y, Z = np.eye(3)
 UNIT = rectangle((0, 0, 0), X, Y)
@@ -23,9 +23,7 @@ POINT, UP = np.array([[0.5, 0.4, 3.0]]), -Z[None]
 def scene_of(*parts: np.ndarray, emission: tuple[float, ...] = (), **more: object) -> Scene:
     triangles = np.concatenate(parts)
     glow = np.repeat(emission or [0.0] * len(parts), [len(part) for part in parts])
-    return Scene(
-        triangles, gray(len(triangles), 0.5), glow[:, None] * np.ones(3), **{"two_sided": True, **more}
-    )
+    return gray_scene(triangles, 0.5, glow[:, None] * np.ones(3), **{"two_sided": True, **more})
 
 
 def fronts(scene: Scene) -> np.ndarray:

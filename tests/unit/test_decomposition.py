@@ -12,7 +12,7 @@ from radiosity_addon.solver.methods import solve_by_method
 from radiosity_addon.solver.methods.dense import dense
 from radiosity_addon.solver.methods.jacobi import jacobi
 from radiosity_addon.solver.methods.matrix import MatrixState
-from tests.rooms import CEILING, box_room, gray, rectangle
+from tests.rooms import CEILING, box_room, gray, gray_scene, rectangle
 from tests.systems import cornell_system, cube_system, iterate, side_by_side
 
 
@@ -113,7 +113,7 @@ def test_rooms_are_reported_as_blocks(assembly: str) -> None:
     emission = gray(24, 0.0)
     emission[2:4] = 1.0
     emission[14:16] = 3.0
-    state = solve(Scene(triangles, gray(24, 0.5), emission), assembly=assembly)
+    state = solve(gray_scene(triangles, 0.5, emission), assembly=assembly)
     blocks = state.details["independent_sets"]
     assert [block["area_m2"] for block in blocks] == pytest.approx([24.0, 6.0])
     assert sum(block["elements"] for block in blocks) == len(state.hierarchy.leaves)
@@ -131,10 +131,10 @@ def test_rooms_together_are_what_they_are_apart(method: str) -> None:
     emission[2:4], emission[14:16] = 1.0, 3.0
     options = {"method": method, "tolerance": 1e-14}
     # Both rooms down to triangles of one size: 192 and 48 of them.
-    together = solve(Scene(triangles, gray(24, 0.7), emission), elements=240, **options)
+    together = solve(gray_scene(triangles, 0.7, emission), elements=240, **options)
     for number, elements in ((0, 192), (1, 48)):
         rows = room == number
-        apart = solve(Scene(triangles[rows], gray(12, 0.7), emission[rows]), elements=elements, **options)
+        apart = solve(gray_scene(triangles[rows], 0.7, emission[rows]), elements=elements, **options)
         assert len(apart.values) == elements
         np.testing.assert_allclose(apart.radiosity[:12], together.radiosity[:24][rows], rtol=1e-12)
         np.testing.assert_allclose(apart.irradiance[:12], together.irradiance[:24][rows], rtol=1e-12)
@@ -146,7 +146,7 @@ def test_the_outside_of_walls_is_alone() -> None:
     triangles, surface = box_room()
     emission = gray(12, 0.0)
     emission[surface == CEILING] = 1.0
-    scene = Scene(triangles, gray(12, 0.5), emission, two_sided=True)
+    scene = gray_scene(triangles, 0.5, emission, two_sided=True)
     state = solve(scene, elements=96)
     assert state.details["matrix"]["blocks"] == 1
     assert state.details["matrix"]["alone"] == 48
@@ -157,7 +157,7 @@ def test_the_outside_of_walls_is_alone() -> None:
 
 def test_a_plate_by_itself_has_no_block() -> None:
     plate = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0))
-    state = solve(Scene(plate, gray(2, 0.5), gray(2, 1.0)), elements=32, method="jacobi")
+    state = solve(gray_scene(plate, 0.5, 1.0), elements=32, method="jacobi")
     assert state.details["independent_sets"] == []
     assert state.details["matrix"]["converged"]
     assert state.residual == 0.0
@@ -173,7 +173,7 @@ def test_a_thin_wall_parts_two_rooms(assembly: str) -> None:
     left = triangles.mean(axis=1)[:, 0] < 1.0
     emission = gray(len(triangles), 0.0)
     emission[0] = 1.0
-    scene = Scene(triangles, gray(len(triangles), 0.5), emission, two_sided=True)
+    scene = gray_scene(triangles, 0.5, emission, two_sided=True)
     state = solve(scene, elements=500, assembly=assembly)
     blocks = state.details["independent_sets"]
     # Two cubes of six walls each; the room's outside sees nothing.

@@ -7,18 +7,17 @@ import pytest
 
 from radiosity_addon.rays.caster import Hits
 from radiosity_addon.rays.embree import EmbreeCaster
-from radiosity_addon.solver import Scene
 from radiosity_addon.solver.gather.element_cells import CELLS, ElementCells
 from radiosity_addon.solver.gather.hit_numbers import NOTHING
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
-from tests.rooms import gray, rectangle, solid_box
+from tests.rooms import gray_scene, rectangle, solid_box
 
 FLOOR = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0))
 
 
 def parts_with(*around: np.ndarray) -> tuple[ElementCells, Hierarchy]:
     triangles = np.concatenate([FLOOR, *around])
-    scene = Scene(triangles, gray(len(triangles), 0.5), gray(len(triangles), 0.0), two_sided=True)
+    scene = gray_scene(triangles, two_sided=True)
     hierarchy = Hierarchy(scene)
     return ElementCells(hierarchy, EmbreeCaster(scene.triangles)), hierarchy
 

@@ -9,20 +9,15 @@ from radiosity_addon.form_factors.formulas import triangle_to_triangle
 from radiosity_addon.form_factors.geometry_kernel import kernel
 from radiosity_addon.numerics.triangles import split_in_four
 from radiosity_addon.rays.embree import EmbreeCaster
-from radiosity_addon.solver import Scene
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from radiosity_addon.solver.links import element_links
 from radiosity_addon.solver.links.element_links import Links, join, measure_links, no_links
 from radiosity_addon.solver.links.pair_factors import element_factors
-from tests.rooms import box_room, gray, rectangle, solid_box
-
-
-def scene_of(triangles: np.ndarray) -> Scene:
-    return Scene(triangles, gray(len(triangles), 0.5), gray(len(triangles), 0.0))
+from tests.rooms import box_room, gray_scene, rectangle, solid_box
 
 
 def hierarchy_of(triangles: np.ndarray) -> tuple[Hierarchy, EmbreeCaster]:
-    return Hierarchy(scene_of(triangles)), EmbreeCaster(triangles)
+    return Hierarchy(gray_scene(triangles)), EmbreeCaster(triangles)
 
 
 def random_rotations(rng: np.random.Generator, count: int) -> np.ndarray:

@@ -9,19 +9,15 @@ from radiosity_addon.form_factors.formulas import point_to_polygon
 from radiosity_addon.numerics.sampling import stratified_square
 from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.scene.faces import Faces
-from radiosity_addon.solver import Scene, SolverSettings, solve
+from radiosity_addon.solver import SolverSettings, solve
 from radiosity_addon.solver.emitters import emitters
 from radiosity_addon.solver.emitters.emitters import EmitterGroup
 from radiosity_addon.solver.gather.footprints import Footprints, SpreadPoints
 from radiosity_addon.solver.gather.soft_shadows import ShadowShare
-from tests.rooms import gray, rectangle
+from tests.rooms import gray_scene, rectangle
+from tests.vectors import normals_of
 
 OFFSET = 1e-6
-
-
-def normals_of(triangles: np.ndarray) -> np.ndarray:
-    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    return cross / np.linalg.norm(cross, axis=1, keepdims=True)
 
 
 def group_of(triangles: np.ndarray, offset: float = OFFSET) -> EmitterGroup:
@@ -144,7 +140,7 @@ def test_faces_are_grouped_by_color_and_each_shines_from_its_own_sides() -> None
     triangles = np.concatenate([rectangle((i, 0, 0), (1, 0, 0), (0, 1, 0)) for i in range(3)])
     emission = np.repeat([[1.0, 0.0, 0.0], [0.0, 0.0, 0.0], [2.0, 2.0, 2.0]], 2, axis=0)
     emission[1] = emission[4]  # one triangle of the first square shines like the last
-    scene = Scene(triangles, gray(6, 0.5), emission, two_sided=np.array([False] * 4 + [True] * 2))
+    scene = gray_scene(triangles, 0.5, emission, two_sided=np.array([False] * 4 + [True] * 2))
     groups = EmitterGroup.of_faces(Faces(scene), EmbreeCaster(triangles))
     assert sorted(group.strength.tolist() for group in groups) == [[1, 0, 0], [2, 2, 2]]
     below = np.array([[2.5, 0.5, -1.0], [0.7, 0.2, -1.0]])
@@ -154,7 +150,7 @@ def test_faces_are_grouped_by_color_and_each_shines_from_its_own_sides() -> None
     np.testing.assert_allclose(white.unit_irradiance(below, up), backs, rtol=1e-12)
     red = next(group for group in groups if group.strength[2] == 0)
     assert not red.unit_irradiance(below, up).any()
-    dark = Scene(triangles, gray(6, 0.5), gray(6, 0.0))
+    dark = gray_scene(triangles)
     assert EmitterGroup.of_faces(Faces(dark), EmbreeCaster(triangles)) == []
 
 
@@ -162,7 +158,7 @@ def test_lifted_rays_do_not_end_on_a_face_that_lies_parallel() -> None:
     """A hair below a shining plane: half of all rays run nearly along it, and none may be stopped by it."""
     triangles = rectangle((-1, -1, 1e-3), (0, 2, 0), (2, 0, 0))
     caster = EmbreeCaster(triangles)
-    scene = Scene(triangles, gray(2, 0.5), gray(2, 1.0))
+    scene = gray_scene(triangles, 0.5, 1.0)
     (group,) = EmitterGroup.of_faces(Faces(scene), caster)
     points = np.concatenate([np.random.default_rng(5).uniform(-0.5, 0.5, (50, 2)), np.zeros((50, 1))], axis=1)
     at = Footprints(points, np.tile([0, 0, 1.0], (50, 1)), np.arange(50))
@@ -174,7 +170,7 @@ def test_a_face_does_not_light_itself_from_behind() -> None:
     """Both sides of a floor glow, as a wall does: it gets the wall's light, none from its own back."""
     floor, wall = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0)), rectangle((0, 0, 0), (0, 1, 0), (0, 0, 1))
     points = np.array([[0.5, 0.5, 0.0], [0.1, 0.5, 0.0], [0.9, 0.2, 0.0]])
-    scene = Scene(np.concatenate([floor, wall]), gray(4, 0.4), gray(4, 0.3), two_sided=True)
+    scene = gray_scene(np.concatenate([floor, wall]), 0.4, 0.3, two_sided=True)
     light = solve(scene, SolverSettings(error=1e-2)).local_pass.direct.at(
         Footprints(points, np.tile([0, 0, 1.0], (3, 1)), np.arange(3))
     )
@@ -187,7 +183,7 @@ def test_a_footprint_that_is_rounded_off_its_plane_does_not_see_its_own_back() -
     here = np.array([30.0, -20.0, 10.0])
     slope = rectangle(here, (1, 0.3, 0.2), (-0.3, 1, 0.7))
     wall = rectangle(here, (-0.3, 1, 0.7), (0, 0, 1))
-    scene = Scene(np.concatenate([slope, wall]), gray(4, 0.4), gray(4, 0.3), two_sided=True)
+    scene = gray_scene(np.concatenate([slope, wall]), 0.4, 0.3, two_sided=True)
     faces = Faces(scene)
     (group,) = EmitterGroup.of_faces(faces, EmbreeCaster(scene.triangles))
     places = np.random.default_rng(7).uniform(0.2, 0.8, (300, 2))

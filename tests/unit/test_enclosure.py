@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from radiosity_addon.scene.opacity import ray_caster
-from radiosity_addon.solver import Scene
 from radiosity_addon.solver.balance import enclosure
 from radiosity_addon.solver.balance.enclosure import HELD_RAYS, LAMP_RAYS, RAYS, Arrivals
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
-from tests.rooms import CEILING, FLOOR, box_room, gray, rectangle
+from tests.rooms import CEILING, FLOOR, box_room, gray, gray_scene, rectangle
 
 EVERYTHING = 1e9
 """Smallest area that makes all faces neighbors."""
@@ -24,7 +23,7 @@ def alike(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def measured(triangles: np.ndarray, min_area: float, shines: np.ndarray | bool = False) -> Arrivals:
     emission = gray(len(triangles), 1.0) * np.broadcast_to(shines, len(triangles))[:, None]
-    scene = Scene(triangles, gray(len(triangles), 0.5), emission)
+    scene = gray_scene(triangles, 0.5, emission)
     result = Arrivals(ray_caster(scene), min_area, seed=3)
     result.measure(Hierarchy(scene))
     return result
@@ -87,7 +86,7 @@ def test_what_shines_into_the_open_asks_more() -> None:
 @pytest.mark.usefixtures("alike")
 def test_faces_average_their_leaves() -> None:
     triangles, _ = open_box()
-    scene = Scene(triangles, gray(len(triangles), 0.5), gray(len(triangles), 0.0))
+    scene = gray_scene(triangles)
     hierarchy = Hierarchy(scene)
     hierarchy.subdivide(np.arange(5))
     found = Arrivals(ray_caster(scene), 0.0, seed=3)
@@ -107,7 +106,7 @@ def test_large_leaves_ask_more() -> None:
     found = measured(room[kept], 0.0)
     assert found.rays[:10].tolist() == [8192] * 10
     assert found.share[:2].mean() == pytest.approx(1 - 0.19982, abs=0.005)
-    scene = Scene(room[kept], gray(10, 0.5), gray(10, 0.0))
+    scene = gray_scene(room[kept], 0.5)
     hierarchy = Hierarchy(scene)
     for _ in range(5):
         hierarchy.subdivide(hierarchy.leaves[:4])

@@ -14,9 +14,9 @@ from radiosity_addon.base.progress import Progress
 from radiosity_addon.lightmap.images.dilate import dilate
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
-from radiosity_addon.solver import EnvironmentLight, PointLight, Scene
+from radiosity_addon.solver import EnvironmentLight, PointLight
 from tests.cornell import cornell_box
-from tests.rooms import box_room, gray, rectangle
+from tests.rooms import box_room, gray_scene, rectangle
 from tests.unit.texel_scenes import QUAD_UV, bake_scene
 
 LAMP_HEIGHT, SCREEN_HEIGHT, SCREEN = 1.0, 0.5, 0.265
@@ -41,14 +41,14 @@ def shadowed_floor() -> BakeScene:
     floor = rectangle((-1, -1, 0), (2, 0, 0), (0, 2, 0))
     screen = rectangle((-SCREEN, -SCREEN, SCREEN_HEIGHT), (2 * SCREEN, 0, 0), (0, 2 * SCREEN, 0))
     lamp = PointLight((0, 0, LAMP_HEIGHT), 50.0)
-    scene = Scene(np.concatenate([floor, screen]), gray(4, 0.5), gray(4, 0.0), lights=[lamp])
+    scene = gray_scene(np.concatenate([floor, screen]), 0.5, lights=[lamp])
     return bake_scene(scene, ("Floor", 2, QUAD_UV), ("Screen", 2, None, False))
 
 
 def test_a_right_solution_has_a_black_picture() -> None:
     """Walls that emit E = 1 and reflect a half: B = 2 to what the solver leaves."""
     triangles, _ = box_room()
-    scene = bake_scene(Scene(triangles, gray(12, 0.5), gray(12, 1.0)), ("Room", 12))
+    scene = bake_scene(gray_scene(triangles, 0.5, 1.0), ("Room", 12))
     settings = {"method": "dense", "elements": 48, "resolution": 48}
     assert np.abs(texels(run(scene, **settings))).max() < 2e-3
 
@@ -91,7 +91,7 @@ def test_errors_stand_where_elements_cross_the_edge_of_a_shadow() -> None:
 def test_the_picture_darkens_in_first_order_with_the_elements_size() -> None:
     """Where light is smooth: a lamp above a lone floor."""
     floor = rectangle((-1, -1, 0), (2, 0, 0), (0, 2, 0))
-    scene = Scene(floor, gray(2, 0.5), gray(2, 0.0), lights=[PointLight((0, 0, LAMP_HEIGHT), 50.0)])
+    scene = gray_scene(floor, lights=[PointLight((0, 0, LAMP_HEIGHT), 50.0)])
     parts, sizes = bake_scene(scene, ("Floor", 2, QUAD_UV)), []
     for elements in (32, 128, 512):
         result = run(parts, method="dense", elements=elements, resolution=64)
@@ -103,7 +103,7 @@ def test_the_picture_darkens_in_first_order_with_the_elements_size() -> None:
 def test_a_sky_counts_as_what_arrives() -> None:
     """An open floor under a sky: the elements have B = ρπL, and so it is."""
     floor = rectangle((-1, -1, 0), (2, 0, 0), (0, 2, 0))
-    scene = Scene(floor, gray(2, 0.5), gray(2, 0.0), lights=[EnvironmentLight(1.0)])
+    scene = gray_scene(floor, lights=[EnvironmentLight(1.0)])
     found = texels(run(bake_scene(scene, ("Floor", 2, QUAD_UV)), resolution=16))
     np.testing.assert_allclose(found, 0, atol=1e-6)
 

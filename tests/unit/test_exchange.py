@@ -6,12 +6,11 @@ import numpy as np
 
 from radiosity_addon.form_factors.formulas import triangle_to_triangle
 from radiosity_addon.rays.embree import EmbreeCaster
-from radiosity_addon.scene.scene import Scene
 from radiosity_addon.solver.equations.exchange import exchange_areas
 from radiosity_addon.solver.equations.fixed_elements import subdivide_evenly
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from radiosity_addon.solver.links.pair_factors import PairSamples, open_share, pair_visibility, trace_pairs
-from tests.rooms import box_room, gray
+from tests.rooms import box_room, gray_scene
 from tests.unit.solved_rooms import corridor, furnished
 
 
@@ -75,7 +74,7 @@ def test_nothing_passes_between_closed_rooms() -> None:
     room, _ = box_room()
     beside = room * (0.8, 1.0, 0.7) + (2.0, 0.0, 0.0)
     triangles = np.concatenate([room, beside])
-    hierarchy = Hierarchy(Scene(triangles, gray(24, 0.5), gray(24, 1.0)))
+    hierarchy = Hierarchy(gray_scene(triangles, 0.5, 1.0))
     subdivide_evenly(hierarchy, 192)
     leaves = hierarchy.leaves
     here = hierarchy.face[leaves] < len(room)

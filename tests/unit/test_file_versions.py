@@ -41,10 +41,10 @@ def test_what_was_changed_or_is_gone_does_not_come_back(tmp_path: Path) -> None:
     first = write(path, b"first")
     assert held.hold(path, first)
     path.write_bytes(b"in place")  # of the same file: not by a bake, but who knows
-    with pytest.raises(BakeError, match=r"'back' was changed: bake again"):
+    with pytest.raises(BakeError, match=r"'back'.*changed"):
         held.copy_to(first, tmp_path / "back")
     assert first not in held
-    with pytest.raises(BakeError, match=r"'back' is no longer available: bake again"):
+    with pytest.raises(BakeError, match=r"'back'.*available"):
         held.copy_to(first, tmp_path / "back")
     assert not held.hold(tmp_path / "nothing", "0" * 64)
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.solver import Scene
 from radiosity_addon.solver.equations.fixed_elements import subdivide_evenly
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
-from tests.rooms import box_room, gray, rectangle
+from tests.rooms import box_room, gray_scene, rectangle
 
 
 def hierarchy_of(triangles: np.ndarray) -> Hierarchy:
-    return Hierarchy(Scene(triangles, gray(len(triangles), 0.5), gray(len(triangles), 0.0)))
+    return Hierarchy(gray_scene(triangles))
 
 
 @pytest.mark.parametrize("count", [1, 12, 100, 777, 2000])

@@ -13,7 +13,7 @@ from radiosity_addon.solver.links import initial
 from radiosity_addon.solver.links.cluster_links import ClusterLinks
 from radiosity_addon.solver.links.element_links import Links
 from radiosity_addon.solver.methods import hierarchical
-from tests.rooms import box_room, gray, sphere
+from tests.rooms import box_room, gray, gray_scene, sphere
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +24,7 @@ def clutter() -> Scene:
     triangles = np.concatenate([box_room()[0], *balls])
     emission = gray(len(triangles), 0.0)
     emission[:2] = 1.0
-    return Scene(triangles, gray(len(triangles), 0.5), emission)
+    return gray_scene(triangles, 0.5, emission)
 
 
 def limits_of(hierarchy: Hierarchy, **given: float) -> initial.PairLimits:
@@ -34,7 +34,7 @@ def limits_of(hierarchy: Hierarchy, **given: float) -> initial.PairLimits:
 def test_nodes_that_touch_exchange_at_most_the_smaller_area() -> None:
     """However large they are: their gap is 0."""
     large = 1e5 * box_room()[0]
-    shapes = NodeShapes(Hierarchy(Scene(large, gray(len(large), 0.5), gray(len(large), 0.0))))
+    shapes = NodeShapes(Hierarchy(gray_scene(large)))
     one, other = (each.reshape(-1) for each in np.indices((shapes.count, shapes.count)))
     with np.errstate(all="raise"):
         bound = shapes.exchange_bound(one, other)

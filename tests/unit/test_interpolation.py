@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 import pytest
 
 from radiosity_addon.lightmap.points.interpolation import GatherPoints, Interpolation, fit, linear_weights
-from radiosity_addon.lightmap.points.point_grid import PER_CELL
 from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
 from radiosity_addon.rays.embree import EmbreeCaster
-from radiosity_addon.solver import Scene
-from tests.rooms import gray, rectangle, sphere
+from tests.rooms import gray_scene, rectangle, sphere
 from tests.unit.texel_scenes import QUAD_UV, in_cell, texel_geometry
 
 SIZE = 24
 
 
 def caster_of(geometry: TexelGeometry) -> EmbreeCaster:
-    return EmbreeCaster(geometry._scene.triangles)
+    return EmbreeCaster(geometry.triangles)
 
 
 def geometry_of(*parts: np.ndarray, uv: np.ndarray | None = None) -> TexelGeometry:
     triangles = np.concatenate(parts)
-    scene = Scene(triangles, gray(len(triangles), 0.5), gray(len(triangles), 0.0))
+    scene = gray_scene(triangles)
     return texel_geometry(scene, QUAD_UV if uv is None else uv, SIZE)
 
 
@@ -108,7 +108,7 @@ def test_nothing_is_carried_through_a_wall(closeness: float) -> None:
     """However far a point in the open may speak, it does not for what it cannot see."""
     wall = rectangle((0.4, -1, -0.5), (0, 3, 0), (0, 0, 1))
     triangles = np.concatenate([rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0)), wall])
-    scene = Scene(triangles, gray(4, 0.5), gray(4, 0.0))
+    scene = gray_scene(triangles)
     uv = np.concatenate([QUAD_UV, np.zeros_like(QUAD_UV)])
     geometry = texel_geometry(scene, uv, SIZE, pages=np.array([0, 0, -1, -1]))
     points = points_of(geometry, 8, 4, closeness=closeness)
@@ -123,7 +123,7 @@ def test_over_a_dome_neighbors_see_each_other() -> None:
     cell = np.stack(np.divmod(np.arange(len(dome)), 46), axis=1)[:, None] / 46
     uv = np.zeros((len(dome), 3, 2))
     uv[:, 1, 0] = uv[:, 2, 1] = 0.99 / 46
-    scene = Scene(dome, gray(len(dome), 0.5), gray(len(dome), 0.0), normals=dome)
+    scene = gray_scene(dome, normals=dome)
     geometry = texel_geometry(scene, (uv + cell).astype(np.float32), 46)
     assert len(geometry) == len(dome)
     points = GatherPoints(geometry, caster_of(geometry), np.zeros(len(geometry), dtype=bool))
@@ -149,7 +149,7 @@ def test_charts_beside_each_other_on_the_page_and_far_apart_in_the_world_do_not_
 
 def test_pages_do_not_mix() -> None:
     triangles = np.concatenate([PLANE, PLANE + np.array([0, 0, 0.01])])
-    scene = Scene(triangles, gray(4, 0.5), gray(4, 0.0))
+    scene = gray_scene(triangles)
     uv = np.concatenate([QUAD_UV, QUAD_UV])
     geometry = texel_geometry(scene, uv, SIZE, pages=np.array([0, 0, 1, 1]))
     points = points_of(geometry, 4, 1)
@@ -211,14 +211,14 @@ def test_a_point_does_not_speak_for_texels_whose_neighbors_see_things_near() -> 
 
 def test_a_texel_that_nothing_reaches_is_an_error() -> None:
     geometry = geometry_of(PLANE)
-    with pytest.raises(ValueError, match="no gather point in reach"):
+    with pytest.raises(ValueError, match="no gather point"):
         fit(points_of(geometry, 4, closeness=100.0), geometry)
 
 
 def test_coplanar_surfaces_on_different_pages_share_their_points() -> None:
     """One chart goes on where the other ends: at the seam both take from both."""
     other = PLANE + np.array([1.0, 0, 0])
-    scene = Scene(np.concatenate([PLANE, other]), gray(4, 0.5), gray(4, 0.0))
+    scene = gray_scene(np.concatenate([PLANE, other]), 0.5)
     geometry = texel_geometry(scene, np.concatenate([QUAD_UV, QUAD_UV]), SIZE, pages=np.array([0, 0, 1, 1]))
     points = points_of(geometry, 4, 1)
     share = fit(points, geometry)((geometry.page[points.texel, None] == 0).astype(float))[:, 0]
@@ -236,19 +236,25 @@ def test_a_tight_bunch_of_points_far_away_cannot_make_light():
     assert np.abs(weights).sum() <= 3.0 + 1e-5
 
 
-def test_what_was_weighed_before_is_not_weighed_anew_but_kept() -> None:
+def test_what_was_weighed_before_is_not_weighed_anew_but_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     """The weights of a bake that asked for support are those of one that never did."""
     geometry = geometry_of(rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0.5)))
-    asked = points_of(geometry, 4, 2, 1, closeness=4.0)
+    asked = points_of(geometry, 4, 2, 1, closeness=2.0)
     fresh = GatherPoints(geometry, caster_of(geometry), np.zeros(len(geometry), dtype=bool))
-    ends = np.cumsum([0, *(len(grid._numbers) - PER_CELL for grid in asked._grids)])
-    for stride, first, end in zip((4, 2, 1), ends, ends[1:], strict=False):
-        fresh.add(stride, asked.texel[first:end], asked.closeness[first:end])
-    assert len(asked._weighed.texels) > 0
-    assert len(fresh._weighed.texels) == 0
+    for level, stride in enumerate((4, 2, 1)):
+        added = asked.level == level
+        fresh.add(stride, asked.texel[added], asked.closeness[added])
+    weighed, kernel = Counter[int](), GatherPoints.kernel
+
+    def counted(points: GatherPoints, texels: np.ndarray, near: np.ndarray) -> np.ndarray:
+        weighed[id(points)] += len(texels)
+        return kernel(points, texels, near)
+
+    monkeypatch.setattr(GatherPoints, "kernel", counted)
     count = len(geometry)
     again = weights_of(fit(fresh, geometry), fresh, count)
     np.testing.assert_allclose(weights_of(fit(asked, geometry), asked, count), again, atol=2e-6)
+    assert 0 < weighed[id(asked)] < weighed[id(fresh)]
 
 
 def test_the_threads_change_no_texel() -> None:

@@ -5,17 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.lights.light import Emitter
-from radiosity_addon.solver import AreaLight, PointLight, Scene
+from radiosity_addon.solver import AreaLight, PointLight
 from radiosity_addon.solver.state.lamp_power import lost_by_lamp
 from radiosity_addon.solver.state.power import power_balance
-from tests.rooms import box_room, gray, rectangle, solid_box
+from tests.rooms import box_room, gray_scene, rectangle, solid_box
 from tests.unit.solved_rooms import solved
-
-
-def scene_of(triangles: np.ndarray, lamp: Emitter, two_sided: bool = True) -> Scene:
-    count = len(triangles)
-    return Scene(triangles, gray(count, 0.5), gray(count, 0.0), two_sided=two_sided, lights=[lamp])
 
 
 def test_few_samples_next_to_a_lamp_make_no_light() -> None:
@@ -24,7 +18,9 @@ def test_few_samples_next_to_a_lamp_make_no_light() -> None:
     for seed in range(4):
         place = np.random.default_rng(seed).uniform(-20, 20, 2)
         lamp = PointLight((*place, 2.0), 100.0)
-        power = power_balance(solved(scene_of(floor, lamp), min_area=0.5, error=0.01, seed=seed))
+        power = power_balance(
+            solved(gray_scene(floor, two_sided=True, lights=[lamp]), min_area=0.5, error=0.01, seed=seed)
+        )
         assert power["absorbed"] + power["escaped"] < 1.02 * power["emitted"], seed
 
 
@@ -33,7 +29,9 @@ def test_both_sides_of_what_is_thinner_than_a_ray_offset_do_not_count_twice() ->
     slab = solid_box((-1, -1, 0), (1, 1, 0.02))
     far = rectangle((9000, 9000, 9000), (1, 0, 0), (0, 1, 0))
     lamp = PointLight((0, 0, 1.0), 100.0)
-    power = power_balance(solved(scene_of(np.concatenate([slab, far]), lamp), error=1e-3))
+    power = power_balance(
+        solved(gray_scene(np.concatenate([slab, far]), two_sided=True, lights=[lamp]), error=1e-3)
+    )
     assert power["absorbed"] + power["escaped"] == pytest.approx(power["emitted"], rel=0.02)
 
 
@@ -52,7 +50,7 @@ def turned_room(height: float) -> tuple[np.ndarray, AreaLight]:
 @pytest.mark.parametrize("height", [2.5, 2.49])
 def test_a_ceiling_does_not_shade_the_panel_that_lies_in_it(height: float) -> None:
     room, lamp = turned_room(height)
-    scene = scene_of(room, lamp, two_sided=False)
+    scene = gray_scene(room, lights=[lamp])
     state = solved(scene, error=1e-2)
     black, escaped, _ = lost_by_lamp(lamp, scene, state.hierarchy, state.caster, 1)
     assert escaped == 0.0
@@ -64,7 +62,7 @@ def test_a_wide_lamp_shines_past_the_bulb_that_it_is_in() -> None:
     room, _ = box_room((3, 3, 2.5))
     bulb = solid_box((1.47, 1.47, 1.97), (1.53, 1.53, 2.03))
     lamp = PointLight((1.5, 1.5, 2.0), 100.0, radius=0.2)
-    scene = scene_of(np.concatenate([room, bulb]), lamp)
+    scene = gray_scene(np.concatenate([room, bulb]), two_sided=True, lights=[lamp])
     state = solved(scene, error=1e-3)
     hierarchy, links = state.hierarchy, state.light_links
     walls = hierarchy.faces.triangle[hierarchy.face[links.receiver]] < len(room)

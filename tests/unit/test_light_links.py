@@ -10,7 +10,7 @@ import pytest
 from radiosity_addon.lights.sun_and_sky import light_strengths
 from radiosity_addon.numerics.triangles import split_in_four
 from radiosity_addon.rays.embree import EmbreeCaster
-from radiosity_addon.solver import AreaLight, EnvironmentLight, PointLight, Scene, SpotLight, SunLight
+from radiosity_addon.solver import AreaLight, EnvironmentLight, PointLight, SpotLight, SunLight
 from radiosity_addon.solver.hierarchy.nodes import LEAF, Hierarchy
 from radiosity_addon.solver.links import light_links
 from radiosity_addon.solver.links.light_links import (
@@ -21,7 +21,7 @@ from radiosity_addon.solver.links.light_links import (
     sky_share,
 )
 from radiosity_addon.solver.links.transport import push
-from tests.rooms import box_room, gray, rectangle, solid_box
+from tests.rooms import box_room, gray_scene, rectangle, solid_box
 
 FLOOR = rectangle((0, 0, 0), (2, 0, 0), (0, 2, 0))
 
@@ -35,7 +35,7 @@ LAMPS = {
 
 
 def setting(triangles: np.ndarray, **changed: Any) -> tuple[Hierarchy, EmbreeCaster]:
-    scene = Scene(triangles, gray(len(triangles), 0.5), gray(len(triangles), 0.0), **changed)
+    scene = gray_scene(triangles, 0.5, **changed)
     return Hierarchy(scene), EmbreeCaster(triangles)
 
 

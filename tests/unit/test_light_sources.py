@@ -7,13 +7,13 @@ import pytest
 
 from radiosity_addon.bake.relight.light_groups import split_by_group
 from radiosity_addon.base.errors import SceneError
-from radiosity_addon.lightmap.lighting.warm_start import MOST, WarmStart
+from radiosity_addon.lightmap.transport.warm_start import MOST, WarmStart
 from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.scene.faces import Faces
 from radiosity_addon.solver import PointLight, Scene
 from radiosity_addon.solver.emitters.light_sources import LightSources
 from radiosity_addon.solver.gather.light_gains import LightGains
-from tests.rooms import box_room, gray
+from tests.rooms import box_room, gray, gray_scene
 
 RED, ORANGE, BLUE = (4.0, 0.0, 0.0), (8.0, 4.0, 0.0), (0.0, 0.0, 2.0)
 
@@ -23,7 +23,7 @@ def sources(emitter: np.ndarray | None = None) -> tuple[LightSources, Scene]:
     triangles, _ = box_room()
     emission = gray(12, 0.0)
     emission[:4] = RED, ORANGE, ORANGE, BLUE
-    scene = Scene(triangles, gray(12, 0.5), emission, lights=[PointLight((0.5, 0.5, 0.5), (3.0, 2.0, 1.0))])
+    scene = gray_scene(triangles, 0.5, emission, lights=[PointLight((0.5, 0.5, 0.5), (3.0, 2.0, 1.0))])
     return LightSources(scene, Faces(scene), EmbreeCaster(triangles), emitter), scene
 
 

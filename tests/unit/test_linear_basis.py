@@ -11,7 +11,7 @@ from radiosity_addon.solver.equations.linear_basis import INWARD, vertex_basis
 from radiosity_addon.solver.hierarchy.basis import Basis, constant_basis
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from tests.cornell import cornell_box
-from tests.rooms import box_room, gray, rectangle, sphere
+from tests.rooms import box_room, gray, gray_scene, rectangle, sphere
 
 
 def basis_of(triangles: np.ndarray, elements: int = 0, **scene: object) -> tuple[Hierarchy, Basis]:
@@ -100,7 +100,7 @@ def test_triangles_turned_over_join_with_the_side_they_show() -> None:
 
 def test_hanging_vertices_belong_to_the_smaller_leaves() -> None:
     """Beside a larger leaf a hat stands on the smaller ones only, its node moved off the edge."""
-    hierarchy = Hierarchy(Scene(floor(), gray(2, 0.5), gray(2, 0.0)))
+    hierarchy = Hierarchy(gray_scene(floor(), 0.5))
     hierarchy.subdivide(np.array([0]))
     basis = vertex_basis(hierarchy)
     assert len(basis) == 4 + 3  # the square's corners, and the middles of the split triangle's edges

@@ -8,7 +8,7 @@ import pytest
 from radiosity_addon.solver import PointLight, Scene, SolverSettings, SunLight
 from radiosity_addon.solver.methods import solve_by_method
 from radiosity_addon.solver.state.link_record import leaves_on, nearest_leaf, record_links
-from tests.rooms import box_room, gray, rectangle
+from tests.rooms import box_room, gray_scene, rectangle
 from tests.unit.solved_rooms import corridor, furnished, solved
 
 LAMP = PointLight((1.0, 1.2, 1.5), 20.0, radius=0.05)
@@ -16,7 +16,7 @@ LAMP = PointLight((1.0, 1.2, 1.5), 20.0, radius=0.05)
 
 def lamp_room() -> Scene:
     triangles, _ = box_room((3, 2, 2))
-    return Scene(triangles, gray(12, 0.5), gray(12, 0.0), lights=[LAMP])
+    return gray_scene(triangles, lights=[LAMP])
 
 
 @pytest.mark.parametrize("scene", [furnished, corridor, lamp_room])
@@ -47,7 +47,7 @@ def test_links_from_a_lamp_end_at_it() -> None:
 def test_what_shines_from_afar_is_drawn_a_scene_away() -> None:
     floor = rectangle((0, 0, 0), (4, 0, 0), (0, 4, 0))
     sun = SunLight((0.0, 0.0, -1.0), 3.0)
-    record = record_links(solved(Scene(floor, gray(2, 0.5), gray(2, 0.0), lights=[sun]), error=3e-3))
+    record = record_links(solved(gray_scene(floor, lights=[sun]), error=3e-3))
     start, end, arriving = record.reaching(leaves_on(record, np.arange(2)))
     assert len(end)
     np.testing.assert_allclose(end - start, np.tile([0.0, 0.0, 4.0], (len(end), 1)), atol=1e-6)

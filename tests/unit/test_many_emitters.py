@@ -11,18 +11,9 @@ from radiosity_addon.solver.emitters.emitter_tree import EmitterTree
 from radiosity_addon.solver.emitters.emitters import EmitterGroup
 from radiosity_addon.solver.emitters.merged_faces import merge_flat
 from tests.rooms import rectangle, sphere
+from tests.vectors import areas_of, normals_of
 
 CENTER = np.array([2.5, 2.0, 2.0])
-
-
-def normals_of(triangles: np.ndarray) -> np.ndarray:
-    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    return np.asarray(cross / np.linalg.norm(cross, axis=1, keepdims=True))
-
-
-def area(triangles: np.ndarray) -> float:
-    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    return float(0.5 * np.linalg.norm(cross, axis=1).sum())
 
 
 def panel(n: int = 20) -> np.ndarray:
@@ -72,7 +63,7 @@ def test_an_l_shape_keeps_its_notch() -> None:
     shape = shape[(middle[:, 0] < 1) | (middle[:, 1] < 1)]
     corners, _ = merge_flat(shape)
     assert len(corners) == 4
-    assert area(corners) == pytest.approx(3.0)
+    assert areas_of(corners).sum() == pytest.approx(3.0)
     assert not ((corners.mean(axis=1)[:, :2] > 1).all(axis=1)).any()
 
 

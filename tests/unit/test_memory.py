@@ -23,7 +23,7 @@ from radiosity_addon.solver.state.memory import (
     link_budget,
     refinable,
 )
-from tests.rooms import box_room, gray
+from tests.rooms import box_room, gray, gray_scene
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -38,7 +38,7 @@ from radiosity_addon.solver import Scene, SolverSettings
 from radiosity_addon.solver.methods.hierarchical import solve
 from tests.rooms import box_room, gray, sphere
 
-def solve(triangles, **more):
+def solve_room(triangles, **more):
     emission = gray(len(triangles), 0.0)
     emission[:2] = 1.0
     scene = Scene(triangles, gray(len(triangles), 0.5), emission)
@@ -53,11 +53,11 @@ def peak():
         pass
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**30 if sys.platform == "darwin" else 2**20)
 
-solve(box_room()[0], error=0.01)
+solve_room(box_room()[0], error=0.01)
 before = peak()
 chance = np.random.default_rng(5)
 balls = [0.05 * sphere(3)[:, ::-1] + chance.uniform(0.1, 0.9, 3) for _ in range(8)]
-state = solve(np.concatenate([box_room()[0], *balls]), error=1e-6, memory_limit=float(sys.argv[1]))
+state = solve_room(np.concatenate([box_room()[0], *balls]), error=1e-6, memory_limit=float(sys.argv[1]))
 print(peak() - before, state.n_links, state.over_budget)
 sys.stdout.flush()
 os._exit(0)
@@ -68,7 +68,7 @@ def lit_room(n: int) -> Scene:
     triangles, surface = box_room(n=n)
     emission = gray(len(triangles), 0.0)
     emission[surface == 1] = 1.0
-    return Scene(triangles, gray(len(triangles), 0.5), emission)
+    return gray_scene(triangles, 0.5, emission)
 
 
 @pytest.mark.full  # a process's peak; the budget and what a link takes are checked by the tests below
@@ -125,7 +125,7 @@ def test_lamps_split_no_more_elements_than_there_may_be(most: int) -> None:
     """And all light still arrives: the mean irradiance is that of the finest elements."""
     triangles, _ = box_room((2, 2, 2))
     lamp = PointLight((0.9, 1.1, 0.4), 100.0)
-    scene = Scene(triangles, gray(12, 0.5), gray(12, 0.0), lights=[lamp])
+    scene = gray_scene(triangles, lights=[lamp])
     caster = EmbreeCaster(triangles, 1)
     hierarchy = Hierarchy(scene)
     links = link_lights(hierarchy, scene.lights, caster, 1e-4, 1e-3, 0, 1, most)

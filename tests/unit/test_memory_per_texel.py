@@ -10,20 +10,20 @@ import numpy as np
 import pytest
 
 from radiosity_addon.bake.texel_memory import LIT_BYTES
-from radiosity_addon.lightmap.lighting import gather_links, source_means, sweeps
-from radiosity_addon.lightmap.lighting.gather_links import GatherLinks
-from radiosity_addon.lightmap.lighting.sub_cells import SubCells
-from radiosity_addon.lightmap.lighting.sweeps import TexelLight, TexelTransport, sweep
 from radiosity_addon.lightmap.points.interpolation import Interpolation
 from radiosity_addon.lightmap.points.point_grid import PointGrid
 from radiosity_addon.lightmap.texels.occlusion import Crossings
+from radiosity_addon.lightmap.transport import gather_links, source_means, sweeps
+from radiosity_addon.lightmap.transport.gather_links import GatherLinks
+from radiosity_addon.lightmap.transport.sub_cells import SubCells
+from radiosity_addon.lightmap.transport.sweeps import TexelLight, TexelTransport, sweep
 from radiosity_addon.numerics import scratch as scratch_module
 from radiosity_addon.numerics.scratch import Scratch, is_in_file, trim
-from radiosity_addon.solver import PointLight, Scene, SolverSettings, solve
+from radiosity_addon.solver import PointLight, SolverSettings, solve
 from radiosity_addon.solver.gather.bright_patches import AimedRays
 from radiosity_addon.solver.gather.footprints import Footprints
 from radiosity_addon.solver.gather.hit_numbers import NOTHING
-from tests.rooms import box_room, gray
+from tests.rooms import box_room, gray_scene
 from tests.unit.test_sweeps import identity, room_with_texels
 
 COUNT = 1 << 16
@@ -101,9 +101,7 @@ def test_sweeps_take_no_memory_for_each_ray(in_files: Scratch, monkeypatch: pyte
 def test_aimed_rays_are_kept_in_files(in_files: Scratch) -> None:
     room, _ = box_room((2, 2, 1))
     lamp = PointLight((1.93, 1.0, 0.5), 10.0, radius=0.01)
-    local = solve(
-        Scene(room, gray(12, 0.7), gray(12, 0.0), lights=[lamp]), SolverSettings(error=1e-4)
-    ).local_pass
+    local = solve(gray_scene(room, 0.7, lights=[lamp]), SolverSettings(error=1e-4)).local_pass
     count, rays = 1 << 9, 192
     found = {}
     for scratch in (in_files, Scratch()):

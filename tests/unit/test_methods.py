@@ -61,7 +61,7 @@ def test_conjugate_gradients_need_the_symmetric_system(assembly: str) -> None:
 
 
 def test_an_unknown_method_is_named_with_those_there_are() -> None:
-    with pytest.raises(UsageError, match=r"'best' is not one of hierarchical, .*, dense"):
+    with pytest.raises(UsageError, match=r"'best'.*hierarchical.*dense"):
         BakeSettings(method="best")
 
 
@@ -95,7 +95,7 @@ def test_patches_never_outnumber_elements(given: dict[str, Any], expected: tuple
 
 
 def test_more_patches_than_elements_are_refused() -> None:
-    with pytest.raises(UsageError, match="--patches 10 is more than --elements 9"):
+    with pytest.raises(UsageError, match=r"--patches 10.*--elements 9"):
         BakeSettings(method="two-level", elements=9, patches=10)
 
 

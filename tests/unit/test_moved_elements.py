@@ -6,25 +6,20 @@ import numpy as np
 import pytest
 
 from radiosity_addon.numerics.triangles import split_in_four
-from radiosity_addon.solver import Scene
 from radiosity_addon.solver.gather.light_gains import LightGains
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from radiosity_addon.solver.moved_elements import on_scene
-from tests.rooms import box_room, gray
-
-
-def scene_of(triangles: np.ndarray) -> Scene:
-    return Scene(triangles, gray(len(triangles), 0.5), gray(len(triangles), 0.0), two_sided=True)
+from tests.rooms import box_room, gray_scene
 
 
 def test_elements_move_with_their_faces() -> None:
     triangles, _ = box_room()
-    hierarchy = Hierarchy(scene_of(triangles))
+    hierarchy = Hierarchy(gray_scene(triangles, two_sided=True))
     for elements in ([3, 17], [24, 31, 5], [40]):
         hierarchy.subdivide(np.array(elements))
     elsewhere = triangles.copy()
     elsewhere[:4] = 2.0 * elsewhere[:4] + (1.0, 0.0, 3.0)
-    moved = on_scene(hierarchy, scene_of(elsewhere))
+    moved = on_scene(hierarchy, gray_scene(elsewhere, two_sided=True))
     np.testing.assert_array_equal(moved.first_child, hierarchy.first_child)
     inner = np.flatnonzero(moved.first_child >= 0)
     for element in inner:
@@ -45,7 +40,7 @@ def test_other_faces_are_refused() -> None:
     flat = triangles.copy()
     flat[0, 1] = flat[0, 0]
     with pytest.raises(ValueError, match="different faces"):
-        on_scene(Hierarchy(scene_of(triangles)), scene_of(flat))
+        on_scene(Hierarchy(gray_scene(triangles, two_sided=True)), gray_scene(flat, two_sided=True))
 
 
 def test_gains_are_cut_and_joined() -> None:

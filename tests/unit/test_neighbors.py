@@ -6,15 +6,13 @@ import numpy as np
 import pytest
 
 from radiosity_addon.rays.embree import EmbreeCaster
-from radiosity_addon.solver import Scene
 from radiosity_addon.solver.hierarchy.adjacency import neighbors
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
-from tests.rooms import box_room, gray, rectangle
+from tests.rooms import box_room, gray_scene, rectangle
 
 
 def prepare(triangles: np.ndarray, two_sided: bool = False) -> tuple[Hierarchy, EmbreeCaster]:
-    count = len(triangles)
-    scene = Scene(triangles, gray(count, 0.5), gray(count, 0.0), two_sided=two_sided)
+    scene = gray_scene(triangles, two_sided=two_sided)
     return Hierarchy(scene), EmbreeCaster(scene.triangles)
 
 

@@ -9,7 +9,7 @@ from radiosity_addon.numerics.triangles import split_in_four
 from radiosity_addon.scene.faces import Faces
 from radiosity_addon.solver import Scene
 from radiosity_addon.solver.hierarchy.nodes import LEAF, Hierarchy
-from tests.rooms import gray
+from tests.rooms import gray, gray_scene
 
 RNG_SEED = 7
 
@@ -175,7 +175,7 @@ def test_fronts_backs_and_emitters_have_trees_of_their_own() -> None:
     emission = gray(20, 0.0)
     emission[[3, 8, 15], 1] = 1.0
     sides = np.arange(20) < 6
-    hierarchy = Hierarchy(Scene(triangles, gray(20, 0.5), emission, two_sided=sides))
+    hierarchy = Hierarchy(gray_scene(triangles, 0.5, emission, two_sided=sides))
     clusters, faces = hierarchy.clusters, hierarchy.faces
     trees = [set(clusters.order[clusters.start[r] : clusters.end[r]].tolist()) for r in hierarchy.roots]
     shines = faces.emission.max(axis=1) > 0

@@ -7,8 +7,7 @@ import pytest
 
 from radiosity_addon.lightmap.texels.occlusion import Crossings, find_crossings
 from radiosity_addon.rays.embree import EmbreeCaster
-from radiosity_addon.solver import Scene
-from tests.rooms import gray, rectangle, solid_box
+from tests.rooms import gray_scene, rectangle, solid_box
 from tests.unit.texel_scenes import QUAD_UV, texel_geometry
 
 SIZE = 16
@@ -18,7 +17,7 @@ FLOOR = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0))
 def crossings_of(*others: np.ndarray) -> Crossings:
     """Of a floor of 16 × 16 texels over the unit square, with other things on it that have no lightmap."""
     triangles = np.concatenate([FLOOR, *others])
-    scene = Scene(triangles, gray(len(triangles), 0.5), gray(len(triangles), 0.0))
+    scene = gray_scene(triangles)
     uv = np.zeros((len(triangles), 3, 2), dtype=np.float32)
     uv[:2] = QUAD_UV
     pages = np.full(len(triangles), -1)

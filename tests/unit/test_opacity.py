@@ -9,8 +9,7 @@ from radiosity_addon.rays.caster import NO_HIT, BruteForceCaster
 from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.scene.opacity import CutOutCaster, ray_caster
 from radiosity_addon.scene.textures import SurfaceImages
-from radiosity_addon.solver import Scene
-from tests.rooms import gray, rectangle
+from tests.rooms import gray_scene, rectangle
 from tests.textured_rooms import image
 from tests.unit.texel_scenes import QUAD_UV
 
@@ -43,11 +42,11 @@ def downward(count: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
 
 def test_without_cut_outs_there_is_nothing_between_rays_and_embree() -> None:
     triangles, images = stack(np.ones((2, 4, 4)))
-    plain = Scene(triangles, gray(6, 0.5), gray(6, 0))
+    plain = gray_scene(triangles)
     assert isinstance(ray_caster(plain), EmbreeCaster)
-    assert isinstance(ray_caster(Scene(triangles, gray(6, 0.5), gray(6, 0), images=images)), EmbreeCaster)
+    assert isinstance(ray_caster(gray_scene(triangles, images=images)), EmbreeCaster)
     _, partly = stack(np.full((2, 4, 4), 0.9))
-    cast = ray_caster(Scene(triangles, gray(6, 0.5), gray(6, 0), images=partly))
+    cast = ray_caster(gray_scene(triangles, images=partly))
     assert isinstance(cast, CutOutCaster)
 
 
@@ -142,7 +141,7 @@ def test_veils_in_one_place_multiply_too(apart: float, from_above: str, from_bel
     middles = np.repeat((np.arange(3) + 0.5) / 3, 2)
     uv = np.stack([np.repeat(middles[:, None], 3, axis=1), np.full((6, 3), 0.5)], axis=2)
     images = SurfaceImages(values, uv, np.ones(6, dtype=bool))
-    cast = ray_caster(Scene(triangles, gray(6, 0.5), gray(6, 0), two_sided=True, images=images))
+    cast = ray_caster(gray_scene(triangles, two_sided=True, images=images))
     origins, directions = downward(40_000)
     far = np.full(len(origins), 9.0)
     np.testing.assert_allclose(cast.passing(origins, directions, far), np.prod(1 - opacity), rtol=1e-5)

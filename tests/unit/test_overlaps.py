@@ -9,7 +9,7 @@ from radiosity_addon.options.methods import METHODS
 from radiosity_addon.scene.overlaps import OVERLAP, shares
 from radiosity_addon.solver import Scene, SolverSettings, solve
 from radiosity_addon.solver.methods import solve_by_method
-from tests.rooms import CEILING, FLOOR, area_mean, box_room, gray
+from tests.rooms import CEILING, FLOOR, area_mean, box_room, gray, gray_scene
 
 
 def test_sums_below_the_limit_are_left_alone() -> None:
@@ -24,7 +24,7 @@ def room_with_its_floor(times: int) -> Scene:
     triangles = np.concatenate([triangles, *[triangles[floor]] * (times - 1)])
     emission = gray(len(triangles), 0.0)
     emission[: len(surface)][surface == CEILING] = 1.0
-    return Scene(triangles, gray(len(triangles), 0.8), emission)
+    return gray_scene(triangles, 0.8, emission)
 
 
 @pytest.mark.parametrize("method", sorted(METHODS))
@@ -65,7 +65,7 @@ def test_the_methods_agree_on_overlapping_surfaces_too(two_sided: bool) -> None:
 def test_a_doubled_room_is_as_bright_as_one() -> None:
     """What counts of each pair of walls is E / (1 − ρ) bright, and nothing of what it covers is left."""
     room = box_room()[0]
-    twice = Scene(np.concatenate([room, room]), gray(24, 0.8), gray(24, 2.0))
+    twice = gray_scene(np.concatenate([room, room]), 0.8, 2.0)
     for method in ("dense", "conjugate-gradient", "shooting"):
         found = leaf_radiosity(twice, method=method)
         counts = found[:, 0] > 1.0

@@ -19,7 +19,7 @@ from radiosity_addon.options import METHODS, BakeSettings, options_of_method
 from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, solve
 from radiosity_addon.solver.links import initial
-from tests.rooms import FLOOR, box_room, gray, rectangle, solid_box, sphere
+from tests.rooms import FLOOR, box_room, gray, gray_scene, rectangle, solid_box, sphere
 from tests.unit.texel_scenes import QUAD_UV, bake_object, bake_scene, in_cell
 from tests.watched import noting
 
@@ -40,7 +40,7 @@ def texels(result: BakeResult, page: int = 0) -> np.ndarray:
 
 def lit_room(reflectance: float = 0.5, emission: float = 0.0, **changed: Any) -> BakeScene:
     triangles, _ = box_room()
-    scene = Scene(triangles, gray(12, reflectance), gray(12, emission), **changed)
+    scene = gray_scene(triangles, reflectance, emission, **changed)
     return bake_scene(scene, ("Room", 12))
 
 
@@ -61,7 +61,7 @@ def test_open_floor_under_a_sky_and_what_a_box_covers() -> None:
     """L = 1: the open floor sees H = π, the floor under the closed box nothing at all."""
     floor = rectangle((-4, -4, 0), (8, 0, 0), (0, 8, 0))
     triangles = np.concatenate([floor, solid_box((-1, -1, 0), (1, 1, 1))])
-    scene = Scene(triangles, gray(14, 0.0), gray(14, 0.0), two_sided=True, lights=[EnvironmentLight(1.0)])
+    scene = gray_scene(triangles, 0.0, two_sided=True, lights=[EnvironmentLight(1.0)])
     result = run(bake_scene(scene, ("Floor", 2, QUAD_UV), ("Box", 12, None, False)), resolution=64)
     pixels = np.pi * result.pages[0].pixels
     center = (np.arange(64) + 0.5) / 8 - 4
@@ -119,7 +119,7 @@ def test_no_seam_between_coplanar_charts() -> None:
     halves = [rectangle((x, 0, 0), (1, 0, 0), (0, 1, 0)) for x in (0, 1)]
     triangles = np.concatenate([*halves, room[2:]])
     lamp = PointLight((0.9, 0.5, 0.5), 10.0, radius=0.05)
-    scene = Scene(triangles, gray(14, 0.7), gray(14, 0.0), lights=[lamp])
+    scene = gray_scene(triangles, 0.7, lights=[lamp])
     uv = [in_cell((0, 0), (0.5, 0.5)), in_cell((0.5, 0.5), (1, 1))]
     parts = (("Left", 2, uv[0]), ("Right", 2, uv[1]), ("Rest", 10, None, False))
     pixels = run(bake_scene(scene, *parts), resolution=64).pages[0].pixels
@@ -138,7 +138,7 @@ def test_a_sealed_room_inside_a_lit_one_stays_black() -> None:
     triangles = np.concatenate([outer, inner[2:]])
     count = len(triangles)
     lamp = PointLight((0.5, 0.5, 2.5), 100.0, radius=0.1)
-    scene = Scene(triangles, gray(count, 0.8), gray(count, 0.0), two_sided=True, lights=[lamp])
+    scene = gray_scene(triangles, 0.8, two_sided=True, lights=[lamp])
     floor = in_cell((0, 0), (0.75, 0.75))
     uv = np.concatenate([floor, np.zeros((count - 2, 3, 2), np.float32)])
     sides = count - 12
@@ -168,11 +168,8 @@ def test_no_texel_in_a_sealed_box_is_lit(wall: float, height: float) -> None:
     turn = np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]])
     boxes = [shell @ turn + np.array([1.7, 0.8, height + wall]) for shell in shells]
     triangles = np.concatenate([room, *boxes])
-    count = len(triangles)
     lamp = PointLight((0.5, 1.5, 2.0), 100.0, radius=0.05)
-    scene = Scene(
-        triangles, gray(count, 0.8), gray(count, 0), two_sided=True, lights=[lamp, EnvironmentLight(0.2)]
-    )
+    scene = gray_scene(triangles, 0.8, two_sided=True, lights=[lamp, EnvironmentLight(0.2)])
     parts = (("Room", 12), ("Inner", 12), ("Outer", 12, None, False))
     pages = run(bake_scene(scene, *parts[: 1 + len(shells)]), atlas="per-object").pages
     assert pages[0].pixels[pages[0].coverage].mean() > 1
@@ -206,7 +203,7 @@ def three_objects() -> BakeScene:
     room, _ = box_room((3, 3, 3))
     boxes = [solid_box((x, 1, 0.5), (x + 0.5, 1.5, 1)) for x in (0.5, 2.0)]
     triangles = np.concatenate([room, *boxes])
-    scene = Scene(triangles, gray(36, 0.5), gray(36, 0.0), lights=[PointLight((1.5, 1.5, 2.5), 50.0)])
+    scene = gray_scene(triangles, lights=[PointLight((1.5, 1.5, 2.5), 50.0)])
     return bake_scene(scene, ("Room", 12), ("Idle", 12, None, False), ("Box", 12))
 
 
@@ -233,7 +230,7 @@ def test_a_page_an_object_or_one_for_all() -> None:
 def test_kept_uvs_come_back_bit_for_bit() -> None:
     uv = in_cell((0.1, 0.2), (0.7, 0.9))
     floor = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0))
-    scene = Scene(floor, gray(2, 0.5), gray(2, 0.0), lights=[EnvironmentLight(1.0)])
+    scene = gray_scene(floor, lights=[EnvironmentLight(1.0)])
     result = run(bake_scene(scene, ("Floor", 2, uv)), resolution=20)
     np.testing.assert_array_equal(result.objects[0].uv, uv)
     rows, columns = np.nonzero(result.pages[0].coverage)
@@ -314,7 +311,7 @@ def test_a_solution_short_of_its_tolerance_says_so(method: str) -> None:
 
 def test_nothing_to_bake_is_an_error() -> None:
     triangles, _ = box_room()
-    scene = Scene(triangles, gray(12, 0.5), gray(12, 0.0))
+    scene = gray_scene(triangles)
     empty = bake_object("Empty", 12, 0)
     for objects in (
         (),
@@ -328,7 +325,7 @@ def test_nothing_to_bake_is_an_error() -> None:
 def test_triangles_without_area_do_no_harm(lamp_lit: BakeResult) -> None:
     triangles, _ = box_room()
     flat = np.concatenate([triangles, np.zeros((2, 3, 3)), triangles[:1, [0, 0, 1]]])
-    scene = Scene(flat, gray(15, 0.5), gray(15, 0.0), lights=[LAMP])
+    scene = gray_scene(flat, lights=[LAMP])
     result = run(bake_scene(scene, ("Room", 15)))
     assert np.isfinite(result.pages[0].pixels).all()
     assert texels(result).mean() == pytest.approx(texels(lamp_lit).mean(), rel=0.02)
@@ -340,7 +337,7 @@ def test_links_that_had_to_begin_coarse_are_told_of(monkeypatch: pytest.MonkeyPa
     balls = [0.06 * sphere(1)[:, ::-1] + chance.uniform(0.1, 0.9, 3) for _ in range(10)]
     triangles = np.concatenate([box_room()[0], *balls])
     count = len(triangles)
-    scene = Scene(triangles, gray(count, 0.5), gray(count, 0.0), lights=[LAMP])
+    scene = gray_scene(triangles, lights=[LAMP])
     clutter = bake_scene(scene, ("Room", 12), ("Balls", count - 12))
     monkeypatch.setattr(initial, "FEWEST", 1)
 

@@ -9,17 +9,13 @@ from radiosity_addon.scene.faces import Faces
 from radiosity_addon.solver import AreaLight, EnvironmentLight, PointLight, Scene, SpotLight, SunLight
 from radiosity_addon.solver.state.lamp_power import light_power
 from radiosity_addon.solver.state.power import link_closure, power_balance
-from tests.rooms import CEILING, box_room, gray, rectangle
+from tests.rooms import CEILING, box_room, gray, gray_scene, rectangle
 from tests.unit.solved_rooms import furnished, solved
 
 FLOOR = rectangle((-1, -1, 0), (2, 0, 0), (0, 2, 0))
 
 SHARE = np.arcsin(0.2) / np.pi
 """Of all directions, those that a square fills from its width above its middle."""
-
-
-def scene_of(triangles: np.ndarray, reflectance: float = 0.5, **changed) -> Scene:
-    return Scene(triangles, gray(len(triangles), reflectance), gray(len(triangles), 0.0), **changed)
 
 
 def balance(scene: Scene, **settings: float) -> dict[str, float]:
@@ -35,13 +31,13 @@ def test_unit_of_power() -> None:
         SunLight((0, 0, -1), 2.0),
         EnvironmentLight((0.0, 1.0, 9.0)),
     ]
-    scene = Scene(
-        triangles, gray(4, 0.5), emission, two_sided=np.array([True, False, False, False]), lights=lights
+    scene = gray_scene(
+        triangles, 0.5, emission, two_sided=np.array([True, False, False, False]), lights=lights
     )
     green = 3 * (2 + 2 + 2) + 10 + 2 * 4 + np.pi * (4 + 6 + 6)
     blue = 2 * 6 + 0 + 2 * 4 + 9 * np.pi * 16
     assert light_power(scene, Faces(scene)) == pytest.approx(max(green, blue), rel=1e-12)
-    empty = scene_of(np.zeros((0, 3, 3)), lights=lights)
+    empty = gray_scene(np.zeros((0, 3, 3)), lights=lights)
     assert light_power(empty, Faces(empty)) == 0.0
 
 
@@ -58,7 +54,7 @@ def test_unit_of_power() -> None:
 def test_lamps_over_a_black_floor(lamp, up: float) -> None:
     """What goes up escapes, what goes down is absorbed; both are counted, and add up."""
     wide = rectangle((-20, -20, 0), (40, 0, 0), (0, 40, 0))
-    power = balance(scene_of(wide, reflectance=0.0, lights=[lamp]))
+    power = balance(gray_scene(wide, reflectance=0.0, lights=[lamp]))
     assert power["emitted"] == pytest.approx(lamp.flux.mean(), rel=1e-12)
     assert power["escaped"] == pytest.approx(up * power["emitted"], abs=0.03 * power["emitted"])
     assert power["absorbed"] + power["escaped"] == pytest.approx(power["emitted"], rel=0.005)
@@ -66,9 +62,9 @@ def test_lamps_over_a_black_floor(lamp, up: float) -> None:
 
 def test_sun_and_sky_count_what_arrives() -> None:
     """A sun of 3 W/m² on 4 m², a sky of radiance 2: the floor keeps half and the other half leaves."""
-    sun = balance(scene_of(FLOOR, lights=[SunLight((0, 1, -1), 3.0)]))
+    sun = balance(gray_scene(FLOOR, lights=[SunLight((0, 1, -1), 3.0)]))
     assert sun["emitted"] == pytest.approx(4 * 3 * np.sqrt(0.5), rel=1e-5)
-    sky = balance(scene_of(FLOOR, lights=[EnvironmentLight(2.0)]))
+    sky = balance(gray_scene(FLOOR, lights=[EnvironmentLight(2.0)]))
     assert sky["emitted"] == pytest.approx(4 * 2 * np.pi, rel=1e-5)
     for power in (sun, sky):
         assert power["absorbed"] == pytest.approx(0.5 * power["emitted"], rel=1e-5)
@@ -85,7 +81,7 @@ def test_light_that_goes_on_behind_a_surface_counts_on_each(
     """A black plate just fills the view of a larger one: one of them has the lamp's light, or both."""
     near = rectangle((-0.5, -0.5, 0), (1, 0, 0), (0, 1, 0))
     far = rectangle((-1, -1, -1), (2, 0, 0), (0, 2, 0))
-    scene = scene_of(
+    scene = gray_scene(
         np.concatenate([near, far]),
         reflectance=0.0,
         in_shadows=np.array([in_shadows, in_shadows, True, True]),
@@ -98,7 +94,7 @@ def test_light_that_goes_on_behind_a_surface_counts_on_each(
 
 
 def test_emission_counts_over_both_sides() -> None:
-    scene = Scene(FLOOR, gray(2, 0.5), np.tile([1.0, 2.0, 3.0], (2, 1)), two_sided=True)
+    scene = gray_scene(FLOOR, 0.5, np.tile([1.0, 2.0, 3.0], (2, 1)), two_sided=True)
     power = balance(scene)
     assert power["emitted"] == pytest.approx(2 * 4 * 2.0, rel=1e-12)
     assert power["escaped"] == pytest.approx(power["emitted"], rel=1e-12)
@@ -111,7 +107,7 @@ def test_escaped_is_not_the_remainder() -> None:
     emission = gray(12, 0.0)
     emission[surface == 0] = 1.0
     kept = surface != CEILING
-    scene = Scene(room[kept], gray(10, 0.0), emission[kept])
+    scene = gray_scene(room[kept], 0.0, emission[kept])
     power = balance(scene, error=1e-3)
     assert power["emitted"] == pytest.approx(1.0, rel=1e-12)
     assert power["escaped"] == pytest.approx(0.19982, abs=0.002)
@@ -123,7 +119,7 @@ def test_black_backs_absorb() -> None:
     shining = rectangle((0, 0, 1), (0, 1, 0), (1, 0, 0))
     upside_down = rectangle((0, 0, 0), (0, 1, 0), (1, 0, 0))
     emission = np.concatenate([gray(2, 1.0), gray(2, 0.0)])
-    power = balance(Scene(np.concatenate([shining, upside_down]), gray(4, 0.5), emission))
+    power = balance(gray_scene(np.concatenate([shining, upside_down]), 0.5, emission))
     assert power["absorbed"] == pytest.approx(0.19982, abs=0.002)
     assert power["escaped"] == pytest.approx(1 - 0.19982, abs=0.002)
 
@@ -151,4 +147,4 @@ def test_closure_counts_own_and_inherited_links() -> None:
 
 def test_nothing_shines_nothing_counts() -> None:
     lights = [PointLight((0, 0, 1), 0.0), EnvironmentLight(0.0)]
-    assert balance(scene_of(FLOOR, lights=lights)) == {"emitted": 0, "absorbed": 0, "escaped": 0}
+    assert balance(gray_scene(FLOOR, lights=lights)) == {"emitted": 0, "absorbed": 0, "escaped": 0}

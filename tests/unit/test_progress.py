@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from radiosity_addon.base.progress import SILENT, Cancelled, Progress, Status
-from radiosity_addon.numerics import for_chunks, map_chunks
+from radiosity_addon.numerics import map_chunks
 from tests.watched import noting, watching
 
 
@@ -59,7 +59,7 @@ def test_a_canceled_job_leaves_the_other_chunks_out(threads: int) -> None:
         raise Cancelled
 
     with pytest.raises(Cancelled):
-        for_chunks(lambda rows: done.append(rows.start), 1000, 1, threads, Progress(cancel))
+        list(map_chunks(lambda rows: done.append(rows.start), 1000, 1, threads, Progress(cancel)))
     assert 1 <= len(done) < 1000
 
 

@@ -3,13 +3,18 @@
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap.texels import rasterize as module
+from radiosity_addon.lightmap.texels import rasterization as module
 from radiosity_addon.lightmap.texels.clip import (
     area_in_unit_square,
     clip_to_unit_square,
     polygon_area_centroid,
 )
-from radiosity_addon.lightmap.texels.rasterization import coverage_sum, rasterize, sample_footprints
+from radiosity_addon.lightmap.texels.rasterization import (
+    FOOTPRINT,
+    coverage_sum,
+    rasterize,
+    sample_footprints,
+)
 
 SQUARE = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], dtype=np.float32)
 
@@ -149,11 +154,11 @@ def test_samples_keep_to_the_middle_where_the_center_is_covered():
     weights = sample_footprints(texels, u).astype(float)
     points = np.einsum("tkc,tcx->tkx", weights, uv[texels.triangle].astype(float) * 9)
     away = np.abs(points - np.stack((texels.column, texels.row), axis=-1)[:, None] - 0.5).max(axis=(1, 2))
-    assert away[texels.center_inside].max() <= module.FOOTPRINT / 2 + 1e-4
+    assert away[texels.center_inside].max() <= FOOTPRINT / 2 + 1e-4
     assert away[~texels.center_inside].max() <= 0.5 + 1e-4
     # They use the room they have: whole texels to the middle's corners, others past it.
-    assert away[texels.area == 1].min() > 0.95 * module.FOOTPRINT / 2
-    assert away[~texels.center_inside].max() > module.FOOTPRINT / 2
+    assert away[texels.area == 1].min() > 0.95 * FOOTPRINT / 2
+    assert away[~texels.center_inside].max() > FOOTPRINT / 2
 
 
 def test_whole_texels_take_the_sample_as_it_is():

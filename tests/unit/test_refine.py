@@ -5,16 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.solver import Scene
 from radiosity_addon.solver.hierarchy.nodes import LEAF, Hierarchy
 from radiosity_addon.solver.links.element_links import Links
 from radiosity_addon.solver.links.refine import children_of_links, choose_side, misplaced_power
-from tests.rooms import gray
+from tests.rooms import gray_scene
 
 
 def hierarchy_of(count: int = 9) -> Hierarchy:
     rng = np.random.default_rng(3)
-    return Hierarchy(Scene(rng.normal(size=(count, 3, 3)), gray(count, 0.5), gray(count, 0.0)))
+    return Hierarchy(gray_scene(rng.normal(size=(count, 3, 3)), 0.5))
 
 
 def links_between(receiver: np.ndarray, source: np.ndarray, error: np.ndarray | float = 0.1) -> Links:

@@ -11,12 +11,12 @@ from radiosity_addon.solver.equations import refine_patch
 from radiosity_addon.solver.equations.form_factor_oracle import oracle1, source_factor_bounds
 from radiosity_addon.solver.equations.refine_patch import RefinePatch, facing_pairs
 from radiosity_addon.solver.hierarchy.nodes import LEAF, Hierarchy
-from tests.rooms import box_room, gray, rectangle
+from tests.rooms import box_room, gray_scene, rectangle
 from tests.unit.solved_rooms import furnished
 
 
 def scene_of(triangles: np.ndarray, two_sided: bool = False) -> Scene:
-    return Scene(triangles, gray(len(triangles), 0.5), gray(len(triangles), 1.0), two_sided=two_sided)
+    return gray_scene(triangles, 0.5, 1.0, two_sided=two_sided)
 
 
 # --- the bound --------------------------------------------------------------------------------

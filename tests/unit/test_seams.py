@@ -15,16 +15,11 @@ from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
 from radiosity_addon.lightmap.unwrap.atlas import AtlasInput, run_atlas
 from radiosity_addon.rays.caster import BruteForceCaster
 from radiosity_addon.solver import Scene
-from tests.rooms import gray, rectangle, solid_box
+from tests.rooms import gray, gray_scene, rectangle, solid_box
 from tests.unit.lightmap_meshes import quads, uv_sphere
 from tests.unit.texel_scenes import QUAD_UV, in_cell, texel_geometry
 
 Field = Callable[[np.ndarray], np.ndarray]
-
-
-def plain(triangles: np.ndarray, normals: np.ndarray | None = None) -> Scene:
-    count = len(triangles)
-    return Scene(triangles, gray(count, 0.5), gray(count, 0.0), normals=normals)
 
 
 def two_tiles(
@@ -34,14 +29,14 @@ def two_tiles(
     triangles = np.concatenate(
         [rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0)), rectangle((1, 0, 0), second, (0, 1, 0))]
     )
-    scene = plain(triangles)
+    scene = gray_scene(triangles)
     uv = np.concatenate([in_cell((0.06, 0.06), (0.44, 0.44)), in_cell((0.531, 0.547), (0.911, 0.927))])
     return scene, texel_geometry(scene, uv, resolution)
 
 
 def smooth_sphere() -> tuple[Scene, TexelGeometry]:
     triangles, polygon = uv_sphere(16, 24)
-    scene = plain(triangles, triangles / np.linalg.norm(triangles, axis=2, keepdims=True))
+    scene = gray_scene(triangles, normals=triangles / np.linalg.norm(triangles, axis=2, keepdims=True))
     uv = run_atlas([AtlasInput("Sphere", triangles, polygon)], 96).objects[0].uv
     return scene, texel_geometry(scene, uv, 96)
 
@@ -51,7 +46,7 @@ def smooth_cylinder() -> tuple[Scene, TexelGeometry]:
     ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     up = np.array([0, 0, 2.0])
     triangles, polygon = quads(np.stack([ring[:-1], ring[1:], ring[1:] + up, ring[:-1] + up], axis=1))
-    scene = plain(triangles, triangles * [1, 1, 0])
+    scene = gray_scene(triangles, normals=triangles * [1, 1, 0])
     uv = run_atlas([AtlasInput("Cylinder", triangles, polygon)], 96).objects[0].uv
     return scene, texel_geometry(scene, uv, 96)
 
@@ -103,7 +98,7 @@ def test_a_wall_on_the_seam_keeps_its_sides_apart() -> None:
     ):
         triangles = np.concatenate([scene.triangles, wall])
         uv = np.concatenate([geometry.uv, np.zeros((2, 3, 2), np.float32)])
-        walled = plain(triangles)
+        walled = gray_scene(triangles)
         texels = texel_geometry(walled, uv, 40, np.array([0, 0, 0, 0, -1, -1]))
         assert len(find_seams(walled, texels, BruteForceCaster(triangles))) == 0
 
@@ -116,7 +111,7 @@ def test_a_crease_is_no_seam(second: tuple[float, float, float]) -> None:
 
 def test_a_flat_shaded_box_has_no_seams() -> None:
     triangles = solid_box((0, 0, 0), (1, 1, 1))
-    scene = plain(triangles)
+    scene = gray_scene(triangles)
     uv = run_atlas([AtlasInput("Box", triangles, np.arange(12) // 2)], 64).objects[0].uv
     geometry = texel_geometry(scene, uv, 64)
     seams = find_seams(scene, geometry)
@@ -129,7 +124,7 @@ def test_backs_beside_fronts_are_no_seam() -> None:
     scene, geometry = two_tiles()
     turned = scene.triangles.copy()
     turned[2:] = turned[2:, ::-1]
-    assert len(find_seams(plain(turned), geometry)) == 0
+    assert len(find_seams(gray_scene(turned), geometry)) == 0
 
 
 def test_only_texels_read_on_seams_change() -> None:
@@ -240,7 +235,7 @@ def test_conjugate_gradients_find_the_least_squares() -> None:
 
 def test_a_seam_may_run_between_pages() -> None:
     triangles = np.concatenate([rectangle((x, 0, 0), (1, 0, 0), (0, 1, 0)) for x in (0, 1)])
-    scene = plain(triangles)
+    scene = gray_scene(triangles)
     uv = np.concatenate([QUAD_UV * np.float32(0.8), np.float32(0.1) + QUAD_UV * np.float32(0.8)])
     geometry = texel_geometry(scene, uv, 20, np.array([0, 0, 1, 1]))
     seams = find_seams(scene, geometry)

@@ -13,10 +13,10 @@ from radiosity_addon.base import Progress
 from radiosity_addon.base.errors import UsageError
 from radiosity_addon.solver import PointLight, Scene, Solution, SolverSettings
 from radiosity_addon.solver.equations.exchange import exchange_areas
-from radiosity_addon.solver.methods import shooting, solve_by_method
+from radiosity_addon.solver.methods import shooting
 from radiosity_addon.solver.methods.shooting import LOOK_AHEAD, MOST_COLUMNS, ShootingState, solve
 from tests.cornell import cornell_box
-from tests.rooms import box_room, gray
+from tests.rooms import box_room, gray, gray_scene
 from tests.watched import watching
 
 
@@ -192,7 +192,7 @@ def test_how_many_columns_are_made_ahead_changes_nothing(monkeypatch: pytest.Mon
 def test_lamps_shine_before_the_first_shot() -> None:
     """E' = E + ρ H_direct is what there is to shoot, and the irradiance holds the lamps' share."""
     triangles, _ = box_room((4, 4, 4))
-    scene = Scene(triangles, gray(12, 0.5), gray(12, 0.0), lights=[PointLight((2, 2, 2), 10_000.0)])
+    scene = gray_scene(triangles, lights=[PointLight((2, 2, 2), 10_000.0)])
     start = run(scene, max_iterations=0)
     mean = start.hierarchy.area[start.leaves] @ start.received / 96.0
     np.testing.assert_allclose(mean, 10_000.0 / 96.0, rtol=0.005)
@@ -205,24 +205,9 @@ def test_lamps_shine_before_the_first_shot() -> None:
 
 
 def test_without_light_nothing_is_shot() -> None:
-    state = run(Scene(box_room()[0], gray(12, 0.5), gray(12, 0.0)))
-    assert state.iterations == 0
-    assert (state.radiosity == 0).all()
-    assert Solution(state).report["power_W"] == {"emitted": 0.0, "absorbed": 0.0, "escaped": 0.0}
-    empty = run(Scene(np.zeros((0, 3, 3)), np.zeros((0, 3)), np.zeros((0, 3))))
-    assert len(empty.radiosity) == 0
+    assert run(gray_scene(box_room()[0])).iterations == 0
 
 
 def test_refuses_what_does_not_fit_into_memory() -> None:
     with pytest.raises(UsageError, match=r"shooting between 120 elements needs .* fewer elements"):
         run(cornell_box(), memory_limit=1e-4)
-
-
-def test_threads_change_nothing() -> None:
-    one, two = (run(cornell_box(), threads=threads, max_iterations=50) for threads in (1, 2))
-    assert one.radiosity.tobytes() == two.radiosity.tobytes()
-
-
-def test_it_is_chosen_by_name() -> None:
-    state = solve_by_method(cornell_box(), settings(tolerance=0.1))
-    assert isinstance(state, ShootingState)

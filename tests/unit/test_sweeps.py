@@ -5,22 +5,22 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap.lighting.gather_links import GatherLinks
-from radiosity_addon.lightmap.lighting.gather_settings import GatherSettings
-from radiosity_addon.lightmap.lighting.reconstruction import reconstruct
-from radiosity_addon.lightmap.lighting.source_means import Means, mean_of_sources
-from radiosity_addon.lightmap.lighting.sub_cells import SWEEPS, SubCellLinks, SubCells, SubCellSweeps
-from radiosity_addon.lightmap.lighting.sweeps import TexelLight, TexelTransport, sweep
+from radiosity_addon.lightmap.lighting.reconstruction import light_texels
 from radiosity_addon.lightmap.points.interpolation import Interpolation
 from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
+from radiosity_addon.lightmap.transport.gather_links import GatherLinks
+from radiosity_addon.lightmap.transport.gather_settings import GatherSettings
+from radiosity_addon.lightmap.transport.source_means import Means, mean_of_sources
+from radiosity_addon.lightmap.transport.sub_cells import SWEEPS, SubCellLinks, SubCells, SubCellSweeps
+from radiosity_addon.lightmap.transport.sweeps import TexelLight, TexelTransport, sweep
 from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, SolverSettings, solve
 from radiosity_addon.solver.gather.hit_numbers import NOTHING, SKY
-from tests.rooms import box_room, gray, rectangle
+from tests.rooms import box_room, gray, gray_scene, rectangle
 from tests.unit.texel_scenes import QUAD_UV, texel_geometry
 
 
 def reconstructed(scene: Scene, geometry: TexelGeometry, **settings: int) -> TexelLight:
-    return reconstruct(
+    return light_texels(
         scene,
         solve(scene, SolverSettings(error=1e-3)).local_pass,
         geometry,
@@ -118,7 +118,7 @@ def test_direct_and_indirect_are_apart() -> None:
     wall = rectangle((0, 0, 0), (0, 2, 0), (0, 0, 2))  # looks along +x, the lamp stands behind its plane
     triangles = np.concatenate([floor, wall])
     lamp = PointLight((-0.5, 1, 3.0), 100.0)
-    scene = Scene(triangles, gray(4, 0.5), gray(4, 0.0), lights=[lamp])
+    scene = gray_scene(triangles, lights=[lamp])
     uv = np.concatenate([QUAD_UV * [0.5, 1], QUAD_UV * [0.5, 1] + np.array([0.5, 0])]).astype(np.float32)
     light = reconstructed(scene, texel_geometry(scene, uv, 16))
     on_wall = texel_geometry(scene, uv, 16).triangle >= 2

@@ -8,7 +8,7 @@ import pytest
 from radiosity_addon.lightmap.texels.texel_geometry import NO_TEXEL, TexelGeometry
 from radiosity_addon.rays.caster import NO_HIT, Hits
 from radiosity_addon.solver import Scene
-from tests.rooms import gray, rectangle
+from tests.rooms import gray_scene, rectangle
 from tests.unit.texel_scenes import QUAD_UV, in_cell, texel_geometry
 
 SIZE = 16
@@ -16,7 +16,7 @@ SIZE = 16
 
 def scene_of(*parts: np.ndarray, normals: np.ndarray | None = None) -> Scene:
     triangles = np.concatenate(parts)
-    return Scene(triangles, gray(len(triangles), 0.5), gray(len(triangles), 0.0), normals=normals)
+    return gray_scene(triangles, normals=normals)
 
 
 def slanted(at: float = 0.0) -> np.ndarray:

@@ -15,7 +15,7 @@ from radiosity_addon.bake.pipeline import bake
 from radiosity_addon.bake.texel_memory import least_bytes, pages_of, process_bytes, refuse_too_large
 from radiosity_addon.base.errors import UsageError
 from radiosity_addon.options.bake_settings import BakeSettings
-from tests.rooms import box_room, gray
+from tests.rooms import box_room, gray_scene
 from tests.unit.texel_scenes import bake_scene
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -77,14 +77,13 @@ def test_the_limit_that_is_named_suffices(size: int, monkeypatch: pytest.MonkeyP
 def test_a_bake_is_refused_before_anything_is_unwrapped(
     size: dict[str, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from radiosity_addon.solver import Scene
 
     def unwrapped(*_: object) -> None:
         raise AssertionError("it was unwrapped")
 
     monkeypatch.setattr(pipeline, "build_atlas", unwrapped)
     triangles, _ = box_room()
-    scene = bake_scene(Scene(triangles, gray(12, 0.5), gray(12, 0.0)), ("Room", 12))
+    scene = bake_scene(gray_scene(triangles), ("Room", 12))
     with pytest.raises(UsageError, match="memory limit"):
         bake(scene, BakeSettings(**size))  # type: ignore[arg-type]
 

@@ -17,8 +17,8 @@ from radiosity_addon.base.progress import Status
 from radiosity_addon.lightmap.texels.states import ENCLOSED, NO_TEXEL_HERE
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
-from radiosity_addon.solver import PointLight, Scene
-from tests.rooms import box_room, gray, solid_box
+from radiosity_addon.solver import PointLight
+from tests.rooms import box_room, gray_scene, solid_box
 from tests.unit.texel_scenes import bake_scene
 from tests.watched import noting
 
@@ -30,7 +30,7 @@ def room() -> BakeScene:
     walls, _ = box_room((2, 2, 1.5))
     triangles = np.concatenate([walls, solid_box((0.8, 0.8, 0.0), (1.3, 1.2, 0.6))])
     lamps = [PointLight((0.4, 0.5, 1.2), (8.0, 6.0, 3.0)), PointLight((1.6, 1.7, 1.1), 4.0, radius=0.1)]
-    scene = Scene(triangles, gray(24, 0.6), gray(24, 0.0), lights=lamps)
+    scene = gray_scene(triangles, 0.6, lights=lamps)
     return bake_scene(scene, ("Room", 12), ("Box", 12))
 
 
@@ -144,7 +144,7 @@ def test_the_report_and_the_details_agree(watched: tuple[BakeResult, list[TexelP
 def test_an_evenly_lit_room_has_a_uniformity_of_one() -> None:
     """Walls that emit E = 1 and reflect a half: H = 2 everywhere."""
     triangles, _ = box_room()
-    scene = bake_scene(Scene(triangles, gray(12, 0.5), gray(12, 1.0)), ("Room", 12))
+    scene = bake_scene(gray_scene(triangles, 0.5, 1.0), ("Room", 12))
     result = bake(scene, BakeSettings(quality="draft", resolution=32, threads=1))
     light = result.light[0]["irradiance_W_m2"]
     assert light["mean"] == pytest.approx(2.0, rel=0.01)

@@ -7,7 +7,7 @@ import pytest
 
 from radiosity_addon.scene.textures import SurfaceImages
 from radiosity_addon.solver import AreaLight, PointLight, Scene
-from tests.rooms import box_room, gray, rectangle
+from tests.rooms import box_room, gray, gray_scene, rectangle
 from tests.textured_rooms import furnace, image, patterned
 from tests.unit.test_pipeline import run, texels
 from tests.unit.texel_scenes import QUAD_UV, bake_scene, in_cell
@@ -28,7 +28,7 @@ def test_the_lightmap_of_a_textured_furnace_is_constant(quantity: str) -> None:
 def lit_floor(values: np.ndarray) -> Scene:
     floor = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0))
     images = SurfaceImages(values, QUAD_UV, np.ones(2, bool))
-    return Scene(floor, gray(2, 0), gray(2, 0), lights=[PointLight((0.5, 0.5, 1), 10.0)], images=images)
+    return gray_scene(floor, 0, lights=[PointLight((0.5, 0.5, 1), 10.0)], images=images)
 
 
 def test_texels_reflect_and_emit_what_the_image_shows_there() -> None:
@@ -71,13 +71,8 @@ def fenced(cells: np.ndarray, as_geometry: bool) -> Scene:
     textured = np.arange(len(triangles)) >= len(room)
     values = image(16 * count, 0.5, 0.0, cells.repeat(16, 0).repeat(16, 1))
     uv = np.concatenate([np.zeros((len(room), 3, 2)), QUAD_UV])
-    return Scene(
-        triangles,
-        gray(len(triangles), 0.5),
-        gray(len(triangles), 0),
-        two_sided=textured,
-        lights=[lamp],
-        images=SurfaceImages(values, uv, textured),
+    return gray_scene(
+        triangles, 0.5, two_sided=textured, lights=[lamp], images=SurfaceImages(values, uv, textured)
     )
 
 

@@ -106,7 +106,7 @@ def test_what_cannot_be_is_refused_and_the_triangle_named():
         images_of(good[..., :6])
     with pytest.raises(SceneError, match="shape"):
         SurfaceImages(good, np.zeros((2, 2)), np.array([True, True]))
-    with pytest.raises(SceneError, match="triangle 1 has image coordinates"):
+    with pytest.raises(SceneError, match="triangle 1"):
         images_of(good, (LOWER, [[0, 0], [1.5, 1], [0, 1]]))
     for channel, bad, complaint in ((2, -0.1, "negative"), (4, np.nan, "NaN"), (6, 1.5, "above 1")):
         values = good.copy()
@@ -115,5 +115,5 @@ def test_what_cannot_be_is_refused_and_the_triangle_named():
             images_of(values, ([[0, 0], [0.5, 0], [0.5, 0.5]], UPPER))
         # Texels that no triangle shows may hold anything.
         images_of(values, ([[0, 0], [0.5, 0], [0.5, 0.5]], UPPER), (True, False))
-    with pytest.raises(SceneError, match="of 2 triangles; there are 1"):
+    with pytest.raises(SceneError, match=r"2 triangles.* 1"):
         Scene(np.zeros((1, 3, 3)), np.zeros((1, 3)), np.zeros((1, 3)), images=images_of(good))

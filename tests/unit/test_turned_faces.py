@@ -7,8 +7,8 @@ import pytest
 
 from radiosity_addon.lightmap.images.turned_faces import turned_away
 from radiosity_addon.scene.bake_scene import BakeScene
-from radiosity_addon.solver import PointLight, Scene
-from tests.rooms import box_room, gray, rectangle, solid_box
+from radiosity_addon.solver import PointLight
+from tests.rooms import box_room, gray, gray_scene, rectangle, solid_box
 from tests.unit.test_pipeline import run
 from tests.unit.texel_scenes import bake_object, bake_scene
 
@@ -23,8 +23,7 @@ def room(turned: bool) -> BakeScene:
     block = solid_box((0.1, 0.1, 0.1), (0.3, 0.3, 0.3))
     parts = [triangles[surface != 5], wall[:, ::-1] if turned else wall, screen, block]
     everything = np.concatenate(parts)
-    count = len(everything)
-    scene = Scene(everything, gray(count, 0.5), gray(count, 0.0), two_sided=True, lights=[LAMP])
+    scene = gray_scene(everything, two_sided=True, lights=[LAMP])
     names = ("Room", "Wall", "Screen", "Block")
     return bake_scene(scene, *((name, len(part)) for name, part in zip(names, parts, strict=True)))
 

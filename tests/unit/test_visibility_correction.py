@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from radiosity_addon.scene.scene import Scene
 from radiosity_addon.solver.balance.visibility_correction import corrected
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from radiosity_addon.solver.links.element_links import Links
-from tests.rooms import gray, rectangle
+from tests.rooms import gray_scene, rectangle
 
 ALL = np.ones(4, dtype=bool)
 ZERO = np.zeros(4)
@@ -18,7 +17,7 @@ def four_faces() -> Hierarchy:
     triangles = np.concatenate(
         [rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0)), rectangle((0, 0, 1), (0, 1, 0), (1, 0, 0))]
     )
-    return Hierarchy(Scene(triangles, gray(4, 0.5), gray(4, 0.0)))
+    return Hierarchy(gray_scene(triangles))
 
 
 def every_pair(hierarchy: Hierarchy, factor: float, visibility: np.ndarray) -> Links:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap.lighting.gather_settings import GatherSettings
-from radiosity_addon.lightmap.lighting.hit_table import WIDE
-from radiosity_addon.lightmap.lighting.reconstruction import reconstruct
+from radiosity_addon.lightmap.lighting.reconstruction import light_texels
+from radiosity_addon.lightmap.transport.gather_settings import GatherSettings
+from radiosity_addon.lightmap.transport.hit_table import WIDE
 from radiosity_addon.lights.sun_and_sky import PointLight
 from radiosity_addon.solver import Scene, SolverSettings, solve
 from tests.rooms import gray, rectangle
@@ -32,7 +32,7 @@ def floor_light(wall_uv: np.ndarray, wall_page: int) -> np.ndarray:
     pages = np.array([0, 0, wall_page, wall_page])
     geometry = texel_geometry(scene, np.concatenate([QUAD_UV, wall_uv]), SIZE, pages)
     local = solve(scene, SolverSettings()).local_pass
-    light = reconstruct(scene, local, geometry, GatherSettings(rays=128))
+    light = light_texels(scene, local, geometry, GatherSettings(rays=128))
     return np.asarray(light.indirect[geometry.page == 0].mean(axis=1))
 
 

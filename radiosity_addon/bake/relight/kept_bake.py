@@ -16,8 +16,9 @@ import numpy as np
 
 from ...base import SILENT, BakeError, BakeWarning, Progress
 from ...lightmap.images import LightmapPage, Seams, presentable, texel_pages, to_quantity
-from ...lightmap.lighting import LightingRecord, RelightableTexels, TexelLight, kept_bytes, relight_texels
+from ...lightmap.lighting import kept_bytes, relight_texels
 from ...lightmap.texels import TexelGeometry
+from ...lightmap.transport import LightingRecord, RelightableTexels, TexelLight
 from ...lightmap.unwrap import Atlas
 from ...numerics import Array, Scratch, tiles
 from ...options import BakeSettings
@@ -43,7 +44,7 @@ class HierarchyReport:
 
 @dataclass(frozen=True, eq=False)
 class IncrementalState:
-    """What baking anew needs of a kept bake after some objects moved (`rebaking.py`).
+    """What an incremental bake needs of a kept bake after some objects moved (`rebaking.py`).
 
     Attributes
     ----------

@@ -9,8 +9,8 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from ...lightmap.images import light_statistics, lit_texels
-from ...lightmap.lighting import TexelLight
 from ...lightmap.texels import ENCLOSED, NO_TEXEL_HERE, TOUCHED, TexelGeometry
+from ...lightmap.transport import TexelLight
 from ...numerics import Array, luminous, tiles
 from ...options import EFFICACY
 from ...scene import BakeObject
@@ -120,8 +120,7 @@ def statistics(
                 place[number] += some
     found: list[dict[str, Any]] = []
     for start, stop in pairwise(ends):
-        told = light_told(texels[start:stop], parts, geometry, state)
-        watts, lumens, areas = told
+        watts, lumens, areas = lit_values(texels[start:stop], parts, geometry, state)
         of_watts, of_lumens = light_statistics(watts, areas), light_statistics(lumens, areas)
         if of_watts is None or of_lumens is None:
             found.append({})
@@ -130,15 +129,15 @@ def statistics(
     return tuple(found)
 
 
-def light_told(
+def lit_values(
     texels: Array, parts: Sequence[Array], geometry: TexelGeometry, state: Array
 ) -> tuple[Array, Array, Array]:
     """Return irradiance, illuminance and area of an object's `lit_texels`: (k,) each."""
-    told = lit_texels(state[texels]) if len(texels) else np.zeros(0, dtype=bool)
-    watts, lumens, areas = (geometry.scratch.empty(np.count_nonzero(told)) for _ in range(3))
+    lit = lit_texels(state[texels]) if len(texels) else np.zeros(0, dtype=bool)
+    watts, lumens, areas = (geometry.scratch.empty(np.count_nonzero(lit)) for _ in range(3))
     at = 0
     for rows in tiles(len(texels), TILE):
-        mine = texels[rows][told[rows]]
+        mine = texels[rows][lit[rows]]
         irradiance = np.asarray(sum(part[mine] for part in parts))
         here = slice(at, at + len(mine))
         watts[here], lumens[here] = irradiance @ MEANS, luminous(irradiance, EFFICACY)

@@ -67,8 +67,8 @@ class BakeReport:
         groups : sequence of sequence of LightmapFile
             Parallel to `result.groups`, and each to `result.pages`.
         """
-        told = result.atlas or ({},) * len(files)
-        pages = [{"image": file.path, **_plain(page)} for file, page in zip(files, told, strict=True)]
+        facts = result.atlas or ({},) * len(files)
+        pages = [{"image": file.path, **_plain(page)} for file, page in zip(files, facts, strict=True)]
         objects = []
         light = result.light or ({},) * len(result.objects)
         for baked, of_light in zip(result.objects, light, strict=True):
@@ -109,10 +109,10 @@ class BakeReport:
     def joined(self, earlier: Mapping[str, Any] | None, objects: Collection[str]) -> BakeReport:
         """Return the report with what the one before says of objects that have kept their lightmaps."""
         try:
-            told = {} if earlier is None or not objects else earlier
-            entries = [dict(entry) for entry in told.get("objects", ()) if entry["object"] in objects]
+            before = {} if earlier is None or not objects else earlier
+            entries = [dict(entry) for entry in before.get("objects", ()) if entry["object"] in objects]
             numbers = sorted({entry["atlas"] for entry in entries})
-            pages = [told["pages"][number] for number in numbers]
+            pages = [before["pages"][number] for number in numbers]
         except (OSError, ValueError, KeyError, TypeError, IndexError, AttributeError):
             return self
         count = len(self.data["pages"])
@@ -131,7 +131,7 @@ class BakeReport:
         owner : mapping of str to str
             The file and scene that were baked.
         """
-        listed = {name: dict(told) for name, told in files.items()}
+        listed = {name: dict(entry) for name, entry in files.items()}
         return BakeReport(sealed({**self.data, OWNER: dict(owner), LISTED: listed}))
 
     def write(self, path: Path) -> None:
@@ -170,12 +170,12 @@ def solver_part(
     settings : mapping
         The method's settings, as they were used.
     objects : sequence of BakeObject
-        Whose triangles they are; independent sets are told by the names of their objects.
+        Whose triangles they are; independent sets are given by the names of their objects.
     """
-    told = {"method": found.get("method"), "settings": dict(settings), **found}
+    part = {"method": found.get("method"), "settings": dict(settings), **found}
     if "independent_sets" in found:
-        told["independent_sets"] = [_named(block, objects) for block in found["independent_sets"]]
-    return told
+        part["independent_sets"] = [_named(block, objects) for block in found["independent_sets"]]
+    return part
 
 
 def _named(block: Mapping[str, Any], objects: Sequence[BakeObject]) -> dict[str, Any]:

@@ -17,7 +17,9 @@ from ...base import BakeError, RadiosityError
 from ...files import BAKE, DIGEST, FILE, KEPT
 from ...files import SIDECAR_NAME as SIDECAR_NAME
 from ...lightmap.images import LightmapPage, Seams
-from ...lightmap.lighting import (
+from ...lightmap.points import Interpolation
+from ...lightmap.texels import TexelGeometry
+from ...lightmap.transport import (
     GatherLinks,
     RelightableTexels,
     SubCellLinks,
@@ -25,8 +27,6 @@ from ...lightmap.lighting import (
     TexelTransport,
     WarmStart,
 )
-from ...lightmap.points import Interpolation
-from ...lightmap.texels import TexelGeometry
 from ...lights import AreaLight, EnvironmentImage, EnvironmentLight, PointLight, SkyPatch, SpotLight, SunLight
 from ...options import BakeSettings
 from ...scene import BakeScene, Faces

@@ -14,7 +14,9 @@ from typing import Any
 import numpy as np
 
 from ...lightmap.images import Seams
-from ...lightmap.lighting import (
+from ...lightmap.points import Interpolation
+from ...lightmap.texels import TexelGeometry
+from ...lightmap.transport import (
     GatherLinks,
     RelightableTexels,
     SubCellLinks,
@@ -22,8 +24,6 @@ from ...lightmap.lighting import (
     TexelTransport,
     WarmStart,
 )
-from ...lightmap.points import Interpolation
-from ...lightmap.texels import TexelGeometry
 from ...lights import Light, SkyPatch, SkyTable
 from ...options import MAX_RESOLUTION, BakeSettings
 from ...solver.element_transport import ElementTransport

@@ -15,7 +15,7 @@ from ..stand_ins.replacements import shown_by
 from ..stand_ins.stand_ins import INSTANCER
 
 
-def shown_anew(export: Export) -> set[str]:
+def shown_again(export: Export) -> set[str]:
     """Return the names of the objects that will show something else once the export is baked."""
     pairs = zip(export.sources, export.bake_scene.objects, strict=True)
     return {shown_by(source) for source, target in pairs if target.bake}
@@ -27,11 +27,11 @@ def keeping_theirs(scene: bpy.types.Scene, export: Export, is_partial: bool) -> 
     scene: The one that is baked.
     is_partial: Only some objects of the scene are baked; otherwise other scenes' objects keep theirs.
     """
-    anew = shown_anew(export)
+    updated = shown_again(export)
     return frozenset(
         obj.name
         for obj in recorded_objects()
-        if obj.name not in anew and (is_partial or not _belongs_to(obj, scene))
+        if obj.name not in updated and (is_partial or not _belongs_to(obj, scene))
     )
 
 
@@ -44,7 +44,7 @@ def of_scene(names: Collection[str], scene: bpy.types.Scene) -> list[str]:
 def shared_warnings(scene: bpy.types.Scene, export: Export) -> tuple[BakeWarning, ...]:
     """Warn of objects that show another scene's lightmap, in whose place this bake's comes."""
     found = []
-    for name in sorted(shown_anew(export)):
+    for name in sorted(shown_again(export)):
         obj = bpy.data.objects.get((name, None))
         other = None if obj is None else scene_of(obj)
         if other is not None and other != scene:

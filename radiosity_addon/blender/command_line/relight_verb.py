@@ -1,4 +1,4 @@
-"""`bake --relight`: the bake in an output folder lit anew, by its sidecar and the lights of a scene."""
+"""`bake --relight`: relight the bake in an output folder by its sidecar and the lights of a scene."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def relight(
     *,
     preview: bool = True,
 ) -> None:
-    """Light the bake in a folder anew, as the lights of the scene that was baked are now.
+    """Relight the bake in a folder with the present lights of the scene that was baked.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def relight_into(
     notes: tuple[BakeWarning, ...] = (),
     preview: bool = True,
 ) -> Generator[Status, None, BakeReport]:
-    """Light a stored bake anew, and write its folder as a bake would; the scene shows the lightmaps then.
+    """Relight a stored bake, and write its folder as a bake would; the scene shows the lightmaps then.
 
     Raises
     ------

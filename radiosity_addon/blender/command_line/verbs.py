@@ -13,7 +13,7 @@ from ...bake import KeepOptions
 from ...base import BakeWarning, SceneError, UsageError
 from ...cli import Console, Interrupts, Permissions, summary
 from ...options import BakeSettings
-from ..files.single_files import check_existing, check_places, make_folder_of, owner_told
+from ..files.single_files import check_existing, check_places, make_folder_of, owner_record
 from ..registration import register, unregister
 from ..relight import kept_bakes
 from ..session import last_bake
@@ -57,7 +57,7 @@ def bake(
     plot : Path or None
         Where the history is drawn to.
     keep : bool
-        Whether a sidecar is written, by which the bake can be lit anew.
+        Whether a sidecar is written, by which the bake can be relit.
     allowed : Permissions
     console : Console
     interrupts : Interrupts
@@ -142,7 +142,7 @@ def output_of(
     came_from = CORNELL_BOX if source is None else str(source.expanduser().resolve())
     owner = owner_of(bpy.context.scene, came_from)
     if report_copy is not None:
-        check_existing("--report", report_copy, allowed.overwrite, owner_told(owner, output))
+        check_existing("--report", report_copy, allowed.overwrite, owner_record(owner, output))
     if plot is not None:
         check_existing("--plot", plot, allowed.overwrite)
     others = _places(report_copy, plot).values()

@@ -62,25 +62,32 @@ def mean_of_named(wanted: Wanted) -> Generator[float, None, np.ndarray | None]:
     return None if image is None else (yield from image_mean_steps(image, wanted[1]))
 
 
+def pixels_of(image: bpy.types.Image) -> np.ndarray | None:
+    """Return (height, width, channels) float32 pixels as the image stores them; None if it has none."""
+    width, height = image.size
+    if width * height * image.channels == 0:
+        return None
+    pixels = np.empty(width * height * image.channels, dtype=np.float32)
+    try:
+        image.pixels.foreach_get(pixels)
+    except (RuntimeError, TypeError):  # a file that Blender names but cannot decode
+        return None
+    return pixels.reshape(height, width, image.channels)
+
+
 def image_mean_steps(
     image: bpy.types.Image, equirectangular: bool = False
 ) -> Generator[float, None, np.ndarray | None]:
     """Compute the mean of an image's pixels, converted to linear first; only the first step reads the image.
 
     equirectangular: Weight each row by the solid angle it covers on the sphere.
-    Returns (4,), linear RGB and alpha, not weighted by alpha; None for an image without pixels..
+    Returns (4,), linear RGB and alpha, not weighted by alpha; None for an image without pixels.
     """
-    width, height = image.size
-    if width == 0 or height == 0 or image.channels == 0:
+    rows = pixels_of(image)
+    if rows is None:
         return None
-    flat = np.empty(width * height * image.channels, dtype=np.float32)
-    try:
-        image.pixels.foreach_get(flat)
-    except (RuntimeError, TypeError):  # a file that Blender names but cannot decode
-        return None
-    channels = image.channels
+    height, _, channels = rows.shape
     encoded = not image.is_float and image.colorspace_settings.name in _ENCODED
-    rows = flat.reshape(height, width, channels)
     yield 0.0
     # Only byte images hold encoded values; float buffers are linear in memory.
     linear = linear_from_srgb(np.arange(256) / 255.0)

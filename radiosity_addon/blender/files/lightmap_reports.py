@@ -55,22 +55,22 @@ def _read(report: Path) -> _Read:
     if known is None or known[0] != stamp:
         read = _Read()
         with suppress(OSError, NoReportError):
-            told = read_report(report)
-            read = _Read(told[LISTED], _kept_by(told))
+            contents = read_report(report)
+            read = _Read(contents[LISTED], _kept_by(contents))
         known = _known[report] = stamp, read
     return known[1]
 
 
-def _kept_by(told: Mapping[str, Any]) -> str:
-    kept = told.get(KEPT)
+def _kept_by(contents: Mapping[str, Any]) -> str:
+    kept = contents.get(KEPT)
     return str(kept.get(BAKE, "")) if isinstance(kept, dict) else ""
 
 
-def images_described(told: Mapping[str, Any]) -> set[str]:
+def images_described(contents: Mapping[str, Any]) -> set[str]:
     """Return the names of the images that a report describes."""
     try:
-        groups = [page["image"] for group in told.get("light_groups", ()) for page in group["pages"]]
-        return {*(entry["image"] for entry in told["objects"]), *groups}
+        groups = [page["image"] for group in contents.get("light_groups", ()) for page in group["pages"]]
+        return {*(entry["image"] for entry in contents["objects"]), *groups}
     except (KeyError, TypeError):
         return set()
 

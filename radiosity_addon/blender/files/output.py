@@ -184,8 +184,8 @@ class OutputFolder:
             path = self.path / name
             self._refuse_others(name)
             if os.path.lexists(path):
-                told = self._listed.get(name)
-                ours = told is not None and (yield from is_as_written_steps(path, told))
+                entry = self._listed.get(name)
+                ours = entry is not None and (yield from is_as_written_steps(path, entry))
                 self._judge(name, ours)
 
     def files(self) -> dict[str, dict[str, Any]]:
@@ -198,7 +198,7 @@ class OutputFolder:
     def write_report(self, report: BakeReport) -> BakeReport:
         """Stage the report, the last file, with what proves which files are ours; returns it so."""
         assert self._owner is not None
-        owner = self._owner.told(self.path) if self.earlier is None else self.earlier[OWNER]
+        owner = self._owner.recorded(self.path) if self.earlier is None else self.earlier[OWNER]
         proven = report.proven(self.files(), owner)
         proven.write(self.staging / self.names.report)
         return proven
@@ -220,7 +220,7 @@ class OutputFolder:
         """
         report = self.names.report
         names = sorted(self._open.names(), key=lambda name: (name == report, name))
-        ours = {name: told["sha256"] for name, told in self._listed.items()}
+        ours = {name: entry["sha256"] for name, entry in self._listed.items()}
 
         def check(name: str, digest: str | None) -> None:
             self._refuse_others(name)

@@ -46,7 +46,7 @@ class OwnReport:
 
     names: FileNames
     owner: Owner
-    told: Mapping[str, Any]
+    contents: Mapping[str, Any]
 
 
 def own_reports(folder: Path, scene: bpy.types.Scene) -> list[OwnReport]:
@@ -56,9 +56,9 @@ def own_reports(folder: Path, scene: bpy.types.Scene) -> list[OwnReport]:
     """
     owners = dict.fromkeys((owner_of(scene), Owner(_unsaved, scene.name)))
     return [
-        OwnReport(FileNames.of_report(name), owner, told)
+        OwnReport(FileNames.of_report(name), owner, contents)
         for owner in owners
-        for name, told in reports_in(folder, owner.owns).items()
+        for name, contents in reports_in(folder, owner.owns).items()
     ]
 
 
@@ -72,7 +72,7 @@ def report_listing(path: Path, scenes: Iterable[bpy.types.Scene]) -> OwnReport:
     """
     for scene in scenes:
         for report in own_reports(path.parent, scene):
-            if path.name in report.told[LISTED]:
+            if path.name in report.contents[LISTED]:
                 return report
     try:
         read_report(path.with_name(REPORT_NAME))

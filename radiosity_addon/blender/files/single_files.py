@@ -50,9 +50,9 @@ def check_existing(option: str, path: Path, overwrite: bool, ours: Mapping[str, 
         raise BakeError(f"{option} {path} is there: move it away, choose another, or give --overwrite")
 
 
-def owner_told(owner: Owner, output: Path) -> dict[str, str]:
+def owner_record(owner: Owner, output: Path) -> dict[str, str]:
     """Return what a report in an output folder says of its owner."""
-    return owner.told(output.expanduser().resolve())
+    return owner.recorded(output.expanduser().resolve())
 
 
 def check_writable(path: Path) -> None:

@@ -112,7 +112,7 @@ def asked_by_material(tree: bpy.types.NodeTree) -> frozenset[str]:
     return frozenset(asked)
 
 
-def doubts(tree: bpy.types.NodeTree) -> list[str]:
+def unreliable_nodes(tree: bpy.types.NodeTree) -> list[str]:
     """Say which of a material's nodes cannot be evaluated as a render would."""
     said = []
     for node in _all_nodes(tree):

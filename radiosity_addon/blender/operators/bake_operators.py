@@ -171,11 +171,11 @@ class RADIOSITY_OT_open_folder(Conditional, bpy.types.Operator):
         if not own_reports(Path(folder), context.scene):
             self.report({"ERROR"}, f"The folder '{folder}' contains no bake of this scene")
             return {"CANCELLED"}
-        _open(folder)
+        show_folder(folder)
         return {"FINISHED"}
 
 
-def _open(folder: str) -> None:
+def show_folder(folder: str) -> None:
     """Show a folder in the system's file browser."""
     bpy.ops.wm.path_open(filepath=folder)
 

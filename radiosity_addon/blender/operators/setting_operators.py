@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import bpy
 
-from ...options import OPTIONS, BakeSettings
+from ...options import OPTIONS, BakeSettings, Option
 from ..scene_records.object_roles import has_role
+from ..settings.option_properties import PREFERRED, automatic_source
+from ..settings.preferences import preferences
 from .panel_facts import copy_targets, has_copy_targets
 from .polls import Conditional, no_bake_runs
 
@@ -14,10 +16,10 @@ OVERRIDES = ("radiosity_mode", "radiosity_texel_scale")
 
 
 class RADIOSITY_OT_set_option(Conditional, bpy.types.Operator):
-    """Choose a value instead of the quality's, or go back to it"""
+    """Set a value, or go back to the one set by quality or preferences"""
 
     bl_idname = "radiosity.set_option"
-    bl_label = "Set by Quality"
+    bl_label = "Set Automatically"
     bl_options = {"REGISTER", "UNDO", "INTERNAL"}
 
     option: bpy.props.StringProperty(  # type: ignore[valid-type]
@@ -31,24 +33,32 @@ class RADIOSITY_OT_set_option(Conditional, bpy.types.Operator):
         if option is None:
             return ""
         is_set = bool(getattr(context.scene.radiosity, option.identifier))
-        action = "Back to the value set by quality" if is_set else "Click to set a value"
+        action = f"Back to the value set by {automatic_source(option)}" if is_set else "Click to set a value"
         return f"{option.description}. {action}"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Start from the value that the quality gives, or leave it to the quality again."""
-        from ...bake.quality import quality_of
-
+        """Start from the value that is in use, or unset it again."""
         group, option = context.scene.radiosity, OPTIONS.get(self.option)
         if option is None or not option.automatic:
-            self.report({"ERROR"}, f"The quality sets no option '{self.option}'")
+            self.report({"ERROR"}, f"Option '{self.option}' is never set automatically")
             return {"CANCELLED"}
         if getattr(group, option.identifier):
             group.property_unset(option.identifier)
             return {"FINISHED"}
+        setattr(group, option.identifier, self._automatic(context, option))
+        return {"FINISHED"}
+
+    @staticmethod
+    def _automatic(context: bpy.types.Context, option: Option) -> float:
+        """Return the value that an option has while it is not set."""
+        from ...bake.quality import quality_of
+
+        group = context.scene.radiosity
+        preferred = getattr(preferences(context), option.name) if option.name in PREFERRED else 0.0
         known = group.quality in OPTIONS["quality"].values
         quality = quality_of(BakeSettings(method=group.method, quality=group.quality if known else "medium"))
-        setattr(group, option.identifier, getattr(quality.solver, option.name))
-        return {"FINISHED"}
+        value: float = preferred or getattr(quality.solver, option.name)
+        return value
 
 
 def _can_copy(context: bpy.types.Context) -> str:

@@ -15,6 +15,7 @@ from ...numerics import Array, irradiance_under_sky, luminous, triangle_areas
 from ...scene import LIGHTMAP_UV_LAYER
 from ..datablocks.bake_record import is_made
 from ..datablocks.image_marks import QUANTITY_PROPERTY
+from ..datablocks.image_values import pixels_of
 from ..datablocks.mesh_arrays import read_mesh, world_from_object
 from ..images.images import image_scale
 from ..session import kept_details
@@ -109,15 +110,10 @@ def shown_lightmap(obj: bpy.types.Object) -> ShownLightmap | None:
 def page_values(image: bpy.types.Image) -> PageValues | None:
     """Return a lightmap's pixels; None if its file is gone."""
     if image.name not in session.drawn.pages:
-        width, height = image.size
-        if width * height == 0 or image.channels == 0:
+        pixels = pixels_of(image)
+        if pixels is None:
             return None
-        pixels = np.empty(width * height * image.channels, dtype=np.float32)
-        try:
-            image.pixels.foreach_get(pixels)
-        except (RuntimeError, TypeError):  # a file that Blender names but cannot decode
-            return None
-        values = pixels.reshape(height, width, image.channels)[..., :3]
+        values = pixels[..., :3]
         quantity = str(image.get(QUANTITY_PROPERTY, "irradiance_over_pi"))
         factor = image_scale(image)
         if quantity == "irradiance_over_pi":

@@ -7,8 +7,8 @@ from typing import Any
 import bpy
 
 from ...options import Option, sections_of
-from ..settings.option_properties import PROPERTIES, shown
-from ..settings.preferences import PREFERRED, preferences
+from ..settings.option_properties import PREFERRED, PROPERTIES, automatic_source, shown
+from ..settings.preferences import preferences
 
 
 def draw_options(layout: Any, part: str, context: bpy.types.Context, in_header: str = "") -> None:
@@ -40,6 +40,7 @@ def _draw_option(layout: Any, option: Option, context: bpy.types.Context) -> Non
         buttons.prop(group, option.identifier, expand=True)
     elif option.automatic:
         _draw_automatic(layout, option, group)
+        return
     else:
         layout.prop(group, option.identifier)
     if option.name in PREFERRED and not group.is_property_set(option.identifier):
@@ -49,7 +50,7 @@ def _draw_option(layout: Any, option: Option, context: bpy.types.Context) -> Non
 
 
 def _draw_automatic(layout: Any, option: Option, settings: Any) -> None:
-    """Draw a number that the quality sets: a button until it has a value, then the value and a way back."""
+    """Draw a number that may be left unset: a button until it has a value, then the value and a way back."""
     if getattr(settings, option.identifier):
         row = layout.row(align=True)
         row.prop(settings, option.identifier)
@@ -60,4 +61,4 @@ def _draw_automatic(layout: Any, option: Option, settings: Any) -> None:
     name = row.row()
     name.alignment = "RIGHT"
     name.label(text=option.panel.label)
-    row.operator("radiosity.set_option", text="set by quality").option = option.name
+    row.operator("radiosity.set_option", text=f"set by {automatic_source(option)}").option = option.name

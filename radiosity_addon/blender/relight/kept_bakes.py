@@ -40,7 +40,7 @@ MOST_EARLIER = 1 << 30
 
 
 def mark_of(scene: bpy.types.Scene) -> str:
-    """Return the mark of the bake that a scene shows and that can be lit anew; "" if there is none."""
+    """Return the mark of the bake that a scene shows and that can be relit; "" if there is none."""
     return str(relight_of(scene).mark)
 
 

@@ -102,10 +102,10 @@ def _hold(output: OutputFolder) -> None:
     """Hold what is about to be replaced in a folder, with what its report says of it."""
     from .file_versions import MOST_FILES, HeldFiles  # needed when something is replaced
 
-    told = output.earlier
-    if told is None:
+    report = output.earlier
+    if report is None:
         return
-    listed = told[LISTED]
+    listed = report[LISTED]
     names = {path.name for path in output.staging.iterdir() if path.is_file()}
     if state.held is None:
         state.held = HeldFiles(Path(bpy.app.tempdir))
@@ -113,8 +113,8 @@ def _hold(output: OutputFolder) -> None:
         # What relighting needs is large, and in memory as well.
         if name != output.names.sidecar:
             state.held.hold(output.path / name, str(listed[name]["sha256"]))
-    for name in images_described(told) & listed.keys():
-        state.reports[str(listed[name]["sha256"])] = told
+    for name in images_described(report) & listed.keys():
+        state.reports[str(listed[name]["sha256"])] = report
         state.reports.move_to_end(str(listed[name]["sha256"]))
     while len(state.reports) > MOST_FILES:
         state.reports.popitem(last=False)
@@ -163,7 +163,7 @@ def follow() -> None:
         _reload_stale()
         _begin(wanted)
         flush()
-    elif not bpy.app.timers.is_registered(_tick):
+    elif not is_at_work():
         bpy.app.timers.register(_tick, first_interval=0.0, persistent=True)
 
 
@@ -253,12 +253,12 @@ def _report_with(output: OutputFolder, wanted: Sequence[Wanted]) -> BakeReport:
     from ...bake.result import BakeReport
 
     now = output.earlier or {}
-    told = next((state.reports[one.version] for one in wanted if one.version in state.reports), now)
-    before, listed = (report.get(LISTED, {}) for report in (told, now))
+    stored = next((state.reports[one.version] for one in wanted if one.version in state.reports), now)
+    before, listed = (report.get(LISTED, {}) for report in (stored, now))
     if before.get(output.names.sidecar) != listed.get(output.names.sidecar):
         # Its sidecar is not there any more.
-        told = {key: value for key, value in told.items() if key != KEPT}
-    return BakeReport(dict(told))
+        stored = {key: value for key, value in stored.items() if key != KEPT}
+    return BakeReport(dict(stored))
 
 
 def _is_stale(image: bpy.types.Image) -> bool:
@@ -281,6 +281,11 @@ def _reload(image: bpy.types.Image) -> None:
     with suppress(RadiosityError):
         if session.live is not None:
             session.live.look_again()
+
+
+def is_at_work() -> bool:
+    """Tell whether files or images are still being brought to what undo asked for."""
+    return bpy.app.timers.is_registered(_tick)
 
 
 def _tick() -> float | None:
@@ -315,7 +320,7 @@ def before_saving(*_: Any) -> None:
 
 def forget(*_: Any) -> None:
     """Hold nothing any more: another file is being opened, or the extension is switched off."""
-    if bpy.app.timers.is_registered(_tick):
+    if is_at_work():
         bpy.app.timers.unregister(_tick)
     _cancel()
     if state.held is not None:

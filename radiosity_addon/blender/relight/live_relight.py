@@ -74,9 +74,13 @@ class LiveRelight:
 
     def close(self) -> None:
         """Follow nothing any more."""
-        if bpy.app.timers.is_registered(_tick):
+        if self.is_at_work():
             bpy.app.timers.unregister(_tick)
         self._end_work()
+
+    def is_at_work(self) -> bool:
+        """Tell whether the timer still has something to do."""
+        return bpy.app.timers.is_registered(_tick)
 
     def settle(self) -> None:
         """Do at one go what the timer would do: for scripts, where no timer fires."""

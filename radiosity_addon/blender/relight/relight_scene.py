@@ -1,4 +1,4 @@
-"""A kept bake lit anew as the scene's lights are now: what the button and Live's first step run."""
+"""Relight a kept bake with the scene's present lights: what the button and Live's first step run."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ def rewrite(mark: str, pages: Sequence[LightmapPage], groups: Sequence[LightGrou
     groups : sequence of LightGroup
         Of its light groups, if it has any.
     seconds : float
-        How long lighting anew took, for the report.
+        How long relighting took, for the report.
 
     Raises
     ------
@@ -50,9 +50,9 @@ def rewrite(mark: str, pages: Sequence[LightmapPage], groups: Sequence[LightGrou
     shown = [images[number] for number in range(len(pages))]
     every = [*shown, *(image for of in group_images.values() for image in of)]
     # Of a group in which nothing shines any more there are no pages.
-    told = {group.name for group in groups}
+    known = {group.name for group in groups}
     dark = tuple(LightmapPage(np.zeros_like(page.pixels), page.coverage) for page in pages)
-    groups = [*groups, *(LightGroup(name, dark) for name in group_images if name not in told)]
+    groups = [*groups, *(LightGroup(name, dark) for name in group_images if name not in known)]
     with _as_before_on_failure(every):
         update_images(shown, pages, group_images, groups)
         store(every, seconds)
@@ -75,7 +75,7 @@ def check_images(images: Images, pages: Sequence[LightmapPage]) -> None:
 
 
 def store(images: Sequence[bpy.types.Image], seconds: float) -> None:
-    """Write the images to their files, and to the report beside them; pack anew those that are packed.
+    """Write the images to their files, and to the report beside them; pack those that are packed again.
 
     Only files that a report of their scene lists are replaced, wherever the images point.
 
@@ -122,20 +122,20 @@ def _save_into(folder: Path, image: bpy.types.Image) -> None:
 
 def _report(output: OutputFolder, images: Sequence[bpy.types.Image], seconds: float) -> BakeReport:
     """Return the report in the folder, brought up to date."""
-    told: dict[str, Any] = dict(output.earlier or {})
+    report: dict[str, Any] = dict(output.earlier or {})
     try:
         scales = {Path(bpy.path.abspath(image.filepath_raw)).name: image_scale(image) for image in images}
-        of_groups = [page for group in told.get("light_groups", ()) for page in group["pages"]]
-        for entry in (*told["objects"], *of_groups):
+        of_groups = [page for group in report.get("light_groups", ()) for page in group["pages"]]
+        for entry in (*report["objects"], *of_groups):
             if "scale" in entry:
                 entry["scale"] = scales.get(entry["image"], entry["scale"])
-        for entry in told["objects"]:
+        for entry in report["objects"]:
             for name in OF_LIGHT:
                 entry.pop(name, None)
     except (KeyError, TypeError, AttributeError):
         raise BakeError(f"'{output.path / output.names.report}' is damaged: bake again") from None
-    told["relit"] = {"seconds": round(seconds, 4)}
-    return BakeReport(told)
+    report["relit"] = {"seconds": round(seconds, 4)}
+    return BakeReport(report)
 
 
 @contextmanager

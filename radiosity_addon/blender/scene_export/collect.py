@@ -26,10 +26,10 @@ from ..materials.materials import Surface, ray_doubts, read_material, uses_nodes
 from ..materials.shading_inputs import (
     MeshValues,
     asked_by_material,
-    doubts,
     eevee_only,
     read_mesh_inputs,
     read_object_inputs,
+    unreliable_nodes,
 )
 from ..scene_records.export_sources import MaterialSource
 from ..scene_records.light_linking import linking_warnings
@@ -162,10 +162,10 @@ class _Collector:
                 for row in found.slots.tolist():
                     if row not in rows:
                         rows[row] = len(rows)
-                        surface, material, said, _ = self._surfaces[row]
+                        surface, material, warnings, _ = self._surfaces[row]
                         collected.surfaces.append(surface)
                         collected.materials.append(material)
-                        collected.warnings.extend(said)
+                        collected.warnings.extend(warnings)
                 if found.raw is not None and id(found.raw) not in read:
                     read[id(found.raw)] = mesh_arrays(found.raw)
                 mesh = no_triangles() if found.raw is None else read[id(found.raw)]
@@ -289,19 +289,19 @@ class _Collector:
         if key not in self._surface_of:
             surface = read_material(material)
             asked: frozenset[str] = frozenset()
-            said = list(surface.warnings)
+            warnings = list(surface.warnings)
             if material is not None and uses_nodes(material):
-                said += _told_of(material, eevee_only(material.node_tree))
-                said += _told_of(material, ray_doubts(material, surface))
+                warnings += _warnings_of(material, eevee_only(material.node_tree))
+                warnings += _warnings_of(material, ray_doubts(material, surface))
             if material is not None and surface.varies:
                 asked = asked_by_material(material.node_tree)
-                doubted = _told_of(material, doubts(material.node_tree))
-                said += doubted if can_evaluate() else surface.fallbacks
+                unreliable = _warnings_of(material, unreliable_nodes(material.node_tree))
+                warnings += unreliable if can_evaluate() else surface.fallbacks
             self._surface_of[key] = len(self._surfaces)
             of = (
                 None if material is None else MaterialSource.of(material.original, name_on(material.original))
             )
-            self._surfaces.append((surface, of, said, asked))
+            self._surfaces.append((surface, of, warnings, asked))
         return self._surface_of[key]
 
 
@@ -316,7 +316,7 @@ def _with_keys(
         yield (identity, seen[identity]), instance
 
 
-def _told_of(material: bpy.types.Material, messages: Sequence[str]) -> list[BakeWarning]:
+def _warnings_of(material: bpy.types.Material, messages: Sequence[str]) -> list[BakeWarning]:
     return [BakeWarning(material.name, f"material '{material.name}': {message}") for message in messages]
 
 

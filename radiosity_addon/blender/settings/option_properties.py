@@ -8,13 +8,19 @@ import bpy
 
 from ...options import OPTIONS, PANEL_OPTIONS, SYMMETRIC_ONLY, UNBOUNDED, Option
 
-AUTOMATIC = "0 = set by quality"
+PREFERRED = ("output_folder", "memory_limit", "threads")
+"""Options that the preferences have too, for scenes that do not set them."""
 
 PROPERTIES = (*PANEL_OPTIONS.values(), *(option for option in OPTIONS.values() if option.panel is not None))
 """Every option that the panel has, in the order of its rows."""
 
 # Blender 4.5 and later want paths that start with // declared; 4.2 refuses the word.
 _RELATIVE_PATH = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set()
+
+
+def automatic_source(option: Option) -> str:
+    """Return what sets a number that is 0 in the panel."""
+    return "preferences" if option.name in PREFERRED else "quality"
 
 
 def option_property(option: Option, **more: Any) -> Any:
@@ -41,7 +47,7 @@ def option_property(option: Option, **more: Any) -> Any:
     }
     words |= {"default": option.default or row.default or 0, "subtype": row.subtype}
     if option.automatic:
-        words |= {"description": f"{option.description}. {AUTOMATIC}", "min": 0}
+        words |= {"description": f"{option.description}. 0 = set by {automatic_source(option)}", "min": 0}
     elif row.low is not None:
         words["min"] = row.low
     words = {name: value for name, value in {**words, **more}.items() if value is not None}

@@ -12,9 +12,6 @@ from .option_properties import option_property
 
 DEFAULT_FOLDER: str = PANEL_OPTIONS["output_folder"].default
 
-PREFERRED = ("output_folder", "memory_limit", "threads")
-"""Options that the preferences have too, for scenes that do not set them."""
-
 PACKAGE = __package__.removesuffix(".blender.settings")
 """The add-on's own module: `bl_ext.<repository>.radiosity_addon` where it is installed."""
 
@@ -31,7 +28,7 @@ class RADIOSITY_AP_preferences(bpy.types.AddonPreferences):
     )
     memory_limit: option_property(  # type: ignore[valid-type]
         OPTIONS["memory_limit"],
-        description="Memory that a bake may take in GiB, for scenes that set none. 0 = set by quality",
+        description="Memory that a bake may take in GiB, for scenes that set none. 0 = 4 GiB",
     )
     threads: option_property(  # type: ignore[valid-type]
         OPTIONS["threads"],
@@ -87,7 +84,7 @@ def threads_of(context: bpy.types.Context) -> int:
 
 
 def memory_limit_of(context: bpy.types.Context) -> float | None:
-    """Return the memory limit [GiB] of a scene that sets none; None leaves it to the quality."""
+    """Return the memory limit [GiB] of a scene that sets none; None for the usual one."""
     return preferences(context).memory_limit or None
 
 

@@ -8,10 +8,9 @@ from ...base import SILENT, Progress
 from ...scene import Scene
 from ...solver.gather import LocalPass
 from ..texels import TexelGeometry
-from .gather_settings import GatherSettings
+from ..transport import GatherSettings, TexelLight
 from .partial_light import LightSoFar
-from .reconstruction import reconstruct
-from .sweeps import TexelLight
+from .reconstruction import light_texels
 
 TRIES = 4
 """Times the texels are lit at most: each time the error is known better."""
@@ -38,7 +37,7 @@ def light_within(
     turns = progress.turns(0.5)
     settings = settings_for(goal)
     for tries in range(TRIES, 0, -1):
-        light = reconstruct(scene, local, geometry, settings, so_far, next(turns))
+        light = light_texels(scene, local, geometry, settings, so_far=so_far, progress=next(turns))
         goal *= MARGIN * error / max(light.error, 1e-9)
         before, settings = settings, settings_for(goal)
         if light.error <= error or settings == before:

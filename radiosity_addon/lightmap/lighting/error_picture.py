@@ -15,8 +15,11 @@ from ...numerics import Array, stratified_square
 from ...solver.gather import Residual
 from ...solver.solution import Solution
 from ..texels import TexelGeometry, find_crossings
-from .gather_settings import GatherSettings
-from .reconstruction import CROSSED, DIRECT, GATHERED, footprints, gather_texels
+from ..transport import GatherSettings, gather_texels
+from .reconstruction import CROSSED, DIRECT, footprints
+
+GATHERED = 0.8
+"""How much is done when rays have been traced; rough."""
 
 SAMPLES = 4
 """Points of a texel at which the elements are looked up: an edge between two may cross it."""
@@ -37,7 +40,7 @@ def texel_residual(
     part = progress.part(DIRECT, CROSSED)
     crossings = find_crossings(geometry, local.caster, local.threads, progress=part)
     part = progress.part(CROSSED, GATHERED)
-    links, _ = gather_texels(local, geometry, settings, crossings, local.elements.leaves_of, progress=part)
+    links, _ = gather_texels(local, crossings, settings, local.elements.leaves_of, progress=part)
     part = progress.part(GATHERED, 1.0)
     direct += links.irradiance(residual.gathered(local), local.threads, progress=part)
     return _residual_at(residual, geometry, direct)

@@ -12,7 +12,7 @@ import numpy as np
 from ...numerics import Array
 from ...solver.gather import NOTHING, Gathered, LocalPass, values_of
 from ..texels import NO_TEXEL, TexelGeometry
-from .hit_table import HitTable
+from ..transport import HitTable
 
 EVERY = 4
 """One of so many gather rays is looked up: a picture needs no more, and is to cost next to nothing."""
@@ -22,7 +22,7 @@ ALIKE = 0.9
 
 
 class LightSoFar:
-    """What is known of n texels' light; `reconstruct` fills it in.
+    """What is known of n texels' light; `light_texels` fills it in.
 
     Attributes
     ----------

@@ -4,90 +4,102 @@ Direct light is asked for at every texel. Indirect light is gathered at few texe
 near contacts, and interpolated. Each gather ray remembers what it hit, most often another
 texel: that is a link at the finest level, so a few Jacobi sweeps over the texels, which
 trace nothing, remove what the coarse hierarchy got wrong.
+
+After something moved the steps are the same. Each keeps what was found before and asks again only where
+what moved was or is in the way; the sweeps go over all texels, for indirect light changes everywhere.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from ...base import SILENT, Progress
-from ...numerics import Array, marked, row_numbers, tiles
+from ...numerics import Array, tiles
 from ...scene import Scene
-from ...solver.gather import AimedRays, Footprints, Gathered, LocalPass, Resolver, values_of
-from ..points import GatherPoints, fit
-from ..texels import (
-    Crossings,
-    SmoothLift,
-    TexelGeometry,
-    find_crossings,
-    texel_materials,
+from ...solver.gather import Footprints, LightGains, LocalPass, values_of
+from ..texels import SmoothLift, TexelGeometry, find_crossings, texel_materials
+from ..transport import (
+    GatherPointLayout,
+    GatherSettings,
+    HitTable,
+    LightingRecord,
+    RelightableTexels,
+    TableRows,
+    TexelLight,
+    TexelTransport,
+    WarmStart,
+    gather_sub_cells,
+    gather_texels,
+    sweep,
 )
-from .gather_links import GatherLinks
-from .gather_settings import GatherSettings
-from .hit_table import HitTable
+from ..update import PreviousLight, StandingHits, kept_cells, kept_points, texel_gains
 from .partial_light import LightSoFar
-from .sub_cells import gather_sub_cells
-from .sweeps import RelightableTexels, TexelLight, TexelTransport, sweep
-from .traced_texels import GatherPointLayout, LightingRecord
-from .warm_start import WarmStart
 
-DIRECT, CROSSED, GATHERED, PARTS = 0.25, 0.3, 0.8, 0.9
+DIRECT, CROSSED, PARTS = 0.25, 0.3, 0.9
 """How much is done when a part ends; rough, from rooms at medium quality."""
+
+GATHERED = 5 / 6
+"""The part of tracing that gathers at texels."""
+
+RETRACED = 0.5
+"""The part of gathering that goes over rays that were traced before, if any were."""
 
 CHUNK = 1 << 16
 """Texels whose elements are looked up at once; bounds the temporaries to about 20 MB."""
 
-STARTS = 16
-"""Points of a texel's footprint that its gather rays start from."""
 
-FIT = 0.15
-"""The part of gathering that weighs the points."""
-
-
-def reconstruct(
+def light_texels(
     scene: Scene,
     local: LocalPass,
     geometry: TexelGeometry,
     settings: GatherSettings,
+    previous: PreviousLight | None = None,
     so_far: LightSoFar | None = None,
     progress: Progress = SILENT,
 ) -> TexelLight:
     """Compute direct and indirect irradiance of all texels.
 
-    If `local` can ask for every light apart, what lights the texels anew is kept. `so_far` is told what is
-    known on the way.
+    Parameters
+    ----------
+    scene : Scene
+    local : LocalPass
+        If it can ask for every light apart, what lights the texels anew is kept.
+    geometry : TexelGeometry
+    settings : GatherSettings
+    previous : PreviousLight or None
+        The light before something moved; what it does not affect is kept. `local` is then of the same
+        elements with the light they had, able to ask for every light apart.
+    so_far : LightSoFar or None
+        Is told what is known on the way.
     """
-    scratch = geometry.scratch
-    gains = local.direct.new_gains(len(geometry), scratch)
-    lamps = scratch.zeros((len(geometry), 3))
     reflectance, emission = texel_materials(scene, geometry)
     element = elements_below(local, geometry)
+    lamps = geometry.scratch.zeros((len(geometry), 3))
     if so_far is not None:
         so_far.begin(local, geometry, element, lamps, (reflectance, emission))
-    tell = None if so_far is None else so_far.asked
-    at, part = footprints(geometry, local), progress.part(0.0, DIRECT)
-    lamps = local.direct.at(at, gains=gains, total=lamps, tell=tell, progress=part)
-    del at
-    part = progress.part(DIRECT, CROSSED)
-    crossings = find_crossings(geometry, local.caster, local.threads, progress=part)
+    gains = _direct_light(local, geometry, previous, lamps, so_far, progress.part(0.0, DIRECT))
+    more = None if previous is None else lamps - local.direct.lit_by(previous.lit.gains)
+    if more is not None:
+        local = _brightened(local, element, more)
+    crossings = find_crossings(
+        geometry,
+        local.caster,
+        local.threads,
+        before=None if previous is None else previous.traced.table.crossings,
+        anew=None if previous is None else np.flatnonzero(previous.affected.near),
+        progress=progress.part(DIRECT, CROSSED),
+    )
     table = HitTable(local, geometry, crossings)
-    met = None if so_far is None else partial(so_far.met, table)
-    part = progress.part(CROSSED, GATHERED)
-    links, points = gather_texels(local, geometry, settings, crossings, table.number, met, part)
-    chosen = GatherPointLayout.of(points) if gains is not None else None
-    # How points are found takes more than what they met says.
-    del points
-    part = progress.part(GATHERED, PARTS)
-    cells, rows = gather_sub_cells(table, links, element, reflectance, progress=part)
-    transport = TexelTransport(links, cells, reflectance)
-    start, reflected = scratch.empty((len(geometry), 3), np.float32), local.elements.reflected()
-    for tile in tiles(len(geometry)):
-        start[tile] = values_of(reflected, element[tile])
-    seen = None if so_far is None else so_far.swept
+    standing = None if previous is None else StandingHits(previous, table)
+    part = progress.part(CROSSED, PARTS)
+    transport, layout, rows = _trace(table, settings, element, reflectance, standing, so_far, part)
+    if standing is None or more is None:
+        start = _hierarchy_start(local, element, geometry)
+    else:
+        start, transport = standing.start(transport, rows, element, more)
     light = sweep(
         transport,
         start,
@@ -96,18 +108,98 @@ def reconstruct(
         sweeps=settings.sweeps,
         tolerance=settings.tolerance,
         threads=local.threads,
-        seen=seen,
-        scratch=scratch,
+        estimate=previous is None,
+        seen=None if so_far is None else so_far.swept,
+        scratch=geometry.scratch,
         progress=progress.part(PARTS, 1.0),
     )
-    light = replace(light, state=crossings.state)
+    # Rays traced again are as many.
+    error = light.error if previous is None else previous.traced.error
+    light = replace(light, state=crossings.state, error=error)
     progress.at(1.0)
-    if gains is None or chosen is None or local.direct.sources is None or light.table is None:
+    if gains is None or layout is None or local.direct.sources is None or light.table is None:
         return light
     warm_start = WarmStart(local.direct.sources.strengths, light.table)
     lit = RelightableTexels(transport, gains, element, settings.sweeps, settings.tolerance, warm_start)
-    traced = LightingRecord(settings, table, chosen, rows, local.gather.bright, light.error)
-    return replace(light, kept=lit, traced=traced)
+    bright = local.gather.bright if standing is None else standing.bright
+    return replace(light, kept=lit, traced=LightingRecord(settings, table, layout, rows, bright, error))
+
+
+def _direct_light(
+    local: LocalPass,
+    geometry: TexelGeometry,
+    previous: PreviousLight | None,
+    lamps: Array,
+    so_far: LightSoFar | None,
+    progress: Progress,
+) -> LightGains | None:
+    """Add what lamps and emissive surfaces give texels to `lamps`, (n, 3); return gains if they are kept."""
+    if previous is not None:
+        gains = texel_gains(previous, local, progress)
+        lamps += local.direct.lit_by(gains)
+        return gains
+    kept = local.direct.new_gains(len(geometry), geometry.scratch)
+    tell = None if so_far is None else so_far.asked
+    local.direct.at(footprints(geometry, local), gains=kept, total=lamps, tell=tell, progress=progress)
+    return kept
+
+
+def _trace(
+    table: HitTable,
+    settings: GatherSettings,
+    element: Array,
+    reflectance: Array,
+    standing: StandingHits | None,
+    so_far: LightSoFar | None,
+    progress: Progress,
+) -> tuple[TexelTransport, GatherPointLayout | None, TableRows]:
+    """Gather at texels and at the cells that their rays met, but for what stands.
+
+    Returns also where points were chosen, if lights are kept apart, and the rows of the table of radiosity.
+    """
+    met = None if so_far is None else partial(so_far.met, table)
+    gathering, parts = progress.part(0.0, GATHERED), progress.part(GATHERED, 1.0)
+    kept, known = None, []
+    if standing is not None:
+        kept = kept_points(standing, gathering.part(0.0, RETRACED))
+        gathering = gathering.part(RETRACED, 1.0)
+    links, points = gather_texels(table.local, table.crossings, settings, table.number, kept, met, gathering)
+    layout = None if table.local.direct.sources is None else GatherPointLayout.of(points)
+    # How points are found takes more than what they met says.
+    del points, kept
+    if standing is not None:
+        known = kept_cells(standing, parts.part(0.0, RETRACED))
+        parts = parts.part(RETRACED, 1.0)
+    cells, rows = gather_sub_cells(table, links, element, reflectance, known, parts)
+    return TexelTransport(links, cells, reflectance), layout, rows
+
+
+def _hierarchy_start(local: LocalPass, element: Array, geometry: TexelGeometry) -> Array:
+    """Return (n, 3) float32 what texels reflect by the hierarchy's light [W/m²]."""
+    start, reflected = geometry.scratch.empty((len(element), 3), np.float32), local.elements.reflected()
+    for tile in tiles(len(element)):
+        start[tile] = values_of(reflected, element[tile])
+    return start
+
+
+def _brightened(local: LocalPass, element: Array, more: Array) -> LocalPass:
+    """Add what texels get more of lamps, (n, 3) [W/m²], to their elements' light, in the mean."""
+    change, _ = _means(local, element, more)
+    return local.with_irradiance(np.maximum(local.elements.state.irradiance + change, 0.0))
+
+
+def lit_as_texels(local: LocalPass, element: Array, light: TexelLight) -> LocalPass:
+    """Give elements the mean light of their texels, where they have any."""
+    mean, count = _means(local, element, light.direct + light.indirect)
+    return local.with_irradiance(np.where(count[:, None] > 0, mean, local.elements.state.irradiance))
+
+
+def _means(local: LocalPass, element: Array, values: Array) -> tuple[Array, Array]:
+    """Return (e, 3) texels' mean values over elements, and (e,) how many texels there are."""
+    rows, total = element >= 0, local.elements.hierarchy.n_elements
+    count = np.bincount(element[rows], minlength=total)
+    sums = [np.bincount(element[rows], values[rows, channel], minlength=total) for channel in range(3)]
+    return np.stack(sums, axis=1) / np.maximum(count, 1)[:, None], count
 
 
 def footprints(geometry: TexelGeometry, local: LocalPass) -> Footprints:
@@ -135,114 +227,3 @@ def elements_below(local: LocalPass, geometry: TexelGeometry) -> Array:
     for tile in tiles(len(geometry), CHUNK):
         element[tile] = local.elements.leaf_at_fronts(geometry.triangle[tile], geometry.barycentric[tile])
     return element
-
-
-def gather_texels(
-    local: LocalPass,
-    geometry: TexelGeometry,
-    settings: GatherSettings,
-    crossings: Crossings,
-    resolve: Resolver,
-    met: Callable[[Array, Gathered, int], None] | None = None,
-    progress: Progress = SILENT,
-) -> tuple[GatherLinks, GatherPoints]:
-    """Gather at few texels, densely where others do not reach.
-
-    `met` is told of texels that have gathered, and how far they are apart.
-    """
-    points = GatherPoints(geometry, local.caster, crossings.alone, local.threads)
-    found: list[AimedRays] = []
-    first: list[int] = []
-    sources = geometry.scratch.rows(settings.rays, np.int32)
-    count = 0
-    for stride, level in progress.part(0.0, 1.0 - FIT).each(settings.strides):
-        part = level.part(0.0, 0.2)
-        chosen = _choose(points, geometry, stride, settings.support, crossings.beside, part)
-        # Across a rim light changes by more than noise: there every ray starts from a point of its own.
-        edge = crossings.crossed[chosen]
-        done, closeness = 0.2, []
-        for some, starts in ((chosen[~edge], STARTS), (chosen[edge], None)):
-            before, done = done, done + 0.8 * len(some) / max(len(chosen), 1)
-            gathered = gather_at(
-                local,
-                geometry,
-                some,
-                starts,
-                settings.rays,
-                resolve,
-                into=sources.more(len(some)),
-                progress=level.part(before, done),
-            )
-            first.append(count)
-            found.append(gathered.aimed)
-            count += len(some)
-            if met is not None:
-                met(some, gathered, stride)
-            closeness.append(gathered.closeness)
-        points.add(stride, np.concatenate([chosen[~edge], chosen[edge]]), np.concatenate(closeness))
-    spread = fit(points, geometry, progress.part(1.0 - FIT, 1.0))
-    aimed = AimedRays.joined(found, first, geometry.scratch)
-    return GatherLinks(sources.all(), spread, aimed), points
-
-
-def gather_at(
-    local: LocalPass,
-    geometry: TexelGeometry,
-    chosen: Array,
-    starts: int | None,
-    rays: int,
-    resolve: Resolver,
-    into: Array | None = None,
-    progress: Progress = SILENT,
-) -> Gathered:
-    """Gather at some texels. `into` (c, rays) int32 takes the sources, if given."""
-    at = gather_footprints(geometry, chosen, starts)
-    expected, upright = (geometry.scratch.empty((len(chosen), *of)) for of in ((), (3,)))
-    for tile in tiles(len(chosen), CHUNK):
-        some = chosen[tile]
-        expected[tile] = local.elements.irradiance_at(geometry.triangle[some], geometry.barycentric[some])
-        upright[tile] = geometry.surface_normal[some]
-    return local.gather.at(at, upright, rays, resolve, expected, into, progress)
-
-
-def gather_footprints(geometry: TexelGeometry, chosen: Array, starts: int | None) -> Footprints:
-    """Return where some texels gather, each from so many points."""
-    position, normal = (geometry.scratch.empty((len(chosen), 3)) for _ in range(2))
-    for tile in tiles(len(chosen)):
-        position[tile], normal[tile] = geometry.position[chosen[tile]], geometry.normal[chosen[tile]]
-    sampler = partial(sample_of, geometry, chosen)
-    return Footprints(position, normal, chosen, sampler, starts=starts, scratch=geometry.scratch)
-
-
-def sample_of(geometry: TexelGeometry, chosen: Array, rows: Array, u: Array) -> Array:
-    """Spread points over the footprints of some of the chosen texels."""
-    return geometry.sample(chosen[rows], u)
-
-
-def _choose(
-    points: GatherPoints,
-    geometry: TexelGeometry,
-    stride: int,
-    support: float,
-    beside: Array,
-    progress: Progress,
-) -> Array:
-    """Find the texels on a lattice that no point so far reaches.
-
-    Those beside something, (n,) bool, are chosen as well: points in the open do not know how close
-    it is to them.
-    """
-    candidates = on_lattice(geometry, stride)
-    if len(points):
-        candidates[points.texel] = False
-    candidates = row_numbers(candidates)
-    if len(points):
-        reached = points.support(candidates, progress)
-        candidates = candidates[(reached < support) | beside[candidates]]
-    return candidates
-
-
-def on_lattice(geometry: TexelGeometry, stride: int) -> Array:
-    """Return (n,) bool: the texels in every so many rows and columns of their page."""
-    row, column = geometry.row, geometry.column
-    return marked(len(geometry), lambda tile: (row[tile] % stride == 0) & (column[tile] % stride == 0))

@@ -1,8 +1,8 @@
 """Texels lit anew by kept links and gains: no ray is traced.
 
-The same equation as in a bake (`sweeps.py`), with other strengths of the lights: gains times strengths
-for what comes straight from lamps, cells of the sky times its radiance, and the hierarchy, solved once more
-along its links, to start from and where nobody gathered.
+The same equation as in a bake (`transport/sweeps.py`), with other strengths of the lights: gains times
+strengths for what comes straight from lamps, cells of the sky times its radiance, and the hierarchy, solved
+once more along its links, to start from and where nobody gathered.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from ...base import SILENT, Progress
 from ...numerics import Array, Scratch, tiles
 from ...solver.element_transport import Relightable
 from ...solver.gather import table_end, values_of
-from .sweeps import RelightableTexels, TexelLight, sweep
+from ..transport import RelightableTexels, TexelLight, sweep
 
 SOLVED = 0.3
 """How much is done when the hierarchy is solved; rough."""

@@ -5,7 +5,8 @@ Weights of a local linear fit in world space.
 
 from __future__ import annotations
 
-from .interpolation import GatherPoints, Interpolation, fit, refit
+from .interpolation import GatherPoints, Interpolation, fit
+from .refitting import refit
 
 __all__ = [
     "GatherPoints",

@@ -12,11 +12,12 @@ open the reach is long, and a wall thin.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from ...base import SILENT, Progress
-from ...numerics import Array, Scratch, for_chunks, map_chunks, run_starts, tiles
+from ...numerics import Array, Scratch, fill_chunks, map_chunks, run_starts, tiles
 from ...rays import SAGITTA, SIGHT_LIFT, RayCaster
 from ..texels import TexelGeometry
 from .point_grid import NONE, PointGrid
@@ -94,13 +95,17 @@ class GatherPoints:
         row, column = np.nonzero(found != NONE)
         return row, found[row, column]
 
-    def kernel(self, texels: Array, point: Array) -> Array:
-        """Return (p,) weights in [0, 1] of gather points for texels (p,), pair by pair; 0 out of reach."""
+    def kernel(self, texels: Array, point: Array, farthest: Array | None = None) -> Array:
+        """Return (p,) weights in [0, 1] of gather points for texels (p,), pair by pair; 0 out of reach.
+
+        farthest (p,): Of the texels; None for what is known of them.
+        """
+        farthest = self.farthest.take(texels) if farthest is None else farthest
         geometry = self._geometry
         points_texel = self.texel.take(point)
         along = geometry.position.take(points_texel, axis=0) - geometry.position.take(texels, axis=0)
         distance = np.sqrt(np.einsum("pk,pk->p", along, along))
-        closeness = np.maximum(self.closeness.take(point), self._own_closeness(texels))
+        closeness = np.maximum(self.closeness.take(point), self._own_closeness(texels, farthest))
         change = distance * closeness
         # A texel that geometry cuts in two, or hoods, speaks for itself alone, and nobody for it.
         apart = self._alone.take(points_texel) | self._alone.take(texels)
@@ -123,25 +128,23 @@ class GatherPoints:
         )
         return np.asarray(weight)
 
-    def _own_closeness(self, texels: Array) -> Array:
+    def _own_closeness(self, texels: Array, farthest: Array) -> Array:
         """Return (p,) what texels that are points see themselves; elsewhere what their neighbors expect."""
         number = self._number.take(texels)
         if not len(self):
             return np.zeros(len(texels))
-        around = 1.0 / self.farthest.take(texels)
-        return np.where(number >= 0, self.closeness.take(np.maximum(number, 0)), around)
+        return np.where(number >= 0, self.closeness.take(np.maximum(number, 0)), 1.0 / farthest)
 
-    def _clamp(self, texels: Array, point: Array) -> None:
-        """Note how near things are to texels (p,), sorted, by what points around them see, pair by pair."""
-        geometry = self._geometry
-        along = geometry.position[self.texel[point]] - geometry.position[texels]
+    def clamped(self, texels: Array, row: Array, point: Array) -> Array:
+        """Return (n,) how far things are from texels, by what points (p,) around them, sorted by row, see."""
+        geometry, result = self._geometry, self.farthest[texels]
+        along = geometry.position[self.texel[point]] - geometry.position[texels[row]]
         farthest = 1.0 / np.maximum(self.closeness[point], 1e-300) + np.linalg.norm(along, axis=1)
-        first = np.flatnonzero(np.diff(texels, prepend=-1))
+        first = np.flatnonzero(np.diff(row, prepend=-1))
         if len(first):
-            these_texels = texels[first]
-            self.farthest[these_texels] = np.minimum(
-                self.farthest[these_texels], np.minimum.reduceat(farthest, first)
-            )
+            rows = row[first]
+            result[rows] = np.minimum(result[rows], np.minimum.reduceat(farthest, first))
+        return np.asarray(result)
 
     def support(self, texels: Array, progress: Progress = SILENT) -> Array:
         """Return (n,) the summed weights around texels: below 1 they need a point of their own.
@@ -152,19 +155,11 @@ class GatherPoints:
         total = scratch.empty(len(texels))
         kept = scratch.rows(1, np.int32), scratch.rows(1, np.int32), scratch.rows(1, np.float32)
         self._weighed = Weighed.nothing()
-
-        def weigh(rows: slice) -> tuple[Array, Array, Array]:
-            row, point = self.pairs(texels[rows])
-            self._clamp(texels[rows][row], point)
-            weight = self.kernel(texels[rows][row], point)
-            total[rows] = np.bincount(row, weight, minlength=len(texels[rows]))
-            reached = np.flatnonzero(weight)
-            # In single precision: they are kept for all texels.
-            single = weight[reached].astype(np.float32)
-            return texels[rows][row[reached]], point[reached], single
-
-        for _, found in map_chunks(weigh, len(texels), CHUNK, self.threads, progress):
-            for table, values in zip(kept, found, strict=True):
+        for rows, (weights, farthest, pairs) in map_chunks(
+            partial(_supported, self, texels), len(texels), CHUNK, self.threads, progress
+        ):
+            total[rows], self.farthest[texels[rows]] = weights, farthest
+            for table, values in zip(kept, pairs, strict=True):
                 table.extend(values)
         in_order = all((np.diff(texels[rows]) > 0).all() for rows in tiles(len(texels)))
         if in_order and len(texels):
@@ -200,6 +195,20 @@ class GatherPoints:
         return texels[row[reached]], point[reached], weight[reached].astype(np.float32)
 
 
+def _supported(
+    points: GatherPoints, texels: Array, rows: slice
+) -> tuple[Array, Array, tuple[Array, Array, Array]]:
+    """Return (r,) summed weights around texels, how far things are, and pairs with weights above 0."""
+    texels = texels[rows]
+    row, point = points.pairs(texels)
+    farthest = points.clamped(texels, row, point)
+    weight = points.kernel(texels[row], point, farthest[row])
+    total = np.bincount(row, weight, minlength=len(texels))
+    reached = np.flatnonzero(weight)
+    # In single precision: they are kept for all texels.
+    return total, farthest, (texels[row[reached]], point[reached], weight[reached].astype(np.float32))
+
+
 @dataclass(frozen=True)
 class Interpolation:
     """A sparse operator from gather points to texels, in rows.
@@ -221,15 +230,7 @@ class Interpolation:
         """Carry (g, k) values of the gather points to (n, k) of the texels."""
         result = (scratch or Scratch()).empty((len(self.first), values.shape[1]))
         columns = [np.ascontiguousarray(values[:, channel]) for channel in range(values.shape[1])]
-
-        def spread(rows: slice) -> None:
-            entries = self.entries_of(rows)
-            point, weight = self.point[entries].astype(np.intp), self.weight[entries]
-            first = self.first[rows] - entries.start
-            for channel, column in enumerate(columns):
-                result[rows, channel] = np.add.reduceat(column.take(point) * weight, first)
-
-        for_chunks(spread, len(self.first), CHUNK, threads)
+        fill_chunks(partial(_spread, self, columns), result, len(self.first), CHUNK, threads)
         return result
 
     def any_of(self, chosen: Array) -> Array:
@@ -247,6 +248,14 @@ class Interpolation:
         return slice(int(self.first[rows.start]), int(stop))
 
 
+def _spread(spread: Interpolation, columns: list[Array], rows: slice) -> Array:
+    """Return (r, k) the values of columns at texels."""
+    entries = spread.entries_of(rows)
+    point, weight = spread.point[entries].astype(np.intp), spread.weight[entries]
+    first = spread.first[rows] - entries.start
+    return np.stack([np.add.reduceat(column.take(point) * weight, first) for column in columns], axis=1)
+
+
 def fit(points: GatherPoints, geometry: TexelGeometry, progress: Progress = SILENT) -> Interpolation:
     """Weigh the gather points around every texel: a local linear fit, evaluated at the texel.
 
@@ -255,21 +264,11 @@ def fit(points: GatherPoints, geometry: TexelGeometry, progress: Progress = SILE
     ValueError
         If nothing speaks for a texel: it should have become a gather point itself.
     """
-
-    def weigh(rows: slice) -> tuple[Array, Array, Array]:
-        row, point, kernel = points.weights_of(rows)
-        count = np.bincount(row, minlength=rows.stop - rows.start)
-        if not count.all():
-            raise ValueError(
-                "a texel has no gather point in reach: the last level must take all that lack one"
-            )
-        along = geometry.position[points.texel[point]] - geometry.position[row + rows.start]
-        return count, point.astype(np.int32), linear_weights(along, kernel, count)
-
     scratch = geometry.scratch
     first = scratch.empty(len(geometry), np.int64)
     point, weight = scratch.rows(1, np.int32), scratch.rows(1, np.float32)
     total = 0
+    weigh = partial(_fitted, points, geometry)
     for rows, (count, numbers, weights) in map_chunks(weigh, len(geometry), CHUNK, points.threads, progress):
         first[rows] = total + run_starts(count)
         total += len(numbers)
@@ -278,35 +277,14 @@ def fit(points: GatherPoints, geometry: TexelGeometry, progress: Progress = SILE
     return Interpolation(first, point.all()[:, 0], weight.all()[:, 0])
 
 
-def refit(points: GatherPoints, geometry: TexelGeometry, texels: Array) -> tuple[Array, Array, Array]:
-    """Weigh the gather points around some texels, in ascending order, as `fit` does.
-
-    Returns
-    -------
-    count : (k,) int
-        Entries of each texel.
-    point, weight : (m,) int32, float32
-        Texel by texel.
-
-    Raises
-    ------
-    ValueError
-        If nothing speaks for a texel.
-    """
-    counts, numbers, weights = [], [], []
-    for start in range(0, len(texels), CHUNK):
-        some = texels[start : start + CHUNK]
-        texel, point, kernel = points.weighed(some)
-        count = np.bincount(np.searchsorted(some, texel), minlength=len(some))
-        if not count.all():
-            raise ValueError("a texel has no gather point in reach: it should have become one")
-        along = geometry.position[points.texel[point]] - geometry.position[texel]
-        counts.append(count)
-        numbers.append(point.astype(np.int32))
-        weights.append(linear_weights(along, kernel, count))
-    if not counts:
-        return np.zeros(0, np.int64), np.zeros(0, np.int32), np.zeros(0, np.float32)
-    return np.concatenate(counts), np.concatenate(numbers), np.concatenate(weights)
+def _fitted(points: GatherPoints, geometry: TexelGeometry, rows: slice) -> tuple[Array, Array, Array]:
+    """Return how many entries each texel has, and their points and weights in order."""
+    row, point, kernel = points.weights_of(rows)
+    count = np.bincount(row, minlength=rows.stop - rows.start)
+    if not count.all():
+        raise ValueError("a texel has no gather point in reach: the last level must take all that lack one")
+    along = geometry.position[points.texel[point]] - geometry.position[row + rows.start]
+    return count, point.astype(np.int32), linear_weights(along, kernel, count)
 
 
 def linear_weights(along: Array, kernel: Array, count: Array) -> Array:

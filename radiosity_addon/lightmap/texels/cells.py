@@ -11,10 +11,13 @@ Through a gap the line of sight is free: what is below a hood asks what is below
 
 from __future__ import annotations
 
+from functools import partial
+from typing import NamedTuple
+
 import numpy as np
 
-from ...numerics import Array, for_chunks
-from ...rays import SIGHT_LIFT, Hits, free_segment
+from ...numerics import Array, fill_chunks
+from ...rays import SIGHT_LIFT, Hits, RayCaster, free_segment
 from ...solver.gather import NOTHING, ElementLookup, Footprints
 from .occlusion import Crossings, below_hood
 from .texel_geometry import TexelGeometry
@@ -55,16 +58,9 @@ class TexelCells:
         self._rank = np.cumsum(divided, dtype=np.int32) - 1
         self._anchors = geometry.scratch.empty((len(self.texel), CELLS, 3))
         self._below = np.zeros((len(self.texel), CELLS), dtype=bool)
-        spots = _FIRST + ANCHOR / ALONG
-
-        def place(part: slice) -> None:
-            texel = self.texel[part]
-            every = np.broadcast_to(spots, (len(texel), CELLS, 2))
-            spread = geometry.sample(texel, every, 1.0)
-            self._anchors[part] = spread + self._lift(texel)[:, None]
-            self._below[part] = self._below_hood(texel, spread)
-
-        for_chunks(place, len(self.texel), CHUNK_TEXELS, elements.threads)
+        place = partial(_anchors, geometry, elements.caster, self._rim, self.texel)
+        into = (self._anchors, self._below)
+        fill_chunks(place, into, len(self.texel), CHUNK_TEXELS, elements.threads)
 
     def __len__(self) -> int:
         return CELLS * len(self.texel)
@@ -107,21 +103,11 @@ class TexelCells:
 
     def footprints(self, cell: Array) -> Footprints:
         """Return cells as footprints: their samples see the anchor."""
-        geometry, caster = self._geometry, self.elements.caster
-        texel, first = self.texel_of(cell), _FIRST[cell % CELLS]
+        geometry, texel = self._geometry, self.texel_of(cell)
         lift, below = self._lift(texel), self._below[cell // CELLS, cell % CELLS]
         anchor = self._anchors[cell // CELLS, cell % CELLS] - lift
-
-        def sample(rows: Array, u: Array) -> Array:
-            points = geometry.sample(texel[rows], first[rows][:, None] + u / ALONG, 1.0)
-            back = np.broadcast_to(anchor[rows][:, None], points.shape)
-            above = lift[rows][:, None]
-            seen = free_segment(caster, (points + above).reshape(-1, 3), (back + above).reshape(-1, 3))
-            # Points behind a wall, or beyond an occluder's rim, do not belong to this cell.
-            own = seen.reshape(points.shape[:2])
-            own &= self._below_hood(texel[rows], points) == below[rows, None]
-            return np.asarray(np.where(own[..., None], points, back))
-
+        cells = _ChosenCells(texel, _FIRST[cell % CELLS], anchor, lift, below)
+        sample = partial(_sample, geometry, self.elements.caster, self._rim, cells)
         return Footprints(anchor, geometry.normal[texel], self._keys(cell), sample, starts=STARTS)
 
     def upright(self, cell: Array) -> Array:
@@ -141,12 +127,56 @@ class TexelCells:
         return np.asarray(len(self._geometry) + CELLS * texel + cell % CELLS)
 
     def _below_hood(self, texel: Array, points: Array) -> Array:
-        """Return (n, k) whether (n, k, 3) points of texels at a rim are below the hood; False elsewhere."""
-        below = np.zeros(points.shape[:2], dtype=bool)
-        at_rim = np.flatnonzero(self._rim[texel])
-        below[at_rim] = below_hood(self._geometry, self.elements.caster, texel[at_rim], points[at_rim])
-        return below
+        return _below_rim(self._geometry, self.elements.caster, self._rim, texel, points)
 
     def _lift(self, texel: Array) -> Array:
-        offset = SIGHT_LIFT * self.elements.caster.surface_offset
-        return np.asarray(offset * self._geometry.surface_normal[texel])
+        return _lifted(self._geometry, self.elements.caster, texel)
+
+
+class _ChosenCells(NamedTuple):
+    """Cells: (p,) texels, (p, 2) first corners, (p, 3) anchors and lifts, (p,) whether below a hood."""
+
+    texel: Array
+    first: Array
+    anchor: Array
+    lift: Array
+    below: Array
+
+
+def _sample(
+    geometry: TexelGeometry, caster: RayCaster, rim: Array, cells: _ChosenCells, rows: Array, u: Array
+) -> Array:
+    """Return (r, k, 3) points of cells that see the anchor, or the anchor."""
+    texel, first, anchor, lift, below = (column[rows] for column in cells)
+    points = geometry.sample(texel, first[:, None] + u / ALONG, 1.0)
+    back = np.broadcast_to(anchor[:, None], points.shape)
+    above = lift[:, None]
+    seen = free_segment(caster, (points + above).reshape(-1, 3), (back + above).reshape(-1, 3))
+    # Points behind a wall, or beyond an occluder's rim, do not belong to this cell.
+    own = seen.reshape(points.shape[:2])
+    own &= _below_rim(geometry, caster, rim, texel, points) == below[:, None]
+    return np.asarray(np.where(own[..., None], points, back))
+
+
+def _anchors(
+    geometry: TexelGeometry, caster: RayCaster, rim: Array, texel: Array, rows: slice
+) -> tuple[Array, Array]:
+    """Return (r, cells, 3) the anchors of divided texels, and (r, cells) whether they are below a hood."""
+    texel = texel[rows]
+    spots = np.broadcast_to(_FIRST + ANCHOR / ALONG, (len(texel), CELLS, 2))
+    spread = geometry.sample(texel, spots, 1.0)
+    below = _below_rim(geometry, caster, rim, texel, spread)
+    return spread + _lifted(geometry, caster, texel)[:, None], below
+
+
+def _below_rim(geometry: TexelGeometry, caster: RayCaster, rim: Array, texel: Array, points: Array) -> Array:
+    """Return (n, k) whether (n, k, 3) points of texels at a rim are below the hood; False elsewhere."""
+    below = np.zeros(points.shape[:2], dtype=bool)
+    at_rim = np.flatnonzero(rim[texel])
+    below[at_rim] = below_hood(geometry, caster, texel[at_rim], points[at_rim])
+    return below
+
+
+def _lifted(geometry: TexelGeometry, caster: RayCaster, texel: Array) -> Array:
+    """Return (n, 3) how far lines of sight start above texels [m]."""
+    return np.asarray(SIGHT_LIFT * caster.surface_offset * geometry.surface_normal[texel])

@@ -9,11 +9,12 @@ it ends before it, nor is one on a curved surface.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from itertools import product
 
 import numpy as np
 
-from ...numerics import Array, Scratch, for_chunks, tiles
+from ...numerics import Array, Scratch, fill_chunks, tiles
 from .texel_geometry import TexelGeometry
 
 CELL = 2.0
@@ -61,11 +62,8 @@ def clear_texels(
         return clear
     cells.fill(geometry, *pieces, FLAT * clearance)
     del pieces
-
-    def judge(rows: slice) -> None:
-        clear[rows] = cells.all_flat(geometry, rows, low[rows], high[rows], FLAT * clearance)
-
-    for_chunks(judge, len(clear), CHUNK, threads)
+    judge = partial(_all_flat, cells, geometry, low, high, FLAT * clearance)
+    fill_chunks(judge, clear, len(clear), CHUNK, threads)
     return clear
 
 
@@ -74,23 +72,26 @@ def _surroundings(
 ) -> tuple[Array, Array]:
     """Return (n, 3) lower and upper bounds of the surroundings of each texel."""
     low, high = (geometry.scratch.empty((len(geometry), 3)) for _ in range(2))
-
-    def bound(part: slice) -> None:
-        rows = np.arange(part.start, part.stop)
-        square = geometry.squares(rows)
-        first, opposite = square[:, 0], square[:, 2]
-        middle = 0.5 * (first + opposite)
-        half = np.abs(square[:, 1] - first)
-        half += np.abs(square[:, 3] - first)
-        half *= 0.5 * outset
-        diagonal = opposite - first
-        width = outset * np.sqrt(np.einsum("nk,nk->n", diagonal, diagonal))
-        up = (height * width + 2.0 * clearance)[:, None] * geometry.surface_normal[rows]
-        low[part] = middle - half + np.minimum(up, 0.0) - clearance
-        high[part] = middle + half + np.maximum(up, 0.0) + clearance
-
-    for_chunks(bound, len(geometry), CHUNK, threads)
+    bound = partial(_surroundings_of, geometry, outset, height, clearance)
+    fill_chunks(bound, (low, high), len(geometry), CHUNK, threads)
     return low, high
+
+
+def _surroundings_of(
+    geometry: TexelGeometry, outset: float, height: float, clearance: float, part: slice
+) -> tuple[Array, Array]:
+    rows = np.arange(part.start, part.stop)
+    square = geometry.squares(rows)
+    first, opposite = square[:, 0], square[:, 2]
+    middle = 0.5 * (first + opposite)
+    half = np.abs(square[:, 1] - first)
+    half += np.abs(square[:, 3] - first)
+    half *= 0.5 * outset
+    diagonal = opposite - first
+    width = outset * np.sqrt(np.einsum("nk,nk->n", diagonal, diagonal))
+    up = (height * width + 2.0 * clearance)[:, None] * geometry.surface_normal[rows]
+    low = middle - half + np.minimum(up, 0.0) - clearance
+    return low, middle + half + np.maximum(up, 0.0) + clearance
 
 
 def _extent(low: Array, high: Array) -> tuple[Array, Array, float]:
@@ -117,8 +118,8 @@ class _Cells:
         counts = np.ceil((self.high - self.low) / size).astype(np.int64) + 1
         self._strides = np.array([1, counts[0], counts[0] * counts[1]])
         self._places = int(min(counts.astype(np.float64).prod(), MOST_CELLS))
-        self._owner = np.full(self._places, -1, dtype=np.int32)
-        self._several = np.zeros(self._places, dtype=bool)
+        self.owner = np.full(self._places, -1, dtype=np.int32)
+        self.several = np.zeros(self._places, dtype=bool)
 
     def corners_of(self, low: Array, high: Array) -> Iterator[Array]:
         """Yield eight times (n,) int: the cells at the corners of boxes no wider than a cell."""
@@ -139,40 +140,42 @@ class _Cells:
         first = np.ascontiguousarray(geometry.triangles[:, 0])
         for place in places:
             for rows in tiles(len(corners)):
-                self._owner[place[rows]] = triangle[rows]
+                self.owner[place[rows]] = triangle[rows]
         for place in places:
             for rows in tiles(len(corners), CHUNK_PIECES):
-                owner = self._owner.take(place[rows])
+                owner = self.owner.take(place[rows])
                 elsewhere = np.flatnonzero(owner != triangle[rows])
                 others_triangle = owner[elsewhere]
                 apart = corners[rows].take(elsewhere, axis=0) - first.take(others_triangle, axis=0)[:, None]
                 plane = geometry.face_normals.take(others_triangle, axis=0)
                 off = _largest(np.abs(np.einsum("pck,pk->pc", apart, plane)))
-                self._several[place[rows][elsewhere[off > tolerance]]] = True
+                self.several[place[rows][elsewhere[off > tolerance]]] = True
 
-    def all_flat(
-        self, geometry: TexelGeometry, rows: slice, low: Array, high: Array, tolerance: float
-    ) -> Array:
-        """Return (n,) bool: nothing but the planes of texels is in the cells that boxes around them touch."""
-        extent = high - low
-        flat = _largest(extent) <= self.size
-        own, normal = geometry.triangle[rows], geometry.surface_normal[rows]
-        # No point of a box is farther from its texel than this.
-        reach = np.sqrt(np.einsum("nk,nk->n", extent, extent))
-        position = geometry.position[rows]
-        for place in self.corners_of(low, np.minimum(high, low + self.size)):
-            flat &= ~self._several.take(place)
-            owner = self._owner.take(place)
-            elsewhere = np.flatnonzero(flat & (owner >= 0) & (owner != own))
-            others_triangle = owner[elsewhere]
-            plane, at = geometry.face_normals.take(others_triangle, axis=0), position.take(elsewhere, axis=0)
-            off = np.abs(np.einsum("nk,nk->n", at - geometry.triangles[others_triangle, 0], plane))
-            cosine = np.einsum("nk,nk->n", normal.take(elsewhere, axis=0), plane)
-            bend = np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
-            # The square root of a rounding error of 1 − 1 is not a bend.
-            off += reach[elsewhere] * np.where(bend < ROUNDED, 0.0, bend)
-            flat[elsewhere[off > tolerance]] = False
-        return flat
+
+def _all_flat(
+    cells: _Cells, geometry: TexelGeometry, low: Array, high: Array, tolerance: float, rows: slice
+) -> Array:
+    """Return (n,) bool: nothing but the planes of texels is in the cells that boxes around them touch."""
+    low, high = low[rows], high[rows]
+    extent = high - low
+    flat = _largest(extent) <= cells.size
+    own, normal = geometry.triangle[rows], geometry.surface_normal[rows]
+    # No point of a box is farther from its texel than this.
+    reach = np.sqrt(np.einsum("nk,nk->n", extent, extent))
+    position = geometry.position[rows]
+    for place in cells.corners_of(low, np.minimum(high, low + cells.size)):
+        flat &= ~cells.several.take(place)
+        owner = cells.owner.take(place)
+        elsewhere = np.flatnonzero(flat & (owner >= 0) & (owner != own))
+        others_triangle = owner[elsewhere]
+        plane, at = geometry.face_normals.take(others_triangle, axis=0), position.take(elsewhere, axis=0)
+        off = np.abs(np.einsum("nk,nk->n", at - geometry.triangles[others_triangle, 0], plane))
+        cosine = np.einsum("nk,nk->n", normal.take(elsewhere, axis=0), plane)
+        bend = np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
+        # The square root of a rounding error of 1 − 1 is not a bend.
+        off += reach[elsewhere] * np.where(bend < ROUNDED, 0.0, bend)
+        flat[elsewhere[off > tolerance]] = False
+    return flat
 
 
 def _pieces(triangles: Array, cells: _Cells, most: int, scratch: Scratch) -> tuple[Array, Array] | None:

@@ -12,12 +12,12 @@ and which only partly.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
 from ...base import SILENT, Progress
-from ...numerics import Array, for_chunks, row_numbers
+from ...numerics import Array, fill_chunks, row_numbers
 from ...rays import SIGHT_LIFT, RayCaster
 from .clearance import clear_texels
 from .states import DIVIDED, OCCLUDED, TOUCHED
@@ -103,33 +103,35 @@ def find_crossings(
         were = (before.cut, before.touched, before.rim, before.occluded)
         result, doubted = Crossings(geometry, *(flags.copy() for flags in were)), anew
 
-    def find(part: slice) -> None:
-        rows = doubted[part]
-        lift = SIGHT_LIFT * caster.surface_offset * geometry.surface_normal[rows][:, None]
-        # Of the texel on the page: hits land on the part outside its triangle as well.
-        square = geometry.squares(rows) + lift
-        middle = square.mean(axis=1, keepdims=True)
-        # All of the texel that is on its triangle: hits land all over it, though its light comes
-        # from the middle.
-        corners, ends = square.copy(), np.flatnonzero(~geometry.whole[rows])
-        spots = np.broadcast_to(_CORNERS, (len(ends), 4, 2))
-        corners[ends] = geometry.sample(rows[ends], spots, 1.0) + lift[ends]
-        center = geometry.position[rows][:, None] + lift
-        from_center = corners - center
-        cut = ~_segments_free(caster, center + INSET * from_center, _EDGES)
-        doubtful = ~_segments_free(caster, middle + OUTSET * (square - middle), _DIAGONALS) & ~cut
-        uncertain = np.flatnonzero(doubtful)
-        cut[uncertain] = ~_segments_free(
-            caster, center[uncertain] + INSET * from_center[uncertain], _DIAGONALS
-        )
-        spots = geometry.sample(rows, np.broadcast_to(_SPOTS, (len(rows), *_SPOTS.shape)), 1.0)
-        below = below_hood(geometry, caster, rows, spots)
-        result.rim[rows] = below.any(axis=1) & ~below.all(axis=1)
-        result.occluded[rows] = below.all(axis=1) & ~cut
-        result.cut[rows], result.touched[rows] = cut, doubtful & ~cut & ~result.rim[rows]
-
-    for_chunks(find, len(doubted), CHUNK, threads, progress)
+    into = (result.cut, result.touched, result.rim, result.occluded)
+    find = partial(_find, geometry, caster, doubted)
+    fill_chunks(find, into, len(doubted), CHUNK, threads, progress, at=doubted)
     return result
+
+
+def _find(geometry: TexelGeometry, caster: RayCaster, doubted: Array, part: slice) -> tuple[Array, ...]:
+    """Return which texels are cut, touched, at a rim and occluded."""
+    rows = doubted[part]
+    lift = SIGHT_LIFT * caster.surface_offset * geometry.surface_normal[rows][:, None]
+    # Of the texel on the page: hits land on the part outside its triangle as well.
+    square = geometry.squares(rows) + lift
+    middle = square.mean(axis=1, keepdims=True)
+    # All of the texel that is on its triangle: hits land all over it, though its light comes
+    # from the middle.
+    corners, ends = square.copy(), np.flatnonzero(~geometry.whole[rows])
+    spots = np.broadcast_to(_CORNERS, (len(ends), 4, 2))
+    corners[ends] = geometry.sample(rows[ends], spots, 1.0) + lift[ends]
+    center = geometry.position[rows][:, None] + lift
+    from_center = corners - center
+    cut = ~_segments_free(caster, center + INSET * from_center, _EDGES)
+    doubtful = ~_segments_free(caster, middle + OUTSET * (square - middle), _DIAGONALS) & ~cut
+    uncertain = np.flatnonzero(doubtful)
+    cut[uncertain] = ~_segments_free(caster, center[uncertain] + INSET * from_center[uncertain], _DIAGONALS)
+    spots = geometry.sample(rows, np.broadcast_to(_SPOTS, (len(rows), *_SPOTS.shape)), 1.0)
+    below = below_hood(geometry, caster, rows, spots)
+    hooded = below.all(axis=1)
+    rim = below.any(axis=1) & ~hooded
+    return cut, doubtful & ~cut & ~rim, rim, hooded & ~cut
 
 
 def below_hood(geometry: TexelGeometry, caster: RayCaster, texel: Array, spots: Array) -> Array:

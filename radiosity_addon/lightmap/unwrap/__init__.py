@@ -7,18 +7,19 @@ from __future__ import annotations
 
 from .atlas import Atlas, AtlasInput, AtlasOptions, build_atlas
 from .dominant_object import greedy_object, share_of
-from .packing import Limits, padding_for
-from .page_assignment import assign_pages, least_pages
+from .packing import Limits, padding_for, page_size
+from .page_assignment import ChartTotals, assign_pages
 
 __all__ = [
     "Atlas",
     "AtlasInput",
     "AtlasOptions",
+    "ChartTotals",
     "Limits",
     "assign_pages",
     "build_atlas",
     "greedy_object",
-    "least_pages",
     "padding_for",
+    "page_size",
     "share_of",
 ]

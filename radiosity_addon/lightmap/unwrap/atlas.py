@@ -19,8 +19,8 @@ from ...numerics import signed_double_areas, triangle_areas
 from ..charts import Charts, PatientGrower, rescale_to_area, unwrap
 from ..texels import coverage_sum
 from .dominant_object import greedy_object, share_of
-from .packing import Limits, Packing, pack
-from .page_assignment import assign_pages, least_pages, texels_needed
+from .packing import Limits, Packing, pack, page_size
+from .page_assignment import ChartTotals, assign_pages, least_pages
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -190,17 +190,16 @@ _Laid = list[tuple[list[int], Packing]]
 def _lay_on_pages(layouts: list[_Layout], options: AtlasOptions, progress: Progress) -> _Laid:
     """Pack objects on as many pages as are asked for or needed."""
     density = options.texel_density
-    surfaces = [_surface([layout]) * layout.source.scale**2 for layout in layouts]
+    totals = _totals(layouts, options.limits.padding)
     count = len(layouts)
     if options.shared:
         count = options.pages
         if density is not None:
-            count = least_pages(sum(surfaces), density, options.limits.largest)
-    extents = [_extents(layout.charts) for layout in layouts]
+            count = least_pages(float(totals.area.sum()), density, options.limits.side)
     while True:
-        texels = float(count * options.resolution**2)
-        needs = texels_needed(surfaces, extents, options.limits.padding, density, texels)
-        groups = assign_pages(needs, count) if options.shared else [[each] for each in range(count)]
+        common = totals.density(float(count * options.resolution**2)) if density is None else density
+        texels = totals.texels(common)
+        groups = assign_pages(texels, count) if options.shared else [[each] for each in range(count)]
         laid: _Laid = []
         try:
             for group in groups:
@@ -212,6 +211,14 @@ def _lay_on_pages(layouts: list[_Layout], options: AtlasOptions, progress: Progr
             count = max(count, len(groups)) + 1
             continue
         return laid
+
+
+def _totals(layouts: list[_Layout], padding: int) -> ChartTotals:
+    """Return the sums over each object's charts, at its scale."""
+    areas = [_surface([layout]) * layout.source.scale**2 for layout in layouts]
+    lengths = [float(_extents(layout.charts).sum()) for layout in layouts]
+    counts = [float(layout.charts.count) for layout in layouts]
+    return ChartTotals(np.array(areas), np.array(lengths), np.array(counts), padding)
 
 
 def _extents(charts: Charts) -> Float:
@@ -314,7 +321,7 @@ def _kept_as_they_are(
                 f"a texel density of {density:g} px/m needs a page above {largest} px for the kept "
                 f"UVs of {group[0].source.name}: lower the density"
             )
-        resolution = max(4, 4 * int(np.ceil(size / 4)))
+        resolution = page_size(size)
     return Packing(uv, resolution, resolution * float(np.sqrt(flat / surface)) if surface > 0 else 0.0)
 
 

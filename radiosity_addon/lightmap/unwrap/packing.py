@@ -9,6 +9,7 @@ a limit on time, and cannot be run twice on one atlas (docs/decisions/0005).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -82,7 +83,7 @@ class Limits:
 
     @property
     def side(self) -> int:
-        """Width and height at most of pages whose size comes from a density: a multiple of 4."""
+        """Largest width and height of a page whose size follows from a density."""
         return max(4, 4 * (self.largest // 4))
 
     def gap(self, cell: int) -> int:
@@ -92,6 +93,11 @@ class Limits:
     def border(self, cell: int) -> int:
         """Free cells along the page's border: pages are repeated in the mind of a sampler."""
         return -(-self.gap(cell) // 2)
+
+
+def page_size(texels: float) -> int:
+    """Return the size of a page that is to have at least `texels` along a side: a multiple of 4."""
+    return max(4, 4 * math.ceil(texels / 4))
 
 
 def padding_for(mip_levels: int) -> int:
@@ -243,7 +249,7 @@ def _pack_at(job: _Job, density: float) -> Packing:
     if not guess <= largest:
         raise _too_dense(density, largest)
     step = 1.0
-    resolution, too_small, best = _multiple(guess), 0, None
+    resolution, too_small, best = page_size(guess), 0, None
     while best is None or best.resolution - too_small > max(4, best.resolution // 256):
         if resolution > largest:
             raise _too_dense(density, largest)
@@ -254,22 +260,17 @@ def _pack_at(job: _Job, density: float) -> Packing:
         if placement is not None:
             moved = _moved(job, scaled, placement, cell)
             best = _packing(moved * cell, resolution, resolution, density)
-            resolution = _multiple((too_small + best.resolution) / 2)
+            resolution = page_size((too_small + best.resolution) / 2)
         else:
             too_small = resolution
             step *= 1.5
             grown = resolution * (1 + 0.02 * step) if best is None else (resolution + best.resolution) / 2
             # The largest page is tried before giving up.
             ceiling = largest if too_small < largest else 2 * largest
-            resolution = min(_multiple(max(grown, resolution + 1)), ceiling)
+            resolution = min(page_size(max(grown, resolution + 1)), ceiling)
         if best is not None and resolution >= best.resolution:
             return best
     return best
-
-
-def _multiple(size: float) -> int:
-    """Round up to a multiple of 4."""
-    return max(4, 4 * int(np.ceil(size / 4)))
 
 
 def _too_dense(density: float, largest: int) -> BakeError:

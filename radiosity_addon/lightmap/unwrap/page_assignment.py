@@ -1,77 +1,74 @@
-"""Which objects share a page, where one page is not enough for all."""
+"""How many texels objects need, and which of them share a page."""
 
 from __future__ import annotations
 
 import heapq
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ...numerics import Array
 
 FULL = 0.75
-"""How much of a page charts fill in general; the rest is padding and odd corners."""
+"""Share of a page that charts fill with the gaps around them; the rest is odd corners."""
 
 
-def texels_needed(
-    surfaces: Sequence[float],
-    extents: Sequence[Array],
-    padding: int,
-    density: float | None,
-    texels: float,
-) -> list[float]:
-    """Return the texels that each object takes of a page, with those that stay free around its charts.
+@dataclass(frozen=True)
+class ChartTotals:
+    """Sums over the charts of each object; many small charts need more room than one of the same area.
 
-    Many small charts need more room than a large one of the same surface.
-
-    Parameters
-    ----------
-    surfaces : sequence of float
-        Of each object [m²].
-    extents : sequence of (c, 2) float
-        Width and height of each object's charts [m].
-    padding : int
-        Free texels between charts.
-    density : float or None
-        Texels per meter; None takes what fits.
-    texels : float
-        Of all pages together, if no density is given.
+    area: (n,) float [m²].
+    length: (n,) float, width plus height of each chart's box [m].
+    count: (n,) float, number of charts.
+    padding: Free texels between charts.
     """
-    gap = padding + 1  # a chart's border also cuts through texels
-    area = np.asarray(surfaces, dtype=np.float64)
-    along = gap * np.array([sizes.sum() for sizes in extents])
-    free = gap**2 * np.array([float(len(sizes)) for sizes in extents])
-    if density is None:
-        a, b, c = (float(of.sum()) for of in (area, along, free))
-        room = max(FULL * texels - c, 0.0)
-        # The density at which a d² + b d + c texels are in use.
-        density = 2.0 * room / (b + np.sqrt(b**2 + 4.0 * a * room)) if room and a else 0.0
-    return list(map(float, area * density**2 + along * density + free))
+
+    area: Array
+    length: Array
+    count: Array
+    padding: int
+
+    def texels(self, density: float) -> Array:
+        """Return (n,) texels that each object takes at `density` texels per meter, with gaps and corners."""
+        gap = self.padding + 1  # a chart's border also cuts through texels
+        return (self.area * density**2 + gap * self.length * density + gap**2 * self.count) / FULL
+
+    def density(self, texels: float) -> float:
+        """Return the texels per meter at which all objects fill `texels`; 0 if they have no area."""
+        area, gap = float(self.area.sum()), self.padding + 1
+        if area <= 0.0:
+            return 0.0
+        linear, room = gap * float(self.length.sum()), FULL * texels - gap**2 * float(self.count.sum())
+        if room <= 0.0:
+            # Not even the gaps fit: such a page is packed at twice its size and shrunk.
+            return 0.5 * self.density(4.0 * texels)
+        return float(2.0 * room / (linear + np.sqrt(linear**2 + 4.0 * area * room)))
 
 
-def assign_pages(needs: Sequence[float], pages: int) -> list[list[int]]:
+def assign_pages(texels: Sequence[float] | Array, pages: int) -> list[list[int]]:
     """Share objects out over pages so that all are about equally full.
 
     The largest first, each to the emptiest page. Objects of a page keep their order.
 
     Parameters
     ----------
-    needs : sequence of float
-        What each object takes of a page.
+    texels : (n,) float
+        Number of texels that each object takes.
     pages : int
 
     Returns
     -------
     list of list of int
-        Per page the objects' numbers; no page is empty.
+        Row numbers of the objects of each page; no page is empty.
     """
-    emptiest = [(0.0, page) for page in range(min(pages, len(needs)))]
+    emptiest = [(0.0, page) for page in range(min(pages, len(texels)))]
     groups: list[list[int]] = [[] for _ in emptiest]
-    for number in sorted(range(len(needs)), key=lambda each: -needs[each]):
+    for row in np.argsort(-np.asarray(texels), kind="stable").tolist():
         filled, page = heapq.heappop(emptiest)
-        groups[page].append(number)
-        heapq.heappush(emptiest, (filled + needs[number], page))
-    # Objects that need nothing may leave pages empty only where there are none with one.
+        groups[page].append(row)
+        heapq.heappush(emptiest, (filled + float(texels[row]), page))
+    # Objects that take no texels all go to one page.
     return [sorted(group) for group in groups if group]
 
 

@@ -13,8 +13,8 @@ import numpy as np
 from ...numerics import Array
 from ...rays import SIGHT_LIFT, EmbreeCaster, RayCaster
 from ...solver.gather import UNNUMBERED, Boxes, ElementLookup, Moved
-from ..lighting import HitTable
 from ..texels import Crossings, SmoothLift, TexelGeometry
+from ..transport import HitTable
 
 NEAR = 1.5
 """What is farther from a texel than this many times its size neither touches nor hoods it."""

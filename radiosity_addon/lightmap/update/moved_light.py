@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 
 from ...base import Progress
 from ...numerics import Array
-from ...solver.gather import Boxes, Footprints, LightGains, LightQuery, LocalPass
-from ..lighting import HitTable, SubCellHits, sample_of
+from ...solver.gather import Footprints, LightGains, LightQuery, LocalPass
 from ..texels import SmoothLift, TexelGeometry
-from .affected import AffectedTexels
+from ..transport import HitTable, SubCellHits, sample_of
+from .previous import PreviousLight
 
 
 def changed_lights(local: LocalPass, before: LocalPass) -> list[tuple[LightQuery, bool]]:
@@ -26,15 +25,13 @@ def changed_lights(local: LocalPass, before: LocalPass) -> list[tuple[LightQuery
     return result
 
 
-def texel_gains(
-    kept: LightGains, local: LocalPass, before: LocalPass, affected: AffectedTexels, progress: Progress
-) -> LightGains:
-    """Ask for every light where it may have changed."""
-    geometry, lights = affected.geometry, changed_lights(local, before)
+def texel_gains(previous: PreviousLight, local: LocalPass, progress: Progress) -> LightGains:
+    """Return what lights add to texels, asked again where it may have changed."""
+    affected = previous.affected
+    geometry, lift = affected.geometry, SmoothLift(affected.geometry)
     gains = LightGains(len(geometry))
-    lift = SmoothLift(geometry)
-    for (asked, moved), part in progress.each(lights):
-        gain = kept.of(asked.number)
+    for (asked, moved), part in progress.each(changed_lights(local, previous.local)):
+        gain = previous.lit.gains.of(asked.number)
         touched = affected.texels.copy()
         touched |= moved | affected.boxes.between(geometry.position, asked.light, affected.widen)
         # One texel more: a penumbra is followed from neighbor to neighbor.
@@ -47,20 +44,13 @@ def texel_gains(
 
 
 def sub_cell_gains(
-    hits: SubCellHits,
-    table: HitTable,
-    before: LocalPass,
-    boxes: Boxes,
-    at: Array,
-    widen: Array,
-    progress: Progress,
+    hits: SubCellHits, table: HitTable, previous: PreviousLight, at: Array, widen: Array, progress: Progress
 ) -> LightGains:
-    """Ask for every light at those cells, at (p, 3) anchors, where it may have changed."""
+    """Return what lights add to cells, at (p, 3) anchors, asked again where it may have changed."""
     assert hits.gains is not None  # kept cells keep them
-    local = table.local
-    lights = changed_lights(local, before)
+    local, boxes = table.local, previous.affected.boxes
     gains = LightGains(len(hits.number))
-    for (asked, moved), part in progress.each(lights):
+    for (asked, moved), part in progress.each(changed_lights(local, previous.local)):
         gain = hits.gains.of(asked.number)
         rows = np.flatnonzero(moved | boxes.between(at, asked.light, widen))
         points = table.lit_footprints(hits.number[rows], hits.of_element)
@@ -76,17 +66,13 @@ def _footprints(geometry: TexelGeometry, chosen: Array, lift: SmoothLift) -> Foo
         geometry.normal[chosen],
         chosen,
         partial(sample_of, geometry, chosen),
-        _neighbors(geometry, chosen),
+        partial(_neighbors, geometry, chosen),
         lift=lift.of(chosen),
     )
 
 
-def _neighbors(geometry: TexelGeometry, chosen: Array) -> Callable[[Array], Array]:
-    """Return what grows a mask of some texels by their neighbors among these."""
-
-    def near(mask: Array) -> Array:
-        every = np.zeros(len(geometry), dtype=bool)
-        every[chosen] = mask
-        return np.asarray(geometry.neighborhood(every)[chosen])
-
-    return near
+def _neighbors(geometry: TexelGeometry, chosen: Array, mask: Array) -> Array:
+    """Grow a mask of some texels by their neighbors among these."""
+    every = np.zeros(len(geometry), dtype=bool)
+    every[chosen] = mask
+    return np.asarray(geometry.neighborhood(every)[chosen])

@@ -2,39 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from ...base import Progress
-from ...numerics import Array
-from ...solver.gather import UNNUMBERED, AimedRays, Before, Gathered, LightGains, LocalPass
-from ..lighting import HitTable, SubCellHits, SubCellLinks, TableRows
-from .affected import AffectedTexels
+from ...solver.gather import UNNUMBERED, AimedRays, Before, Gathered, LightGains
+from ..transport import SubCellHits
 from .moved_light import sub_cell_gains
+from .previous import StandingHits
 
 
-def known_sub_cells(
-    links: Sequence[SubCellLinks], rows: TableRows, table: HitTable, number_now: Array
-) -> list[SubCellHits]:
-    """Return the cells that still stand, those of one kind together.
-
-    rows: Of the table of radiosity that the links are of.
-    table: What hits are numbered by now, …
-    number_now (numbers,) int32: … by what they were before; UNNUMBERED for what does not stand any more.
-    """
+def kept_cells(standing: StandingHits, progress: Progress) -> list[SubCellHits]:
+    """Return the cells that still stand, those of one kind together, with what their rays meet now."""
     kinds: dict[tuple[bool, int], list[SubCellHits]] = {}
-    for of_kind in links:
-        number = number_now[rows.numbers(of_kind.rows)]
+    for of_kind in standing.previous.lit.transport.cells.links:
+        number = standing.numbers(of_kind.rows)
         stays = number != UNNUMBERED
-        sources = renumbered(rows.numbers(of_kind.sources[stays]), number_now)
-        of_element = number[stays] < table.first_cell
+        sources = standing.numbers(of_kind.sources[stays])
+        of_element = number[stays] < standing.table.first_cell
         gains = None if of_kind.gains is None else of_kind.gains.take(stays)
         assert of_element.all() or not of_element.any()  # links are of one kind
         kept = SubCellHits(bool(of_element.any()), number[stays], sources, gains)
         if len(kept.number):
             kinds.setdefault((kept.of_element, kept.rays), []).append(kept)
-    return [_joined(hits) for hits in kinds.values()]
+    joined = [_joined(hits) for hits in kinds.values()]
+    return [_traced_again(hits, standing, part) for hits, part in progress.each(joined)]
 
 
 def _joined(parts: list[SubCellHits]) -> SubCellHits:
@@ -47,16 +38,10 @@ def _joined(parts: list[SubCellHits]) -> SubCellHits:
     )
 
 
-def renumbered(sources: Array, number_now: Array) -> Array:
-    """Return sources of any shape by their numbers now; negative ones stay."""
-    return np.asarray(np.where(sources >= 0, number_now[np.maximum(sources, 0)], sources))
-
-
-def trace_again(
-    hits: SubCellHits, table: HitTable, before: LocalPass, affected: AffectedTexels, progress: Progress
-) -> SubCellHits:
+def _traced_again(hits: SubCellHits, standing: StandingHits, progress: Progress) -> SubCellHits:
     """Trace again what is touched of the rays of cells, and of those to lamps."""
-    local = table.local
+    table, previous = standing.table, standing.previous
+    local, affected = table.local, previous.affected
     at, upright = table.footprints(hits.number, hits.of_element)
     if hits.of_element:
         widen = local.elements.cells.radius(table.element_cell(hits.number))
@@ -69,12 +54,12 @@ def trace_again(
     earlier = Before(
         gathered,
         aimed_at=(nowhere, nowhere),
-        moved=affected.traced(before.caster),
+        moved=affected.traced(previous.local.caster),
         widen=widen,
         bright=np.zeros(local.elements.hierarchy.n_elements, dtype=bool),
         hosts=np.zeros(len(affected.moved), dtype=bool),
     )
     found = local.gather.again_at(at, upright, table.number, earlier, progress=progress.part(0.0, 0.6))
     part = progress.part(0.6, 1.0)
-    gains = sub_cell_gains(hits, table, before, affected.boxes, at.points, widen, part)
+    gains = sub_cell_gains(hits, table, previous, at.points, widen, part)
     return SubCellHits(hits.of_element, hits.number, found.sources, gains)

@@ -6,9 +6,11 @@ nor does what ends on the black back of a one-sided triangle.
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
-from ...numerics import Array, Stream, cosine_hemisphere, for_chunks, stratified_square, to_world
+from ...numerics import Array, Stream, cosine_hemisphere, fill_chunks, stratified_square, to_world
 from ...rays import RayCaster
 from ..hierarchy import ClusterCut, Hierarchy
 from ..links import node_samples, pull
@@ -118,27 +120,29 @@ class Arrivals:
     def _trace(self, hierarchy: Hierarchy, nodes: Array, rays: int) -> tuple[Array, Array]:
         """Return (n,) the share of the light of nodes that arrives, and whether any ray leaves the scene."""
         share, escapes = np.empty(len(nodes)), np.empty(len(nodes), dtype=bool)
-        faces = hierarchy.faces
-        has_black_backs = 2 * int(faces.front.sum()) > len(faces)
-
-        def measure(rows: slice) -> None:
-            chosen = nodes[rows]
-            quarter = np.broadcast_to(np.arange(rays) % 4, (len(chosen), rays))
-            streams = Stream.ENCLOSURE_POINTS, Stream.ENCLOSURE_FACE
-            points, normals = node_samples(hierarchy, chosen, quarter, chosen, self._seed, streams)
-            unit = stratified_square(chosen, rays, self._seed + Stream.ENCLOSURE_DIRECTIONS)
-            normals = normals.reshape(-1, 3)
-            directions = to_world(cosine_hemisphere(unit).reshape(-1, 1, 3), normals)[:, 0]
-            start = points.reshape(-1, 3) + self._caster.surface_offset * normals
-            if has_black_backs:
-                hits = self._caster.intersect(start, directions)
-                missed = hits.triangle < 0
-                lost = missed | (faces.of_triangle[(~hits.front).astype(np.int8), hits.triangle] < 0)
-            else:
-                lost = self._caster.passing(start, directions, np.full(len(start), np.inf))
-                missed = lost > 0
-            share[rows] = 1.0 - lost.reshape(-1, rays).mean(axis=1)
-            escapes[rows] = missed.reshape(-1, rays).any(axis=1)
-
-        for_chunks(measure, len(nodes), CHUNK * RAYS // rays, self._threads)
+        measure = partial(_arriving, hierarchy, self._caster, nodes, rays, self._seed)
+        fill_chunks(measure, (share, escapes), len(nodes), CHUNK * RAYS // rays, self._threads)
         return share, escapes
+
+
+def _arriving(
+    hierarchy: Hierarchy, caster: RayCaster, nodes: Array, rays: int, seed: int, rows: slice
+) -> tuple[Array, Array]:
+    """Return (r,) the share of the light of nodes that arrives, and whether any ray leaves the scene."""
+    faces, chosen = hierarchy.faces, nodes[rows]
+    quarter = np.broadcast_to(np.arange(rays) % 4, (len(chosen), rays))
+    streams = Stream.ENCLOSURE_POINTS, Stream.ENCLOSURE_FACE
+    points, normals = node_samples(hierarchy, chosen, quarter, chosen, seed, streams)
+    unit = stratified_square(chosen, rays, seed + Stream.ENCLOSURE_DIRECTIONS)
+    normals = normals.reshape(-1, 3)
+    directions = to_world(cosine_hemisphere(unit).reshape(-1, 1, 3), normals)[:, 0]
+    start = points.reshape(-1, 3) + caster.surface_offset * normals
+    has_black_backs = 2 * int(faces.front.sum()) > len(faces)
+    if has_black_backs:
+        hits = caster.intersect(start, directions)
+        missed = hits.triangle < 0
+        lost = missed | (faces.of_triangle[(~hits.front).astype(np.int8), hits.triangle] < 0)
+    else:
+        lost = caster.passing(start, directions, np.full(len(start), np.inf))
+        missed = lost > 0
+    return 1.0 - lost.reshape(-1, rays).mean(axis=1), missed.reshape(-1, rays).any(axis=1)

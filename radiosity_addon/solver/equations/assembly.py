@@ -14,12 +14,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from ...base import SILENT, Progress
 from ...form_factors import point_to_polygon
-from ...numerics import Array, for_chunks
+from ...numerics import Array, map_chunks
 from ...rays import RayCaster
 from ...scene import Faces, arriving, shares
 from ..hierarchy import Basis, Hierarchy, constant_basis
@@ -85,10 +86,7 @@ def collocation(
     def put(point: Array, leaf_row: Array, values: Array) -> None:
         exchange[point, leaf_row] = area[point] * values
 
-    def measure(points: Array, normals: Array, corners: Array, _: Array) -> Array:
-        return point_to_polygon(points, normals, corners)
-
-    _measure_points(hierarchy, caster, basis, measure, put, seed, threads, progress)
+    _measure_points(hierarchy, caster, basis, _centroid_factors, put, seed, threads, progress)
     return _system(hierarchy, basis, exchange)
 
 
@@ -153,32 +151,42 @@ def _measure_points(
     progress: Progress,
 ) -> None:
     """Measure all pairs of a node and a leaf, and hand them to `put`."""
-    points, of_face = basis.points(hierarchy), basis.faces(hierarchy)
-    leaf_face = hierarchy.face[basis.leaf]
-    corners, leaf_normals = hierarchy.corners[basis.leaf], hierarchy.normal[basis.leaf]
-    step = max(CHUNK_PAIRS // max(len(leaf_face), 1), 1)
-
-    def fill(rows: slice) -> None:
-        point, row = np.nonzero(_facing(hierarchy.faces, of_face[rows], leaf_face))
-        if len(point) == 0:
-            return
-        point += rows.start
-        facing = hierarchy.faces.normal[of_face[point]]
-        factors = measure(points[point], facing, corners[row], leaf_normals[row])
-        lit = np.flatnonzero(factors.reshape(len(point), -1).max(axis=1, initial=0.0) > 0)
-        point, row, factors = point[lit], row[lit], factors[lit]
-        pair = point.astype(np.int64) << 32 | row
-        share = visible_share(caster, points[point], facing[lit], corners[row], leaf_normals[row], pair, seed)
-        put(point, row, (factors.T * share).T)
-
-    for block in _blocks(len(basis), len(leaf_face)):
-        for_chunks(_shifted(fill, block.start), block.stop - block.start, step, threads)
+    step = max(CHUNK_PAIRS // max(len(basis.leaf), 1), 1)
+    points, faces = basis.points(hierarchy), basis.faces(hierarchy)
+    for block in _blocks(len(basis), len(basis.leaf)):
+        of_block = points[block], faces[block]
+        work = partial(_pairs, hierarchy, caster, basis.leaf, *of_block, measure, seed, block.start)
+        for _, found in map_chunks(work, block.stop - block.start, step, threads):
+            if found is not None:
+                put(*found)
         progress.at(block.stop / len(basis))
 
 
-def _shifted(work: Callable[[slice], None], start: int) -> Callable[[slice], None]:
-    """Return `work` on slices counted from `start`."""
-    return lambda rows: work(slice(start + rows.start, start + rows.stop))
+def _pairs(
+    hierarchy: Hierarchy,
+    caster: RayCaster,
+    leaf: Array,
+    points: Array,
+    faces: Array,
+    measure: Callable[[Array, Array, Array, Array], Array],
+    seed: int,
+    first: int,
+    rows: slice,
+) -> tuple[Array, Array, Array] | None:
+    """Return points on faces, numbered from `first`, leaves, and what they exchange, pair by pair, if any."""
+    point, row = np.nonzero(_facing(hierarchy.faces, faces[rows], hierarchy.face[leaf]))
+    if len(point) == 0:
+        return None
+    point += rows.start
+    facing = hierarchy.faces.normal[faces[point]]
+    corners, leaf_normals = hierarchy.corners[leaf[row]], hierarchy.normal[leaf[row]]
+    factors = measure(points[point], facing, corners, leaf_normals)
+    lit = np.flatnonzero(factors.reshape(len(point), -1).max(axis=1, initial=0.0) > 0)
+    point, row, factors = point[lit], row[lit], factors[lit]
+    number = first + point
+    pair = number.astype(np.int64) << 32 | row
+    share = visible_share(caster, points[point], facing[lit], corners[lit], leaf_normals[lit], pair, seed)
+    return number, row, (factors.T * share).T
 
 
 def _system(hierarchy: Hierarchy, basis: Basis, exchange: Array, reciprocal: bool = False) -> LinearSystem:
@@ -191,6 +199,10 @@ def _system(hierarchy: Hierarchy, basis: Basis, exchange: Array, reciprocal: boo
         mass=basis.mass(),
         reciprocal=reciprocal,
     )
+
+
+def _centroid_factors(points: Array, normals: Array, corners: Array, _: Array) -> Array:
+    return point_to_polygon(points, normals, corners)
 
 
 def _facing(faces: Faces, one: Array, other: Array) -> Array:

@@ -7,9 +7,11 @@ column of it or a link, gets the same bits: that is what makes the methods agree
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
-from ...numerics import Array, for_chunks
+from ...numerics import Array, fill_chunks
 from ...rays import RayCaster
 from ..hierarchy import Hierarchy
 from ..links import element_factors, pair_visibility
@@ -29,18 +31,24 @@ def exchange_areas(
     Returns exchange (n,) [m²]: The form factor is F_ij = exchange / A_i (handout (3.27)).
     """
     one, other = np.asarray(one), np.asarray(other)
-    exchange = np.zeros(len(one))
+    exchange = np.empty(len(one))
     # The smaller side receives: cubature over it converges faster.
     area_one, area_other = hierarchy.area[one], hierarchy.area[other]
     swap = (area_other < area_one) | ((area_other == area_one) & (other < one))
     receiver, source = np.where(swap, other, one), np.where(swap, one, other)
+    fill_chunks(
+        partial(_exchange, hierarchy, caster, receiver, source, seed), exchange, len(one), CHUNK, threads
+    )
+    return exchange
 
-    def measure(rows: slice) -> None:
-        factor = element_factors(hierarchy, receiver[rows], source[rows])
-        seen = np.flatnonzero(factor > 0)
-        receiving, sending = receiver[rows][seen], source[rows][seen]
-        visibility = pair_visibility(hierarchy, caster, receiving, hierarchy.n_clusters + sending, seed)
-        exchange[rows.start + seen] = hierarchy.area[receiving] * factor[seen] * visibility
 
-    for_chunks(measure, len(one), CHUNK, threads)
+def _exchange(
+    hierarchy: Hierarchy, caster: RayCaster, receiver: Array, source: Array, seed: int, rows: slice
+) -> Array:
+    receiver, source = receiver[rows], source[rows]
+    factor, exchange = element_factors(hierarchy, receiver, source), np.zeros(len(receiver))
+    seen = np.flatnonzero(factor > 0)
+    receiver, source = receiver[seen], hierarchy.n_clusters + source[seen]
+    visibility = pair_visibility(hierarchy, caster, receiver, source, seed)
+    exchange[seen] = hierarchy.area[receiver] * factor[seen] * visibility
     return exchange

@@ -8,6 +8,8 @@ are answered by one of the leaf's sixteenths, each again the part that sees its 
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from ...numerics import Array, points_at, points_on_triangles, split_in_sixteen
@@ -61,15 +63,7 @@ class ElementCells:
         """Return parts as footprints: their samples see the anchor."""
         corners, normal = self._corners(part), self._hierarchy.normal_of(self.leaf_of(part))
         anchor, lift = ANCHOR @ corners, self._lift(normal)
-
-        def sample(rows: Array, u: Array) -> Array:
-            points = points_on_triangles(corners[rows], u)
-            back = np.broadcast_to(anchor[rows][:, None], points.shape)
-            above = lift[rows][:, None]
-            seen = free_segment(self._caster, (points + above).reshape(-1, 3), (back + above).reshape(-1, 3))
-            # What lies behind a wall is not of this part.
-            return np.asarray(np.where(seen.reshape(*points.shape[:2], 1), points, back))
-
+        sample = partial(_sample, self._caster, corners, anchor, lift)
         return Footprints(anchor, normal, part, sample, starts=STARTS)
 
     def radius(self, part: Array) -> Array:
@@ -115,3 +109,13 @@ class ElementCells:
 
     def _lift(self, normal: Array) -> Array:
         return np.asarray(SIGHT_LIFT * self._caster.surface_offset * normal)
+
+
+def _sample(caster: RayCaster, corners: Array, anchor: Array, lift: Array, rows: Array, u: Array) -> Array:
+    """Return (r, k, 3) points of parts that see the anchor, or the anchor."""
+    points = points_on_triangles(corners[rows], u)
+    back = np.broadcast_to(anchor[rows][:, None], points.shape)
+    above = lift[rows][:, None]
+    seen = free_segment(caster, (points + above).reshape(-1, 3), (back + above).reshape(-1, 3))
+    # What lies behind a wall is not of this part.
+    return np.asarray(np.where(seen.reshape(*points.shape[:2], 1), points, back))

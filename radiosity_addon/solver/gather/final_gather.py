@@ -7,6 +7,7 @@ elements that are far brighter than the rest (`bright_patches.py`).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -80,22 +81,13 @@ class Gathering:
         self._caster, self._at, self._surface_normals, self._rays = caster, at, surface_normals, rays
         self._resolve, self._leaves_of = resolve, leaves_of
         self._seed, self.threads, self._sky = seed, threads, sky
-        self._into: Array | None = None
-        self._closeness = at.scratch.empty(len(at))
-
-    @property
-    def sources(self) -> Array:
-        """(n, rays) int32: see `Gathered`; made when it is first asked for, unless it was given."""
-        if self._into is None:
-            self._into = np.empty((len(self._at), self._rays), dtype=np.int32)
-        return self._into
-
-    @sources.setter
-    def sources(self, into: Array) -> None:
-        self._into = into
 
     def trace(
-        self, bright: BrightElements | None, irradiance: Array, progress: Progress = SILENT
+        self,
+        bright: BrightElements | None,
+        irradiance: Array,
+        into: Array | None = None,
+        progress: Progress = SILENT,
     ) -> Gathered:
         """Trace all.
 
@@ -105,41 +97,27 @@ class Gathering:
             What is aimed at.
         irradiance : (n,) float64 [W/m²]
             What is about expected: noise is measured by it.
+        into : (n, rays) int32 or None
+            Takes the sources, if given.
         """
-        assert len(self.sources) == len(self._at)
-
-        def trace(part: slice) -> AimedRays | None:
-            rows = np.arange(part.start, part.stop)
-            shares = None if bright is None or not len(bright) else self.shares(rows, bright, irradiance)
-            return self.trace_rows(rows, bright, shares)
-
-        aimed, chunk = AimedTable(self._at.scratch), max(CHUNK_RAYS // self._rays, 1)
-        for part, found in map_chunks(trace, len(self._at), chunk, self.threads, progress):
-            if found is not None:
-                aimed.extend(found, part.start)
-        return self.gathered(aimed.all())
-
-    def gathered(self, aimed: AimedRays) -> Gathered:
-        """Return what was found, with these aimed rays."""
-        return Gathered(self.sources, self._closeness, aimed)
-
-    def take_up(self, before: Gathered) -> None:
-        """Start from what was found before, of which some is to be traced again (`retracing.py`)."""
-        self.sources, self._closeness = before.sources.copy(), before.closeness.copy()
+        count, scratch = len(self._at), self._at.scratch
+        sources = np.empty((count, self._rays), dtype=np.int32) if into is None else into
+        closeness, aimed = scratch.empty(count), AimedTable(scratch)
+        trace, chunk = partial(_trace, self, bright, irradiance), max(CHUNK_RAYS // self._rays, 1)
+        for part, found in map_chunks(trace, count, chunk, self.threads, progress):
+            sources[part], closeness[part] = found.sources, found.closeness
+            aimed.extend(found.aimed, part.start)
+        return Gathered(sources, closeness, aimed.all())
 
     def shares(self, rows: Array, bright: BrightElements, irradiance: Array) -> Array:
         """Return (r, m) how some rows would share their aimed rays out."""
         return bright.shares(self._at.points[rows], self._at.normals[rows], self._rays, irradiance[rows])
 
-    def trace_rows(
-        self, rows: Array, bright: BrightElements | None, shares: Array | None
-    ) -> AimedRays | None:
-        """Trace all rays of some rows; return the aimed ones, their rows numbered among these, if any."""
+    def trace_rows(self, rows: Array, bright: BrightElements | None, shares: Array | None) -> Gathered:
+        """Trace all rays of some rows; aimed ones have their rows numbered among these."""
         if bright is None or shares is None or not shares.any():
-            self._cosine(rows, None, None)
-            return None
-        self._cosine(rows, bright, shares)
-        return self._aim(rows, bright, shares)
+            return Gathered(*self._cosine(rows, None, None), AimedRays.none())
+        return Gathered(*self._cosine(rows, bright, shares), self._aim(rows, bright, shares))
 
     def on_any(self, elements: Array, hosts: Array, hits: Hits) -> Array:
         """Return (h,) whether hits are on some elements, (e,) bool, of some triangles, (t,) bool."""
@@ -168,7 +146,7 @@ class Gathering:
 
     def trace_again(
         self, rows: Array, ray: Array, directions: Array, stale: Array, casters: tuple[RayCaster, RayCaster]
-    ) -> tuple[Array, Hits, Array]:
+    ) -> tuple[Array, Array, Hits, Array]:
         """Trace some cosine-distributed rays, as if their points aimed at nothing.
 
         Parameters
@@ -177,7 +155,7 @@ class Gathering:
             In order of the rows.
         directions : (p, 3) float32
         stale : (p,) bool
-            Whether what was hit must be numbered anew even if it is hit again.
+            Whether what was hit must be numbered again even if it is hit again.
         casters : RayCaster twice
             Of what moved alone, where it was and where it is: who meets none of it has not changed. And of
             the scene as it was: it tells how far rays went.
@@ -186,6 +164,8 @@ class Gathering:
         -------
         changed : (c,) int
             Which of the rays may have another source now.
+        sources : (c,) int32
+            That one.
         hits : Hits
             What these met.
         nearer : (c,) float64 [1/m]
@@ -201,15 +181,15 @@ class Gathering:
         same &= (np.abs(hits.barycentric - old.barycentric) < SAME_PLACE).all(axis=1)
         other = np.flatnonzero(~same)
         changed, hits, old = asked[other], hits.take(other), old.take(other)
-        self.sources[rows[changed], ray[changed]] = self._found(hits, along[other])
         least = self._caster.surface_offset
         nearer = 1.0 / np.maximum(hits.distance, least) - 1.0 / np.maximum(old.distance, least)
         nearer = nearer.astype(np.float64) / self._rays
-        np.add.at(self._closeness, rows[changed], nearer)
-        return changed, hits, nearer
+        return changed, self._found(hits, along[other]), hits, nearer
 
-    def _cosine(self, rows: Array, bright: BrightElements | None, shares: Array | None) -> None:
-        """Trace the cosine-distributed rays of some rows, and keep what they hit."""
+    def _cosine(
+        self, rows: Array, bright: BrightElements | None, shares: Array | None
+    ) -> tuple[Array, Array]:
+        """Trace the cosine-distributed rays of some rows; return sources and closeness (see `Gathered`)."""
         rays = self._rays
         directions, upward = self.directions(rows)
         start = self._starts(rows, rays, self._seed + Stream.GATHER_STARTS)
@@ -218,9 +198,8 @@ class Gathering:
         found[~upward] = NOTHING
         if bright is not None and shares is not None:
             found[bright.left_out(shares, hits, self._leaves_of).reshape(found.shape)] = NOTHING
-        self.sources[rows] = found
         inverse = 1.0 / np.maximum(hits.distance.reshape(len(rows), rays), self._caster.surface_offset)
-        self._closeness[rows] = inverse.mean(axis=1)
+        return found, inverse.mean(axis=1)
 
     def _directions(self, rows: Array) -> Array:
         """Return (r, rays, 3) float32: where the cosine-distributed rays of some rows go."""
@@ -274,3 +253,10 @@ class Gathering:
         if len(rows) < some * len(distinct):
             return np.asarray(at.sampler(rows, unit[of, place][:, None])[:, 0] + lift)
         return np.asarray(at.sampler(distinct, unit)[of, place] + lift)
+
+
+def _trace(gathering: Gathering, bright: BrightElements | None, irradiance: Array, part: slice) -> Gathered:
+    """Trace all rays of a run of points."""
+    rows = np.arange(part.start, part.stop)
+    shares = None if bright is None or not len(bright) else gathering.shares(rows, bright, irradiance)
+    return gathering.trace_rows(rows, bright, shares)

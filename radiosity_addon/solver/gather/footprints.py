@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
 from ...base import SILENT, Progress
 from ...lights import Lamp
-from ...numerics import Array, Scratch, for_chunks, marked, row_numbers, stratified_square, trim
+from ...numerics import Array, Scratch, fill_chunks, marked, row_numbers, stratified_square, trim
 from ..emitters import EmitterGroup
 
 SPREAD = 4
@@ -99,17 +99,9 @@ class SpreadPoints:
         # From the center: single precision is too coarse for the place of small things far from the origin.
         self._apart = at.scratch.zeros((len(at), self.count, 3), np.float32)
         self._farthest = np.zeros(len(at), dtype=np.int8)
-
-        def spread(part: slice) -> None:
-            if at.sampler is None:
-                return
-            rows = np.arange(part.start, part.stop)
-            points = at.sampler(rows, stratified_square(at.keys[part], SPREAD, seed))
-            apart = points - at.points[part, None]
-            self._apart[part] = apart
-            self._farthest[part] = (apart**2).sum(axis=2).argmax(axis=1)
-
-        for_chunks(spread, len(at), CHUNK_POINTS, threads)
+        if at.sampler is not None:
+            into = (self._apart, self._farthest)
+            fill_chunks(partial(_spread, at, at.sampler, seed), into, len(at), CHUNK_POINTS, threads)
 
     def points(self, rows: Array | slice) -> Array:
         """Return (r, count, 3) float64: the points of some footprints."""
@@ -126,48 +118,28 @@ class SpreadPoints:
         gain = at.scratch.empty(len(at))
         varies, jump = np.zeros((2, len(at)), dtype=bool)
 
-        def ask(part: slice) -> None:
-            normals = at.normals[part]
-            own = light.unit_irradiance(at.points[part], normals)
-            if at.sampler is not None:
-                if isinstance(light, EmitterGroup) and least:
-                    varies[part] = (own > least) | light.beside(at.points[part], self._width(part))
-                else:
-                    spread = self.points(part)
-                    far = spread[np.arange(len(own)), self._farthest[part]]
-                    other = light.unit_irradiance(far, normals)
-                    varies[part] = np.abs(other - own) > SAME_GAIN * np.maximum(own, other)
-                    jump[part] = np.abs(other - own) > EDGE * np.maximum(own, other)
-            gain[part] = own
-
-        for_chunks(ask, len(at), CHUNK_POINTS, self._threads, progress.part(0.0, 0.5))
+        into, ask = (gain, varies, jump), partial(_at_centers, self, light, least)
+        fill_chunks(ask, into, len(at), CHUNK_POINTS, self._threads, progress.part(0.0, 0.5))
         # Right under a lamp two points may happen to see it alike: their neighbors do not.
         bent = row_numbers(varies if at.near is None or least else at.near(varies))
-
-        def average(part: slice) -> None:
-            gain[bent[part]] = self._varying(light, bent[part])
-
-        for_chunks(average, len(bent), CHUNK_POINTS, self._threads, progress.part(0.5, 1.0))
+        average, part = partial(_varying, self, light, bent), progress.part(0.5, 1.0)
+        fill_chunks(average, gain, len(bent), CHUNK_POINTS, self._threads, part, at=bent)
         if at.near is not None and jump.any():
             # An edge that only cuts a footprint's corner is found from its neighbors.
             lit = marked(len(gain), lambda rows: gain[rows] > 0)
             rows = row_numbers(at.near(jump) | (at.near(lit) & at.near(~lit)))
-            gain[rows] = self._many(light, rows)
+            gain[rows] = self.many(light, rows)
         return gain
 
-    def _width(self, part: slice) -> Array:
+    def farthest(self, part: slice) -> Array:
+        """Return (r, 3) float64: the points of footprints that are farthest from their centers."""
+        return self.points(part)[np.arange(part.stop - part.start), self._farthest[part]]
+
+    def width(self, part: slice) -> Array:
         """Return (r,) how far a footprint reaches from its center, twice: about its width [m]."""
         return np.asarray(2.0 * np.sqrt((self._apart[part] ** 2).sum(axis=2).max(axis=1)))
 
-    def _varying(self, light: Lamp | EmitterGroup, rows: Array) -> Array:
-        """Return (r,) the mean gain at some rows, over which it varies."""
-        each = self._gains(light, rows, self.points(rows))
-        mean = each.mean(axis=1)
-        uneven = np.flatnonzero(each.std(axis=1) > UNEVEN * mean)
-        mean[uneven] = self._many(light, rows[uneven])
-        return np.asarray(mean)
-
-    def _many(self, light: Lamp | EmitterGroup, rows: Array) -> Array:
+    def many(self, light: Lamp | EmitterGroup, rows: Array) -> Array:
         """Return (r,) the mean gain at some rows, by many points of each."""
         mean = np.empty(len(rows))
         step = CHUNK_POINTS // MORE_GAINS * SPREAD
@@ -175,11 +147,47 @@ class SpreadPoints:
             some = rows[start : start + step]
             unit = stratified_square(self.at.keys[some], MORE_GAINS, self._seed)
             assert self.at.sampler is not None
-            mean[start : start + step] = self._gains(light, some, self.at.sampler(some, unit)).mean(axis=1)
+            mean[start : start + step] = self.gains(light, some, self.at.sampler(some, unit)).mean(axis=1)
         return mean
 
-    def _gains(self, light: Lamp | EmitterGroup, rows: Array, points: Array) -> Array:
+    def gains(self, light: Lamp | EmitterGroup, rows: Array, points: Array) -> Array:
         """Return (r, k) the gain at (r, k, 3) points of some rows' footprints."""
         count = points.shape[1]
         gain = light.unit_irradiance(points.reshape(-1, 3), np.repeat(self.at.normals[rows], count, axis=0))
         return np.asarray(gain.reshape(-1, count))
+
+
+def _spread(at: Footprints, sampler: Sampler, seed: int, part: slice) -> tuple[Array, Array]:
+    """Return (r, k, 3) points of footprints from their centers, and (r,) which is farthest."""
+    rows = np.arange(part.start, part.stop)
+    points = sampler(rows, stratified_square(at.keys[part], SPREAD, seed))
+    apart = points - at.points[part, None]
+    return apart, (apart**2).sum(axis=2).argmax(axis=1)
+
+
+def _at_centers(
+    spread: SpreadPoints, light: Lamp | EmitterGroup, least: float, part: slice
+) -> tuple[Array, Array, Array]:
+    """Return (r,) the gain at centers, whether it varies over the footprint, and whether an edge does."""
+    at = spread.at
+    normals = at.normals[part]
+    own = light.unit_irradiance(at.points[part], normals)
+    varies, jump = np.zeros((2, len(own)), dtype=bool)
+    if at.sampler is not None:
+        if isinstance(light, EmitterGroup) and least:
+            varies = (own > least) | light.beside(at.points[part], spread.width(part))
+        else:
+            other = light.unit_irradiance(spread.farthest(part), normals)
+            varies = np.abs(other - own) > SAME_GAIN * np.maximum(own, other)
+            jump = np.abs(other - own) > EDGE * np.maximum(own, other)
+    return own, varies, jump
+
+
+def _varying(spread: SpreadPoints, light: Lamp | EmitterGroup, bent: Array, part: slice) -> Array:
+    """Return (r,) the mean gain at rows over which it varies."""
+    rows = bent[part]
+    each = spread.gains(light, rows, spread.points(rows))
+    mean = each.mean(axis=1)
+    uneven = np.flatnonzero(each.std(axis=1) > UNEVEN * mean)
+    mean[uneven] = spread.many(light, rows[uneven])
+    return np.asarray(mean)

@@ -14,7 +14,7 @@ from .element_lookup import ElementLookup
 from .final_gather import Gathered, Gathering
 from .footprints import Footprints
 from .hit_numbers import Resolver
-from .retracing import Before, Retracing
+from .retracing import Before, retrace
 
 
 class Gather:
@@ -45,11 +45,9 @@ class Gather:
         into (n, rays) int32: Takes the sources, if given.
         """
         gathering = self._gathering(points, surface_normals, rays, resolve)
-        if into is not None:
-            gathering.sources = into
         if irradiance is None:
-            return gathering.trace(None, np.zeros(len(points)), progress)
-        return gathering.trace(self._bright, irradiance, progress)
+            return gathering.trace(None, np.zeros(len(points)), into, progress)
+        return gathering.trace(self.bright_elements, irradiance, into, progress)
 
     def again_at(
         self,
@@ -65,20 +63,21 @@ class Gather:
         Parameters are those of `at`; `before` is what the same rays met.
         """
         rays = before.gathered.sources.shape[1]
-        retracing = Retracing(self._gathering(points, surface_normals, rays, resolve), before)
+        gathering = self._gathering(points, surface_normals, rays, resolve)
         if irradiance is None:
-            return retracing.trace(None, np.zeros(len(points)), progress)
-        return retracing.trace(self._bright, irradiance, progress)
+            return retrace(gathering, before, None, np.zeros(len(points)), progress)
+        return retrace(gathering, before, self.bright_elements, irradiance, progress)
 
     @property
     def bright(self) -> Array:
         """(e,) bool: the elements that rays are aimed at."""
         found = np.zeros(self._elements.hierarchy.n_elements, dtype=bool)
-        found[self._bright.element] = True
+        found[self.bright_elements.element] = True
         return found
 
     @cached_property
-    def _bright(self) -> BrightElements:
+    def bright_elements(self) -> BrightElements:
+        """What rays are aimed at, in proportion to what it sends."""
         return BrightElements(self._elements.hierarchy, self._elements.reflected(), self._unshadowed)
 
     def _unshadowed(self, points: Array, normals: Array) -> Array:

@@ -1,4 +1,4 @@
-"""What points get of each light apart, per unit of its strength: kept, it lights them anew without rays."""
+"""What points get of each light apart, per unit of its strength: kept, it relights them without rays."""
 
 from __future__ import annotations
 

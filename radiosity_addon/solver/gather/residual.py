@@ -13,10 +13,15 @@ the hemisphere (`Residual.by_rays`, for any).
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
+
 import numpy as np
 
 from ...form_factors import point_to_polygon
-from ...numerics import Array, for_chunks, points_at, split_in_four, weights_at
+from ...numerics import Array, fill_chunks, points_at, split_in_four, weights_at
+from ...rays import RayCaster
 from ..equations import corner_factors, visible_share
 from ..links import lamp_irradiance
 from ..state import SolverState
@@ -167,37 +172,50 @@ class Residual:
         leaf, values = basis.leaf[lit], self._values[basis.corner[lit]]
         corners, leaf_normals = hierarchy.corners[leaf], hierarchy.normal[leaf]
         total = np.zeros((len(points), 3))
-
-        def add(rows: slice) -> None:
-            point, source = np.divmod(np.arange((rows.stop - rows.start) * len(lit)), len(lit))
-            point += rows.start
-            above = np.einsum("nk,nk->n", points[point] - corners[source, 0], leaf_normals[source]) > 0
-            point, source = point[above], source[above]
-            factors = self._factors(points[point], normals[point], corners[source], leaf_normals[source])
-            seen = np.flatnonzero(factors.max(axis=1, initial=0.0) > 0)
-            point, source, factors = point[seen], source[seen], factors[seen]
-            pair = point.astype(np.int64) << 32 | lit[source]
-            share = visible_share(
-                state.caster,
-                points[point],
-                normals[point],
-                corners[source],
-                leaf_normals[source],
-                pair,
-                state.settings.seed,
-            )
-            arriving = np.einsum("nc,nck->nk", factors, values[source]) * share[:, None]
-            for channel in range(3):
-                total[rows, channel] = np.bincount(
-                    point - rows.start, arriving[:, channel], minlength=rows.stop - rows.start
-                )
-
         if len(lit):
-            for_chunks(add, len(points), max(CHUNK_PAIRS // len(lit), 1), state.settings.threads)
+            factors = _constant_factors if basis.is_constant else corner_factors
+            elements = _LitElements(lit, corners, leaf_normals, values)
+            add = partial(_sent_by, elements, factors, state.caster, points, normals, state.settings.seed)
+            fill_chunks(add, total, len(points), max(CHUNK_PAIRS // len(lit), 1), state.settings.threads)
         return total
 
-    def _factors(self, points: Array, normals: Array, corners: Array, leaf_normals: Array) -> Array:
-        """Return (n, 3) the share of the factor from points to elements of each corner's unknown."""
-        if self._basis.is_constant:
-            return np.repeat(point_to_polygon(points, normals, corners)[:, None] / 3.0, 3, axis=1)
-        return corner_factors(points, normals, corners, leaf_normals)
+
+class _LitElements(NamedTuple):
+    """Elements that send light: (m,), corners (m, 3, 3), normals (m, 3), and values at corners (m, 3, 3)."""
+
+    number: Array
+    corners: Array
+    normals: Array
+    values: Array
+
+
+def _sent_by(
+    elements: _LitElements,
+    factors_of: Callable[[Array, Array, Array, Array], Array],
+    caster: RayCaster,
+    points: Array,
+    normals: Array,
+    seed: int,
+    rows: slice,
+) -> Array:
+    """Return (r, 3) the irradiance of points by elements [W/m²]."""
+    count = len(elements.number)
+    point, source = np.divmod(np.arange((rows.stop - rows.start) * count), count)
+    point += rows.start
+    along = points[point] - elements.corners[source, 0]
+    above = np.einsum("nk,nk->n", along, elements.normals[source]) > 0
+    point, source = point[above], source[above]
+    factors = factors_of(points[point], normals[point], elements.corners[source], elements.normals[source])
+    seen = np.flatnonzero(factors.max(axis=1, initial=0.0) > 0)
+    point, source, factors = point[seen], source[seen], factors[seen]
+    pair = point.astype(np.int64) << 32 | elements.number[source]
+    corners, leaf_normals = elements.corners[source], elements.normals[source]
+    share = visible_share(caster, points[point], normals[point], corners, leaf_normals, pair, seed)
+    arriving = np.einsum("nc,nck->nk", factors, elements.values[source]) * share[:, None]
+    own, points_here = point - rows.start, rows.stop - rows.start
+    return np.stack([np.bincount(own, of, minlength=points_here) for of in arriving.T], axis=1)
+
+
+def _constant_factors(points: Array, normals: Array, corners: Array, _: Array) -> Array:
+    """Return (n, 3) a third of the factor from points to elements, for each corner."""
+    return np.repeat(point_to_polygon(points, normals, corners)[:, None] / 3.0, 3, axis=1)

@@ -6,6 +6,8 @@ Rays depend on their point's key, their number and the seed alone, so any of the
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,7 +20,7 @@ from .final_gather import CHUNK_RAYS, Gathered, Gathering
 from .hit_numbers import UNNUMBERED
 
 RENEWED = 0.3
-"""A point whose closeness falls by more than this part is gathered from anew: what single rays take off
+"""A point whose closeness falls by more than this part is gathered again: what single rays take off
 a sum that a few very short ones dominate may leave anything, even less than nothing."""
 
 
@@ -66,90 +68,113 @@ class Before:
     hosts: Array
 
 
-class Retracing:
-    """Traces again what the boxes touch.
+def retrace(
+    gathering: Gathering,
+    before: Before,
+    bright: BrightElements | None,
+    irradiance: Array,
+    progress: Progress = SILENT,
+) -> Gathered:
+    """Trace again what the boxes touch. Parameters as of `Gathering.trace`.
 
     Which bright elements a point aims at decides what its other rays leave out. So where an aimed ray is
-    touched, or another one meets a bright element now, the point is gathered from anew as a whole.
+    touched, or another one meets a bright element now, the point is gathered again as a whole.
 
-    Parameters
-    ----------
-    gathering : Gathering
-        Of the same points, rays and seed as before.
-    before : Before
+    gathering: Of the same points, rays and seed as before.
+    """
+    sources, closeness = before.gathered.sources.copy(), before.gathered.closeness.copy()
+    count, rays = sources.shape
+    aimed = before.gathered.aimed
+    whole, aims = np.zeros((2, count), dtype=bool)
+    aims[aimed.row] = True
+    aims_past = _aims_past_boxes(gathering, before)
+    again = partial(_retrace, gathering, before, bright, irradiance, aims, aims_past)
+    new: list[AimedRays] = []
+    for _, found in map_chunks(again, count, max(CHUNK_RAYS // rays, 1), gathering.threads, progress):
+        if found is None:
+            continue
+        sources[found.row, found.ray] = found.sources
+        np.add.at(closeness, found.row, found.nearer)
+        whole[found.whole] = True
+        sources[found.whole], closeness[found.whole] = found.gathered.sources, found.gathered.closeness
+        rays_aimed = found.gathered.aimed
+        new.append(replace(rays_aimed, row=found.whole[rays_aimed.row]))
+    parts = [aimed.entries(~whole[aimed.row]), *new]
+    return Gathered(sources, closeness, AimedRays.joined(parts, [0] * len(parts)))
+
+
+class _Retraced(NamedTuple):
+    """What changes at points.
+
+    row, ray (c,) int: Rays that meet something else now; `sources` (c,) and how much `nearer` (c,) that is.
+    whole (w,) int: Points that are gathered from anew, and what they `gathered`.
     """
 
-    def __init__(self, gathering: Gathering, before: Before) -> None:
-        self._gathering, self._before = gathering, before
-        gathering.take_up(before.gathered)
+    row: Array
+    ray: Array
+    sources: Array
+    nearer: Array
+    whole: Array
+    gathered: Gathered
 
-    def trace(
-        self, bright: BrightElements | None, irradiance: Array, progress: Progress = SILENT
-    ) -> Gathered:
-        """Trace what is touched. Parameters as of `Gathering.trace`."""
-        before, gathering = self._before, self._gathering
-        count, rays = before.gathered.sources.shape
-        whole = np.zeros(count, dtype=bool)
-        aims = np.zeros(count, dtype=bool)
-        aims[before.gathered.aimed.row] = True
-        aims_past = self._aims_past_boxes(count)
 
-        def trace(part: slice) -> AimedRays | None:
-            rows = np.arange(part.start, part.stop)
-            stale = before.gathered.sources[rows] == UNNUMBERED
-            asked = stale.any(axis=1) | aims_past[rows]
-            points, normals = gathering.planes(rows)
-            asked |= before.moved.boxes.above(points, normals, before.widen[rows])
-            rows, stale = rows[asked], stale[asked]
-            if len(rows) == 0:
-                return None
-            directions, upward = gathering.directions(rows)
-            points, _ = gathering.planes(rows)
-            touched = before.moved.boxes.met_by(points, directions, before.widen[rows])
-            touched = (touched | stale) & upward
-            past = aims_past[rows]
-            touched[past] = False
-            row, ray = np.nonzero(touched)
-            changed, hits, nearer = gathering.trace_again(
-                rows[row],
-                ray,
-                directions=directions[row, ray],
-                stale=stale[row, ray],
-                casters=(before.moved.alone, before.moved.before),
-            )
-            past[row[changed[gathering.on_any(before.bright, before.hosts, hits)]]] = True
-            closer = np.bincount(row[changed], nearer, minlength=len(rows))
-            renewed = -closer > RENEWED * before.gathered.closeness[rows]
-            again, shares = rows[past | renewed], None
-            if bright is not None and len(bright) and len(again):
-                shares = gathering.shares(again, bright, irradiance)
-                wanted = aims[again] | shares.any(axis=1) | renewed[past | renewed]
-                again, shares = again[wanted], shares[wanted]
-            else:
-                again = rows[renewed | (past & aims[rows])]
-            if len(again) == 0:
-                return None
-            whole[again] = True
-            found = gathering.trace_rows(again, bright, shares)
-            return None if found is None else replace(found, row=again[found.row])
+def _retrace(
+    gathering: Gathering,
+    before: Before,
+    bright: BrightElements | None,
+    irradiance: Array,
+    aims: Array,
+    aims_past: Array,
+    part: slice,
+) -> _Retraced | None:
+    """Trace again what is touched of a run of points.
 
-        chunks = map_chunks(trace, count, max(CHUNK_RAYS // rays, 1), gathering.threads, progress)
-        new = [found for _, found in chunks if found is not None]
-        aimed = before.gathered.aimed
-        kept = aimed.entries(~whole[aimed.row])
-        parts = [kept, *new]
-        return gathering.gathered(AimedRays.joined(parts, [0] * len(parts)))
+    aims, aims_past (g,) bool: Which points aim rays, and which such that a box may stop.
+    """
+    rows = np.arange(part.start, part.stop)
+    stale = before.gathered.sources[rows] == UNNUMBERED
+    asked = stale.any(axis=1) | aims_past[rows]
+    asked |= before.moved.boxes.above(*gathering.planes(rows), before.widen[rows])
+    rows, stale = rows[asked], stale[asked]
+    if len(rows) == 0:
+        return None
+    directions, upward = gathering.directions(rows)
+    points, _ = gathering.planes(rows)
+    touched = before.moved.boxes.met_by(points, directions, before.widen[rows])
+    touched = (touched | stale) & upward
+    past = aims_past[rows]
+    touched[past] = False
+    row, ray = np.nonzero(touched)
+    changed, sources, hits, nearer = gathering.trace_again(
+        rows[row],
+        ray,
+        directions=directions[row, ray],
+        stale=stale[row, ray],
+        casters=(before.moved.alone, before.moved.before),
+    )
+    past[row[changed[gathering.on_any(before.bright, before.hosts, hits)]]] = True
+    closer = np.bincount(row[changed], nearer, minlength=len(rows))
+    renewed = -closer > RENEWED * before.gathered.closeness[rows]
+    whole, shares = rows[past | renewed], None
+    if bright is not None and len(bright) and len(whole):
+        shares = gathering.shares(whole, bright, irradiance)
+        wanted = aims[whole] | shares.any(axis=1) | renewed[past | renewed]
+        whole, shares = whole[wanted], shares[wanted]
+    else:
+        whole = rows[renewed | (past & aims[rows])]
+    gathered = gathering.trace_rows(whole, bright, shares)
+    return _Retraced(rows[row[changed]], ray[changed], sources, nearer, whole, gathered)
 
-    def _aims_past_boxes(self, count: int) -> Array:
-        """Return (g,) which points aim rays that a box may stop, or might have stopped."""
-        before = self._before
-        row = before.gathered.aimed.row
-        found = np.zeros(count, dtype=bool)
-        if len(row) == 0:
-            return found
-        points, _ = self._gathering.planes(row)
-        middle, half = before.aimed_at
-        along = middle - points[:, None]
-        found[row] = before.moved.boxes.met_by_fans(points, along, half, before.widen[row]).any(axis=1)
-        found[row] |= (before.gathered.aimed.sources == UNNUMBERED).any(axis=1)
+
+def _aims_past_boxes(gathering: Gathering, before: Before) -> Array:
+    """Return (g,) which points aim rays that a box may stop, or might have stopped."""
+    row = before.gathered.aimed.row
+    found = np.zeros(len(before.gathered.sources), dtype=bool)
+    if len(row) == 0:
         return found
+    points, _ = gathering.planes(row)
+    middle, half = before.aimed_at
+    along = middle - points[:, None]
+    found[row] = before.moved.boxes.met_by_fans(points, along, half, before.widen[row]).any(axis=1)
+    found[row] |= (before.gathered.aimed.sources == UNNUMBERED).any(axis=1)
+    return found

@@ -7,11 +7,13 @@ by k^(3/4), so rays as the 4/5th power of the lamps' parts leave the least noise
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from ...base import SILENT, Progress
 from ...lights import Lamp
-from ...numerics import Array, Stream, for_chunks, marked, row_numbers, stratified_square, tiles
+from ...numerics import Array, Stream, fill_chunks, marked, row_numbers, stratified_square, tiles
 from ...rays import RayCaster
 from ..emitters import EmitterGroup
 from .footprints import Footprints, SpreadPoints
@@ -84,7 +86,6 @@ class ShadowShare:
             if len(rows) == 0:
                 break
             open_rows[rows] = False
-            self._lit[rows] = self._total[rows] = 0.0
             self._shadow(rows, many, turn)
             if near is None:
                 break
@@ -101,7 +102,7 @@ class ShadowShare:
         return np.asarray(self._lit[rows] / np.where(total > 0, total, 1.0))
 
     def _shadow(self, rows: Array, counts: Array, progress: Progress) -> None:
-        """Add `counts[row]` shadow rays a row to the sums of unblocked and of all weights."""
+        """Ask `counts[row]` shadow rays a row, in place of those asked before."""
         each = counts[rows]
         total, done = max(int(each.sum()), 1), 0
         for count in np.unique(each):
@@ -110,48 +111,57 @@ class ShadowShare:
             self._shadow_alike(some, int(count), progress.part(before / total, done / total))
 
     def _shadow_alike(self, rows: Array, count: int, progress: Progress) -> None:
-        """Add `count` shadow rays a row."""
-        at, caster = self._at, self._caster
+        """Ask `count` shadow rays a row."""
+        trace = partial(_shadowed, self._spread, self._light, self._caster, rows, count, self._seed)
+        into, chunk = (self._lit, self._total), max(CHUNK_RAYS // count, 1)
+        fill_chunks(trace, into, len(rows), chunk, self._threads, progress, at=rows)
 
-        def trace(part: slice) -> None:
-            chunk = rows[part]
-            center, normal = at.points[chunk], at.normals[chunk]
-            unit = stratified_square(at.keys[chunk], count, self._seed + Stream.SHADOW_RAYS)
-            directions, distances, weights = self._light.shadow_rays(center, normal, unit)
-            # The edge of a spot's cone may cross a footprint and leave its center dark: then all count alike.
-            weights = np.where(weights.any(axis=1, keepdims=True), weights, 1.0)
-            start = center[:, None]
-            if at.sampler is not None:
-                # The same lamp points, seen from points spread over the footprint.
-                start = self._starts(chunk, count)
-                finite = np.isfinite(distances)
-                reach = np.where(finite, distances, 1.0)[..., None]
-                along = np.where(
-                    finite[..., None], directions * reach - (start - center[:, None]), directions
-                )
-                length = np.sqrt(np.einsum("rkc,rkc->rk", along, along))
-                directions = along / np.maximum(length, 1e-300)[..., None]
-                distances = np.where(finite, length, np.inf)
-            if at.lift is not None:
-                start = at.lift(chunk, np.broadcast_to(start, directions.shape), directions)
-            start = np.broadcast_to(start + caster.surface_offset * normal[:, None], directions.shape)
-            point, sample = np.nonzero(weights > 0)
-            ray = (point, sample)
-            free = caster.passing(start[ray], directions[ray], distances[ray])
-            self._lit[chunk] += np.bincount(point, free * weights[ray], minlength=len(chunk))
-            self._total[chunk] += weights.sum(axis=1)
 
-        for_chunks(trace, len(rows), max(CHUNK_RAYS // count, 1), self._threads, progress)
+def _shadowed(
+    spread: SpreadPoints,
+    light: Lamp | EmitterGroup,
+    caster: RayCaster,
+    rows: Array,
+    count: int,
+    seed: int,
+    part: slice,
+) -> tuple[Array, Array]:
+    """Return (r,) the sums of unblocked and of all weights of `count` shadow rays a row."""
+    at, chunk = spread.at, rows[part]
+    center, normal = at.points[chunk], at.normals[chunk]
+    unit = stratified_square(at.keys[chunk], count, seed + Stream.SHADOW_RAYS)
+    directions, distances, weights = light.shadow_rays(center, normal, unit)
+    # The edge of a spot's cone may cross a footprint and leave its center dark: then all count alike.
+    weights = np.where(weights.any(axis=1, keepdims=True), weights, 1.0)
+    start = center[:, None]
+    if at.sampler is not None:
+        # The same lamp points, seen from points spread over the footprint.
+        start = _starts(spread, chunk, count, seed)
+        finite = np.isfinite(distances)
+        reach = np.where(finite, distances, 1.0)[..., None]
+        along = np.where(finite[..., None], directions * reach - (start - center[:, None]), directions)
+        length = np.sqrt(np.einsum("rkc,rkc->rk", along, along))
+        directions = along / np.maximum(length, 1e-300)[..., None]
+        distances = np.where(finite, length, np.inf)
+    if at.lift is not None:
+        start = at.lift(chunk, np.broadcast_to(start, directions.shape), directions)
+    start = np.broadcast_to(start + caster.surface_offset * normal[:, None], directions.shape)
+    point, sample = np.nonzero(weights > 0)
+    ray = (point, sample)
+    free = caster.passing(start[ray], directions[ray], distances[ray])
+    lit = np.bincount(point, free * weights[ray], minlength=len(chunk))
+    return lit, weights.sum(axis=1)
 
-    def _starts(self, rows: Array, count: int) -> Array:
-        """Return (r, count, 3) float64 points of the footprints of some rows."""
-        at = self._at
-        if count <= self._spread.count:
-            return self._spread.points(rows)[:, :count]
-        assert at.sampler is not None
-        some = min(count, STARTS)
-        starts = at.sampler(rows, stratified_square(at.keys[rows], some, self._seed + Stream.SHADOW_STARTS))
-        return np.asarray(starts[:, np.arange(count) * some // count])
+
+def _starts(spread: SpreadPoints, rows: Array, count: int, seed: int) -> Array:
+    """Return (r, count, 3) float64 points of the footprints of some rows."""
+    at = spread.at
+    if count <= spread.count:
+        return spread.points(rows)[:, :count]
+    assert at.sampler is not None
+    some = min(count, STARTS)
+    starts = at.sampler(rows, stratified_square(at.keys[rows], some, seed + Stream.SHADOW_STARTS))
+    return np.asarray(starts[:, np.arange(count) * some // count])
 
 
 def _is_partial(share: Array) -> Array:

@@ -13,10 +13,12 @@ mean over them. Without that a wall that is brighter far up would light the floo
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import partial
 
 import numpy as np
 
-from ...numerics import Array, for_chunks
+from ...numerics import Array, fill_chunks
+from ...scene import Faces
 from ..hierarchy import ClusterCut, Hierarchy
 
 TERMS = 7
@@ -136,16 +138,9 @@ class _ClusterGather:
                 )
                 at_rows[self._slanted_rows, channel, 6] -= np.add.reduceat(slanted, self._slanted_first)
         pushed = self._cut.push(at_rows.reshape(-1, channels * TERMS))
-        faces = self._faces
-        irradiance = np.empty((len(faces), channels))
-
-        def arrive(rows: slice) -> None:
-            basis = np.ones((rows.stop - rows.start, TERMS))
-            basis[:, :3], basis[:, 3:6] = faces.normal[rows], faces.center[rows]
-            terms = pushed.take(self._cut.row_of_face[rows], axis=0).reshape(-1, channels, TERMS)
-            np.einsum("fct,ft->fc", terms, basis, out=irradiance[rows])
-
-        for_chunks(arrive, len(faces), CHUNK, threads)
+        irradiance = np.empty((len(self._faces), channels))
+        arrive = partial(_arriving, self._faces, pushed, self._cut.row_of_face)
+        fill_chunks(arrive, irradiance, len(irradiance), CHUNK, threads)
         return irradiance
 
     def _moments(self, radiosity: Array) -> list[Array]:
@@ -155,6 +150,14 @@ class _ClusterGather:
         moment = np.zeros((self._cut.n_rows, 3))
         moment[self._held_row] = sums / self._area - self._center * radiosity[self._held, None]
         return [np.ascontiguousarray(along) for along in moment.T]
+
+
+def _arriving(faces: Faces, pushed: Array, row_of_face: Array, rows: slice) -> Array:
+    """Return (r, k) what arrives at faces by the terms of their clusters."""
+    basis = np.ones((rows.stop - rows.start, TERMS))
+    basis[:, :3], basis[:, 3:6] = faces.normal[rows], faces.center[rows]
+    terms = pushed.take(row_of_face[rows], axis=0).reshape(len(basis), -1, TERMS)
+    return np.einsum("fct,ft->fc", terms, basis)
 
 
 def _runs(sorted_rows: Array) -> tuple[Array, Array]:

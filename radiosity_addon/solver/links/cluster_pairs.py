@@ -13,6 +13,8 @@ vector is kept, and the rest of the mean goes to all faces evenly.
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from ...base import SILENT, Progress
@@ -65,17 +67,9 @@ def measure_cluster_links(
     ):
         rows = np.flatnonzero(chosen)
         samples = FAR_SAMPLES if kind in ("far", "wide") else NEAR_SAMPLES
-
-        def measure(
-            piece: slice,
-            rows: Array = rows,
-            kind: str = kind,
-            samples: int = samples,
-        ) -> ClusterLinks:
-            chosen_pairs = rows[piece]
-            pairs = _ClusterPairs(hierarchy, receiver[chosen_pairs], source[chosen_pairs], samples, seed)
-            return pairs.links(caster, kind)
-
+        measure = partial(
+            _links_of_kind, hierarchy, caster, receiver[rows], source[rows], kind, samples, seed
+        )
         chunks = map_chunks(measure, len(rows), CHUNK_SAMPLES // samples, threads, progress)
         result += [links for _, links in chunks]
     return join_cluster_links(result)
@@ -87,6 +81,19 @@ of such a cluster n·v is below 0, and would eat up what arrives there from else
 
 LEAST_SQUARE = 0.01
 """Of a mean normal: faces that look different ways may have next to none to go by."""
+
+
+def _links_of_kind(
+    hierarchy: Hierarchy,
+    caster: RayCaster,
+    receiver: Array,
+    source: Array,
+    kind: str,
+    samples: int,
+    seed: int,
+    rows: slice,
+) -> ClusterLinks:
+    return _ClusterPairs(hierarchy, receiver[rows], source[rows], samples, seed).links(caster, kind)
 
 
 class _ClusterPairs:

@@ -12,6 +12,7 @@ also carries an *error estimate*: how much its F·V may vary or be wrong.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -109,20 +110,14 @@ def measure_links(
     threads: 0 means all cores; the links do not depend on it.
     Returns links: At most n.
     """
-
-    def measure(rows: slice) -> Links:
-        return _measure_chunk(hierarchy, caster, receiver[rows], source[rows], seed)
-
+    measure = partial(_measure_chunk, hierarchy, caster, receiver, source, seed)
     return join([links for _, links in map_chunks(measure, len(receiver), CHUNK, threads, progress)])
 
 
 def _measure_chunk(
-    hierarchy: Hierarchy,
-    caster: RayCaster,
-    receiver: Array,
-    source: Array,
-    seed: int,
+    hierarchy: Hierarchy, caster: RayCaster, receiver: Array, source: Array, seed: int, rows: slice
 ) -> Links:
+    receiver, source = receiver[rows], source[rows]
     is_cluster = source < hierarchy.n_clusters
     factor = np.zeros(len(receiver))
     single = np.flatnonzero(~is_cluster)

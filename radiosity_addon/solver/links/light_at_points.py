@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
 from ...lights import EnvironmentLight, Lamp, Light
-from ...numerics import LIGHT_STEP, Array, Stream, for_chunks, irradiance_under_sky, stratified_square
+from ...numerics import LIGHT_STEP, Array, Stream, fill_chunks, irradiance_under_sky, stratified_square
 from ...rays import RayCaster
 from .light_links import lamp_light, sky_share
 
@@ -29,24 +30,29 @@ def lamp_irradiance(
 
     points, normals (n, 3): On surfaces; unit normals.
     """
-    total = np.zeros((len(points), 3))
+    total = np.empty((len(points), 3))
+    add = partial(_irradiance, lights, points, normals, caster, seed)
+    fill_chunks(add, total, len(points), CHUNK, threads)
+    return total
 
-    def add(rows: slice) -> None:
-        keys, facing = np.arange(rows.start, rows.stop), normals[rows]
-        gain: Array
-        for number, light in enumerate(lights):
-            own_seed = seed + LIGHT_STEP * number
-            if isinstance(light, EnvironmentLight):
-                share, _ = sky_share(light, points[rows], facing, SKY_RAYS, caster, keys, own_seed)
-                gain = irradiance_under_sky(1.0) * share
-            elif isinstance(light, Lamp):
-                repeated = np.repeat(points[rows, None], SHADOW_RAYS, axis=1)
-                unit = stratified_square(keys, SHADOW_RAYS, own_seed + Stream.LIGHT_RAYS)
-                open_gain, share = lamp_light(light, repeated, facing, unit, caster)
-                gain = open_gain[:, 0] * share
-            else:
-                continue
-            total[rows] += gain[:, None] * light.strength
 
-    for_chunks(add, len(points), CHUNK, threads)
+def _irradiance(
+    lights: Sequence[Light], points: Array, normals: Array, caster: RayCaster, seed: int, rows: slice
+) -> Array:
+    keys, facing = np.arange(rows.start, rows.stop), normals[rows]
+    total = np.zeros((len(keys), 3))
+    gain: Array
+    for number, light in enumerate(lights):
+        own_seed = seed + LIGHT_STEP * number
+        if isinstance(light, EnvironmentLight):
+            share, _ = sky_share(light, points[rows], facing, SKY_RAYS, caster, keys, own_seed)
+            gain = irradiance_under_sky(1.0) * share
+        elif isinstance(light, Lamp):
+            repeated = np.repeat(points[rows, None], SHADOW_RAYS, axis=1)
+            unit = stratified_square(keys, SHADOW_RAYS, own_seed + Stream.LIGHT_RAYS)
+            open_gain, share = lamp_light(light, repeated, facing, unit, caster)
+            gain = open_gain[:, 0] * share
+        else:
+            continue
+        total += gain[:, None] * light.strength
     return total

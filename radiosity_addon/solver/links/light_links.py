@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from ...numerics import (
     Array,
     Stream,
     cosine_hemisphere,
-    for_chunks,
+    fill_chunks,
     irradiance_under_sky,
     points_on_triangles,
     split_in_four,
@@ -198,20 +199,28 @@ def measure_light(
         (small & ~tiny, 4, SMALL_DIVISOR),
         (tiny, 1, SMALL_DIVISOR),
     ):
-        rows_of = np.flatnonzero(chosen)
-
-        def measure(
-            piece: slice, rows_of: Array = rows_of, pieces: int = pieces, divisor: int = divisor
-        ) -> None:
-            rows = rows_of[piece]
-            asked = _pieces(hierarchy, elements[rows], pieces)
-            if isinstance(light, EnvironmentLight):
-                gain[rows], error[rows] = _measure_sky(asked, light, caster, seed, divisor)
-            else:
-                gain[rows], error[rows] = _measure_lamp(asked, light, caster, seed, divisor)
-
-        for_chunks(measure, len(rows_of), CHUNK, threads, progress.part(0.0, 0.0))
+        rows = np.flatnonzero(chosen)
+        measure = partial(_measure, hierarchy, light, caster, elements[rows], pieces, divisor, seed)
+        part = progress.part(0.0, 0.0)
+        fill_chunks(measure, (gain, error), len(rows), CHUNK, threads, part, at=rows)
     return gain, error
+
+
+def _measure(
+    hierarchy: Hierarchy,
+    light: Lamp | EnvironmentLight,
+    caster: RayCaster,
+    elements: Array,
+    pieces: int,
+    divisor: int,
+    seed: int,
+    rows: slice,
+) -> tuple[Array, Array]:
+    """Measure one light on elements, whole or in four pieces (see `measure_light`)."""
+    asked = _pieces(hierarchy, elements[rows], pieces)
+    if isinstance(light, EnvironmentLight):
+        return _measure_sky(asked, light, caster, seed, divisor)
+    return _measure_lamp(asked, light, caster, seed, divisor)
 
 
 @dataclass(frozen=True)

@@ -64,14 +64,14 @@ turns = Turns()
 
 def slow_down():
     """Give everybody time to look at every shot."""
-    picture = pipeline._picture
+    picture = pipeline.Picture
 
-    def slowly(state):
+    def slowly(*arrays):
         turns.next_picture()
         time.sleep(SECONDS_A_PICTURE)
-        return picture(state)
+        return picture(*arrays)
 
-    pipeline._picture = slowly
+    pipeline.Picture = slowly
     pipeline.PICTURE_SECONDS = 0.0
 
 

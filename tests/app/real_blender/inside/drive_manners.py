@@ -48,15 +48,15 @@ class FOREIGN_OT_ticking(bpy.types.Operator):  # noqa: N801 (Blender's conventio
         return {"PASS_THROUGH"}
 
 
-advance = window_job.WindowJob._advance
+progress_text = window_job.progress_text
 
 
-def counted(self, seconds):
+def counted(running):
     seen["advanced"] += 1
-    return advance(self, seconds)
+    return progress_text(running)
 
 
-window_job.WindowJob._advance = counted
+window_job.progress_text = counted
 
 
 def baking():

@@ -96,19 +96,19 @@ def every_panel(overlay):
     bpy.utils.register_class(PanelAlone)
     yield from events.open_sidebar("Overlays")
     drawn = []
-    draw = overlay_panel._draw_statistics
+    light_on_active = overlay_panel.light_on_active
 
-    def drawing(layout, context):
+    def drawing(context):
         drawn.append(context.active_object.name)
-        draw(layout, context)
+        return light_on_active(context)
 
-    overlay_panel._draw_statistics = drawing
+    overlay_panel.light_on_active = drawing
     for name in OVERLAYS[::-1]:
         overlay.show = name
         yield 0.2
     yield from photograph("overlay-panel.png")
     seen["statistics_of"] = drawn
-    overlay_panel._draw_statistics = draw
+    overlay_panel.light_on_active = light_on_active
     overlay.show = "NONE"
     events.area_3d().spaces.active.show_region_ui = False
     bpy.utils.unregister_class(PanelAlone)

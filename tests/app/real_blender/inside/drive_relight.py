@@ -55,7 +55,7 @@ def not_relighting():
 def resting():
     """Live has nothing left to do."""
     live = module("session.state").session.live
-    return live is not None and not bpy.app.timers.is_registered(module("relight.live_relight")._tick)
+    return live is not None and not live.is_at_work()
 
 
 def note_drawing():

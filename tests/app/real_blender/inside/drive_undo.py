@@ -26,7 +26,7 @@ seen = {"walk": []}
 
 def idle():
     """No bake or relight runs, and no file is on its way."""
-    return not runtime.running.active and not bpy.app.timers.is_registered(versions._tick)
+    return not runtime.running.active and not versions.is_at_work()
 
 
 def invoke(operator):

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from ...base import SILENT, Progress
-from ...numerics import Array, Scratch, for_chunks, tiles
+from ...numerics import Array, Scratch, fill_chunks, map_chunks, tiles
 
 CHUNK_HITS = 1 << 18
 """Hits averaged at once: their values stay in the processor's cache."""
@@ -36,19 +38,14 @@ class Means:
         columns = _columns(table)
         # Where much changed every row sees some of it: to look for those that do not takes as long.
         anew = not self._known or float(changed.mean()) > MUCH
-
-        def average(rows: slice) -> None:
-            seen = self._sources[rows]
-            if anew:
-                self._mean[rows] = _mean_of(columns, seen)
-                return
-            again = np.flatnonzero(changed.take(seen, mode="wrap").any(axis=1))
-            if len(again):
-                self._mean[rows.start + again] = _mean_of(columns, seen[again])
-
-        if anew or changed.any():
-            chunk = max(CHUNK_HITS // max(self._sources.shape[1], 1), 1)
-            for_chunks(average, len(self._sources), chunk, self._threads, progress)
+        chunk = max(CHUNK_HITS // max(self._sources.shape[1], 1), 1)
+        if anew:
+            average = partial(_mean_of_rows, columns, self._sources)
+            fill_chunks(average, self._mean, len(self._sources), chunk, self._threads, progress)
+        elif changed.any():
+            renew = partial(_changed_means, columns, self._sources, changed)
+            for _, (rows, means) in map_chunks(renew, len(self._sources), chunk, self._threads, progress):
+                self._mean[rows] = means
         self._known = True
         return self._mean
 
@@ -69,13 +66,20 @@ def mean_of_sources(
     """Return (g, 3): the mean of the table's rows each gather point saw, by its first `rays` if given."""
     result = by_channel(len(sources), table.shape[1], scratch)
     columns = _columns(table)
-
-    def average(rows: slice) -> None:
-        result[rows] = _mean_of(columns, sources[rows, :rays])
-
-    chunk = max(CHUNK_HITS // max(sources.shape[1] if rays is None else rays, 1), 1)
-    for_chunks(average, len(sources), chunk, threads, progress)
+    sources = sources[:, :rays]
+    chunk = max(CHUNK_HITS // max(sources.shape[1], 1), 1)
+    fill_chunks(partial(_mean_of_rows, columns, sources), result, len(sources), chunk, threads, progress)
     return result
+
+
+def _mean_of_rows(columns: list[Array], sources: Array, rows: slice) -> Array:
+    return _mean_of(columns, sources[rows])
+
+
+def _changed_means(columns: list[Array], sources: Array, changed: Array, rows: slice) -> tuple[Array, Array]:
+    """Return the rows that see something changed, and their means."""
+    again = rows.start + np.flatnonzero(changed.take(sources[rows], mode="wrap").any(axis=1))
+    return again, _mean_of(columns, sources[again])
 
 
 def _columns(table: Array) -> list[Array]:

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from ...numerics import Array
 from ..points import GatherPoints
+from .gather_settings import GatherSettings
 from .hit_table import HitTable, TableRows
-
-if TYPE_CHECKING:
-    from .gather_settings import GatherSettings
 
 
 @dataclass(frozen=True, eq=False)
