@@ -35,7 +35,9 @@ def measure(quality: str, resolution: int, bakes: int, priority: int) -> dict:
     with cornell_window() as (installed, scene):
         if priority:
             os.nice(-priority)
-        return drive(installed, scene, "drive_frames.py", WINDOW, quality, str(resolution), str(bakes))
+        return installed.drive(
+            "drive_frames.py", scene, "window", quality, str(resolution), str(bakes), size=WINDOW
+        )
 
 
 @contextmanager
@@ -55,20 +57,6 @@ def cornell_window() -> Iterator[tuple[Installed, Path]]:
         scene = folder / "cornell.blend"
         _must(installed.script("save_cornell_box.py", scene))
         yield installed, scene
-
-
-def drive(installed: Installed, scene: Path, script: str, window: tuple[str, str], *words: str) -> dict:
-    """Run a script of `inside/` in a window and return its answer."""
-    answer = scene.with_name("answer.json")
-    command = [scene, "--enable-event-simulate", "--window-geometry", "0", "0", *window]
-    command += ["--python", installed.folder / script, "--", answer, *words]
-    done = installed.run(*command, window=True, timeout=1200)
-    if not answer.exists():
-        sys.exit(done.stdout)
-    seen: dict = json.loads(answer.read_text())
-    if seen["failure"] or "Traceback" in done.stdout:
-        sys.exit(f"{seen['failure']}\n{done.stdout}")
-    return seen
 
 
 def _must(done: subprocess.CompletedProcess[str]) -> None:

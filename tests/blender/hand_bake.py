@@ -22,6 +22,9 @@ TEXEL = (0.25, 0.5, 3.0)
 BASE = (0.5, 0.25, 0.75)
 """The base color of `principled_material`."""
 
+SMALL = 32
+"""Default resolution: evaluated materials get pictures of a few times its size, pages made by hand do not."""
+
 SOLVER = {
     "elements": 8, "links": 12, "rays": 345, "iterations": 3, "residual": 1e-4,
     "power_W": {"emitted": 1.0, "absorbed": 0.75, "escaped": 0.25}, "closure_area_mean": 0.998,
@@ -52,7 +55,7 @@ def bake_by_hand(
 
     `failing` is raised once the lightmaps are shown.
     """
-    wanted = BakeSettings(**settings)
+    wanted = BakeSettings(**{"resolution": SMALL, **settings})
     with originals_shown(bpy.context):
         export = export_scene(bpy.context, wanted)
     result = hand_result(export, colors)

@@ -17,7 +17,7 @@ from radiosity_addon.blender.images.node_group import GROUP_NAME
 from radiosity_addon.blender.scene_export.export import export_scene
 from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.file_dump import differences, dump_file
-from tests.blender.hand_bake import add_plane, bake_by_hand, hand_result, principled_material
+from tests.blender.hand_bake import SMALL, add_plane, bake_by_hand, hand_result, principled_material
 from tests.blender.zoo import build_zoo
 
 pytestmark = pytest.mark.usefixtures("record")
@@ -91,10 +91,10 @@ def test_materials_linked_to_the_object_are_the_ones_copied() -> None:
 def test_stand_ins_stand_where_the_instances_were(tmp_path: Path) -> None:
     """World-space corners of all that is rendered, before and after, sheared instances included."""
     build_zoo(bpy.context)
-    export = export_scene(bpy.context, BakeSettings())
+    export = export_scene(bpy.context, BakeSettings(resolution=SMALL))
     before = export.bake_scene.scene
     bake_by_hand(folder=tmp_path)
-    after = export_scene(bpy.context, BakeSettings()).bake_scene.scene
+    after = export_scene(bpy.context, BakeSettings(resolution=SMALL)).bake_scene.scene
 
     def soup(scene: object) -> np.ndarray:
         """Corners in an order that does not depend on the objects', winding kept."""
@@ -113,7 +113,7 @@ def test_stand_ins_stand_where_the_instances_were(tmp_path: Path) -> None:
 def test_an_instancer_s_other_instances_stay_visible() -> None:
     """Only one of its two objects is baked, yet hiding the instancer must not lose the other."""
     build_zoo(bpy.context)
-    settings = BakeSettings(objects=("Instancer 0/Leaf",))
+    settings = BakeSettings(objects=("Instancer 0/Leaf",), resolution=SMALL)
     export = export_scene(bpy.context, settings)
     result = hand_result(export)
     apply_lightmaps(bpy.context, export, result, write_pages(result, settings, None), settings)

@@ -16,14 +16,14 @@ from radiosity_addon.blender.images.images import write_pages
 from radiosity_addon.blender.scene_export.export import export_scene
 from radiosity_addon.options.bake_settings import BakeSettings
 from tests.blender.file_dump import differences, differences_since, dump_file, tidy_dump
-from tests.blender.hand_bake import hand_result
+from tests.blender.hand_bake import SMALL, hand_result
 from tests.blender.zoo import build_zoo
 
 pytestmark = pytest.mark.usefixtures("record")
 
 
 def _bake(folder: Path | None, **settings: str) -> None:
-    wanted = BakeSettings(**settings)
+    wanted = BakeSettings(**{"resolution": SMALL, **settings})
     export = export_scene(bpy.context, wanted)
     result = hand_result(export, ((0.25, 0.5, 0.75), (1.0, 2.0, 3.0)))
     apply_lightmaps(bpy.context, export, result, write_pages(result, wanted, folder), wanted)

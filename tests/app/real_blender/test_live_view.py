@@ -2,60 +2,30 @@
 
 from __future__ import annotations
 
-import json
-import shutil
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-import bpy
 import numpy as np
 import pytest
 
-from tests.app.real_blender.installed import Installed
+from tests.app.conftest import read_pixels
+from tests.app.real_blender.installed import PICTURES, Installed
 
 pytestmark = pytest.mark.real_blender
-
-PICTURES = Path(__file__).resolve().parents[3] / "out" / "ci"
 
 
 @pytest.fixture(scope="module")
 def seen(installed: Installed, cornell_blend: Path) -> dict[str, Any]:
     """What one session saw; its photographs lie in `out/ci`."""
-    answer = cornell_blend.with_name("live.json")
-    done = installed.run(
-        cornell_blend,
-        "--enable-event-simulate",
-        "--window-geometry",
-        *("0", "0", "1280", "800"),
-        "--python",
-        installed.folder / "drive_live_view.py",
-        "--",
-        answer,
-        window=True,
-        timeout=400,
-    )
-    PICTURES.mkdir(parents=True, exist_ok=True)
-    for picture in PICTURES.glob("live-*.png"):
-        picture.unlink()
-    for picture in answer.parent.glob("live-*.png"):
-        shutil.copy(picture, PICTURES)
-    assert answer.exists(), done.stdout
-    told = json.loads(answer.read_text())
-    assert told["failure"] is None, f"{told['failure']}\n{done.stdout}"
-    assert "Traceback" not in done.stdout, done.stdout
-    return told
+    return installed.drive("drive_live_view.py", cornell_blend, "live")
 
 
 def photograph(seen: dict[str, Any], name: str) -> np.ndarray:
     """What the viewport showed, (height, width, 3) in [0, 1]; its header and gizmos are left out."""
-    image = bpy.data.images.load(str(PICTURES / name))
-    width, height = image.size
-    values = np.empty(width * height * 4, dtype=np.float32)
-    image.pixels.foreach_get(values)
-    bpy.data.images.remove(image)
+    picture = read_pixels(PICTURES / name)
     x, y, across, down = seen["viewport"]
-    pixels = values.reshape(height, width, 4)[::-1, :, :3]
+    pixels = picture[::-1]
     return pixels[y + down // 8 : y + down, x : x + int(across * 0.9)]
 
 

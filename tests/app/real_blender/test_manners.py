@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import shutil
 from pathlib import Path
 from typing import Any
 
@@ -13,34 +11,11 @@ from tests.app.real_blender.installed import Installed
 
 pytestmark = pytest.mark.real_blender
 
-PICTURES = Path(__file__).resolve().parents[3] / "out" / "ci"
-
 
 @pytest.fixture(scope="module")
 def seen(installed: Installed, cornell_blend: Path) -> dict[str, Any]:
     """What one session saw; its photographs lie in `out/ci`."""
-    answer = cornell_blend.with_name("manners.json")
-    done = installed.run(
-        cornell_blend,
-        "--enable-event-simulate",
-        "--window-geometry",
-        *("0", "0", "1280", "800"),
-        "--python",
-        installed.folder / "drive_manners.py",
-        "--",
-        answer,
-        window=True,
-        timeout=500,
-    )
-    PICTURES.mkdir(parents=True, exist_ok=True)
-    for picture in answer.parent.glob("manners-*.png"):
-        shutil.copy(picture, PICTURES)
-    assert answer.exists(), done.stdout
-    told = json.loads(answer.read_text())
-    (PICTURES / "manners.json").write_text(json.dumps(told, indent=1) + done.stdout)
-    assert told["failure"] is None, f"{told['failure']}\n{done.stdout}"
-    assert "Traceback" not in done.stdout, done.stdout
-    return told
+    return installed.drive("drive_manners.py", cornell_blend, "manners")
 
 
 def test_the_dialogs_button_bakes(seen: dict[str, Any]) -> None:

@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import os
-import shutil
 from pathlib import Path
 from typing import Any
 
-import bpy
 import numpy as np
 import pytest
 
-from tests.app.real_blender.installed import Installed
+from tests.app.conftest import read_pixels
+from tests.app.real_blender.installed import PICTURES, Installed
 
 pytestmark = pytest.mark.real_blender
 
 FINE = "RADIOSITY_FINE_PICTURES"
 """Set, the photographs are those of the user guide (docs/overlays.py)."""
-
-PICTURES = Path(__file__).resolve().parents[3] / "out" / "ci"
 
 BLUE, GREEN, CHECKERS = (0.12, 0.30, 0.80), (0.25, 0.75, 0.30), ((0.25, 0.25, 0.27), (0.85, 0.85, 0.82))
 DOUBTFUL = (0.95, 0.90, 0.30)
@@ -28,41 +24,19 @@ DOUBTFUL = (0.95, 0.90, 0.30)
 @pytest.fixture(scope="module")
 def seen(installed: Installed, cornell_blend: Path) -> dict[str, Any]:
     """What one session saw; its photographs lie in `out/ci`."""
-    answer = cornell_blend.with_name("overlays.json")
-    done = installed.run(
+    return installed.drive(
+        "drive_overlays.py",
         cornell_blend,
-        "--enable-event-simulate",
-        "--window-geometry",
-        *("0", "0", "1280", "800"),
-        "--python",
-        installed.folder / "drive_overlays.py",
-        "--",
-        answer,
+        "overlay",
         *(("256", "medium") if os.environ.get(FINE) else ("96", "draft")),
-        window=True,
-        timeout=800,
     )
-    PICTURES.mkdir(parents=True, exist_ok=True)
-    for picture in PICTURES.glob("overlay-*.png"):
-        picture.unlink()
-    for picture in answer.parent.glob("overlay-*.png"):
-        shutil.copy(picture, PICTURES)
-    assert answer.exists(), done.stdout
-    told = json.loads(answer.read_text())
-    assert told["failure"] is None, f"{told['failure']}\n{done.stdout}"
-    assert "Traceback" not in done.stdout, done.stdout
-    return told
 
 
 def photograph(seen: dict[str, Any], name: str) -> np.ndarray:
     """What the viewport showed, (height, width, 3) in [0, 1]; its header and gizmos are left out."""
-    image = bpy.data.images.load(str(PICTURES / f"overlay-{name}.png"))
-    width, height = image.size
-    values = np.empty(width * height * 4, dtype=np.float32)
-    image.pixels.foreach_get(values)
-    bpy.data.images.remove(image)
+    picture = read_pixels(PICTURES / f"overlay-{name}.png")
     x, y, across, down = seen["viewport"]
-    pixels = values.reshape(height, width, 4)[::-1, :, :3]
+    pixels = picture[::-1]
     return pixels[y + down // 8 : y + down, x : x + int(across * 0.9)]
 
 

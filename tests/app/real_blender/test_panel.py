@@ -2,44 +2,20 @@
 
 from __future__ import annotations
 
-import json
-import shutil
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.app.real_blender.installed import Installed
+from tests.app.real_blender.installed import PICTURES, Installed
 
 pytestmark = pytest.mark.real_blender
-
-ROOT = Path(__file__).resolve().parents[3]
 
 
 @pytest.fixture(scope="module")
 def seen(installed: Installed, cornell_blend: Path) -> dict[str, Any]:
     """What one session at the panel saw."""
-    answer = cornell_blend.with_name("panel.json")
-    done = installed.run(
-        cornell_blend,
-        "--enable-event-simulate",
-        "--window-geometry",
-        *("0", "0", "1280", "800"),
-        "--python",
-        installed.folder / "drive_panel.py",
-        "--",
-        answer,
-        window=True,
-        timeout=400,
-    )
-    pictures = ROOT / "out" / "ci"
-    pictures.mkdir(parents=True, exist_ok=True)
-    for picture in answer.parent.glob("panel*.png"):
-        shutil.copy(picture, pictures)
-    assert answer.exists(), done.stdout
-    told = json.loads(answer.read_text())
-    assert told["failure"] is None, f"{told['failure']}\n{done.stdout}"
-    return told
+    return installed.drive("drive_panel.py", cornell_blend, "panel")
 
 
 def test_the_bake_button_runs_a_modal_operator_to_its_end(seen: dict[str, Any]) -> None:
@@ -70,4 +46,4 @@ def test_the_restore_button_brings_everything_back(seen: dict[str, Any]) -> None
 
 
 def test_the_window_was_photographed(seen: dict[str, Any]) -> None:
-    assert (ROOT / "out" / "ci" / "panel.png").stat().st_size > 20_000
+    assert (PICTURES / "panel.png").stat().st_size > 20_000

@@ -2,32 +2,24 @@
 
 from __future__ import annotations
 
-import json
-import shutil
 from itertools import pairwise
 from pathlib import Path
 
-import bpy
 import numpy as np
 import pytest
 
-from tests.app.real_blender.installed import Installed
+from tests.app.conftest import read_pixels
+from tests.app.real_blender.installed import PICTURES, Installed
 
 pytestmark = pytest.mark.real_blender
-
-PICTURES = Path(__file__).resolve().parents[3] / "out" / "ci"
 
 CHANGES = ("opened", "baking", "canceled", "baked", "interrupted", "recovered", "restored")
 
 
 def pixels(name: str) -> np.ndarray:
     """A photograph's colors [sRGB], (height, width, 3), without the tabs, and the frame around the mouse."""
-    image = bpy.data.images.load(str(PICTURES / f"frames-{name}.png"))
-    width, height = image.size
-    values = np.empty(width * height * 4, np.float32)
-    image.pixels.foreach_get(values)
-    bpy.data.images.remove(image)
-    return values.reshape(height, width, 4)[10:-10, 15:250, :3]
+    picture = read_pixels(PICTURES / f"frames-{name}.png")
+    return picture[10:-10, 15:250]
 
 
 def differing(one: str, other: str) -> float:
@@ -36,26 +28,7 @@ def differing(one: str, other: str) -> float:
 
 
 def test_nothing_is_drawn_over_each_other_after_a_change(installed: Installed, cornell_blend: Path) -> None:
-    answer = cornell_blend.with_name("frames.json")
-    done = installed.run(
-        cornell_blend,
-        "--enable-event-simulate",
-        "--window-geometry",
-        *("0", "0", "1280", "800"),
-        "--python",
-        installed.folder / "drive_panel_frames.py",
-        "--",
-        answer,
-        window=True,
-        timeout=300,
-    )
-    PICTURES.mkdir(parents=True, exist_ok=True)
-    for picture in answer.parent.glob("frames-*.png"):
-        shutil.copy(picture, PICTURES)
-    assert answer.exists(), done.stdout
-    told = json.loads(answer.read_text())
-    assert told["failure"] is None, f"{told['failure']}\n{done.stdout}"
-    assert "Traceback" not in done.stdout, done.stdout
+    told = installed.drive("drive_panel_frames.py", cornell_blend, "frames")
     assert tuple(told["changes"]) == CHANGES
     # The panel does change: without these there would be nothing to draw wrongly.
     for before, after in pairwise(CHANGES[1:]):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from pathlib import Path
 from typing import Any
@@ -13,8 +12,6 @@ from tests.app.real_blender.installed import Installed
 
 pytestmark = pytest.mark.real_blender
 
-PICTURES = Path(__file__).resolve().parents[3] / "out" / "ci"
-
 
 @pytest.fixture(scope="module")
 def seen(installed: Installed, cornell_blend: Path) -> dict[str, Any]:
@@ -22,28 +19,7 @@ def seen(installed: Installed, cornell_blend: Path) -> dict[str, Any]:
     folder = cornell_blend.parent.parent / "undo"
     folder.mkdir()
     scene = Path(shutil.copy(cornell_blend, folder / "undone.blend"))
-    answer = folder / "undo.json"
-    done = installed.run(
-        scene,
-        "--enable-event-simulate",
-        "--window-geometry",
-        *("0", "0", "1280", "800"),
-        "--python",
-        installed.folder / "drive_undo.py",
-        "--",
-        answer,
-        window=True,
-        timeout=600,
-    )
-    PICTURES.mkdir(parents=True, exist_ok=True)
-    for picture in folder.glob("undo-*.png"):
-        shutil.copy(picture, PICTURES)
-    assert answer.exists(), done.stdout
-    told = json.loads(answer.read_text())
-    (PICTURES / "undo.json").write_text(json.dumps(told, indent=1) + done.stdout)
-    assert told["failure"] is None, f"{told['failure']}\n{done.stdout}"
-    assert "Traceback" not in done.stdout, done.stdout
-    return told
+    return installed.drive("drive_undo.py", scene, "undo")
 
 
 def test_there_are_states_to_tell_apart(seen: dict[str, Any]) -> None:

@@ -8,7 +8,6 @@ Usage: blender cornell.blend --enable-event-simulate --python drive_frames.py --
 """
 
 import importlib
-import json
 import os
 import sys
 import time
@@ -20,7 +19,6 @@ sys.path.insert(0, str(Path(__file__).parent))
 import events
 from file_dump import differences, dump_file
 
-ANSWER = Path(sys.argv[sys.argv.index("--") + 1])
 QUALITY, RESOLUTION, BAKES = sys.argv[sys.argv.index("--") + 2 :]
 MODULE = "bl_ext.user_default.radiosity_addon"
 runtime = importlib.import_module(f"{MODULE}.blender.session.state").session
@@ -148,10 +146,4 @@ def script():
         yield 1.0
 
 
-def finished(failure):
-    seen["failure"] = failure
-    ANSWER.write_text(json.dumps(seen, indent=1))
-
-
-bpy.context.preferences.view.show_splash = False
-events.drive(script(), finished)
+events.drive(script(), seen)

@@ -4,7 +4,6 @@ Usage: blender FILE --enable-event-simulate --python drive_light_groups.py -- AN
 """
 
 import importlib
-import json
 import sys
 from pathlib import Path
 
@@ -13,7 +12,6 @@ import bpy
 sys.path.insert(0, str(Path(__file__).parent))
 import events
 
-ANSWER = Path(sys.argv[sys.argv.index("--") + 1])
 MODULE = "bl_ext.user_default.radiosity_addon"
 
 seen = {"drawn": {}}
@@ -49,13 +47,7 @@ def script():
         seen["baked"] = sorted(bpy.ops.radiosity.bake("EXEC_DEFAULT"))
     yield from events.open_sidebar("Radiosity")
     yield 1.0
-    events.screenshot(ANSWER.with_name("light-groups.png"))
+    events.screenshot(events.ANSWER.with_name("light-groups.png"))
 
 
-def finished(failure):
-    seen["failure"] = failure
-    ANSWER.write_text(json.dumps(seen, indent=1))
-
-
-bpy.context.preferences.view.show_splash = False
-events.drive(script(), finished)
+events.drive(script(), seen)

@@ -7,7 +7,6 @@ Usage: blender cornell.blend --enable-event-simulate --python drive_live_view.py
 """
 
 import importlib
-import json
 import sys
 import threading
 import time
@@ -21,7 +20,6 @@ sys.path.insert(0, str(Path(__file__).parent))
 import events
 from file_dump import differences, dump_file
 
-ANSWER = Path(sys.argv[sys.argv.index("--") + 1])
 FILE = bpy.data.filepath
 MODULE = "bl_ext.user_default.radiosity_addon"
 live_view = importlib.import_module(f"{MODULE}.blender.jobs.live_view")
@@ -118,7 +116,7 @@ def photograph(name):
         events.region("WINDOW").tag_redraw()
         yield 0.05
     bpy.types.SpaceView3D.draw_handler_remove(drawing, "WINDOW")
-    events.screenshot(ANSWER.with_name(name))
+    events.screenshot(events.ANSWER.with_name(name))
     place, height = events.region("WINDOW"), events.window().height
     seen["viewport"] = [place.x, height - place.y - place.height, place.width, place.height]
 
@@ -188,16 +186,8 @@ def script():
     seen["operators_when_switched_off"] = len(events.window().modal_operators)
 
 
-def finished(failure):
-    seen["failure"] = failure
-    if failure:
-        events.screenshot(ANSWER.with_name("live-failure.png"))
-    ANSWER.write_text(json.dumps(seen, indent=1))
-
-
-bpy.context.preferences.view.show_splash = False
 # Edges would go on changing for a while after anything else.
 bpy.context.preferences.system.viewport_aa = "OFF"
 slow_down()
 remember_pictures()
-events.drive(script(), finished)
+events.drive(script(), seen)

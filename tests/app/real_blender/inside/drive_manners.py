@@ -15,7 +15,6 @@ sys.path.insert(0, str(Path(__file__).parent))
 import events
 from file_dump import differences, dump_file
 
-ANSWER = Path(sys.argv[sys.argv.index("--") + 1])
 MODULE = "bl_ext.user_default.radiosity_addon"
 
 cleaning = importlib.import_module(f"{MODULE}.blender.operators.cleaning")
@@ -88,7 +87,7 @@ def invoke(operator, window=None):
 
 def photograph(name):
     yield 0.7
-    events.screenshot(ANSWER.with_name(f"manners-{name}.png"))
+    events.screenshot(events.ANSWER.with_name(f"manners-{name}.png"))
 
 
 def script():
@@ -233,12 +232,4 @@ def close(window):
         bpy.ops.wm.window_close()
 
 
-def finished(failure):
-    seen["failure"] = failure
-    if failure:
-        events.screenshot(ANSWER.with_name("manners-failure.png"))
-    ANSWER.write_text(json.dumps(seen, indent=1))
-
-
-bpy.context.preferences.view.show_splash = False
-events.drive(script(), finished)
+events.drive(script(), seen)

@@ -5,7 +5,6 @@ Usage: blender cornell.blend --enable-event-simulate --python drive_overlays.py 
 """
 
 import importlib
-import json
 import sys
 from pathlib import Path
 
@@ -15,8 +14,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import events
 from file_dump import differences, dump_file
 
-ANSWER, RESOLUTION, QUALITY = sys.argv[sys.argv.index("--") + 1 :]
-ANSWER = Path(ANSWER)
+RESOLUTION, QUALITY = sys.argv[sys.argv.index("--") + 2 :]
 MODULE = "bl_ext.user_default.radiosity_addon"
 live_view = importlib.import_module(f"{MODULE}.blender.jobs.live_view")
 kept_details = importlib.import_module(f"{MODULE}.blender.session.kept_details")
@@ -67,7 +65,7 @@ def photograph(name):
         events.region("WINDOW").tag_redraw()
         yield 0.05
     bpy.types.SpaceView3D.draw_handler_remove(drawing, "WINDOW")
-    events.screenshot(ANSWER.with_name(name))
+    events.screenshot(events.ANSWER.with_name(name))
     place, height = events.region("WINDOW"), events.window().height
     seen["viewport"] = [place.x, height - place.y - place.height, place.width, place.height]
 
@@ -150,7 +148,7 @@ def script():
     yield from every_panel(overlay)
 
     overlay.show = "FALSE_COLOR"
-    path = ANSWER.with_name("baked.blend")
+    path = events.ANSWER.with_name("baked.blend")
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     bpy.ops.wm.open_mainfile(filepath=str(path))
     yield 1.0
@@ -168,16 +166,8 @@ def script():
     seen["after_restore"] = differences(before, dump_file())
 
 
-def finished(failure):
-    seen["failure"] = failure
-    if failure:
-        events.screenshot(ANSWER.with_name("overlay-failure.png"))
-    ANSWER.write_text(json.dumps(seen, indent=1))
-
-
-bpy.context.preferences.view.show_splash = False
 bpy.context.preferences.system.viewport_aa = "OFF"
 texel_pictures.SECONDS = 0.0
 texel_pictures.SHARE = 1.0
 remember_texels()
-events.drive(script(), finished)
+events.drive(script(), seen)

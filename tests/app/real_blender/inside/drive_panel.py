@@ -3,7 +3,6 @@
 Usage: blender cornell.blend --enable-event-simulate --python drive_panel.py -- ANSWER.json
 """
 
-import json
 import sys
 from pathlib import Path
 
@@ -13,7 +12,6 @@ sys.path.insert(0, str(Path(__file__).parent))
 import events
 from file_dump import differences, dump_file
 
-ANSWER = Path(sys.argv[sys.argv.index("--") + 1])
 MODULE = "bl_ext.user_default.radiosity_addon"
 HEADER = 34  # pixels at the sidebar's top: the panel's title, which a click would fold
 
@@ -42,20 +40,20 @@ def script():
     bpy.context.scene.radiosity.quality = "draft"
     bpy.ops.ed.undo_push(message="Settings")
     yield from events.open_sidebar("Radiosity")
-    events.screenshot(ANSWER.with_name("panel-before.png"))
+    events.screenshot(events.ANSWER.with_name("panel-before.png"))
     before = dump_file()
     seen["objects"] = sorted(obj.name for obj in bpy.data.objects if obj.type == "MESH")
 
     bake_button = yield from events.click_down(HEADER, baking)
     seen["modal"] = True
     yield 0.5  # for the progress bar to be drawn
-    events.screenshot(ANSWER.with_name("panel-baking.png"))
+    events.screenshot(events.ANSWER.with_name("panel-baking.png"))
     seen["asked_while_baking"], seen["longest_wait"] = yield from events.until(not_baking, 120)
     seen["lit"] = lit_objects()
     seen["images"] = [image.name for image in bpy.data.images if image.has_data or image.packed_file]
     yield from redrawn()
     seen["shading"] = events.area_3d().spaces.active.shading.type
-    events.screenshot(ANSWER.with_name("panel.png"))
+    events.screenshot(events.ANSWER.with_name("panel.png"))
     events.area_3d().spaces.active.shading.type = "SOLID"
     yield from redrawn()
 
@@ -90,7 +88,7 @@ def script():
         yield from events.click(sidebar.x + 30, y + bake_button - distance)
     yield 0.5
     seen["after_restore"] = differences(before, dump_file())
-    events.screenshot(ANSWER.with_name("panel-restored.png"))
+    events.screenshot(events.ANSWER.with_name("panel-restored.png"))
 
 
 def redrawn():
@@ -101,12 +99,4 @@ def redrawn():
     yield 1.0
 
 
-def finished(failure):
-    seen["failure"] = failure
-    if failure:
-        events.screenshot(ANSWER.with_name("panel-failure.png"))
-    ANSWER.write_text(json.dumps(seen, indent=1))
-
-
-bpy.context.preferences.view.show_splash = False
-events.drive(script(), finished)
+events.drive(script(), seen)

@@ -4,7 +4,6 @@ Usage: blender cornell.blend --enable-event-simulate --python drive_panel_frames
 """
 
 import importlib
-import json
 import sys
 from pathlib import Path
 
@@ -13,7 +12,6 @@ import bpy
 sys.path.insert(0, str(Path(__file__).parent))
 import events
 
-ANSWER = Path(sys.argv[sys.argv.index("--") + 1])
 MODULE = "bl_ext.user_default.radiosity_addon"
 runtime = importlib.import_module(f"{MODULE}.blender.session.state").session
 
@@ -24,7 +22,7 @@ def photograph(name):
     """Picture of the sidebar."""
     place, height = events.region("UI"), events.window().height
     part = (place.x, height - place.y - place.height, place.width, place.height)
-    events.screenshot(ANSWER.with_name(f"frames-{name}.png"), part)
+    events.screenshot(events.ANSWER.with_name(f"frames-{name}.png"), part)
 
 
 def after(name):
@@ -64,10 +62,4 @@ def script():
         yield from after("restored")
 
 
-def finished(failure):
-    seen["failure"] = failure
-    ANSWER.write_text(json.dumps(seen, indent=1))
-
-
-bpy.context.preferences.view.show_splash = False
-events.drive(script(), finished)
+events.drive(script(), seen)

@@ -4,7 +4,6 @@ Usage: blender FILE --enable-event-simulate --python drive_relight.py -- ANSWER.
 """
 
 import importlib
-import json
 import sys
 import time
 from pathlib import Path
@@ -15,7 +14,6 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 import events
 
-ANSWER = Path(sys.argv[sys.argv.index("--") + 1])
 MODULE = "bl_ext.user_default.radiosity_addon.blender"
 HEADER = 34  # pixels at the sidebar's top: the panel's title, which a click would fold
 STEPS = 4
@@ -92,12 +90,12 @@ def script():
     bpy.context.window_manager.radiosity_live = True
     yield from events.until(resting, 60)
     seen["baked"], seen["power"] = light(), lamp().energy
-    events.screenshot(ANSWER.with_name("relight-before.png"))
+    events.screenshot(events.ANSWER.with_name("relight-before.png"))
 
     yield from drag()
     yield from events.until(resting, 60)
     seen["dragged"], seen["power_dragged"] = light(), lamp().energy
-    events.screenshot(ANSWER.with_name("relight-after.png"))
+    events.screenshot(events.ANSWER.with_name("relight-after.png"))
     yield from events.key("Z", *view, ctrl=True)
     yield 0.5
     yield from events.until(resting, 60)
@@ -169,12 +167,4 @@ def follow():
     seen["latencies"], seen["frames"] = latencies, frames
 
 
-def finished(failure):
-    seen["failure"] = failure
-    if failure:
-        events.screenshot(ANSWER.with_name("relight-failure.png"))
-    ANSWER.write_text(json.dumps(seen, indent=1))
-
-
-bpy.context.preferences.view.show_splash = False
-events.drive(script(), finished)
+events.drive(script(), seen)

@@ -5,7 +5,6 @@ Usage: blender cornell.blend --enable-event-simulate --python drive_undo.py -- A
 
 import hashlib
 import importlib
-import json
 import sys
 from pathlib import Path
 
@@ -15,7 +14,6 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 import events
 
-ANSWER = Path(sys.argv[sys.argv.index("--") + 1])
 MODULE = "bl_ext.user_default.radiosity_addon.blender"
 STEPS = [-1, -1, 1, 1, -1, -1, -1, 1, -1, -1, 1, 1, 1, 1]
 """Undo and redo, one after the other, from the last of five states on."""
@@ -154,7 +152,7 @@ def guard():
         seen["entered"] = block.mode
     yield from events.until(refused, 20)
     yield 0.5
-    events.screenshot(ANSWER.with_name("undo-guard.png"))
+    events.screenshot(events.ANSWER.with_name("undo-guard.png"))
     stand_in = bpy.data.objects["Empty/Leaf (Lightmap)"]
     before = [list(row) for row in stand_in.matrix_basis]
     stand_in.location.x += 1.0
@@ -168,12 +166,4 @@ def guard():
     seen["same_layers"] = layers() == baked
 
 
-def finished(failure):
-    seen["failure"] = failure
-    if failure:
-        events.screenshot(ANSWER.with_name("undo-failure.png"))
-    ANSWER.write_text(json.dumps(seen, indent=1))
-
-
-bpy.context.preferences.view.show_splash = False
-events.drive(script(), finished)
+events.drive(script(), seen)

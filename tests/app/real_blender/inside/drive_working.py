@@ -4,7 +4,6 @@ Usage: blender cornell.blend --enable-event-simulate --python drive_working.py -
 """
 
 import importlib
-import json
 import sys
 from pathlib import Path
 
@@ -14,7 +13,6 @@ sys.path.insert(0, str(Path(__file__).parent))
 import events
 from file_dump import differences, dump_file
 
-ANSWER = Path(sys.argv[sys.argv.index("--") + 1])
 MODULE = "bl_ext.user_default.radiosity_addon"
 HEADER = 34  # pixels at the sidebar's top: the panel's title, which a click would fold
 
@@ -47,7 +45,7 @@ def time_told():
 def photograph(name, part):
     """Take a part of the screen: x, y from the top left, width, height."""
     yield 0.7
-    events.screenshot(ANSWER.with_name(f"working-{name}.png"), part)
+    events.screenshot(events.ANSWER.with_name(f"working-{name}.png"), part)
 
 
 def script():
@@ -92,12 +90,4 @@ def script():
     seen["after_escape"] = differences(before, dump_file())
 
 
-def finished(failure):
-    seen["failure"] = failure
-    if failure:
-        events.screenshot(ANSWER.with_name("working-failure.png"))
-    ANSWER.write_text(json.dumps(seen, indent=1))
-
-
-bpy.context.preferences.view.show_splash = False
-events.drive(script(), finished)
+events.drive(script(), seen)

@@ -4,13 +4,19 @@ The scripts are generators: each `yield SECONDS` gives the window time to handle
 References to Blender's data do not outlive an undo, so everything here looks it up anew.
 """
 
+import json
 import subprocess
+import sys
 import time
 import traceback
+from pathlib import Path
 
 import bpy
 
 PAUSE = 0.08
+
+ANSWER = Path(sys.argv[sys.argv.index("--") + 1])
+"""File for what a script has seen; its pictures go beside it, called alike."""
 
 
 def window():
@@ -99,19 +105,21 @@ def first_frame(kind):
         bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
 
 
-def drive(script, finished):
-    """Run the generator `script` on a timer, then call `finished(traceback or None)` and quit."""
+def drive(script, seen):
+    """Run the generator `script` on a timer, write what it has seen, or its failure, as JSON and quit."""
 
     def tick():
         try:
             return next(script)
         except StopIteration:
-            failure = None
+            seen["failure"] = None
         except Exception:  # noqa: BLE001  (whatever it is, the test has to hear of it)
-            failure = traceback.format_exc()
-        finished(failure)
+            seen["failure"] = traceback.format_exc()
+            screenshot(ANSWER.with_name(f"{ANSWER.stem}-failure.png"))
+        ANSWER.write_text(json.dumps(seen, indent=1))
         bpy.ops.wm.quit_blender()
         return None
 
+    bpy.context.preferences.view.show_splash = False
     # Persistent, for undo and opening files take other timers away.
     bpy.app.timers.register(tick, first_interval=1.0, persistent=True)
