@@ -26,7 +26,7 @@ class Status:
     picture: Any = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Progress:
     """Tells a listener how far work is. May be used from any thread.
 

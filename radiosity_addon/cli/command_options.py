@@ -12,6 +12,8 @@ SECTION = "Command"
 
 @dataclass(frozen=True)
 class _BakeCommand:
+    """Options of `bake` on the command line alone."""
+
     output: Path | None = option(
         None,
         "Folder that everything is written to; for the bundled scene out/cornell if it is not given",
@@ -46,6 +48,8 @@ class _BakeCommand:
 
 @dataclass(frozen=True)
 class _EveryCommand:
+    """Options of every command."""
+
     quiet: bool = option(False, "Print errors only", SECTION)
     overwrite: bool = option(
         False,

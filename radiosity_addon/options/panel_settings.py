@@ -14,6 +14,8 @@ RELIGHT_GROUP = "radiosity_relight"
 
 @dataclass(init=False, repr=False, eq=False)
 class _PanelSettings:
+    """Options of the panel alone."""
+
     scope: str = option(
         "all",
         "Which objects get a lightmap; all others still light and block",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import uuid
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +18,7 @@ from ..datablocks.bake_record import is_made
 CORNELL_BOX = "<Cornell box>"
 """Stands for the file of the bundled scene."""
 
-_unsaved = f"<unsaved {uuid.uuid4().hex}>"
+_unsaved = f"<unsaved {os.urandom(16).hex()}>"
 """Stands for the open file as long as it has no path; no two unsaved files are the same."""
 
 
@@ -126,4 +125,4 @@ def _is_same(path: Path, read: Path) -> bool:
 def forget_unsaved(*_: object) -> None:
     """Another file is being opened: know one unsaved file from the next."""
     global _unsaved
-    _unsaved = f"<unsaved {uuid.uuid4().hex}>"
+    _unsaved = f"<unsaved {os.urandom(16).hex()}>"
