@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
+from tests.processes import run_python
 
 START = """
 import os, sys
 from pathlib import Path
-sys.path.insert(0, sys.argv[1])
 import bpy
 from tests.blender import hand_bake
 bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
 engine = "BLENDER_EEVEE_NEXT" if bpy.app.version < (5, 0) else "BLENDER_EEVEE"
 def look():
-    print("seen", *hand_bake.seen_from_above(Path(sys.argv[2]), 8, engine)[4, 4])
+    print("seen", *hand_bake.seen_from_above(Path(sys.argv[1]), 8, engine)[4, 4])
 """
 
 END = """
@@ -31,13 +28,7 @@ os._exit(0)
 
 def seen_in_eevee(script: str, folder: Path) -> np.ndarray:
     """Return (n, 3) what a script saw from above each time it called `look`; skips without OpenGL."""
-    done = subprocess.run(
-        [sys.executable, "-c", START + script + END, str(ROOT), str(folder)],
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
+    done = run_python(START + script + END, folder, timeout=300)
     if done.returncode in (134, 139, -6, -11):
         pytest.skip("EEVEE needs OpenGL, which this machine does not have")
     assert done.returncode == 0, done.stderr

@@ -97,18 +97,6 @@ def light_on(report: dict[str, Any], name: str) -> float:
     return next(entry["irradiance_W_m2"]["mean"] for entry in report["objects"] if entry["object"] == name)
 
 
-def lightmap_of(obj: bpy.types.Object) -> bpy.types.Image | None:
-    """The image that an object's first material shows, itself or in a group."""
-    trees = [slot.material.node_tree for slot in obj.material_slots[:1] if slot.material is not None]
-    for of in trees:
-        for node in of.nodes:
-            if node.type == "GROUP" and node.node_tree is not None:
-                trees.append(node.node_tree)
-            elif node.type == "TEX_IMAGE" and node.image is not None:
-                return node.image
-    return None
-
-
 def pixels_of(image: bpy.types.Image) -> np.ndarray:
     pixels = np.empty(image.size[0] * image.size[1] * 4, dtype=np.float32)
     image.pixels.foreach_get(pixels)

@@ -13,7 +13,7 @@ from radiosity_addon.blender.datablocks import bake_record
 bake_record.register()
 emission = dict(Emission_Color=(0.25, 0.25, 0.25, 1.0), Emission_Strength=2.0)
 hand_bake.add_plane(material=hand_bake.principled_material(**emission))
-hand_bake.bake_by_hand(folder=Path(sys.argv[2]))
+hand_bake.bake_by_hand(folder=Path(sys.argv[1]))
 look()
 """
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+
+from tests.processes import run_python
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -38,10 +38,7 @@ os._exit(code)
 @pytest.mark.parametrize("kind", ["OPEN_EXR", "PNG"])
 def test_one_line_says_that_an_image_could_not_be_written(tmp_path: Path, kind: str) -> None:
     path = tmp_path / "page"
-    done = subprocess.run(
-        [sys.executable, "-c", CODE, str(path), kind],
-        env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, timeout=120, check=False,
-    )  # fmt: skip
+    done = run_python(CODE, path, kind)
     assert done.stderr == ""
     assert done.stdout.splitlines() == [done.stdout]
     assert done.stdout.startswith(f"cannot write '{path}': ")

@@ -19,7 +19,6 @@ from tests.blender.promised import (
     Run,
     bake,
     command_line,
-    lightmap_of,
     pixels_of,
     refuse_work,
     refused,
@@ -30,6 +29,7 @@ from tests.blender.promised import (
     show_picture,
 )
 from tests.reliability.folders import broken_result, changes, images_of, listed, tree
+from tests.reliability.light import lightmap_of
 from tests.reliability.sandbox import add
 
 pytestmark = pytest.mark.usefixtures("registered")

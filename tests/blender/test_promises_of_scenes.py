@@ -13,7 +13,6 @@ from tests.blender.promised import (
     QUAD,
     bake,
     light_on,
-    lightmap_of,
     pixels_of,
     report_in,
     restore,
@@ -23,6 +22,7 @@ from tests.blender.promised import (
     uv_of,
 )
 from tests.reliability.folders import broken_result
+from tests.reliability.light import lightmap_of
 from tests.reliability.sandbox import add, paint
 from tests.reliability.snapshot import differences, snapshot
 

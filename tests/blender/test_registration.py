@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from dataclasses import fields
 from pathlib import Path
 
@@ -14,6 +12,7 @@ import radiosity_addon
 from radiosity_addon.blender.command_line import host
 from radiosity_addon.blender.settings.properties import settings_of
 from radiosity_addon.options.bake_settings import BakeSettings
+from tests.processes import run_python
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -73,9 +72,7 @@ def test_registering_imports_no_solver(tmp_path: Path) -> None:
         "ours = {m.split('.')[1] for m in new if m.startswith('radiosity_addon.')}\n"
         "print('ours:', sorted(ours))\n"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=120, check=False
-    )
+    done = run_python(code)
     # The exit code tells that Blender survived leaving with the extension registered.
     assert (done.returncode, done.stderr) == (0, "")
     lines = dict(line.split(": ", 1) for line in done.stdout.splitlines() if ": [" in line)

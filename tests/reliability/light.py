@@ -199,3 +199,15 @@ def _cosine(normal: np.ndarray, random: np.random.Generator) -> np.ndarray:
     ball /= np.linalg.norm(ball, axis=1)[:, None]
     made = normal + ball * (1 - 1e-9)
     return made / np.linalg.norm(made, axis=1)[:, None]
+
+
+def lightmap_of(obj: bpy.types.Object) -> bpy.types.Image | None:
+    """Return the lightmap that an object's first material shows."""
+    trees = [slot.material.node_tree for slot in obj.material_slots[:1] if slot.material is not None]
+    for tree in trees:
+        for node in tree.nodes:
+            if node.type == "GROUP" and node.node_tree is not None:
+                trees.append(node.node_tree)
+            elif node.type == "TEX_IMAGE" and node.image is not None:
+                return node.image
+    return None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import os
-import subprocess
 import sys
 from pathlib import Path
 
@@ -12,6 +11,7 @@ import pytest
 
 pytest.importorskip("bpy")
 
+from tests.processes import run_python
 from tests.reliability import damage, full_disk, kills, scenes
 from tests.reliability.command import ROOT
 from tests.reliability.tally import Tally
@@ -75,15 +75,7 @@ def test_failing_calls() -> None:
         "code = tally.finish()\n"
         "os._exit(code)\n"
     )
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=300,
-    )
+    done = run_python(code, timeout=300)
     assert "calls:" in done.stdout, done.stderr[-2000:]
     assert done.returncode == 0, done.stderr[-3000:]
 

@@ -276,7 +276,7 @@ def _compare_light(trial: Trial, seed: int) -> None:
 
 def _mean_shown(obj: bpy.types.Object, seed: int, count: int = 4000) -> np.ndarray | None:
     """Return the mean of an object's lightmap at random surface points; None for too few texels."""
-    image, mesh = _lightmap_of(obj), obj.data
+    image, mesh = light.lightmap_of(obj), obj.data
     layer = mesh.uv_layers.get("Lightmap")
     if image is None or layer is None:
         return None
@@ -298,18 +298,6 @@ def _mean_shown(obj: bpy.types.Object, seed: int, count: int = 4000) -> np.ndarr
     if len(set(zip(row.tolist(), column.tolist(), strict=True))) < FEWEST_TEXELS:
         return None
     return pixels[row, column].astype(np.float64).mean(axis=0)
-
-
-def _lightmap_of(obj: bpy.types.Object) -> bpy.types.Image | None:
-    """Return the lightmap that an object's first material shows."""
-    trees = [slot.material.node_tree for slot in obj.material_slots[:1] if slot.material is not None]
-    for tree in trees:
-        for node in tree.nodes:
-            if node.type == "GROUP" and node.node_tree is not None:
-                trees.append(node.node_tree)
-            elif node.type == "TEX_IMAGE" and node.image is not None:
-                return node.image
-    return None
 
 
 def _missing_images() -> list[str]:
@@ -360,7 +348,7 @@ def _bake_the_other(trial: Trial, clean: set[str]) -> None:
 
 
 def _shows_new(obj: bpy.types.Object, clean: set[str]) -> bool:
-    image = _lightmap_of(obj)
+    image = light.lightmap_of(obj)
     return image is not None and image.name not in clean
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -16,6 +15,7 @@ from radiosity_addon.blender import command_line
 from radiosity_addon.blender.command_line.main import main
 from radiosity_addon.cli.permissions import Permissions
 from radiosity_addon.options.bake_settings import BakeSettings
+from tests.processes import run_python
 
 ROOT = Path(__file__).resolve().parents[2]
 VERBS = "radiosity_addon.blender.command_line.verbs"
@@ -288,21 +288,6 @@ def test_a_deferred_stage_is_finished_before_the_interrupt(verbs: list[tuple]) -
     sys.modules[VERBS].bake = bake
     assert main(["bake"]) == 130
     assert finished == [True]
-
-
-def run_python(code: str) -> subprocess.CompletedProcess[str]:
-    """Run code in a fresh interpreter beside the package."""
-    # Unbuffered, nothing that was written too early could come out too late.
-    env = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
-    return subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=ROOT,
-        env=env,
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
 
 
 def test_parsing_imports_neither_blender_nor_arrays() -> None:

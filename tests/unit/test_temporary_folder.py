@@ -6,13 +6,13 @@ import contextlib
 import os
 import signal
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from radiosity_addon.publishing.marked_folders import MARK, MarkedFolder
+from tests.processes import run_python
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -44,16 +44,7 @@ os.kill(os.getpid(), 9)
 
 
 def run(code: str, tmpdir: Path, **more: str) -> subprocess.CompletedProcess[str]:
-    env = {**os.environ, "TMPDIR": str(tmpdir), "PYTHONPATH": str(ROOT), **more}
-    return subprocess.run(
-        [sys.executable, "-c", code],
-        env=env,
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+    return run_python(code, TMPDIR=str(tmpdir), **more)
 
 
 @pytest.mark.parametrize("no_folders", ["", "1"])

@@ -20,7 +20,7 @@ from ..charts import Charts, PatientGrower, rescale_to_area, unwrap
 from ..texels import coverage_sum
 from .dominant_object import greedy_object, share_of
 from .packing import Limits, Packing, pack, page_size
-from .page_assignment import ChartTotals, assign_pages, least_pages
+from .page_assignment import ChartTotals, assign_pages
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -195,7 +195,7 @@ def _lay_on_pages(layouts: list[_Layout], options: AtlasOptions, progress: Progr
     if options.shared:
         count = options.pages
         if density is not None:
-            count = least_pages(float(totals.area.sum()), density, options.limits.side)
+            count = totals.least_pages(density, options.limits.side)
     while True:
         common = totals.density(float(count * options.resolution**2)) if density is None else density
         texels = totals.texels(common)

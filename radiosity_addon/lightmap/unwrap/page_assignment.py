@@ -45,6 +45,10 @@ class ChartTotals:
             return 0.5 * self.density(4.0 * texels)
         return float(2.0 * room / (linear + np.sqrt(linear**2 + 4.0 * area * room)))
 
+    def least_pages(self, density: float, largest: int) -> int:
+        """Return a number of pages, of `largest` texels a side, that all objects may just fit on."""
+        return max(1, int(FULL * float(self.texels(density).sum()) / largest**2))
+
 
 def assign_pages(texels: Sequence[float] | Array, pages: int) -> list[list[int]]:
     """Share objects out over pages so that all are about equally full.
@@ -70,8 +74,3 @@ def assign_pages(texels: Sequence[float] | Array, pages: int) -> list[list[int]]
         heapq.heappush(emptiest, (filled + float(texels[row]), page))
     # Objects that take no texels all go to one page.
     return [sorted(group) for group in groups if group]
-
-
-def least_pages(surface: float, density: float, largest: int) -> int:
-    """Return how many pages of at most `largest` texels a side a surface [m²] needs at least."""
-    return max(1, int(surface * density**2 / (FULL * largest**2)))

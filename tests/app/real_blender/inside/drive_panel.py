@@ -81,14 +81,11 @@ def script():
     yield from events.click(x, y)
     yield from events.until(not_baking, 120)
     seen["lit_before_restore"] = lit_objects()
-    # Just below the Bake button, whose lower edge is not known: a bake that starts is cancelled.
-    distance = bake_button
-    while lit_objects() and distance < bake_button + 90:
+    # Below the buttons of scope and size, at the left: labels there do nothing, and headers only unfold.
+    distance = bake_button + 100
+    while lit_objects() and distance < sidebar.height - 20:
         distance += 6
-        yield from events.click(x, y + bake_button - distance)
-        if baking():
-            yield from events.key("ESC", *view)
-            yield from events.until(not_baking, 30)
+        yield from events.click(sidebar.x + 30, y + bake_button - distance)
     yield 0.5
     seen["after_restore"] = differences(before, dump_file())
     events.screenshot(events.ANSWER.with_name("panel-restored.png"))
