@@ -197,7 +197,8 @@ def test_procedural_nodes_as_cycles_bakes_them_on_the_object_itself(kind: str) -
     if "Scale" in node.inputs:
         node.inputs["Scale"].default_value = 0.4 if kind == "bricks" else 1.3
     feed(material, node.outputs[output])
-    obj = add_mesh("Lump", CUBE, CUBE_FACES, material=material, location=(0.4, 0.2, 0.3))
+    # A name beyond ASCII: its bytes count into its number.
+    obj = add_mesh("Höcker", CUBE, CUBE_FACES, material=material, location=(0.4, 0.2, 0.3))
     obj.rotation_euler, obj.scale, obj.color = (0.3, 0.4, 0.5), (1, -2, 0.5), (0.3, 0.5, 0.7, 1)
     for vertex in obj.data.vertices:
         vertex.co.x = max(vertex.co.x * 1.5, -1.0)

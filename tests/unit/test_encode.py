@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from radiosity_addon.base.errors import BakeError, UsageError
-from radiosity_addon.lightmap.images.encode import encode_png16, png16_scale, to_quantity
+from radiosity_addon.lightmap.images.encode import encode_png16, png16_scale, presentable, to_quantity
+from radiosity_addon.lightmap.images.page import LightmapPage
 
 IRRADIANCE = np.array([[np.pi, 2.0, 0.0]])
 REFLECTANCE = np.array([[0.5, 0.25, 0.75]])
@@ -28,6 +29,13 @@ def test_quantities(quantity, expected):
 def test_an_unknown_quantity_is_named():
     with pytest.raises(UsageError, match="luminance"):
         to_quantity(IRRADIANCE, REFLECTANCE, EMISSION, "luminance")
+
+
+@pytest.mark.parametrize(("signed", "expected"), [(False, [0.0, 2.0]), (True, [-1.0, 2.0])])
+def test_only_error_pictures_keep_values_below_0(signed, expected):
+    pixels = np.repeat(np.array([[[-1.0], [2.0]]], np.float32), 3, axis=2)
+    (page,) = presentable([LightmapPage(pixels, np.ones((1, 2), bool))], signed)
+    np.testing.assert_array_equal(page.pixels[0, :, 0], expected)
 
 
 def test_one_scale_for_all_pages_brings_them_back_within_half_a_step():

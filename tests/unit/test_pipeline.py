@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from radiosity_addon.bake.pipeline import bake
+from radiosity_addon.bake.pipeline import bake, bake_and_keep
 from radiosity_addon.bake.quality import QUALITIES, quality_of
 from radiosity_addon.bake.result.pictures import Picture
 from radiosity_addon.bake.result.result import BakeResult
 from radiosity_addon.base.errors import SceneError
 from radiosity_addon.base.progress import Cancelled, Progress, Status
+from radiosity_addon.lightmap.images.seam_steps import seam_steps
 from radiosity_addon.options import METHODS, BakeSettings, options_of_method
 from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, solve
@@ -122,12 +123,18 @@ def test_no_seam_between_coplanar_charts() -> None:
     scene = gray_scene(triangles, 0.7, lights=[lamp])
     uv = [in_cell((0, 0), (0.5, 0.5)), in_cell((0.5, 0.5), (1, 1))]
     parts = (("Left", 2, uv[0]), ("Right", 2, uv[1]), ("Rest", 10, None, False))
-    pixels = run(bake_scene(scene, *parts), resolution=64).pages[0].pixels
+    settings = BakeSettings(quality="draft", resolution=64)
+    result, kept = bake_and_keep(bake_scene(scene, *parts), settings)
+    pixels = result.pages[0].pixels
     left, right = pixels[:32, :32], pixels[32:, 32:]
     step = np.maximum(np.abs(left[:, -1] - left[:, -2]), np.abs(right[:, 1] - right[:, 0])).mean()
     joint = np.abs(right[:, 0] - left[:, -1]).mean()
     assert joint < 1.5 * step
     assert joint < 0.05 * pixels[:32].mean()
+    # Look-ups on both sides of the joint agree: the page is stitched.
+    assert kept.seams is not None
+    across, inside, _ = seam_steps(kept.geometry, kept.seams, [pixels]).medians()
+    assert across < 0.5 * inside
 
 
 def test_a_sealed_room_inside_a_lit_one_stays_black() -> None:

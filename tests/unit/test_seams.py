@@ -118,6 +118,8 @@ def test_a_flat_shaded_box_has_no_seams() -> None:
     assert len(seams) == 0
     pages = painted(geometry, light)
     assert stitch_pages(pages, geometry, seams)[0].tobytes() == pages[0].tobytes()
+    values = pages[0].reshape(-1, 3)
+    np.testing.assert_array_equal(stitch(values, np.ones(len(values)), seams), values)
 
 
 def test_backs_beside_fronts_are_no_seam() -> None:

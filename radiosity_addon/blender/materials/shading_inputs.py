@@ -300,7 +300,7 @@ def _random_id(instance: bpy.types.DepsgraphObjectInstance) -> int:
         return int(instance.random_id)
     name = 0
     for code in instance.object.name.encode():
-        name = name * 37 + (code - 256 if code > 127 else code)  # characters are signed there
+        name = name * 37 + code  # Blender is built with unsigned characters
     bits = 0xFFFFFFFF
     b = c = (0xDEADBEEF + (2 << 2) + 13) & bits
     a = (b + name) & bits
