@@ -77,8 +77,8 @@ def refuse_too_large(pages: Sequence[int], settings: BakeSettings) -> None:
     # Rounded up: the limit that is named has to do.
     raised = math.ceil(10 * (needed + memory_limit(settings) - left) / 2**30) / 10
     raise UsageError(
-        f"{what} pixels needs at least {needed / 2**30:.1f} GiB of memory, but the memory limit of {limit:g} "
-        f"GiB leaves {left / 2**30:.1f}: lower the {smaller}, or raise the limit to {raised:.1f}"
+        f"at least {needed / 2**30:.1f} GiB of memory needed for {what} pixels, but the memory limit of "
+        f"{limit:g} GiB leaves {left / 2**30:.1f}: lower the {smaller}, or raise the limit to {raised:.1f}"
     )
 
 

@@ -58,7 +58,7 @@ def _check_groups(settings: Any) -> None:
     if "" in names:
         raise UsageError("a light group has no name")
     inside = [member for _, group in settings.groups for member in group]
-    for kind, found in (("light group", names), ("member of light groups", inside)):
+    for kind, found in (("light group", names), ("light group member", inside)):
         twice = next((name for name in found if found.count(name) > 1), None)
         if twice is not None:
             raise UsageError(f"{kind} '{twice}' is given twice")

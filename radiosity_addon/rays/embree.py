@@ -2,7 +2,7 @@
 
 It owns what Embree needs: float32, origins moved to the scene's center (so that a scene
 far from the origin keeps its precision), batches on threads, the first query single; and copies of
-what lies back to back with a black back (`coincident`).
+what lies back to back with a black back (`scene/coincident_pairs.py`).
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import bpy
@@ -50,6 +51,26 @@ def test_what_is_not_followed_is_told() -> None:
     of_scene, of_object = messages(export_with())
     assert says(of_scene, scene.name, "Fast GI")
     assert says(of_object, "Culled", "culling")
+
+
+def test_a_library_that_is_missing_is_named(tmp_path: Path) -> None:
+    """Blender shows nothing in its place, so that light would be missing without a word."""
+    library = tmp_path / "lamps.blend"
+    lamp = add_lamp("POINT", energy=100.0)
+    bpy.data.libraries.write(str(library), {lamp})
+    bpy.data.objects.remove(lamp)
+    with bpy.data.libraries.load(str(library), link=True) as (there, linked):
+        linked.objects = there.objects
+    bpy.context.scene.collection.objects.link(linked.objects[0])
+    add_mesh("Floor")
+    add_lamp("SUN", energy=1.0)
+    assert not messages(export_with())
+    file = str(tmp_path / "scene.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+    library.unlink()
+    bpy.ops.wm.open_mainfile(filepath=file)
+    (message,) = messages(export_with())
+    assert says(message, "lamps.blend", "relink")
 
 
 def test_a_driven_viewport_is_told() -> None:

@@ -81,10 +81,10 @@ class BakeResult:
         tell.
     warnings: The scene's and the bake's own.
     seconds: Wall-clock time of each stage.
-    atlas: Parallel to `pages`: "resolution", "texels_per_metre" of objects at texel scale 1, "utilization"
+    atlas: Parallel to `pages`: "resolution", "texels_per_metre" of objects at texel scale 1, "utilisation"
         (the share of texels that show a surface) and the number of "objects".
     groups: Those that were asked for, and one of what is in none of them.
-    light: Parallel to `objects`: statistics of the light on their fronts, see `bake_details.statistics`.
+    light: Parallel to `objects`: statistics of the light on their fronts, see `details.py`.
     """
 
     pages: tuple[LightmapPage, ...]

@@ -183,7 +183,7 @@ def read_sidecar(path: Path, memory_limit: float | None = None) -> StoredBake:
         check_stored(stored)
         return StoredBake(stored["bake_id"], BakeSettings(**stored["settings"]), path, stored)
     except FileNotFoundError:
-        raise BakeError(f"there is no '{path}': bake with a sidecar to relight that bake") from None
+        raise BakeError(f"there is no '{path}': bake with --keep to relight the bake later") from None
     except OSError as error:
         raise BakeError(f"cannot read '{path}': {error.strerror}") from error
     except TooLargeError as error:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -61,7 +62,7 @@ def own_reports(folder: Path, scene: bpy.types.Scene) -> list[OwnReport]:
     ]
 
 
-def report_listing(path: Path, scenes: Iterable[bpy.types.Scene]) -> OwnReport:
+def report_listing(path: Path, scenes: Collection[bpy.types.Scene]) -> OwnReport:
     """Return the report next to a file that lists it as one of a scene's lightmaps.
 
     Raises
@@ -73,12 +74,13 @@ def report_listing(path: Path, scenes: Iterable[bpy.types.Scene]) -> OwnReport:
         for report in own_reports(path.parent, scene):
             if path.name in report.contents[LISTED]:
                 return report
-    try:
-        read_report(path.with_name(REPORT_NAME))
-    except (OSError, NoReportError) as error:
-        if isinstance(error, NoReportError):
-            raise BakeError(f"'{path.with_name(REPORT_NAME)}' {error}: bake again") from None
-    raise BakeError(f"'{path}' is not a lightmap written by a bake of this file and scene: bake again")
+    for name in dict.fromkeys((*(panel_names(scene).report for scene in scenes), REPORT_NAME)):
+        with suppress(OSError):
+            try:
+                read_report(path.with_name(name))
+            except NoReportError as error:
+                raise BakeError(f"'{path.with_name(name)}' {error}: move it away and bake again") from None
+    raise BakeError(f"no report of this file and scene lists '{path}': move it away and bake again")
 
 
 def is_read(path: Path) -> bool:

@@ -123,7 +123,7 @@ class RADIOSITY_OT_clean(Conditional, bpy.types.Operator):
         found = unused_lightmaps(context)
         if not found.count or bpy.app.background:
             return self.execute(context)
-        message = f"Delete {found.count} unused lightmap files? This cannot be undone"
+        message = f"Delete unused lightmap files ({found.count})? This cannot be undone"
         return context.window_manager.invoke_confirm(self, event, title="Clean Up Lightmaps", message=message)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -140,9 +140,9 @@ class RADIOSITY_OT_clean(Conditional, bpy.types.Operator):
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         if not count:
-            self.report({"INFO"}, "Nothing to clean up: all lightmaps of this file are used")
+            self.report({"INFO"}, "Nothing to clean up: no report of this file lists an unused lightmap")
             return {"CANCELLED"}
-        self.report({"INFO"}, f"Deleted {count} lightmap files")
+        self.report({"INFO"}, f"Deleted unused lightmap files: {count}")
         return {"FINISHED"}
 
 

@@ -1,7 +1,7 @@
 """Collect what an evaluated scene holds into plain records, while the evaluation lives.
 
 The scene is shown as a render would show it only for moments: what is found is copied as it is, as much as
-fits into a moment, and made sense of afterward (`_sorted_out`). Nothing that outlives a moment points into
+fits into a moment, and made sense of afterward (`sorted_out`). Nothing that outlives a moment points into
 the file: it may be edited before the next.
 """
 

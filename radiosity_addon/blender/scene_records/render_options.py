@@ -37,7 +37,21 @@ def option_warnings(context: bpy.types.Context) -> list[BakeWarning]:
     if space != _USUAL_SPACE:
         message = f"the file's working space is {space}: its lightmaps hold such colors, not {_USUAL_SPACE}"
         warnings.append(BakeWarning(scene.name, message))
-    return [*warnings, *_still_as_in_the_viewport(objects)]
+    return [*warnings, *_missing_links(), *_still_as_in_the_viewport(objects)]
+
+
+def _missing_links() -> Iterator[BakeWarning]:
+    """Warn of libraries that linked data-blocks cannot be loaded from: empty ones stand for them."""
+    missing: dict[str, list[str]] = {}
+    data = bpy.data
+    for blocks in (data.objects, data.collections, data.meshes, data.lights, data.materials, data.worlds):
+        for block in blocks:
+            if block.is_missing and block.library is not None:
+                missing.setdefault(block.library.filepath, []).append(block.name)
+    for path, names in missing.items():
+        more = f" and {len(names) - 1} more" if len(names) > 1 else ""
+        message = f"library '{path}' lacks '{names[0]}'{more}: what is linked from it is left out; relink it"
+        yield BakeWarning(path, message)
 
 
 def _culled(cycles: object, objects: Iterable[bpy.types.Object]) -> Iterator[BakeWarning]:

@@ -16,8 +16,8 @@ sends more than it has, and the iteration converges (but for what gradients of c
 What a leaf receives is the same the other way round: where nothing escapes ΣFV = 1, and what its own links
 leave of that is what it receives over shared ones. A face that is its own leaf has all its light scaled, as
 links to clusters miss what is curved within them. Both balances are struck in turn (Sinkhorn 1964), and
-before them visibilities that few rays estimate are corrected (`known_sums`). The links as measured stay
-as they are: what they alone add up to is reported too.
+before them visibilities that few rays estimate are corrected (`visibility_correction.py`). The links as
+measured stay as they are: what they alone add up to is reported too.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ curvature, and must not be hidden."""
 class Balance:
     """The links and factors by which light is exchanged.
 
-    links: To elements, their visibilities corrected (see `known_sums`).
+    links: To elements, their visibilities corrected (see `visibility_correction.py`).
     sent, received (e, 2): What leaves' radiosity and their gathered light are scaled with, over their own
         links and over those they share with their ancestors and clusters; 1 where nothing is known.
     """
