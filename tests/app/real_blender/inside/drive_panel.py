@@ -81,7 +81,8 @@ def script():
     yield from events.click(x, y)
     yield from events.until(not_baking, 120)
     seen["lit_before_restore"] = lit_objects()
-    # Below the result of the check and the buttons of scope and size, at the left: labels there do nothing, and headers only unfold.
+    # Below the result of the check and the buttons of scope and size, at the left: labels there do nothing,
+    # and headers only unfold.
     distance = bake_button + 124
     while lit_objects() and distance < sidebar.height - 20:
         distance += 6
