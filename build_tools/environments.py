@@ -125,10 +125,10 @@ def _ready(
 
 
 def create(folder: Path, python: str) -> None:
-    """Make a virtual environment, or make it anew."""
+    """Make a virtual environment; one that is there is replaced."""
     print(f"making {folder} with {python}", file=sys.stderr, flush=True)
     if subprocess.run([python, "-m", "venv", "--clear", str(folder)], check=False).returncode != 0:
-        raise BuildError(f"{python} could not make {folder} (its message is above); mend that, run again")
+        raise BuildError(f"{python} could not make {folder} (its message is above); fix that and run again")
 
 
 def install(folder: Path, pins: list[Path], *how: str) -> None:
@@ -142,7 +142,7 @@ def install(folder: Path, pins: list[Path], *how: str) -> None:
     command += [word for path in pins for word in ("-r", str(path))]
     # What pip says belongs to the set-up, not to the verb's own output.
     if subprocess.run(command, stdout=sys.stderr, check=False).returncode != 0:
-        raise BuildError(f"pip could not install {names} (its message is above); mend that, run again")
+        raise BuildError(f"pip could not install {names} (its message is above); fix that and run again")
 
 
 def _works(folder: Path) -> bool:

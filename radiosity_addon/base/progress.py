@@ -47,7 +47,7 @@ class Progress:
     def at(self, fraction: float, shown: object = None) -> None:
         """Say that a fraction of this part, 0 to 1, is done; `shown` is what a picture can be made of.
 
-        Raises Canceled if the job was canceled.
+        Raises Cancelled if the job was canceled.
         """
         if self.listener is not None:
             picture = None if self.look is None else self.look(shown)

@@ -15,7 +15,6 @@ from typing import Any
 
 from ...base import BakeError, RadiosityError
 from ...files import BAKE, DIGEST, FILE, KEPT
-from ...files import SIDECAR_NAME as SIDECAR_NAME
 from ...lightmap.images import LightmapPage, Seams
 from ...lightmap.points import Interpolation
 from ...lightmap.texels import TexelGeometry

@@ -343,7 +343,7 @@ def _no_groups(name: str) -> BakeWarning:
 
 
 def _nothing_to_bake(context: bpy.types.Context) -> str:
-    return f"scene '{context.scene.name}' has nothing to bake: renders show no object with faces to be baked"
+    return f"scene '{context.scene.name}' has nothing to bake: add a mesh with faces, or show one in renders"
 
 
 def _linked(piece: Piece) -> str:
