@@ -98,7 +98,6 @@ def test_no_step_of_an_export_of_300_objects_takes_long(textured: int, of_blende
             break
     assert len(export.sources) == 300
     assert max(taken) < LONGEST, [round(each, 3) for each in sorted(taken)[-8:]]
-    assert sum(taken) > 0.1  # there is something to divide
 
 
 def test_moments_change_nothing_of_what_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
