@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..numerics import Array
-from ..rays import RayCaster
+from ..rays import RayCaster, passing_light
 
 LEAST = 1e-6
 """Lower bound of the shares that cut-outs pass and stop, in results of `visibility_of`."""
@@ -85,9 +85,9 @@ def visibility_of(
 
     points, normals, other_points, other_normals (n, 3).
     Returns visible (n,) bool or: Never 0 or 1 where a cut-out was met: others may find what few rays between
-        do not.
+        do not. (n, 3) by channel if the caster is tinted.
     """
     start = points + caster.surface_offset * normals
     along = other_points + caster.surface_offset * other_normals - start
     distance = np.linalg.norm(along, axis=1)
-    return caster.passing(start, along / np.maximum(distance, _TINY)[:, None], distance, LEAST)
+    return passing_light(caster, start, along / np.maximum(distance, _TINY)[:, None], distance, LEAST)

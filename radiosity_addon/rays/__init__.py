@@ -5,7 +5,7 @@ Embree does the work; only `embree.py` imports it.
 
 from __future__ import annotations
 
-from .caster import NO_HIT, SAGITTA, SIGHT_LIFT, Hits, RayCaster, free_segment, surface_offset
+from .caster import NO_HIT, SAGITTA, SIGHT_LIFT, Hits, RayCaster, free_segment, passing_light, surface_offset
 from .embree import TARGET_SLACK, EmbreeCaster
 
 __all__ = [
@@ -17,5 +17,6 @@ __all__ = [
     "Hits",
     "RayCaster",
     "free_segment",
+    "passing_light",
     "surface_offset",
 ]

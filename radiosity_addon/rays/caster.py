@@ -35,16 +35,20 @@ class Hits:
     barycentric (n, 2) float32: Weights of the triangle's second and third corner.
     front (n,) bool: Whether the ray came from the triangle's front.
     distance (n,) float32: Along the unit direction [m]; infinite without a hit.
+    tint (n, 3) float32: What the light that comes along each ray is multiplied with on its way through glass;
+        None where there is none.
     """
 
     triangle: Array
     barycentric: Array
     front: Array
     distance: Array
+    tint: Array | None = None
 
     def take(self, rows: Array) -> Hits:
         """Return the hits of a boolean mask or of row numbers."""
-        return Hits(self.triangle[rows], self.barycentric[rows], self.front[rows], self.distance[rows])
+        tint = None if self.tint is None else self.tint[rows]
+        return Hits(self.triangle[rows], self.barycentric[rows], self.front[rows], self.distance[rows], tint)
 
 
 class RayCaster(Protocol):
@@ -52,6 +56,11 @@ class RayCaster(Protocol):
 
     surface_offset: float
     """How far ray origins leave their surface [m]."""
+
+    @property
+    def tinted(self) -> bool:
+        """Whether rays meet glass: light then passes by color, and hits have a tint."""
+        ...
 
     @property
     def rays(self) -> int:
@@ -71,8 +80,14 @@ class RayCaster(Protocol):
         """Return (n,) the share of light that passes: as `unoccluded`, but between 0 and 1 through cut-outs.
 
         Their opacity counts as at least `least` and as at most 1 − `least`, for callers that judge
-        by few rays: where some met a cut-out, more are needed.
+        by few rays: where some met a cut-out, more are needed. Of a tinted caster the mean of the channels.
         """
+        ...
+
+    def passing_colors(
+        self, origins: Array, directions: Array, distances: Array, least: float = 0.0
+    ) -> Array:
+        """Return (n, 3) the share of each channel's light that passes; of a tinted caster alone."""
         ...
 
     def intersect(self, origins: Array, directions: Array) -> Hits:
@@ -87,6 +102,15 @@ def surface_offset(triangles: Array) -> float:
     corners = triangles.reshape(-1, 3)
     extent = float(np.max(corners.max(axis=0) - corners.min(axis=0)))
     return max(OFFSET_STEPS * float(np.finfo(np.float32).eps) * extent, 1e-12)
+
+
+def passing_light(
+    caster: RayCaster, origins: Array, directions: Array, distances: Array, least: float = 0.0
+) -> Array:
+    """Return the share of light that passes: (n,), or (n, 3) by channel if the caster is tinted."""
+    if caster.tinted:
+        return caster.passing_colors(origins, directions, distances, least)
+    return caster.passing(origins, directions, distances, least)
 
 
 def free_segment(caster: RayCaster, start: Array, end: Array) -> Array:
@@ -106,6 +130,7 @@ class BruteForceCaster:
         self._normal = np.cross(self._edge_1, self._edge_2)
         self.surface_offset = surface_offset(triangles)
         self.rays = 0
+        self.tinted = False
 
     @property
     def for_lamps(self) -> RayCaster:
@@ -119,6 +144,12 @@ class BruteForceCaster:
     def passing(self, origins: Array, directions: Array, distances: Array, least: float = 0.0) -> Array:  # noqa: ARG002
         """Return the same: all surfaces are whole."""
         return self.unoccluded(origins, directions, distances)
+
+    def passing_colors(
+        self, origins: Array, directions: Array, distances: Array, least: float = 0.0
+    ) -> Array:
+        """Return the same for each channel."""
+        return np.repeat(self.passing(origins, directions, distances, least)[:, None], 3, axis=1)
 
     def intersect(self, origins: Array, directions: Array) -> Hits:
         """See `RayCaster.intersect`."""

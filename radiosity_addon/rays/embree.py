@@ -46,6 +46,7 @@ class EmbreeCaster:
         from embreex.rtcore_scene import EmbreeScene
 
         self._own_rays = 0
+        self.tinted = False
         self._for_lamps = for_lamps
         self._counting = Lock()
         self.surface_offset = surface_offset(triangles)
@@ -98,6 +99,12 @@ class EmbreeCaster:
     def passing(self, origins: Array, directions: Array, distances: Array, least: float = 0.0) -> Array:  # noqa: ARG002
         """Return the same: all surfaces are whole."""
         return self.unoccluded(origins, directions, distances)
+
+    def passing_colors(
+        self, origins: Array, directions: Array, distances: Array, least: float = 0.0
+    ) -> Array:
+        """Return the same for each channel."""
+        return np.repeat(self.passing(origins, directions, distances, least)[:, None], 3, axis=1)
 
     def intersect(self, origins: Array, directions: Array) -> Hits:
         """Return what each ray meets first."""

@@ -132,7 +132,7 @@ class Layers:
         triangle, front, barycentric = hits.triangle.copy(), hits.front.copy(), hits.barycentric.copy()
         triangle[moved], front[moved] = side // 2, side % 2 == 0
         barycentric[moved] = place
-        return Hits(triangle, barycentric, front, hits.distance)
+        return Hits(triangle, barycentric, front, hits.distance, hits.tint)
 
     def is_pressed(self, triangle: Array, barycentric: Array) -> Array:
         """Return (n,) whether points of triangles' fronts, (n,) and (n, 2), lie against another surface.

@@ -6,6 +6,10 @@ looks up the opacity there. Asked how much light passes, what it leaves is multi
 is hit first, the surface is hit if a number drawn for the ray and the triangle is below it: where
 opacity is 0 or 1 no chance is left. That number depends on nothing but the two, so results do not
 depend on how rays are divided among threads.
+
+Glass is a cut-out whose opacity differs by channel. Light passes it by color. A ray that goes on through it
+takes a tint along: of a surface that it might have hit, what passes relative to the chance that it does; of
+glass that sends no light of its own there is nothing to hit, and the tint is all that passes.
 """
 
 from __future__ import annotations
@@ -39,7 +43,7 @@ def _caster(scene: Scene, threads: int, only: Array, for_lamps: RayCaster | None
 
 
 def _plain_caster(scene: Scene, threads: int, only: Array, for_lamps: RayCaster | None) -> RayCaster:
-    if scene.images is None or not scene.images.cut_out.any():
+    if scene.images is None or not (scene.images.cut_out & only).any():
         return EmbreeCaster(scene.triangles, threads, only, for_lamps, scene.two_sided)
     stacks = Stacks(scene, only)
     return CutOutCaster(
@@ -53,6 +57,7 @@ class LayeredCaster:
     def __init__(self, caster: RayCaster, layers: Layers) -> None:
         self._caster, self._layers = caster, layers
         self.surface_offset = caster.surface_offset
+        self.tinted = caster.tinted
 
     @property
     def for_lamps(self) -> RayCaster:
@@ -72,6 +77,12 @@ class LayeredCaster:
     def passing(self, origins: Array, directions: Array, distances: Array, least: float = 0.0) -> Array:
         """See `RayCaster.passing`."""
         return self._caster.passing(origins, directions, distances, least)
+
+    def passing_colors(
+        self, origins: Array, directions: Array, distances: Array, least: float = 0.0
+    ) -> Array:
+        """See `RayCaster.passing_colors`."""
+        return self._caster.passing_colors(origins, directions, distances, least)
 
     def intersect(self, origins: Array, directions: Array) -> Hits:
         """See `RayCaster.intersect`."""
@@ -107,6 +118,7 @@ class CutOutCaster:
         self._images, self._stacks = images, stacks
         met = np.ones(len(triangles), dtype=bool) if only is None else only
         whole, cut = met & ~images.cut_out, met & images.cut_out
+        self.tinted = bool((met & images.tinting).any())
         self._whole_rows = np.append(np.flatnonzero(whole), NO_HIT).astype(np.int32)
         self._cut_rows = np.append(np.flatnonzero(cut), NO_HIT).astype(np.int32)
         sides = (None, None) if two_sided is None else (two_sided[whole], two_sided[cut])
@@ -134,6 +146,8 @@ class CutOutCaster:
 
     def passing(self, origins: Array, directions: Array, distances: Array, least: float = 0.0) -> Array:
         """Return (n,) float64 what share of light passes: no chance here, but 1 − opacity of all it meets."""
+        if self.tinted:
+            return np.asarray(self.passing_colors(origins, directions, distances, least).mean(axis=1))
         self._count(len(origins))
         share = self._whole.unoccluded(origins, directions, distances).astype(np.float64)
         free = np.flatnonzero(share)
@@ -143,6 +157,21 @@ class CutOutCaster:
             opacity = np.clip(self._images.opacity_at(hits.triangle, hits.barycentric), least, 1.0 - least)
             np.multiply.at(share, ways.ray[at], 1.0 - opacity)
             ways.keep(share[ways.ray] > 0.0)
+        return share
+
+    def passing_colors(
+        self, origins: Array, directions: Array, distances: Array, least: float = 0.0
+    ) -> Array:
+        """Return (n, 3) float64 the same of each channel."""
+        self._count(len(origins))
+        free = self._whole.unoccluded(origins, directions, distances)
+        share = np.repeat(free.astype(np.float64)[:, None], 3, axis=1)
+        ways = self._ways(np.flatnonzero(free), origins, directions, distances * (1.0 - TARGET_SLACK))
+        while len(ways.ray):
+            at, hits = ways.meet()
+            passes = self._images.passes_at(hits.triangle, hits.barycentric)
+            np.multiply.at(share, ways.ray[at], np.clip(passes, least, 1.0 - least))
+            ways.keep(share[ways.ray].any(axis=1))
         return share
 
     def intersect(self, origins: Array, directions: Array) -> Hits:
@@ -156,6 +185,7 @@ class CutOutCaster:
             np.where(is_cut[:, None], nearer.barycentric, hits.barycentric),
             np.where(is_cut, nearer.front, hits.front),
             np.where(is_cut, nearer.distance, hits.distance),
+            nearer.tint,
         )
 
     def _first_there(self, origins: Array, directions: Array, reach: Array) -> Hits:
@@ -165,21 +195,44 @@ class CutOutCaster:
         barycentric = np.zeros((count, 2), dtype=np.float32)
         front = np.zeros(count, dtype=bool)
         distance = np.full(count, np.inf, dtype=np.float32)
+        tint = np.ones((count, 3), dtype=np.float32) if self.tinted else None
         ways = self._ways(np.arange(count), origins, directions, reach)
         while len(ways.ray):
             at, hits = ways.meet()
             ray = ways.ray[at]
             opacity = self._images.opacity_at(hits.triangle, hits.barycentric)
-            stops = np.flatnonzero(opacity > _drawn(origins[ray], directions[ray], hits.triangle))
+            stopped_by = opacity > _drawn(origins[ray], directions[ray], hits.triangle)
+            if tint is not None:
+                stopped_by &= ~self._images.clear[hits.triangle]
+            stops = np.flatnonzero(stopped_by)
             # Of several in one place the outermost.
             ended, first = np.unique(at[stops], return_index=True)
+            if tint is not None:
+                self._tint(tint, ray, at, hits, opacity, ends=stops[first])
             stops, stopped = stops[first], ways.ray[ended]
             triangle[stopped], distance[stopped] = hits.triangle[stops], hits.distance[stops]
             barycentric[stopped], front[stopped] = hits.barycentric[stops], hits.front[stops]
             going = np.ones(len(ways.ray), dtype=bool)
             going[ended] = False
             ways.keep(going)
-        return Hits(triangle, barycentric, front, distance)
+        return Hits(triangle, barycentric, front, distance, tint)
+
+    def _tint(self, tint: Array, ray: Array, at: Array, hits: Hits, opacity: Array, ends: Array) -> None:
+        """Multiply the tints (n, 3) of rays by what passes the h cut-outs that they met in front of their ends.
+
+        ray, at (h,) int: The ray of each hit, and the number of its way, sorted.
+        ends (e,) int: The hits that stop rays.
+        """
+        before = np.ones(len(at), dtype=bool)
+        row = np.searchsorted(at[ends], at)
+        there = row < len(ends)
+        there[there] = at[ends][row[there]] == at[there]
+        before[there] = np.flatnonzero(there) < ends[row[there]]
+        rows = np.flatnonzero(before & self._images.tinting[hits.triangle])
+        if len(rows):
+            passed = self._images.passes_at(hits.triangle[rows], hits.barycentric[rows])
+            chance = np.where(self._images.clear[hits.triangle[rows]], 1.0, 1.0 - opacity[rows])
+            np.multiply.at(tint, ray[rows], passed / np.maximum(chance, 1e-6)[:, None])
 
     def _ways(self, ray: Array, origins: Array, directions: Array, reach: Array) -> _Ways:
         offset, stacks = self.surface_offset, self._stacks

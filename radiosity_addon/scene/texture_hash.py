@@ -15,7 +15,10 @@ from ..numerics import Array, plane_weights_at, signed_double_areas
 from .textures import SurfaceImages
 
 LOOKS, GLOWS = (0, 1, 2, 6), (3, 4, 5)
-"""Channels of the images: reflectance with opacity, and emission."""
+"""Channels of the images: reflectance with opacity, and emission; …"""
+
+PASSES = (7, 8, 9)
+"""… and what passes glass."""
 
 SUMS = 8
 """Random sums of each channel of an emission."""
@@ -42,9 +45,10 @@ def texture_digest(images: SurfaceImages, rows: Array, step: float | None = None
     step: Values are rounded to multiples of it; None takes them to the last bit.
     """
     digest, first = hashlib.blake2b(digest_size=16), None
+    looks = LOOKS if images.passes is None else (*LOOKS, *PASSES)
     varies = False
     for values, count in _texels(images, rows):
-        seen = values[:, LOOKS]
+        seen = values[:, looks]
         seen = seen + 0.0 if step is None else np.round(seen / step).astype(np.int16)
         first = seen[0] if first is None else first
         varies = varies or bool((seen != first).any())
@@ -87,12 +91,15 @@ def same_glow(before: Glow, now: Glow) -> bool:
 
 
 def _texels(images: SurfaceImages, rows: Array) -> Iterator[tuple[Array, Array]]:
-    """Yield the texels (n, 7) whose centers lie on textured triangles, and how many each triangle has.
+    """Yield the texels (n, 7), with glass (n, 10), whose centers lie on textured triangles, and how many each triangle has.
 
     Triangles come in groups of one size in texels, and in their order; the texels of each by their weights.
     """
     rows = rows[images.textured[rows]]
-    height, width = images.values.shape[:2]
+    texel_values = images.values
+    if images.passes is not None:
+        texel_values = np.concatenate([texel_values, images.passes], axis=2)
+    height, width = texel_values.shape[:2]
     corners = images.image_uv[rows].astype(np.float64) * (width, height) - 0.5
     low = np.rint(np.floor(corners.min(axis=1) + 1e-3)).astype(np.int64)
     size = np.rint(np.ceil(corners.max(axis=1) - 1e-3)).astype(np.int64) - low + 1
@@ -109,7 +116,7 @@ def _texels(images: SurfaceImages, rows: Array) -> Iterator[tuple[Array, Array]]
             inside = np.take_along_axis(inside, order, axis=1)
             count = inside.sum(axis=1)
             if count.any():
-                yield images.values.reshape(-1, images.values.shape[2])[pixel[inside]], count
+                yield texel_values.reshape(-1, texel_values.shape[2])[pixel[inside]], count
 
 
 def _on_triangles(corners: Array, at: Array) -> tuple[Array, Array]:

@@ -5,6 +5,9 @@ by its corners' coordinates. Where opacity is below 1 a surface is only partly t
 not neither reflects, emits nor blocks. So look-ups give reflectance and emission multiplied
 by opacity, which is what a piece of surface sends for what arrives on all of it, and what may
 be averaged; `where_there` divides again.
+
+What goes through is gray as a rule: 1 − opacity. Where it has a color, a second image holds it by channel,
+and opacity is 1 − its mean.
 """
 
 from __future__ import annotations
@@ -48,10 +51,21 @@ class SurfaceImages:
         (c+1)/w] × [r/h, (r+1)/h]. Look-ups are bilinear and reach half a texel beyond the triangle:
         neighbors in the image need a border of their own texels.
     textured (t,) bool: Other rows use the scene's constants and are opaque.
+    passes (h, w, 3): The share of each channel's light that goes straight through; its mean is 1 − opacity.
+        None: the same of all channels.
+    glass (t,) bool: Triangles that are glass: where they reflect and emit nothing, rays go on through them
+        with what is left of their light. None: none.
     Raises SceneError if shapes do not match, or a textured triangle meets a value out of range.
     """
 
-    def __init__(self, values: Array, image_uv: Array, textured: Array) -> None:
+    def __init__(
+        self,
+        values: Array,
+        image_uv: Array,
+        textured: Array,
+        passes: Array | None = None,
+        glass: Array | None = None,
+    ) -> None:
         self.values = np.array(values, dtype=np.float32)
         self.image_uv = np.array(image_uv, dtype=np.float32)
         self.textured = np.array(textured, dtype=bool)
@@ -62,6 +76,16 @@ class SurfaceImages:
                 f"image_uv has shape {self.image_uv.shape} and textured {self.textured.shape}; "
                 "(t, 3, 2) and (t,) are needed"
             )
+        self.glass = (
+            np.zeros(len(self.textured), dtype=bool) if glass is None else np.array(glass, dtype=bool)
+        )
+        self.passes = None if passes is None else np.array(passes, dtype=np.float32)
+        if self.glass.shape != self.textured.shape or (
+            self.passes is not None and self.passes.shape != (*self.values.shape[:2], 3)
+        ):
+            raise SceneError("glass and passes are not of the same triangles and texels as the surface image")
+        if self.passes is None and self.glass.any():
+            self.passes = np.repeat(1.0 - self.values[..., 6:], 3, axis=2)
         self._check()
         self.image_uv = np.clip(self.image_uv, 0.0, 1.0)
         self.image_uv[~self.textured] = 0.0
@@ -71,6 +95,8 @@ class SurfaceImages:
         self._weighed = self.values.copy()
         self._weighed[..., :6] *= self.values[..., 6:]
         self._opacity = np.ascontiguousarray(self.values[..., 6:])
+        if self.passes is not None:
+            self.passes = np.clip(np.where(np.isfinite(self.passes), self.passes, 0.0), 0.0, 1.0)
 
     def __len__(self) -> int:
         return len(self.textured)
@@ -79,13 +105,35 @@ class SurfaceImages:
         """Whether another image has the same values on the same triangles."""
         return all(
             np.array_equal(getattr(self, name), getattr(other, name))
-            for name in ("textured", "image_uv", "values")
+            for name in ("textured", "image_uv", "values", "passes", "glass")
         )
 
     @cached_property
     def cut_out(self) -> Array:
         """(t,) bool: triangles that anything may be seen through."""
         return self._meets(self.values[..., 6] < 1.0 - ROUNDING)
+
+    @cached_property
+    def clear(self) -> Array:
+        """(t,) bool: glass that neither reflects nor emits."""
+        if not self.glass.any():
+            return self.glass
+        return np.asarray(self.glass & ~self._meets((self._weighed[..., :6] > ROUNDING).any(axis=2)))
+
+    @cached_property
+    def tinting(self) -> Array:
+        """(t,) bool: cut-outs of whose color the light that goes on takes a share."""
+        if self.passes is None:
+            return np.zeros(len(self), dtype=bool)
+        colors = np.ptp(self.passes, axis=2) > ROUNDING
+        return np.asarray(self.cut_out & (self.clear | self._meets(colors)))
+
+    @cached_property
+    def invisible(self) -> Array:
+        """(t,) bool: clear glass that takes nothing of the light, which need not be traced."""
+        if self.passes is None:
+            return np.zeros(len(self), dtype=bool)
+        return np.asarray(self.clear & ~self._meets((self.passes < 1.0 - ROUNDING).any(axis=2)))
 
     def at(self, triangle: Array, barycentric: Array) -> Array:
         """Look up points of textured triangles, bilinearly.
@@ -100,6 +148,16 @@ class SurfaceImages:
         """Return (n,) float32 the opacity at the same points."""
         return _bilinear(self._opacity, self._place(triangle, barycentric))[:, 0]
 
+    def passes_at(self, triangle: Array, barycentric: Array) -> Array:
+        """Return (n, 3) float32 the share of each channel that goes through at the same points."""
+        assert self.passes is not None
+        return _bilinear(self.passes, self._place(triangle, barycentric))
+
+    def mean_passes(self, triangle: Array, corners: Array) -> Array:
+        """Return (n, 3) means of what goes through by channel; parameters as of `area_means`."""
+        assert self.passes is not None
+        return self._means_of(self.passes, triangle, corners)
+
     def area_means(self, triangle: Array, corners: Array) -> Array:
         """Average over parts of textured triangles.
 
@@ -111,7 +169,11 @@ class SurfaceImages:
         corners (n, 3, 2): Each part's corners, as weights of its triangle's second and third corner.
         Returns weighed (n, 7): As from `at`.
         """
-        means = np.empty((len(triangle), CHANNELS))
+        return self._means_of(self._weighed, triangle, corners)
+
+    def _means_of(self, image: Array, triangle: Array, corners: Array) -> Array:
+        """Return (n, k) means of an image (h, w, k) over parts of triangles."""
+        means = np.empty((len(triangle), image.shape[2]))
         place = self._place(np.repeat(triangle, 3), corners.reshape(-1, 2)).reshape(-1, 3, 2)
         depth = _depth(place)
         for levels in np.unique(depth):
@@ -121,7 +183,7 @@ class SurfaceImages:
             for first in range(0, len(rows), step):
                 chunk = rows[first : first + step]
                 points = np.einsum("sc,nck->nsk", inside, place[chunk]).reshape(-1, 2)
-                found = _nearest(self._weighed, points).reshape(len(chunk), len(inside), CHANNELS)
+                found = _nearest(image, points).reshape(len(chunk), len(inside), image.shape[2])
                 means[chunk] = found.mean(axis=1, dtype=np.float64)
         return means
 

@@ -122,9 +122,9 @@ class Solution:
         local = self.local_pass
         at = Footprints(points, normals, np.arange(len(points)))
         direct = local.direct.at(at, rays=64)
-        sources = local.gather.at(at, normals, POINT_RAYS, local.elements.leaves_of).sources
+        gathered = local.gather.at(at, normals, POINT_RAYS, local.elements.leaves_of)
         radiosity = np.concatenate([local.elements.reflected(), local.elements.beyond()])
-        return np.asarray(direct + radiosity[sources].mean(axis=1))
+        return np.asarray(direct + gathered.mean_of(radiosity))
 
     def residual(
         self, triangle: Array, barycentric: Array, front: bool | Array = True, rays: int | None = None

@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...lights import Light
-from ...numerics import Array
+from ...numerics import WHOLE_TRIANGLE, Array
 from ...options import BakeSettings
-from ...scene import BakeObject, BakeScene, Glow, glow_pattern, texture_digest
+from ...scene import BakeObject, BakeScene, Glow, Scene, glow_pattern, texture_digest
 
 STEP = 1.0 / 256.0
 """Smallest change of reflectance or opacity that a rounded digest shows."""
@@ -106,6 +106,9 @@ def rounded_digest(bake_scene: BakeScene, item: BakeObject) -> str:
         for point in _POINTS:
             seen = scene.images.at(triangle, np.broadcast_to(point, (len(triangle), 2)))
             weighed = np.concatenate([seen[:, :3], seen[:, 6:]], axis=1)
+            if scene.images.tinting[triangle].any():
+                passes = scene.images.passes_at(triangle, np.broadcast_to(point, (len(triangle), 2)))
+                weighed = np.concatenate([weighed, passes], axis=1)
             digest.update(np.round(weighed / STEP).astype(np.int16).tobytes())
     return digest.hexdigest()
 
@@ -139,12 +142,23 @@ def _record_of(bake_scene: BakeScene, item: BakeObject, laid_out: Array | None) 
             np.array(item.bake), scene.two_sided[rows], scene.in_bounces[rows], scene.in_shadows[rows]
         ),
         place=_digest(scene.triangles[rows], scene.normals[rows]),
-        surface=_digest(scene.reflectance[rows], scene.opacity[rows]),
+        surface=_digest(scene.reflectance[rows], scene.opacity[rows], *_glass_of(scene, triangle)),
         emission=_digest(scene.emission[rows], *emitter),
         uv="" if item.uv is None or not item.bake else _digest(item.uv.astype(np.float32)),
         laid_out="" if laid_out is None else _digest(laid_out[rows].astype(np.float32)),
         texture="" if images is None else texture_digest(images, triangle),
         glow=() if images is None else glow_pattern(images, triangle),
+    )
+
+
+def _glass_of(scene: Scene, triangle: Array) -> tuple[Array, ...]:
+    """Return which of an object's triangles are glass, and what passes them; nothing if none are."""
+    images = scene.images
+    if images is None or not (images.glass | images.tinting)[triangle].any():
+        return ()
+    rows = triangle[images.textured[triangle]]
+    return images.glass[triangle], images.mean_passes(
+        rows, np.broadcast_to(WHOLE_TRIANGLE, (len(rows), 3, 2))
     )
 
 

@@ -40,6 +40,7 @@ KINDS = (
     "uint16",
     "uint32",
     "uint64",
+    "float16",
     "float32",
     "float64",
 )

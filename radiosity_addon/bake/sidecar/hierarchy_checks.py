@@ -18,6 +18,9 @@ from .value_checks import LARGE, SLACK, instance, integers, number, numbers, req
 
 MOST_THREADS, MOST_LEVELS = 4096, 64
 
+MOST_TINT = 64.0
+"""Tints are relative to means, and to the chance that rays pass: a few times 1, at many crossings more."""
+
 MOST_FACTOR = 1e3
 """Means of samples may exceed what the exact form factor cannot."""
 
@@ -47,7 +50,9 @@ def check_elements(transport: ElementTransport, lights: int, triangles: int) -> 
     of_lights = instance(transport.light_links, LightLinks)
     integers(of_lights.receiver, (len(of_lights.receiver),), 0, count - 1)
     integers(of_lights.light, of_lights.receiver.shape, 0, lights - 1)
-    numbers(of_lights.gain, (len(of_lights.receiver), 4), 0.0)
+    channels = np.shape(of_lights.gain)[2:]
+    require(channels in ((), (3,)), "gains of no channels")
+    numbers(of_lights.gain, (len(of_lights.receiver), 4, *channels), 0.0)
     return count
 
 
@@ -88,6 +93,12 @@ def _check_hierarchy(hierarchy: Hierarchy, triangles: int) -> None:
     numbers(hierarchy.opacity, (e,), 0.0, 1.0 + SLACK)
 
 
+def check_tints(tints: Any, shape: tuple[int, ...]) -> None:
+    """Refuse tints that are there and not by channel of links of a shape, or out of range."""
+    if tints is not None:
+        numbers(tints, (*shape, 3), 0.0, MOST_TINT)
+
+
 def _check_levels(levels: Any, count: int) -> None:
     """Refuse levels that do not divide `count` rows among them, in order."""
     at = 0
@@ -108,6 +119,7 @@ def _check_links(links: Links, clusters: int, elements: int) -> None:
     numbers(links.visibility, (count,), 0.0, 1.0 + SLACK)
     numbers(links.to_quarter, (count, 4), 0.0, 4.0 + SLACK)
     numbers(links.of_quarter, (count, 4), 0.0, 4.0 + SLACK)
+    check_tints(links.tint, (count,))
 
 
 def _check_cluster_links(links: ClusterLinks, clusters: int, elements: int) -> None:
@@ -117,3 +129,4 @@ def _check_cluster_links(links: ClusterLinks, clusters: int, elements: int) -> N
     numbers(links.vector, (count, 3), -LARGE)
     numbers(links.gradient, (count, 3), -LARGE)
     numbers(links.even, (count,), -LARGE)
+    check_tints(links.tint, (count,))

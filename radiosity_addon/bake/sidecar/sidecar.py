@@ -44,7 +44,7 @@ from .array_file import ArrayFileError, TooLargeError, read_arrays, read_digest,
 from .plain_objects import flatten, restore
 from .sidecar_checks import check_stored, stored_layout
 
-MAGIC, FORMAT = b"RADIOSITYRELIGHT", 3
+MAGIC, FORMAT = b"RADIOSITYRELIGHT", 4
 """The format rises with whatever is stored: classes say it themselves (`plain_objects.stored_names`)."""
 
 OF_SOURCES = ("emitter", "emitter_names", "light_groups", "emitter_groups")

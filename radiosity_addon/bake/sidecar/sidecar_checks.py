@@ -30,7 +30,7 @@ from ...solver.element_transport import ElementTransport
 from ...solver.emitters import NO_SOURCE, EmitterGroup, LightSources
 from ...solver.gather import NOTHING, AimedRays, LightGains, lowest_number
 from ..scene_diff import as_object_records
-from .hierarchy_checks import MOST_LEVELS, MOST_THREADS, check_elements
+from .hierarchy_checks import MOST_LEVELS, MOST_THREADS, check_elements, check_tints
 from .value_checks import LARGE, SLACK, array_of, instance, integers, number, numbers, require, whole
 
 MOST_ROUNDS, MOST_RINGS = 1 << 20, 4096
@@ -204,7 +204,9 @@ def _check_lit(lit: RelightableTexels, sources: LightSources, texels: int, eleme
     shape = np.shape(aimed.sources)
     integers(aimed.row, shape[:1], 0, gather - 1)
     integers(aimed.sources, (shape[0], shape[1]), lowest, surfaces - 1)
-    numbers(aimed.weights, shape, 0.0)
+    require(np.shape(aimed.weights)[2:] in ((), (3,)), "weights of no channels")
+    numbers(aimed.weights, (*shape, *np.shape(aimed.weights)[2:]), 0.0)
+    check_tints(links.tints, (gather, rays))
     integers(aimed.element, (len(aimed.element), shape[1]), NOTHING, elements - 1)
     numbers(transport.reflectance, (texels, 3), 0.0, 1.0)
     numbers(cells.start, (surfaces - texels, 3), 0.0)
@@ -215,6 +217,7 @@ def _check_lit(lit: RelightableTexels, sources: LightSources, texels: int, eleme
         require(np.shape(some.sources)[1] > 0, "no rays")
         integers(some.sources, (count, np.shape(some.sources)[1]), lowest, surfaces - 1)
         numbers(some.reflectance, (count, 3), 0.0, 1.0)
+        check_tints(some.tints, (count, np.shape(some.sources)[1]))
         _check_gains(instance(some.gains, LightGains), count, lamps)
     _check_gains(instance(lit.gains, LightGains), texels, lamps)
     integers(lit.element, (texels,), NOTHING, elements - 1)
@@ -243,11 +246,18 @@ def _check_gains(gains: LightGains, count: int, lamps: int) -> None:
     for light, (rows, gain) in instance(gains.gain_of, dict).items():
         whole(light, 0, lamps - 1)
         if rows is None:
-            numbers(gain, (count,), 0.0)
+            numbers(gain, (count, *_channels(gain)), 0.0)
         else:
             integers(rows, (len(rows),), 0, count - 1)
             require((np.diff(rows) > 0).all(), "rows in no order")
-            numbers(gain, (len(rows),), 0.0)
+            numbers(gain, (len(rows), *_channels(gain)), 0.0)
+
+
+def _channels(gain: Any) -> tuple[int, ...]:
+    """Return the shape of a gain of one point: () or (3,)."""
+    channels = np.shape(gain)[1:]
+    require(channels in ((), (3,)), "gains of no channels")
+    return channels
 
 
 def _check_seams(seams: Seams, geometry: TexelGeometry, triangles: int) -> None:

@@ -138,12 +138,14 @@ class LightSoFar:
 
     def _brought(self, gathered: Gathered) -> Array:
         """Return (g, 3) what rays brought by the hierarchy's light [W/m²]."""
-        mean = self._values_at(gathered.sources[:, ::EVERY]).mean(axis=1)
+        seen = self._values_at(gathered.sources[:, ::EVERY])
+        mean = (seen if gathered.tints is None else seen * gathered.tints[:, ::EVERY]).mean(axis=1)
         aimed = gathered.aimed
         if len(aimed.row):
             seen = self._values_at(aimed.sources)
             seen[aimed.sources < 0] = 0.0
-            mean[aimed.row] += np.einsum("akc,ak->ac", seen, aimed.weights)
+            weights = aimed.weights
+            mean[aimed.row] += np.einsum("akc,ak->ac" if weights.ndim == 2 else "akc,akc->ac", seen, weights)
         return np.asarray(mean)
 
     def _values_at(self, sources: Array) -> Array:

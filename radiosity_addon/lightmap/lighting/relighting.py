@@ -85,6 +85,8 @@ def kept_bytes(kept: RelightableTexels) -> int:
     links, cells = kept.transport.links, kept.transport.cells
     total = links.sources.nbytes + links.aimed.sources.nbytes + links.aimed.weights.nbytes
     total += kept.gains.nbytes + kept.element.nbytes + kept.transport.reflectance.nbytes
+    total += 0 if links.tints is None else links.tints.nbytes
     for some in cells.links:
+        total += 0 if some.tints is None else some.tints.nbytes
         total += some.sources.nbytes + (0 if some.gains is None else some.gains.nbytes)
     return int(np.int64(total))

@@ -28,11 +28,14 @@ class GatherLinks:
     spread : Interpolation
     aimed : AimedRays
         What some of the points ask apart.
+    tints : (g, rays, 3) float16 or None
+        What the light of each ray is multiplied with on its way through glass; None where there is none.
     """
 
     sources: Array
     spread: Interpolation
     aimed: AimedRays = field(default_factory=AimedRays.none)
+    tints: Array | None = None
 
     def irradiance(
         self,
@@ -42,7 +45,9 @@ class GatherLinks:
         progress: Progress = SILENT,
     ) -> Array:
         """Return (n, 3) what a table of radiosity sends to the texels."""
-        mean = mean_of_sources(table, self.sources, threads, scratch=scratch, progress=progress)
+        mean = mean_of_sources(
+            table, self.sources, threads, scratch=scratch, tints=self.tints, progress=progress
+        )
         return self.spread_out(table, mean, threads, scratch)
 
     def spread_out(
@@ -55,7 +60,8 @@ class GatherLinks:
             for channel in range(table.shape[1]):
                 values = table[:, channel][sources]
                 values[sources < 0] = 0.0
-                mean[row, channel] += np.einsum("ak,ak->a", values, weights)
+                of_channel = weights if weights.ndim == 2 else weights[..., channel]
+                mean[row, channel] += np.einsum("ak,ak->a", values, of_channel)
         return self.spread(mean, threads, scratch)
 
     def mark_aims(self, aims: Array, marked: Array) -> None:

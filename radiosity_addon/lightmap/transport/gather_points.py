@@ -54,7 +54,8 @@ class KeptPoints:
     def of_level(self, level: int) -> tuple[Array, Gathered]:
         """Return the texels of a level's points, and what they meet."""
         mine, found = self.before.level[self.rows] == level, self.gathered
-        kept = Gathered(found.sources[mine], found.closeness[mine], found.aimed.of_points(mine))
+        tints = None if found.tints is None else found.tints[mine]
+        kept = Gathered(found.sources[mine], found.closeness[mine], found.aimed.of_points(mine), tints)
         return self.before.texel[self.rows[mine]], kept
 
     def refitted(self, points: GatherPoints, geometry: TexelGeometry) -> Interpolation:
@@ -83,12 +84,15 @@ def gather_texels(
     aimed: list[AimedRays] = []
     first: list[int] = []
     sources = geometry.scratch.rows(settings.rays, np.int32)
+    tints = geometry.scratch.rows(3 * settings.rays, np.float16) if local.caster.tinted else None
     for level, (stride, of_level) in enumerate(progress.part(0.0, 1.0 - FIT).each(settings.strides)):
         texels, closeness = [], []
         if kept is not None:
             texel, stays = kept.of_level(level)
             first.append(len(sources))
             sources.more(len(texel))[:] = stays.sources
+            if tints is not None and stays.tints is not None:
+                tints.more(len(texel))[:] = stays.tints.reshape(len(texel), -1)
             texels.append(texel)
             closeness.append(stays.closeness)
             aimed.append(stays.aimed)
@@ -100,7 +104,8 @@ def gather_texels(
             before, done = done, done + 0.8 * len(some) / max(len(chosen), 1)
             part = of_level.part(before, done)
             first.append(len(sources))
-            into = sources.more(len(some))
+            colors = None if tints is None else tints.more(len(some)).reshape(len(some), settings.rays, 3)
+            into = sources.more(len(some)), colors
             gathered = gather_at(local, geometry, some, starts, settings.rays, resolve, into, part)
             if met is not None:
                 met(some, gathered, stride)
@@ -112,7 +117,9 @@ def gather_texels(
         spread = fit(points, geometry, progress.part(1.0 - FIT, 1.0))
     else:
         spread = kept.refitted(points, geometry)
-    return GatherLinks(sources.all(), spread, AimedRays.joined(aimed, first, geometry.scratch)), points
+    colors = None if tints is None else tints.all().reshape(len(points), settings.rays, 3)
+    rays_aimed = AimedRays.joined(aimed, first, geometry.scratch)
+    return GatherLinks(sources.all(), spread, rays_aimed, colors), points
 
 
 def gather_at(
@@ -122,10 +129,10 @@ def gather_at(
     starts: int | None,
     rays: int,
     resolve: Resolver,
-    into: Array | None = None,
+    into: tuple[Array, Array | None] | None = None,
     progress: Progress = SILENT,
 ) -> Gathered:
-    """Gather at some texels. `into` (c, rays) int32 takes the sources, if given."""
+    """Gather at some texels. `into` takes the sources and tints, if given."""
     at = gather_footprints(geometry, chosen, starts)
     expected, upright = (geometry.scratch.empty((len(chosen), *of)) for of in ((), (3,)))
     for tile in tiles(len(chosen), CHUNK):

@@ -13,7 +13,7 @@ import numpy as np
 from ...base import SILENT, Progress
 from ...numerics import Array, tiles
 from ...rays import SIGHT_LIFT, Hits, free_segment
-from ...solver.gather import NOTHING, Footprints, LocalPass
+from ...solver.gather import NOTHING, Footprints, Gathered, LocalPass
 from ..texels import NO_TEXEL, Crossings, TexelCells, TexelGeometry, below_hood, whole_neighbor
 
 WIDE = 4.0
@@ -119,10 +119,10 @@ class HitTable:
             return self.local.elements.lit_cells(self.element_cell(number))
         return self.texel_cells.lit(self.texel_cell(number))
 
-    def gather(self, number: Array, of_element: bool, rays: int, progress: Progress = SILENT) -> Array:
-        """Gather over cells of elements, or of texels; return (p, rays) int32 numbers of hits."""
+    def gather(self, number: Array, of_element: bool, rays: int, progress: Progress = SILENT) -> Gathered:
+        """Gather over cells of elements, or of texels; sources are numbers of hits."""
         at, surface_normals = self.footprints(number, of_element)
-        return self.local.gather.at(at, surface_normals, rays, self.number, progress=progress).sources
+        return self.local.gather.at(at, surface_normals, rays, self.number, progress=progress)
 
 
 class TableRows:

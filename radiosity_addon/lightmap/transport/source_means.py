@@ -20,11 +20,19 @@ class Means:
     """Means over rows of sources, of which only those are made anew that see something changed.
 
     sources (g, rays) int32.
+    tints (g, rays, channels): What the rows that are seen are multiplied with, if it is not 1.
     scratch: Makes the array of means; None keeps it in memory.
     """
 
-    def __init__(self, sources: Array, channels: int, threads: int, scratch: Scratch | None = None) -> None:
-        self._sources, self._threads = sources, threads
+    def __init__(
+        self,
+        sources: Array,
+        channels: int,
+        threads: int,
+        tints: Array | None = None,
+        scratch: Scratch | None = None,
+    ) -> None:
+        self._sources, self._tints, self._threads = sources, tints, threads
         self._mean = by_channel(len(sources), channels, scratch)
         for rows in tiles(len(sources)):
             self._mean[rows] = 0.0
@@ -40,10 +48,10 @@ class Means:
         anew = not self._known or float(changed.mean()) > MUCH
         chunk = max(CHUNK_HITS // max(self._sources.shape[1], 1), 1)
         if anew:
-            average = partial(_mean_of_rows, columns, self._sources)
+            average = partial(_mean_of_rows, columns, self._sources, self._tints)
             fill_chunks(average, self._mean, len(self._sources), chunk, self._threads, progress)
         elif changed.any():
-            renew = partial(_changed_means, columns, self._sources, changed)
+            renew = partial(_changed_means, columns, self._sources, self._tints, changed)
             for _, (rows, means) in map_chunks(renew, len(self._sources), chunk, self._threads, progress):
                 self._mean[rows] = means
         self._known = True
@@ -61,25 +69,32 @@ def mean_of_sources(
     threads: int = 1,
     rays: int | None = None,
     scratch: Scratch | None = None,
+    tints: Array | None = None,
     progress: Progress = SILENT,
 ) -> Array:
-    """Return (g, 3): the mean of the table's rows each gather point saw, by its first `rays` if given."""
+    """Return (g, 3): the mean of the table's rows each gather point saw, by its first `rays` if given.
+
+    tints (g, rays, 3): As for `Means`.
+    """
     result = by_channel(len(sources), table.shape[1], scratch)
     columns = _columns(table)
-    sources = sources[:, :rays]
+    sources, tints = sources[:, :rays], None if tints is None else tints[:, :rays]
     chunk = max(CHUNK_HITS // max(sources.shape[1], 1), 1)
-    fill_chunks(partial(_mean_of_rows, columns, sources), result, len(sources), chunk, threads, progress)
+    average = partial(_mean_of_rows, columns, sources, tints)
+    fill_chunks(average, result, len(sources), chunk, threads, progress)
     return result
 
 
-def _mean_of_rows(columns: list[Array], sources: Array, rows: slice) -> Array:
-    return _mean_of(columns, sources[rows])
+def _mean_of_rows(columns: list[Array], sources: Array, tints: Array | None, rows: slice) -> Array:
+    return _mean_of(columns, sources[rows], None if tints is None else tints[rows])
 
 
-def _changed_means(columns: list[Array], sources: Array, changed: Array, rows: slice) -> tuple[Array, Array]:
+def _changed_means(
+    columns: list[Array], sources: Array, tints: Array | None, changed: Array, rows: slice
+) -> tuple[Array, Array]:
     """Return the rows that see something changed, and their means."""
     again = rows.start + np.flatnonzero(changed.take(sources[rows], mode="wrap").any(axis=1))
-    return again, _mean_of(columns, sources[again])
+    return again, _mean_of(columns, sources[again], None if tints is None else tints[again])
 
 
 def _columns(table: Array) -> list[Array]:
@@ -87,8 +102,11 @@ def _columns(table: Array) -> list[Array]:
     return [np.ascontiguousarray(table[:, channel]) for channel in range(table.shape[1])]
 
 
-def _mean_of(columns: list[Array], sources: Array) -> Array:
-    """Return (r, channels) means over the columns' values at (r, rays) sources."""
+def _mean_of(columns: list[Array], sources: Array, tints: Array | None) -> Array:
+    """Return (r, channels) means over the columns' values at (r, rays) sources, times (r, rays, channels)."""
     # "wrap" lets negative numbers count from the end.
     seen = sources.astype(np.intp)
-    return np.stack([column.take(seen, mode="wrap").mean(axis=1) for column in columns], axis=1)
+    if tints is None:
+        return np.stack([column.take(seen, mode="wrap").mean(axis=1) for column in columns], axis=1)
+    found = np.stack([column.take(seen, mode="wrap") for column in columns], axis=2)
+    return np.asarray((found * tints).mean(axis=1))

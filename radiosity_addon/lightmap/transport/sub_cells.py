@@ -44,15 +44,17 @@ class SubCellLinks:
     reflectance (p, 3) float64
     lamps (p, 3) float64: Irradiance straight from lamps and emissive faces [W/m²].
     gains: The same for each light apart, if it is kept.
+    tints (p, rays, 3) float16: As in `GatherLinks`.
     """
 
-    STORED = ("rows", "sources", "reflectance", "gains")
+    STORED = ("rows", "sources", "reflectance", "gains", "tints")
 
     rows: Array
     sources: Array
     reflectance: Array
     lamps: Array
     gains: LightGains | None = None
+    tints: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -76,12 +78,14 @@ class SubCellHits:
     number (p,) int: Theirs in a `HitTable`.
     sources (p, rays) int32: Numbers of what they hit.
     gains: What lights add, if that is known as well.
+    tints (p, rays, 3) float16: As in `GatherLinks`.
     """
 
     of_element: bool
     number: Array
     sources: Array
     gains: LightGains | None = None
+    tints: Array | None = None
 
     @property
     def rays(self) -> int:
@@ -96,7 +100,8 @@ class SubCellHits:
     def take(self, chosen: Array) -> SubCellHits:
         """Return those of some cells, row numbers or a mask."""
         gains = None if self.gains is None else self.gains.take(chosen)
-        return SubCellHits(self.of_element, self.number[chosen], self.sources[chosen], gains)
+        tints = None if self.tints is None else self.tints[chosen]
+        return SubCellHits(self.of_element, self.number[chosen], self.sources[chosen], gains, tints)
 
 
 def gather_sub_cells(
@@ -178,9 +183,9 @@ class _SubCellGather:
         for (of_element, rays, cells), part in progress.each(groups):
             if len(cells) == 0:
                 continue
-            sources = self._table.gather(cells, of_element, rays, part)
-            self.count(sources)
-            self._found.append(SubCellHits(of_element, cells, sources))
+            gathered = self._table.gather(cells, of_element, rays, part)
+            self.count(gathered.sources)
+            self._found.append(SubCellHits(of_element, cells, gathered.sources, tints=gathered.tints))
 
     def small(self) -> Array:
         """Return (s,) int64, ascending: smaller cells of elements that were met, and of texels that gathered.
@@ -205,8 +210,8 @@ class _SubCellGather:
             else:
                 gains, lamps = hits.gains, direct.lit_by(hits.gains)
             of_cells = table.reflectance(hits.number, hits.of_element, reflectance)
-            links = SubCellLinks(rows.rows(hits.number), rows.rows(hits.sources), of_cells, lamps, gains)
-            made.append(links)
+            sources = rows.rows(hits.sources)
+            made.append(SubCellLinks(rows.rows(hits.number), sources, of_cells, lamps, gains, hits.tints))
         return made
 
 
@@ -222,7 +227,9 @@ class SubCellSweeps:
     def __init__(self, cells: SubCells, texel_count: int, threads: int) -> None:
         self._links, self._surfaces = cells.links, texel_count + len(cells.start)
         self._texel_count = texel_count
-        self._means = [Means(links.sources, links.lamps.shape[1], threads) for links in cells.links]
+        self._means = [
+            Means(links.sources, links.lamps.shape[1], threads, links.tints) for links in cells.links
+        ]
         self._unseen: Array | None = None
 
     def lit_or_unknown(self, direct: Array) -> Array:

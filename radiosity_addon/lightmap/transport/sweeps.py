@@ -165,7 +165,7 @@ def sweep(
     del reached
     indirect = scratch.zeros(direct.shape)
     changed = np.ones(len(table), dtype=bool)
-    means = Means(links.sources, table.shape[1], threads, scratch)
+    means = Means(links.sources, table.shape[1], threads, links.tints, scratch)
     still = STILL * tolerance * float(table[:texel_count].mean()) if texel_count else 0.0
     for _, turn in zip(range(sweeps), progress.part(0.1, 1.0).turns(SWEPT), strict=False):
         cells.sweep(table, changed, still)
@@ -229,8 +229,8 @@ def estimated_noise(
         The radiosity that the links' sources had in the end, the sky's among it.
     """
     half = links.sources.shape[1] // 2
-    whole = mean_of_sources(table, links.sources, threads, scratch=scratch)
-    part = mean_of_sources(table, links.sources, threads, half, scratch)
+    whole = mean_of_sources(table, links.sources, threads, scratch=scratch, tints=links.tints)
+    part = mean_of_sources(table, links.sources, threads, half, scratch, links.tints)
     for rows in tiles(len(part)):
         part[rows] -= whole[rows]
     del whole

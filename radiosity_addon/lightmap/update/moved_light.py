@@ -8,7 +8,7 @@ import numpy as np
 
 from ...base import Progress
 from ...numerics import Array
-from ...solver.gather import Footprints, LightGains, LightQuery, LocalPass
+from ...solver.gather import Footprints, LightGains, LightQuery, LocalPass, alike
 from ..texels import SmoothLift, TexelGeometry
 from ..transport import HitTable, SubCellHits, sample_of
 from .previous import PreviousLight
@@ -38,6 +38,7 @@ def texel_gains(previous: PreviousLight, local: LocalPass, progress: Progress) -
         around = np.flatnonzero(geometry.neighborhood(touched))
         found = local.direct.gain(asked, _footprints(geometry, around, lift), progress=part)
         own = touched[around]
+        gain, found = alike(gain, found)
         gain[around[own]] = found[own]
         gains.put(asked.number, gain)
     return gains
@@ -54,7 +55,8 @@ def sub_cell_gains(
         gain = hits.gains.of(asked.number)
         rows = np.flatnonzero(moved | boxes.between(at, asked.light, widen))
         points = table.lit_footprints(hits.number[rows], hits.of_element)
-        gain[rows] = local.direct.gain(asked, points, hits.shadow_rays, part)
+        gain, found = alike(gain, local.direct.gain(asked, points, hits.shadow_rays, part))
+        gain[rows] = found
         gains.put(asked.number, gain)
     return gains
 

@@ -42,17 +42,21 @@ def _traced_again(standing: StandingHits, links: GatherLinks, rows: Array, progr
     """Trace again what is touched of the rays of some points."""
     points = standing.previous.traced.points
     sources, closeness = links.sources[rows], points.closeness[rows].copy()
+    tints = None if links.tints is None else links.tints[rows]
     aimed: list[AimedRays] = []
     # Across a rim every ray starts from a point of its own.
     edge = standing.table.crossings.crossed[points.texel[rows]]
     for (mine, starts), part in progress.each(((~edge, STARTS), (edge, None))):
         chosen = np.zeros(len(points.texel), dtype=bool)
         chosen[rows[mine]] = True
-        before = Gathered(sources[mine], closeness[mine], links.aimed.of_points(chosen))
+        of_mine = None if tints is None else tints[mine]
+        before = Gathered(sources[mine], closeness[mine], links.aimed.of_points(chosen), of_mine)
         found = _gathered_again(standing, before, points.texel[rows[mine]], starts, part)
         sources[mine], closeness[mine] = found.sources, found.closeness
+        if tints is not None:
+            tints[mine] = found.tints
         aimed.append(replace(found.aimed, row=np.flatnonzero(mine)[found.aimed.row]))
-    return Gathered(sources, closeness, AimedRays.joined(aimed, [0, 0]))
+    return Gathered(sources, closeness, AimedRays.joined(aimed, [0, 0]), tints)
 
 
 def _gathered_again(

@@ -21,7 +21,8 @@ def kept_cells(standing: StandingHits, progress: Progress) -> list[SubCellHits]:
         of_element = number[stays] < standing.table.first_cell
         gains = None if of_kind.gains is None else of_kind.gains.take(stays)
         assert of_element.all() or not of_element.any()  # links are of one kind
-        kept = SubCellHits(bool(of_element.any()), number[stays], sources, gains)
+        tints = None if of_kind.tints is None else of_kind.tints[stays]
+        kept = SubCellHits(bool(of_element.any()), number[stays], sources, gains, tints)
         if len(kept.number):
             kinds.setdefault((kept.of_element, kept.rays), []).append(kept)
     joined = [_joined(hits) for hits in kinds.values()]
@@ -30,11 +31,13 @@ def kept_cells(standing: StandingHits, progress: Progress) -> list[SubCellHits]:
 
 def _joined(parts: list[SubCellHits]) -> SubCellHits:
     gains = [hits.gains for hits in parts if hits.gains is not None]
+    tints = [hits.tints for hits in parts if hits.tints is not None]
     return SubCellHits(
         parts[0].of_element,
         np.concatenate([hits.number for hits in parts]),
         np.concatenate([hits.sources for hits in parts]),
         LightGains.joined(gains),
+        np.concatenate(tints) if tints else None,
     )
 
 
@@ -50,7 +53,7 @@ def _traced_again(hits: SubCellHits, standing: StandingHits, progress: Progress)
     nowhere = np.zeros((0, 1, 3))
     # Cells speak for nobody: how close things are to them is not asked.
     unasked = np.full(len(hits.number), np.inf)
-    gathered = Gathered(hits.sources, unasked, AimedRays.none())
+    gathered = Gathered(hits.sources, unasked, AimedRays.none(), hits.tints)
     earlier = Before(
         gathered,
         aimed_at=(nowhere, nowhere),
@@ -62,4 +65,4 @@ def _traced_again(hits: SubCellHits, standing: StandingHits, progress: Progress)
     found = local.gather.again_at(at, upright, table.number, earlier, progress=progress.part(0.0, 0.6))
     part = progress.part(0.6, 1.0)
     gains = sub_cell_gains(hits, table, previous, at.points, widen, part)
-    return SubCellHits(hits.of_element, hits.number, found.sources, gains)
+    return SubCellHits(hits.of_element, hits.number, found.sources, gains, found.tints)

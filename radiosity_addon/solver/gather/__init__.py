@@ -13,7 +13,7 @@ from .final_gather import Gathered
 from .footprints import Footprints
 from .gather_rays import Gather
 from .hit_numbers import NOTHING, UNNUMBERED, Resolver, lowest_number, table_end, values_of
-from .light_gains import LightGains
+from .light_gains import LightGains, alike
 from .local_pass import LocalPass
 from .residual import Residual
 from .retracing import Before, Moved
@@ -35,6 +35,7 @@ __all__ = [
     "Moved",
     "Residual",
     "Resolver",
+    "alike",
     "lowest_number",
     "table_end",
     "values_of",

@@ -58,7 +58,8 @@ class AimedRays:
     row (a,) int: The gather points.
     sources (a, k) int32: What was hit, numbered as the hits of all other rays; NOTHING where something is in
         the way.
-    weights (a, k) float32: What each source's radiosity counts for.
+    weights (a, k) float32: What each source's radiosity counts for; (a, k, 3) by channel where rays may pass
+        glass.
     element (a, k) int32: What each was aimed at.
     """
 
@@ -106,7 +107,8 @@ class AimedTable:
             return
         if not self._columns:
             width, make = rays.sources.shape[1], self._scratch.rows
-            self._columns = make(1, np.int64), *(make(width, of) for of in (np.int32, np.float32, np.int32))
+            columns = (width, np.int32), (rays.weights[0].size, np.float32), (width, np.int32)
+            self._columns = make(1, np.int64), *(make(*column) for column in columns)
         for rows in tiles(len(rays.row), TABLE_ROWS):
             values = rays.row[rows] + first, rays.sources[rows], rays.weights[rows], rays.element[rows]
             for column, some in zip(self._columns, values, strict=True):
@@ -118,6 +120,8 @@ class AimedTable:
             return AimedRays.none()
         row, sources, weights, element = (column.all() for column in self._columns)
         self._columns = ()
+        if weights.shape != sources.shape:
+            weights = weights.reshape(*sources.shape, 3)
         return AimedRays(row[:, 0], sources, weights, element)
 
 

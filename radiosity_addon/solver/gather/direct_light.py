@@ -71,7 +71,8 @@ class DirectLight:
         for asked, part in progress.each(lights):
             arriving = self._arriving(asked, spread, rays, part)
             for rows in tiles(len(total)):
-                total[rows] += arriving[rows, None] * asked.light.strength
+                gain = arriving[rows] if arriving.ndim == 2 else arriving[rows, None]
+                total[rows] += gain * asked.light.strength
             if gains is not None:
                 gains.put(asked.number, arriving)
             if tell is not None:
@@ -94,7 +95,7 @@ class DirectLight:
     def gain(
         self, asked: LightQuery, points: Footprints, rays: int | None = None, progress: Progress = SILENT
     ) -> Array:
-        """Return (n,) what one light adds per unit of its strength, as if it were the only one."""
+        """Return what one light adds per unit of its strength, as if it were the only one; see `_arriving`."""
         return self._arriving(asked, self._spread(replace(points, expected=None)), rays, progress)
 
     def _spread(self, points: Footprints) -> SpreadPoints:
@@ -104,13 +105,20 @@ class DirectLight:
     def _arriving(
         self, asked: LightQuery, spread: SpreadPoints, rays: int | None, progress: Progress
     ) -> Array:
-        """Return (n,) unoccluded irradiance per unit of a light's strength times visibility."""
+        """Return (n,) unoccluded irradiance per unit of a light's strength times visibility.
+
+        (n, 3) by channel where its light may pass glass.
+        """
         light, settings = asked.light, self._state.settings
         glows = isinstance(light, EmitterGroup)
         caster = self._state.caster if glows else self._state.caster.for_lamps
         gain = spread.gain(light, NEAR if glows else 0.0, progress.part(0.0, 0.1))
         share = ShadowShare(caster, light, spread, asked.seed, settings.threads)
         unblocked = share.at_points(gain, rays or settings.shadow_rays, progress.part(0.1, 1.0))
+        if unblocked.ndim == 2:
+            for rows in tiles(len(gain)):
+                unblocked[rows] *= gain[rows, None]
+            return unblocked
         for rows in tiles(len(gain)):
             gain[rows] *= unblocked[rows]
         return gain

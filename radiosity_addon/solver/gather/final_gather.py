@@ -41,11 +41,19 @@ class Gathered:
     closeness : (n,) float64
         Mean of 1/distance over the rays [1/m]: how quickly irradiance may change.
     aimed : AimedRays
+    tints : (n, rays, 3) float16 or None
+        What the light of each ray is multiplied with on its way through glass; None where there is none.
     """
 
     sources: Array
     closeness: Array
     aimed: AimedRays
+    tints: Array | None = None
+
+    def mean_of(self, table: Array) -> Array:
+        """Return (n, 3) means over the cosine-distributed rays of a table's rows (rows, 3)."""
+        seen = table[self.sources]
+        return np.asarray((seen if self.tints is None else seen * self.tints).mean(axis=1))
 
 
 class Gathering:
@@ -86,7 +94,7 @@ class Gathering:
         self,
         bright: BrightElements | None,
         irradiance: Array,
-        into: Array | None = None,
+        into: tuple[Array, Array | None] | None = None,
         progress: Progress = SILENT,
     ) -> Gathered:
         """Trace all.
@@ -97,17 +105,24 @@ class Gathering:
             What is aimed at.
         irradiance : (n,) float64 [W/m²]
             What is about expected: noise is measured by it.
-        into : (n, rays) int32 or None
-            Takes the sources, if given.
+        into : (n, rays) int32, and (n, rays, 3) float16 or None
+            Takes the sources and tints, if given.
         """
         count, scratch = len(self._at), self._at.scratch
-        sources = np.empty((count, self._rays), dtype=np.int32) if into is None else into
+        if into is None:
+            into = np.empty((count, self._rays), dtype=np.int32), self._new_tints(count)
+        sources, tints = into
         closeness, aimed = scratch.empty(count), AimedTable(scratch)
         trace, chunk = partial(_trace, self, bright, irradiance), max(CHUNK_RAYS // self._rays, 1)
         for part, found in map_chunks(trace, count, chunk, self.threads, progress):
             sources[part], closeness[part] = found.sources, found.closeness
+            if tints is not None:
+                tints[part] = found.tints
             aimed.extend(found.aimed, part.start)
-        return Gathered(sources, closeness, aimed.all())
+        return Gathered(sources, closeness, aimed.all(), tints)
+
+    def _new_tints(self, count: int) -> Array | None:
+        return np.empty((count, self._rays, 3), dtype=np.float16) if self._caster.tinted else None
 
     def shares(self, rows: Array, bright: BrightElements, irradiance: Array) -> Array:
         """Return (r, m) how some rows would share their aimed rays out."""
@@ -116,8 +131,10 @@ class Gathering:
     def trace_rows(self, rows: Array, bright: BrightElements | None, shares: Array | None) -> Gathered:
         """Trace all rays of some rows; aimed ones have their rows numbered among these."""
         if bright is None or shares is None or not shares.any():
-            return Gathered(*self._cosine(rows, None, None), AimedRays.none())
-        return Gathered(*self._cosine(rows, bright, shares), self._aim(rows, bright, shares))
+            sources, closeness, tints = self._cosine(rows, None, None)
+            return Gathered(sources, closeness, AimedRays.none(), tints)
+        sources, closeness, tints = self._cosine(rows, bright, shares)
+        return Gathered(sources, closeness, self._aim(rows, bright, shares), tints)
 
     def on_any(self, elements: Array, hosts: Array, hits: Hits) -> Array:
         """Return (h,) whether hits are on some elements, (e,) bool, of some triangles, (t,) bool."""
@@ -179,6 +196,9 @@ class Gathering:
         hits, old = self._caster.intersect(start, along), before.intersect(start, along)
         same = (hits.triangle == old.triangle) & (hits.front == old.front) & ~stale[asked]
         same &= (np.abs(hits.barycentric - old.barycentric) < SAME_PLACE).all(axis=1)
+        if hits.tint is not None or old.tint is not None:
+            one, other = (1.0 if some.tint is None else some.tint for some in (hits, old))
+            same &= np.isclose(one, other).all(axis=1)
         other = np.flatnonzero(~same)
         changed, hits, old = asked[other], hits.take(other), old.take(other)
         least = self._caster.surface_offset
@@ -188,8 +208,8 @@ class Gathering:
 
     def _cosine(
         self, rows: Array, bright: BrightElements | None, shares: Array | None
-    ) -> tuple[Array, Array]:
-        """Trace the cosine-distributed rays of some rows; return sources and closeness (see `Gathered`)."""
+    ) -> tuple[Array, Array, Array | None]:
+        """Trace the cosine-distributed rays of some rows; return sources, closeness and tints (`Gathered`)."""
         rays = self._rays
         directions, upward = self.directions(rows)
         start = self._starts(rows, rays, self._seed + Stream.GATHER_STARTS)
@@ -199,7 +219,8 @@ class Gathering:
         if bright is not None and shares is not None:
             found[bright.left_out(shares, hits, self._leaves_of).reshape(found.shape)] = NOTHING
         inverse = 1.0 / np.maximum(hits.distance.reshape(len(rows), rays), self._caster.surface_offset)
-        return found, inverse.mean(axis=1)
+        tints = None if hits.tint is None else tints_of(hits).reshape(len(rows), rays, 3)
+        return found, inverse.mean(axis=1), tints
 
     def _directions(self, rows: Array) -> Array:
         """Return (r, rays, 3) float32: where the cosine-distributed rays of some rows go."""
@@ -228,7 +249,10 @@ class Gathering:
         sources = np.full(len(arrived), NOTHING, dtype=np.int32)
         sources[arrived] = self._resolve(hits.take(arrived))
         shape = aim.element.shape
-        return AimedRays(aim.row, sources.reshape(shape), aim.weights.astype(np.float32), aim.element)
+        weights = aim.weights.astype(np.float32)
+        if hits.tint is not None:
+            weights = weights[..., None] * hits.tint.reshape(*shape, 3)
+        return AimedRays(aim.row, sources.reshape(shape), weights, aim.element)
 
     def _starts(self, rows: Array, rays: int, seed: int) -> Array:
         """Return (r, rays, 3) where rays start, just above the footprints."""
@@ -253,6 +277,13 @@ class Gathering:
         if len(rows) < some * len(distinct):
             return np.asarray(at.sampler(rows, unit[of, place][:, None])[:, 0] + lift)
         return np.asarray(at.sampler(distinct, unit)[of, place] + lift)
+
+
+def tints_of(hits: Hits) -> Array:
+    """Return (n, 3) float16 the tints of hits; ones if they have none."""
+    if hits.tint is None:
+        return np.ones((len(hits.triangle), 3), dtype=np.float16)
+    return np.asarray(hits.tint.astype(np.float16))
 
 
 def _trace(gathering: Gathering, bright: BrightElements | None, irradiance: Array, part: slice) -> Gathered:

@@ -33,7 +33,7 @@ class Gather:
         rays: int,
         resolve: Resolver,
         irradiance: Array | None = None,
-        into: Array | None = None,
+        into: tuple[Array, Array | None] | None = None,
         progress: Progress = SILENT,
     ) -> Gathered:
         """Trace the rays of points.
@@ -42,7 +42,7 @@ class Gather:
         rays: Cosine-distributed ones a point; each stands for a form factor of 1 / rays.
         resolve: Numbers the hits.
         irradiance (n,): What is about expected [W/m²]. None aims at nothing.
-        into (n, rays) int32: Takes the sources, if given.
+        into (n, rays) int32, and (n, rays, 3) float16 or None: Takes the sources and tints, if given.
         """
         gathering = self._gathering(points, surface_normals, rays, resolve)
         if irradiance is None:

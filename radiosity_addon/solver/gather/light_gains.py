@@ -6,11 +6,21 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...numerics import Array, Scratch, row_numbers, tiles
+from ...numerics import Array, Scratch, marked, row_numbers, tiles
 
 SPARSE = 0.5
 """A light that reaches less than this part of the points is kept as the rows it reaches: 8 bytes each; else
 as 4 bytes a point."""
+
+
+def by_channel(gain: Array) -> Array:
+    """Return (n, 3) gains, of (n,) that are the same of all channels."""
+    return gain if gain.ndim == 2 else np.repeat(gain[:, None], 3, axis=1)
+
+
+def alike(one: Array, other: Array) -> tuple[Array, Array]:
+    """Return two gains, (n,) or (n, 3), both by channel if either is."""
+    return (one, other) if one.ndim == other.ndim else (by_channel(one), by_channel(other))
 
 
 class LightGains:
@@ -19,7 +29,7 @@ class LightGains:
     count: n.
     scratch: Makes the arrays; None keeps them in memory.
     gain_of dict of int to (rows or None, gain): Of each light: (k,) float32 at the rows that it reaches, (k,)
-        int32; None for all rows.
+        int32; None for all rows. (k, 3) by channel where its light passes glass.
     """
 
     STORED = ("count", "gain_of")
@@ -40,25 +50,29 @@ class LightGains:
         return sum(gain.nbytes + (0 if rows is None else rows.nbytes) for rows, gain in self.gain_of.values())
 
     def put(self, light: int, gain: Array) -> None:
-        """Keep (n,) the gain of a light, which has this number, at all points."""
+        """Keep the gain of a light, which has this number, at all points: (n,), or (n, 3) by channel."""
         scratch = self._scratch or Scratch()
-        if np.count_nonzero(gain) < SPARSE * self.count:
-            rows, kept = row_numbers(gain), scratch.rows(1, np.float32)
+        if gain.ndim == 2 and not marked(self.count, lambda tile: np.ptp(gain[tile], axis=1) > 0).any():
+            gain = gain[:, 0]
+        lit = gain if gain.ndim == 1 else marked(self.count, lambda tile: gain[tile].any(axis=1))
+        width = 1 if gain.ndim == 1 else 3
+        if np.count_nonzero(lit) < SPARSE * self.count:
+            rows, kept = row_numbers(lit), scratch.rows(width, np.float32)
             for tile in tiles(len(rows)):
                 kept.extend(gain[rows[tile]].astype(np.float32))
-            self.gain_of[light] = rows, kept.all()[:, 0]
+            self.gain_of[light] = rows, kept.all() if width > 1 else kept.all()[:, 0]
         else:
-            single = scratch.empty(self.count, np.float32)
+            single = scratch.empty(gain.shape, np.float32)
             for tile in tiles(self.count):
                 single[tile] = gain[tile]
             self.gain_of[light] = None, single
 
     def of(self, light: int) -> Array:
-        """Return (n,) float32: the gain of a light; 0 of one that was not put in."""
+        """Return (n,) or (n, 3) float32: the gain of a light; 0 of one that was not put in."""
         rows, gain = self.gain_of.get(light, (np.zeros(0, np.int32), np.zeros(0, np.float32)))
         if rows is None:
             return gain.copy()
-        everywhere = np.zeros(self.count, dtype=np.float32)
+        everywhere = np.zeros((self.count, *gain.shape[1:]), dtype=np.float32)
         everywhere[rows] = gain
         return everywhere
 
@@ -74,7 +88,10 @@ class LightGains:
         """Put the points of several one after the other."""
         result = LightGains(sum(len(part) for part in parts))
         for light in sorted({light for part in parts for light in part.gain_of}):
-            result.put(light, np.concatenate([part.of(light) for part in parts]))
+            gains = [part.of(light) for part in parts]
+            if any(gain.ndim == 2 for gain in gains):
+                gains = [by_channel(gain) for gain in gains]
+            result.put(light, np.concatenate(gains))
         return result
 
     def irradiance(self, strengths: Array) -> Array:
@@ -84,6 +101,7 @@ class LightGains:
             if not strengths[light].any():
                 continue
             for tile in tiles(len(gain)):
-                arriving = gain[tile].astype(np.float64)[:, None] * strengths[light]
+                own = gain[tile].astype(np.float64)
+                arriving = (own if own.ndim == 2 else own[:, None]) * strengths[light]
                 total[tile if rows is None else rows[tile]] += arriving
         return total

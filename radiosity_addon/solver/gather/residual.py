@@ -106,8 +106,8 @@ class Residual:
         points, normals = self.position(face, barycentric), self._hierarchy.faces.normal[face]
         at = Footprints(points, normals, np.arange(len(face)))
         direct = local.direct.at(at, rays=SHADOW_RAYS)
-        sources = local.gather.at(at, normals, rays, local.elements.leaves_of).sources
-        indirect = self.gathered(local)[sources].mean(axis=1)
+        gathered = local.gather.at(at, normals, rays, local.elements.leaves_of)
+        indirect = gathered.mean_of(self.gathered(local))
         return self.given(face, barycentric, direct + indirect)
 
     def gathered(self, local: LocalPass) -> Array:

@@ -16,7 +16,7 @@ from ...numerics import Array, map_chunks
 from ...rays import RayCaster
 from .boxes import Boxes
 from .bright_patches import AimedRays, BrightElements
-from .final_gather import CHUNK_RAYS, Gathered, Gathering
+from .final_gather import CHUNK_RAYS, Gathered, Gathering, tints_of
 from .hit_numbers import UNNUMBERED
 
 RENEWED = 0.3
@@ -83,6 +83,7 @@ def retrace(
     gathering: Of the same points, rays and seed as before.
     """
     sources, closeness = before.gathered.sources.copy(), before.gathered.closeness.copy()
+    tints = None if before.gathered.tints is None else before.gathered.tints.copy()
     count, rays = sources.shape
     aimed = before.gathered.aimed
     whole, aims = np.zeros((2, count), dtype=bool)
@@ -97,16 +98,20 @@ def retrace(
         np.add.at(closeness, found.row, found.nearer)
         whole[found.whole] = True
         sources[found.whole], closeness[found.whole] = found.gathered.sources, found.gathered.closeness
+        if tints is not None:
+            tints[found.row, found.ray] = found.tints
+            tints[found.whole] = 1.0 if found.gathered.tints is None else found.gathered.tints
         rays_aimed = found.gathered.aimed
         new.append(replace(rays_aimed, row=found.whole[rays_aimed.row]))
     parts = [aimed.entries(~whole[aimed.row]), *new]
-    return Gathered(sources, closeness, AimedRays.joined(parts, [0] * len(parts)))
+    return Gathered(sources, closeness, AimedRays.joined(parts, [0] * len(parts)), tints)
 
 
 class _Retraced(NamedTuple):
     """What changes at points.
 
     row, ray (c,) int: Rays that meet something else now; `sources` (c,) and how much `nearer` (c,) that is.
+    tints (c, 3) float16: Theirs.
     whole (w,) int: Points that are gathered from anew, and what they `gathered`.
     """
 
@@ -114,6 +119,7 @@ class _Retraced(NamedTuple):
     ray: Array
     sources: Array
     nearer: Array
+    tints: Array
     whole: Array
     gathered: Gathered
 
@@ -163,7 +169,7 @@ def _retrace(
     else:
         whole = rows[renewed | (past & aims[rows])]
     gathered = gathering.trace_rows(whole, bright, shares)
-    return _Retraced(rows[row[changed]], ray[changed], sources, nearer, whole, gathered)
+    return _Retraced(rows[row[changed]], ray[changed], sources, nearer, tints_of(hits), whole, gathered)
 
 
 def _aims_past_boxes(gathering: Gathering, before: Before) -> Array:

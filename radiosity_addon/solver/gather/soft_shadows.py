@@ -14,7 +14,7 @@ import numpy as np
 from ...base import SILENT, Progress
 from ...lights import Lamp
 from ...numerics import Array, Stream, fill_chunks, marked, row_numbers, stratified_square, tiles
-from ...rays import RayCaster
+from ...rays import RayCaster, passing_light
 from ..emitters import EmitterGroup
 from .footprints import Footprints, SpreadPoints
 
@@ -34,12 +34,15 @@ seen, not that of its light: 0.40 for 0.44 behind a plate half way to a near lam
 STARTS = 16
 """Points of a footprint that the many rays start from, each of them a run that is stratified by itself."""
 
+UNEVEN = 0.02
+"""Rays behind glass disagree if some bring less than the others by more than this part of any channel."""
+
 PENUMBRA_STEPS = 32
 """How far, in neighbors, a penumbra is followed from where few rays found it."""
 
 
 class ShadowShare:
-    """The unblocked share of one lamp at footprints.
+    """The unblocked share of one lamp at footprints, by channel if the caster is tinted.
 
     spread: The footprints.
     """
@@ -55,15 +58,18 @@ class ShadowShare:
         self._caster, self._light, self._spread = caster, light, spread
         self._at: Footprints = spread.at
         self._seed, self._threads = seed, threads
-        scratch = self._at.scratch
-        self._lit, self._total = scratch.zeros(len(self._at)), scratch.zeros(len(self._at))
+        scratch, count = self._at.scratch, len(self._at)
+        self._lit = scratch.zeros((count, 3) if caster.tinted else count)
+        self._total = scratch.zeros(count)
+        # Behind even glass no share is 0 or 1, and yet all rays agree.
+        self._uneven = scratch.zeros(count, bool) if caster.tinted else None
 
     def at_points(self, gain: Array, rays: int, progress: Progress = SILENT) -> Array:
         """Ask where the lamp shines.
 
         gain (n,): Unoccluded irradiance per unit of the lamp's strength.
         rays: A point, where the lamp is most of the light there is.
-        Returns share (n,).
+        Returns share (n,) or (n, 3).
         """
         if isinstance(self._light, Lamp) and not self._light.casts_shadow:
             return np.ones(len(gain))
@@ -77,9 +83,9 @@ class ShadowShare:
         self._shadow(row_numbers(facing), few, progress.part(0.0, 0.5))
         # Few rays miss the faint ends of a penumbra: where many rays found one, ask around it.
         open_rows = facing & (many > few)
-        partial = marked(count, lambda some: facing[some] & _is_partial(self._share(some)))
+        partial = marked(count, lambda some: facing[some] & self._is_partial(some))
         if near is not None:
-            bright = marked(count, lambda some: facing[some] & (self._share(some) > 0.5))
+            bright = marked(count, lambda some: facing[some] & (_mean(self._share(some)) > 0.5))
             partial = near(partial) | (near(bright) & near(facing & ~bright))
         for _, turn in zip(range(PENUMBRA_STEPS), progress.part(0.5, 1.0).turns(0.5), strict=False):
             rows = row_numbers(partial & open_rows)
@@ -89,9 +95,8 @@ class ShadowShare:
             self._shadow(rows, many, turn)
             if near is None:
                 break
-            share = self._share(rows)
             partial = np.zeros(len(facing), dtype=bool)
-            partial[rows[_is_partial(share)]] = True
+            partial[rows[self._is_partial(rows)]] = True
             partial = near(partial)
         for some in tiles(count):
             self._lit[some] = self._share(some)
@@ -99,7 +104,14 @@ class ShadowShare:
 
     def _share(self, rows: Array | slice = slice(None)) -> Array:
         total = self._total[rows]
-        return np.asarray(self._lit[rows] / np.where(total > 0, total, 1.0))
+        return np.asarray((self._lit[rows].T / np.where(total > 0, total, 1.0)).T)
+
+    def _is_partial(self, rows: Array | slice) -> Array:
+        """Return which rows' shares are neither none nor all."""
+        if self._uneven is not None:
+            return np.asarray(self._uneven[rows])
+        share = self._share(rows)
+        return np.asarray((share > 1e-6) & (share < 1 - 1e-6))
 
     def _shadow(self, rows: Array, counts: Array, progress: Progress) -> None:
         """Ask `counts[row]` shadow rays a row, in place of those asked before."""
@@ -113,7 +125,8 @@ class ShadowShare:
     def _shadow_alike(self, rows: Array, count: int, progress: Progress) -> None:
         """Ask `count` shadow rays a row."""
         trace = partial(_shadowed, self._spread, self._light, self._caster, rows, count, self._seed)
-        into, chunk = (self._lit, self._total), max(CHUNK_RAYS // count, 1)
+        into: tuple[Array, ...] = (self._lit, self._total)
+        into, chunk = (into if self._uneven is None else (*into, self._uneven)), max(CHUNK_RAYS // count, 1)
         fill_chunks(trace, into, len(rows), chunk, self._threads, progress, at=rows)
 
 
@@ -125,8 +138,11 @@ def _shadowed(
     count: int,
     seed: int,
     part: slice,
-) -> tuple[Array, Array]:
-    """Return (r,) the sums of unblocked and of all weights of `count` shadow rays a row."""
+) -> tuple[Array, ...]:
+    """Return (r,) the sums of unblocked and of all weights of `count` shadow rays a row.
+
+    Of a tinted caster (r, 3) and (r,), and whether the rays of a row differ, (r,).
+    """
     at, chunk = spread.at, rows[part]
     center, normal = at.points[chunk], at.normals[chunk]
     unit = stratified_square(at.keys[chunk], count, seed + Stream.SHADOW_RAYS)
@@ -148,9 +164,15 @@ def _shadowed(
     start = np.broadcast_to(start + caster.surface_offset * normal[:, None], directions.shape)
     point, sample = np.nonzero(weights > 0)
     ray = (point, sample)
-    free = caster.passing(start[ray], directions[ray], distances[ray])
-    lit = np.bincount(point, free * weights[ray], minlength=len(chunk))
-    return lit, weights.sum(axis=1)
+    free = passing_light(caster, start[ray], directions[ray], distances[ray])
+    if not caster.tinted:
+        return np.bincount(point, free * weights[ray], minlength=len(chunk)), weights.sum(axis=1)
+    lit = [np.bincount(point, of * weights[ray], minlength=len(chunk)) for of in free.T]
+    low, high = np.full((len(chunk), 3), np.inf), np.zeros((len(chunk), 3))
+    np.minimum.at(low, point, free)
+    np.maximum.at(high, point, free)
+    uneven = (high - low > UNEVEN * high).any(axis=1)
+    return np.stack(lit, axis=1), weights.sum(axis=1), uneven
 
 
 def _starts(spread: SpreadPoints, rows: Array, count: int, seed: int) -> Array:
@@ -164,9 +186,9 @@ def _starts(spread: SpreadPoints, rows: Array, count: int, seed: int) -> Array:
     return np.asarray(starts[:, np.arange(count) * some // count])
 
 
-def _is_partial(share: Array) -> Array:
-    """Return which shares are neither none nor all."""
-    return np.asarray((share > 1e-6) & (share < 1 - 1e-6))
+def _mean(share: Array) -> Array:
+    """Return (n,) shares, of (n, 3) by channel the mean."""
+    return share if share.ndim == 1 else np.asarray(share.mean(axis=1))
 
 
 def _power_of_two(wanted: Array, most: int) -> Array:

@@ -103,6 +103,20 @@ class Hierarchy:
         """(e,) float64: the divisor for radiosity at ray hits; never 0."""
         return np.where(self.opacity > 0, self.opacity, 1.0)
 
+    def opacity_by_channel(self, elements: Array) -> Array:
+        """Return (n, 1) the opacity of elements, or (n, 3) by channel where there is glass."""
+        opacity = self.opacity[elements][:, None]
+        if self._images is None or not self._images.tinting.any():
+            return opacity
+        opacity = np.repeat(opacity, 3, axis=1)
+        rows = np.flatnonzero(self._images.tinting[self.faces.triangle[self.face[elements]]])
+        chosen = elements[rows]
+        passed = self._images.mean_passes(self.faces.triangle[self.face[chosen]], self._weights[chosen])
+        there = self.opacity[chosen] / np.maximum(1.0 - passed.mean(axis=1), 1e-6)
+        # What others cover is no part of it.
+        opacity[rows] = (1.0 - passed) * np.minimum(there, 1.0)[:, None]
+        return opacity
+
     def normal_of(self, elements: Array) -> Array:
         """Return (n, 3) float64: the unit normals of elements."""
         return np.asarray(self.faces.normal[self.face[elements]])

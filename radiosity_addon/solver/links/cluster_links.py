@@ -12,7 +12,7 @@ mean over them. Without that a wall that is brighter far up would light the floo
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import partial
 
 import numpy as np
@@ -20,6 +20,7 @@ import numpy as np
 from ...numerics import Array, fill_chunks
 from ...scene import Faces
 from ..hierarchy import ClusterCut, Hierarchy
+from .element_links import join_tints
 
 TERMS = 7
 """Coefficients of a cluster's light: linear in a face's normal and position, and a constant."""
@@ -41,9 +42,10 @@ class ClusterLinks:
     gradient (l, 3) float32: g [1/m], visibility included.
     even (l,) float32: h, visibility included: the light that a face receives in any orientation; 0 unless the
         receiver's faces look many ways.
+    tint (l, 3) float32: As for `Links`.
     """
 
-    STORED = ("receiver", "source", "vector", "gradient", "even")
+    STORED = ("receiver", "source", "vector", "gradient", "even", "tint")
 
     receiver: Array
     source: Array
@@ -53,13 +55,18 @@ class ClusterLinks:
     vector: Array
     gradient: Array
     even: Array
+    tint: Array | None = None
 
     def __len__(self) -> int:
         return len(self.receiver)
 
     def take(self, rows: Array) -> ClusterLinks:
         """Return the links of a boolean mask or of row numbers."""
-        return ClusterLinks(*(getattr(self, field.name)[rows] for field in fields(self)))
+        taken = (getattr(self, name)[rows] for name in _ARRAYS)
+        return replace(ClusterLinks(*taken), tint=None if self.tint is None else self.tint[rows])
+
+
+_ARRAYS = tuple(field.name for field in fields(ClusterLinks) if field.name != "tint")
 
 
 def no_cluster_links() -> ClusterLinks:
@@ -71,9 +78,8 @@ def no_cluster_links() -> ClusterLinks:
 def join_cluster_links(parts: list[ClusterLinks]) -> ClusterLinks:
     """Concatenate sets of links."""
     parts = [no_cluster_links(), *parts]
-    return ClusterLinks(
-        *(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(ClusterLinks))
-    )
+    joined = (np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS)
+    return replace(ClusterLinks(*joined), tint=join_tints([(part.tint, len(part)) for part in parts]))
 
 
 def gather_at_clusters(
@@ -106,11 +112,13 @@ class _ClusterGather:
         row = row[order]
         self._rows, self._first = _runs(row)
         self._source = links.source[order]
+        self._tint = None if links.tint is None else np.ascontiguousarray(links.tint[order].T)
         # n·v + g·x + h − g·c: linear in (n, x, 1), so seven numbers a cluster and channel.
         constant = links.even - np.einsum("lk,lk->l", links.gradient, clusters.center[links.receiver])
         weights = [*links.vector.T, *links.gradient.T, constant]
         self._weights = [np.ascontiguousarray(weight[order]) for weight in weights]
         grouped = np.flatnonzero(self._source < len(clusters))
+        self._grouped = grouped
         self._slope = [weight[grouped] for weight in self._weights[3:6]]
         self._source_row = cut.row[self._source[grouped]]
         self._slanted_rows, self._slanted_first = _runs(row[grouped])
@@ -128,6 +136,10 @@ class _ClusterGather:
         for channel in range(channels):
             of_nodes = np.ascontiguousarray(radiosity[:, channel])
             sent = of_nodes.take(self._source)
+            # One channel is none of light's.
+            tint = None if self._tint is None or channels == 1 else self._tint[channel]
+            if tint is not None:
+                sent *= tint
             for term, weight in enumerate(self._weights):
                 at_rows[self._rows, channel, term] = np.add.reduceat(weight * sent, self._first)
             if len(self._source_row):
@@ -136,6 +148,8 @@ class _ClusterGather:
                     slope * along.take(self._source_row)
                     for slope, along in zip(self._slope, moment, strict=True)
                 )
+                if tint is not None:
+                    slanted = slanted * tint[self._grouped]
                 at_rows[self._slanted_rows, channel, 6] -= np.add.reduceat(slanted, self._slanted_first)
         pushed = self._cut.push(at_rows.reshape(-1, channels * TERMS))
         irradiance = np.empty((len(self._faces), channels))

@@ -24,6 +24,7 @@ from ...rays import RayCaster
 from ..hierarchy import Hierarchy, NodeShapes
 from .cluster_links import ClusterLinks, join_cluster_links
 from .node_sampling import node_area, node_samples
+from .pair_factors import gray, open_share
 
 CHUNK_SAMPLES = 1 << 18
 """Point pairs measured at once: bounds the temporaries to about 100 MB a thread."""
@@ -154,18 +155,17 @@ class _ClusterPairs:
             vector += mean_normal * (lacking / squared)[:, None]
         factor = np.maximum(even + np.einsum("nk,nk->n", mean_normal, vector), 0.0)
         traced, free = self._trace(caster, transfer)
-        weight = np.where(traced, transfer, 0.0)
-        total = weight.sum(axis=1)
-        visibility = np.where(total > 0, (weight * free).sum(axis=1) / np.maximum(total, 1e-300), 1.0)
+        visibility, tint = open_share(transfer, traced, free)
         links = ClusterLinks(
             self.receiver.astype(np.int32),
             self.source.astype(np.int32),
             factor.astype(np.float32),
             visibility.astype(np.float32),
-            _doubt(transfer, traced, free, factor).astype(np.float32),
+            _doubt(transfer, traced, gray(free), factor).astype(np.float32),
             (vector * visibility[:, None]).astype(np.float32),
             (gradient * visibility[:, None]).astype(np.float32),
             (even * visibility).astype(np.float32),
+            tint,
         )
         return links.take(factor > 0)
 
@@ -217,8 +217,9 @@ class _ClusterPairs:
         return values
 
     def _trace(self, caster: RayCaster, transfer: Array) -> tuple[Array, Array]:
-        """Trace the first samples of every pair, and all where those disagree: (n, s) bool and float."""
-        traced, free = np.zeros(transfer.shape, dtype=bool), np.zeros(transfer.shape)
+        """Trace the first samples of every pair, and all where those disagree: (n, s) bool and float, or (n, s, 3)."""
+        traced = np.zeros(transfer.shape, dtype=bool)
+        free = np.zeros((*transfer.shape, 3) if caster.tinted else transfer.shape)
         rows = np.arange(len(transfer))
         for columns in (slice(0, FIRST_RAYS), slice(FIRST_RAYS, transfer.shape[1])):
             chosen = np.zeros(transfer.shape, dtype=bool)
@@ -226,7 +227,7 @@ class _ClusterPairs:
             at = np.nonzero(chosen)
             free[at] = visibility_of(caster, self.x[at], self.n_x[at], self.y[at], self.n_y[at])
             traced |= chosen
-            seen, tried = free.sum(axis=1), traced.sum(axis=1)
+            seen, tried = gray(free).sum(axis=1), traced.sum(axis=1)
             # Nothing traced yet: the first samples face away from each other, others do not.
             rows = np.flatnonzero((tried == 0) | ((seen > 0) & (seen < tried)))
         return traced, free

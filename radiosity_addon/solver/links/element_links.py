@@ -11,7 +11,7 @@ also carries an *error estimate*: how much its F·V may vary or be wrong.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -21,7 +21,7 @@ from ...form_factors import point_to_polygon
 from ...numerics import Array, map_chunks, split_in_four
 from ...rays import RayCaster
 from ..hierarchy import Hierarchy
-from .pair_factors import PairSamples, element_factors, open_share, trace_pairs
+from .pair_factors import PairSamples, element_factors, gray, open_share, trace_pairs
 
 CHUNK = 1 << 15
 """Pairs measured at once: 16 samples of 48 bytes each bound the temporaries to about 100 MB."""
@@ -40,9 +40,11 @@ class Links:
     to_quarter, of_quarter (l, 4) float32: How F·V is distributed over the receiver's and the source's
         quarters, mean 1 each: so leaves below an inner element do not all inherit the same (a cluster's are
         all 1).
+    tint (l, 3) float32: What the light of each channel is multiplied with, mean 1, where links lead through
+        glass; None without any.
     """
 
-    STORED = ("receiver", "source", "factor", "visibility", "to_quarter", "of_quarter")
+    STORED = ("receiver", "source", "factor", "visibility", "to_quarter", "of_quarter", "tint")
 
     receiver: Array
     source: Array
@@ -51,6 +53,7 @@ class Links:
     error_estimate: Array
     to_quarter: Array
     of_quarter: Array
+    tint: Array | None = None
 
     def __len__(self) -> int:
         return len(self.receiver)
@@ -65,6 +68,7 @@ class Links:
             self.error_estimate[rows],
             self.to_quarter[rows],
             self.of_quarter[rows],
+            None if self.tint is None else self.tint[rows],
         )
 
     def sorted_by_receiver(self) -> Links:
@@ -91,7 +95,16 @@ def join(parts: list[Links]) -> Links:
     ):
         arrays = [getattr(part, name) for part in parts] or [np.zeros(shape)]
         joined.append(np.concatenate(arrays).astype(kind, copy=False))
-    return Links(*joined)
+    return replace(Links(*joined), tint=join_tints([(part.tint, len(part)) for part in parts]))
+
+
+def join_tints(parts: list[tuple[Array | None, int]]) -> Array | None:
+    """Put the tints (l, 3) of sets of l links one after the other; None if no set has any."""
+    if all(tint is None for tint, _ in parts):
+        return None
+    return np.concatenate(
+        [np.ones((count, 3), np.float32) if tint is None else tint for tint, count in parts]
+    )
 
 
 def measure_links(
@@ -129,7 +142,8 @@ def _measure_chunk(
     transfer = samples.transfer
     factor = np.where(is_cluster, transfer.mean(axis=1), factor)
     traced, free = trace_pairs(caster, samples)
-    visibility = open_share(samples, traced, free)
+    visibility, tint = open_share(transfer, traced, free)
+    free = gray(free)
     rays = traced.sum(axis=1)
     # The variation of F·V over the pair, and the share that few rays can have missed.
     passed = np.where(traced, transfer * free, 0.0)
@@ -144,6 +158,7 @@ def _measure_chunk(
         visibility.astype(np.float32),
         estimate.astype(np.float32),
         *_quarter_shares(hierarchy, receiver, source, samples, transfer * np.where(traced, free, 1.0)),
+        tint,
     )
     return links.take(factor > 0)
 

@@ -51,8 +51,8 @@ def _irradiance(
             repeated = np.repeat(points[rows, None], SHADOW_RAYS, axis=1)
             unit = stratified_square(keys, SHADOW_RAYS, own_seed + Stream.LIGHT_RAYS)
             open_gain, share = lamp_light(light, repeated, facing, unit, caster)
-            gain = open_gain[:, 0] * share
+            gain = (open_gain[:, 0] * share.T).T
         else:
             continue
-        total += gain[:, None] * light.strength
+        total += (gain if gain.ndim == 2 else gain[:, None]) * light.strength
     return total

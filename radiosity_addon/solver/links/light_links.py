@@ -22,7 +22,7 @@ from ...numerics import (
     stratified_square,
     to_world,
 )
-from ...rays import RayCaster
+from ...rays import RayCaster, passing_light
 from ..hierarchy import LEAF, Hierarchy
 
 LAMP_SAMPLES = 4
@@ -52,7 +52,8 @@ class LightLinks:
 
     receiver (l,) int32.
     light (l,) int32: Row of the scene's lights.
-    gain (l, 4) float32: Irradiance per unit of strength on each quarter of the receiver, visibility included.
+    gain (l, 4) float32: Irradiance per unit of strength on each quarter of the receiver, visibility included;
+        (l, 4, 3) by channel where light passes glass.
     """
 
     receiver: Array
@@ -62,12 +63,18 @@ class LightLinks:
     def __len__(self) -> int:
         return len(self.receiver)
 
+    @property
+    def mean_gain(self) -> Array:
+        """(l,) float32: the mean over quarters and channels."""
+        return self.gain.mean(axis=1) if self.gain.ndim == 2 else self.gain.mean(axis=(1, 2))
+
     def irradiance(self, strengths: Array, n_elements: int) -> Array:
         """Return (n_elements, 4, 3): each element's share on its quarters, for (n_lights, 3) strengths."""
         total = np.zeros((n_elements, 4, 3))
         for channel in range(3):
             for quarter in range(4):
-                arriving = self.gain[:, quarter] * strengths[self.light, channel]
+                gain = self.gain[:, quarter] if self.gain.ndim == 2 else self.gain[:, quarter, channel]
+                arriving = gain * strengths[self.light, channel]
                 total[:, quarter, channel] = np.bincount(self.receiver, arriving, minlength=n_elements)
         return total
 
@@ -83,8 +90,15 @@ def join_light_links(one: LightLinks, other: LightLinks) -> LightLinks:
     return LightLinks(
         np.concatenate([one.receiver, other.receiver]),
         np.concatenate([one.light, other.light]),
-        np.concatenate([one.gain, other.gain]),
+        _join_gains([one.gain, other.gain]),
     )
+
+
+def _join_gains(parts: list[Array]) -> Array:
+    """Put gains (l, 4) and (l, 4, 3) one after the other: by channel if any are."""
+    if any(gain.ndim == 3 for gain in parts):
+        parts = [np.repeat(gain[..., None], 3, axis=2) if gain.ndim == 2 else gain for gain in parts]
+    return np.concatenate(parts)
 
 
 def link_lights(
@@ -119,7 +133,8 @@ def link_lights(
             # Where few samples may miss the light altogether, none are taken.
             blind = may_split & ((area > coarse_area) | too_near(light, hierarchy, waiting))
             blind = _affordable(hierarchy, waiting, blind, area, most_elements)
-            gain, error = np.zeros((len(waiting), 4)), np.zeros(len(waiting))
+            gain = np.zeros((len(waiting), 4, *_channels(light, caster)))
+            error = np.zeros(len(waiting))
             seeing = np.flatnonzero(~blind)
             gain[seeing], error[seeing] = measure_light(
                 hierarchy, light, caster, waiting[seeing], seed + LIGHT_STEP * number, threads, part
@@ -127,7 +142,7 @@ def link_lights(
             misplaced = np.where(blind, np.inf, error * area * strength)
             split = may_split & (misplaced > misplaced_power)
             split = _affordable(hierarchy, waiting, split, misplaced, most_elements)
-            kept = ~split & (gain.max(axis=1) > 0)
+            kept = ~split & (gain > 0).any(axis=tuple(range(1, gain.ndim)))
             receivers.append(waiting[kept])
             gains.append(gain[kept])
             numbers.append(np.full(int(kept.sum()), number))
@@ -138,8 +153,13 @@ def link_lights(
     return LightLinks(
         np.concatenate(receivers or empty).astype(np.int32),
         np.concatenate(numbers or empty).astype(np.int32),
-        np.concatenate(gains or [np.zeros((0, 4))]).astype(np.float32),
+        _join_gains(gains or [np.zeros((0, 4))]).astype(np.float32),
     )
+
+
+def _channels(light: Lamp | EnvironmentLight, caster: RayCaster) -> tuple[int, ...]:
+    """Return the shape of a gain: (3,) where what a light meets may be glass."""
+    return (3,) if (caster.for_lamps if isinstance(light, Lamp) else caster).tinted else ()
 
 
 def _affordable(hierarchy: Hierarchy, elements: Array, wanted: Array, weight: Array, most: int) -> Array:
@@ -187,10 +207,10 @@ def measure_light(
 ) -> tuple[Array, Array]:
     """Measure one light's irradiance on the quarters of elements, per unit of strength, and its error.
 
-    Returns gain (n, 4): On each quarter.
+    Returns gain (n, 4) or (n, 4, 3): On each quarter.
     Returns error (n,).
     """
-    gain, error = np.empty((len(elements), 4)), np.empty(len(elements))
+    gain, error = np.empty((len(elements), 4, *_channels(light, caster))), np.empty(len(elements))
     area = hierarchy.area[elements]
     share = area / float(hierarchy.faces.area.sum())
     tiny, small = share < TINY, share < SMALL
@@ -250,10 +270,10 @@ def _measure_sky(
     unit = stratified_square(asked.keys, rays, seed + Stream.LIGHT_POINTS)
     points = points_on_triangles(asked.corners, unit)
     share, error = sky_share(light, points, asked.normals, rays, caster, asked.keys, seed)
-    values = irradiance_under_sky(share.reshape(-1, asked.count))
+    values = irradiance_under_sky(share.reshape(-1, asked.count, *share.shape[1:]))
     # Expected noise of a quarter's mean is not a difference between quarters.
     noise = irradiance_under_sky(error.reshape(-1, asked.count).mean(axis=1))
-    return values, np.maximum(values.std(axis=1) - noise, 0.0)
+    return values, np.maximum(_largest(values.std(axis=1)) - noise, 0.0)
 
 
 def _measure_lamp(
@@ -265,9 +285,17 @@ def _measure_lamp(
     points = points_on_triangles(asked.corners, unit)
     unit = stratified_square(asked.keys, samples, seed + Stream.LIGHT_RAYS)
     open_gain, share = lamp_light(light, points, asked.normals, unit, caster)
-    values = (open_gain.mean(axis=1) * share).reshape(-1, asked.count)
+    mean = open_gain.mean(axis=1)
+    values = (mean * share if share.ndim == 1 else mean[:, None] * share).reshape(
+        -1, asked.count, *share.shape[1:]
+    )
     missed = open_gain.reshape(len(values), -1).mean(axis=1) / (asked.count * samples + 2.0)
-    return values, np.hypot(values.std(axis=1), missed)
+    return values, np.hypot(_largest(values.std(axis=1)), missed)
+
+
+def _largest(values: Array) -> Array:
+    """Return (n,) values, of (n, 3) by channel the largest."""
+    return values if values.ndim == 1 else np.asarray(values.max(axis=1))
 
 
 def lamp_light(
@@ -279,23 +307,25 @@ def lamp_light(
     normals (n, 3).
     unit (n, k, 2): Places the point of the lamp each ray goes to.
     Returns gain (n, k): Unoccluded irradiance per unit of strength.
-    Returns share (n,): How much of it arrives, over the k points together.
+    Returns share (n,) or (n, 3): How much of it arrives, over the k points together.
     """
     flat = points.reshape(-1, 3)
     facing = np.repeat(normals, points.shape[1], axis=0)
     gain = light.unit_irradiance(flat, facing)
-    weights, passed = np.zeros(len(flat)), np.zeros(len(flat))
+    lamps = caster.for_lamps
+    channels = (3,) if lamps.tinted else ()
+    weights, passed = np.zeros(len(flat)), np.zeros((len(flat), *channels))
     rows = np.flatnonzero(gain > 0)
     directions, distances, above = light.shadow_rays(flat[rows], facing[rows], unit.reshape(-1, 1, 2)[rows])
     start = flat[rows] + caster.surface_offset * facing[rows]
-    lamps = caster.for_lamps
-    free = lamps.passing(start, directions[:, 0], distances[:, 0]) if light.casts_shadow else True
+    free = passing_light(lamps, start, directions[:, 0], distances[:, 0]) if light.casts_shadow else 1.0
     # A lamp point below the horizon is ignored: the closed form has clipped it already.
     weights[rows] = np.where(above[:, 0] > 0, gain[rows], 0.0)
-    passed[rows] = weights[rows] * free
+    passed[rows] = (weights[rows].T * np.asarray(free).T).T
     shape = unit.shape[:2]
     total = weights.reshape(shape).sum(axis=1)
-    share = np.where(total > 0, passed.reshape(shape).sum(axis=1) / np.where(total > 0, total, 1.0), 0.0)
+    arrived = passed.reshape(*shape, *channels).sum(axis=1)
+    share = np.where(total > 0, arrived.T / np.where(total > 0, total, 1.0), 0.0).T
     return gain.reshape(shape), share
 
 
@@ -312,11 +342,12 @@ def sky_share(
 
     `points` are (n, 3), or (n, rays, 3) to start every ray elsewhere.
 
-    Returns share (n,): The cosine-weighted share of each hemisphere that meets no surface, weighted by the
-        relative radiance there.
+    Returns share (n,) or (n, 3): The cosine-weighted share of each hemisphere that meets no surface, weighted
+        by the relative radiance there.
     Returns error (n,): Its standard error, were the rays independent.
     """
-    share, error = np.empty(len(points)), np.empty(len(points))
+    share = np.empty((len(points), 3) if caster.tinted else len(points))
+    error = np.empty(len(points))
     for first in range(0, len(points), CHUNK):
         rows = slice(first, first + CHUNK)
         unit = stratified_square(keys[rows], rays, seed + Stream.LIGHT_RAYS)
@@ -324,8 +355,11 @@ def sky_share(
         start = points[rows] if points.ndim == 3 else points[rows, None]
         start = np.broadcast_to(start + caster.surface_offset * normals[rows, None], directions.shape)
         endless = np.full(directions.shape[0] * rays, np.inf)
-        free = caster.passing(start.reshape(-1, 3), directions.reshape(-1, 3), endless)
-        found = free.reshape(-1, rays) * light.relative(directions)
+        free = passing_light(caster, start.reshape(-1, 3), directions.reshape(-1, 3), endless)
+        relative = light.relative(directions)
+        if caster.tinted:
+            relative = relative[..., None]
+        found = free.reshape(-1, rays, *free.shape[1:]) * relative
         share[rows] = found.mean(axis=1)
-        error[rows] = found.std(axis=1) / np.sqrt(rays)
+        error[rows] = _largest(found.std(axis=1)) / np.sqrt(rays)
     return share, error

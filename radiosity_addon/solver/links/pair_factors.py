@@ -53,17 +53,17 @@ ALL_SAMPLES, FIRST_SAMPLES = 16, 4
 def pair_visibility(
     hierarchy: Hierarchy, caster: RayCaster, receiver: Array, source: Array, seed: int
 ) -> Array:
-    """Return (n,) the visibility V of pairs, as `open_share` of all their samples gives it.
+    """Return (n,) the visibility V of pairs, as `open_share` of all their samples gives it: of colors the mean.
 
     Most pairs are settled by their first four samples. The others make all sixteen, those
     too of whose first four none faces both ways: taken for open they would leak through walls.
     """
     few = PairSamples(hierarchy, receiver, source, seed, FIRST_SAMPLES)
-    visibility = open_share(few, *trace_pairs(caster, few))
+    visibility = _open_share(few, *trace_pairs(caster, few))
     unasked = ~(few.transfer > 0).any(axis=1)
     rows = np.flatnonzero(((visibility > 0) & (visibility < 1)) | unasked)
     many = PairSamples(hierarchy, receiver[rows], source[rows], seed)
-    visibility[rows] = open_share(many, *trace_pairs(caster, many, empty_too=True))
+    visibility[rows] = _open_share(many, *trace_pairs(caster, many, empty_too=True))
     return visibility
 
 
@@ -73,25 +73,46 @@ def trace_pairs(caster: RayCaster, samples: PairSamples, empty_too: bool = False
     empty_too: All sixteen also where the four carry nothing. Not for links: their error estimate is about
         such pairs, and has them refined.
     Returns traced (n, 16) bool: Which samples were asked.
-    Returns free (n, 16): What share of these passes: 0 or 1 where there are no cut-outs.
+    Returns free (n, 16): What share of these passes: 0 or 1 where there are no cut-outs. (n, 16, 3) by channel
+        if the caster is tinted.
     """
     traced = np.zeros(samples.transfer.shape, dtype=bool)
-    free = np.zeros(samples.transfer.shape)
+    free = np.zeros((*traced.shape, 3) if caster.tinted else traced.shape)
     every = np.arange(len(traced))
     _trace(caster, samples, every, slice(0, FIRST_SAMPLES), traced, free)
-    seen = free[:, :4].sum(axis=1)
+    seen = gray(free[:, :4]).sum(axis=1)
     tried = traced[:, :4].sum(axis=1)
     unsettled = np.flatnonzero(((seen > 0) & (seen < tried)) | (empty_too & (tried == 0)))
     _trace(caster, samples, unsettled, slice(FIRST_SAMPLES, ALL_SAMPLES), traced, free)
     return traced, free
 
 
-def open_share(samples: PairSamples, traced: Array, free: Array) -> Array:
-    """Return (n,) the visibility V: the share of the traced samples' transfer that nothing blocks."""
-    weight = np.where(traced, samples.transfer, 0.0)
+def gray(free: Array) -> Array:
+    """Return (n, k) shares of light that pass, of (n, k, 3) by channel the mean."""
+    return free if free.ndim == 2 else np.asarray(free.mean(axis=2))
+
+
+def open_share(transfer: Array, traced: Array, free: Array) -> tuple[Array, Array | None]:
+    """Return the share of the traced samples' transfer that nothing blocks.
+
+    transfer (n, k).
+    free (n, k) or (n, k, 3).
+    Returns visibility (n,): V, of colors the mean.
+    Returns tint (n, 3): What the light of each channel that passes is relative to that; None without colors.
+    """
+    weight = np.where(traced, transfer, 0.0)
     total = weight.sum(axis=1)
-    lit = (weight * free).sum(axis=1)
-    return np.where(total > 0, lit / np.maximum(total, 1e-300), 1.0)
+    lit = (weight * gray(free)).sum(axis=1)
+    visibility = np.where(total > 0, lit / np.maximum(total, 1e-300), 1.0)
+    if free.ndim == 2:
+        return visibility, None
+    colors = np.einsum("nk,nkc->nc", weight, free)
+    tint = np.where(lit[:, None] > 0, colors / np.maximum(lit, 1e-300)[:, None], 1.0)
+    return visibility, tint.astype(np.float32)
+
+
+def _open_share(samples: PairSamples, traced: Array, free: Array) -> Array:
+    return open_share(samples.transfer, traced, free)[0]
 
 
 def _trace(

@@ -54,6 +54,8 @@ def gather(
         for quarter in range(4):
             arriving[inner] += 0.25 * links.of_quarter[inner, quarter] * means[children + quarter, channel]
         arriving *= weight
+        if links.tint is not None and channels > 1:  # one channel is none of light's
+            arriving *= links.tint[:, channel]
         irradiance[receivers, :, channel] = np.add.reduceat(arriving, first)[:, None]
         for quarter in range(4):
             share = np.add.reduceat(arriving * links.to_quarter[:, quarter], first)

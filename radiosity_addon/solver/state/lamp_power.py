@@ -37,17 +37,22 @@ def is_stopped(light: Light) -> TypeGuard[Emitter]:
 
 
 def fate(hierarchy: Hierarchy, caster: RayCaster, origins: Array, directions: Array) -> tuple[Array, Array]:
-    """Return (n,) whether rays end on a black back, and whether they leave the scene."""
+    """Return (n,) what share of rays ends on a black back, and leaves the scene; (n, 3) of a tinted caster."""
     hits = caster.intersect(origins, directions)
     escaped = hits.triangle < 0
     face = hierarchy.faces.of_triangle[(~hits.front).astype(int), hits.triangle]
-    return ~escaped & (face < 0), escaped
+    black = ~escaped & (face < 0)
+    if hits.tint is None:
+        return black, escaped
+    return black[:, None] * hits.tint, escaped[:, None] * hits.tint
 
 
 def lost_by_lamp(
     light: Emitter, scene: Scene, hierarchy: Hierarchy, caster: RayCaster, seed: int, rays: int = MOST_RAYS
-) -> tuple[float, float, float]:
+) -> tuple[Array, Array, float]:
     """Return the shares of a lamp's power that end on black backs and leave the scene, and their error.
+
+    Shares are single numbers, or one for each channel if the lamp's light may pass glass.
 
     caster: Of surfaces; it knows the one for lamps.
     """
@@ -57,9 +62,9 @@ def lost_by_lamp(
     start = _off_surfaces(scene, caster, origins, directions)
     black, escaped = fate(hierarchy, caster.for_lamps, start, directions)
     weight = share / max(float(share.sum()), 1e-300)
-    lost = float(weight @ (black | escaped))
-    error = float(np.sqrt((weight * weight) @ ((black | escaped) - lost) ** 2))
-    return float(weight @ black), float(weight @ escaped), error
+    gone = black | escaped if black.ndim == 1 else (black + escaped).mean(axis=1)
+    error = float(np.sqrt((weight * weight) @ (gone - float(weight @ gone)) ** 2))
+    return np.asarray(weight @ black), np.asarray(weight @ escaped), error
 
 
 def _off_surfaces(scene: Scene, caster: RayCaster, origins: Array, directions: Array) -> Array:
@@ -85,7 +90,7 @@ def lamps_within_power(
         return links
     rays = min(max(RAYS // len(lamps), LEAST_RAYS), MOST_RAYS)
     receiver = links.receiver
-    gain = hierarchy.area[receiver] * hierarchy.opacity[receiver] * links.gain.mean(axis=1)
+    gain = hierarchy.area[receiver] * hierarchy.opacity[receiver] * links.mean_gain
     gain *= scene.in_shadows[hierarchy.faces.triangle[hierarchy.face[receiver]]]
     arriving = np.bincount(links.light, gain, minlength=len(scene.lights))
     scale = np.ones(len(scene.lights))
@@ -95,13 +100,15 @@ def lamps_within_power(
         power = float(light.flux.mean())
         said = arriving[number] * float(light.strength.mean())
         own_seed = seed + LAMP_STEP * number
-        black, escaped, error = lost_by_lamp(light, scene, hierarchy, caster, own_seed, rays)
+        *lost, error = lost_by_lamp(light, scene, hierarchy, caster, own_seed, rays)
+        black, escaped = (float(share.mean()) for share in lost)
         most = (1.0 + SOFT) * (1.0 - black - escaped) + STANDARD_ERRORS * (error + 1.0 / rays)
         if said > most * power:
             scale[number] = (1.0 - black - escaped) * power / said
     if (scale == 1.0).all():
         return links
-    return replace(links, gain=links.gain * scale[links.light, None].astype(np.float32))
+    of_links = scale[links.light].astype(np.float32)
+    return replace(links, gain=(links.gain.T * of_links).T)
 
 
 def light_power(scene: Scene, faces: Faces) -> float:

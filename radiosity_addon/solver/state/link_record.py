@@ -119,7 +119,7 @@ def record_links(state: SolverState) -> LinkRecord:
     first_lamp = hierarchy.n_clusters + hierarchy.n_elements
     receiver.append(lights.receiver + hierarchy.n_clusters)
     source.append(lights.light + first_lamp)
-    arriving.append(lights.gain.mean(axis=1) * strengths[lights.light] if len(lights) else np.zeros(0))
+    arriving.append(lights.mean_gain * strengths[lights.light] if len(lights) else np.zeros(0))
     above = np.full(hierarchy.n_clusters + len(faces), LEAF, dtype=np.int32)
     above[clusters.children.ravel()] = np.repeat(np.arange(len(clusters)), 2)
     lamps = [_place(light) for light in state.scene.lights]

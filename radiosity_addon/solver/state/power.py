@@ -2,7 +2,7 @@
 
 The escaped part is followed by rays that leave the surfaces and lamps, never taken as the
 remainder, so that emitted = absorbed + escaped is a check and not a definition. Powers are
-means over the three channels, in watts.
+means over the three channels, in watts. What glass takes of the light that passes it is absorbed, too.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ ESCAPE_RAYS = 1 << 17
 
 
 def power_balance(state: SolverState) -> dict[str, float]:
-    """Return the emitted, absorbed and escaped power [W].
+    """Return the emitted, absorbed and escaped power [W], and how much of what is absorbed is by glass.
 
     Lamps and emission count over all their sides, sun and sky what arrives at the faces. So does a
     lamp without shadows: each surface on its light's way gets all of it. Other lamps count beside their
@@ -39,8 +39,8 @@ def power_balance(state: SolverState) -> dict[str, float]:
     hierarchy, scene = state.hierarchy, state.scene
     leaves = hierarchy.leaves
     emitted = float((hierarchy.area[leaves] @ hierarchy.emission[leaves]).mean()) if len(leaves) else 0.0
-    receiver = state.light_links.receiver
-    gain = hierarchy.area[receiver] * hierarchy.opacity[receiver] * state.light_links.gain.mean(axis=1)
+    links, receiver = state.light_links, state.light_links.receiver
+    gain = hierarchy.area[receiver] * hierarchy.opacity[receiver] * links.mean_gain
     # What stops a lamp's light has it from the lamp's power, all else on top of that.
     stops = scene.in_shadows[hierarchy.faces.triangle[hierarchy.face[receiver]]]
     for number, light in enumerate(scene.lights):
@@ -48,17 +48,27 @@ def power_balance(state: SolverState) -> dict[str, float]:
         if is_stopped(light):
             emitted += float(light.flux.mean())
             on_top &= ~stops
-        emitted += float(gain[on_top].sum()) * float(light.strength.mean())
+        if links.gain.ndim == 2:
+            emitted += float(gain[on_top].sum()) * float(light.strength.mean())
+        else:
+            rows = receiver[on_top]
+            by_channel = hierarchy.opacity_by_channel(rows) * links.gain[on_top].mean(axis=1)
+            emitted += float((hierarchy.area[rows] @ by_channel) @ light.strength) / 3.0
 
-    kept = (hierarchy.opacity[leaves, None] - hierarchy.reflectance[leaves]) * state.irradiance[leaves]
+    kept = (hierarchy.opacity_by_channel(leaves) - hierarchy.reflectance[leaves]) * state.irradiance[leaves]
     absorbed = float((hierarchy.area[leaves] @ kept).mean()) if len(leaves) else 0.0
     from_surfaces = _follow_surfaces(state)
     from_lamps = _follow_lamps(state)
-    return {
+    balance = {
         "emitted": emitted,
         "absorbed": absorbed + from_surfaces[0] + from_lamps[0],
         "escaped": from_surfaces[1] + from_lamps[1],
     }
+    glass = np.zeros(0, dtype=bool) if scene.images is None else scene.images.clear
+    if glass.any():
+        own = glass[hierarchy.faces.triangle[hierarchy.face[leaves]]]
+        balance["absorbed_by_glass"] = float((hierarchy.area[leaves][own] @ kept[own]).mean())
+    return balance
 
 
 def _follow_surfaces(state: SolverState) -> tuple[float, float]:
@@ -81,6 +91,10 @@ def _follow_surfaces(state: SolverState) -> tuple[float, float]:
     directions = to_world(cosine_hemisphere(unit), normals)[:, 0]
     start = points + state.caster.surface_offset * normals
     black, escaped = fate(hierarchy, state.caster, start, directions)
+    if black.ndim == 2:
+        radiosity = state.radiosity[leaf]
+        color = radiosity / np.maximum(radiosity.mean(axis=1, keepdims=True), 1e-300)
+        black, escaped = color * black, color * escaped
     return total * float(black.mean()), total * float(escaped.mean())
 
 
@@ -92,9 +106,13 @@ def _follow_lamps(state: SolverState) -> tuple[float, float]:
             continue
         seed = state.settings.seed + LAMP_STEP * number
         black, escaped, _ = lost_by_lamp(light, state.scene, state.hierarchy, state.caster, seed)
-        flux = float(light.flux.mean())
-        black_total += flux * black
-        escaped_total += flux * escaped
+        if black.ndim == 0:
+            flux = float(light.flux.mean())
+            black_total += flux * float(black)
+            escaped_total += flux * float(escaped)
+        else:
+            black_total += float(np.mean(light.flux * black))
+            escaped_total += float(np.mean(light.flux * escaped))
     return black_total, escaped_total
 
 
