@@ -29,13 +29,16 @@ class Arriving:
             self.area = clusters.area[links.receiver]
             self.power = self.area * links.factor * links.visibility
             return
-        weight = (_taken_below(hierarchy, received)[: len(faces)] * faces.area)[:, None]
-        sums = cut.sums(np.concatenate([weight, weight * faces.normal, weight * faces.center], axis=1))
-        at = sums[cut.row[links.receiver]]
-        self.area = at[:, 0]
-        offset = at[:, 4:] - at[:, :1] * clusters.center[links.receiver]
-        self.power = at[:, 0] * links.even + np.einsum("lk,lk->l", at[:, 1:4], links.vector)
-        self.power += np.einsum("lk,lk->l", offset, links.gradient)
+        channels = []
+        for opacity, tint in _opacity_of_channels(hierarchy, links.tint):
+            weight = (_taken_below(hierarchy, opacity, received)[: len(faces)] * faces.area)[:, None]
+            sums = cut.sums(np.concatenate([weight, weight * faces.normal, weight * faces.center], axis=1))
+            at = sums[cut.row[links.receiver]]
+            offset = at[:, 4:] - at[:, :1] * clusters.center[links.receiver]
+            power = at[:, 0] * links.even + np.einsum("lk,lk->l", at[:, 1:4], links.vector)
+            power += np.einsum("lk,lk->l", offset, links.gradient)
+            channels.append((tint * at[:, 0], tint * power))
+        self.area, self.power = _mean_of(channels)
 
 
 def sent_by_leaves(
@@ -66,10 +69,10 @@ def received_by_leaves(
 
     Returns own, shared (e,): Of the leaves; other rows mean nothing.
     """
-    there = hierarchy.opacity[:, None]
-    gathered = gather(hierarchy, links, there, scale, cut)
-    own = quarters_mean(gathered)[:, 0]
-    shared = push(hierarchy, gathered)[:, 0] - own
+    # Of colors the mean: what passes glass is relative to what it finds behind it.
+    gathered = gather(hierarchy, links, hierarchy.opacity_by_channel, scale, cut)
+    own = quarters_mean(gathered).mean(axis=1)
+    shared = push(hierarchy, gathered).mean(axis=1) - own
     if len(cluster_links):
         shared += received_over_clusters(hierarchy, cut, cluster_links, scale)[hierarchy.face]
     return own, shared
@@ -79,8 +82,9 @@ def received_over_clusters(
     hierarchy: Hierarchy, cut: ClusterCut, cluster_links: ClusterLinks, scale: Array
 ) -> Array:
     """Return (f,) ΣFV over links to clusters, sources scaled by `scale`."""
-    means = node_radiosity(hierarchy, pull(hierarchy, scale[:, 1:] * hierarchy.opacity[:, None]), cut)
-    return np.asarray(np.maximum(gather_at_clusters(hierarchy, cut, cluster_links, means)[:, 0], 0.0))
+    means = node_radiosity(hierarchy, pull(hierarchy, scale[:, 1:] * hierarchy.opacity_by_channel), cut)
+    gathered = gather_at_clusters(hierarchy, cut, cluster_links, means)
+    return np.asarray(np.maximum(gathered.mean(axis=1), 0.0))
 
 
 def _from_clusters(
@@ -130,23 +134,42 @@ def taken_at_links(hierarchy: Hierarchy, links: Links, received: Array | None = 
 
     received (e, 2): What the light that leaves gather is scaled with, as from `Conservation.balance`.
     """
-    there = hierarchy.opacity if received is None else hierarchy.opacity * received[:, 0]
-    below = _taken_below(hierarchy, received)
     child = hierarchy.first_child[links.receiver]
     inner = np.flatnonzero(child != LEAF)
-    share = there[links.receiver]
-    # Quarters take unequal parts of what arrives, and may be covered: each is weighted by what it takes.
-    share[inner] = 0.0
-    for quarter in range(4):
-        share[inner] += 0.25 * links.to_quarter[inner, quarter] * below[child[inner] + quarter]
+    channels = []
+    for opacity, tint in _opacity_of_channels(hierarchy, links.tint):
+        there = opacity if received is None else opacity * received[:, 0]
+        below = _taken_below(hierarchy, opacity, received)
+        share = there[links.receiver]
+        # Quarters take unequal parts of what arrives, and may be covered: each is weighted by what it takes.
+        share[inner] = 0.0
+        for quarter in range(4):
+            share[inner] += 0.25 * links.to_quarter[inner, quarter] * below[child[inner] + quarter]
+        channels.append((tint * share,))
+    (share,) = _mean_of(channels)
     return np.asarray(hierarchy.area[links.receiver] * share * links.factor * links.visibility)
 
 
-def _taken_below(hierarchy: Hierarchy, received: Array | None) -> Array:
-    """Return (e,) the part of their ancestors' light that the leaves of elements take, times opacity."""
+def _opacity_of_channels(hierarchy: Hierarchy, tint: Array | None) -> list[tuple[Array, Array | float]]:
+    """Return opacities (e,) and the tints (l,) of links, of each channel; of gray light one pair."""
+    opacity = hierarchy.opacity_by_channel
+    if tint is None or opacity.shape[1] == 1:
+        return [(hierarchy.opacity, 1.0)]
+    return list(zip(opacity.T, tint.T, strict=True))
+
+
+def _mean_of(channels: list[tuple[Array, ...]]) -> tuple[Array, ...]:
+    """Return the means of several arrays over one or three channels."""
+    if len(channels) == 1:
+        return channels[0]
+    return tuple(np.mean(values, axis=0) for values in zip(*channels, strict=True))
+
+
+def _taken_below(hierarchy: Hierarchy, opacity: Array, received: Array | None) -> Array:
+    """Return (e,) the part of their ancestors' light that leaves take, times their opacity (e,)."""
     if received is None:
-        return hierarchy.opacity
-    return np.asarray(pull(hierarchy, hierarchy.opacity[:, None] * received[:, 1:])[:, 0])
+        return opacity
+    return np.asarray(pull(hierarchy, opacity[:, None] * received[:, 1:])[:, 0])
 
 
 def sent(hierarchy: Hierarchy, links: Links, at_links: Array | None = None) -> Array:

@@ -51,6 +51,7 @@ class Hierarchy:
         self.emission: Array = self.faces.emission.copy()
         self.opacity: Array = self.faces.opacity.copy()
         self._images = scene.images
+        self._by_channel: Array | None = None
         self._plain = scene.reflectance, scene.emission, scene.opacity
         self._detailed = np.zeros(count, dtype=bool)
         """(f,) bool: faces whose elements differ: textured, or covered in part"""
@@ -103,19 +104,20 @@ class Hierarchy:
         """(e,) float64: the divisor for radiosity at ray hits; never 0."""
         return np.where(self.opacity > 0, self.opacity, 1.0)
 
-    def opacity_by_channel(self, elements: Array) -> Array:
-        """Return (n, 1) the opacity of elements, or (n, 3) by channel where there is glass."""
-        opacity = self.opacity[elements][:, None]
+    @property
+    def opacity_by_channel(self) -> Array:
+        """(e, 1) float64: the opacity, or (e, 3) where there is glass, whose mean it is then."""
         if self._images is None or not self._images.tinting.any():
-            return opacity
-        opacity = np.repeat(opacity, 3, axis=1)
-        rows = np.flatnonzero(self._images.tinting[self.faces.triangle[self.face[elements]]])
-        chosen = elements[rows]
-        passed = self._images.mean_passes(self.faces.triangle[self.face[chosen]], self._weights[chosen])
-        there = self.opacity[chosen] / np.maximum(1.0 - passed.mean(axis=1), 1e-6)
-        # What others cover is no part of it.
-        opacity[rows] = (1.0 - passed) * np.minimum(there, 1.0)[:, None]
-        return opacity
+            return self.opacity[:, None]
+        if self._by_channel is None or len(self._by_channel) != self.n_elements:
+            triangle = self.faces.triangle[self.face]
+            rows = np.flatnonzero(self._images.tinting[triangle])
+            stopped = 1.0 - self._images.mean_passes(triangle[rows], self._weights[rows])
+            self._by_channel = np.repeat(self.opacity[:, None], 3, axis=1)
+            # By the same mean as above: what others cover is no part of it.
+            mean = np.maximum(stopped.mean(axis=1), 1e-300)
+            self._by_channel[rows] = np.minimum(stopped * (self.opacity[rows] / mean)[:, None], 1.0)
+        return self._by_channel
 
     def normal_of(self, elements: Array) -> Array:
         """Return (n, 3) float64: the unit normals of elements."""

@@ -91,6 +91,9 @@ def lamps_within_power(
     rays = min(max(RAYS // len(lamps), LEAST_RAYS), MOST_RAYS)
     receiver = links.receiver
     gain = hierarchy.area[receiver] * hierarchy.opacity[receiver] * links.mean_gain
+    if links.gain.ndim == 3:
+        by_channel = hierarchy.opacity_by_channel[receiver] * links.gain.mean(axis=1)
+        gain = hierarchy.area[receiver] * by_channel.mean(axis=1)
     gain *= scene.in_shadows[hierarchy.faces.triangle[hierarchy.face[receiver]]]
     arriving = np.bincount(links.light, gain, minlength=len(scene.lights))
     scale = np.ones(len(scene.lights))

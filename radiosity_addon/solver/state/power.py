@@ -52,10 +52,10 @@ def power_balance(state: SolverState) -> dict[str, float]:
             emitted += float(gain[on_top].sum()) * float(light.strength.mean())
         else:
             rows = receiver[on_top]
-            by_channel = hierarchy.opacity_by_channel(rows) * links.gain[on_top].mean(axis=1)
+            by_channel = hierarchy.opacity_by_channel[rows] * links.gain[on_top].mean(axis=1)
             emitted += float((hierarchy.area[rows] @ by_channel) @ light.strength) / 3.0
 
-    kept = (hierarchy.opacity_by_channel(leaves) - hierarchy.reflectance[leaves]) * state.irradiance[leaves]
+    kept = (hierarchy.opacity_by_channel[leaves] - hierarchy.reflectance[leaves]) * state.irradiance[leaves]
     absorbed = float((hierarchy.area[leaves] @ kept).mean()) if len(leaves) else 0.0
     from_surfaces = _follow_surfaces(state)
     from_lamps = _follow_lamps(state)
