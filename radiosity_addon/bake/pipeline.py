@@ -22,7 +22,7 @@ from ..lightmap.lighting import (
 )
 from ..lightmap.texels import FOOTPRINT, TexelGeometry, rasterize, texel_materials
 from ..lightmap.transport import GatherSettings, TexelLight
-from ..lightmap.unwrap import Atlas, AtlasInput, AtlasOptions, Limits, build_atlas, padding_for
+from ..lightmap.unwrap import Atlas, AtlasInput, AtlasObject, AtlasOptions, Limits, build_atlas, padding_for
 from ..numerics import Array, Scratch, tiles
 from ..options import BakeSettings
 from ..rays import RayCaster
@@ -218,10 +218,7 @@ def _unwrap(
     bake_scene: BakeScene, baked: list[BakeObject], settings: BakeSettings, progress: Progress
 ) -> Atlas:
     """Lay the objects' charts out on pages."""
-    inputs = [
-        AtlasInput(item.name, bake_scene.scene.triangles[item.rows], item.polygon, item.uv, item.texel_scale)
-        for item in baked
-    ]
+    inputs = [_to_lay_out(bake_scene, item) for item in baked]
     options = AtlasOptions(
         settings.resolution,
         settings.texel_density,
@@ -230,7 +227,26 @@ def _unwrap(
         Limits(settings.max_resolution, _padding(settings)),
         settings.unwrap_seconds,
     )
-    return build_atlas(inputs, options, progress)
+    atlas = build_atlas(inputs, options, progress)
+    placed = [_with_glass(item, each) for item, each in zip(baked, atlas.objects, strict=True)]
+    return replace(atlas, objects=tuple(placed))
+
+
+def _to_lay_out(bake_scene: BakeScene, item: BakeObject) -> AtlasInput:
+    """Return what gets texels of an object."""
+    triangles, polygon, uv = bake_scene.scene.triangles[item.rows], item.polygon, item.uv
+    if item.glass is not None:
+        triangles, polygon, uv = triangles[item.lit], polygon[item.lit], None if uv is None else uv[item.lit]
+    return AtlasInput(item.name, triangles, polygon, uv, item.texel_scale)
+
+
+def _with_glass(item: BakeObject, placed: AtlasObject) -> AtlasObject:
+    """Return where all triangles of an object lie: glass where it was, or nowhere."""
+    if item.glass is None:
+        return placed
+    uv = np.zeros((item.count, 3, 2), dtype=np.float32) if item.uv is None else item.uv.copy()
+    uv[item.lit] = placed.uv
+    return replace(placed, uv=uv)
 
 
 def _padding(settings: BakeSettings) -> int:
@@ -245,7 +261,7 @@ def _texels(bake_scene: BakeScene, baked: list[BakeObject], atlas: Atlas, scratc
     page_of_triangle = np.full(count, -1, dtype=np.int32)
     for item, placed in zip(baked, atlas.objects, strict=True):
         uv[item.rows] = placed.uv
-        page_of_triangle[item.rows] = placed.page
+        page_of_triangle[item.rows] = np.where(item.lit, placed.page, -1)
     # What has no area has no side to be lit from, whatever its UVs say.
     page_of_triangle[bake_scene.scene.areas == 0] = -1
     rows = [np.flatnonzero(page_of_triangle == page) for page in range(len(atlas.pages))]

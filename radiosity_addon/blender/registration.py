@@ -12,9 +12,16 @@ from . import handlers
 from .datablocks import bake_record
 from .operators import bake_operators, cleaning, light_group_operators, relight_operators, setting_operators
 from .overlays import overlay_properties, overlay_view
-from .panels import bake_panel, check_panel, light_group_panels, object_panel, overlay_panel
+from .panels import (
+    bake_panel,
+    check_panel,
+    light_group_panels,
+    material_panel,
+    object_panel,
+    overlay_panel,
+)
 from .relight import live_switch, relight_properties
-from .scene_records import object_roles
+from .scene_records import glass, object_roles
 from .session import facts
 from .session.state import session
 from .settings import light_group_properties, preferences, preset_menu, properties
@@ -30,6 +37,7 @@ CLASSES = (
     *light_group_panels.CLASSES,
     *check_panel.CLASSES,
     *object_panel.CLASSES,
+    *material_panel.CLASSES,
     *overlay_panel.CLASSES,
     *cleaning.CLASSES,
 )
@@ -43,7 +51,7 @@ def register() -> None:
         return
     try:
         for module in (
-            *(bake_record, object_roles, light_group_properties, properties),
+            *(bake_record, object_roles, glass, light_group_properties, properties),
             *(relight_properties, live_switch, overlay_properties, overlay_view, handlers),
         ):
             module.register()

@@ -132,7 +132,7 @@ def _reading(option: Option) -> dict[str, Any]:
     """Return how argparse reads an option's value; settings that are not given are left out."""
     if option.kind is bool:
         default: Any = argparse.SUPPRESS if option.name in OPTIONS else False
-        return {"action": "store_const", "const": True, "default": default}
+        return {"action": "store_const", "const": not option.default, "default": default}
     words: dict[str, Any] = {"type": option.kind, "metavar": option.metavar}
     words["default"] = argparse.SUPPRESS if option.name in OPTIONS else None
     if option.choices:
@@ -148,7 +148,7 @@ def _reading(option: Option) -> dict[str, Any]:
 
 def _help(option: Option) -> str:
     """Return the description for the help, with the default and the methods that have the option."""
-    text = option.description
+    text = option.off or option.description
     text = text[0].lower() + text[1:] if text[1].islower() else text
     if option.methods:
         few = len(option.methods) < len(METHODS)

@@ -335,6 +335,14 @@ class BakeSettings:
         methods=ALL,
         panel=PanelRow("Memory Limit"),
     )
+    light_through_glass: bool = option(
+        True,
+        "Light goes straight through glass, tinted by its color; else glass is baked like an opaque surface",
+        "Scene",
+        flag="--opaque-glass",
+        off="Bake glass like an opaque surface; else light goes straight through it, tinted by its color",
+        panel=PanelRow("Glass Lets Light Through"),
+    )
 
     def __post_init__(self) -> None:
         for name, found in OPTIONS.items():

@@ -104,6 +104,8 @@ class Option(NamedTuple):
         Whether presets set it.
     panel : PanelRow or None
         None for what only the command line and scripts have.
+    off : str
+        What the flag of an option does that is on by default: it turns it off.
     """
 
     description: str
@@ -122,6 +124,7 @@ class Option(NamedTuple):
     methods: tuple[str, ...] = ()
     preset: bool = False
     panel: PanelRow | None = None
+    off: str = ""
 
     @property
     def values(self) -> tuple[str, ...]:

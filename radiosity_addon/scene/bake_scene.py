@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..base import BakeWarning
 from ..numerics import Array
 from .scene import Scene
@@ -26,6 +28,7 @@ class BakeObject:
     loops (count, 3) int32: The mesh corner (loop) of each triangle corner: UVs go back through it.
     uv (count, 3, 2) float32: The existing `Lightmap` UVs to keep; None to unwrap.
     texel_scale: Its texels per meter, relative to the other objects.
+    glass (count,) bool: Triangles that are glass, which get no texels; None for none.
     """
 
     name: str
@@ -36,11 +39,17 @@ class BakeObject:
     loops: Array
     uv: Array | None = None
     texel_scale: float = 1.0
+    glass: Array | None = None
 
     @property
     def rows(self) -> slice:
         """The rows of its triangles in the scene."""
         return slice(self.first, self.first + self.count)
+
+    @property
+    def lit(self) -> Array:
+        """(count,) bool: the triangles that get texels, if it gets a lightmap."""
+        return np.ones(self.count, dtype=bool) if self.glass is None else ~self.glass
 
 
 @dataclass(frozen=True)

@@ -218,7 +218,7 @@ class CutOutCaster:
         return Hits(triangle, barycentric, front, distance, tint)
 
     def _tint(self, tint: Array, ray: Array, at: Array, hits: Hits, opacity: Array, ends: Array) -> None:
-        """Multiply the tints (n, 3) of rays by what passes the h cut-outs that they met in front of their ends.
+        """Multiply the tints (n, 3) of rays by what passes the h cut-outs that they met before they ended.
 
         ray, at (h,) int: The ray of each hit, and the number of its way, sorted.
         ends (e,) int: The hits that stop rays.

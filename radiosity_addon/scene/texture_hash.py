@@ -91,7 +91,9 @@ def same_glow(before: Glow, now: Glow) -> bool:
 
 
 def _texels(images: SurfaceImages, rows: Array) -> Iterator[tuple[Array, Array]]:
-    """Yield the texels (n, 7), with glass (n, 10), whose centers lie on textured triangles, and how many each triangle has.
+    """Yield the texels whose centers lie on textured triangles, and how many each triangle has.
+
+    Texels (n, 7), with glass (n, 10).
 
     Triangles come in groups of one size in texels, and in their order; the texels of each by their weights.
     """

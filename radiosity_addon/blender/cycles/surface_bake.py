@@ -89,7 +89,7 @@ class SurfaceBake:
             for row, source in materials.items():
                 if source is None:
                     continue
-                self._rewired[row] = RewiredMaterial(source.find(), self._attributes)
+                self._rewired[row] = RewiredMaterial(source.find(), self._attributes, source.lets_through)
                 self._made += self._rewired[row].made
             self._scene = _new_scene(context.scene, context.view_layer, settings)
             self._made.append(self._scene)

@@ -19,7 +19,7 @@ from ...options import BakeSettings
 from ...scene import SurfaceImages
 from ..datablocks.mesh_arrays import normal_matrix, world_from_object
 from ..materials.materials import Surface
-from ..materials.surface_terms import surface_of_terms
+from ..materials.surface_terms import passing_color, surface_of_terms
 from ..scene_records.export_sources import MaterialSource
 from ..scene_records.pieces import Piece
 from ..session.background import elsewhere
@@ -85,7 +85,8 @@ def evaluate_surfaces(
                 bake.draw(batch.drawn)
                 seen = bake.channel(channel)
             yield from elsewhere(partial(batch.put, seen, terms[channel]), in_background)
-    return (yield from elsewhere(lambda: _images(tiles, terms, rows, len(surface)), in_background))
+    glass = np.array([one.glass for one in surfaces])[own]
+    return (yield from elsewhere(lambda: _images(tiles, terms, rows, glass, len(surface)), in_background))
 
 
 def _side(settings: BakeSettings, cut_out: bool) -> int:
@@ -136,7 +137,7 @@ def _terms_of_constants(
     constants = {
         "reflected": np.array([one.reflectance for one in surfaces]) * opacity[:, None],
         "radiance": radiance_of_radiosity(np.array([one.emission for one in surfaces])) * opacity[:, None],
-        "passed": np.repeat(1.0 - opacity[:, None], 3, axis=1),
+        "passed": np.array([_passed(one) for one in surfaces]),
     }
     triangle, row, column, *_ = tiles.texels()
     for channel, values in constants.items():
@@ -144,17 +145,31 @@ def _terms_of_constants(
     return terms
 
 
+def _passed(surface: Surface) -> np.ndarray:
+    """Return (3,) what passes a surface by channel."""
+    return np.full(3, 1.0 - surface.opacity) if surface.passed is None else surface.passed
+
+
 def _images(
-    tiles: SurfaceTiles, terms: Mapping[str, np.ndarray], rows: np.ndarray, count: int
+    tiles: SurfaceTiles, terms: Mapping[str, np.ndarray], rows: np.ndarray, glass: np.ndarray, count: int
 ) -> SurfaceImages:
+    """Put the terms together for `rows`, of which some are glass: light passes these by color."""
     reflectance, radiance, opacity = surface_of_terms(*(terms[channel] for channel in CHANNELS))
     values = np.empty((tiles.height, tiles.width, 7), dtype=np.float32)
     values[..., :3] = np.clip(np.nan_to_num(reflectance), 0.0, MAX_REFLECTANCE)
     values[..., 3:6] = radiosity_of_radiance(np.maximum(np.nan_to_num(radiance, posinf=0.0), 0.0))
     values[..., 6] = opacity
+    passes, of_glass = None, np.zeros(count, dtype=bool)
+    of_glass[rows] = glass
+    if glass.any():
+        triangle, row, column, *_ = tiles.texels()
+        row, column = row[glass[triangle]], column[glass[triangle]]
+        passes = np.repeat(1.0 - values[..., 6:], 3, axis=2)
+        passes[row, column] = passing_color(terms["passed"][row, column], opacity[row, column])
+        tiles.fill_diagonals(passes)
     tiles.fill_diagonals(values)
     image_uv = np.zeros((count, 3, 2), dtype=np.float32)
     image_uv[rows] = tiles.coordinates()
     textured = np.zeros(count, dtype=bool)
     textured[rows] = True
-    return SurfaceImages(values, image_uv, textured)
+    return SurfaceImages(values, image_uv, textured, passes, of_glass)

@@ -38,9 +38,12 @@ class RewiredMaterial:
 
     original: One with nodes.
     attributes mapping of str to str: The names of the mesh attributes that hold inputs of the nodes.
+    lets_through: See `read_material`.
     """
 
-    def __init__(self, original: bpy.types.Material, attributes: Mapping[str, str]) -> None:
+    def __init__(
+        self, original: bpy.types.Material, attributes: Mapping[str, str], lets_through: bool = False
+    ) -> None:
         self.made: list[bpy.types.ID] = []
         """The datablocks to remove in the end."""
         self.material = original.copy()
@@ -53,7 +56,7 @@ class RewiredMaterial:
         output = output_node(self._tree)
         self._terms = nothing()
         if output is not None:
-            self._terms = _Rewiring().shader(output.inputs["Surface"], _Place(self._tree))
+            self._terms = _Rewiring(lets_through).shader(output.inputs["Surface"], _Place(self._tree))
         self._finish(output)
 
     @property
@@ -139,6 +142,9 @@ class _Place:
 
 class _Rewiring(ShaderTerms[_Place]):
     """Builds the expressions in the tree of a copied material."""
+
+    def __init__(self, lets_through: bool = False) -> None:
+        self.lets_through = lets_through
 
     def shader(self, socket: bpy.types.NodeSocket, place: _Place) -> Terms:
         feed = feed_of(socket, enter_groups=False)

@@ -7,7 +7,7 @@ Where something varies over the surface the material says so (`Surface.varies`),
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -24,10 +24,14 @@ from .shader_nodes import (
     evaluate,
     feed_of,
     output_node,
+    shadow_ray,
 )
-from .shader_terms import ShaderTerms, Terms, nothing
+from .shader_terms import ROUGH, ShaderTerms, Terms, nothing
 from .shading_inputs import LIGHT_PATHS, asks_light_path
-from .surface_terms import surface_of_terms
+from .surface_terms import LEAST_COLOR, passing_color, surface_of_terms
+
+PASSING_RAYS = ("Is Shadow Ray", "Is Diffuse Ray")
+"""Rays for which shaders of glass are mixed with transparency."""
 
 DEFAULT_GRAY = 0.8
 """Reflectance of a face without material, as in Cycles."""
@@ -52,6 +56,11 @@ class Surface:
         Which; reported unless the material is evaluated.
     is_volume : bool
         It has a volume and no surface: fog, through which all light goes.
+    passed : (3,) float64 or None
+        The share of each channel that goes straight through, of mean 1 − opacity; None where all have the
+        same.
+    glass : bool
+        Light goes through it by color; where it reflects and emits nothing, it is glass and nothing else.
     """
 
     reflectance: np.ndarray
@@ -61,6 +70,8 @@ class Surface:
     varies: bool = False
     fallbacks: tuple[BakeWarning, ...] = ()
     is_volume: bool = False
+    passed: np.ndarray | None = None
+    glass: bool = False
 
     @property
     def is_plain(self) -> bool:
@@ -68,11 +79,14 @@ class Surface:
         return not self.varies and self.opacity == 1.0
 
 
-def read_material(material: bpy.types.Material | None) -> Surface:
-    """Return what a material reflects, emits and covers; None is Cycles' default gray."""
+def read_material(material: bpy.types.Material | None, lets_through: bool = False) -> Surface:
+    """Return what a material reflects, emits and covers; None is Cycles' default gray.
+
+    lets_through: Light goes through glass; else it is opaque, and what goes through the rest is gray.
+    """
     if material is None:
         return Surface(np.full(3, DEFAULT_GRAY), np.zeros(3))
-    reader = _Reader(material.name, "material")
+    reader = _Reader(material.name, "material", lets_through)
     if not uses_nodes(material):
         terms = Terms(np.array(material.diffuse_color[:3], dtype=np.float64), np.zeros(3), np.zeros(3))
     else:
@@ -88,6 +102,8 @@ def read_material(material: bpy.types.Material | None) -> Surface:
         reader.varies,
         tuple(reader.fallbacks),
         reader.is_volume,
+        passing_color(terms.passed, opacity[0]) if reader.is_glass else None,
+        reader.is_glass,
     )
 
 
@@ -165,9 +181,11 @@ def uses_nodes(owner: bpy.types.ID) -> bool:
 class _Reader(ShaderTerms[Stack]):
     """Reads one node tree as constants and collects its warnings."""
 
-    def __init__(self, name: str, kind: str) -> None:
+    def __init__(self, name: str, kind: str, lets_through: bool = False) -> None:
         self.name = name
         self.kind = kind
+        self.lets_through = lets_through
+        self.is_glass = False
         self.warnings: list[BakeWarning] = []
         self.fallbacks: list[BakeWarning] = []
         self.varies = False
@@ -191,7 +209,39 @@ class _Reader(ShaderTerms[Stack]):
         for socket in ("Volume", "Displacement"):
             if output.inputs[socket].is_linked:
                 self.warn(f"its {socket.lower()} is ignored")
-        return self.shader(output.inputs["Surface"], ())
+        if not asks_light_path(tree, PASSING_RAYS):
+            return self.shader(output.inputs["Surface"], ())
+        # Shadow rays are lamps' light, for which what passes counts alone.
+        with shadow_ray(1.0):
+            passed = self.shader(output.inputs["Surface"], ()).passed
+        with shadow_ray(0.0):
+            terms = replace(self.shader(output.inputs["Surface"], ()), passed=passed)
+        # A pane by the usual trick, whatever it is for other rays.
+        clear = not terms.reflected.any() and not terms.radiance.any() and passed.any()
+        self.is_glass |= self.lets_through and bool(clear)
+        return terms
+
+    def meets_glass(self, roughness: bpy.types.NodeSocket, place: Stack) -> None:
+        self.is_glass = True
+        frosted = self._known(roughness, place)
+        if frosted is None or Value(frosted).scalar >= ROUGH:
+            self.warn("its glass is rough, but light goes straight through it")
+
+    def _transparent(self, node: bpy.types.Node, place: Stack) -> Terms:
+        terms = super()._transparent(node, place)
+        if self.lets_through:
+            # A pane of color, such as shaders for shadow rays mix with glass.
+            color = self._known(node.inputs["Color"], place)
+            self.is_glass |= color is None or bool(np.ptp(color) > LEAST_COLOR)
+        return terms
+
+    def _known(self, socket: bpy.types.NodeSocket, place: Stack) -> np.ndarray | None:
+        """Return a socket's constant (3,); None where it varies."""
+        try:
+            value = evaluate(socket, place)
+        except NotConstantError:
+            return None
+        return None if value.notes else value.rgb
 
     def shader(self, socket: bpy.types.NodeSocket, place: Stack) -> Terms:
         feed = feed_of(socket, place)

@@ -94,6 +94,17 @@ class NodeAlgebra:
         self._feed(node.inputs["Scale"], factor)
         return node.outputs["Vector"]
 
+    def square_root(self, a: Color) -> Color:
+        """Return √a, channel by channel."""
+        if not is_socket(a):
+            return np.sqrt(np.maximum(a, 0.0))
+        if self._tree is None:
+            raise ValueError("sockets need a node tree to be combined in")
+        node = self._tree.nodes.new("ShaderNodeGamma")
+        self._feed(node.inputs["Color"], a)
+        node.inputs["Gamma"].default_value = 0.5
+        return node.outputs["Color"]
+
     def blend(self, share: Scalar, a: Color, b: Color) -> Color:
         """Return a · (1 − share) + b · share; the share is a saturated one."""
         return self.add(self.scale(a, self.complement(share)), self.scale(b, share))

@@ -8,6 +8,8 @@ refused (`NotConstantError`), and the caller falls back on the socket's own defa
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import bpy
@@ -21,6 +23,20 @@ Stack = tuple[bpy.types.Node, ...]
 
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 _MAX_STEPS = 1000  # a tree with an invalid cycle must not hang us
+
+
+_shadow_ray: list[float] = []
+"""What Is Shadow Ray is while it is known."""
+
+
+@contextmanager
+def shadow_ray(value: float) -> Iterator[None]:
+    """Have Is Shadow Ray be a constant, 0 or 1, as long as this lasts."""
+    _shadow_ray.append(value)
+    try:
+        yield
+    finally:
+        _shadow_ray.pop()
 
 
 class NotConstantError(Exception):
@@ -174,6 +190,8 @@ def _checker(node: bpy.types.Node, output: bpy.types.NodeSocket, stack: Stack) -
 
 
 def _light_path(_: bpy.types.Node, output: bpy.types.NodeSocket, _stack: Stack) -> Value:
+    if output.name == "Is Shadow Ray" and _shadow_ray:
+        return Value(np.full(3, _shadow_ray[-1]))
     if not output.name.startswith("Is ") or output.name == "Is Shadow Ray":
         raise NotConstantError(f"Light Path '{output.name}'")
     return Value(np.full(3, LIGHT_PATHS.get(output.name, 0.0)))
@@ -224,6 +242,8 @@ _MATH = {
     "SUBTRACT": lambda a, b: a - b,
     "MULTIPLY": lambda a, b: a * b,
     "DIVIDE": lambda a, b: a / b if b else 0.0,
+    "MAXIMUM": lambda a, b: max(a, b),
+    "MINIMUM": lambda a, b: min(a, b),
 }
 _COMPUTE = {
     "RGB": _constant,

@@ -40,6 +40,12 @@ DIFFUSE = (
 )
 """Shaders that are diffuse, or are taken as diffuse ones of their color."""
 
+GLASS = ("BSDF_GLASS", "BSDF_REFRACTION")
+"""Shaders that light passes by their color."""
+
+ROUGH = 0.05
+"""Glass of this roughness, or more, is frosted."""
+
 _IGNORED_WEIGHTS = (  # Principled sockets that should be 0, and what we do instead
     ("Transmission Weight", "transmission is ignored: the surface is baked opaque"),
     ("Subsurface Weight", "subsurface scattering is ignored: the base color is used"),
@@ -103,6 +109,10 @@ class ShaderWalk(ABC, Generic[Place, Seen]):
     def _transparent(self, node: bpy.types.Node, place: Place, /) -> Seen:
         """Return what a Transparent BSDF comes to."""
 
+    def _glass(self, node: bpy.types.Node, _: Place, /) -> Seen:
+        """Return what a Glass or Refraction BSDF comes to."""
+        return self.not_understood(node)
+
     @abstractmethod
     def _mixed(self, node: bpy.types.Node, place: Place, /) -> Seen:
         """Return what a Mix Shader comes to."""
@@ -136,6 +146,8 @@ class ShaderWalk(ABC, Generic[Place, Seen]):
                 return self._mixed(node, place)
             case "ADD_SHADER":
                 return self._added(node, place)
+        if node.type in GLASS:
+            return self._glass(node, place)
         color = node.inputs.get("Color") or node.inputs.get("Base Color")
         if node.type in DIFFUSE and color is not None:
             return self._diffuse(node, color, place)
@@ -143,7 +155,13 @@ class ShaderWalk(ABC, Generic[Place, Seen]):
 
 
 class ShaderTerms(ShaderWalk[Place, Terms]):
-    """Comes from shader nodes to their terms; what their sockets hold is for others to say."""
+    """Comes from shader nodes to their terms; what their sockets hold is for others to say.
+
+    lets_through: Light goes straight through glass, without what Fresnel's equations would reflect; else glass
+        is opaque.
+    """
+
+    lets_through = False
 
     @abstractmethod
     def color(self, socket: bpy.types.NodeSocket, place: Place) -> Color:
@@ -183,19 +201,45 @@ class ShaderTerms(ShaderWalk[Place, Terms]):
     def _transparent(self, node: bpy.types.Node, place: Place) -> Terms:
         return Terms(np.zeros(3), np.zeros(3), self.color(node.inputs["Color"], place))
 
+    def _glass(self, node: bpy.types.Node, place: Place) -> Terms:
+        if not self.lets_through:
+            return self.not_understood(node)
+        self.meets_glass(node.inputs["Roughness"], place)
+        return Terms(np.zeros(3), np.zeros(3), self.color(node.inputs["Color"], place))
+
+    def meets_glass(self, roughness: bpy.types.NodeSocket, place: Place, /) -> None:
+        """Note that there is glass, of a roughness."""
+
     def _principled(self, node: bpy.types.Node, place: Place) -> Terms:
         self._normal_map(node)
         for name, message in _IGNORED_WEIGHTS:
             socket = node.inputs.get(name)
-            if socket is not None and (socket.is_linked or socket.default_value > 0):
+            ignored = not (self.lets_through and name == "Transmission Weight")
+            if ignored and socket is not None and (socket.is_linked or socket.default_value > 0):
                 self.warn(message)
         algebra = self.algebra(place)
         alpha = algebra.saturate(self.scalar(node.inputs["Alpha"], place))
         return Terms(
             algebra.scale(self._principled_albedo(node, place), alpha),
             algebra.scale(self._principled_radiance(node, place), alpha),
-            algebra.scale(np.ones(3), algebra.complement(alpha)),
+            self._principled_passed(node, place, alpha),
         )
+
+    def _principled_passed(self, node: bpy.types.Node, place: Place, alpha: Scalar) -> Color:
+        """Return (1 − α) + α transmission (1 − metallic) √base.
+
+        The root is Cycles': a solid, which is crossed twice, has the base color.
+        """
+        algebra, inputs = self.algebra(place), node.inputs
+        past = algebra.scale(np.ones(3), algebra.complement(alpha))
+        transmission = algebra.saturate(self.scalar(inputs["Transmission Weight"], place))
+        metallic = algebra.saturate(self.scalar(inputs["Metallic"], place))
+        if not self.lets_through or transmission == 0.0 or metallic == 1.0:
+            return past
+        self.meets_glass(inputs["Roughness"], place)
+        share = algebra.calculate("MULTIPLY", transmission, algebra.complement(metallic))
+        color = algebra.square_root(self.color(inputs["Base Color"], place))
+        return algebra.add(past, algebra.scale(algebra.scale(color, share), alpha))
 
     def _principled_radiance(self, node: bpy.types.Node, place: Place) -> Color:
         strength, color = node.inputs["Emission Strength"], node.inputs["Emission Color"]
@@ -206,7 +250,10 @@ class ShaderTerms(ShaderWalk[Place, Terms]):
         return self.algebra(place).scale(self.color(color, place), self.scalar(strength, place))
 
     def _principled_albedo(self, node: bpy.types.Node, place: Place) -> Color:
-        """Return metallic · metal + (1 − metallic) · (shine + (1 − shine) (1 − transmission) base)."""
+        """Return metallic · metal + (1 − metallic) · (shine + (1 − shine) (1 − transmission) base).
+
+        Where light goes through glass, what is transmitted has no shine either.
+        """
         algebra, inputs = self.algebra(place), node.inputs
         base = self.color(inputs["Base Color"], place)
         metallic = algebra.saturate(self.scalar(inputs["Metallic"], place))
@@ -217,9 +264,11 @@ class ShaderTerms(ShaderWalk[Place, Terms]):
             self.color(inputs["Specular Tint"], place),
             glossy_albedo.dielectric(algebra, ior, level, roughness),
         )
-        under = algebra.scale(base, algebra.complement(transmission))
+        under = base if self.lets_through else algebra.scale(base, algebra.complement(transmission))
         kept = algebra.add(np.ones(3), algebra.scale(shine, -1.0))
         matte = algebra.add(shine, algebra.multiply(kept, under))
+        if self.lets_through:
+            matte = algebra.scale(matte, algebra.complement(transmission))
         if metallic == 0.0:
             return matte
         multiple = node.distribution == "MULTI_GGX"

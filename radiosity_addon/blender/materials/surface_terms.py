@@ -8,6 +8,10 @@ LEAST_EMITTING = 1 / 64
 """Opacity of what glows but hides nothing: only what is there can emit."""
 
 
+LEAST_COLOR = 1e-4
+"""What passes has a color if its channels differ by more than this."""
+
+
 def surface_of_terms(
     reflected: np.ndarray, radiance: np.ndarray, passed: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -22,3 +26,12 @@ def surface_of_terms(
     opacity = np.where(glows, LEAST_EMITTING, opacity)
     there = np.where(opacity > 0, opacity, 1.0)[..., None]
     return reflected / there, radiance / there, opacity
+
+
+def passing_color(passed: np.ndarray, opacity: np.ndarray) -> np.ndarray:
+    """Return (..., 3) what passes by channel, with 1 − opacity as its mean; gray stays exactly that."""
+    gray = np.repeat((1.0 - opacity)[..., None], 3, axis=-1)
+    color = np.clip(np.nan_to_num(passed), 0.0, 1.0)
+    mean = color.mean(axis=-1, keepdims=True)
+    colored = np.ptp(color, axis=-1, keepdims=True) > LEAST_COLOR
+    return np.where(colored, np.minimum(color * gray / np.where(mean > 0, mean, 1.0), 1.0), gray)

@@ -32,6 +32,7 @@ from ..materials.shading_inputs import (
     unreliable_nodes,
 )
 from ..scene_records.export_sources import MaterialSource
+from ..scene_records.glass import lets_light_through
 from ..scene_records.light_linking import linking_warnings
 from ..scene_records.light_membership import Membership, PlaceGroups, name_on
 from ..scene_records.object_roles import BAKE, BAKEABLE_TYPES, IGNORE, role_of
@@ -287,7 +288,8 @@ class _Collector:
     def _surface(self, material: bpy.types.Material | None) -> int:
         key = None if material is None else material.original.name_full
         if key not in self._surface_of:
-            surface = read_material(material)
+            lets_through = lets_light_through(material, self._settings)
+            surface = read_material(material, lets_through)
             asked: frozenset[str] = frozenset()
             warnings = list(surface.warnings)
             if material is not None and uses_nodes(material):
@@ -298,9 +300,10 @@ class _Collector:
                 unreliable = _warnings_of(material, unreliable_nodes(material.node_tree))
                 warnings += unreliable if can_evaluate() else surface.fallbacks
             self._surface_of[key] = len(self._surfaces)
-            of = (
-                None if material is None else MaterialSource.of(material.original, name_on(material.original))
-            )
+            of = None
+            if material is not None:
+                original = material.original
+                of = MaterialSource.of(original, name_on(original), lets_through)
             self._surfaces.append((surface, of, warnings, asked))
         return self._surface_of[key]
 

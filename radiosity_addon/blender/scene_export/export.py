@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import bpy
@@ -20,7 +20,7 @@ from ..cycles.surface_evaluation import evaluate_surfaces
 from ..cycles.world import read_world
 from ..datablocks.mesh_arrays import all_finite, degenerate, not_finite_message, world_from_object
 from ..datablocks.uv_layers import MAX_UV_LAYERS
-from ..scene_records.export_sources import Export
+from ..scene_records.export_sources import Export, ExportSource
 from ..scene_records.light_membership import blender_groups, group_on
 from ..scene_records.object_roles import BAKE, BAKEABLE_TYPES, half_visible
 from ..scene_records.pieces import Collected, Piece
@@ -188,6 +188,8 @@ def _export(
     surface = triangles.surface
     reflectance = np.array([surface.reflectance for surface in collected.surfaces]).reshape(-1, 3)
     emission = np.array([surface.emission for surface in collected.surfaces]).reshape(-1, 3)
+    # What takes nothing of the light need not be traced.
+    unseen = np.zeros(len(surface), dtype=bool) if images is None else images.invisible
     scene = Scene(
         triangles=triangles.corners,
         reflectance=reflectance[surface],
@@ -196,9 +198,14 @@ def _export(
         lights=collected.lights,
         normals=triangles.normals,
         images=images,
-        in_bounces=triangles.in_bounces,
-        in_shadows=triangles.in_shadows,
+        in_bounces=triangles.in_bounces & ~unseen,
+        in_shadows=triangles.in_shadows & ~unseen,
     )
+    objects, sources = _without_glass(triangles.objects, collected.pieces, images)
+    if not any(item.bake and item.count for item in objects):
+        raise SceneError(
+            f"object '{triangles.objects[0].name}' and all others to bake are glass, which gets no lightmap"
+        )
     for piece, obj in zip(collected.pieces, triangles.objects, strict=True):
         if piece.linking and scene.emission[obj.rows].any():
             warnings += piece.linking
@@ -222,15 +229,35 @@ def _export(
     return Export(
         BakeScene(
             scene,
-            tuple(triangles.objects),
+            tuple(objects),
             tuple(dict.fromkeys(warnings)),
             emitter,
             emitting,
             of_lights,
             emitter_groups,
         ),
-        tuple(piece.source for piece in collected.pieces),
+        tuple(sources),
     )
+
+
+def _without_glass(
+    objects: Sequence[BakeObject], pieces: Sequence[Piece], images: SurfaceImages | None
+) -> tuple[list[BakeObject], list[ExportSource]]:
+    """Return objects and sources that say what of them is glass; what is nothing else gets no lightmap."""
+    sources = [piece.source for piece in pieces]
+    if images is None or not images.clear.any():
+        return list(objects), sources
+    found, noted = [], []
+    for item, piece, source in zip(objects, pieces, sources, strict=True):
+        glass = images.clear[item.rows]
+        if glass.any():
+            slots = np.maximum(piece.mesh.material, 0)
+            only = frozenset(np.unique(slots[glass]).tolist()) - frozenset(np.unique(slots[~glass]).tolist())
+            source = replace(source, glass_slots=only)
+            item = replace(item, glass=glass, bake=item.bake and not glass.all())
+        found.append(item)
+        noted.append(source)
+    return found, noted
 
 
 def _emitters(

@@ -29,6 +29,7 @@ class ExportSource:
     needs_evaluated_mesh: The exported polygons and loops are those of the evaluated mesh, because modifiers
         change them. False: they are those of the object's own mesh. Always True for an instance.
     makes_instances: The object also makes instances that became stand-ins.
+    glass_slots: Material slots of glass, which gets no lightmap and keeps its material.
     """
 
     name: str
@@ -40,6 +41,7 @@ class ExportSource:
     matrix_world: Matrix4
     needs_evaluated_mesh: bool
     makes_instances: bool = False
+    glass_slots: frozenset[int] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -48,16 +50,19 @@ class MaterialSource:
 
     library: File it is linked from; None for a local one.
     group: The light group that is named on it, or "".
+    lets_through: See `read_material`.
     """
 
     name: str
     library: str | None
     group: str
+    lets_through: bool = False
 
     @staticmethod
-    def of(material: bpy.types.Material, group: str) -> MaterialSource:
+    def of(material: bpy.types.Material, group: str, lets_through: bool = False) -> MaterialSource:
         """Return the source that finds a material."""
-        return MaterialSource(material.name, material.library.filepath if material.library else None, group)
+        library = material.library.filepath if material.library else None
+        return MaterialSource(material.name, library, group, lets_through)
 
     def find(self) -> bpy.types.Material:
         """Return the material.

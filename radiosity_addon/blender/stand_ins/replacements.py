@@ -89,7 +89,9 @@ def dress(
         image = images[baked.page]
         groups = [shares.emission_group(source, each) if shares else "" for each in drawn]
         replacement.copies = [
-            materials.copy_of(material, image, pinned, group, slot in replacement.empty_slots)
+            material
+            if slot in source.glass_slots
+            else materials.copy_of(material, image, pinned, group, slot in replacement.empty_slots)
             for slot, (material, group) in enumerate(zip(drawn, groups, strict=True))
         ]
     if replacement.in_place:

@@ -5,7 +5,7 @@ Our own packer; see `docs/decisions/0005-our-own-packer.md`.
 
 from __future__ import annotations
 
-from .atlas import Atlas, AtlasInput, AtlasOptions, build_atlas
+from .atlas import Atlas, AtlasInput, AtlasObject, AtlasOptions, build_atlas
 from .dominant_object import greedy_object, share_of
 from .packing import Limits, padding_for, page_size
 from .page_assignment import ChartTotals, assign_pages
@@ -13,6 +13,7 @@ from .page_assignment import ChartTotals, assign_pages
 __all__ = [
     "Atlas",
     "AtlasInput",
+    "AtlasObject",
     "AtlasOptions",
     "ChartTotals",
     "Limits",

@@ -6,6 +6,8 @@ over theirs. Both sums are 1 where nothing escapes, if the links are right (`con
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ...numerics import Array
@@ -158,7 +160,7 @@ def _opacity_of_channels(hierarchy: Hierarchy, tint: Array | None) -> list[tuple
     return list(zip(opacity.T, tint.T, strict=True))
 
 
-def _mean_of(channels: list[tuple[Array, ...]]) -> tuple[Array, ...]:
+def _mean_of(channels: Sequence[tuple[Array, ...]]) -> tuple[Array, ...]:
     """Return the means of several arrays over one or three channels."""
     if len(channels) == 1:
         return channels[0]

@@ -95,7 +95,7 @@ class DirectLight:
     def gain(
         self, asked: LightQuery, points: Footprints, rays: int | None = None, progress: Progress = SILENT
     ) -> Array:
-        """Return what one light adds per unit of its strength, as if it were the only one; see `_arriving`."""
+        """Return what one light adds per unit of its strength, as if it were alone; see `_arriving`."""
         return self._arriving(asked, self._spread(replace(points, expected=None)), rays, progress)
 
     def _spread(self, points: Footprints) -> SpreadPoints:

@@ -209,7 +209,7 @@ class Gathering:
     def _cosine(
         self, rows: Array, bright: BrightElements | None, shares: Array | None
     ) -> tuple[Array, Array, Array | None]:
-        """Trace the cosine-distributed rays of some rows; return sources, closeness and tints (`Gathered`)."""
+        """Trace the cosine-distributed rays of some rows; return sources, closeness, tints (`Gathered`)."""
         rays = self._rays
         directions, upward = self.directions(rows)
         start = self._starts(rows, rays, self._seed + Stream.GATHER_STARTS)

@@ -217,7 +217,10 @@ class _ClusterPairs:
         return values
 
     def _trace(self, caster: RayCaster, transfer: Array) -> tuple[Array, Array]:
-        """Trace the first samples of every pair, and all where those disagree: (n, s) bool and float, or (n, s, 3)."""
+        """Trace the first samples of every pair, and all where those disagree.
+
+        Returns (n, s) bool, and (n, s) float or (n, s, 3) by channel.
+        """
         traced = np.zeros(transfer.shape, dtype=bool)
         free = np.zeros((*transfer.shape, 3) if caster.tinted else transfer.shape)
         rows = np.arange(len(transfer))

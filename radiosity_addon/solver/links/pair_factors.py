@@ -53,7 +53,9 @@ ALL_SAMPLES, FIRST_SAMPLES = 16, 4
 def pair_visibility(
     hierarchy: Hierarchy, caster: RayCaster, receiver: Array, source: Array, seed: int
 ) -> Array:
-    """Return (n,) the visibility V of pairs, as `open_share` of all their samples gives it: of colors the mean.
+    """Return (n,) the visibility V of pairs, as `open_share` of all their samples gives it.
+
+    Of colors the mean.
 
     Most pairs are settled by their first four samples. The others make all sixteen, those
     too of whose first four none faces both ways: taken for open they would leak through walls.
@@ -73,8 +75,8 @@ def trace_pairs(caster: RayCaster, samples: PairSamples, empty_too: bool = False
     empty_too: All sixteen also where the four carry nothing. Not for links: their error estimate is about
         such pairs, and has them refined.
     Returns traced (n, 16) bool: Which samples were asked.
-    Returns free (n, 16): What share of these passes: 0 or 1 where there are no cut-outs. (n, 16, 3) by channel
-        if the caster is tinted.
+    Returns free (n, 16): What share of these passes: 0 or 1 where there are no cut-outs. (n, 16, 3) by
+        channel if the caster is tinted.
     """
     traced = np.zeros(samples.transfer.shape, dtype=bool)
     free = np.zeros((*traced.shape, 3) if caster.tinted else traced.shape)

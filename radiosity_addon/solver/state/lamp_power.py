@@ -37,7 +37,7 @@ def is_stopped(light: Light) -> TypeGuard[Emitter]:
 
 
 def fate(hierarchy: Hierarchy, caster: RayCaster, origins: Array, directions: Array) -> tuple[Array, Array]:
-    """Return (n,) what share of rays ends on a black back, and leaves the scene; (n, 3) of a tinted caster."""
+    """Return what share of rays ends on a black back, and leaves the scene: (n,), or (n, 3) through glass."""
     hits = caster.intersect(origins, directions)
     escaped = hits.triangle < 0
     face = hierarchy.faces.of_triangle[(~hits.front).astype(int), hits.triangle]
