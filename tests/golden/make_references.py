@@ -19,6 +19,7 @@ import numpy as np
 from bench import cycles
 from tests.golden import references
 from tests.golden.rows import ROWS, Row
+from tests.golden.usual_trick import let_light_through
 
 SEEDS = (1, 2)
 
@@ -51,6 +52,7 @@ def make(row: Row, threads: int) -> tuple[float, int]:
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     row.build()
     scene = bpy.context.scene
+    let_light_through(scene)
     cycles.set_up(scene, threads)
     started = time.perf_counter()
     bakes = [cycles.bake_light(scene, row.resolution, row.samples, seed) for seed in SEEDS]

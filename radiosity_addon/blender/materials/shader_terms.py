@@ -157,7 +157,7 @@ class ShaderWalk(ABC, Generic[Place, Seen]):
 class ShaderTerms(ShaderWalk[Place, Terms]):
     """Comes from shader nodes to their terms; what their sockets hold is for others to say.
 
-    lets_through: Light goes straight through glass, without what Fresnel's equations would reflect; else glass
+    lets_through: Light goes straight through glass, and Fresnel's equations take nothing of it; else glass
         is opaque.
     """
 

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from types import FunctionType
 
-FAMILIES = ("lights", "world", "materials", "geometry")
+FAMILIES = ("lights", "world", "materials", "glass", "geometry")
 """The modules of this folder that hold rows, in the gallery's order."""
 
 
