@@ -126,7 +126,7 @@ def refuse_before_unwrapping(bake_scene: BakeScene, settings: BakeSettings) -> N
     if sizes is None:
         areas = bake_scene.scene.areas
         lit = [
-            LightmappedObject(item.name, item.count, float(areas[item.rows].sum()), item.texel_scale)
+            LightmappedObject(item.name, item.count, float(areas[item.rows] @ item.lit), item.texel_scale)
             for item in bake_scene.objects
             if item.bake and item.count
         ]

@@ -134,6 +134,8 @@ def _bake(
         lit = _texel_values(bake_scene, solution, geometry, quality.gather, settings, keep, so_far, part)
         del so_far, look, part
     report = solver_part(solution.final_report(), used_settings(quality.solver), bake_scene.objects)
+    glass = [item.name for item in bake_scene.objects if item.glass is not None]
+    report |= {"glass": glass} if glass else {}
     from_behind = turned_away(
         baked, bake_scene.scene.areas, fronts=solution.triangle_irradiance, backs=solution.back_irradiance
     )

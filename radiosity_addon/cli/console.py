@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from typing import Any, TextIO
 
@@ -140,6 +140,8 @@ def summary(where: str, files: Iterable[tuple[str, str]], report: dict[str, Any]
         lines.append(
             f"share of light that meets a surface: {solver['closure_area_mean']:.4f} (closed scenes: 1)"
         )
+    if solver.get("glass"):
+        lines.append(_of_glass(solver["glass"], solver["power_W"]))
     seconds = report["seconds"]
     lines += [f"  {stage:<24} {taken:7.2f} s" for stage, taken in seconds.items()]
     lines.append(f"  {'total':<24} {sum(seconds.values()):7.2f} s")
@@ -148,3 +150,12 @@ def summary(where: str, files: Iterable[tuple[str, str]], report: dict[str, Any]
         lines.append(f"{len(warnings)} warning{'s' if len(warnings) > 1 else ''}:")
         lines += [f"  {warning['name']}: {warning['message']}" for warning in one_of_each(warnings)]
     return lines
+
+
+def _of_glass(objects: Sequence[str], power: dict[str, float]) -> str:
+    """Say which objects are glass, and what they take of the light."""
+    named = ", ".join(f"'{name}'" for name in objects[:3]) + (", …" if len(objects) > 3 else "")
+    taken = power.get("absorbed_by_glass", 0.0) / max(power["emitted"], 1e-300)
+    count = f"{len(objects)} object{'' if len(objects) == 1 else 's'}"
+    takes = "takes" if len(objects) == 1 else "take"
+    return f"glass: light goes straight through {count} ({named}), which {takes} {taken:.1%} of all light"

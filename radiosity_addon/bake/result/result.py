@@ -77,8 +77,8 @@ class BakeResult:
     """All that a bake yields.
 
     solver: What the report says of the solver: "method", its "settings", "elements", "links", "rays",
-        "iterations", "residual", "power_W", "closure_area_mean", "history", and what the method itself has to
-        tell.
+        "iterations", "residual", "power_W", "closure_area_mean", "history", what the method itself has to
+        tell, and in "glass" the names of objects that light goes through, if there are any.
     warnings: The scene's and the bake's own.
     seconds: Wall-clock time of each stage.
     atlas: Parallel to `pages`: "resolution", "texels_per_metre" of objects at texel scale 1, "utilisation"

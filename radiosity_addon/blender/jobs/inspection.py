@@ -32,6 +32,7 @@ from ..scene_export.export import check_names, chosen_pieces
 from ..scene_records.object_roles import BAKEABLE_TYPES
 from ..scene_records.pieces import Collected, Piece
 from ..scene_records.render_state import render_depsgraph
+from .lit_objects import glass_materials, lit_objects
 
 if TYPE_CHECKING:
     from ..cycles.lamps import LampFactors
@@ -149,7 +150,7 @@ def inspect(
         chosen = []
         findings.append(Finding(ERROR, context.scene.name, str(error)))
     shapes = {id(piece): _shape(piece) for piece in collected.pieces if len(piece.mesh)}
-    lit = [_lit(piece, shapes) for piece in chosen]
+    lit = lit_objects(chosen, {of: shape.area for of, shape in shapes.items()}, collected)
     triangles = sum(len(piece.mesh) for piece in collected.pieces)
     plan = estimate_bake(lit, triangles, settings)
     refused = None if output is None else refusal(output, settings, collected, chosen, files)
@@ -158,6 +159,7 @@ def inspect(
     findings += [
         *_of_the_file(folder),
         *_of_light(context, collected, settings),
+        *_of_glass(collected),
         *_of_visibility(context),
         *_of_layers(chosen, settings),
         *_of_texels(lit, plan),
@@ -168,7 +170,7 @@ def inspect(
     ]
     findings.sort(key=lambda finding: (ERROR, WARNING, INFO).index(finding.level))
     return Inspection(
-        objects=len(chosen),
+        objects=len(lit),
         triangles=sum(item.triangles for item in lit),
         scene_triangles=triangles,
         estimate=plan,
@@ -176,10 +178,13 @@ def inspect(
     )
 
 
-def _lit(piece: Piece, shapes: dict[int, _Shape]) -> LightmappedObject:
-    shape = shapes.get(id(piece))
-    area = 0.0 if shape is None else shape.area
-    return LightmappedObject(piece.source.name, len(piece.mesh), area, piece.role.texel_scale)
+def _of_glass(collected: Collected) -> Iterator[Finding]:
+    """Name the materials that are glass."""
+    names = glass_materials(collected)
+    if names:
+        listed = ", ".join(f"'{name}'" for name in names)
+        message = f"light goes straight through glass, which gets no lightmap: {listed}"
+        yield Finding(INFO, names[0], message)
 
 
 def _shape(piece: Piece) -> _Shape:

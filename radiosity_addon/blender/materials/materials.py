@@ -78,6 +78,11 @@ class Surface:
         """Whether its reflectance and emission say it all."""
         return not self.varies and self.opacity == 1.0
 
+    @property
+    def is_clear(self) -> bool:
+        """Whether it is glass and nothing else, as far as constants tell."""
+        return self.glass and not self.reflectance.any() and not self.emission.any()
+
 
 def read_material(material: bpy.types.Material | None, lets_through: bool = False) -> Surface:
     """Return what a material reflects, emits and covers; None is Cycles' default gray.

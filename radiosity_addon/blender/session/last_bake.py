@@ -101,6 +101,9 @@ def _parse(text: str) -> LastBake | None:
         if solver.get("closure_area_mean") is not None:
             # The share of light that meets a surface: 1 in a closed scene, less where it may leave.
             figures.append(("Light Kept", f"{solver['closure_area_mean']:.2%}"))
+        if solver.get("glass"):
+            # Objects that light goes straight through.
+            figures.append(("Glass", f"{len(solver['glass']):,}"))
         return LastBake(
             figures=tuple(figures),
             warnings=tuple((str(name), str(message)) for name, message in record["warnings"]),

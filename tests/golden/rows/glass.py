@@ -12,7 +12,17 @@ import bpy
 
 from . import row
 from .materials import NOWHERE, _image, _tile
-from .stage import add_lamp, add_mesh, add_node, add_quad, diffuse, emptied_nodes, shader_material, stage
+from .stage import (
+    add_lamp,
+    add_mesh,
+    add_node,
+    add_object,
+    add_quad,
+    diffuse,
+    emptied_nodes,
+    shader_material,
+    stage,
+)
 
 PANE = ((-1.6, -0.9, 0.0), (1.9, -0.9, 0.0), (1.9, -0.9, 1.5), (-1.6, -0.9, 1.5))
 """A pane between the lamp at the front and most of the stage."""
@@ -77,6 +87,9 @@ def glass_window() -> None:
     glass = shader_material("Window", "ShaderNodeBsdfGlass", Color=(0.85, 0.9, 0.88, 1))
     _box("Pane", (2.01, -1.4, 0.5), (2.03, 1.2, 1.9), glass)
     add_lamp("SUN", location=(6, -1.5, 5.2), target=(0, 0.2, 0.3), energy=3, angle=math.radians(2))
+    # For Cycles alone, or its noise would be larger than what is compared.
+    portal = add_lamp("AREA", location=(2.06, -0.1, 1.2), target=(0, -0.1, 1.2), shape="RECTANGLE")
+    portal.data.size, portal.data.size_y, portal.data.cycles.is_portal = 2.7, 1.5, True
     world = bpy.data.worlds.new("Sky")
     tree = emptied_nodes(world)
     background = add_node(tree, "ShaderNodeBackground", Color=(0.4, 0.6, 1.0, 1), Strength=1.0)
@@ -123,7 +136,11 @@ def _closed_pane(material: bpy.types.Material) -> None:
 
 
 def _wall(name: str, corners: tuple[tuple[float, float, float], ...], material: bpy.types.Material) -> None:
-    add_quad(name, corners, NOWHERE, material)
+    """Add a quad that gets no lightmap."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(corners, [], ((0, 1, 2, 3),))
+    mesh.materials.append(material)
+    add_object(name, mesh)
 
 
 def _box(

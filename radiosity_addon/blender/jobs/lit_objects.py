@@ -1,0 +1,47 @@
+"""What gets texels of the objects to be baked, before anything is unwrapped: glass gets none."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ...bake import LightmappedObject
+from ...numerics import triangle_areas
+from ..datablocks.mesh_arrays import world_from_object
+from ..scene_records.pieces import Collected, Piece
+
+
+def lit_objects(
+    chosen: Sequence[Piece], areas: Mapping[int, float], collected: Collected
+) -> list[LightmappedObject]:
+    """Return the objects that get a lightmap.
+
+    areas: The pieces' surfaces by their `id` [m²].
+    """
+    clear = _clear(collected)
+    return [
+        _lit(piece, areas.get(id(piece), 0.0), clear)
+        for piece in chosen
+        if not len(piece.mesh) or not clear[piece.surface].all()
+    ]
+
+
+def glass_materials(collected: Collected) -> list[str]:
+    """Return the names of the materials that are glass and nothing else."""
+    clear = _clear(collected)
+    shown = {row for piece in collected.pieces for row in np.unique(piece.surface[clear[piece.surface]])}
+    return sorted({source.name for row in shown if (source := collected.materials[row]) is not None})
+
+
+def _clear(collected: Collected) -> np.ndarray:
+    """Return (s,) bool: the surfaces that are glass and nothing else."""
+    return np.array([surface.is_clear for surface in collected.surfaces], dtype=bool)
+
+
+def _lit(piece: Piece, area: float, clear: np.ndarray) -> LightmappedObject:
+    matte = ~clear[piece.surface]
+    if area > 0.0 and not matte.all():
+        corners, _, _ = world_from_object(piece.mesh, piece.matrix)
+        area = float(triangle_areas(corners[matte]).sum())
+    return LightmappedObject(piece.source.name, int(matte.sum()), area, piece.role.texel_scale)
