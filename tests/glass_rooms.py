@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from radiosity_addon.scene import Scene, SurfaceImages
+from radiosity_addon.scene import BakeScene, Scene, SurfaceImages
+from tests.relit_rooms import BAKED, lit_room
 from tests.rooms import gray, rectangle
+from tests.unit.texel_scenes import bake_scene
 
 COLOR = np.array([0.9, 0.5, 0.2])
 """Of a pane that tints what passes."""
@@ -61,3 +64,47 @@ def glazed(
         in_shadows=seen,
         **given,
     )
+
+
+WINDOW_COLOR, SCREEN_COLOR = np.array([0.8, 0.9, 0.6]), np.array([0.9, 0.4, 0.3])
+"""Of a window that closes `lit_room`, and of a screen in its middle."""
+
+
+def glazed_room(strengths: np.ndarray = BAKED, screen: np.ndarray = SCREEN_COLOR) -> BakeScene:
+    """`relit_rooms.lit_room` with a window in its open side, and a screen that its box pokes through.
+
+    The window is a part of the room, which gets a lightmap all the same; the screen is an object of its own.
+    """
+    room = lit_room(strengths)
+    window = rectangle((3.0, 0.0, 0.0), (0, 2.0, 0), (0, 0, 2.0))
+    parts = [
+        room.triangles[:10],
+        window,
+        room.triangles[10:],
+        rectangle((1.5, 0.0, 0.0), (0, 2, 0), (0, 0, 1.5)),
+    ]
+    triangles = np.concatenate(parts)
+    count = len(triangles)
+    is_window, is_screen = np.zeros((2, count), dtype=bool)
+    is_window[10:12], is_screen[-2:] = True, True
+    matte = ~(is_window | is_screen)
+    reflectance, emission = gray(count, 0.0), gray(count, 0.0)
+    reflectance[matte], emission[matte] = room.reflectance, room.emission
+    # Two texels: the window's and the screen's.
+    values, passes = np.zeros((1, 2, 7)), np.stack([WINDOW_COLOR, screen])[None]
+    values[..., 6] = 1.0 - passes.mean(axis=2)
+    uv = np.full((count, 3, 2), 0.25)
+    uv[is_screen] = (1.0, 0.5)
+    uv[is_window] = (0.0, 0.5)
+    images = SurfaceImages(values, uv, ~matte, passes, ~matte)
+    scene = Scene(triangles, reflectance, emission, two_sided=~matte, lights=room.lights, images=images)
+    plain = bake_scene(scene, ("Room", 12), ("Panel", 2), ("Sign", 2), ("Box", 12), ("Screen", 2))
+    objects = tuple(
+        replace(
+            item, glass=~matte[item.rows] if (~matte[item.rows]).any() else None, bake=item.name != "Screen"
+        )
+        for item in plain.objects
+    )
+    emitter = np.zeros(count, dtype=np.int32)
+    emitter[14:16] = 1
+    return BakeScene(scene, objects, (), emitter, ("Panel", "Sign"))

@@ -126,7 +126,7 @@ class SurfaceImages:
         if self.passes is None:
             return np.zeros(len(self), dtype=bool)
         colors = np.ptp(self.passes, axis=2) > ROUNDING
-        return np.asarray(self.cut_out & (self.clear | self._meets(colors)))
+        return np.asarray(self.cut_out & ~self.invisible & (self.clear | self._meets(colors)))
 
     @cached_property
     def invisible(self) -> Array:

@@ -107,7 +107,7 @@ class Hierarchy:
     @property
     def opacity_by_channel(self) -> Array:
         """(e, 1) float64: the opacity, or (e, 3) where there is glass, whose mean it is then."""
-        if self._images is None or not self._images.tinting.any():
+        if self._images is None or not self._images.tinting[self.faces.triangle].any():
             return self.opacity[:, None]
         if self._by_channel is None or len(self._by_channel) != self.n_elements:
             triangle = self.faces.triangle[self.face]
