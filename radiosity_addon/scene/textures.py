@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 
 from ..base import SceneError
-from ..numerics import MAX_REFLECTANCE, Array, points_at, split_in_four, texels_around
+from ..numerics import MAX_REFLECTANCE, WHOLE_TRIANGLE, Array, points_at, split_in_four, texels_around
 
 CHANNELS = 7
 """Reflectance RGB, emission RGB, opacity."""
@@ -131,9 +131,11 @@ class SurfaceImages:
     @cached_property
     def invisible(self) -> Array:
         """(t,) bool: clear glass that takes nothing of the light, which need not be traced."""
-        if self.passes is None:
-            return np.zeros(len(self), dtype=bool)
-        return np.asarray(self.clear & ~self._meets((self.passes < 1.0 - ROUNDING).any(axis=2)))
+        found, rows = np.zeros(len(self), dtype=bool), np.flatnonzero(self.clear)
+        if len(rows):
+            whole = np.broadcast_to(WHOLE_TRIANGLE, (len(rows), 3, 2))
+            found[rows] = (self.mean_passes(rows, whole) > 1.0 - ROUNDING).all(axis=1)
+        return found
 
     def at(self, triangle: Array, barycentric: Array) -> Array:
         """Look up points of textured triangles, bilinearly.

@@ -58,10 +58,13 @@ def _mix(tree: bpy.types.NodeTree, glass: bpy.types.Node) -> None:
 def _same_color(tree: bpy.types.NodeTree, glass: bpy.types.Node, transparent: bpy.types.Node) -> None:
     principled = glass.type == "BSDF_PRINCIPLED"
     color = glass.inputs["Base Color" if principled else "Color"]
-    root = tree.nodes.new("ShaderNodeGamma")
     # Cycles takes the root of Principled's base color at each crossing.
-    root.inputs["Gamma"].default_value = 0.5 if principled else 1.0
-    root.inputs["Color"].default_value = color.default_value
+    power = 0.5 if principled else 1.0
     if color.is_linked:
+        root = tree.nodes.new("ShaderNodeGamma")
+        root.inputs["Gamma"].default_value = power
         tree.links.new(color.links[0].from_socket, root.inputs["Color"])
-    tree.links.new(root.outputs["Color"], transparent.inputs["Color"])
+        tree.links.new(root.outputs["Color"], transparent.inputs["Color"])
+    else:
+        red, green, blue, alpha = color.default_value
+        transparent.inputs["Color"].default_value = (red**power, green**power, blue**power, alpha)

@@ -228,7 +228,7 @@ def _of_light(context: bpy.types.Context, collected: Collected, settings: BakeSe
     for row, surface in surfaces:
         material = collected.materials[row]
         black = surface.reflectance.max() < BLACK and not surface.emission.any() and not surface.varies
-        if material is not None and black and surface.opacity > 0:
+        if material is not None and black and surface.opacity > 0 and not surface.is_clear:
             message = f"material '{material.name}' is black: surfaces with it look black in any light"
             yield Finding(INFO, material.name, message)
 
