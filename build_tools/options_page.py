@@ -120,7 +120,7 @@ def _label(option: Option) -> str:
 
 def _meaning(option: Option) -> str:
     """Return what an option does, with its range or choices, and what it cannot be given with."""
-    sentences = [option.description]
+    sentences = [f"{option.description}. The flag turns it off" if option.off else option.description]
     if option.range:
         sentences.append(option.range[0].upper() + option.range[1:])
     if option.instead_of:

@@ -40,6 +40,11 @@ CHAPTERS = {
     "lights": ("Lamps", "Shapes, softness, colors, and which objects they light."),
     "world": ("Worlds", "Plain skies, images, and the Sky Texture."),
     "materials": ("Materials", "Reflection, transparency and emission."),
+    "glass": (
+        "Glass",
+        "Light goes straight through it. In Cycles' references all glass is transparent to shadow and "
+        "diffuse rays, of its own color.",
+    ),
     "geometry": ("Geometry", "Everything that is rendered as a mesh, near and far, large and small."),
 }
 """Title and first line of each family's chapter."""

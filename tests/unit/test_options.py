@@ -26,9 +26,9 @@ def test_what_an_option_names_exists(name: str) -> None:
     option = OPTIONS[name]
     assert option.section in SECTIONS
     assert set(option.methods) <= set(METHODS)
-    # The command line makes them exclusive section by section, and knows no way to switch something off.
+    # The command line makes them exclusive section by section; a flag that switches something off says so.
     assert not option.instead_of or OPTIONS[option.instead_of].section == option.section
-    assert option.kind is not bool or not option.default
+    assert option.kind is not bool or bool(option.off) == option.default
     assert option.kind in (int, float, bool, str, tuple)
     assert (option.kind is str) == bool(option.choices)
     if option.kind in (int, float):
