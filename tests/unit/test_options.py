@@ -28,7 +28,7 @@ def test_what_an_option_names_exists(name: str) -> None:
     assert set(option.methods) <= set(METHODS)
     # The command line makes them exclusive section by section; a flag that switches something off says so.
     assert not option.instead_of or OPTIONS[option.instead_of].section == option.section
-    assert option.kind is not bool or bool(option.off) == option.default
+    assert option.kind is not bool or bool(option.off) == bool(option.default)
     assert option.kind in (int, float, bool, str, tuple)
     assert (option.kind is str) == bool(option.choices)
     if option.kind in (int, float):
