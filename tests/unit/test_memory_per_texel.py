@@ -109,7 +109,9 @@ def test_aimed_rays_are_kept_in_files(in_files: Scratch) -> None:
             np.tile([0.15, 0.8, 0.0], (count, 1)), np.tile(UP, (count, 1)), np.arange(count), scratch=scratch
         )
         into = scratch.empty((count, rays), np.int32)
-        gathered = local.gather.at(at, at.normals, rays, local.elements.leaves_of, np.full(count, 1e-9), into)
+        gathered = local.gather.at(
+            at, at.normals, rays, local.elements.leaves_of, np.full(count, 1e-9), (into, None)
+        )
         found[scratch] = gathered.aimed
     filed, kept = (found[scratch] for scratch in found)
     assert len(filed.row) == count
