@@ -119,7 +119,6 @@ ZOO: dict[str, Callable[[], bpy.types.Material]] = {
     "glowing": _principled(Base_Color=RED, Emission_Color=BLUE, Emission_Strength=2.0),
     "thin": _principled(Base_Color=RED, Alpha=0.3, Emission_Color=BLUE, Emission_Strength=2.0),
     "glass": _principled(Base_Color=RED, Transmission_Weight=0.6),
-    "pane": lambda: shader_material("M", "ShaderNodeBsdfGlass", Color=RED, Roughness=0.0),
     "mixed": lambda: _mixed("ShaderNodeMixShader"),
     "added": lambda: _mixed("ShaderNodeAddShader"),
     "cut out": cut_out,

@@ -203,8 +203,9 @@ def _export(
     )
     objects, sources = _without_glass(triangles.objects, collected.pieces, images)
     if not any(item.bake and item.count for item in objects):
+        name = next(item.name for item in triangles.objects if item.bake and item.count)
         raise SceneError(
-            f"object '{triangles.objects[0].name}' and all others to bake are glass, which gets no lightmap"
+            f"object '{name}' is glass, as all that is to be baked, and gets no lightmap: bake other objects"
         )
     for piece, obj in zip(collected.pieces, triangles.objects, strict=True):
         if piece.linking and scene.emission[obj.rows].any():
