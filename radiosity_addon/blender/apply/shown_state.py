@@ -170,16 +170,17 @@ def _take_off(obj: bpy.types.Object) -> None:
     recorded = is_recorded(obj)
     known = stand_in_of(obj.data) if isinstance(obj.data, bpy.types.Mesh) else None
     original = obj.data.get(ORIGINAL) if known is not None else None
+    record = obj.radiosity_bake.modifiers if recorded else ()
+    modifiers = tuple((each.name, each.show_viewport, each.show_render) for each in record)
     if known is not None and original is not None:
         obj.data = original
         if recorded or obj.override_library is not None:
             for slot in known.object_slots:
                 if slot < len(obj.material_slots):
                     link_to_object(obj, slot)
-            _switch_on(obj, known.modifiers)
             obj.active_material_index = known.active_slot
-    elif recorded and obj.radiosity_bake.modifiers:
-        _switch_on(obj, [(m.name, m.show_viewport, m.show_render) for m in obj.radiosity_bake.modifiers])
+            modifiers = modifiers or known.modifiers
+    _switch_on(obj, modifiers)
     show_own_originals(obj)
     if recorded and obj.radiosity_bake.is_hidden:
         # What was made visible meanwhile stays so.

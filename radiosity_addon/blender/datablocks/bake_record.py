@@ -170,6 +170,17 @@ def record_hiding(obj: bpy.types.Object, scene: bpy.types.Scene) -> None:
     record.scene = scene.name
 
 
+def record_modifiers(obj: bpy.types.Object) -> None:
+    """Remember which modifiers show, for as long as they are switched off.
+
+    The stand-in mesh knows them too, for library overrides keep no list; but the object may get another mesh.
+    """
+    for modifier in obj.modifiers if obj.override_library is None else ():
+        entry = obj.radiosity_bake.modifiers.add()
+        entry.name = modifier.name
+        entry.show_viewport, entry.show_render = modifier.show_viewport, modifier.show_render
+
+
 def forget(obj: bpy.types.Object) -> None:
     """Drop the object's record, leaving no trace of it in the file."""
     obj.property_unset("radiosity_bake")
