@@ -22,7 +22,7 @@ MARK = ".owner"
 _MARK_TEXT = "made by Radiosity Lightmaps while it bakes; it cleans up by itself\n"
 _RANDOM_BYTES = 8
 _SUFFIX = rf"[0-9a-f]{{{2 * _RANDOM_BYTES}}}-[a-z0-9_]{{8}}"
-"""What follows the prefix. It takes no word or date, so an empty folder of such a name is ours without a mark."""
+"""What follows the prefix: nobody else names a folder so, which makes an empty one ours without a mark."""
 
 _ATTEMPTS = 3
 
