@@ -1,4 +1,7 @@
-"""The files that a glTF or OBJ scene consists of besides itself: nothing may be written in their places."""
+"""The files that a glTF or OBJ scene consists of besides itself.
+
+Nothing may be written in their places, and they must be files.
+"""
 
 from __future__ import annotations
 
