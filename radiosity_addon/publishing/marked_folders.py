@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import re
+import secrets
 import shutil
 import stat
 import tempfile
@@ -19,8 +20,9 @@ from typing import IO
 MARK = ".owner"
 
 _MARK_TEXT = "made by Radiosity Lightmaps while it bakes; it cleans up by itself\n"
-_SUFFIX = r"[a-z0-9_]{8}"
-"""What `tempfile` adds to a prefix."""
+_RANDOM_BYTES = 8
+_SUFFIX = rf"[0-9a-f]{{{2 * _RANDOM_BYTES}}}-[a-z0-9_]{{8}}"
+"""What follows the prefix: nobody else names a folder so, which makes an empty one ours without a mark."""
 
 _ATTEMPTS = 3
 
@@ -33,7 +35,8 @@ class MarkedFolder:
 
     def __init__(self, parent: Path, prefix: str) -> None:
         for attempt in range(_ATTEMPTS):
-            self.path = Path(tempfile.mkdtemp(prefix=prefix, dir=parent))
+            name = f"{prefix}{secrets.token_hex(_RANDOM_BYTES)}-"
+            self.path = Path(tempfile.mkdtemp(prefix=name, dir=parent))
             made = self.path.lstat()
             self._identity = made.st_dev, made.st_ino
             try:

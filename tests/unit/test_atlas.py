@@ -195,6 +195,13 @@ def test_a_density_beyond_the_largest_page_names_the_mend():
         run_atlas(inputs(box((1, 1, 1))), texel_density=20_000)
 
 
+@pytest.mark.parametrize("others", [0, 3])
+def test_a_density_that_one_huge_object_exceeds_names_it(others: int) -> None:
+    objects = inputs(*[box((1, 1, 1))] * others, box((9000, 9000, 1)))
+    with pytest.raises(BakeError, match=objects[-1].name):
+        run_atlas(objects, texel_density=10)
+
+
 @pytest.mark.parametrize("resolution", [1, 2, 4, 8])
 def test_tiny_pages_work_and_say_that_they_are_crowded(resolution):
     atlas = run_atlas(inputs(*cornell()), resolution)

@@ -26,6 +26,9 @@ from radiosity_addon.publishing.publish import (
 )
 
 ROOT = Path(__file__).resolve().parents[2]
+OURS = "0123456789abcdef-abcd1234"
+"""What follows the prefix in the name of a folder of ours."""
+
 A, B, C = "a.exr", "b.exr", "c.exr"
 
 KILLED = """
@@ -114,7 +117,7 @@ def test_folders_without_our_mark_are_left_alone(tmp_path: Path) -> None:
     mine = tmp_path / f"{PREFIX}notes"
     (mine / EARLIER).mkdir(parents=True)
     (mine / JOURNAL).write_text('{"names": ["thesis"]}')
-    others = [tmp_path / f"{PREFIX}other", tmp_path / f"{PREFIX}12345678"]
+    others = [tmp_path / f"{PREFIX}other", tmp_path / f"{PREFIX}{OURS}"]
     for other in others:
         other.mkdir()
         (other / MARK).write_text("somebody else's mark")
@@ -311,12 +314,20 @@ def test_a_file_that_appears_while_publishing_is_not_replaced(
 
 
 def test_what_kills_leave_half_made_is_removed(tmp_path: Path) -> None:
-    empty, marked = tmp_path / f"{PREFIX}abcd1234", tmp_path / f"{PREFIX}abcd5678"
+    empty, marked = tmp_path / f"{PREFIX}{OURS}", tmp_path / f"{PREFIX}{OURS[:-1]}5"
     empty.mkdir()
     marked.mkdir()
     (marked / MARK).touch()
     clean_up(tmp_path)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["projects", "12345678", "versions-abcd1234"])
+def test_an_empty_folder_that_somebody_else_made_stays(tmp_path: Path, name: str) -> None:
+    """A word of eight letters looks like what `tempfile` adds to a prefix."""
+    (tmp_path / f"{PREFIX}{name}").mkdir()
+    clean_up(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == [f"{PREFIX}{name}"]
 
 
 def test_a_single_file_is_replaced_as_a_whole_or_not(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from ...base import BakeError, UsageError
 from ...files import OWNER, NoReportError, Owner, read_report
 from .output import is_same_file, refuse_special
 from .ownership import is_read
+from .scene_parts import scene_parts
 
 
 def check_places(places: Mapping[str, Path], scene: Path | None) -> None:
@@ -23,7 +24,10 @@ def check_places(places: Mapping[str, Path], scene: Path | None) -> None:
     scene: The scene's file, if there is one.
     Raises RadiosityError: Naming the option.
     """
-    taken: dict[str, Path] = {} if scene is None else {"the scene itself": scene}
+    taken: dict[str, Path] = {}
+    if scene is not None and places:
+        taken = {f"a part of the scene, '{part.name}'": part for part in scene_parts(scene)}
+        taken["the scene itself"] = scene
     for option, path in places.items():
         for what, other in taken.items():
             if is_same_file(_absolute(path), _absolute(other)):

@@ -351,7 +351,11 @@ def _pack_page(
     used = np.flatnonzero(chart >= 0)
     if not len(used):
         return Packing(np.full(uv.shape, 0.5, dtype=np.float32), resolution if density is None else 4, 0.0)
-    packing = pack(uv[used], chart[used], resolution, density, limits, progress)
+    try:
+        packing = pack(uv[used], chart[used], resolution, density, limits, progress)
+    except BakeError as error:
+        alone = f"object '{group[0].source.name}': " if len(group) == 1 else ""
+        raise BakeError(f"{alone}{error}{_greedy(group)[1]}") from None
     pages = np.empty(uv.shape, dtype=np.float32)
     pages[used] = packing.uv
     _park(pages, chart, [len(layout.source.triangles) for layout in group])
@@ -380,15 +384,19 @@ def _surface(group: list[_Layout]) -> float:
     return float(triangle_areas(corners).sum())
 
 
+def _greedy(group: list[_Layout]) -> tuple[str, str]:
+    """Return which object takes nearly all of the surface, and words on it; empty if none does."""
+    surfaces = [_surface([layout]) * layout.source.scale**2 for layout in group]
+    name = greedy_object([layout.source.name for layout in group], surfaces) or ""
+    taken = share_of(max(surfaces), sum(surfaces)) if name else ""
+    return name, name and f"; object '{name}' takes {taken} of the surface: lower its texel scale"
+
+
 def _crowded(group: list[_Layout], resolution: int) -> BakeWarning:
     count = sum(layout.charts.count for layout in group)
-    surfaces = [_surface([layout]) * layout.source.scale**2 for layout in group]
-    greedy = greedy_object([layout.source.name for layout in group], surfaces)
-    fix = "raise the resolution or the number of pages"
-    if greedy is not None:
-        taken = share_of(max(surfaces), sum(surfaces))
-        fix = f"object '{greedy}' takes {taken} of the surface; lower its texel scale"
+    greedy, fix = _greedy(group)
     return BakeWarning(
         group[0].source.name if len(group) == 1 else greedy or "atlas",
-        f"{resolution} px is too small to keep {count} charts apart, so light bleeds between them; {fix}",
+        f"{resolution} px is too small to keep {count} charts apart, so light bleeds between them"
+        + (fix or "; raise the resolution or the number of pages"),
     )
