@@ -41,8 +41,8 @@ usage: python3 build.py VERB [arguments]
   bake [SCENE] [options]     bake a scene, or the bundled Cornell box (bake --help lists the options)
   restore SCENE [options]    take a bake out of a .blend again
   test [WHICH] ...           run all tests but a few slow ones; what follows goes to pytest instead
-                             --quick: the fast ones that need neither bpy nor a window, in three minutes, in
-                             an environment without bpy; --full: the slow ones too;
+                             --quick: the fast ones that need neither bpy nor a window, in a minute, in an
+                             environment without bpy; --full: the slow ones too;
                              --bpy 4.2 or 5.2: with that bpy, in an environment of its own
   fuzz [--seeds A:B]         bake random scenes and check what must hold of each (default 0:500)
   bench [--case NAME] ...    measure against Cycles into bench/results and the README; --small tries

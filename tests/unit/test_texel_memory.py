@@ -65,12 +65,17 @@ def test_what_cannot_be_done_is_refused_with_the_figure() -> None:
 
 
 @pytest.mark.parametrize("size", [12_000, 12_300, 12_600, 12_900, 16_384])
-def test_the_limit_that_is_named_suffices(size: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_limit_that_is_named_is_the_least_that_suffices(
+    size: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """To the tenth of a GiB that it is named with."""
     monkeypatch.setattr(texel_memory, "process_bytes", lambda: 0.3e9)
     with pytest.raises(UsageError) as caught:
         refuse_too_large([size], BakeSettings(resolution=size))
     raised = float(str(caught.value).split("to ")[-1])
     refuse_too_large([size], BakeSettings(resolution=size, memory_limit=raised))
+    with pytest.raises(UsageError):
+        refuse_too_large([size], BakeSettings(resolution=size, memory_limit=raised - 0.1))
 
 
 @pytest.mark.parametrize("size", [{"resolution": 16384}, {"texel_density": 20_000.0}])

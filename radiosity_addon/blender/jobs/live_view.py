@@ -66,7 +66,7 @@ class _LiveView:
         if (self._picture is None and self._texels is None) or bpy.context.scene.name_full != self._scene:
             return
         shading = bpy.context.space_data.shading
-        exposure = self._exposure if _uses_exposure(shading) else 1.0
+        exposure = self._exposure if uses_exposure(shading) else 1.0
         if self._picture is not None and exposure not in self._batches:
             self._batches[exposure] = self._upload(self._picture, exposure)
         # The two sides of a triangle lie in one place, each counter-clockwise as seen from its own.
@@ -109,7 +109,7 @@ class _LiveView:
         return batches
 
 
-def _uses_exposure(shading: bpy.types.View3DShading) -> bool:
+def uses_exposure(shading: bpy.types.View3DShading) -> bool:
     """Tell whether a viewport will show the lightmaps with the scene's exposure.
 
     As Blender does: not in a material preview that is lit by a studio light alone. One that is
