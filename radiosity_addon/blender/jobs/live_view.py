@@ -12,6 +12,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import bpy
+import gpu
 from bpy.app.handlers import persistent
 
 from ..overlays.drawing import PagedSurfaces, over_the_objects
@@ -92,7 +93,6 @@ class _LiveView:
 
     def _upload(self, picture: Picture, exposure: float) -> list[tuple[bool, Any]]:
         """Hand the picture to the graphics card, fronts and backs apart: once, however often it is drawn."""
-        import gpu
         from gpu_extras.batch import batch_for_shader
 
         from .live_picture import corner_arrays

@@ -14,6 +14,19 @@ from pathlib import Path
 import bpy
 
 from ...base import BakeError
+from ...files import (
+    BLEND_NAME,
+    LIGHTMAPS,
+    LISTED,
+    PREVIEW_NAME,
+    is_as_written,
+    read_report,
+    reports_in,
+    text_of,
+    without,
+)
+from ...publishing import clean_up, is_interrupted, write_text
+from ..files.ownership import owner_of
 from ..session import last_bake
 from ..session.redraw import redraw_sidebars
 from ..session.state import session
@@ -44,9 +57,6 @@ class Unused:
 
 def unused_lightmaps(context: bpy.types.Context) -> Unused:
     """Find the lightmaps that bakes of the open file wrote and that it does not show."""
-    from ...files import BLEND_NAME, LIGHTMAPS, LISTED, PREVIEW_NAME, is_as_written, reports_in
-    from ..files.ownership import owner_of
-
     images = [image for image in bpy.data.images if image.filepath_raw]
     shown = {Path(bpy.path.abspath(each.filepath_raw, library=each.library)).resolve() for each in images}
     here = Path(bpy.data.filepath).resolve() if bpy.data.filepath else None
@@ -79,9 +89,6 @@ def delete(unused: Unused) -> int:
     OSError, BakeError
         If one cannot be deleted, or its report cannot be written; those before it are gone.
     """
-    from ...files import read_report, text_of, without
-    from ...publishing import write_text
-
     for report, names in unused.files.items():
         contents = read_report(report)
         for name in names:
@@ -92,8 +99,6 @@ def delete(unused: Unused) -> int:
 
 def interrupted_folders(context: bpy.types.Context) -> list[Path]:
     """Return the folders of this file's bakes in which one was killed while it published; only looks."""
-    from ...publishing import is_interrupted
-
     return [folder for folder in _folders(context) if is_interrupted(folder)]
 
 
@@ -155,8 +160,6 @@ class RADIOSITY_OT_recover(Conditional, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Put them back, and have the open file show them."""
-        from ...publishing import clean_up
-
         done: list[Path] = []
         try:
             done = [folder.resolve() for folder in interrupted_folders(context) if clean_up(folder)]

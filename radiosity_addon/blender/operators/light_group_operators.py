@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..images.light_mixer import WHITE, mixers, sliders_of
 from ..scene_records.light_membership import NAME, Membership, name_on
 from ..session import facts
 from ..settings.light_group_properties import LONGEST_NAME
@@ -99,8 +100,6 @@ class RADIOSITY_OT_light_group_reset(Conditional, bpy.types.Operator):
 
     def execute(self, _context: bpy.types.Context) -> set[str]:
         """Set every slider."""
-        from ..images.light_mixer import WHITE, mixers, sliders_of
-
         for tree in mixers():
             for sliders in sliders_of(tree):
                 sliders.color.default_value, sliders.strength.default_value = WHITE, 1.0

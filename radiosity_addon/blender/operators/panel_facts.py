@@ -9,7 +9,11 @@ from typing import Any, NamedTuple
 
 import bpy
 
+from ..datablocks.bake_record import is_baked
+from ..images.light_mixer import mixers, sliders_of
+from ..overlays.overlay_properties import overlay_of
 from ..relight import kept_bakes
+from ..relight.kept_sidecars import refusal
 from ..scene_records.object_roles import has_role
 from ..session.facts import fact
 from ..settings.light_group_properties import ListedGroup, list_groups
@@ -77,16 +81,12 @@ def has_copy_targets(context: bpy.types.Context) -> bool:
 @fact(unknown=False)
 def can_restore(_context: bpy.types.Context) -> bool:
     """Whether the file shows a bake."""
-    from ..datablocks.bake_record import is_baked
-
     return is_baked()
 
 
 @fact(unknown="")
 def relight_refusal(context: bpy.types.Context) -> str:
     """Why the scene's bake cannot be relit; empty if it can."""
-    from ..relight.kept_sidecars import refusal
-
     return refusal(context.scene)
 
 
@@ -104,8 +104,6 @@ def has_light_mixers(context: bpy.types.Context) -> bool:
 @fact(unknown=())
 def light_mixers(_context: bpy.types.Context) -> tuple[tuple[str, tuple[LightRow, ...]], ...]:
     """The node groups that mix baked light groups, each with its groups."""
-    from ..images.light_mixer import mixers, sliders_of
-
     found = []
     for tree in mixers():
         rows = []
@@ -149,7 +147,6 @@ def overlay_message(context: bpy.types.Context) -> str:
 def light_on_active(context: bpy.types.Context) -> tuple[tuple[str, str], ...]:
     """Minimum, mean, maximum and uniformity of the light on the active object; empty without a lightmap."""
     from ..overlays.lightmap_values import lightmap_of, object_statistics
-    from ..overlays.overlay_properties import overlay_of
 
     obj, settings = context.view_layer.objects.active, overlay_of(context)
     if obj is None or lightmap_of(obj) is None:

@@ -7,6 +7,9 @@ from contextlib import contextmanager
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+import gpu
+from mathutils import Matrix
+
 if TYPE_CHECKING:
     from ...numerics import Array
 
@@ -44,8 +47,6 @@ void main()
 @cache
 def page_shader() -> Any:
     """Return the shader that shows texels as they are, none of them smoothed into its neighbors."""
-    import gpu
-
     between = gpu.types.GPUStageInterfaceInfo("radiosity_page")
     between.smooth("VEC2", "spot")
     info = gpu.types.GPUShaderCreateInfo()
@@ -85,7 +86,6 @@ class PagedSurfaces:
 
     def paint(self, pages: Sequence[Array]) -> None:
         """Give the pages their colors: (height, width, 4) float32 each; what has no alpha is not drawn."""
-        import gpu
         import numpy as np
 
         self._textures = []
@@ -96,8 +96,6 @@ class PagedSurfaces:
 
     def draw(self) -> None:
         """Draw them into the viewport whose turn it is."""
-        import gpu
-
         shader = page_shader()
         shader.bind()
         shader.uniform_float(
@@ -116,9 +114,6 @@ def over_the_objects(culled: bool = True, nearer: float = NEARER) -> Iterator[No
     culled: Whether only what is counter-clockwise is seen.
     nearer: In what has been drawn so before, more brings it in front.
     """
-    import gpu
-    from mathutils import Matrix
-
     depth_test, depth_mask = gpu.state.depth_test_get(), gpu.state.depth_mask_get()
     projection = Matrix.Translation((0.0, 0.0, -nearer)) @ gpu.matrix.get_projection_matrix()
     gpu.state.depth_test_set("LESS_EQUAL")

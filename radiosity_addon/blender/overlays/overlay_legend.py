@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import blf
+import gpu
 import numpy as np
+from gpu_extras.batch import batch_for_shader
 
 from .overlay_pictures import Legend
 
@@ -21,8 +24,6 @@ _STRIPS = 64
 
 def draw_legend(legend: Legend, ui_scale: float) -> None:
     """Draw it into the viewport whose turn it is; in pixels from its lower left corner."""
-    import gpu
-
     blend = gpu.state.blend_get()
     gpu.state.blend_set("ALPHA")
     try:
@@ -69,9 +70,6 @@ def _draw_entries(legend: Legend, size: float) -> None:
 
 def _rectangles(places: list[tuple[float, float, float, float]], colors: list[tuple[float, ...]]) -> None:
     """Fill rectangles, given as (left, bottom, width, height)."""
-    import gpu
-    from gpu_extras.batch import batch_for_shader
-
     shader: Any = gpu.shader.from_builtin("FLAT_COLOR")
     corners, of = [], []
     for (left, bottom, width, height), color in zip(places, colors, strict=True):
@@ -82,8 +80,6 @@ def _rectangles(places: list[tuple[float, float, float, float]], colors: list[tu
 
 
 def _write(text: str, x: float, y: float, size: float) -> None:
-    import blf
-
     blf.size(FONT, size * TEXT)
     blf.color(FONT, *_WHITE)
     blf.position(FONT, x, y, 0)
@@ -91,7 +87,5 @@ def _write(text: str, x: float, y: float, size: float) -> None:
 
 
 def _width(text: str, size: float) -> float:
-    import blf
-
     blf.size(FONT, size * TEXT)
     return float(blf.dimensions(FONT, text)[0])

@@ -28,6 +28,7 @@ from ..files.lightmap_reports import forget_reports, images_described, listed_in
 from ..files.ownership import own_reports
 from ..session.redraw import redraw_sidebars, redraw_viewports
 from ..session.state import session
+from .file_versions import MOST_FILES, HeldFiles
 
 if TYPE_CHECKING:
     from ...bake.result import BakeReport
@@ -100,8 +101,6 @@ def publish(output: OutputFolder, report: BakeReport) -> None:
 
 def _hold(output: OutputFolder) -> None:
     """Hold what is about to be replaced in a folder, with what its report says of it."""
-    from .file_versions import MOST_FILES, HeldFiles  # needed when something is replaced
-
     report = output.earlier
     if report is None:
         return

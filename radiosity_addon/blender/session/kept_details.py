@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import bpy
+import numpy as np
 
 from .state import session
 
@@ -43,8 +44,6 @@ class KeptDetails:
 
     def seen(self) -> Array:
         """Return (t,) bool which of the scene's triangles are on objects with a lightmap that are shown."""
-        import numpy as np
-
         record = self.details.links
         ends = [item.first + item.count for item in self.objects.values()]
         seen = np.zeros(max([int(record.triangle.max(initial=-1)) + 1, *ends]), dtype=bool)
