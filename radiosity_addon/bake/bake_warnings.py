@@ -14,7 +14,7 @@ from ..solver import Solution, SolverSettings
 from ..solver.links import COARSEST_FAINT
 from .quality import used_settings
 
-FEW_TEXELS = 8
+MIN_SIDE = 8
 """An object with fewer than the square of so many texels is warned of."""
 
 
@@ -31,11 +31,10 @@ def small_objects(
         mend = f"object '{greedy}' takes {taken} of all texels; lower its texel scale"
     for item, own in zip(baked, texels, strict=True):
         surface = bake_scene.scene.areas[item.rows].sum()
-        if surface > 0 and own < FEW_TEXELS**2:
+        if surface > 0 and own < MIN_SIDE**2:
             yield BakeWarning(
                 item.name,
-                f"object '{item.name}' gets only {own} texels, fewer than {FEW_TEXELS} × {FEW_TEXELS}: "
-                f"{mend}",
+                f"object '{item.name}' gets only {own} texels, fewer than {MIN_SIDE} × {MIN_SIDE}: {mend}",
             )
 
 

@@ -16,7 +16,7 @@ from ..lightmap.unwrap import ChartTotals, Limits, assign_pages, padding_for, pa
 from ..numerics import thread_count
 from ..options import BakeSettings
 from ..scene import BakeScene
-from .texel_memory import least_bytes, pages_of, refuse_too_large, room
+from .texel_memory import least_bytes, pages_of, refuse_large_pages, room
 
 CHARTS = 6.0
 """Charts of an object whose faces look all ways; a heavy mesh has more: one for so many …"""
@@ -120,7 +120,7 @@ def estimate_bake(objects: Sequence[LightmappedObject], triangles: int, settings
 def refuse_before_unwrapping(bake_scene: BakeScene, settings: BakeSettings) -> None:
     """Refuse pages that will not fit into the memory limit, as far as areas tell how large they get.
 
-    Raises UsageError: See `refuse_too_large`.
+    Raises UsageError: See `refuse_large_pages`.
     """
     sizes = pages_of(settings)
     if sizes is None:
@@ -134,7 +134,7 @@ def refuse_before_unwrapping(bake_scene: BakeScene, settings: BakeSettings) -> N
     if settings.texel_density is not None:
         # It is known roughly; what unwrapping finds decides.
         sizes = tuple(int(UNSURE * size) for size in sizes)
-    refuse_too_large(sizes, settings)
+    refuse_large_pages(sizes, settings)
 
 
 def _pages(objects: Sequence[LightmappedObject], settings: BakeSettings) -> tuple[list[int], list[float]]:

@@ -32,7 +32,15 @@ from ..solver.element_transport import Relightable
 from .bake_warnings import of_solution, small_objects
 from .estimate import refuse_before_unwrapping
 from .quality import for_error, quality_of, used_settings
-from .relight import HierarchyReport, IncrementalState, KeptBake, are_wanted, check_groups, group_pages, shown
+from .relight import (
+    HierarchyReport,
+    IncrementalState,
+    KeptBake,
+    are_wanted,
+    check_groups,
+    group_pages,
+    held_values,
+)
 from .result import (
     BakedObject,
     BakeResult,
@@ -44,7 +52,7 @@ from .result import (
     solver_part,
 )
 from .stages import timed
-from .texel_memory import refuse_too_large, share_out_memory, texel_scratch
+from .texel_memory import refuse_large_pages, share_out_memory, texel_scratch
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +127,7 @@ def _bake(
         atlas = _unwrap(bake_scene, baked, settings, part)
     progress.stage("rasterise", RASTERIZE, SOLVE).at(0.0)
     sizes = [page.resolution for page in atlas.pages]
-    refuse_too_large(sizes, settings)
+    refuse_large_pages(sizes, settings)
     scratch = texel_scratch(sizes, settings)
     with timed(seconds, "rasterise"):
         geometry = _texels(bake_scene, baked, atlas, scratch)
@@ -321,7 +329,7 @@ def _texel_values(
         # Hits were looked up in it: it is large, and stays in memory.
         light = replace(light, table=None)
     reflectance, emission = texel_materials(bake_scene.scene, geometry, FOOTPRINT)
-    values = shown(light, reflectance, emission, settings, geometry.scratch)
+    values = held_values(light, reflectance, emission, settings, geometry.scratch)
     return TexelValues(values, local.caster, light, relightable, (reflectance, emission))
 
 

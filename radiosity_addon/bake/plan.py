@@ -27,7 +27,7 @@ _NAMED = 5
 """Objects that a message names."""
 
 
-class ShownLightmap(NamedTuple):
+class RememberedLightmap(NamedTuple):
     """What is remembered of an object's lightmap.
 
     digest, light: Those of the object and of the light it was baked in.
@@ -49,7 +49,7 @@ class ShownBake(NamedTuple):
         to `SHORT`.
     """
 
-    lightmaps: Mapping[str, ShownLightmap]
+    lightmaps: Mapping[str, RememberedLightmap]
     objects: Mapping[str, str]
 
 

@@ -19,7 +19,7 @@ class Quality:
     gather: GatherSettings
 
 
-QUALITIES = {
+QUALITY_SETTINGS = {
     "draft": Quality(
         SolverSettings(
             shadow_rays=4,
@@ -67,9 +67,9 @@ COARSEST = Quality(
 
 LADDER = (
     (0.029, COARSEST),
-    (0.0125, QUALITIES["draft"]),
-    (0.0077, QUALITIES["medium"]),
-    (0.0057, QUALITIES["high"]),
+    (0.0125, QUALITY_SETTINGS["draft"]),
+    (0.0077, QUALITY_SETTINGS["medium"]),
+    (0.0057, QUALITY_SETTINGS["high"]),
 )
 """Relative RMS errors in the Cornell box at 256², the larger of estimated and measured against Cycles
 (docs/decisions/0020)."""
@@ -123,7 +123,7 @@ def quality_of(settings: BakeSettings) -> Quality:
 
     A preset gives way to what was given: patches never outnumber elements.
     """
-    preset = QUALITIES[settings.quality]
+    preset = QUALITY_SETTINGS[settings.quality]
     if settings.relative_error is not None:
         preset = for_error(settings.relative_error)
     given = settings.method_settings()

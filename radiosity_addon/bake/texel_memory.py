@@ -61,7 +61,7 @@ def least_bytes(pages: Sequence[int], settings: BakeSettings) -> float:
     return most + working_bytes(settings) * min(pixels / WORKING_PIXELS, 1.0)
 
 
-def refuse_too_large(pages: Sequence[int], settings: BakeSettings) -> None:
+def refuse_large_pages(pages: Sequence[int], settings: BakeSettings) -> None:
     """Refuse pages that do not fit into the memory limit, even in tiles.
 
     pages: The width and height of each in texels.

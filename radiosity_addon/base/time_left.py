@@ -19,7 +19,7 @@ SLOWEST = 0.5
 SHORTEST_MEMORY, MEMORY = 0.7, 0.08
 """What is shown follows a new estimate within so many seconds, or this share of it."""
 
-APART = 0.05
+READING_INTERVAL = 0.05
 """Seconds between two readings that are remembered."""
 
 
@@ -57,7 +57,7 @@ class RemainingTime:
 
     def _remember(self, now: float, fraction: float) -> None:
         """Note a reading, and forget those before the recent past, but for the last of them."""
-        if now - self._readings[-1][0] >= APART:
+        if now - self._readings[-1][0] >= READING_INTERVAL:
             self._readings.append((now, fraction))
         since = now - RECENT * (now - self._start)
         while len(self._readings) > 1 and self._readings[1][0] <= since:

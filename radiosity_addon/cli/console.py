@@ -12,7 +12,7 @@ from typing import Any, TextIO
 from ..base import RemainingTime, duration, one_of_each
 from .path_checks import escaped
 
-STEP = 10
+PERCENT_STEP = 10
 """Without a terminal a stage prints a line again after this many per cent."""
 
 
@@ -31,7 +31,7 @@ class Console:
         self._theirs: TextIO = sys.stdout
         self._saved: int | None = None
         self._stage = ""
-        self._percent = -STEP
+        self._percent = -PERCENT_STEP
         self._open_line = False
         self._remaining = RemainingTime()
 
@@ -77,7 +77,7 @@ class Console:
                 self._write(f"\r\x1b[K[{percent:3d} %] {stage}{left}")
                 self._open_line = True
                 self._stage, self._percent = stage, percent
-        elif stage != self._stage or percent >= self._percent + STEP:
+        elif stage != self._stage or percent >= self._percent + PERCENT_STEP:
             self._write(f"[{percent:3d} %] {stage}{left}\n")
             self._stage, self._percent = stage, percent
 

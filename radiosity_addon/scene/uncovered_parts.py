@@ -22,10 +22,10 @@ from .surfaces import Surfaces
 NOTHING_LEFT = 1e-9
 """Parts of a side smaller than this share of it are dropped."""
 
-EVEN = 0.05
+EVEN_OPACITY = 0.05
 """A cover whose opacity varies less over a part hides its mean, …"""
 
-FINEST = 5
+MAX_DIVISIONS = 5
 """… otherwise the part is split in four, at most this many times."""
 
 CHUNK_PAIRS = 1 << 17
@@ -192,13 +192,13 @@ def _shining_through(
     assert scene.images is not None
     images = scene.images
     done = []
-    for depth in range(FINEST + 1):
+    for depth in range(MAX_DIVISIONS + 1):
         place = _moved(corners, part[cover], in_cover[cover])
         opacity = images.area_means(by[cover] // 2, place)[:, 6]
         spots = place[:, :1] + np.einsum("sw,nwk->nsk", _SPOTS, place[:, 1:] - place[:, :1])
         there = np.repeat(by[cover] // 2, len(_SPOTS))
         each = images.opacity_at(there, spots.reshape(-1, 2)).reshape(-1, len(_SPOTS))
-        ready = (np.ptp(each, axis=1) < EVEN) | (depth == FINEST)
+        ready = (np.ptp(each, axis=1) < EVEN_OPACITY) | (depth == MAX_DIVISIONS)
         done.append((own[ready], corners[ready], level[ready] * (1.0 - opacity[ready])))
         open_ = ~ready
         if not open_.any():

@@ -133,7 +133,7 @@ def test_far_and_near_rules_agree(monkeypatch: pytest.MonkeyPatch) -> None:
     first = shape @ np.stack([random_rotation(rng) for _ in range(2000)])
     second = shape @ np.stack([random_rotation(rng) for _ in range(2000)]) + 3 * rng.normal(size=(2000, 1, 3))
     mixed = triangle_to_triangle(first, second)
-    monkeypatch.setattr(triangle_pairs, "FAR", 0.0)
+    monkeypatch.setattr(triangle_pairs, "MAX_CUBATURE_RATIO", 0.0)
     outline = triangle_to_triangle(first, second)
     assert (mixed != outline).mean() > 0.05
     np.testing.assert_allclose(mixed, outline, atol=2e-5)

@@ -18,13 +18,13 @@ from radiosity_addon.blender.overlays.color_scale import ColorScale, automatic_s
 from radiosity_addon.blender.overlays.lightmap_values import lightmap_of, object_statistics, page_values
 from radiosity_addon.blender.overlays.overlay_pictures import (
     CHECKERS,
+    MAX_PICTURE_WIDTH,
     STATE_COLORS,
-    WIDEST,
     OverlayPicture,
     chosen_elements,
+    coarse_page,
     missing,
     overlay_picture,
-    thinned,
 )
 from radiosity_addon.blender.session.kept_details import details_of
 from radiosity_addon.blender.session.state import session
@@ -278,11 +278,11 @@ def test_an_unregistered_overlay_leaves_nothing() -> None:
 
 
 def test_large_pages_are_drawn_coarser() -> None:
-    page = np.arange(2 * WIDEST)[:, None] + np.zeros(2 * WIDEST)
-    thin = thinned(page)
-    assert thin.shape == (WIDEST, WIDEST)
-    assert np.abs(thin[:, 0] / 2 - np.arange(WIDEST)).max() <= 1.0
-    assert thinned(thin) is thin
+    page = np.arange(2 * MAX_PICTURE_WIDTH)[:, None] + np.zeros(2 * MAX_PICTURE_WIDTH)
+    thin = coarse_page(page)
+    assert thin.shape == (MAX_PICTURE_WIDTH, MAX_PICTURE_WIDTH)
+    assert np.abs(thin[:, 0] / 2 - np.arange(MAX_PICTURE_WIDTH)).max() <= 1.0
+    assert coarse_page(thin) is thin
 
 
 def test_scales_end_at_round_numbers_and_clip() -> None:

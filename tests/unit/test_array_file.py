@@ -108,7 +108,7 @@ def test_bombs_are_refused_before_anything_of_their_size_is_allocated(
 ) -> None:
     """100 MB of zeros in half a megabyte, and claims that a file of this size cannot keep."""
     path, packed = tmp_path / "bomb", zeros
-    blocks = [len(packed)] * -(-claimed // array_file.BLOCK)
+    blocks = [len(packed)] * -(-claimed // array_file.BLOCK_BYTES)
     forged(
         path,
         {"description": None, "arrays": [{"kind": "uint8", "shape": [claimed], "blocks": blocks}]},

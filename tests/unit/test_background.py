@@ -10,7 +10,7 @@ from collections.abc import Generator
 import pytest
 
 from radiosity_addon.base.progress import Progress
-from radiosity_addon.blender.session.background import TURN, in_thread
+from radiosity_addon.blender.session.background import SWITCH_INTERVAL, in_thread
 
 
 def finish(steps: Generator) -> tuple[list[float], object]:
@@ -124,7 +124,7 @@ def test_turns_are_short_while_it_runs_and_as_before_afterwards() -> None:
         progress.at(1.0)
 
     finish(in_thread(work))
-    assert during == [pytest.approx(TURN)]
+    assert during == [pytest.approx(SWITCH_INTERVAL)]
     assert sys.getswitchinterval() == before
     steps = in_thread(work)
     next(steps)

@@ -8,7 +8,12 @@ import pytest
 from radiosity_addon.numerics.sampling import stratified_square
 from radiosity_addon.solver import PointLight, SolverSettings, solve
 from radiosity_addon.solver.gather import Footprints, Gathered, LocalPass
-from radiosity_addon.solver.gather.bright_patches import CONTRAST, MOST, AimedRays, BrightElements
+from radiosity_addon.solver.gather.bright_patches import (
+    CONTRAST,
+    MAX_BRIGHT_ELEMENTS,
+    AimedRays,
+    BrightElements,
+)
 from radiosity_addon.solver.gather.hit_numbers import NOTHING
 from tests.rooms import box_room, gray_scene, solid_box
 
@@ -79,7 +84,7 @@ def test_bright_elements_are_few_and_far_above_the_mean(local: LocalPass) -> Non
     bright = BrightElements(hierarchy, reflected)
     leaves = hierarchy.leaves
     mean = reflected[leaves, 0] @ hierarchy.area[leaves] / hierarchy.area[leaves].sum()
-    assert 0 < len(bright) <= MOST
+    assert 0 < len(bright) <= MAX_BRIGHT_ELEMENTS
     assert (reflected[bright.element, 0] > CONTRAST * mean).all()
     assert (hierarchy.first_child[bright.element] < 0).all()
     others = np.setdiff1d(leaves, bright.element)

@@ -7,7 +7,7 @@ import pytest
 
 from radiosity_addon.bake.relight.light_groups import split_by_group
 from radiosity_addon.base.errors import SceneError
-from radiosity_addon.lightmap.transport.warm_start import MOST, WarmStart
+from radiosity_addon.lightmap.transport.warm_start import MAX_SOLUTIONS, WarmStart
 from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.scene.faces import Faces
 from radiosity_addon.solver import PointLight, Scene
@@ -101,7 +101,7 @@ def test_the_first_light_is_never_forgotten() -> None:
     for strengths in one[1:]:
         earlier.add(strengths, np.ones((1, 3), dtype=np.float32))
     known = [number for number in range(20) if earlier.mixed(one[number]) is not None]
-    assert known == [0, *range(20 - MOST + 1, 20)]
+    assert known == [0, *range(20 - MAX_SOLUTIONS + 1, 20)]
 
 
 def test_parts_are_scaled_to_sum_to_the_whole() -> None:

@@ -12,7 +12,7 @@ from radiosity_addon.solver.equations.matrix_report import (
     asymmetry,
     diagonal_dominance,
     extreme_eigenvalues,
-    fill,
+    filled_share,
     matrix_properties,
     reciprocity_error,
     symmetrised,
@@ -32,13 +32,13 @@ def test_size_and_fill() -> None:
     system = cube_system()
     assert matrix_properties(system).size == len(system) == 192
     # Every element sees those of the five other walls; 32 are on its own.
-    assert fill(system) == pytest.approx((1 + 160) / 192)
+    assert filled_share(system) == pytest.approx((1 + 160) / 192)
     black = system.reflectance.copy()
     black[:48] = 0.0
-    assert fill(replace(system, reflectance=black)) == pytest.approx((0.75 * 161 + 0.25) / 192)
+    assert filled_share(replace(system, reflectance=black)) == pytest.approx((0.75 * 161 + 0.25) / 192)
     one_channel = black.copy()
     one_channel[:48, 2] = 0.1
-    assert fill(replace(system, reflectance=one_channel)) == fill(system)
+    assert filled_share(replace(system, reflectance=one_channel)) == filled_share(system)
 
 
 @pytest.mark.parametrize("reflectance", [0.2, 0.5, 0.9])

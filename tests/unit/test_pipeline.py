@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from radiosity_addon.bake.pipeline import bake, bake_and_keep
-from radiosity_addon.bake.quality import QUALITIES, quality_of
+from radiosity_addon.bake.quality import QUALITY_SETTINGS, quality_of
 from radiosity_addon.bake.result.pictures import Picture
 from radiosity_addon.bake.result.result import BakeResult
 from radiosity_addon.base.errors import SceneError
@@ -346,7 +346,7 @@ def test_links_that_had_to_begin_coarse_are_told_of(monkeypatch: pytest.MonkeyPa
     count = len(triangles)
     scene = gray_scene(triangles, lights=[LAMP])
     clutter = bake_scene(scene, ("Room", 12), ("Balls", count - 12))
-    monkeypatch.setattr(initial, "FEWEST", 1)
+    monkeypatch.setattr(initial, "MIN_LINKS", 1)
 
     def told(**settings: Any) -> list[str]:
         warnings = run(clutter, resolution=16, **settings).warnings
@@ -355,5 +355,5 @@ def test_links_that_had_to_begin_coarse_are_told_of(monkeypatch: pytest.MonkeyPa
     assert told() == []
     (message,) = told(max_links=2_000)
     share = float(message.split("up to ")[1].split("%")[0])
-    assert 100 * initial.COARSEST_FAINT * QUALITIES["draft"].solver.error < share < 100
+    assert 100 * initial.COARSEST_FAINT * QUALITY_SETTINGS["draft"].solver.error < share < 100
     assert "raise the most links and the memory limit" in message

@@ -14,7 +14,7 @@ import pytest
 from radiosity_addon.base.errors import BakeError
 from radiosity_addon.files.baked_files import digest_of_file
 from radiosity_addon.publishing import publish as staging_module
-from radiosity_addon.publishing.marked_folders import MARK
+from radiosity_addon.publishing.marked_folders import OWNER_FILE
 from radiosity_addon.publishing.publish import (
     EARLIER,
     JOURNAL,
@@ -117,7 +117,7 @@ def test_folders_without_our_mark_are_left_alone(tmp_path: Path) -> None:
     others = [tmp_path / f"{PREFIX}other", tmp_path / f"{PREFIX}12345678"]
     for other in others:
         other.mkdir()
-        (other / MARK).write_text("somebody else's mark")
+        (other / OWNER_FILE).write_text("somebody else's mark")
     (tmp_path / "thesis").write_text("years of work")
     assert not clean_up(tmp_path)
     assert mine.exists()
@@ -206,8 +206,8 @@ def test_links_in_a_staging_folder_are_not_followed(tmp_path: Path, what: str) -
     files = {A: {"new": digest_of_file(folder / A), "old": digest_of_file(elsewhere / A)}}
     made = crafted(folder, files, {A: "secret"})
     if what == "mark":
-        (made / MARK).rename(elsewhere / "mark")
-        (made / MARK).symlink_to(elsewhere / "mark")
+        (made / OWNER_FILE).rename(elsewhere / "mark")
+        (made / OWNER_FILE).symlink_to(elsewhere / "mark")
     elif what == "earlier":
         (made / EARLIER / A).unlink()
         (made / EARLIER).rmdir()
@@ -314,7 +314,7 @@ def test_what_kills_leave_half_made_is_removed(tmp_path: Path) -> None:
     empty, marked = tmp_path / f"{PREFIX}abcd1234", tmp_path / f"{PREFIX}abcd5678"
     empty.mkdir()
     marked.mkdir()
-    (marked / MARK).touch()
+    (marked / OWNER_FILE).touch()
     clean_up(tmp_path)
     assert list(tmp_path.iterdir()) == []
 

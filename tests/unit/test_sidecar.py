@@ -20,8 +20,8 @@ from radiosity_addon.bake.sidecar.array_file import read_arrays, write_arrays
 from radiosity_addon.bake.sidecar.plain_objects import restore, stored_names
 from radiosity_addon.bake.sidecar.sidecar import (
     FORMAT,
-    KINDS,
     MAGIC,
+    STORED_CLASSES,
     check_belongs,
     read_sidecar,
     sidecar_entry,
@@ -210,7 +210,7 @@ def test_only_known_classes_come_back_and_nothing_of_theirs_is_called(tmp_path: 
 
 def test_what_is_stored_of_a_class_is_public() -> None:
     """A private attribute may be renamed without a thought for files."""
-    for kind in KINDS:
+    for kind in STORED_CLASSES:
         assert not [name for name in stored_names(kind) if name.startswith("_")]
 
 

@@ -163,13 +163,13 @@ def _relight(kept: KeptBake, wanted: Array, progress: Progress) -> tuple[Lightma
     scratch = kept.geometry.scratch
     light = relight_texels(kept.lit, kept.solved, wanted, scratch, progress.part(0.0, 0.95))
     emission = kept.sources.emission(kept.emission, kept.geometry.triangle, wanted)
-    values = shown(light, kept.reflectance, emission, kept.settings, scratch)
+    values = held_values(light, kept.reflectance, emission, kept.settings, scratch)
     pages = presentable(texel_pages(kept.geometry, values, kept.seams, kept.rings))
     progress.at(1.0)
     return pages
 
 
-def shown(
+def held_values(
     light: TexelLight, reflectance: Array, emission: Array, settings: BakeSettings, scratch: Scratch
 ) -> Array:
     """Return (n, 3) float32 what texels are to hold of their light; reflectance and emission as they show."""

@@ -24,13 +24,13 @@ from ...base import BakeError
 
 Array = npt.NDArray[Any]
 
-BLOCK = 1 << 22
+BLOCK_BYTES = 1 << 22
 """Bytes of an array that are compressed at a time: blocks are independent, a thread each."""
 
 LEVEL = 1
 """Of zlib: more takes several times as long for a tenth less."""
 
-KINDS = (
+ARRAY_TYPES = (
     "bool",
     "int8",
     "int16",
@@ -45,7 +45,7 @@ KINDS = (
 )
 """Types of arrays that may be stored: plain numbers, never objects."""
 
-MOST = 1 << 38
+MAX_FILE_BYTES = 1 << 38
 """Bytes that a file may claim to hold, unless the caller allows fewer."""
 
 RATIO, SPARE = 32, 1 << 24
@@ -83,7 +83,7 @@ def write_arrays(path: Path, magic: bytes, format_number: int, description: Any,
 
     magic: 16 of them at most: the kind of file.
     description: What JSON can hold.
-    arrays list of arrays of the `KINDS`.
+    arrays list of arrays of the `ARRAY_TYPES`.
     Raises OSError if the file cannot be written.
     """
     with ThreadPoolExecutor() as threads:
@@ -103,7 +103,9 @@ def write_arrays(path: Path, magic: bytes, format_number: int, description: Any,
         return file.tell()
 
 
-def read_arrays(path: Path, magic: bytes, format_number: int, most: int = MOST) -> tuple[Any, list[Array]]:
+def read_arrays(
+    path: Path, magic: bytes, format_number: int, most: int = MAX_FILE_BYTES
+) -> tuple[Any, list[Array]]:
     """Read what `write_arrays` wrote.
 
     most: Bytes that it may take in memory; what would take more is refused before it is unpacked.
@@ -123,7 +125,7 @@ def read_arrays(path: Path, magic: bytes, format_number: int, most: int = MOST) 
         raise ArrayFileError("it is damaged")
     try:
         head = json.loads(_unpacked(body[:length], min(HEAD_RATIO * length + HEAD_SPARE, MOST_HEAD)))
-        entries, room = head["arrays"], min(RATIO * len(body) + SPARE, MOST)
+        entries, room = head["arrays"], min(RATIO * len(body) + SPARE, MAX_FILE_BYTES)
         total = _total(entries)
         if total > room:
             raise ArrayFileError(f"it claims to hold {total >> 20} MB, which a file of its size cannot")
@@ -172,11 +174,11 @@ def _total(entries: list[dict[str, Any]]) -> int:
     """Return the bytes that arrays would take, which may be any number."""
     total = 0
     for entry in entries:
-        if entry["kind"] not in KINDS or len(entry["shape"]) > MOST_AXES:
+        if entry["kind"] not in ARRAY_TYPES or len(entry["shape"]) > MOST_AXES:
             raise ValueError("unknown kind of array")
         count = 1
         for size in entry["shape"]:
-            if type(size) is not int or not 0 <= size <= MOST:
+            if type(size) is not int or not 0 <= size <= MAX_FILE_BYTES:
                 raise ValueError("impossible shape")
             count *= size
         total += count * np.dtype(entry["kind"]).itemsize
@@ -185,10 +187,10 @@ def _total(entries: list[dict[str, Any]]) -> int:
 
 def _blocks(array: Array) -> list[Array]:
     """Cut an array into flat blocks."""
-    if array.dtype.name not in KINDS:
+    if array.dtype.name not in ARRAY_TYPES:
         raise TypeError(f"arrays of {array.dtype} cannot be stored")
     flat = np.ascontiguousarray(array).reshape(-1)
-    step = BLOCK // array.dtype.itemsize
+    step = BLOCK_BYTES // array.dtype.itemsize
     return [flat[first : first + step] for first in range(0, len(flat), step)]
 
 
@@ -204,7 +206,7 @@ def _read(body: memoryview, entries: list[dict[str, Any]]) -> list[Array]:
     for entry in entries:
         dtype, shape = np.dtype(entry["kind"]), tuple(entry["shape"])
         count = math.prod(shape)
-        step = BLOCK // dtype.itemsize
+        step = BLOCK_BYTES // dtype.itemsize
         if len(entry["blocks"]) != -(-count // step):
             raise ValueError("impossible array")
         flat = np.empty(count, dtype=dtype)

@@ -12,7 +12,7 @@ from ..scene_records.pieces import Collected, Piece
 from .output import OutputFolder
 
 
-def refusal(
+def file_refusal(
     output: OutputFolder,
     settings: BakeSettings,
     collected: Collected,

@@ -9,7 +9,7 @@ from functools import partial
 
 import bpy
 
-from ...bake import BakePlan, KeepOptions, pages_of, plan_bake, refuse_too_large, run_pipeline, timed
+from ...bake import BakePlan, KeepOptions, pages_of, plan_bake, refuse_large_pages, run_pipeline, timed
 from ...bake.relight import KeptBake
 from ...bake.result import BakeResult
 from ...base import BakeWarning, NothingToDoError, Progress, Status, staged
@@ -27,7 +27,7 @@ from ..scene_export.export import export_steps
 from ..scene_records.export_sources import Export
 from ..session.background import in_thread
 from .finish import APPLYING, BakeJob, Copies, Scope, finish
-from .live_picture import Seen, seen_triangles
+from .live_picture import ViewportFilter, seen_triangles
 from .preview import SAMPLES
 
 SOLVE = 0.03
@@ -74,7 +74,7 @@ def run_bake(
     """
     seconds: dict[str, float] = {}
     # Now, not after the export: large pages need much memory whatever is on them.
-    refuse_too_large(pages_of(settings) or (), settings)
+    refuse_large_pages(pages_of(settings) or (), settings)
     lightmap_versions.flush()
     with ExitStack() as stack:
         if output is not None:
@@ -161,7 +161,7 @@ def _solve(
 ) -> Generator[Status, None, tuple[BakeResult, KeptBake | None]]:
     """Run the pipeline, its progress scaled to its share of the whole, its pictures to what is `seen`."""
     steps = in_thread(lambda progress: baking(progress.part(SOLVE, end)), in_background)
-    status, only = Status("unwrap", SOLVE), Seen(seen)
+    status, only = Status("unwrap", SOLVE), ViewportFilter(seen)
     try:
         while True:
             try:

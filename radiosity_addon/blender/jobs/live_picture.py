@@ -33,7 +33,7 @@ def seen_triangles(context: bpy.types.Context, export: Export) -> Array:
     return seen
 
 
-class Seen:
+class ViewportFilter:
     """Leaves out of pictures what the viewports do not show.
 
     triangles (t,) bool: From `seen_triangles`.

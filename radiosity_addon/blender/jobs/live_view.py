@@ -21,7 +21,7 @@ from ..session.redraw import redraw_viewports as _redraw
 if TYPE_CHECKING:
     from ...bake.result import Picture, TexelPicture, TexelSurfaces
 
-WHITE = 16.0
+WHITE_RADIANCE = 16.0
 """Radiance that view transforms with soft highlights (AgX, Filmic) show white, at exposure 0 [W/m²/sr]."""
 
 _HARD = frozenset({"Standard", "Raw", "False Color"})
@@ -35,7 +35,7 @@ class _LiveView:
         # By name: undo would make a reference stale.
         self._scene = scene.name_full
         self._exposure = 2.0**scene.view_settings.exposure
-        self._white = 1.0 if scene.view_settings.view_transform in _HARD else WHITE
+        self._white = 1.0 if scene.view_settings.view_transform in _HARD else WHITE_RADIANCE
         self._picture: Picture | None = None
         self._texels: TexelPicture | None = None
         self._lit: tuple[TexelSurfaces, PagedSurfaces] | None = None

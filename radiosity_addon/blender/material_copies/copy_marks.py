@@ -97,7 +97,7 @@ def is_added(node: bpy.types.Node) -> bool:
     return name is not None and (name == node.name or _is_ours(node))
 
 
-def source_name(socket: bpy.types.NodeSocket) -> str:
+def linked_output(socket: bpy.types.NodeSocket) -> str:
     """Return a name for the output that is linked to an input; "" where none is."""
     if not socket.is_linked:
         return ""

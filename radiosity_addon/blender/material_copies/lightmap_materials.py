@@ -42,8 +42,8 @@ from .copy_marks import (
     SUFFIX,
     TOKEN,
     copied_groups,
+    linked_output,
     mark_added,
-    source_name,
 )
 from .copy_record import record
 from .false_colors import false_colors
@@ -181,7 +181,7 @@ class LightmapMaterials:
             feed_color(tree, group.inputs[EMISSION], surface.emission)
         fed = group.inputs[BASE_COLOR], group.inputs[EMISSION]
         group[FED] = [component for socket in fed for component in socket.default_value]
-        group[FED_BY] = [source_name(socket) for socket in fed]
+        group[FED_BY] = [linked_output(socket) for socket in fed]
 
         shader = group.outputs[SHADER]
         if surface.alpha != 1.0:

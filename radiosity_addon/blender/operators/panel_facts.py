@@ -13,7 +13,7 @@ from ..datablocks.bake_record import is_baked
 from ..images.light_mixer import mixers, sliders_of
 from ..overlays.overlay_properties import overlay_of
 from ..relight import kept_bakes
-from ..relight.kept_sidecars import refusal
+from ..relight.kept_sidecars import why_not_relit
 from ..scene_records.object_roles import has_role
 from ..session.facts import fact
 from ..settings.light_group_properties import ListedGroup, list_groups
@@ -21,7 +21,7 @@ from ..settings.light_group_properties import ListedGroup, list_groups
 SHOWN_LIGHTS = 16
 
 
-class Place(NamedTuple):
+class PropertyPath(NamedTuple):
     """A property of a datablock.
 
     Parameters
@@ -54,7 +54,7 @@ class LightRow(NamedTuple):
 
     name: str
     icon: str
-    places: tuple[Place, ...] = ()
+    places: tuple[PropertyPath, ...] = ()
 
 
 @fact(unknown=True)
@@ -87,7 +87,7 @@ def can_restore(_context: bpy.types.Context) -> bool:
 @fact(unknown="")
 def relight_refusal(context: bpy.types.Context) -> str:
     """Why the scene's bake cannot be relit; empty if it can."""
-    return refusal(context.scene)
+    return why_not_relit(context.scene)
 
 
 @fact(unknown=())
@@ -171,7 +171,7 @@ _COLLECTIONS = (
 )
 
 
-def _place(block: bpy.types.ID, owner: Any, attribute: str) -> Place:
+def _place(block: bpy.types.ID, owner: Any, attribute: str) -> PropertyPath:
     """Return where a property is: of a datablock itself, or of a socket in its node tree."""
     collection = next(name for kind, name in _COLLECTIONS if isinstance(block, kind))
     path = ""
@@ -179,4 +179,4 @@ def _place(block: bpy.types.ID, owner: Any, attribute: str) -> Place:
         inside = "" if isinstance(block, bpy.types.NodeTree) else "node_tree."
         path = inside + owner.path_from_id()
     library = None if block.library is None else block.library.filepath
-    return Place(collection, (block.name, library), path, attribute)
+    return PropertyPath(collection, (block.name, library), path, attribute)

@@ -40,7 +40,7 @@ TICK = 0.02
 FOREIGN = "The lightmaps on disk are from another bake than this file: bake again"
 
 
-class Wanted(NamedTuple):
+class WantedFile(NamedTuple):
     """An image whose file has other bytes than it should.
 
     Attributes
@@ -125,7 +125,7 @@ def lightmaps() -> list[bpy.types.Image]:
     return [image for image in own if PAGE in image.keys() and image.get(VERSION)]  # noqa: SIM118 (an ID)
 
 
-def differing() -> list[Wanted]:
+def differing() -> list[WantedFile]:
     """Return the images whose files have, by the reports next to them, other bytes than they should."""
     found = []
     for image in lightmaps():
@@ -134,7 +134,7 @@ def differing() -> list[Wanted]:
         path, report = Path(bpy.path.abspath(image.filepath_raw)), report_of(image)
         listed = listed_in(report).get(path.name)
         if listed is not None and listed["sha256"] != image[VERSION]:
-            found.append(Wanted(image.name, path, image[VERSION], report))
+            found.append(WantedFile(image.name, path, image[VERSION], report))
     return found
 
 
@@ -174,7 +174,7 @@ def check(*_: Any) -> None:
 class _Swap:
     """Files on their way back."""
 
-    def __init__(self, wanted: Sequence[Wanted]) -> None:
+    def __init__(self, wanted: Sequence[WantedFile]) -> None:
         self.wanted = tuple(wanted)
         self.outputs: dict[Path, OutputFolder] = {}
         self.error = ""
@@ -209,7 +209,7 @@ class _Swap:
         self.outputs = {}
 
 
-def _begin(wanted: Sequence[Wanted]) -> None:
+def _begin(wanted: Sequence[WantedFile]) -> None:
     """Begin to bring files back, those that are held; say so of the others."""
     held = state.held
     there = [one for one in wanted if held is not None and one.version in held]
@@ -247,7 +247,7 @@ def _cancel() -> None:
         swap.close()
 
 
-def _report_with(output: OutputFolder, wanted: Sequence[Wanted]) -> BakeReport:
+def _report_with(output: OutputFolder, wanted: Sequence[WantedFile]) -> BakeReport:
     """Return the report that the files had, with all that lies in the folder now."""
     from ...bake.result import BakeReport
 

@@ -37,7 +37,7 @@ from .relit_materials import show_emission
 TICK = 0.02
 """Seconds between two looks while something is going on."""
 
-REST = 0.4
+QUIET_SECONDS = 0.4
 """Seconds without a change after which the light is made exact."""
 
 AHEAD = 8
@@ -183,7 +183,7 @@ class LiveRelight:
         if missing:
             self._start(missing[0], partial(self._responses.find, missing[0]))
             return True
-        resting = time.perf_counter() - self._noticed > REST or not in_background
+        resting = time.perf_counter() - self._noticed > QUIET_SECONDS or not in_background
         if not self._exact and resting:
             self._start(None, partial(lit, self._held().bake, self._strengths))
             return True

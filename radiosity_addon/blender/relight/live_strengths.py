@@ -17,7 +17,7 @@ from ..cycles.lamps import read_lamp
 from ..materials.light_inputs import shown_world
 from ..materials.materials import read_material, read_radiance, uses_nodes
 
-SAME = 1e-5
+SAME_STRENGTH = 1e-5
 """A constant that is off by no more than this part is what the export found."""
 
 
@@ -39,7 +39,9 @@ class StrengthReader:
         }
         self._first = self._constants()
         with np.errstate(divide="ignore", invalid="ignore"):
-            off = np.abs(self._first - strengths) > SAME * np.abs(strengths).max(axis=1, keepdims=True)
+            off = np.abs(self._first - strengths) > SAME_STRENGTH * np.abs(strengths).max(
+                axis=1, keepdims=True
+            )
         self._varies = off.any(axis=1)
 
     def read(self) -> Array:
@@ -57,7 +59,7 @@ class StrengthReader:
         material, before = bpy.data.materials.get(name), self._reflectance.get(name)
         if material is None or before is None:
             return False
-        return bool(np.abs(read_material(material).reflectance - before).max() > SAME)
+        return bool(np.abs(read_material(material).reflectance - before).max() > SAME_STRENGTH)
 
     def _constants(self) -> Array:
         """Return (s, 3) the sources' strengths as far as constants tell them."""

@@ -19,7 +19,7 @@ from ..materials.materials import read_material, uses_nodes
 _EMISSION_SOCKETS = {"Color", "Strength", "Emission Color", "Emission Strength"}
 
 
-def refresh(names: Collection[str]) -> None:
+def refresh_copies(names: Collection[str]) -> None:
     """Have the lightmap copies of some materials glow as their originals do.
 
     The copies hold the originals' nodes: all their values are taken over, but by a copy that the user edited

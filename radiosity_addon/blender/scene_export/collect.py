@@ -20,7 +20,7 @@ from ...lights import Light
 from ...options import BakeSettings
 from ..cycles.lamps import LampFactors, read_lamp
 from ..cycles.surface_bake import can_evaluate
-from ..datablocks.image_values import Means, UnknownMeanError, Wanted, known_means_only, mean_of_named
+from ..datablocks.image_values import ImageKey, ImageMeans, UnknownMeanError, known_means_only, mean_of_named
 from ..datablocks.mesh_arrays import MeshArrays, RawMesh, copy_mesh_data, mesh_arrays, no_triangles
 from ..materials.materials import Surface, ray_doubts, read_material, uses_nodes
 from ..materials.shading_inputs import (
@@ -86,7 +86,7 @@ def collect_steps(
         NaN or infinite.
     """
     collector = _Collector(factors, settings, dark)
-    means: Means = {}
+    means: ImageMeans = {}
     while True:
         began = time.perf_counter()
         with view() as depsgraph, known_means_only(means):
@@ -114,7 +114,7 @@ class _Collector:
         self._surface_of: dict[str | None, int] = {}
         # A curve's mesh comes as an instance, and may have the curve's own name.
         self._taken = {obj.name for obj in bpy.data.objects if obj.library is None and obj.type == "MESH"}
-        self.wanted: set[Wanted] = set()
+        self.wanted: set[ImageKey] = set()
         """Images whose means are asked for before what shows them can be read."""
 
     @property

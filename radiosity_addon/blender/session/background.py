@@ -13,10 +13,10 @@ from ...base import Cancelled, Progress, Status
 
 R = TypeVar("R")
 
-PATIENCE = 0.005
+POLL_SECONDS = 0.005
 """Seconds that one `next` waits for news."""
 
-TURN = 0.001
+SWITCH_INTERVAL = 0.001
 """Seconds after which a thread that runs Python hands over to one that waits, instead of Python's 5 ms: to
 draw a window once takes dozens of turns."""
 
@@ -55,14 +55,14 @@ def in_thread(work: Callable[[Progress], R], in_window: bool = True) -> Generato
 
     turn = sys.getswitchinterval()
     if in_window:
-        sys.setswitchinterval(min(turn, TURN))
+        sys.setswitchinterval(min(turn, SWITCH_INTERVAL))
     thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="radiosity")
     running = thread.submit(work, Progress(listen, in_window=in_window))
     try:
         while True:
             over = running.done()
             try:
-                status = news.get(timeout=0.0 if over else PATIENCE)
+                status = news.get(timeout=0.0 if over else POLL_SECONDS)
             except Empty:
                 if over:
                     return running.result()

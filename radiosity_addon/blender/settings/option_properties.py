@@ -71,7 +71,7 @@ class OptionProperties:
     __annotations__ = properties_of("radiosity")
 
 
-def shown(option: Option, group: Any) -> bool:
+def is_shown(option: Option, group: Any) -> bool:
     """Tell whether the panel shows an option, and a bake listens to it, as the other ones are chosen.
 
     group: `scene.radiosity`.
@@ -88,7 +88,7 @@ def chosen_options(group: Any) -> dict[str, Any]:
     values = {
         name: _typed(getattr(group, option.identifier))
         for name, option in OPTIONS.items()
-        if shown(option, group)
+        if is_shown(option, group)
     }
     return {name: value for name, value in values.items() if _chosen(OPTIONS[name], value)}
 

@@ -24,7 +24,7 @@ Float32 = NDArray[np.float32]
 HOLD_COVERED, HOLD_EDGE, HOLD_OUTSIDE = 1.0, 0.1, 0.01
 """λ of texels whose center is on the surface, of those of which only a part is, and of dilated ones."""
 
-ITERATIONS = 40
+MAX_ITERATIONS = 40
 """Conjugate-gradient steps at most; …"""
 
 TOLERANCE = 1e-4
@@ -113,7 +113,7 @@ class _System:
         ahead = self._inverse_diagonal * residual
         direction = ahead.copy()
         product = (residual * ahead).sum(axis=0)
-        for _ in range(ITERATIONS):
+        for _ in range(MAX_ITERATIONS):
             going = np.sqrt((residual**2).sum(axis=0)) > TOLERANCE * start
             if not going.any():
                 break

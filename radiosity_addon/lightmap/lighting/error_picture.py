@@ -18,7 +18,7 @@ from ..texels import TexelGeometry, find_crossings
 from ..transport import GatherSettings, gather_texels
 from .reconstruction import CROSSED, DIRECT, footprints
 
-GATHERED = 0.8
+TRACED_FRACTION = 0.8
 """How much is done when rays have been traced; rough."""
 
 SAMPLES = 4
@@ -39,9 +39,9 @@ def texel_residual(
     direct = local.direct.at(footprints(geometry, local), progress=progress.part(0.0, DIRECT))
     part = progress.part(DIRECT, CROSSED)
     crossings = find_crossings(geometry, local.caster, local.threads, progress=part)
-    part = progress.part(CROSSED, GATHERED)
+    part = progress.part(CROSSED, TRACED_FRACTION)
     links, _ = gather_texels(local, crossings, settings, local.elements.leaves_of, progress=part)
-    part = progress.part(GATHERED, 1.0)
+    part = progress.part(TRACED_FRACTION, 1.0)
     direct += links.irradiance(residual.gathered(local), local.threads, progress=part)
     return _residual_at(residual, geometry, direct)
 

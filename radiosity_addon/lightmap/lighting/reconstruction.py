@@ -41,7 +41,7 @@ from .partial_light import LightSoFar
 DIRECT, CROSSED, PARTS = 0.25, 0.3, 0.9
 """How much is done when a part ends; rough, from rooms at medium quality."""
 
-GATHERED = 5 / 6
+GATHER_FRACTION = 5 / 6
 """The part of tracing that gathers at texels."""
 
 RETRACED = 0.5
@@ -158,7 +158,7 @@ def _trace(
     Returns also where points were chosen, if lights are kept apart, and the rows of the table of radiosity.
     """
     met = None if so_far is None else partial(so_far.met, table)
-    gathering, parts = progress.part(0.0, GATHERED), progress.part(GATHERED, 1.0)
+    gathering, parts = progress.part(0.0, GATHER_FRACTION), progress.part(GATHER_FRACTION, 1.0)
     kept, known = None, []
     if standing is not None:
         kept = kept_points(standing, gathering.part(0.0, RETRACED))

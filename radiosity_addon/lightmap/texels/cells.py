@@ -33,7 +33,7 @@ ANCHOR = np.array([0.54, 0.47])
 STARTS = 4
 """Points of a cell that its gather rays start from: each costs a ray to the anchor."""
 
-SAME_SURFACE = 0.9
+SURFACE_COSINE = 0.9
 """Cosine between the normals of a texel's triangle and of another one that the texel lies on as well."""
 
 CHUNK_TEXELS = 1 << 13
@@ -81,7 +81,7 @@ class TexelCells:
         found = np.full(len(texel), NOTHING, dtype=np.int32)
         normal = geometry.surface_normal[texel]
         # On the page a texel may extend beyond its triangle onto one with another normal.
-        alike = np.einsum("hk,hk->h", geometry.face_normals[hits.triangle], normal) > SAME_SURFACE
+        alike = np.einsum("hk,hk->h", geometry.face_normals[hits.triangle], normal) > SURFACE_COSINE
         waiting = np.flatnonzero(alike)
         position = geometry.positions_of(hits) + self._lift(texel)
         rank = self._rank[texel]

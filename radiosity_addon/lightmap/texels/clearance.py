@@ -23,10 +23,10 @@ CELL = 2.0
 MOST_CELLS = 1 << 24
 """Beyond, cells share places: some 80 MB."""
 
-MOST_PIECES = 1 << 16
+MAX_PIECES = 1 << 16
 """More pieces of triangles than this and than four a texel are not made: then no texel is clear."""
 
-FLAT = 0.45
+SAME_PLANE = 0.45
 """Surfaces this near each other's planes, as a part of the clearance, are one: twice that still is within."""
 
 ROUNDED = 1e-7
@@ -57,12 +57,12 @@ def clear_texels(
         return clear
     low, high = _surroundings(geometry, outset, height, clearance, threads)
     cells = _Cells(*_extent(low, high))
-    pieces = _pieces(geometry.triangles, cells, max(MOST_PIECES, 4 * len(geometry)), geometry.scratch)
+    pieces = _pieces(geometry.triangles, cells, max(MAX_PIECES, 4 * len(geometry)), geometry.scratch)
     if pieces is None:
         return clear
-    cells.fill(geometry, *pieces, FLAT * clearance)
+    cells.fill(geometry, *pieces, SAME_PLANE * clearance)
     del pieces
-    judge = partial(_all_flat, cells, geometry, low, high, FLAT * clearance)
+    judge = partial(_all_flat, cells, geometry, low, high, SAME_PLANE * clearance)
     fill_chunks(judge, clear, len(clear), CHUNK, threads)
     return clear
 

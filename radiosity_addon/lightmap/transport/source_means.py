@@ -12,11 +12,11 @@ from ...numerics import Array, Scratch, fill_chunks, map_chunks, tiles
 CHUNK_HITS = 1 << 18
 """Hits averaged at once: their values stay in the processor's cache."""
 
-MUCH = 0.1
+MANY_CHANGED = 0.1
 """A change of more of the table than this part asks all rows again."""
 
 
-class Means:
+class SourceMeans:
     """Means over rows of sources, of which only those are made anew that see something changed.
 
     sources (g, rays) int32.
@@ -37,7 +37,7 @@ class Means:
         """
         columns = _columns(table)
         # Where much changed every row sees some of it: to look for those that do not takes as long.
-        anew = not self._known or float(changed.mean()) > MUCH
+        anew = not self._known or float(changed.mean()) > MANY_CHANGED
         chunk = max(CHUNK_HITS // max(self._sources.shape[1], 1), 1)
         if anew:
             average = partial(_mean_of_rows, columns, self._sources)

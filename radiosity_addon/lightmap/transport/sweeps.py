@@ -14,7 +14,7 @@ from ...base import SILENT, Progress
 from ...numerics import Array, Scratch, row_numbers, tiles, trim
 from ...solver.gather import LightGains
 from .gather_links import GatherLinks
-from .source_means import CHUNK_HITS, Means, by_channel, mean_of_sources
+from .source_means import CHUNK_HITS, SourceMeans, by_channel, mean_of_sources
 from .sub_cells import SubCells, SubCellSweeps
 from .traced_texels import LightingRecord
 from .warm_start import WarmStart
@@ -24,7 +24,7 @@ TOLERANCE = 2e-4
 there at once; a dark closet next to a bright room, into which the hierarchy's elements leak across the
 wall's foot, takes as many sweeps as light would bounce in it."""
 
-STILL = 0.1
+REST_SHARE = 0.1
 """A row of the table moves once it is off by this part of the tolerance: what sees only rows that rest
 need not be asked again, and most rest after a few sweeps."""
 
@@ -165,8 +165,8 @@ def sweep(
     del reached
     indirect = scratch.zeros(direct.shape)
     changed = np.ones(len(table), dtype=bool)
-    means = Means(links.sources, table.shape[1], threads, scratch)
-    still = STILL * tolerance * float(table[:texel_count].mean()) if texel_count else 0.0
+    means = SourceMeans(links.sources, table.shape[1], threads, scratch)
+    still = REST_SHARE * tolerance * float(table[:texel_count].mean()) if texel_count else 0.0
     for _, turn in zip(range(sweeps), progress.part(0.1, 1.0).turns(SWEPT), strict=False):
         cells.sweep(table, changed, still)
         table[surfaces:] = 0.0

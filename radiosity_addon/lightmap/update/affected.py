@@ -16,10 +16,10 @@ from ...solver.gather import UNNUMBERED, Boxes, ElementLookup, Moved
 from ..texels import Crossings, SmoothLift, TexelGeometry
 from ..transport import HitTable
 
-NEAR = 1.5
+REACH = 1.5
 """What is farther from a texel than this many times its size neither touches nor hoods it."""
 
-MARGIN = 4.0
+BOX_MARGIN = 4.0
 """Boxes are this many surface offsets larger than what moved."""
 
 
@@ -51,7 +51,7 @@ class AffectedTexels:
         for rows in parts:
             moved[rows] = True
         places = [triangles[rows] for rows in parts for triangles in (before.triangles, geometry.triangles)]
-        return AffectedTexels(before, geometry, moved, Boxes.around(places, MARGIN * offset))
+        return AffectedTexels(before, geometry, moved, Boxes.around(places, BOX_MARGIN * offset))
 
     @cached_property
     def texels(self) -> Array:
@@ -71,7 +71,7 @@ class AffectedTexels:
     def near(self) -> Array:
         """(n,) bool: texels that moved, and those that what moved may stand on, touch or hood."""
         geometry = self.geometry
-        return self.texels | self.boxes.near(geometry.position, NEAR * geometry.reach)
+        return self.texels | self.boxes.near(geometry.position, REACH * geometry.reach)
 
     @cached_property
     def widen(self) -> Array:

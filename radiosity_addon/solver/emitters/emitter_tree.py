@@ -25,7 +25,7 @@ CURVED = 4.0
 MOST_SLANT = 0.35
 """… (the sine of the angle to the farthest from their mean), and none of its faces is turned away."""
 
-FLAT = 1e-5
+FLAT_SINE = 1e-5
 """Sine of the angle to the farthest normal of a flat group."""
 
 THINNEST = 1e-3
@@ -100,7 +100,7 @@ class EmitterTree:
         self._scale[single] = weight[of] / np.maximum(triangle_areas(local[of]), 1e-300)
         self.facing = facing
         self.radius, self._slant = self._extremes(corners, normals)
-        flat, coherent = self._slant <= FLAT, self._slant <= MOST_SLANT
+        flat, coherent = self._slant <= FLAT_SINE, self._slant <= MOST_SLANT
         self._smallness = np.where(flat, 1.0 / NEAREST, np.where(coherent, 1.0 / CURVED, 0.0))
 
     def _sums(self, values: Array) -> Array:
@@ -136,7 +136,7 @@ class EmitterTree:
             front = np.einsum("pk,pk->p", along, self.facing.take(node, axis=0))
             seen = (height <= radius) & (front >= -(radius + slant))
             single = self._single.take(node)
-            whole = (slant <= FLAT * distance) | (front >= radius + slant)
+            whole = (slant <= FLAT_SINE * distance) | (front >= radius + slant)
             asked = single | (whole & (radius <= self._smallness.take(node) * distance))
             done = np.flatnonzero(seen & asked)
             rows.append(row[done])

@@ -14,7 +14,7 @@ from ...rays import RayCaster
 from ...scene import Faces, Scene, SurfaceImages
 from .emitters import EmitterGroup, corners_of_parts, end_offset, upright
 
-MOST_PIECES = 256
+MAX_PIECES = 256
 """Of all textured faces together, if no more faces shine: every lit point asks every piece."""
 
 SMOOTH = 0.002
@@ -56,12 +56,12 @@ def emissive_pieces(faces: Faces, rows: Array, images: SurfaceImages) -> tuple[A
     weights = upright(faces, face, weights)
     parts = _part_emissions(faces, face, weights, images) * level[:, None, None]
     power = float(area @ parts.mean(axis=(1, 2)))
-    while len(face) < MOST_PIECES:
+    while len(face) < MAX_PIECES:
         spread = area * np.abs(parts - parts.mean(axis=1, keepdims=True)).mean(axis=(1, 2))
         chosen = np.flatnonzero(spread > SMOOTH * power)
         if len(chosen) == 0:
             break
-        room = max((MOST_PIECES - len(face)) // 3, 1)
+        room = max((MAX_PIECES - len(face)) // 3, 1)
         chosen = np.sort(chosen[np.argsort(-spread[chosen], kind="stable")[:room]])
         children = split_in_four(weights[chosen]).reshape(-1, 3, 2)
         of = np.repeat(face[chosen], 4)

@@ -56,7 +56,7 @@ def matrix_properties(system: LinearSystem) -> MatrixProperties:
     condition = float(((1.0 - low) / np.where(beyond > 0, beyond, np.nan)).max()) if len(system) else 1.0
     return MatrixProperties(
         size=len(system),
-        fill=fill(system),
+        fill=filled_share(system),
         dominance=diagonal_dominance(system),
         spectral_radius=float(np.maximum(high, -low).max()) if len(system) else 0.0,
         condition=condition if np.isfinite(condition) else float("inf"),
@@ -65,7 +65,7 @@ def matrix_properties(system: LinearSystem) -> MatrixProperties:
     )
 
 
-def fill(system: LinearSystem) -> float:
+def filled_share(system: LinearSystem) -> float:
     """Return the share of K's entries that are not 0 in any channel."""
     count = len(system)
     reflects = (system.reflectance > 0).any(axis=1)

@@ -12,7 +12,7 @@ from ...lights import AreaLight, Lamp, PointLight, SkyPatch, SpotLight, SunLight
 from ...numerics import Array
 from ..emitters import EmitterGroup
 
-WIDEST = 1.5
+MAX_SKY_ANGLE = 1.5
 """A part of the sky farther than this from its middle [rad] is everywhere."""
 
 
@@ -141,4 +141,4 @@ def _extent(light: Lamp | EmitterGroup) -> tuple[float, Array, Array]:
 
 def _opening(half_angle: float) -> Array:
     """Return (3,) how far off its axis a cone gets for each meter along it."""
-    return np.full(3, np.tan(half_angle) if half_angle < WIDEST else np.inf)
+    return np.full(3, np.tan(half_angle) if half_angle < MAX_SKY_ANGLE else np.inf)

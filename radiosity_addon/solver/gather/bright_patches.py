@@ -30,17 +30,17 @@ from ...numerics import (
 from ...rays import Hits
 from ..hierarchy import Hierarchy
 
-EVEN = 0.2
+EVEN_SHARE = 0.2
 """This part of the rays at an element spreads over it evenly: lamps do not tell what other light there
 is, nor shadows."""
 
 CONTRAST = 6.0
 """Elements are bright from this many times the mean reflected radiosity …"""
 
-MOST = 128
+MAX_BRIGHT_ELEMENTS = 128
 """… and so many at most, the brightest: all are tried at every point."""
 
-FAR = 0.05
+MAX_HEMISPHERE_SHARE = 0.05
 """Aimed at are elements that fill less than this of the hemisphere: others many rays hit anyway."""
 
 NOISE = 0.002
@@ -152,7 +152,7 @@ class BrightElements:
         level, area = reflected[leaves].mean(axis=1), hierarchy.area[leaves]
         mean = float(level @ area) / max(float(area.sum()), 1e-300)
         bright = np.flatnonzero(level > CONTRAST * mean)
-        bright = bright[np.argsort(-level[bright], kind="stable")[:MOST]]
+        bright = bright[np.argsort(-level[bright], kind="stable")[:MAX_BRIGHT_ELEMENTS]]
         self.element = leaves[bright].astype(np.int32)
         """(m,) int32"""
         self._level, self._area = level[bright], area[bright]
@@ -177,7 +177,7 @@ class BrightElements:
         level = lit(places, np.repeat(self._normals, 64, axis=0)).reshape(-1, 16, 4).mean(axis=2)
         total = level.sum(axis=1, keepdims=True)
         uneven = np.where(total > 0, level / np.where(total > 0, total, 1.0), chance)
-        return np.asarray(EVEN * chance + (1.0 - EVEN) * uneven)
+        return np.asarray(EVEN_SHARE * chance + (1.0 - EVEN_SHARE) * uneven)
 
     def shares(self, points: Array, normals: Array, rays: int, irradiance: Array) -> Array:
         """Return (n, m) what each element would send to points [W/m²], roughly; 0 is left to chance.
@@ -195,7 +195,7 @@ class BrightElements:
         # Seen whole: no corner below the horizon.
         lowest = (normals @ self._corners.reshape(-1, 3).T).reshape(len(points), -1, 3).min(axis=2)
         lowest -= np.einsum("nk,nk->n", points, normals)[:, None]
-        far = (lowest > 0) & (cos_s > 0) & (self._area < FAR * np.pi * square)
+        far = (lowest > 0) & (cos_s > 0) & (self._area < MAX_HEMISPHERE_SHARE * np.pi * square)
         factor = np.where(far, self._area * cos_r * cos_s / np.maximum(np.pi * square * square, 1e-300), 0.0)
         noise = factor @ (self._level**2) / rays
         factor[noise <= (NOISE * irradiance) ** 2] = 0.0

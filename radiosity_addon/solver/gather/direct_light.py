@@ -18,7 +18,7 @@ from .footprints import Footprints, SpreadPoints
 from .light_gains import LightGains
 from .soft_shadows import ShadowShare
 
-NEAR = 0.05
+NEAR_FACTOR = 0.05
 """Form factor beyond which emissive faces are so near that it may change over a texel."""
 
 
@@ -108,7 +108,7 @@ class DirectLight:
         light, settings = asked.light, self._state.settings
         glows = isinstance(light, EmitterGroup)
         caster = self._state.caster if glows else self._state.caster.for_lamps
-        gain = spread.gain(light, NEAR if glows else 0.0, progress.part(0.0, 0.1))
+        gain = spread.gain(light, NEAR_FACTOR if glows else 0.0, progress.part(0.0, 0.1))
         share = ShadowShare(caster, light, spread, asked.seed, settings.threads)
         unblocked = share.at_points(gain, rays or settings.shadow_rays, progress.part(0.1, 1.0))
         for rows in tiles(len(gain)):

@@ -27,7 +27,7 @@ UNEVEN, MORE_GAINS = 0.02, 64
 """Where the few points differ by more than this part, as beside a lamp and at the rim of a spot's cone,
 so many are asked."""
 
-EDGE = 0.5
+EDGE_DIFFERENCE = 0.5
 """Where center and farthest point differ by more than this part, an edge of the lamp's beam crosses."""
 
 DARKEST = 0.25
@@ -179,7 +179,7 @@ def _at_centers(
         else:
             other = light.unit_irradiance(spread.farthest(part), normals)
             varies = np.abs(other - own) > SAME_GAIN * np.maximum(own, other)
-            jump = np.abs(other - own) > EDGE * np.maximum(own, other)
+            jump = np.abs(other - own) > EDGE_DIFFERENCE * np.maximum(own, other)
     return own, varies, jump
 
 

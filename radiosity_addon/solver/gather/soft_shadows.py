@@ -27,7 +27,7 @@ MORE_RAYS = 16
 MAIN_PART = 0.6
 """… and a lamp gives this part of the light, or more."""
 
-FEWEST = 2
+MIN_SHADOW_RAYS = 2
 """Shadow rays of a lamp that adds hardly anything. A single one would tell the share of the lamp that is
 seen, not that of its light: 0.40 for 0.44 behind a plate half way to a near lamp; two tell 0.43."""
 
@@ -170,6 +170,6 @@ def _is_partial(share: Array) -> Array:
 
 
 def _power_of_two(wanted: Array, most: int) -> Array:
-    """Return (n,) int64 powers of two no less than what is wanted, from `FEWEST` up to `most` itself."""
-    exponent = np.ceil(np.log2(np.maximum(wanted, FEWEST)))
+    """Return (n,) int64 powers of two, at least `wanted`, from `MIN_SHADOW_RAYS` up to `most` itself."""
+    exponent = np.ceil(np.log2(np.maximum(wanted, MIN_SHADOW_RAYS)))
     return np.asarray(np.minimum(2.0**exponent, most), dtype=np.int64)

@@ -14,7 +14,7 @@ from ...scene import Faces, Scene
 from ..hierarchy import Hierarchy
 from ..links import LightLinks
 
-RAYS = 1 << 17
+LAMP_RAYS = 1 << 17
 """Rays of all lamps together, …"""
 
 LEAST_RAYS, MOST_RAYS = 1 << 8, 1 << 14
@@ -83,7 +83,7 @@ def lamps_within_power(
     lamps = [number for number, light in enumerate(scene.lights) if is_stopped(light) and light.flux.any()]
     if not lamps:
         return links
-    rays = min(max(RAYS // len(lamps), LEAST_RAYS), MOST_RAYS)
+    rays = min(max(LAMP_RAYS // len(lamps), LEAST_RAYS), MOST_RAYS)
     receiver = links.receiver
     gain = hierarchy.area[receiver] * hierarchy.opacity[receiver] * links.gain.mean(axis=1)
     gain *= scene.in_shadows[hierarchy.faces.triangle[hierarchy.face[receiver]]]
