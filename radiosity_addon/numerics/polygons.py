@@ -50,8 +50,8 @@ def _cut_half_plane(polygon: Array, distance: Array) -> Array:
     place = np.cumsum(given, axis=1) - 1
     kept = np.flatnonzero(given)
     result = np.zeros((count * (size + 1), width))
-    to = place.ravel().take(kept) + (size + 1) * (kept // (2 * size))
-    result[to] = corners.reshape(-1, width).take(kept, axis=0)
+    target = place.ravel().take(kept) + (size + 1) * (kept // (2 * size))
+    result[target] = corners.reshape(-1, width).take(kept, axis=0)
     last = np.minimum(np.arange(size + 1), place[:, -1:]) + (size + 1) * np.arange(count)[:, None]
     return np.asarray(result.take(last, axis=0))
 

@@ -118,23 +118,24 @@ def own_parts(side: Array, part: Array, by: Array, in_cover: Array, scene: Surfa
     order = np.lexsort((-areas(part), np.repeat(np.arange(len(sides)), count)))
     for number in range(int(count.max(initial=0))):
         cover = np.where(count > number, order[np.minimum(first + number, len(side) - 1)], -1)[own]
-        asked = np.flatnonzero(cover >= 0)
-        if len(asked) == 0:
+        covered = np.flatnonzero(cover >= 0)
+        if len(covered) == 0:
             continue
-        chosen = cover[asked]
-        inner = _clipped(corners[asked], part[chosen])
+        chosen = cover[covered]
+        inner = _clipped(corners[covered], part[chosen])
         met = areas(inner) > NOTHING_LEFT
-        asked, chosen, inner = asked[met], chosen[met], inner[met]
+        covered, chosen, inner = covered[met], chosen[met], inner[met]
         left = np.ones(len(own), dtype=bool)
-        left[asked] = False
+        left[covered] = False
         pieces = [(own[left], corners[left], level[left])]
         pieces += [
-            (own[asked[row]], each, level[asked[row]]) for row, each in _outside(corners[asked], part[chosen])
+            (own[covered[row]], each, level[covered[row]])
+            for row, each in _outside(corners[covered], part[chosen])
         ]
         seen_through = np.flatnonzero(cut[by[chosen] // 2])
         if len(seen_through):
             row, each = _fans(inner[seen_through])
-            piece_row, piece_cover = asked[seen_through[row]], chosen[seen_through[row]]
+            piece_row, piece_cover = covered[seen_through[row]], chosen[seen_through[row]]
             pieces.append(
                 _shining_through(
                     own[piece_row], each, level[piece_row], piece_cover, part, in_cover, by, scene

@@ -133,10 +133,10 @@ def members(
     _check_members(settings, names)
     groups = [group_of(name, own, settings) for name, own in zip(names, of_scene, strict=True)]
     label = np.array(groups, dtype=object)
-    asked = [name for name, _ in settings.groups]
-    rest = sorted(set(label) - {*asked, OTHERS})
-    found = [(name, label == name) for name in (*asked, *rest)]
+    chosen = [name for name, _ in settings.groups]
+    rest = sorted(set(label) - {*chosen, OTHERS})
+    found = [(name, label == name) for name in (*chosen, *rest)]
     left = label == OTHERS
-    if OTHERS not in asked and (left & strengths.any(axis=1)).any():
+    if OTHERS not in chosen and (left & strengths.any(axis=1)).any():
         found.append((OTHERS, left))
     return found

@@ -89,11 +89,15 @@ def write_arrays(path: Path, magic: bytes, format_number: int, description: Any,
     with ThreadPoolExecutor() as threads:
         blocks = [list(threads.map(_compressed, _blocks(array))) for array in arrays]
     entries = [
-        {"kind": array.dtype.name, "shape": list(array.shape), "blocks": [len(block) for block in some]}
-        for array, some in zip(arrays, blocks, strict=True)
+        {
+            "kind": array.dtype.name,
+            "shape": list(array.shape),
+            "blocks": [len(block) for block in array_blocks],
+        }
+        for array, array_blocks in zip(arrays, blocks, strict=True)
     ]
     head = zlib.compress(json.dumps({"description": description, "arrays": entries}).encode())
-    body = [head, *(block for some in blocks for block in some)]
+    body = [head, *(block for array_blocks in blocks for block in array_blocks)]
     digest = hashlib.blake2b(digest_size=32)
     for part in body:
         digest.update(part)

@@ -89,8 +89,8 @@ class StoredBake:
             If the file is not of the scene that it says it is of.
         """
         stored = self._stored
-        now = scene_record(bake_scene)
-        compare(SceneRecord(stored["objects"], now.lights), now).refuse_all_but(RELIGHTABLE)
+        present = scene_record(bake_scene)
+        compare(SceneRecord(stored["objects"], present.lights), present).refuse_all_but(RELIGHTABLE)
         baked = sum(item.bake and item.count > 0 for item in bake_scene.objects)
         if stored_layout(stored) != (len(bake_scene.scene), baked):
             raise damaged(self.path)

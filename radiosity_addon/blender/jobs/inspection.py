@@ -30,7 +30,7 @@ from ..materials.materials import uses_nodes
 from ..scene_export.collect import collect
 from ..scene_export.export import check_names, chosen_pieces
 from ..scene_records.object_roles import BAKEABLE_TYPES
-from ..scene_records.pieces import Collected, Piece
+from ..scene_records.pieces import Piece, SceneContents
 from ..scene_records.render_state import render_depsgraph
 
 if TYPE_CHECKING:
@@ -206,7 +206,9 @@ def _of_the_file(folder: Path | None) -> Iterator[Finding]:
         yield Finding(ERROR, "file", f"cannot write to the output folder '{folder}': choose another")
 
 
-def _of_light(context: bpy.types.Context, collected: Collected, settings: BakeSettings) -> Iterator[Finding]:
+def _of_light(
+    context: bpy.types.Context, collected: SceneContents, settings: BakeSettings
+) -> Iterator[Finding]:
     """Say whether anything shines, and which surfaces are black."""
     shown = {row for piece in collected.pieces for row in np.unique(piece.surface).tolist()}
     surfaces = [(row, collected.surfaces[row]) for row in sorted(shown)]
@@ -303,7 +305,7 @@ def _of_texels(lit: Sequence[LightmappedObject], plan: Estimate) -> Iterator[Fin
 
 
 def _of_shapes(
-    context: bpy.types.Context, collected: Collected, shapes: dict[int, _Shape]
+    context: bpy.types.Context, collected: SceneContents, shapes: dict[int, _Shape]
 ) -> Iterator[Finding]:
     """Name objects that are inside out, and scales that look forgotten."""
     pieces = [piece for piece in collected.pieces if id(piece) in shapes]

@@ -59,14 +59,14 @@ def asked_by_outputs(node: bpy.types.Node) -> dict[str, tuple[str, str]]:
         that gives it.
     """
     if node.type == "TEX_COORD":
-        asked = {
+        names = {
             "Generated": ("generated", "Vector"),
             "Normal": ("normal", "Vector"),
             "UV": ("uv", "Vector"),
         }
         if node.object is None:
-            asked["Object"] = ("object", "Vector")
-        return asked
+            names["Object"] = ("object", "Vector")
+        return names
     if node.type == "UVMAP":
         return {"UV": (_named("uv", node.uv_map), "Vector")}
     if node.type == "VERTEX_COLOR":
@@ -101,15 +101,15 @@ def asked_by_default(node: bpy.types.Node) -> str | None:
 
 def asked_by_material(tree: bpy.types.NodeTree) -> frozenset[str]:
     """Return the inputs that a material's nodes ask for, groups included."""
-    asked = set()
+    names = set()
     for node in _all_nodes(tree):
         for identifier, (name, _) in asked_by_outputs(node).items():
             if node.outputs[identifier].is_linked:
-                asked.add(name)
+                names.add(name)
         default = asked_by_default(node)
         if default is not None:
-            asked.add(default)
-    return frozenset(asked)
+            names.add(default)
+    return frozenset(names)
 
 
 def unreliable_nodes(tree: bpy.types.NodeTree) -> list[str]:

@@ -35,7 +35,7 @@ from .polls import Conditional
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Unused:
+class UnusedFiles:
     """What nothing shows any more.
 
     Parameters
@@ -55,7 +55,7 @@ class Unused:
         return sum(map(len, self.files.values()))
 
 
-def unused_lightmaps(context: bpy.types.Context) -> Unused:
+def unused_lightmaps(context: bpy.types.Context) -> UnusedFiles:
     """Find the lightmaps that bakes of the open file wrote and that it does not show."""
     images = [image for image in bpy.data.images if image.filepath_raw]
     shown = {Path(bpy.path.abspath(each.filepath_raw, library=each.library)).resolve() for each in images}
@@ -68,20 +68,20 @@ def unused_lightmaps(context: bpy.types.Context) -> Unused:
             copy = folder / BLEND_NAME
             if BLEND_NAME in contents[LISTED] and copy.exists() and copy.resolve() != here:
                 continue
-            for name, of in contents[LISTED].items():
+            for name, entry in contents[LISTED].items():
                 path = folder / name
                 if path.suffix.lower() not in LIGHTMAPS or name == PREVIEW_NAME or not path.is_file():
                     continue
                 if path.resolve() in shown:
                     continue
-                if is_as_written(path, of):
+                if is_as_written(path, entry):
                     files.setdefault(folder / report, []).append(name)
                 else:
                     changed.append(path)
-    return Unused(files, tuple(changed))
+    return UnusedFiles(files, tuple(changed))
 
 
-def delete(unused: Unused) -> int:
+def delete(unused: UnusedFiles) -> int:
     """Delete the files that nothing shows, and take them off their reports; returns how many.
 
     Raises

@@ -154,12 +154,12 @@ def light_on_active(context: bpy.types.Context) -> tuple[tuple[str, str], ...]:
     found = object_statistics(obj, context.scene, settings.unit, settings.efficacy)
     if found is None:
         return ()
-    of, unit = found
+    statistics, unit = found
     return (
-        ("Minimum", f"{of.minimum:.4g} {unit}"),
-        ("Mean", f"{of.mean:.4g} {unit}"),
-        ("Maximum", f"{of.maximum:.4g} {unit}"),
-        ("Uniformity", "–" if of.uniformity is None else f"{of.uniformity:.2f}"),
+        ("Minimum", f"{statistics.minimum:.4g} {unit}"),
+        ("Mean", f"{statistics.mean:.4g} {unit}"),
+        ("Maximum", f"{statistics.maximum:.4g} {unit}"),
+        ("Uniformity", "–" if statistics.uniformity is None else f"{statistics.uniformity:.2f}"),
     )
 
 

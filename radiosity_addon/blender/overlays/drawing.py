@@ -76,10 +76,10 @@ class PagedSurfaces:
         shader = page_shader()
         self._batches = {}
         for number in np.unique(page):
-            mine = page == number
+            on_page = page == number
             given = {
-                "pos": np.ascontiguousarray(corners[mine].reshape(-1, 3), dtype=np.float32),
-                "uv": np.ascontiguousarray(uv[mine].reshape(-1, 2), dtype=np.float32),
+                "pos": np.ascontiguousarray(corners[on_page].reshape(-1, 3), dtype=np.float32),
+                "uv": np.ascontiguousarray(uv[on_page].reshape(-1, 2), dtype=np.float32),
             }
             self._batches[int(number)] = batch_for_shader(shader, "TRIS", given)
         self._textures: list[Any] = []

@@ -71,12 +71,14 @@ def _draw_entries(legend: Legend, size: float) -> None:
 def _rectangles(places: list[tuple[float, float, float, float]], colors: list[tuple[float, ...]]) -> None:
     """Fill rectangles, given as (left, bottom, width, height)."""
     shader: Any = gpu.shader.from_builtin("FLAT_COLOR")
-    corners, of = [], []
+    corners, vertex_colors = [], []
     for (left, bottom, width, height), color in zip(places, colors, strict=True):
         right, top = left + width, bottom + height
         corners += [(left, bottom), (right, bottom), (right, top), (left, bottom), (right, top), (left, top)]
-        of += [color] * 6
-    batch_for_shader(shader, "TRIS", {"pos": [(*at, 0.0) for at in corners], "color": of}).draw(shader)
+        vertex_colors += [color] * 6
+    batch_for_shader(shader, "TRIS", {"pos": [(*at, 0.0) for at in corners], "color": vertex_colors}).draw(
+        shader
+    )
 
 
 def _write(text: str, x: float, y: float, size: float) -> None:

@@ -269,8 +269,8 @@ def chosen_elements(context: bpy.types.Context, kept: KeptDetails) -> Array:
     item = None if obj is None else kept.objects.get(obj.name.removesuffix(STAND_IN_SUFFIX))
     if item is None or obj.type != "MESH" or len(obj.data.polygons) == 0:
         return np.zeros(0, dtype=np.int64)
-    mine = np.flatnonzero(item.polygon == obj.data.polygons.active) + item.first
-    return leaves_on(record, mine)
+    triangles = np.flatnonzero(item.polygon == obj.data.polygons.active) + item.first
+    return leaves_on(record, triangles)
 
 
 def _scale(context: bpy.types.Context, values: Array, signed: bool) -> ColorScale:
@@ -284,11 +284,11 @@ def _scale(context: bpy.types.Context, values: Array, signed: bool) -> ColorScal
 def _surfaces(shown: Sequence[ShownLightmap], pages: dict[str, Array]) -> PagedTriangles:
     """Return objects with the pages that are theirs by name."""
     number = {name: row for row, name in enumerate(pages)}
-    of = [np.full(len(found.corners), number[str(found.image)], dtype=np.int32) for found in shown]
+    page = [np.full(len(found.corners), number[str(found.image)], dtype=np.int32) for found in shown]
     return PagedTriangles(
         np.concatenate([found.corners for found in shown]),
         np.concatenate([found.uv for found in shown]),
-        np.concatenate(of),
+        np.concatenate(page),
         list(pages.values()),
     )
 

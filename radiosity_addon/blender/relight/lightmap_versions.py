@@ -251,9 +251,9 @@ def _report_with(output: OutputFolder, wanted: Sequence[WantedFile]) -> BakeRepo
     """Return the report that the files had, with all that lies in the folder now."""
     from ...bake.result import BakeReport
 
-    now = output.earlier or {}
-    stored = next((state.reports[one.version] for one in wanted if one.version in state.reports), now)
-    before, listed = (report.get(LISTED, {}) for report in (stored, now))
+    current = output.earlier or {}
+    stored = next((state.reports[one.version] for one in wanted if one.version in state.reports), current)
+    before, listed = (report.get(LISTED, {}) for report in (stored, current))
     if before.get(output.names.sidecar) != listed.get(output.names.sidecar):
         # Its sidecar is not there any more.
         stored = {key: value for key, value in stored.items() if key != KEPT}

@@ -35,7 +35,7 @@ from ..scene_records.export_sources import MaterialSource
 from ..scene_records.light_linking import linking_warnings
 from ..scene_records.light_membership import Membership, PlaceGroups, name_on
 from ..scene_records.object_roles import BAKE, BAKEABLE_TYPES, IGNORE, role_of
-from ..scene_records.pieces import Collected, Found, names_of, piece_of
+from ..scene_records.pieces import Found, SceneContents, names_of, piece_of
 from ..scene_records.render_state import background_scenes
 from ..scene_records.scene_objects import (
     identity_of,
@@ -62,7 +62,7 @@ def collect(
     factors: LampFactors,
     settings: BakeSettings | None = None,
     dark: bool = False,
-) -> Collected:
+) -> SceneContents:
     """Read meshes, materials and lamps of an evaluated scene; `factors` are those of `lamp_factors`.
 
     `settings.ignore` and `settings.light_only` name objects to leave out, or without lightmaps; `dark` takes
@@ -77,7 +77,7 @@ def collect(
 
 def collect_steps(
     view: View, factors: LampFactors, settings: BakeSettings, dark: bool
-) -> Generator[float, None, Callable[[], Collected]]:
+) -> Generator[float, None, Callable[[], SceneContents]]:
     """Copy meshes, materials and lamps of a scene, as much a step as fits into a moment.
 
     view: Shows the scene, for a step.
@@ -145,9 +145,9 @@ class _Collector:
             self._unknown.append(BakeWarning(name, message))
         return complete
 
-    def sorted_out(self) -> Collected:
+    def sorted_out(self) -> SceneContents:
         """Return what was found and is still there, in the scene's order; needs no Blender."""
-        collected = Collected([], [], [], [], [], [])
+        collected = SceneContents([], [], [], [], [], [])
         rows: dict[int, int] = {}
         read: dict[int, MeshArrays | None] = {}
         for key in self._order:
@@ -298,10 +298,10 @@ class _Collector:
                 unreliable = _warnings_of(material, unreliable_nodes(material.node_tree))
                 warnings += unreliable if can_evaluate() else surface.fallbacks
             self._surface_of[key] = len(self._surfaces)
-            of = (
+            source = (
                 None if material is None else MaterialSource.of(material.original, name_on(material.original))
             )
-            self._surfaces.append((surface, of, warnings, asked))
+            self._surfaces.append((surface, source, warnings, asked))
         return self._surface_of[key]
 
 

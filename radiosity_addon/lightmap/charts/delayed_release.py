@@ -21,7 +21,7 @@ MAX_WAITING = max(8, min(256, 1024 // (os.cpu_count() or 1)))
 """Maximum number of waiting objects: each keeps as many threads as the machine has cores."""
 
 
-class Resting:
+class DelayedRelease:
     """Keeps objects alive for a while; expired ones are released when a new one arrives.
 
     rest: Seconds that each is kept at least.

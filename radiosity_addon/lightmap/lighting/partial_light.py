@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...numerics import Array
-from ...solver.gather import NOTHING, Gathered, LocalPass, values_of
+from ...solver.gather import NOTHING, GatheredHits, LocalPass, values_of
 from ..texels import NO_TEXEL, TexelGeometry
 from ..transport import HitTable
 
@@ -38,7 +38,7 @@ class LightSoFar:
         self._table: HitTable | None = None
         self._element = np.zeros(0, dtype=np.int32)
         self._direct = self._reflectance = self._emission = np.zeros((0, 3))
-        self._waiting: list[tuple[Array, Gathered, int]] = []
+        self._waiting: list[tuple[Array, GatheredHits, int]] = []
         self._expected: Array | None = None
         self._indirect: Array | None = None
         self._gathered = np.zeros(0, dtype=bool)
@@ -72,7 +72,7 @@ class LightSoFar:
         """Note that another lamp has been asked everywhere."""
         self.version += 1
 
-    def met(self, table: HitTable, rows: Array, gathered: Gathered, stride: int) -> None:
+    def met(self, table: HitTable, rows: Array, gathered: GatheredHits, stride: int) -> None:
         """Note what (g,) texels gathered that lie `stride` texels apart."""
         if len(rows):
             self._table = table
@@ -128,15 +128,15 @@ class LightSoFar:
         )
         texel = np.full(row.shape, NO_TEXEL, dtype=np.int32)
         for page, numbers in enumerate(geometry.index):
-            mine = (geometry.page[rows] == page)[:, None] & (row < len(numbers)) & (column < len(numbers))
-            texel[mine] = numbers[row[mine], column[mine]]
+            on_page = (geometry.page[rows] == page)[:, None] & (row < len(numbers)) & (column < len(numbers))
+            texel[on_page] = numbers[row[on_page], column[on_page]]
         normal = geometry.surface_normal
         near = np.einsum("gk,gsk->gs", normal[rows], normal[texel]) > ALIKE
         point = np.broadcast_to(np.arange(len(rows))[:, None], texel.shape)
         found = (texel != NO_TEXEL) & near
         return texel[found], point[found]
 
-    def _brought(self, gathered: Gathered) -> Array:
+    def _brought(self, gathered: GatheredHits) -> Array:
         """Return (g, 3) what rays brought by the hierarchy's light [W/m²]."""
         mean = self._values_at(gathered.sources[:, ::EVERY]).mean(axis=1)
         aimed = gathered.aimed

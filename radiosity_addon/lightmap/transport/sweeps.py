@@ -249,8 +249,8 @@ def _reached(links: GatherLinks, cells: SubCellSweeps, direct: Array, beyond: in
     while True:
         dark, step = row_numbers(~aims), max(CHUNK_HITS // links.sources.shape[1], 1)
         for first in range(0, len(dark), step):
-            some = dark[first : first + step]
-            aims[some] = padded[links.sources[some]].any(axis=1)
+            chunk = dark[first : first + step]
+            aims[chunk] = padded[links.sources[chunk]].any(axis=1)
             trim()
         links.mark_aims(aims, padded)
         more = ~padded[: len(direct)] & links.spread.any_of(aims)

@@ -176,7 +176,7 @@ def _job(uv: Float, chart: Int, limits: Limits) -> _Job:
 
 
 @dataclass(frozen=True)
-class _Scaled:
+class _ScaledCharts:
     """Cells per meter (count, 2) of each chart and the shapes they have then.
 
     For an even and for an odd number of quarter turns.
@@ -186,11 +186,11 @@ class _Scaled:
     shapes: tuple[Shapes, Shapes]
 
 
-def _scaled(job: _Job, scale: float, cell: int, stretch: float = 1.0) -> _Scaled:
+def _scaled(job: _Job, scale: float, cell: int, stretch: float = 1.0) -> _ScaledCharts:
     """Return the charts at `scale` texels per meter, stretched along the page's u."""
     even = _measured(job, scale * np.array((stretch**0.5, stretch**-0.5)), cell)
     odd = even if stretch == 1.0 else _measured(job, scale * np.array((stretch**-0.5, stretch**0.5)), cell)
-    return _Scaled((even[0], odd[0]), (even[1], odd[1]))
+    return _ScaledCharts((even[0], odd[0]), (even[1], odd[1]))
 
 
 def _measured(job: _Job, scale: Float, cell: int) -> tuple[Float, Shapes]:
@@ -297,7 +297,7 @@ def _place(job: _Job, shapes: tuple[Shapes, Shapes], side: int, cell: int) -> tu
     return None, placement.height if placement is not None else 0
 
 
-def _moved(job: _Job, scaled: _Scaled, placement: Placement, cell: int) -> Float:
+def _moved(job: _Job, scaled: _ScaledCharts, placement: Placement, cell: int) -> Float:
     """Return (n, 3, 2) chart corners turned and moved to their place [cells]."""
     chart = job.chart
     quarter = placement.quarter[chart]

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...numerics import Array
 from ...rays import SIGHT_LIFT, EmbreeCaster, RayCaster
-from ...solver.gather import UNNUMBERED, Boxes, ElementLookup, Moved
+from ...solver.gather import UNNUMBERED, Boxes, ElementLookup, MovedGeometry
 from ..texels import Crossings, SmoothLift, TexelGeometry
 from ..transport import HitTable
 
@@ -58,13 +58,13 @@ class AffectedTexels:
         """(n,) bool: those that moved."""
         return np.asarray(self.moved[self.geometry.triangle])
 
-    def traced(self, before: RayCaster) -> Moved:
+    def traced(self, before: RayCaster) -> MovedGeometry:
         """Return what tells the rays that what moved is in the way of; `before` casts those of before."""
-        return Moved(self.boxes, self._alone, before)
+        return MovedGeometry(self.boxes, self._alone, before)
 
     @cached_property
     def _alone(self) -> RayCaster:
-        both = [some.triangles[self.moved] for some in (self.before, self.geometry)]
+        both = [geometry.triangles[self.moved] for geometry in (self.before, self.geometry)]
         return EmbreeCaster(np.concatenate(both), threads=1)
 
     @cached_property
@@ -94,16 +94,16 @@ class AffectedTexels:
         divided : (n,) bool
             See `divided`.
         """
-        now = np.arange(old.end, dtype=np.int32)
+        numbers = np.arange(old.end, dtype=np.int32)
         # A hit on a divided texel may have been answered by a neighbor.
         texels = self.texels | self.geometry.neighborhood(divided)
-        now[: old.texel_count][texels] = UNNUMBERED
-        now[old.texel_count : old.first_cell][self._cells_near(table.local.elements)] = UNNUMBERED
+        numbers[: old.texel_count][texels] = UNNUMBERED
+        numbers[old.texel_count : old.first_cell][self._cells_near(table.local.elements)] = UNNUMBERED
         cells = old.texel_cells.renumbered(table.texel_cells)
-        of = old.texel_cells.texel_of(np.arange(len(cells)))
-        stale = (cells < 0) | texels[of]
-        now[old.first_cell :] = np.where(stale, UNNUMBERED, cells + table.first_cell)
-        return now
+        texel = old.texel_cells.texel_of(np.arange(len(cells)))
+        stale = (cells < 0) | texels[texel]
+        numbers[old.first_cell :] = np.where(stale, UNNUMBERED, cells + table.first_cell)
+        return numbers
 
     def _cells_near(self, elements: ElementLookup) -> Array:
         """Return (cells,) bool: those of elements that moved, or that a box touches."""

@@ -40,20 +40,25 @@ def corrected(hierarchy: Hierarchy, links: Links, closed: Array, received: Array
     rows = np.flatnonzero((source >= 0) & (links.visibility > 0) & (links.visibility < 1))
     faces, area = len(hierarchy.faces), hierarchy.faces.area
     receiver, source = links.receiver[rows], source[rows]
-    to, of = hierarchy.face[receiver], hierarchy.face[source]
+    receiver_face, source_face = hierarchy.face[receiver], hierarchy.face[source]
     visibility = links.visibility[rows].astype(np.float64)
     doubtful = hierarchy.area[receiver] * links.factor[rows] * visibility * (1.0 - visibility)
     # A partly opaque surface receives and sends only that part.
     arriving, leaving = doubtful * hierarchy.opacity[source], doubtful * hierarchy.opacity[receiver]
-    at_receivers, at_sources = np.bincount(to, arriving, faces), np.bincount(of, leaving, faces)
+    at_receivers, at_sources = (
+        np.bincount(receiver_face, arriving, faces),
+        np.bincount(source_face, leaving, faces),
+    )
     of_receiver, of_source = np.zeros(faces), np.zeros(faces)
     for _ in range(CORRECTION_ROUNDS):
-        lacking = area * (1.0 - received) - np.bincount(to, arriving * of_source[of], faces)
+        lacking = area * (1.0 - received) - np.bincount(
+            receiver_face, arriving * of_source[source_face], faces
+        )
         of_receiver = _shared_out(lacking, at_receivers, closed, area)
-        lacking = area * (1.0 - sent) - np.bincount(of, leaving * of_receiver[to], faces)
+        lacking = area * (1.0 - sent) - np.bincount(source_face, leaving * of_receiver[receiver_face], faces)
         of_source = _shared_out(lacking, at_sources, closed, area)
     everywhere = links.visibility.copy()
-    changed = visibility * (1.0 + (1.0 - visibility) * (of_receiver[to] + of_source[of]))
+    changed = visibility * (1.0 + (1.0 - visibility) * (of_receiver[receiver_face] + of_source[source_face]))
     everywhere[rows] = np.clip(changed, 0.0, 1.0)
     return replace(links, visibility=everywhere)
 

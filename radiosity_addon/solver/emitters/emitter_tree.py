@@ -33,7 +33,7 @@ THINNEST = 1e-3
 
 
 @dataclass(frozen=True)
-class Asked:
+class EmitterPairs:
     """The nodes that n points ask, p pairs sorted by point.
 
     row, node (p,) int.
@@ -94,10 +94,10 @@ class EmitterTree:
         self.polygon = self.center[:, None] + around[:, :1] * one[:, None] + around[:, 1:] * other[:, None]
         self._scale = length / np.maximum(4.0 * half.prod(axis=1), 1e-300)
         single = np.flatnonzero(self._single)
-        of = self.begin[single]
+        face = self.begin[single]
         # A repeated corner is an edge of no length.
-        self.polygon[single] = corners[of][:, [0, 1, 2, 2]]
-        self._scale[single] = weight[of] / np.maximum(triangle_areas(local[of]), 1e-300)
+        self.polygon[single] = corners[face][:, [0, 1, 2, 2]]
+        self._scale[single] = weight[face] / np.maximum(triangle_areas(local[face]), 1e-300)
         self.facing = facing
         self.radius, self._slant = self._extremes(corners, normals)
         flat, coherent = self._slant <= FLAT_SINE, self._slant <= MOST_SLANT
@@ -113,15 +113,15 @@ class EmitterTree:
         radius, cosine = np.zeros((2, len(self.begin)))
         for first, last in zip(self._levels[:-1], self._levels[1:], strict=True):
             held = first + np.flatnonzero(self.end[first:last] > self.begin[first:last])
-            of = np.repeat(held, self.end[held] - self.begin[held])
-            apart = np.linalg.norm(corners - self.center[of][:, None], axis=2).max(axis=1)
+            node = np.repeat(held, self.end[held] - self.begin[held])
+            apart = np.linalg.norm(corners - self.center[node][:, None], axis=2).max(axis=1)
             radius[held] = np.maximum.reduceat(apart, self.begin[held])
-            along = np.einsum("mi,mi->m", normals, self.facing[of])
+            along = np.einsum("mi,mi->m", normals, self.facing[node])
             cosine[held] = np.minimum.reduceat(along, self.begin[held])
         sine = np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
         return radius, np.where(cosine > 0.0, sine, 1.0)
 
-    def ask(self, points: Array, normals: Array) -> Asked:
+    def ask(self, points: Array, normals: Array) -> EmitterPairs:
         """Return what points (n, 3) that face along `normals` get from nodes that together are all faces."""
         row, node = np.arange(len(points)), np.zeros(len(points), dtype=np.int64)
         rows, nodes = [], []
@@ -137,11 +137,11 @@ class EmitterTree:
             seen = (height <= radius) & (front >= -(radius + slant))
             single = self._single.take(node)
             whole = (slant <= FLAT_SINE * distance) | (front >= radius + slant)
-            asked = single | (whole & (radius <= self._smallness.take(node) * distance))
-            done = np.flatnonzero(seen & asked)
+            settled = single | (whole & (radius <= self._smallness.take(node) * distance))
+            done = np.flatnonzero(seen & settled)
             rows.append(row[done])
             nodes.append(node[done])
-            more = np.flatnonzero(seen & ~asked)
+            more = np.flatnonzero(seen & ~settled)
             child = self._child.take(node[more])
             row = np.repeat(row[more], 2)
             node = np.stack([child, child + 1], axis=1).ravel()
@@ -149,9 +149,9 @@ class EmitterTree:
         shapes = self.polygon.take(node, axis=0)
         factor = point_to_polygon(points.take(row, axis=0), normals.take(row, axis=0), shapes, contact=False)
         factor *= self._scale.take(node)
-        some = np.flatnonzero(factor > 0)
-        some = some[np.argsort(row[some], kind="stable")]
-        return Asked(row[some], node[some], factor[some])
+        lit = np.flatnonzero(factor > 0)
+        lit = lit[np.argsort(row[lit], kind="stable")]
+        return EmitterPairs(row[lit], node[lit], factor[lit])
 
 
 def _sorted_tree(places: Array, normals: Array) -> tuple[Array, list[Array]]:

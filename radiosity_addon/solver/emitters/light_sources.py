@@ -95,9 +95,9 @@ class LightSources:
         triangle (n,) int: Whose surfaces they are.
         """
         result = emission.copy()
-        of = self.emitter[triangle]
+        emitter = self.emitter[triangle]
         for source in range(len(self.strengths) - len(self.lights)):
-            rows = np.flatnonzero(of == source)
+            rows = np.flatnonzero(emitter == source)
             result[rows] = self._changed(emission[rows], source, strengths)
         return result
 

@@ -64,10 +64,10 @@ def emissive_pieces(faces: Faces, rows: Array, images: SurfaceImages) -> tuple[A
         room = max((MAX_PIECES - len(face)) // 3, 1)
         chosen = np.sort(chosen[np.argsort(-spread[chosen], kind="stable")[:room]])
         children = split_in_four(weights[chosen]).reshape(-1, 3, 2)
-        of = np.repeat(face[chosen], 4)
-        new = _part_emissions(faces, of, children, images) * np.repeat(level[chosen], 4)[:, None, None]
+        parent = np.repeat(face[chosen], 4)
+        new = _part_emissions(faces, parent, children, images) * np.repeat(level[chosen], 4)[:, None, None]
         kept = np.delete(np.arange(len(face)), chosen)
-        face = np.concatenate([face[kept], of])
+        face = np.concatenate([face[kept], parent])
         level = np.concatenate([level[kept], np.repeat(level[chosen], 4)])
         weights = np.concatenate([weights[kept], children])
         area = np.concatenate([area[kept], np.repeat(area[chosen] / 4, 4)])

@@ -86,8 +86,8 @@ class AimedRays:
 
     def of_points(self, chosen: Array) -> AimedRays:
         """Return those of the gather points that a mask (g,) has chosen, numbered among these."""
-        mine = self.entries(chosen[self.row])
-        return replace(mine, row=(np.cumsum(chosen) - 1)[mine.row])
+        rays = self.entries(chosen[self.row])
+        return replace(rays, row=(np.cumsum(chosen) - 1)[rays.row])
 
 
 class AimedTable:
@@ -106,11 +106,14 @@ class AimedTable:
             return
         if not self._columns:
             width, make = rays.sources.shape[1], self._scratch.rows
-            self._columns = make(1, np.int64), *(make(width, of) for of in (np.int32, np.float32, np.int32))
+            self._columns = (
+                make(1, np.int64),
+                *(make(width, kind) for kind in (np.int32, np.float32, np.int32)),
+            )
         for rows in tiles(len(rays.row), TABLE_ROWS):
             values = rays.row[rows] + first, rays.sources[rows], rays.weights[rows], rays.element[rows]
-            for column, some in zip(self._columns, values, strict=True):
-                column.extend(some)
+            for column, added in zip(self._columns, values, strict=True):
+                column.extend(added)
 
     def all(self) -> AimedRays:
         """Return all rays, and give the table up."""

@@ -68,12 +68,12 @@ class DirectLight:
         if gains is not None:
             points = replace(points, expected=None)
         spread = self._spread(points)
-        for asked, part in progress.each(lights):
-            arriving = self._arriving(asked, spread, rays, part)
+        for query, part in progress.each(lights):
+            arriving = self._arriving(query, spread, rays, part)
             for rows in tiles(len(total)):
-                total[rows] += arriving[rows, None] * asked.light.strength
+                total[rows] += arriving[rows, None] * query.light.strength
             if gains is not None:
-                gains.put(asked.number, arriving)
+                gains.put(query.number, arriving)
             if tell is not None:
                 tell()
         return total
@@ -87,9 +87,13 @@ class DirectLight:
         ]
         first, seed, step = len(self._state.scene.lights), self._state.settings.seed, SHADOW_STEP
         of_lamps, of_groups = seed + Stream.LAMP_SHADOWS, seed + Stream.EMITTER_SHADOWS
-        asked = [LightQuery(lit, row, of_lamps + step * place) for place, (row, lit) in enumerate(lamps)]
+        lamps_asked = [
+            LightQuery(lit, row, of_lamps + step * place) for place, (row, lit) in enumerate(lamps)
+        ]
         groups = enumerate(self.emitters)
-        return asked + [LightQuery(lit, first + place, of_groups + step * place) for place, lit in groups]
+        return lamps_asked + [
+            LightQuery(lit, first + place, of_groups + step * place) for place, lit in groups
+        ]
 
     def gain(
         self, asked: LightQuery, points: Footprints, rays: int | None = None, progress: Progress = SILENT

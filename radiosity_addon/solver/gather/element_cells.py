@@ -87,8 +87,8 @@ class ElementCells:
         for turn in range(CELLS):
             cell = order[waiting, turn]
             seen = free_segment(self._caster, position[waiting], anchors[waiting, cell])
-            some = waiting[seen]
-            found[some] = self._hierarchy.n_elements + CELLS * leaf[some] + cell[seen]
+            rows = waiting[seen]
+            found[rows] = self._hierarchy.n_elements + CELLS * leaf[rows] + cell[seen]
             waiting = waiting[~seen]
         return found
 

@@ -144,10 +144,10 @@ class SpreadPoints:
         mean = np.empty(len(rows))
         step = CHUNK_POINTS // MORE_GAINS * SPREAD
         for start in range(0, len(rows), step):
-            some = rows[start : start + step]
-            unit = stratified_square(self.at.keys[some], MORE_GAINS, self._seed)
+            chunk = rows[start : start + step]
+            unit = stratified_square(self.at.keys[chunk], MORE_GAINS, self._seed)
             assert self.at.sampler is not None
-            mean[start : start + step] = self.gains(light, some, self.at.sampler(some, unit)).mean(axis=1)
+            mean[start : start + step] = self.gains(light, chunk, self.at.sampler(chunk, unit)).mean(axis=1)
         return mean
 
     def gains(self, light: Lamp | EmitterGroup, rows: Array, points: Array) -> Array:

@@ -217,10 +217,10 @@ def _measure(
     rows: slice,
 ) -> tuple[Array, Array]:
     """Measure one light on elements, whole or in four pieces (see `measure_light`)."""
-    asked = _pieces(hierarchy, elements[rows], pieces)
+    parts = _pieces(hierarchy, elements[rows], pieces)
     if isinstance(light, EnvironmentLight):
-        return _measure_sky(asked, light, caster, seed, divisor)
-    return _measure_lamp(asked, light, caster, seed, divisor)
+        return _measure_sky(parts, light, caster, seed, divisor)
+    return _measure_lamp(parts, light, caster, seed, divisor)
 
 
 @dataclass(frozen=True)

@@ -132,8 +132,8 @@ def add_rows(state: TwoLevelState, new: Array, progress: Progress = SILENT) -> N
         exchange = exchange_areas(
             hierarchy, state.caster, one, other, state.settings.seed, state.settings.threads
         )
-        to = kept + start + np.arange(len(block))
-        state.factors[to] = exchange.reshape(len(block), -1) / hierarchy.area[block][:, None]
+        target = kept + start + np.arange(len(block))
+        state.factors[target] = exchange.reshape(len(block), -1) / hierarchy.area[block][:, None]
         progress.at((start + len(block)) / len(new), state)
     state.details["two_level"]["elements"].append(len(state.leaves))
     state.details["two_level"]["rows"].append(len(new))
