@@ -44,7 +44,7 @@ class RememberedLightmap(NamedTuple):
 class ShownBake(NamedTuple):
     """What is remembered of a scene's lightmaps.
 
-    lightmaps mapping of str to ShownLightmap: Of the objects that show one.
+    lightmaps mapping of str to RememberedLightmap: Of the objects that show one.
     objects mapping of str to str: Digest of each object that the last bake had, with a lightmap or not, cut
         to `SHORT`.
     """

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from radiosity_addon.blender.apply.restore import restore
-from radiosity_addon.blender.datablocks.bake_record import is_made
-from radiosity_addon.blender.material_copies.copy_marks import ORIGINAL
+from radiosity_addon.blender.datablocks.bake_record import ORIGINAL, is_made
 from radiosity_addon.blender.material_edits.material_edits import carry_material_edits
 from radiosity_addon.blender.materials.materials import read_material
 from tests.blender.edited_copies import (

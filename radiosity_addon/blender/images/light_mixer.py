@@ -14,13 +14,13 @@ from dataclasses import dataclass
 import bpy
 
 from ..datablocks.bake_record import is_made, mark_made
+from .node_group import LIGHTMAP
 
 MIXER_NAME = "Radiosity Light Groups"
 SLIDERS_NAME = "Radiosity Light Group"
 
 COLOR, STRENGTH, TEXEL, SCALE = "Color", "Strength", "Texel", "Scale"
 FACTOR, LIGHT = "Factor", "Light"
-LIGHTMAP = "Lightmap"
 
 KIND = "radiosity_mixer"
 """Custom property of the mixer, also where it is set aside."""

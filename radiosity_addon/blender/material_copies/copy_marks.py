@@ -10,16 +10,13 @@ from collections.abc import Iterator
 
 import bpy
 
-from ..datablocks.bake_record import MADE_MARKER, is_made
+from ..datablocks.bake_record import MADE_MARKER, ORIGINAL, is_made
 from ..datablocks.image_marks import GROUP
 
 SUFFIX = " (Lightmap)"
 """What a copy's name ends with."""
 
 NO_MATERIAL = f"No Material{SUFFIX}"
-
-ORIGINAL = "radiosity_original"
-"""On a copy: the material or node group that it is of; missing for a copy of no material."""
 
 COPY_NAME = "radiosity_copy_name"
 """On a copied material: the name we gave it."""

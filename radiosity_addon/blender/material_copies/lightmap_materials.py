@@ -14,7 +14,7 @@ import bpy
 
 from ...numerics import brdf_of_reflectance, radiance_of_radiosity
 from ...scene import LIGHTMAP_UV_LAYER
-from ..datablocks.bake_record import is_made, mark_made
+from ..datablocks.bake_record import ORIGINAL, is_made, mark_made
 from ..datablocks.image_marks import GROUP
 from ..images.images import image_scale
 from ..images.light_mixer import factor_of
@@ -36,7 +36,6 @@ from .copy_marks import (
     FED,
     FED_BY,
     NO_MATERIAL,
-    ORIGINAL,
     PLAIN,
     SAMPLING,
     SUFFIX,

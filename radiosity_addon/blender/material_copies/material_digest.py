@@ -13,10 +13,11 @@ from typing import Any, TypeAlias
 
 import bpy
 
+from ..datablocks.bake_record import ORIGINAL
 from ..datablocks.keyed_paths import curves, path_of
 from ..images.node_group import BASE_COLOR, EMISSION
 from ..materials.materials import uses_nodes
-from .copy_marks import COPY_MARKS, FED, NODE_MARKS, ORIGINAL, is_added, is_copied_group
+from .copy_marks import COPY_MARKS, FED, NODE_MARKS, is_added, is_copied_group
 
 Reader: TypeAlias = Callable[[Any], Any]
 Readers: TypeAlias = tuple[Reader, tuple[tuple[str, Reader], ...]]

@@ -8,9 +8,9 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..datablocks.bake_record import is_made
+from ..datablocks.bake_record import ORIGINAL, is_made
 from ..images.node_group import BASE_COLOR, EMISSION, SHADER
-from ..material_copies.copy_marks import COPY_MARKS, ORIGINAL, STATE
+from ..material_copies.copy_marks import COPY_MARKS, STATE
 from ..material_copies.material_digest import digest_of_material
 from ..materials.materials import DEFAULT_GRAY
 from ..materials.shader_nodes import feed_of

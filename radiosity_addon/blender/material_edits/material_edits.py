@@ -15,13 +15,12 @@ import numpy as np
 
 from ...base import BakeWarning
 from ..datablocks.asset_marks import take_marks
-from ..datablocks.bake_record import is_made
+from ..datablocks.bake_record import ORIGINAL, is_made
 from ..material_copies.copy_marks import (
     CARRIED,
     CONTENT,
     COPY_NAME,
     NO_MATERIAL,
-    ORIGINAL,
     PLAIN,
     SOURCE,
     STATE,

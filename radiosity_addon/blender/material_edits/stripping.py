@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..datablocks.bake_record import is_made
+from ..datablocks.bake_record import ORIGINAL, is_made
 from ..datablocks.keyed_paths import move_keys, path_of
 from ..images.node_group import BASE_COLOR, EMISSION, SHADER, SURFACE
 from ..material_copies.copy_marks import (
@@ -12,7 +12,6 @@ from ..material_copies.copy_marks import (
     FED,
     FED_BY,
     NODE_MARKS,
-    ORIGINAL,
     SAMPLING,
     SOCKETS,
     THROUGH,
