@@ -15,7 +15,7 @@ from ..solver.links import COARSEST_FAINT
 from .quality import used_settings
 
 MIN_SIDE = 8
-"""An object with fewer than the square of so many texels is warned of."""
+"""Objects with fewer texels than the square of this cause a warning."""
 
 
 def small_objects(
@@ -25,16 +25,16 @@ def small_objects(
     counts = geometry.counts
     texels = [int(counts[item.rows].sum()) for item in baked]
     greedy = greedy_object([item.name for item in baked], texels)
-    mend = "raise the resolution or its texel scale"
+    advice = "raise the resolution or its texel scale"
     if greedy is not None:
         taken = share_of(max(texels), sum(texels))
-        mend = f"object '{greedy}' takes {taken} of all texels; lower its texel scale"
+        advice = f"object '{greedy}' takes {taken} of all texels; lower its texel scale"
     for item, own in zip(baked, texels, strict=True):
         surface = bake_scene.scene.areas[item.rows].sum()
         if surface > 0 and own < MIN_SIDE**2:
             yield BakeWarning(
                 item.name,
-                f"object '{item.name}' gets only {own} texels, fewer than {MIN_SIDE} × {MIN_SIDE}: {mend}",
+                f"object '{item.name}' gets only {own} texels, fewer than {MIN_SIDE} × {MIN_SIDE}: {advice}",
             )
 
 

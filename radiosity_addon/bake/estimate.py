@@ -78,9 +78,9 @@ class Estimate:
 
     pages: Each page's width and height in texels.
     texels: Parallel to the objects: about how many each gets.
-    memory: What it takes beside what Blender has taken already [bytes], …
+    memory: What it takes in addition to what Blender already uses [bytes], …
     files: … and what does not fit into the memory limit: temporary files take it [bytes].
-    seconds: None where it depends on what is found: an error that is asked for, and methods for study.
+    seconds: None where it depends on the results: bakes to a target error, and methods for study.
     """
 
     pages: tuple[int, ...]
@@ -118,7 +118,7 @@ def estimate_bake(objects: Sequence[LightmappedObject], triangles: int, settings
 
 
 def refuse_before_unwrapping(bake_scene: BakeScene, settings: BakeSettings) -> None:
-    """Refuse pages that will not fit into the memory limit, as far as areas tell how large they get.
+    """Refuse pages that will not fit into the memory limit, as far as their size follows from areas.
 
     Raises UsageError: See `refuse_large_pages`.
     """

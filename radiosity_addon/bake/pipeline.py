@@ -96,7 +96,7 @@ def bake_and_keep(
 ) -> tuple[BakeResult, KeptBake]:
     """Bake lightmaps, and keep what relighting needs (`kept_bake.py`).
 
-    Every lamp is asked for with all its shadow rays, those that are dark now too, so that scenes of
+    Every lamp gets all its shadow rays, also those that are dark now, so that scenes of
     many lamps take longer than by `bake`. Parameters and errors are those of `bake`.
 
     Raises UsageError if the method keeps no links, or the quantity is the residual.
@@ -163,7 +163,7 @@ def finish(
     seconds: dict[str, float],
     progress: Progress,
 ) -> tuple[BakeResult, KeptBake | None]:
-    """Put what texels hold on pages, and tell of the bake; what was kept goes on in the kept bake."""
+    """Put texel values on pages, and report the bake; data to keep goes into the kept bake."""
     baked = baked_objects(bake_scene)
     progress.stage("encode", 0.0, 0.0).at(0.0)
     with timed(seconds, "encode"):
@@ -307,7 +307,7 @@ def _texel_values(
     so_far: LightSoFar | None,
     progress: Progress,
 ) -> TexelValues:
-    """Compute the quantity asked for at all texels, and estimate the light's relative error."""
+    """Compute the requested quantity at all texels, and estimate the light's relative error."""
     if settings.quantity == "residual":
         residual = texel_residual(solution, geometry, gather, progress)
         return TexelValues(residual, solution.local_pass.caster)

@@ -21,7 +21,7 @@ from .relight import KeptBake
 from .scene_diff import Part, compare, light_digest, rounded_digest, scene_record
 
 SHORT = 16
-"""Characters of the digests by which objects that are gone are told from renamed ones."""
+"""Characters of the digests that distinguish objects that are gone from renamed ones."""
 
 _NAMED = 5
 """Objects that a message names."""

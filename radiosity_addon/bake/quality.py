@@ -63,7 +63,7 @@ COARSEST = Quality(
     SolverSettings(shadow_rays=2, error=3e-3, min_area=3e-4),
     GatherSettings(strides=(4, 2, 1), support=0.2, rays=32, tolerance=2e-3),
 )
-"""What is bought for the largest errors that are asked for."""
+"""The settings for the largest target errors."""
 
 LADDER = (
     (0.029, COARSEST),
@@ -75,14 +75,14 @@ LADDER = (
 (docs/decisions/0020)."""
 
 FEWEST_RAYS, MOST_RAYS = COARSEST.gather.rays, 2048
-"""A gather point's rays, whatever error is asked for."""
+"""Limits of a gather point's rays, for every target error."""
 
 
 def for_error(error: float) -> Quality:
     """Return what would reach a relative RMS error in the Cornell box: between the qualities, and beyond.
 
     Every number follows a power of the error, from one quality to the next; other scenes take
-    more or less, which the estimate of the error then tells.
+    more or less, which the estimate of the error then shows.
     """
     rung = sum(error <= step for step, _ in LADDER[1:-1])
     (low_error, low), (high_error, high) = LADDER[rung : rung + 2]

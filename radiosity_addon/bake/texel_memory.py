@@ -37,7 +37,7 @@ SHOWN_BYTES, SHOWN_SHARE = 200.0, 0.3
 of what is free then."""
 
 PROCESS_BYTES = 600e6
-"""What Blender and a scene take where the system does not tell."""
+"""What Blender and a scene take if the system does not report it."""
 
 
 def memory_limit(settings: BakeSettings) -> float:

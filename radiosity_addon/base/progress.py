@@ -1,4 +1,4 @@
-"""How far long work is: one object, passed down to all who do it, that also tells them to stop."""
+"""The progress of long work: one object, passed down to all parts of it, which also cancels them."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ MAX_SINGLE = 3
 """So many of a kind are shown one by one."""
 
 MAX_NAMED = 3
-"""So many others are named beside the first one of a kind."""
+"""At most this many others are named after the first one of a kind."""
 
 _PARTICULARS = re.compile(r"'[^']*'|\d+(?:[.,]\d+)*")
 """What differs between warnings of a kind: names and numbers."""

@@ -8,16 +8,16 @@ from collections import deque
 from collections.abc import Callable
 
 FIRST_SECONDS, FIRST_FRACTION = 1.0, 0.1
-"""Nothing is said before so much time and so much of the work: the first steps tell nothing of the others."""
+"""No estimate before this time and this part of the work: the first steps do not predict the others."""
 
 RECENT = 0.35
 """The pace is that of this last part of the time so far, …"""
 
 SLOWEST = 0.5
-"""… but no less than this share of the mean pace: a step that stands still will not do so for ever."""
+"""… but no less than this share of the mean pace: a step that makes no progress will end."""
 
 SHORTEST_MEMORY, MEMORY = 0.7, 0.08
-"""What is shown follows a new estimate within so many seconds, or this share of it."""
+"""The shown time follows a new estimate within this many seconds, or this share of it."""
 
 READING_INTERVAL = 0.05
 """Seconds between two readings that are remembered."""

@@ -250,8 +250,8 @@ def _outline_factor(outer: Float64Array, inner: Float64Array, area: Float64Array
             if bisection < BLIND_BISECTIONS:
                 middle = start[part] + (from_t[part, None] + 0.5 * width) * edge[part]
                 square = width * width * np.einsum("ij,ij->i", edge[part], edge[part])
-                beside = _square_distances(middle, inner[row[part]]) < square
-                error[part] = np.maximum(error[part], np.where(beside, BLIND_ERROR * square, 0.0))
+                near = _square_distances(middle, inner[row[part]]) < square
+                error[part] = np.maximum(error[part], np.where(near, BLIND_ERROR * square, 0.0))
         again = error > TOLERANCE * scale[row]
         if bisection == MAX_BISECTIONS:
             again[:] = False

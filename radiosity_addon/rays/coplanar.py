@@ -3,7 +3,7 @@
 The back of a one-sided triangle is black. Where another surface lies in it and faces the ray, that
 one is in front, but Embree reports either, as rounding has it. So sides of which a black back may lie
 in the same plane get a copy, moved out toward where they look: seen from there it comes first. The
-triangle itself stays, so nothing opens beside it.
+triangle itself stays, so no gap opens next to it.
 """
 
 from __future__ import annotations

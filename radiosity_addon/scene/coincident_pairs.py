@@ -13,7 +13,7 @@ TOLERANCE = 1e-6
 """Faces that are no farther apart than this [m], …"""
 
 SPACINGS = 8.0
-"""… or than so many float32 spacings of their coordinates, are in one place."""
+"""… or than this many float32 spacings of their coordinates, coincide."""
 
 SLACK = 1.25
 """Factor on the tolerance: a distance of a micrometer may be slightly more in float32."""

@@ -111,5 +111,5 @@ def test_what_lies_beside_a_face_is_told_by_the_boxes_of_faces() -> None:
     group = EmitterGroup(np.concatenate([left, right]), np.tile([0.0, 0.0, 1.0], (4, 1)), np.ones(3), 1e-6)
     points = np.array([[0.5, 0.5, 0.3], [1.2, 1.2, 0.0], [5.0, 0.5, 0.0], [9.5, 0.5, -0.5], [12.0, 0.5, 0.0]])
     reach = np.array([0.31, 0.28, 0.3, 0.4, 2.1])
-    np.testing.assert_array_equal(group.beside(points, reach), [True, False, False, False, True])
-    assert group.beside(points[1:2], np.array([0.29]))[0]
+    np.testing.assert_array_equal(group.is_near(points, reach), [True, False, False, False, True])
+    assert group.is_near(points[1:2], np.array([0.29]))[0]

@@ -101,4 +101,4 @@ def test_texels_beside_crossed_ones_are_told() -> None:
     wall = rectangle((6.5 / SIZE, -1, -0.5), (0, 3, 0), (0, 0, 1))
     crossings = crossings_of(wall, slab(11.5, 13.5, 0.05))
     expected = np.broadcast_to(np.isin(np.arange(SIZE), [5, 7, 10, 14]), (SIZE, SIZE))
-    np.testing.assert_array_equal(crossings.beside[crossings.geometry.index[0]], expected)
+    np.testing.assert_array_equal(crossings.next_to_crossed[crossings.geometry.index[0]], expected)

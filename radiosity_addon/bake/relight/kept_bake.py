@@ -36,7 +36,7 @@ DAMAGED = (
 
 @dataclass(frozen=True, eq=False)
 class HierarchyReport:
-    """What a bake tells of its hierarchy: the solver's part of the report, and warnings."""
+    """What a bake reports of its hierarchy: the solver's part of the report, and warnings."""
 
     report: dict[str, Any]
     warnings: tuple[BakeWarning, ...]

@@ -95,7 +95,7 @@ def group_pages(
 
 
 def split_by_group(whole: Array, parts: Array) -> Array:
-    """Return (g, …) float32 what `share_out` makes of parts."""
+    """Return (g, …) float32: `share_out` for parts."""
     result = parts.astype(np.float64)
     share_out(whole, list(result))
     return result.astype(np.float32)
@@ -125,7 +125,7 @@ def members(
     """Tell which sources are in which group.
 
     names, of_scene: The s sources' names, and the groups that the scene puts them in.
-    strengths (s, 3): Theirs: `OTHERS` is there only if it was asked for, or something in it shines.
+    strengths (s, 3): Theirs: `OTHERS` is there only if it was requested, or something in it shines.
     Returns members list of (str, (s,) bool): The settings' groups in their order, then the scene's by name,
         `OTHERS` last.
     Raises UsageError if a member is no source.

@@ -1,4 +1,4 @@
-"""Pictures of the light so far, for whoever watches a bake."""
+"""Pictures of the light so far, shown while a bake runs."""
 
 from __future__ import annotations
 

@@ -166,7 +166,7 @@ def _check_head(content: bytes, magic: bytes, format_number: int) -> tuple[bytes
 
 
 def _unpacked(packed: memoryview, most: int) -> bytes:
-    """Expand bytes, to so many at most."""
+    """Expand bytes, to at most `most`."""
     expander = zlib.decompressobj()
     content = expander.decompress(packed, most + 1)
     if len(content) > most or not expander.eof:

@@ -116,8 +116,8 @@ class EarlierBake:
         """Take lightmaps off all objects but those to keep; `targets` are about to be changed, too."""
         going = [obj for obj in showing() if obj.name not in self.keep]
         meshes = {own_mesh(obj) for obj in targets}
-        beside = [obj for obj in showing() if own_mesh(obj) in meshes]
-        self._state = ShownState(list(dict.fromkeys([*going, *targets, *beside])))
+        sharing = [obj for obj in showing() if own_mesh(obj) in meshes]
+        self._state = ShownState(list(dict.fromkeys([*going, *targets, *sharing])))
         take_off(going)
 
     def show_again(self) -> None:

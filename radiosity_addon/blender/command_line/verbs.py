@@ -30,7 +30,7 @@ from ..relight import kept_bakes
 from ..session import last_bake
 
 MAX_IMAGES = 8
-"""The closing lines name so many lightmaps one by one."""
+"""The closing lines name at most this many lightmaps one by one."""
 
 
 def bake(

@@ -1,6 +1,6 @@
 """Copies of materials that emit what the originals reflect, emit or transmit.
 
-The shader tree is followed once and three expressions are built beside it, of Math nodes on the
+The shader tree is followed once. Next to it, three expressions are built of Math nodes on the
 sockets that feed the shaders; Cycles then evaluates them. Node groups are copied for each use,
 and what crosses a group's border does so through sockets added to it.
 """

@@ -289,12 +289,12 @@ def _of_texels(lit: Sequence[LightmappedObject], plan: Estimate) -> Iterator[Fin
     ]
     greedy = greedy_object([item.name for item in lit], plan.texels)
     if tiny:
-        mend = (
+        advice = (
             "raise the resolution or the texel scale"
             if greedy is None
             else f"'{greedy}' takes nearly all of them"
         )
-        yield Finding(WARNING, tiny[0], f"{_names(tiny)} about to get fewer than 8 × 8 texels: {mend}")
+        yield Finding(WARNING, tiny[0], f"{_names(tiny)} about to get fewer than 8 × 8 texels: {advice}")
     if greedy is not None:
         taken = share_of(max(plan.texels), sum(plan.texels))
         message = (
@@ -375,7 +375,7 @@ def _of_memory(plan: Estimate, settings: BakeSettings) -> Iterator[Finding]:
 
 
 def free_memory() -> float | None:
-    """Return the memory that is free [bytes]; None where the system does not tell."""
+    """Return the memory that is free [bytes]; None if the system does not report it."""
     try:
         lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
         values = {line.split(":")[0]: float(line.split()[1]) for line in lines}

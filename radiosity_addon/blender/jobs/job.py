@@ -64,7 +64,7 @@ def run_bake(
     with_copy: Write `baked.blend` and `preview.png` into the output folder as well.
     in_background: Return from every `next` within a moment, for a window: the steps between the export and
         the lightmaps, which know nothing of Blender, run in a thread.
-    keeping: If given, the bake is kept for relighting: in memory, and in a sidecar if that is asked for.
+    keeping: If given, the bake is kept for relighting: in memory, and in a sidecar if requested.
     only_changed: Give new lightmaps to objects that changed since the last bake; the bake cannot be kept
         then. If objects have only moved since a bake that was kept, all lightmaps follow (`bake/plan.py`).
     notes: What is known before the bake and belongs into its report.
@@ -83,9 +83,9 @@ def run_bake(
         yield Status("export", 0.0)
         if output is not None:
             preview = (PREVIEW_NAME,) if with_preview else ()
-            beside = (BLEND_NAME, *preview) if with_copy else ()
+            own_copies = (BLEND_NAME, *preview) if with_copy else ()
             sidecars = (output.names.sidecar,) if keeping and keeping.sidecar else ()
-            for _ in output.expecting((*beside, *sidecars)):
+            for _ in output.expecting((*own_copies, *sidecars)):
                 yield Status("export", 0.0)
         originals = Originals(context)
         with timed(seconds, "export"):

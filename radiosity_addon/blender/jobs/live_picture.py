@@ -54,8 +54,8 @@ class ViewportFilter:
         return replace(picture, surfaces=self._surfaces[1])
 
 
-def beside(picture: Picture, surfaces: TexelSurfaces) -> Picture:
-    """Return the picture of what texels do not show: backs, and surfaces without a lightmap."""
+def without_texels(picture: Picture, surfaces: TexelSurfaces) -> Picture:
+    """Return the part of a picture that texels do not show: backs, and surfaces without a lightmap."""
     lit = np.isin(picture.triangle, surfaces.triangle) & picture.front
     return picture.only(~lit)
 
@@ -72,7 +72,7 @@ def page_colors(picture: TexelPicture, exposure: float, white: float) -> list[Ar
 
 @lru_cache(maxsize=4)
 def _colors_of_halves(exposure: float, white: float) -> Array:
-    """Return (65536,) float32 what `display_colors` makes of each float16, by its bits; 0 below 0."""
+    """Return (65536,) float32: `display_colors` of each float16, indexed by its bits; 0 below 0."""
     values = np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(np.float64)
     values = np.nan_to_num(values, nan=0.0, posinf=HALF_MAX, neginf=0.0)
     return display_colors(values, exposure, white)

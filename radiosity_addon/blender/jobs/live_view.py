@@ -47,11 +47,11 @@ class _LiveView:
     def show(self, picture: Picture | TexelPicture) -> None:
         """Draw this from now on; texels in place of the elements below them."""
         from ...bake.result import TexelPicture
-        from .live_picture import beside
+        from .live_picture import without_texels
 
         if isinstance(picture, TexelPicture):
             if self._picture is not None and self._texels is None:
-                self.show(beside(self._picture, picture.surfaces))
+                self.show(without_texels(self._picture, picture.surfaces))
             self._texels = picture
         else:
             self._picture, self._batches = picture, {}

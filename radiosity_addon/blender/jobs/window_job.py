@@ -121,7 +121,7 @@ class WindowJob:
         raise NotImplementedError
 
     def _follow(self, progress: Any) -> None:
-        """Show what a step of the work brings, beside how far it is."""
+        """Show the picture that a step of the work brings, if any, in addition to its progress."""
 
     def _undone(self, context: bpy.types.Context) -> None:
         """Go on as before the work, which was cancelled or failed."""

@@ -37,7 +37,7 @@ class NodeAlgebra:
         self._tree = tree
 
     def calculate(self, operation: str, a: Scalar, b: Scalar) -> Scalar:
-        """Return what a Math node makes of two scalars."""
+        """Return the result of a Math node for two scalars."""
         if not is_socket(a) and not is_socket(b):
             return float(_COMPUTE[operation](a, b))
         node = self._new("ShaderNodeMath", operation)

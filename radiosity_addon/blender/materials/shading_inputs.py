@@ -294,7 +294,7 @@ def _padded(values: np.ndarray) -> np.ndarray:
 def _random_id(instance: bpy.types.DepsgraphObjectInstance) -> int:
     """Return Object Info's Random as an integer: an instance's own, or of the object's name.
 
-    Cycles mixes what it makes of the name by the last rounds of Jenkins' lookup3.
+    Cycles mixes its hash of the name by the last rounds of Jenkins' lookup3.
     """
     if instance.is_instance:
         return int(instance.random_id)

@@ -260,7 +260,7 @@ def _links(context: bpy.types.Context, kept: KeptDetails) -> OverlayPicture | No
 
 
 def chosen_elements(context: bpy.types.Context, kept: KeptDetails) -> Array:
-    """Return the leaf elements whose links are asked for; none if the active face was not baked."""
+    """Return the leaf elements whose links are to be shown; none if the active face was not baked."""
     record = kept.details.links
     if overlay_of(context).links_of == "CURSOR":
         nearest = nearest_leaf(record, np.array(context.scene.cursor.location, dtype=np.float64))

@@ -283,7 +283,7 @@ def _reload(image: bpy.types.Image) -> None:
 
 
 def is_at_work() -> bool:
-    """Tell whether files or images are still being brought to what undo asked for."""
+    """Return whether files or images are still being changed after an undo or redo."""
     return bpy.app.timers.is_registered(_tick)
 
 

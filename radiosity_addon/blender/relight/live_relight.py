@@ -1,10 +1,9 @@
 """Live: lightmaps that follow the lights while somebody drags their sliders.
 
-Blender tells a handler what has changed. That only takes a note; a timer does the rest a moment later, so
-that of many changes only the last one counts. While things change, the images follow by responses
-(`responses.py`); once they rest the kept bake is lit exactly, in a thread, and the files are written. What is
-written to images and materials comes back to the handler as a change, but strengths are then as they were,
-and nothing follows from it.
+Blender calls a handler with what has changed. The handler only takes a note; a timer does the rest a moment
+later, so that only the last of many changes counts. During changes the images follow by responses
+(`responses.py`); afterward the kept bake is lit exactly, in a thread, and the files are written. Writing to
+images and materials calls the handler again, but strengths are then unchanged, so nothing follows from it.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Strengths of a kept bake's sources as the file has them now, without exporting the scene.
 
-Lamps, materials and the world are read as constants. Where nodes make a light vary, which only Cycles can
-tell, its constant still follows its sliders: then its ratio to what it was at the start is taken.
+Lamps, materials and the world are read as constants. Where nodes make a light vary, only Cycles
+knows its strength, but its constant still follows its sliders: then the ratio to its first value is used.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class StrengthReader:
         return bool(np.abs(read_material(material).reflectance - before).max() > SAME_STRENGTH)
 
     def _constants(self) -> Array:
-        """Return (s, 3) the sources' strengths as far as constants tell them."""
+        """Return (s, 3) the sources' strengths as far as constants determine them."""
         lights = self._kept.bake_scene.scene.lights
         rows = [self._of_light(light) for light in lights]
         rows += [_of_material(name) for name in self._kept.names[len(lights) :]]

@@ -115,7 +115,7 @@ class _Collector:
         # A curve's mesh comes as an instance, and may have the curve's own name.
         self._taken = {obj.name for obj in bpy.data.objects if obj.library is None and obj.type == "MESH"}
         self.wanted: set[ImageKey] = set()
-        """Images whose means are asked for before what shows them can be read."""
+        """Images whose means are needed before the surfaces that show them can be read."""
 
     @property
     def fraction(self) -> float:
@@ -251,7 +251,7 @@ class _Collector:
     def _read(
         self, instance: bpy.types.DepsgraphObjectInstance, asked: frozenset[str]
     ) -> tuple[RawMesh, MeshValues]:
-        """Return a mesh's data, and what is asked of it at its triangles' corners."""
+        """Return a mesh's data, and the inputs of its materials at its triangles' corners."""
         obj = instance.object
         key = (obj.data.as_pointer(), asked)
         if key not in self._meshes:
@@ -308,7 +308,7 @@ class _Collector:
 def _with_keys(
     depsgraph: bpy.types.Depsgraph,
 ) -> Iterator[tuple[_Key, bpy.types.DepsgraphObjectInstance]]:
-    """Yield what a scene shows, each with what tells it from all else as long as nothing is renamed."""
+    """Yield the objects that a scene shows, each with a key that is unique as long as nothing is renamed."""
     seen: Counter[_Key] = Counter()
     for instance in visible_objects(depsgraph):
         identity = identity_of(instance)

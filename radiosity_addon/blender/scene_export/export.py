@@ -265,7 +265,7 @@ def chosen_pieces(
 ) -> list[Piece]:
     """Return the pieces that get a lightmap.
 
-    Raises SceneError, UsageError if there is none, or one that was asked for by name can have none.
+    Raises SceneError, UsageError if there is none, or if one that is given by name can have none.
     """
     if names is None:
         bakeable = [piece for piece in pieces if piece.bakeable]

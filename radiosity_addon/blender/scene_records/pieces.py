@@ -35,7 +35,7 @@ class Piece:
     inputs : dict of str to (t, 3, 4) or (4,) float32
         What was found of it: not what follows from `mesh` and `matrix`, nor what is missing.
     bakeable : bool
-        It is to have a lightmap, if it is asked for, and can: it may be edited.
+        It may get a lightmap, if requested: the object is editable.
     linked : bool
         It would be bakeable, were it not linked from a library.
     uv_layers : int

@@ -86,7 +86,7 @@ def _asks(tree: bpy.types.NodeTree | None, known: dict[str, bool]) -> bool:
     if tree is None:
         return False
     if tree.name_full not in known:
-        known[tree.name_full] = False  # while its groups are asked
+        known[tree.name_full] = False  # while its groups are searched
         groups = [node.node_tree for node in tree.nodes if node.type == "GROUP"]
         itself = any(node.bl_idname == "GeometryNodeIsViewport" for node in tree.nodes)
         known[tree.name_full] = itself or any(_asks(group, known) for group in groups)

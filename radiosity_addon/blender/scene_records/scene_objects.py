@@ -171,7 +171,7 @@ def copy_evaluated_meshes(
 
 
 def identity_of(instance: bpy.types.DepsgraphObjectInstance) -> tuple[str, str | None, str, tuple[int, ...]]:
-    """Return what tells an instance from all others: object, library, instancer, persistent id."""
+    """Return what identifies an instance: object, library, instancer, persistent id."""
     shown = original_object(instance)
     library = shown.library.filepath if shown.library else None
     instancer = instance.parent.original.name if instance.is_instance else ""

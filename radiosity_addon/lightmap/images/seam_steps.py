@@ -21,20 +21,20 @@ class SeamSteps:
 
     across (s,): At places on seams, between bilinear look-ups on either side.
     inside (p,): Between texels side by side in one chart, everywhere.
-    beside (q,): The same, for texels that a look-up on a seam reads.
+    near_seams (q,): The same, for texels that a look-up on a seam reads.
     """
 
     across: Array
     inside: Array
-    beside: Array
+    near_seams: Array
 
     def medians(self) -> tuple[float, float, float]:
         """Return the medians of the three; 0 for none."""
-        across, inside, beside = (
+        across, inside, near_seams = (
             float(np.median(steps)) if len(steps) else 0.0
-            for steps in (self.across, self.inside, self.beside)
+            for steps in (self.across, self.inside, self.near_seams)
         )
-        return across, inside, beside
+        return across, inside, near_seams
 
 
 def seam_steps(geometry: TexelGeometry, seams: Seams, pages: Sequence[Array]) -> SeamSteps:

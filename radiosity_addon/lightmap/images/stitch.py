@@ -4,7 +4,7 @@ Least squares over the texels that are read along seams: Σ length (a(x) − b(x
 the seams, where a and b are bilinear look-ups on either side, plus Σ λ (v − v₀)² over the texels,
 solved by conjugate gradients. Texels outside the charts, which dilation made up, give way easily;
 those whose center is on the surface hardly. No texel leaves the range of the values that were
-read beside it, so what is dark stays dark, and nothing turns negative.
+read next to it, so dark texels stay dark, and nothing turns negative.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Light texels to an error that was asked for: look harder until the estimate says it is reached."""
+"""Light texels to a target error: with more and more rays, until the estimated error is below it."""
 
 from __future__ import annotations
 

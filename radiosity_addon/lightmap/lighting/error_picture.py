@@ -1,9 +1,8 @@
 """The residual of the elements' solution at every texel: an error picture.
 
-What is baked otherwise is not the elements' radiosity but light asked for anew at each texel.
-Here it is the elements that are judged: their radiosity B̂ at the texel, less what it would be
-by the light that B̂ itself sends there (handout (3.5)). So hits are looked up in the elements,
-and no sweep corrects them.
+Other bakes do not show the elements' radiosity but light that is gathered again at each texel. Here
+the elements are judged: their radiosity B̂ at the texel, less what it would be by the light that B̂
+itself sends there (handout (3.5)). So hits are looked up in the elements, and no sweep corrects them.
 """
 
 from __future__ import annotations

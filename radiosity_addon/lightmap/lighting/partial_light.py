@@ -1,8 +1,8 @@
 """The light of texels while it is still being computed, to be looked at.
 
-At first it is the hierarchy's. As lamps are asked, texels get the detail of direct light that elements are
-too large for; as gather points are done, they and the texels around them get what their rays brought; and
-each sweep replaces it all. Nothing of it goes into the result.
+At first it is the hierarchy's. After each lamp, texels get the detail of direct light that elements are too
+large for; after gather points, they and the texels around them get what their rays brought; each sweep
+replaces it all. Nothing of it goes into the result.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from ..texels import NO_TEXEL, TexelGeometry
 from ..transport import HitTable
 
 EVERY = 4
-"""One of so many gather rays is looked up: a picture needs no more, and is to cost next to nothing."""
+"""One of this many gather rays is looked up: a picture needs no more, and must cost next to nothing."""
 
 ALIKE = 0.9
 """Cosine between the normals of a gather point and of a texel it may stand for."""
@@ -59,7 +59,7 @@ class LightSoFar:
         element : (n,) int32
             The leaf element below each texel, or NOTHING.
         direct : (n, 3) float64 [W/m²]
-            All 0; it grows as lamps are asked.
+            All 0; it grows lamp by lamp.
         materials : reflectance and emission, (n, 3) float64 each
         """
         self.geometry, self._local, self._element = geometry, local, element
@@ -68,7 +68,7 @@ class LightSoFar:
         self._gathered = np.zeros(len(geometry), dtype=bool)
         self.version += 1
 
-    def asked(self) -> None:
+    def lamp_done(self) -> None:
         """Note that another lamp has been asked everywhere."""
         self.version += 1
 

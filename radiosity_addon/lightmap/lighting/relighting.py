@@ -1,4 +1,4 @@
-"""Texels lit anew by kept links and gains: no ray is traced.
+"""Texels relit by kept links and gains, without tracing rays.
 
 The same equation as in a bake (`transport/sweeps.py`), with other strengths of the lights: gains times
 strengths for what comes straight from lamps, cells of the sky times its radiance, and the hierarchy, solved

@@ -4,7 +4,7 @@ A gather point may speak for a texel as far as irradiance can be expected to sta
 same: distance times the mean closeness of what the point sees, plus the turn of the
 normal (the split-sphere estimate of Ward, Rubinstein and Clear 1988). Near a contact that
 reach goes to zero. What neighbors of a texel see d away, it sees no farther away than that and the
-way to them: so no point in the open speaks for texels beside a contact (neighbor clamping, Křivánek,
+way to them: so no point in the open speaks for texels next to a contact (neighbor clamping, Křivánek,
 Bouatouch, Pattanaik and Žára 2006). A point must also see the texel, just above the surface: in the
 open the reach is long, and a wall thin.
 """

@@ -2,7 +2,7 @@
 
 A texel that a wall stands on, or that a window's frame covers in part, shows the mean of what it
 holds, as it should. Light that comes back from it must not be the mean: a ray from inside a closed
-box would then bring the lit floor outside. Nor can a whole neighbor answer, for the strip beside a
+box would then bring the lit floor outside. Nor can a whole neighbor answer, for the strip next to a
 frame is darker than what lies a texel farther in the open. So a divided texel answers in cells,
 each as those of its points that see the cell's *anchor* in a straight line just above the surface;
 a hit asks the nearest cell whose anchor it sees (`element_cells.py` does the same for elements).

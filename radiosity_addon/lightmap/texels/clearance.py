@@ -2,8 +2,8 @@
 
 Space is cut into cells a few texels wide, and every cell that a piece of a triangle may reach remembers a
 plane, or that there are several. A texel whose surroundings lie in cells of its own plane, and in
-empty ones, is clear. All is judged to the safe side: a texel beside a wall is not clear though
-it ends before it, nor is one on a curved surface.
+empty ones, is clear. The test errs on the safe side: a texel next to a wall is not clear although it
+ends before the wall, nor is one on a curved surface.
 """
 
 from __future__ import annotations

@@ -138,7 +138,7 @@ def gather_at(
 
 
 def gather_footprints(geometry: TexelGeometry, chosen: Array, starts: int | None) -> Footprints:
-    """Return where some texels gather, each from so many points."""
+    """Return where texels gather, each from `starts` points."""
     position, normal = (geometry.scratch.empty((len(chosen), 3)) for _ in range(2))
     for tile in tiles(len(chosen)):
         position[tile], normal[tile] = geometry.position[chosen[tile]], geometry.normal[chosen[tile]]
@@ -161,7 +161,7 @@ def _choose(
 ) -> Array:
     """Find the texels on a lattice that no point so far reaches, among the unsure ones if some points stay.
 
-    Those beside something are chosen as well: points in the open do not know how close it is to them.
+    Texels next to a crossed one are chosen as well: points in the open do not know how close it is to them.
     """
     candidates = _on_lattice(crossings.geometry, stride)
     if kept is not None:
@@ -172,11 +172,11 @@ def _choose(
     candidates = row_numbers(candidates)
     if len(points):
         reached = points.support(candidates, progress)
-        candidates = candidates[(reached < support) | crossings.beside[candidates]]
+        candidates = candidates[(reached < support) | crossings.next_to_crossed[candidates]]
     return candidates
 
 
 def _on_lattice(geometry: TexelGeometry, stride: int) -> Array:
-    """Return (n,) bool: the texels in every so many rows and columns of their page."""
+    """Return (n,) bool: the texels in every `stride`-th row and column of their page."""
     row, column = geometry.row, geometry.column
     return marked(len(geometry), lambda tile: (row[tile] % stride == 0) & (column[tile] % stride == 0))

@@ -17,7 +17,7 @@ from ...solver.gather import NOTHING, Footprints, LocalPass
 from ..texels import NO_TEXEL, Crossings, TexelCells, TexelGeometry, below_hood, whole_neighbor
 
 WIDE_TEXEL = 4.0
-"""Texels this many times wider than the median tell less of the light than leaf elements that are smaller."""
+"""Texels this many times wider than the median show less detail than leaf elements that are smaller."""
 
 TILE_HITS = 1 << 22
 """Stored hits that are counted or numbered at once; bounds the temporaries to about 60 MB."""

@@ -20,7 +20,7 @@ from .hit_table import TILE_HITS, HitTable, TableRows
 from .source_means import SourceMeans
 
 OFTEN = 32
-"""A cell that so many rays met matters: …"""
+"""A cell that this many rays met matters: …"""
 
 RAYS, MANY_RAYS = 16, 64
 """… it gathers with more rays. Cells that few rays met answer few, and their noise averages out."""

@@ -25,8 +25,8 @@ there at once; a dark closet next to a bright room, into which the hierarchy's e
 wall's foot, takes as many sweeps as light would bounce in it."""
 
 REST_SHARE = 0.1
-"""A row of the table moves once it is off by this part of the tolerance: what sees only rows that rest
-need not be asked again, and most rest after a few sweeps."""
+"""A row of the table moves once it is off by this part of the tolerance: rows that see only resting rows
+are not computed again, and most rest after a few sweeps."""
 
 SWEPT = 0.3
 """A sweep takes this part of the progress left: how many there will be is not known."""
@@ -41,11 +41,11 @@ class TexelLight:
     direct, indirect : (n, 3) float64 [W/m²]
         Their sum is the whole.
     error : float
-        Estimate of the whole's RMS error, relative to its mean; 0 if it was not asked for.
+        Estimate of the whole's RMS error, relative to its mean; 0 if not requested.
     table : (surfaces, 3) float32 or None [W/m²]
         What texels and cells reflected in the end.
     kept : RelightableTexels or None
-        What lights them anew, if it is kept, …
+        The data to relight them, if it is kept, …
     traced : LightingRecord or None
         … and how they were lit.
     noise : (n,) float32 or None [W/m²]
@@ -132,7 +132,7 @@ def sweep(
     beyond : (sky cells + 2, 3) float64 [W/m²]
         Radiosity of the sky and of nothing, see `table_end`.
     sweeps : int
-        At most so many, …
+        Maximum number, …
     tolerance : float
         … or until no texel changes by more than this part of the mean.
     estimate : bool

@@ -2,7 +2,7 @@
 
 Kept UVs (an existing layer) stay as they are, bit for bit, wherever that is possible: on an
 object's own page always, on a shared page when all objects bring UVs and none lies over another's.
-Otherwise each object's kept layout is packed, as one chart of unchanged shape, beside the others.
+Otherwise each object's kept layout is packed, as one chart of unchanged shape, next to the others.
 """
 
 from __future__ import annotations
@@ -188,7 +188,7 @@ _Laid = list[tuple[list[int], Packing]]
 
 
 def _lay_on_pages(layouts: list[_Layout], options: AtlasOptions, progress: Progress) -> _Laid:
-    """Pack objects on as many pages as are asked for or needed."""
+    """Pack objects on as many pages as are requested or needed."""
     density = options.texel_density
     totals = _totals(layouts, options.limits.padding)
     count = len(layouts)
@@ -205,7 +205,7 @@ def _lay_on_pages(layouts: list[_Layout], options: AtlasOptions, progress: Progr
             for group in groups:
                 laid.append((group, _pack_group([layouts[each] for each in group], options, progress)))
         except BakeError:
-            # What does not fit at the density asked for may fit on more pages.
+            # What does not fit at the requested density may fit on more pages.
             if density is None or len(groups) == len(layouts):
                 raise
             count = max(count, len(groups)) + 1

@@ -59,7 +59,7 @@ class AffectedTexels:
         return np.asarray(self.moved[self.geometry.triangle])
 
     def traced(self, before: RayCaster) -> MovedGeometry:
-        """Return what tells the rays that what moved is in the way of; `before` casts those of before."""
+        """Return what finds the rays that moved objects block; `before` casts rays in the scene as it was."""
         return MovedGeometry(self.boxes, self._alone, before)
 
     @cached_property
@@ -87,7 +87,7 @@ class AffectedTexels:
     def renumbered(self, old: HitTable, table: HitTable, divided: Array) -> Array:
         """Return (numbers,) int32: what each hit of before is numbered now, or UNNUMBERED.
 
-        Stale is what moved, what is beside it, and parts of leaves that it may cut.
+        Texels that moved, those next to them, and parts of leaves that they may cut get new numbers.
 
         Parameters
         ----------

@@ -86,7 +86,7 @@ def _unsure(standing: StandingHits, spread: Interpolation, closer: Array) -> Arr
     """Return (n,) bool: texels whose points are weighed again, `closer` (g,) or hidden ones among them."""
     traced, moved, geometry = standing.previous.traced, standing.previous.affected, standing.table.geometry
     unsure = moved.texels | geometry.neighborhood(standing.divided) | spread.any_of(closer)
-    # A texel's points are in cells beside its own, no wider than the coarsest lattice.
+    # A texel's points are in cells next to its own, no wider than the coarsest lattice.
     farthest = CELLS_ACROSS * max(*traced.settings.strides, 1.5) * geometry.texel_size
     near = np.flatnonzero(moved.boxes.near(geometry.position, np.full(len(geometry), farthest)))
     ends = np.append(spread.first, len(spread.point))

@@ -42,7 +42,7 @@ class Arrivals:
 
     share (e,): Of leaves, what part of their light arrives; of those that never were leaves NaN.
     escapes (e,) bool: Whether any ray left the scene.
-    rays (e,) int32: How many were asked.
+    rays (e,) int32: How many were traced.
     """
 
     def __init__(self, caster: RayCaster, min_area: float, seed: int, threads: int = 0) -> None:

@@ -1,10 +1,10 @@
 """Lamps of very many faces: from afar, groups of faces send like a rectangle.
 
-A bulb of ten thousand triangles cannot be asked triangle by triangle from every texel. A binary tree
-groups the faces by place and way of facing; each point goes down it until what is left is small for
-its distance and faces one way (Walter et al., Lightcuts: a scalable approach to illumination, 2005).
+A bulb of ten thousand triangles cannot be evaluated triangle by triangle at every texel. A binary tree
+groups the faces by position and orientation; each point descends it until a group is small for its
+distance and faces one way (Walter et al., Lightcuts: a scalable approach to illumination, 2005).
 Such a group sends like the rectangle that has its area vector, its centroid and its second moments;
-single faces are asked exactly. Which groups a point asks depends on the point alone.
+single faces are evaluated exactly. Which groups a point uses depends on the point alone.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from ...form_factors import point_to_polygon
 from ...numerics import Array, running_sums, triangle_areas
 
 NEAREST = 3.0
-"""A flat group is asked as one from this many times its radius on, …"""
+"""A flat group is evaluated as one from this many times its radius on, …"""
 
 CURVED = 4.0
-"""… one that is not flat from so many, if its normals span little …"""
+"""… one that is not flat from this many, if its normals span little …"""
 
 MOST_SLANT = 0.35
 """… (the sine of the angle to the farthest from their mean), and none of its faces is turned away."""
@@ -34,7 +34,7 @@ THINNEST = 1e-3
 
 @dataclass(frozen=True)
 class EmitterPairs:
-    """The nodes that n points ask, p pairs sorted by point.
+    """The nodes that light n points: p pairs sorted by point.
 
     row, node (p,) int.
     factor (p,): What the point gets from the node per unit of strength; above 0.

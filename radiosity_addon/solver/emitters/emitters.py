@@ -25,7 +25,7 @@ CHUNK_PAIRS = 1 << 18
 """Point and face pairs evaluated at once; bounds the temporaries to about 50 MB a thread."""
 
 MANY = 256
-"""More faces than these are asked in groups where they are far."""
+"""More faces than these are evaluated in groups where they are far."""
 
 CHUNK_POINTS = 1 << 12
 """Points that go down a tree of faces at once: each of them visits some hundred nodes."""
@@ -35,7 +35,7 @@ ENDS = 2.0
 must not put their ends back on the face."""
 
 NEAR_HORIZON = 1e-9
-"""So much of the group's extent a corner may seem to lie below the horizon and still be asked for."""
+"""A corner may lie below the horizon by this share of the group's extent, by rounding, and still count."""
 
 
 class EmitterGroup:
@@ -122,7 +122,7 @@ class EmitterGroup:
             gain[rows] = self.factors(points[rows], normals[rows]).sum(axis=1)
         return gain
 
-    def beside(self, points: Array, reach: Array) -> Array:
+    def is_near(self, points: Array, reach: Array) -> Array:
         """Whether the box around one of the faces is within `reach` (n,) [m] of points, (n,) bool."""
         low, high = self._corners.min(axis=1), self._corners.max(axis=1)
         close = _box_distance(points, low.min(axis=0), high.max(axis=0)) <= reach
@@ -137,9 +137,9 @@ class EmitterGroup:
     def shadow_rays(self, points: Array, normals: Array, u: Array) -> tuple[Array, Array, Array]:
         """Aim (n, k) rays at the faces in proportion to their factors.
 
-        The weights tell apart the rays to one face only; every face weighs as much as it has rays.
-        Else, so near a large face that no ray finds the spot most light comes from, the few rays to a
-        far and perhaps hidden face would decide.
+        The weights distinguish only the rays to one face; every face weighs as much as it has rays.
+        Otherwise, so near a large face that no ray finds the spot that most light comes from, the few
+        rays to a far and perhaps hidden face would decide.
 
         Returns
         -------

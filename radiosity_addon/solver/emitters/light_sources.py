@@ -1,7 +1,7 @@
 """The sources of a scene's light that can be changed apart: lamps, the sky, and emissive materials.
 
 Everything a bake computes is linear in their strengths, channel by channel. Shadow rays of emissive
-surfaces are asked for groups of faces that cannot be told apart by color (`textured_emitters.py`);
+surfaces are traced for groups of faces of one emission (`textured_emitters.py`);
 here the groups stay within one source, so that its strength can change alone.
 """
 

@@ -1,9 +1,9 @@
 """Faces of one plane merged: a panel of ten thousand triangles is a lamp of two.
 
-What a point gets from emissive faces is asked of each of them, exactly. Where the faces tile a flat
-polygon, few triangles tile it as well, and send the same. Joined are faces across shared edges; the
-outline of what is joined, without the corners on its sides, is cut into triangles by their ears
-(Meisters, Polygons have ears, 1975). Whatever is not one plain outline stays as it was.
+The light of emissive faces at a point is evaluated exactly, face by face. Where the faces tile a flat
+polygon, a few triangles that tile it send the same light. Faces are joined across shared edges; the
+outline of the result, without the corners on its sides, is cut into triangles by their ears (Meisters,
+Polygons have ears, 1975). Faces whose outline is not one simple polygon stay as they were.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ SAME_AREA = 1e-7
 """A triangulation must have the area of what it replaces, to this part."""
 
 _ASIDE = np.array([0.358, 0.471, 0.806])
-"""Faces turned along it and against it are told apart: a direction that hardly a surface lies along."""
+"""Separates faces turned along it from those turned against it: hardly any surface is parallel to it."""
 
 MOST_CORNERS = 64
 """Outlines of more corners are left: the ears of k corners take k² steps."""

@@ -2,7 +2,7 @@
 
 Radiosity jumps at creases, and the kernel κ is discontinuous there. So faces share vertices
 only across edges where nothing but they meet, coplanar and of one material; and the nodes at
-the rim of such a patch are moved slightly into their face before the equation is asked there.
+the rim of such a patch are moved slightly into their face before the equation is evaluated there.
 """
 
 from __future__ import annotations

@@ -95,7 +95,7 @@ def _split_factors(
 ) -> Array:
     """Return (n, 3) corner factors as sums over 4^generations parts of each triangle.
 
-    A part's factor is exact; a few values of the kernel tell where on the part it comes from.
+    A part's factor is exact; a few values of the kernel determine where on the part it comes from.
     """
     parts, weights = corners, np.eye(3)[None]
     for _ in range(generations):

@@ -1,8 +1,8 @@
 """Rays aimed at the few elements that are far brighter than the rest.
 
-A small bright patch, the wall beside a lamp, is hit by few of a point's cosine-distributed
-rays, and each hit is a speck. So the patch's elements are asked apart, like lamps: rays aimed
-at them in proportion to what each would send. What is aimed at, cosine rays leave out; which
+A small bright patch, such as the wall next to a lamp, is hit by few of a point's cosine-distributed
+rays, and each hit makes a speck. So the patch's elements are sampled separately, like lamps: by rays
+aimed at them in proportion to what each would send. Cosine rays leave out what is aimed at; which
 elements those are depends on the point alone, so that the two together are unbiased.
 """
 
@@ -31,14 +31,14 @@ from ...rays import Hits
 from ..hierarchy import Hierarchy
 
 EVEN_SHARE = 0.2
-"""This part of the rays at an element spreads over it evenly: lamps do not tell what other light there
-is, nor shadows."""
+"""This part of the rays at an element spreads over it evenly: lamps do not show other
+light, nor shadows."""
 
 CONTRAST = 6.0
 """Elements are bright from this many times the mean reflected radiosity …"""
 
 MAX_BRIGHT_ELEMENTS = 128
-"""… and so many at most, the brightest: all are tried at every point."""
+"""… and at most this many, the brightest: all are tried at every point."""
 
 MAX_HEMISPHERE_SHARE = 0.05
 """Aimed at are elements that fill less than this of the hemisphere: others many rays hit anyway."""

@@ -51,7 +51,7 @@ class DirectLight:
         rays: int | None = None,
         gains: LightGains | None = None,
         total: Array | None = None,
-        tell: Callable[[], None] | None = None,
+        on_light: Callable[[], None] | None = None,
         progress: Progress = SILENT,
     ) -> Array:
         """Return (n, 3) float64 the irradiance at points [W/m²].
@@ -61,7 +61,7 @@ class DirectLight:
             without strength too, then emissive groups. Each is measured as if it were the only one, which
             it may become.
         total (n, 3): If given, all 0, the result grows in it, one light after the other, …
-        tell: … and this is called after each.
+        on_light: … and this is called after each.
         """
         total = points.scratch.zeros((len(points), 3)) if total is None else total
         lights = self.lights(include_dark_lights=gains is not None)
@@ -74,8 +74,8 @@ class DirectLight:
                 total[rows] += arriving[rows, None] * query.light.strength
             if gains is not None:
                 gains.put(query.number, arriving)
-            if tell is not None:
-                tell()
+            if on_light is not None:
+                on_light()
         return total
 
     def lights(self, include_dark_lights: bool = True) -> list[LightQuery]:

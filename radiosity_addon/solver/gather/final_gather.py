@@ -23,7 +23,7 @@ CHUNK_RAYS = 1 << 16
 """Rays a thread prepares at once; bounds its temporaries to about 10 MB."""
 
 AIMED_PART = 4
-"""One ray is aimed for so many cosine-distributed ones, where any are aimed."""
+"""One ray is aimed for this many cosine-distributed ones, where any are aimed."""
 
 SAME_PLACE = 1e-5
 """Barycentric weights that differ by less are one place on a triangle."""
@@ -61,7 +61,7 @@ class FinalGather:
     rays : int
         Cosine-distributed ones a point; each stands for a form factor of 1 / rays.
     resolve, leaves_of : callable
-        Number the hits, and tell the leaf elements hit.
+        Number the hits, and return the leaf elements that were hit.
     seed, threads : int
     sky : SkyTable
     """
@@ -157,8 +157,8 @@ class FinalGather:
         stale : (p,) bool
             Whether what was hit must be numbered again even if it is hit again.
         casters : RayCaster twice
-            Of what moved alone, where it was and where it is: who meets none of it has not changed. And of
-            the scene as it was: it tells how far rays went.
+            Of what moved alone, at both places: rays that meet none of it have not changed. And of the scene
+            as it was: it gives the lengths of the rays.
 
         Returns
         -------

@@ -43,7 +43,7 @@ class Residual:
     Parameters
     ----------
     state : SolverState
-        A scene and its B̂, whoever made it.
+        A scene and its B̂, from any method.
     """
 
     def __init__(self, state: SolverState) -> None:

@@ -107,7 +107,7 @@ class _RetracedRays(NamedTuple):
     """What changes at points.
 
     row, ray (c,) int: Rays that meet something else now; `sources` (c,) and how much `nearer` (c,) that is.
-    whole (w,) int: Points that are gathered from anew, and what they `gathered`.
+    whole (w,) int: Points that gather again with all their rays, and what they `gathered`.
     """
 
     row: Array

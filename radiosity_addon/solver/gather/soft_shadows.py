@@ -28,8 +28,8 @@ MAIN_PART = 0.6
 """… and a lamp gives this part of the light, or more."""
 
 MIN_SHADOW_RAYS = 2
-"""Shadow rays of a lamp that adds hardly anything. A single one would tell the share of the lamp that is
-seen, not that of its light: 0.40 for 0.44 behind a plate half way to a near lamp; two tell 0.43."""
+"""Shadow rays of a lamp that adds hardly anything. A single one would measure the visible share of the lamp,
+not of its light: 0.40 instead of 0.44 behind a plate half way to a near lamp; two measure 0.43."""
 
 STARTS = 16
 """Points of a footprint that the many rays start from, each of them a run that is stratified by itself."""

@@ -3,7 +3,7 @@
 Far pairs are sampled: stratified point pairs give the mean of the kernel without the
 receiver's cosine, as a vector, and of the kernel's derivative. Where the two sides nearly
 touch samples would scatter wildly; there Lambert's formula, summed over the source's faces,
-is asked at points of the receiver, and a plane is fitted to the answers.
+is evaluated at points of the receiver, and a plane is fitted to the results.
 
 Receivers that look many ways are linked only where they exchange hardly anything. What such
 faces receive is no plane of their normal n: over all directions max(n·d, 0) is nearest to

@@ -2,8 +2,8 @@
 
 Nowhere are all faces paired with all: a pair of nodes is dropped once one lies behind the
 other, linked once both look small, and opened on its larger side otherwise. Faces far
-smaller than the smallest element that is asked for are never told apart: clusters below A_ε
-are linked however near they are.
+smaller than the smallest requested element are never separated: clusters below A_ε are linked
+however near they are.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ DEPTH = 5
 """Steps remembered: two arrays of radiosity each."""
 
 GROWTH = 2.0
-"""When the change grows so many times beyond the least one, all is forgotten."""
+"""When the change exceeds this many times the smallest one, the history is discarded."""
 
 
 class Anderson:

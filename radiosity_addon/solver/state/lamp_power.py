@@ -1,4 +1,4 @@
-"""What becomes of the power of lamps: rays from them tell, apart from what links say arrives."""
+"""The power that lamps bring to surfaces, measured by rays from them, independently of the links."""
 
 from __future__ import annotations
 

@@ -157,8 +157,8 @@ def _distance(corners: Array, point: Array) -> Array:
     edge = np.roll(corners, -1, axis=1) - corners
     apart = point - corners
     along = np.einsum("nck,nck->nc", apart, edge) / np.maximum(np.einsum("nck,nck->nc", edge, edge), 1e-300)
-    beside = apart - np.clip(along, 0.0, 1.0)[:, :, None] * edge
-    to_edges = np.einsum("nck,nck->nc", beside, beside).min(axis=1)
+    to_edge = apart - np.clip(along, 0.0, 1.0)[:, :, None] * edge
+    to_edges = np.einsum("nck,nck->nc", to_edge, to_edge).min(axis=1)
     normal = np.cross(edge[:, 0], edge[:, 1])
     square = np.maximum(np.einsum("nk,nk->n", normal, normal), 1e-300)
     above = np.einsum("nk,nk->n", apart[:, 0], normal) ** 2 / square

@@ -1,8 +1,8 @@
 """What the hierarchical method may allocate: `memory_limit`, shared out among its stages.
 
-Faces are there whatever is asked for, so a scene whose faces and coarsest links do not fit
-is refused before anything is allocated. What they leave is for elements that lamps ask for,
-then for links and the elements that these split.
+Faces are always needed, so a scene whose faces and coarsest links do not fit is refused before
+anything is allocated. The rest is for elements that lamps need, then for links and the elements
+that these split.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def link_budget(hierarchy: Hierarchy, settings: SolverSettings, light_links: int
 
 
 def refinable(hierarchy: Hierarchy, settings: SolverSettings, links: int, light_links: int) -> int:
-    """Return how many of so many links may be refined at once: three more links each, and four elements."""
+    """Return how many of `count` links may be refined at once: three more links each, and four elements."""
     free = free_bytes(hierarchy, settings, light_links) - LINK_BYTES * links
     in_memory = int(max(free, 0.0) / (3 * LINK_BYTES + 4 * ELEMENT_BYTES))
     room = min(max((settings.max_links - links - light_links) // 3, 0), in_memory)
