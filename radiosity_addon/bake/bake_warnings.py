@@ -53,7 +53,7 @@ def of_solution(solution: Solution, settings: SolverSettings) -> tuple[BakeWarni
         warnings.append(
             BakeWarning(
                 "scene",
-                f"refinement stopped at its budget of links; single links may misplace up to "
+                f"refinement stopped at the maximum number of links; single links may misplace up to "
                 f"{solution.over_budget:.2%} of the light: bake at a lower quality, or fewer objects",
             )
         )
@@ -63,7 +63,7 @@ def of_solution(solution: Solution, settings: SolverSettings) -> tuple[BakeWarni
                 "scene",
                 f"so many small surfaces that links begin coarse, between parts that may exchange up to "
                 f"{solution.first_faint:.2%} of all light: single small faces may be lit unevenly; "
-                "raise the most links and the memory limit, or bake fewer objects",
+                "raise Max Links and the memory limit, or bake fewer objects",
             )
         )
     residual, tolerance = solution.report["residual"], used_settings(settings).get("tolerance", np.inf)

@@ -350,8 +350,8 @@ def _check(report: dict[str, Any], pages: tuple[LightmapPage, ...]) -> None:
     )
     if not np.isfinite(report["residual"]) or not finite:
         raise BakeError(
-            "the solution is not finite: this is a defect of the solver; please report the scene, "
-            "and try another quality meanwhile"
+            "the solution is not finite: this is a bug of the solver; please report it with the scene, "
+            "and try another quality"
         )
 
 

@@ -96,12 +96,12 @@ class BakePlan:
 
     @property
     def warnings(self) -> tuple[BakeWarning, ...]:
-        """What the bake does not renew."""
+        """What the bake does not update."""
         if self.kind != "changed":
             return ()
         message = (
-            f"{len(self.unchanged)} unchanged objects kept their lightmaps: light and shadow that the "
-            "changed ones throw on them are as before; bake all to renew them"
+            f"{len(self.unchanged)} unchanged objects kept their lightmaps, without the new light and shadow "
+            "of the changed ones; bake all to update them"
         )
         return (BakeWarning("scene", f"{message}; {self._gone}" if self.gone else message),)
 
@@ -109,7 +109,7 @@ class BakePlan:
     def _gone(self) -> str:
         named = ", ".join(f"'{name}'" for name in self.gone[:_NAMED])
         more = f" and {len(self.gone) - _NAMED} more" if len(self.gone) > _NAMED else ""
-        return f"gone since the last bake: {named}{more}; light and shadow from there stay until you bake all"
+        return f"removed since the last bake: {named}{more}; their light and shadow stay until you bake all"
 
 
 def plan_bake(

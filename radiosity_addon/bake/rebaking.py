@@ -85,7 +85,7 @@ def _resized(moved: list[BakeObject], before: Scene, now: Scene) -> tuple[BakeWa
                 BakeWarning(
                     item.name,
                     f"object '{item.name}' has another size or shape but keeps its texels: "
-                    "bake again to distribute them again",
+                    "bake again for an even density",
                 )
             )
     return tuple(found)

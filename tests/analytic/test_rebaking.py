@@ -112,7 +112,7 @@ def test_what_moved_can_move_back(
     assert points[1] < 1.2 * points[0]
 
 
-def test_it_can_be_lit_anew(moved: tuple[BakeResult, KeptBake], fresh: tuple[BakeResult, KeptBake]) -> None:
+def test_it_can_be_relit(moved: tuple[BakeResult, KeptBake], fresh: tuple[BakeResult, KeptBake]) -> None:
     """As a full bake of the moved scene can."""
     strengths = moved[1].strengths
     same = pixels(replace(moved[0], pages=relight_pages(moved[1], strengths)))
@@ -128,7 +128,7 @@ def test_what_glows_may_move(kept: KeptBake) -> None:
     assert relative(pixels(found), full(room(panel=-0.6), kept)) < 0.01
 
 
-def test_another_size_keeps_its_texels_and_is_told_of(kept: KeptBake) -> None:
+def test_another_size_keeps_its_texels_and_is_reported(kept: KeptBake) -> None:
     found, _ = bake_moved(kept, room(size=1.3))
     assert any("another size" in warning.message for warning in found.warnings)
     assert relative(pixels(found), full(room(size=1.3), kept)) < 0.01
@@ -187,7 +187,7 @@ def test_parts_that_nothing_meets_any_more_are_left_out() -> None:
     assert relative(pixels(back), pixels(first)) < 0.01
 
 
-def test_what_moved_is_told_by_name(kept: KeptBake) -> None:
+def test_what_moved_is_named(kept: KeptBake) -> None:
     assert moved_objects(kept, room()) == ()
     assert moved_objects(kept, room(turn=1.0)) == ("Box",)
     assert moved_objects(kept, room(turn=1.0, panel=0.1)) == ("Box", "Panel")

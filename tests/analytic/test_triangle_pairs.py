@@ -220,7 +220,7 @@ def test_parts_behind_the_other_plane_do_not_count() -> None:
     assert triangle_to_triangle(floor, wall)[0] == pytest.approx(expected, abs=1e-5)
 
 
-def test_tiny_receiver_beside_a_huge_source() -> None:
+def test_tiny_receiver_next_to_a_huge_source() -> None:
     """A thousandth's width from the foot of a wall: what a point there sees."""
     size = 1e-4
     tiny = size * np.array([[[1.0, 0, 0], [2, 0, 0], [1, 1, 0]]]) + [0, 0.3, 0]

@@ -136,7 +136,7 @@ def test_numbers_of_an_object_are_the_reports(opened: dict[str, Any], kept: bool
             assert of[0].maximum == pytest.approx(entry[told]["maximum"], rel=1e-3) or not kept
 
 
-def test_density_is_told_by_uvs_and_image_size(opened: dict[str, Any]) -> None:
+def test_density_follows_from_uvs_and_image_size(opened: dict[str, Any]) -> None:
     picture = shown(kinds.DENSITY)
     density = opened["report"]["pages"][0]["texels_per_metre"]
     assert picture.legend.scale.high == pytest.approx(2.0 * density, rel=0.02)  # type: ignore[union-attr]
@@ -221,7 +221,7 @@ def test_errors_are_signed_where_they_can_be(opened: dict[str, Any], of: str) ->
     assert scale.low == (-scale.high if of == "ELEMENTS" else 0.0)  # type: ignore[union-attr]
 
 
-def test_after_a_reload_only_what_the_file_tells_is_left(opened: dict[str, Any]) -> None:
+def test_after_a_reload_only_data_of_the_file_is_left(opened: dict[str, Any]) -> None:
     session.kept_details.clear()
     for kind in EVERY:
         settings().show = kind

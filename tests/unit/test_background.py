@@ -26,7 +26,7 @@ def finish(steps: Generator) -> tuple[list[float], object]:
 
 
 @pytest.mark.parametrize("in_window", [True, False])
-def test_what_it_tells_and_returns_comes_through(in_window: bool) -> None:
+def test_what_it_reports_and_returns_comes_through(in_window: bool) -> None:
     threads = set()
 
     def work(progress: Progress) -> str:
@@ -87,7 +87,7 @@ def test_the_work_goes_on_while_the_caller_does_something_else() -> None:
 
 
 @pytest.mark.parametrize("in_window", [True, False])
-def test_closed_it_cancels_the_work_where_it_next_tells_how_far_it_is(in_window: bool) -> None:
+def test_closed_it_cancels_the_work_at_its_next_progress(in_window: bool) -> None:
     """In a window closing does not wait for that."""
     go_on, cleaned_up, goes_on = threading.Event(), threading.Event(), []
 

@@ -42,7 +42,7 @@ def test_nodes_that_touch_exchange_at_most_the_smaller_area() -> None:
 
 
 @pytest.mark.parametrize("faint", [0.0, 1e-5, 1e-3])
-def test_the_estimate_tells_how_many_links_there_are(
+def test_the_estimate_predicts_the_number_of_links(
     clutter: Scene, faint: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Whole if nothing is thinned, and within five standard errors or so if most is."""

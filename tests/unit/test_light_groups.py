@@ -29,7 +29,7 @@ def test_the_scene_s_groups_come_by_name_and_the_others_last() -> None:
     assert list(found(light_groups=True).items()) == [("left", [0]), ("right", [1, 4]), (OTHERS, [2, 3])]
 
 
-def test_without_being_asked_for_the_scene_s_groups_do_not_count() -> None:
+def test_without_being_requested_the_scene_s_groups_do_not_count() -> None:
     assert found(groups=(("sky", ("World",)),)) == {"sky": [3], OTHERS: [0, 1, 2, 4]}
 
 

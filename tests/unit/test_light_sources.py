@@ -27,7 +27,7 @@ def sources(emitter: np.ndarray | None = None) -> tuple[LightSources, Scene]:
     return LightSources(scene, Faces(scene), EmbreeCaster(triangles), emitter), scene
 
 
-def test_every_color_is_a_source_if_nothing_tells_them_apart() -> None:
+def test_every_color_is_a_source_if_nothing_distinguishes_them() -> None:
     found, scene = sources()
     assert sorted(map(tuple, found.strengths)) == sorted([(3.0, 2.0, 1.0), RED, ORANGE, BLUE])
     assert (found.emitter[4:] == -1).all()

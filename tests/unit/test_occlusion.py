@@ -96,7 +96,7 @@ def test_a_high_gap_and_what_lies_below_the_surface_hood_nothing(height: float) 
     assert not crossings_of(slab(6.5, 11.5, height)).alone.any()
 
 
-def test_texels_beside_crossed_ones_are_told() -> None:
+def test_texels_next_to_crossed_ones_are_reported() -> None:
     """A wall cuts column 6; a board hoods columns 11 to 13, with rims in 11 and 13."""
     wall = rectangle((6.5 / SIZE, -1, -0.5), (0, 3, 0), (0, 0, 1))
     crossings = crossings_of(wall, slab(11.5, 13.5, 0.05))

@@ -23,6 +23,7 @@ from radiosity_addon.solver.links import initial
 from tests.rooms import FLOOR, box_room, gray, gray_scene, rectangle, solid_box, sphere
 from tests.unit.texel_scenes import QUAD_UV, bake_object, bake_scene, in_cell
 from tests.watched import noting
+from tests.wording import says
 
 
 def run(scene: BakeScene, **settings: Any) -> BakeResult:
@@ -338,7 +339,7 @@ def test_triangles_without_area_do_no_harm(lamp_lit: BakeResult) -> None:
     assert texels(result).mean() == pytest.approx(texels(lamp_lit).mean(), rel=0.02)
 
 
-def test_links_that_had_to_begin_coarse_are_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_links_that_had_to_begin_coarse_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     """Many small curved things, and a budget that does not do for the links they ask for."""
     chance = np.random.default_rng(5)
     balls = [0.06 * sphere(1)[:, ::-1] + chance.uniform(0.1, 0.9, 3) for _ in range(10)]
@@ -356,4 +357,4 @@ def test_links_that_had_to_begin_coarse_are_told_of(monkeypatch: pytest.MonkeyPa
     (message,) = told(max_links=2_000)
     share = float(message.split("up to ")[1].split("%")[0])
     assert 100 * initial.COARSEST_FAINT * QUALITY_SETTINGS["draft"].solver.error < share < 100
-    assert "raise the most links and the memory limit" in message
+    assert says(message, "Max Links", "memory limit")

@@ -122,7 +122,7 @@ def test_a_flat_shaded_box_has_no_seams() -> None:
     np.testing.assert_array_equal(stitch(values, np.ones(len(values)), seams), values)
 
 
-def test_backs_beside_fronts_are_no_seam() -> None:
+def test_backs_next_to_fronts_are_no_seam() -> None:
     scene, geometry = two_tiles()
     turned = scene.triangles.copy()
     turned[2:] = turned[2:, ::-1]

@@ -128,7 +128,7 @@ def test_direct_and_indirect_are_apart() -> None:
     assert light.direct[~on_wall].mean() > 5 * light.indirect[~on_wall].mean()
 
 
-def test_only_what_sees_a_change_is_asked_again() -> None:
+def test_only_rows_that_see_a_change_are_computed_again() -> None:
     random = np.random.default_rng(2)
     sources = random.integers(-2, 40, (300, 8)).astype(np.int32)
     table = random.random((42, 3)).astype(np.float32)

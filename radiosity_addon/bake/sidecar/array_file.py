@@ -149,17 +149,17 @@ def read_digest(path: Path, magic: bytes, format_number: int) -> str:
 def _opened(path: Path) -> BinaryIO:
     """Open a file to read; a device or a pipe, which may have no end, is none."""
     if path.exists() and not path.is_file():
-        raise ArrayFileError("it is no such file")
+        raise ArrayFileError("it is not a sidecar")
     return path.open("rb")
 
 
 def _check_head(content: bytes, magic: bytes, format_number: int) -> tuple[bytes, int]:
     """Return the digest and the description's length that a file's first bytes hold."""
     if len(content) < _HEAD.size:
-        raise ArrayFileError("it is cut off")
+        raise ArrayFileError("it is incomplete")
     kind, found, digest, length = _HEAD.unpack_from(content)
     if kind != magic.ljust(16, b"\0"):
-        raise ArrayFileError("it is no such file")
+        raise ArrayFileError("it is not a sidecar")
     if found != format_number:
         raise ArrayFileError(f"it has format {found}, and this version reads format {format_number}")
     return digest, length
@@ -170,7 +170,7 @@ def _unpacked(packed: memoryview, most: int) -> bytes:
     expander = zlib.decompressobj()
     content = expander.decompress(packed, most + 1)
     if len(content) > most or not expander.eof:
-        raise ValueError("too long, or cut off")
+        raise ValueError("too long, or incomplete")
     return content
 
 

@@ -109,7 +109,9 @@ def _carry_places() -> list[BakeWarning]:
             continue
         source.matrix_world = stand_in.matrix_basis @ Matrix(place).inverted_safe() @ source.matrix_world
         place_again(stand_in)
-        warnings.append(BakeWarning(source.name, f"object '{source.name}' was moved where its lightmap was"))
+        warnings.append(
+            BakeWarning(source.name, f"object '{source.name}' was moved to where its lightmap was")
+        )
     return warnings
 
 

@@ -124,7 +124,7 @@ class WindowJob:
         """Show the picture that a step of the work brings, if any, in addition to its progress."""
 
     def _undone(self, context: bpy.types.Context) -> None:
-        """Go on as before the work, which was cancelled or failed."""
+        """Go on as before the work, which was canceled or failed."""
 
     def _succeeded(self, context: bpy.types.Context, in_window: bool) -> None:
         """Report on what was done."""

@@ -107,7 +107,7 @@ class RADIOSITY_OT_bake(Conditional, WindowJob, bpy.types.Operator):
 
 
 class RADIOSITY_OT_restore(Conditional, bpy.types.Operator):
-    """Take the lightmaps off this scene: what you edited since the bake stays"""
+    """Remove the lightmaps from this scene. What you edited since the bake is kept"""
 
     bl_idname = "radiosity.restore"
     bl_label = "Restore"
@@ -137,7 +137,7 @@ class RADIOSITY_OT_restore(Conditional, bpy.types.Operator):
 
 
 class RADIOSITY_OT_add_cornell_box(Conditional, bpy.types.Operator):
-    """Add the Cornell box, ready to bake, to this scene if it is empty, else in a scene of its own"""
+    """Add a Cornell box that is ready to bake: to this scene if it is empty, otherwise in a new scene"""
 
     bl_idname = "radiosity.add_cornell_box"
     bl_label = "Add Cornell Box"

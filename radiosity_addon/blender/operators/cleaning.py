@@ -117,7 +117,7 @@ def _is_remote(folder: Path) -> bool:
 
 
 class RADIOSITY_OT_clean(Conditional, bpy.types.Operator):
-    """Delete lightmap files that bakes of this file have written and that nothing in it shows any more"""
+    """Delete lightmap files that bakes of this file wrote and that it no longer shows"""
 
     bl_idname = "radiosity.clean"
     bl_label = "Clean Up Lightmaps"
@@ -152,7 +152,7 @@ class RADIOSITY_OT_clean(Conditional, bpy.types.Operator):
 
 
 class RADIOSITY_OT_recover(Conditional, bpy.types.Operator):
-    """Put the files of the last whole bake back: a bake was interrupted while it replaced them"""
+    """Recover the files of the last complete bake: a bake was interrupted while it replaced them"""
 
     bl_idname = "radiosity.recover"
     bl_label = "Recover Lightmaps"

@@ -48,7 +48,7 @@ class RADIOSITY_OT_light_group_assign(Conditional, bpy.types.Operator):
 
 
 class RADIOSITY_OT_light_group_remove(Conditional, bpy.types.Operator):
-    """Take the light group's name off the selected objects; their material's or collection's then holds"""
+    """Remove the selected objects from this light group. That of their material or collection then applies"""
 
     bl_idname = "radiosity.light_group_remove"
     bl_label = "Remove from Light Group"

@@ -50,7 +50,9 @@ def _missing_links() -> Iterator[BakeWarning]:
                 missing.setdefault(block.library.filepath, []).append(block.name)
     for path, names in missing.items():
         more = f" and {len(names) - 1} more" if len(names) > 1 else ""
-        message = f"library '{path}' lacks '{names[0]}'{more}: what is linked from it is left out; relink it"
+        message = (
+            f"library '{path}' has no '{names[0]}'{more}: objects linked from it are left out; relink it"
+        )
         yield BakeWarning(path, message)
 
 

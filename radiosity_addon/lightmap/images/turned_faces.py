@@ -49,5 +49,5 @@ def turned_away(
                 item.name,
                 f"object '{item.name}' is lit from behind only on {share:.0%} of its surface: normals point "
                 "away from the light, so its lightmap is dark there; flip them (Mesh → Normals → Flip) if "
-                "that side is to be seen",
+                "that side should be visible",
             )

@@ -257,9 +257,8 @@ def _lay_flat(
         warnings.append(
             BakeWarning(
                 source.name,
-                f"object '{source.name}' took more than {seconds:g} s to unwrap; the rest of it was cut by "
-                "the directions its faces look, which makes more seams: give it a UV layer Lightmap and "
-                "keep UVs, or simplify it",
+                f"object '{source.name}' took more than {seconds:g} s to unwrap; the rest was cut by face "
+                "direction, which makes more seams: give it a UV layer Lightmap and keep UVs, or simplify it",
             )
         )
     return _Layout(source, _scaled(charts, source.scale), kept=False)
