@@ -19,7 +19,7 @@ from ..scene import BakeScene
 from .texel_memory import least_bytes, pages_of, refuse_large_pages, room
 
 CHARTS = 6.0
-"""Charts of an object whose faces look all ways; a heavy mesh has more: one for so many …"""
+"""Charts of an object whose faces look all ways; a heavy mesh has more: one for this many …"""
 
 TRIANGLES_A_CHART = 24.0
 """… triangles (the office)."""

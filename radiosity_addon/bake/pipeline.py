@@ -254,7 +254,7 @@ def _texels(bake_scene: BakeScene, baked: list[BakeObject], atlas: Atlas, scratc
     for item, placed in zip(baked, atlas.objects, strict=True):
         uv[item.rows] = placed.uv
         page_of_triangle[item.rows] = placed.page
-    # What has no area has no side to be lit from, whatever its UVs say.
+    # Triangles without area have no side to be lit from, even if their UVs have one.
     page_of_triangle[bake_scene.scene.areas == 0] = -1
     rows = [np.flatnonzero(page_of_triangle == page) for page in range(len(atlas.pages))]
     texels = [rasterize(uv[of], page.resolution, scratch) for of, page in zip(rows, atlas.pages, strict=True)]

@@ -166,7 +166,7 @@ def _moved_alone(kept: KeptBake, bake_scene: BakeScene, settings: BakeSettings) 
 
 
 def _gone(shown: ShownBake, digests: BakeDigests) -> list[str]:
-    """Return the objects that the last bake had and the scene has not, but for renamed ones."""
+    """Return the objects that the last bake had and the scene has not, except for renamed ones."""
     present = {digest[:SHORT] for digest in digests.objects.values()}
     return [
         name for name in shown.objects if name not in digests.objects and shown.objects[name] not in present

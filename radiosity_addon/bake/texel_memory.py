@@ -27,7 +27,7 @@ WORKING_BYTES, THREAD_BYTES = 120e6, 60e6
 """Temporaries of a tile, and of each thread, of pages of at least …"""
 
 WORKING_PIXELS = 1 << 20
-"""… so many pixels; of smaller ones in proportion."""
+"""… this many pixels; of smaller ones in proportion."""
 
 BEFORE_SOLVING = 0.25
 """Share of the free memory that the places of texels may take before the scene is solved."""
@@ -53,7 +53,7 @@ def room(settings: BakeSettings) -> float:
 
 
 def least_bytes(pages: Sequence[int], settings: BakeSettings) -> float:
-    """Return what pages of some sizes take at least, whatever lives in files [bytes]."""
+    """Return the least that pages of these sizes take outside temporary files [bytes]."""
     pixels = float(sum(size**2 for size in pages))
     # Besides the image there are its copy for Cycles, and those of light groups.
     images = IMAGE_BYTES * (2 + len(settings.groups)) * pixels

@@ -56,7 +56,7 @@ class RemainingTime:
         return self._shown
 
     def _remember(self, now: float, fraction: float) -> None:
-        """Note a reading, and forget those before the recent past, but for the last of them."""
+        """Note a reading, and forget those before the recent past, except for the last of them."""
         if now - self._readings[-1][0] >= READING_INTERVAL:
             self._readings.append((now, fraction))
         since = now - RECENT * (now - self._start)

@@ -59,8 +59,8 @@ def _cut_half_plane(polygon: Array, distance: Array) -> Array:
 def _outside_once(distance: Array) -> Array:
     """Return (t, k) distances that are negative along one run of corners, the one with the smallest.
 
-    A line meets the outline of a convex polygon twice; where corners lie on it but for rounding, it seems to
-    more often.
+    A line meets the outline of a convex polygon twice; where corners lie on it, except for rounding, it
+    seems to meet it more often.
     """
     size = distance.shape[1]
     turned = (np.argmin(distance, axis=1)[:, None] + np.arange(size)) % size

@@ -109,7 +109,7 @@ class Staging(MarkedFolder):
             raise
 
     def close(self) -> None:
-        """Remove the folder and whatever is left in it; it stays if earlier files could not be put back."""
+        """Remove the folder and everything left in it; it stays if earlier files could not be put back."""
         for aside in _asides(self.target, self.path):
             _remove_file(aside)
         if (self.path / JOURNAL).exists():

@@ -2,7 +2,7 @@
 
 What is kept is light-independent (geometry and reflectance): gather hits, each lamp's gain at each texel,
 the hierarchy's links. Color and power of lamps, emission, and the world's color and strength may change;
-whatever moves, turns or reflects otherwise needs a new bake.
+anything that moves, turns or reflects differently needs a new bake.
 """
 
 from __future__ import annotations

@@ -45,7 +45,7 @@ from .plain_objects import flatten, restore
 from .sidecar_checks import check_stored, stored_layout
 
 MAGIC, FORMAT = b"RADIOSITYRELIGHT", 3
-"""The format rises with whatever is stored: classes say it themselves (`plain_objects.stored_names`)."""
+"""The format rises with every change of the stored fields (`plain_objects.stored_names`)."""
 
 OF_SOURCES = ("emitter", "emitter_names", "light_groups", "emitter_groups")
 """What a scene says of its sources besides their strengths: it stays as it was baked."""

@@ -164,7 +164,7 @@ def _is_there(block: bpy.types.ID) -> bool:
 def replacing_earlier(
     context: bpy.types.Context, keep: Collection[str] = (), is_partial: bool = False
 ) -> Iterator[EarlierBake]:
-    """Replace the earlier bake by what `apply_lightmaps` shows in this block, but for objects to `keep`.
+    """Replace the earlier bake by what `apply_lightmaps` shows in this block, except for objects to `keep`.
 
     A failure in it leaves what was there before.
     """

@@ -73,7 +73,7 @@ def run_bake(
     Raises RadiosityError: Whatever cannot be baked or written, in one line.
     """
     seconds: dict[str, float] = {}
-    # Now, not after the export: large pages need much memory whatever is on them.
+    # Now, not after the export: large pages need much memory, even if they are nearly empty.
     refuse_large_pages(pages_of(settings) or (), settings)
     lightmap_versions.flush()
     with ExitStack() as stack:

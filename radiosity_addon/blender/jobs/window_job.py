@@ -174,7 +174,7 @@ class WindowJob:
         return {"CANCELLED"}
 
     def _end(self, context: bpy.types.Context) -> None:
-        """Close the work, whatever state it is in, and everything shown about it."""
+        """Close the work in any state, and everything shown about it."""
         job, self._job = self._job, None
         try:
             if job is not None:

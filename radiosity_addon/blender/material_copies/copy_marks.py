@@ -22,7 +22,7 @@ COPY_NAME = "radiosity_copy_name"
 """On a copied material: the name we gave it."""
 
 TOKEN = "radiosity_token"
-"""On a copied material: shared with no other, but for those that the user duplicated from it."""
+"""On a copied material: shared with no other, except for those that the user duplicated from it."""
 
 SAMPLING = "radiosity_emission_sampling"
 """On a copied material: how Cycles sampled the original's emission."""

@@ -1,6 +1,6 @@
 """What rough mirrors reflect in all, so that they can bounce light as matte surfaces do.
 
-Hemispherical albedos, of light that comes from everywhere alike, fitted to what Cycles does.
+Hemispherical albedos, of light that comes evenly from all directions, fitted to Cycles.
 Over roughness 0 to 1 they are within 0.02 of it for metals, and within 0.01 for what lies
 over a matte base (decision record 0022 has the figures).
 """

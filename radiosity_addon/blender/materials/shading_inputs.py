@@ -178,7 +178,7 @@ def read_mesh_inputs(mesh: bpy.types.Mesh, loops: np.ndarray, asked: Iterable[st
 
 
 def read_object_inputs(instance: bpy.types.DepsgraphObjectInstance, asked: Iterable[str]) -> ObjectValues:
-    """Read what an instance has for all its corners alike: (4,) float32 by input."""
+    """Read the inputs that are the same at all corners of an instance: (4,) float32 by input."""
     obj = instance.object
     values: ObjectValues = {}
     for name in asked:

@@ -72,7 +72,7 @@ def _current(context: bpy.types.Context) -> OverlayPicture | None:
 
 
 def _key(context: bpy.types.Context) -> tuple[object, ...]:
-    """Return what a picture depends on, but for objects and lightmaps, whose changes are reported."""
+    """Return what a picture depends on, except for objects and lightmaps, whose changes are reported."""
     settings, scene = overlay_of(context), context.scene
     names = [
         prop.identifier for prop in settings.bl_rna.properties if prop.type not in ("POINTER", "COLLECTION")

@@ -2,7 +2,7 @@
 
 Python can only reach the graph that the viewport evaluates: objects hidden there are not
 in it, and modifiers run at viewport levels. A graph in render mode exists only inside a
-render engine. So whatever has a viewport and a render setting is switched to the render's
+render engine. So everything with a viewport and a render setting is switched to the render's
 for a moment, and put back after.
 
 What this does not see: the *Is Viewport* node of geometry nodes, and settings that an

@@ -154,7 +154,7 @@ def _trace(
     so_far: LightSoFar | None,
     progress: Progress,
 ) -> tuple[TexelTransport, GatherPointLayout | None, TableRows]:
-    """Gather at texels and at the cells that their rays met, but for what stands.
+    """Gather at texels and at the cells that their rays met, except what stands.
 
     Returns also where points were chosen, if lights are kept apart, and the rows of the table of radiosity.
     """

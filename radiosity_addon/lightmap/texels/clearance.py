@@ -30,7 +30,7 @@ SAME_PLANE = 0.45
 """Surfaces this near each other's planes, as a part of the clearance, are one: twice that still is within."""
 
 ROUNDED = 1e-7
-"""A sine less than this, of planes that are the same but for rounding, is 0."""
+"""A sine less than this, of planes that are the same except for rounding, is 0."""
 
 CHUNK = 1 << 13
 """Texels worked on at once; bounds the temporaries to about 5 MB a thread."""

@@ -10,7 +10,7 @@ So rays find what share of each leaf's light arrives anywhere at all, in a close
 simply all of it. What the leaf's own links leave of that is what it sends over shared ones:
 its radiosity is scaled when they take their mean. Where its own links alone send more than
 it has (faces closer together than rays can resolve are all hit), those are scaled too: so no leaf ever
-sends more than it has, and the iteration converges (but for what gradients of clusters make negative:
+sends more than it has, and the iteration converges (except what gradients of clusters make negative:
 `hierarchical.STALLED`).
 
 What a leaf receives is the same the other way round: where nothing escapes ΣFV = 1, and what its own links

@@ -2,7 +2,7 @@
 
 A face with an image of emission becomes pieces of constant emission. Shadow rays ask what share of a
 lamp is seen, one number for all colors; so where pieces differ in color each channel is a lamp
-of its own, lest a red half of a screen be hidden by what stands before the green one.
+of its own, so that an object in front of the green half of a screen does not hide the red half.
 """
 
 from __future__ import annotations
