@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.bake.relight.light_groups import split_by_group
+from radiosity_addon.bake.relight.light_groups import share_out
 from radiosity_addon.base.errors import SceneError
 from radiosity_addon.lightmap.transport.warm_start import MAX_SOLUTIONS, WarmStart
 from radiosity_addon.rays.embree import EmbreeCaster
@@ -107,8 +107,8 @@ def test_the_first_light_is_never_forgotten() -> None:
 def test_parts_are_scaled_to_sum_to_the_whole() -> None:
     parts = np.array([[1.0, 0.0, -0.1, 0.0], [3.0, 2.0, 0.4, 0.0]])
     whole = np.array([5.0, 2.0, 0.2, 0.1])
-    found = split_by_group(whole, parts)
-    np.testing.assert_allclose(found, [[1.25, 0, 0, 0], [3.75, 2, 0.2, 0.1]], rtol=1e-6)
+    share_out(whole, list(parts))
+    np.testing.assert_allclose(parts, [[1.25, 0, 0, 0], [3.75, 2, 0.2, 0.1]], rtol=1e-6)
 
 
 def test_what_is_known_is_taken_off_and_nothing_falls_below_0() -> None:

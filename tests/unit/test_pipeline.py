@@ -15,12 +15,12 @@ from radiosity_addon.bake.result.pictures import Picture
 from radiosity_addon.bake.result.result import BakeResult
 from radiosity_addon.base.errors import SceneError
 from radiosity_addon.base.progress import Cancelled, Progress, Status
-from radiosity_addon.lightmap.images.seam_steps import seam_steps
 from radiosity_addon.options import METHODS, BakeSettings, options_of_method
 from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, solve
 from radiosity_addon.solver.links import initial
 from tests.rooms import FLOOR, box_room, gray, gray_scene, rectangle, solid_box, sphere
+from tests.seam_steps import seam_steps
 from tests.unit.texel_scenes import QUAD_UV, bake_object, bake_scene, in_cell
 from tests.watched import noting
 from tests.wording import says

@@ -94,13 +94,6 @@ def group_pages(
     )
 
 
-def split_by_group(whole: Array, parts: Array) -> Array:
-    """Return (g, …) float32: `share_out` for parts."""
-    result = parts.astype(np.float64)
-    share_out(whole, list(result))
-    return result.astype(np.float32)
-
-
 def share_out(whole: Array, parts: Sequence[Array]) -> None:
     """Scale parts of an image where they are, so that they sum to the `whole` (height, …), none below 0.
 

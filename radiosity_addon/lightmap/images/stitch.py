@@ -31,18 +31,11 @@ TOLERANCE = 1e-4
 """… or until the residual has fallen to this part."""
 
 
-def stitch_pages(pages: Sequence[Float32], geometry: TexelGeometry, seams: Seams) -> list[Float32]:
-    """Stitch dilated pages, (height, width, channels) each; returns new ones.
-
-    What lies farther outside the charts than filtering reaches keeps what dilation gave it.
-    """
-    stitched = [page.copy() for page in pages]
-    stitch_in_place(stitched, geometry, seams)
-    return stitched
-
-
 def stitch_in_place(pages: Sequence[Float32], geometry: TexelGeometry, seams: Seams) -> None:
-    """Stitch dilated pages where they are."""
+    """Stitch dilated pages, (height, width, channels) each, where they are.
+
+    Texels farther outside the charts than filtering reaches keep their dilated values.
+    """
     if not len(seams):
         return
     texel, inverse = np.unique(seams.texel, return_inverse=True)

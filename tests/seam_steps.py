@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...numerics import Array
-from ..texels import NO_TEXEL, TexelGeometry
-from .seams import Seams
+from radiosity_addon.lightmap.images.seams import Seams
+from radiosity_addon.lightmap.texels import NO_TEXEL, TexelGeometry
+from radiosity_addon.numerics import Array
 
 NEIGHBOR = 2.5
 """Texels side by side on the page are neighbors if they lie no farther apart [texels] in the world."""
