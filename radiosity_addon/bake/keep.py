@@ -31,7 +31,7 @@ class KeepOptions:
 
 
 def can_keep(settings: BakeSettings) -> bool:
-    """Tell whether bakes of these settings can be relit."""
+    """Return whether bakes of these settings can be relit."""
     return settings.method == "hierarchical" and settings.quantity != "residual"
 
 

@@ -28,7 +28,7 @@ class Status:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Progress:
-    """Tells a listener how far work is. May be used from any thread.
+    """Reports the progress of work to a listener. May be used from any thread.
 
     listener: Takes a `Status`. Raises `Cancelled` to stop the work. None: nobody listens.
     name: The stage.

@@ -19,7 +19,7 @@ BAND = 64
 
 
 def are_wanted(bake_scene: BakeScene, settings: BakeSettings) -> bool:
-    """Tell whether a bake makes lightmaps of light groups."""
+    """Return whether a bake makes lightmaps of light groups."""
     known = any((*bake_scene.light_groups, *bake_scene.emitter_groups))
     return bool(settings.groups) or (settings.light_groups and known)
 
@@ -115,7 +115,7 @@ def share_out(whole: Array, parts: Sequence[Array]) -> None:
 def members(
     settings: BakeSettings, names: Sequence[str], of_scene: Sequence[str], strengths: Array
 ) -> list[tuple[str, Array]]:
-    """Tell which sources are in which group.
+    """Return which sources are in which group.
 
     names, of_scene: The s sources' names, and the groups that the scene puts them in.
     strengths (s, 3): Theirs: `OTHERS` is there only if it was requested, or something in it shines.

@@ -187,7 +187,7 @@ def _named(block: Mapping[str, Any], objects: Sequence[BakeObject]) -> dict[str,
 
 
 def _file(file: LightmapFile) -> dict[str, Any]:
-    """Tell of an image: its name, and its scale where it has one."""
+    """Return an image's entry: its name, and its scale if it has one."""
     return {"image": file.path} if file.scale is None else {"image": file.path, "scale": file.scale}
 
 

@@ -231,7 +231,7 @@ def _of_light(
 
 
 def _shines(world: bpy.types.World | None) -> bool:
-    """Tell whether a world may give light, without rendering it."""
+    """Return whether a world may give light, without rendering it."""
     if world is None:
         return False
     if not uses_nodes(world):

@@ -19,7 +19,7 @@ _SEEN_THROUGH = frozenset({"WIRE", "BOUNDS"})
 
 
 def seen_triangles(context: bpy.types.Context, export: Export) -> Array:
-    """Tell which of the scene's triangles the viewports show as surfaces.
+    """Return which of the scene's triangles the viewports show as surfaces.
 
     What is hidden there, so that one can look into a room, is baked but stays hidden.
 

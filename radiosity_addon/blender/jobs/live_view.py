@@ -110,7 +110,7 @@ class _LiveView:
 
 
 def _uses_exposure(shading: bpy.types.View3DShading) -> bool:
-    """Tell whether a viewport will show the lightmaps with the scene's exposure.
+    """Return whether a viewport will show the lightmaps with the scene's exposure.
 
     As Blender does: not in a material preview that is lit by a studio light alone. One that is
     solid now is taken for the material preview it can be switched to.
@@ -151,7 +151,7 @@ def end() -> None:
 
 
 def is_active() -> bool:
-    """Tell whether pictures are being drawn."""
+    """Return whether pictures are being drawn."""
     return _view is not None
 
 

@@ -105,7 +105,7 @@ class WindowJob:
         return self._finish(context)
 
     def _is_our_turn(self) -> bool:
-        """Tell whether our timer has come: events do not say whose they are, but it counts on."""
+        """Return whether our timer has come: events do not say whose they are, but it counts on."""
         now = 0.0 if self._timer is None else self._timer.time_duration
         if now == self._ticked:
             return False

@@ -23,7 +23,7 @@ _COMPUTE = {
 
 
 def is_socket(value: Scalar | Color) -> bool:
-    """Tell whether a value is only known where it is rendered."""
+    """Return whether a value is only known where it is rendered."""
     return isinstance(value, bpy.types.NodeSocket)
 
 

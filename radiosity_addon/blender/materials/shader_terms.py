@@ -73,11 +73,11 @@ def nothing() -> Terms:
 
 
 class ShaderWalk(ABC, Generic[Place, Seen]):
-    """Tells shader nodes apart, for baking and for display; what becomes of each is for others to say."""
+    """Distinguishes shader nodes, for baking and for display; subclasses define the result of each."""
 
     @abstractmethod
     def shader(self, socket: bpy.types.NodeSocket, place: Place) -> Seen:
-        """Return what feeds a shader socket comes to."""
+        """Return the result for what feeds a shader socket."""
 
     @abstractmethod
     def _nothing(self) -> Seen:
@@ -159,7 +159,7 @@ class ShaderTerms(ShaderWalk[Place, Terms]):
 
     @abstractmethod
     def warn(self, message: str) -> None:
-        """Tell that something is not taken as it is."""
+        """Report something that is not baked as it is."""
 
     def _nothing(self) -> Terms:
         return nothing()

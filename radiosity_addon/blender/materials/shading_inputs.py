@@ -140,7 +140,7 @@ def eevee_only(tree: bpy.types.NodeTree) -> list[str]:
 
 
 def asks_light_path(tree: bpy.types.NodeTree, names: tuple[str, ...]) -> bool:
-    """Tell whether one of these outputs of a Light Path node is linked in a tree or its groups."""
+    """Return whether one of these outputs of a Light Path node is linked in a tree or its groups."""
     nodes = (node for node in _all_nodes(tree) if node.type == "LIGHT_PATH")
     return any(output.is_linked for node in nodes for output in node.outputs if output.name in names)
 

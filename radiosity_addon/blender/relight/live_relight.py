@@ -78,7 +78,7 @@ class LiveRelight:
         self._end_work()
 
     def is_at_work(self) -> bool:
-        """Tell whether the timer still has something to do."""
+        """Return whether the timer still has something to do."""
         return bpy.app.timers.is_registered(_tick)
 
     def settle(self) -> None:

@@ -31,7 +31,7 @@ BAKEABLE_TYPES = frozenset({"MESH", "CURVE", "SURFACE", "FONT", "META"})
 
 
 def has_role(obj: bpy.types.Object | None) -> bool:
-    """Tell whether an object can light, block or be baked: surfaces, and instances of collections."""
+    """Return whether an object can light, block or be baked: surfaces, and instances of collections."""
     return obj is not None and (obj.type in BAKEABLE_TYPES or obj.instance_type == "COLLECTION")
 
 

@@ -84,7 +84,7 @@ def _still_as_in_the_viewport(objects: Iterable[bpy.types.Object]) -> Iterator[B
 
 
 def _asks(tree: bpy.types.NodeTree | None, known: dict[str, bool]) -> bool:
-    """Tell whether a node tree, or a group in it, asks if it is evaluated for the viewport."""
+    """Return whether a node tree, or a group in it, asks if it is evaluated for the viewport."""
     if tree is None:
         return False
     if tree.name_full not in known:

@@ -68,6 +68,6 @@ def details_of(scene: bpy.types.Scene) -> KeptDetails | None:
 
 
 def _is_shown(name: str) -> bool:
-    """Tell whether an object, or the stand-in of an instance "Instancer/Object", is seen."""
+    """Return whether an object, or the stand-in of an instance "Instancer/Object", is seen."""
     there = [bpy.data.objects.get(name + ending) for ending in ("", STAND_IN_SUFFIX)]
     return any(obj.visible_get() for obj in there if obj is not None)

@@ -113,7 +113,7 @@ class Session:
             manager.radiosity_live = False
 
     def lightmaps_changed(self) -> None:
-        """Tell everything that draws or caches lightmaps."""
+        """Notify everything that draws or caches lightmaps."""
         for listener in self.on_lightmaps_changed:
             listener()
 

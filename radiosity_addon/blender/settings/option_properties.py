@@ -72,7 +72,7 @@ class OptionProperties:
 
 
 def is_shown(option: Option, group: Any) -> bool:
-    """Tell whether the panel shows an option, and a bake listens to it, as the other ones are chosen.
+    """Return whether the panel shows an option, and a bake listens to it, as the other ones are chosen.
 
     group: `scene.radiosity`.
     """
@@ -94,7 +94,7 @@ def chosen_options(group: Any) -> dict[str, Any]:
 
 
 def _chosen(option: Option, value: Any) -> bool:
-    """Tell whether a value says something: 0 may leave it to the quality, a last choice to another option."""
+    """Return whether a value is a choice: 0 may leave it to the quality, a last choice to another option."""
     if option.choices:
         return value in option.values
     return option.default is not None or bool(value)

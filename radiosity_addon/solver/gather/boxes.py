@@ -56,7 +56,7 @@ class Boxes:
         return found
 
     def met_by(self, start: Array, along: Array, widen: Array, end: float = np.inf) -> Array:
-        """Tell which rays meet a box that is `widen` larger on all sides.
+        """Return which rays meet a box that is `widen` larger on all sides.
 
         start (n, 3).
         along (n, k, 3).
@@ -81,7 +81,7 @@ class Boxes:
         return found
 
     def met_by_fans(self, start: Array, along: Array, grow: Array, widen: Array, end: float = 1.0) -> Array:
-        """Tell which fans of rays meet a box: from a point to all of another box, or of a patch of the sky.
+        """Return which fans of rays meet a box: from a point to all of another box, or of a patch of the sky.
 
         start (n, 3).
         along (n, k, 3): To the middle of what is at the fan's end.

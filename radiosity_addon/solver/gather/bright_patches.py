@@ -209,7 +209,7 @@ class BrightElements:
 
         shares (n, m).
         hits: k of each point, one point after the other.
-        leaves_of: Tells the leaf elements hit.
+        leaves_of: Returns the leaf elements that were hit.
         """
         out = np.zeros(len(hits.triangle), dtype=bool)
         aims = np.repeat(shares.any(axis=1), len(out) // len(shares))

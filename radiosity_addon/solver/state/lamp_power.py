@@ -32,7 +32,7 @@ LYING = 1.0 / 32.0
 
 
 def is_stopped(light: Light) -> TypeGuard[Emitter]:
-    """Tell whether each part of a light's power ends at one surface, or none."""
+    """Return whether each part of a light's power ends at one surface, or none."""
     return isinstance(light, Emitter) and light.casts_shadow
 
 
