@@ -39,7 +39,7 @@ def last_check(scene: bpy.types.Scene) -> Any:
 
 
 def look_first(context: bpy.types.Context) -> bool:
-    """Return whether a scene that was neither baked nor checked has problems that the user should see first."""
+    """Return whether a scene that was neither baked nor checked has problems the user should see first."""
     scene = context.scene
     known = last_bake.read(scene) is not None or last_check(scene) is not None
     if known or not preferences(context).check_first:
