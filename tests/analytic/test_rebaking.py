@@ -218,12 +218,12 @@ def test_other_changes_are_refused(kept: KeptBake) -> None:
     plain = room(ELSEWHERE)
     painted = plain.scene.reflectance.copy()
     painted[12] = 0.1
-    with pytest.raises(SceneError, match="'Box'.* material"):
+    with pytest.raises(SceneError, match=r"'Box'.* material"):
         moved_objects(kept, altered(reflectance=painted))
     with pytest.raises(SceneError, match=f"'{plain.scene.lights[-1].name}' is missing"):
         moved_objects(kept, altered(lights=plain.scene.lights[:-1]))
     brighter = (replace(plain.scene.lights[0], power=1.0), *plain.scene.lights[1:])
-    with pytest.raises(SceneError, match="'Bulb'.* strength"):
+    with pytest.raises(SceneError, match=r"'Bulb'.* strength"):
         moved_objects(kept, altered(lights=brighter))
     named = replace(plain, objects=(replace(plain.objects[0], name="Hall"), *plain.objects[1:]))
     with pytest.raises(SceneError, match="'Room' is missing"):
@@ -236,7 +236,7 @@ def test_other_changes_are_refused(kept: KeptBake) -> None:
     with pytest.raises(SceneError, match=r"'Room'.*coordinates"):
         moved_objects(replace(kept, bake_scene=laid_out), plain)
     mesh = replace(plain.objects[1], polygon=plain.objects[1].polygon[::-1])
-    with pytest.raises(SceneError, match="'Box'.* mesh"):
+    with pytest.raises(SceneError, match=r"'Box'.* mesh"):
         moved_objects(kept, replace(plain, objects=(plain.objects[0], mesh, plain.objects[2])))
     with pytest.raises(SceneError, match="nothing in it moved"):
         moved_objects(replace(kept, moves=None), plain)

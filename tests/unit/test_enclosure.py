@@ -7,7 +7,7 @@ import pytest
 
 from radiosity_addon.scene.opacity import ray_caster
 from radiosity_addon.solver.balance import enclosure
-from radiosity_addon.solver.balance.enclosure import HELD_RAYS, LAMP_RAYS, LEAF_RAYS, Arrivals
+from radiosity_addon.solver.balance.enclosure import EMISSIVE_LEAF_RAYS, HELD_RAYS, LEAF_RAYS, Arrivals
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from tests.rooms import CEILING, FLOOR, box_room, gray, gray_scene, rectangle
 
@@ -77,7 +77,7 @@ def test_black_backs_take_what_does_not_escape() -> None:
 def test_what_shines_into_the_open_asks_more() -> None:
     triangles, surface = open_box()
     found = measured(triangles, 0.0, surface == FLOOR)
-    assert (found.rays[surface == FLOOR] == LAMP_RAYS).all()
+    assert (found.rays[surface == FLOOR] == EMISSIVE_LEAF_RAYS).all()
     others = (surface != FLOOR) & found.escapes
     assert others.sum() > 10
     assert (found.rays[others] == LEAF_RAYS).all()

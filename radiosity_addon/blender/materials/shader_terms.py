@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 
 from . import glossy_albedo
-from .node_algebra import Color, NodeAlgebra, Scalar
+from .node_algebra import NodeAlgebra, NodeColor, Scalar
 from .shader_nodes import Feed, default_rgb
 
 Place = TypeVar("Place")
@@ -62,9 +62,9 @@ class Terms:
         The share of light that goes straight through.
     """
 
-    reflected: Color
-    radiance: Color
-    passed: Color
+    reflected: NodeColor
+    radiance: NodeColor
+    passed: NodeColor
 
 
 def nothing() -> Terms:
@@ -146,7 +146,7 @@ class ShaderTerms(ShaderWalk[Place, Terms]):
     """Comes from shader nodes to their terms; what their sockets hold is for others to say."""
 
     @abstractmethod
-    def color(self, socket: bpy.types.NodeSocket, place: Place) -> Color:
+    def color(self, socket: bpy.types.NodeSocket, place: Place) -> NodeColor:
         """Return what a color socket holds."""
 
     @abstractmethod
@@ -197,7 +197,7 @@ class ShaderTerms(ShaderWalk[Place, Terms]):
             algebra.scale(np.ones(3), algebra.complement(alpha)),
         )
 
-    def _principled_radiance(self, node: bpy.types.Node, place: Place) -> Color:
+    def _principled_radiance(self, node: bpy.types.Node, place: Place) -> NodeColor:
         strength, color = node.inputs["Emission Strength"], node.inputs["Emission Color"]
         if not strength.is_linked and strength.default_value == 0:
             return np.zeros(3)
@@ -205,7 +205,7 @@ class ShaderTerms(ShaderWalk[Place, Terms]):
             return np.zeros(3)
         return self.algebra(place).scale(self.color(color, place), self.scalar(strength, place))
 
-    def _principled_albedo(self, node: bpy.types.Node, place: Place) -> Color:
+    def _principled_albedo(self, node: bpy.types.Node, place: Place) -> NodeColor:
         """Return metallic · metal + (1 − metallic) · (shine + (1 − shine) (1 − transmission) base)."""
         algebra, inputs = self.algebra(place), node.inputs
         base = self.color(inputs["Base Color"], place)

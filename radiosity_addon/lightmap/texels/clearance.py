@@ -26,7 +26,7 @@ MOST_CELLS = 1 << 24
 MAX_PIECES = 1 << 16
 """More pieces of triangles than this and than four a texel are not made: then no texel is clear."""
 
-SAME_PLANE = 0.45
+PLANE_DISTANCE = 0.45
 """Surfaces this near each other's planes, as a part of the clearance, are one: twice that still is within."""
 
 ROUNDED = 1e-7
@@ -60,9 +60,9 @@ def clear_texels(
     pieces = _pieces(geometry.triangles, cells, max(MAX_PIECES, 4 * len(geometry)), geometry.scratch)
     if pieces is None:
         return clear
-    cells.fill(geometry, *pieces, SAME_PLANE * clearance)
+    cells.fill(geometry, *pieces, PLANE_DISTANCE * clearance)
     del pieces
-    judge = partial(_all_flat, cells, geometry, low, high, SAME_PLANE * clearance)
+    judge = partial(_all_flat, cells, geometry, low, high, PLANE_DISTANCE * clearance)
     fill_chunks(judge, clear, len(clear), CHUNK, threads)
     return clear
 

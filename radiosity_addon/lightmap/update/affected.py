@@ -16,7 +16,7 @@ from ...solver.gather import UNNUMBERED, Boxes, ElementLookup, MovedGeometry
 from ..texels import Crossings, SmoothLift, TexelGeometry
 from ..transport import HitTable
 
-REACH = 1.5
+AFFECTED_REACH = 1.5
 """What is farther from a texel than this many times its size neither touches nor hoods it."""
 
 BOX_MARGIN = 4.0
@@ -71,7 +71,7 @@ class AffectedTexels:
     def near(self) -> Array:
         """(n,) bool: texels that moved, and those that what moved may stand on, touch or hood."""
         geometry = self.geometry
-        return self.texels | self.boxes.near(geometry.position, REACH * geometry.reach)
+        return self.texels | self.boxes.near(geometry.position, AFFECTED_REACH * geometry.reach)
 
     @cached_property
     def widen(self) -> Array:

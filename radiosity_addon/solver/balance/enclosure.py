@@ -18,7 +18,7 @@ from ..links import node_samples, pull
 LEAF_RAYS = 32
 """Hemisphere rays of a leaf; in a closed scene they all agree, and there is no noise at all."""
 
-LAMP_RAYS = 512
+EMISSIVE_LEAF_RAYS = 512
 """Rays of an emissive leaf, where not all of the others arrive: most power starts there."""
 
 HELD_RAYS = 128
@@ -87,7 +87,7 @@ class Arrivals:
         rays = np.minimum(LEAF_RAYS * 4 ** power.astype(np.int64), MOST_OF_ONE)
         large = hierarchy.area[leaves] >= self._min_area
         shines = hierarchy.emission[leaves].any(axis=1)
-        rays[large & shines] = np.maximum(rays[large & shines], LAMP_RAYS)
+        rays[large & shines] = np.maximum(rays[large & shines], EMISSIVE_LEAF_RAYS)
         held = large & ~shines & ~self.escapes[leaves]
         rays[held] = np.maximum(rays[held], HELD_RAYS)
         return np.asarray(rays)
