@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """One front door for everything a developer does: `python3 build.py VERB ...`, standard library only.
 
-It sets itself up: the first verb that needs packages makes `.venv` beside this file with the
+It sets itself up: the first verb that needs packages makes `.venv` next to this file with the
 pinned versions of `requirements/`, later ones only check that the pins have not changed.
 """
 
@@ -190,7 +190,7 @@ def package(_: list[str]) -> int:
 
 
 def prepare_real_blender(_: list[str]) -> int:
-    """Install the Blender that the tests need beside the module, if it is not there yet."""
+    """Install the Blender that the tests need in addition to the module, if it is not there yet."""
     from build_tools import real_blender
 
     print(f"Blender is in {real_blender.prepare().root}")

@@ -117,7 +117,7 @@ def _triangle(damage: dict) -> bytes:
         ({"nodes": [{"name": "Empty", "extensions": []}]}, "parse glTF"),
     ],
 )
-def test_the_cause_is_told_and_nothing_is_printed(
+def test_the_cause_is_reported_and_nothing_is_printed(
     damage: dict, words: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "damaged.gltf"

@@ -59,7 +59,7 @@ def test_the_command_line_replaces_no_foreign_file(
     assert (out / name).read_text() == "mine"
 
 
-def test_the_command_line_replaces_a_foreign_file_when_told_to(room: Path, run: Run) -> None:
+def test_the_command_line_replaces_a_foreign_file_on_request(room: Path, run: Run) -> None:
     out = room / "out"
     out.mkdir()
     (out / "lightmap.exr").write_text("mine")

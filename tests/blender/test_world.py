@@ -15,7 +15,7 @@ from radiosity_addon.blender.scene_export.export import export_scene
 from radiosity_addon.form_factors.formulas import point_to_polygon
 from radiosity_addon.lights.environment import (
     BRIGHT,
-    CELLS,
+    SKY_CELLS,
     SkyPatch,
     cell_directions,
     pixel_bounds,
@@ -183,7 +183,7 @@ def test_what_only_the_camera_sees_does_not_light() -> None:
 def _irradiance(scene: BakeScene, normal: np.ndarray) -> np.ndarray:
     """What an open plane receives of the exported sky, (3,) [W/m²]."""
     total = np.zeros(3)
-    toward, angle = cell_directions(CELLS), solid_angles(pixel_bounds(CELLS))
+    toward, angle = cell_directions(SKY_CELLS), solid_angles(pixel_bounds(SKY_CELLS))
     for light in scene.scene.lights:
         if isinstance(light, EnvironmentLight):
             share = light.relative(toward) * np.maximum(toward @ normal, 0.0)

@@ -14,7 +14,7 @@ import pytest
 from radiosity_addon.base.errors import BakeError
 from radiosity_addon.files.baked_files import digest_of_file
 from radiosity_addon.publishing import publish as staging_module
-from radiosity_addon.publishing.marked_folders import MARK
+from radiosity_addon.publishing.marked_folders import OWNER_FILE
 from radiosity_addon.publishing.publish import (
     EARLIER,
     JOURNAL,
@@ -120,7 +120,7 @@ def test_folders_without_our_mark_are_left_alone(tmp_path: Path) -> None:
     others = [tmp_path / f"{PREFIX}other", tmp_path / f"{PREFIX}{OURS}"]
     for other in others:
         other.mkdir()
-        (other / MARK).write_text("somebody else's mark")
+        (other / OWNER_FILE).write_text("somebody else's mark")
     (tmp_path / "thesis").write_text("years of work")
     assert not clean_up(tmp_path)
     assert mine.exists()
@@ -209,8 +209,8 @@ def test_links_in_a_staging_folder_are_not_followed(tmp_path: Path, what: str) -
     files = {A: {"new": digest_of_file(folder / A), "old": digest_of_file(elsewhere / A)}}
     made = crafted(folder, files, {A: "secret"})
     if what == "mark":
-        (made / MARK).rename(elsewhere / "mark")
-        (made / MARK).symlink_to(elsewhere / "mark")
+        (made / OWNER_FILE).rename(elsewhere / "mark")
+        (made / OWNER_FILE).symlink_to(elsewhere / "mark")
     elif what == "earlier":
         (made / EARLIER / A).unlink()
         (made / EARLIER).rmdir()
@@ -317,7 +317,7 @@ def test_what_kills_leave_half_made_is_removed(tmp_path: Path) -> None:
     empty, marked = tmp_path / f"{PREFIX}{OURS}", tmp_path / f"{PREFIX}{OURS[:-1]}5"
     empty.mkdir()
     marked.mkdir()
-    (marked / MARK).touch()
+    (marked / OWNER_FILE).touch()
     clean_up(tmp_path)
     assert list(tmp_path.iterdir()) == []
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from radiosity_addon.publishing.marked_folders import MARK, MarkedFolder
+from radiosity_addon.publishing.marked_folders import OWNER_FILE, MarkedFolder
 from tests.processes import run_python
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -148,4 +148,4 @@ def test_a_folder_loses_its_mark_last(tmp_path: Path, monkeypatch: pytest.Monkey
             patch.setattr(os, name, noted(getattr(os, name)))
         folder.close()
     assert not folder.path.exists()
-    assert removed[-2:] == [MARK, folder.path.name]
+    assert removed[-2:] == [OWNER_FILE, folder.path.name]

@@ -109,7 +109,9 @@ def _carry_places() -> list[BakeWarning]:
             continue
         source.matrix_world = stand_in.matrix_basis @ Matrix(place).inverted_safe() @ source.matrix_world
         place_again(stand_in)
-        warnings.append(BakeWarning(source.name, f"object '{source.name}' was moved where its lightmap was"))
+        warnings.append(
+            BakeWarning(source.name, f"object '{source.name}' was moved to where its lightmap was")
+        )
     return warnings
 
 
@@ -305,13 +307,13 @@ def _replace_original(
 
 def _has_other_slots(original: bpy.types.Mesh, mesh: bpy.types.Mesh, known: StandIn) -> bool:
     """Whether a mesh holds other materials than when its stand-in was made."""
-    now = [original_of(material) for material in original.materials]
+    present = [original_of(material) for material in original.materials]
     before = [stood_for(mesh, slot) for slot in range(known.slots)]
-    if not now and len(before) == 1:
+    if not present and len(before) == 1:
         return False  # objects without slots show one
-    pairs = enumerate(zip(now, before, strict=False))
+    pairs = enumerate(zip(present, before, strict=False))
     other = any(one != two for slot, (one, two) in pairs if slot not in known.object_slots)
-    return other or len(now) != len(before)
+    return other or len(present) != len(before)
 
 
 def _aim_drivers(before: bpy.types.Key, now: bpy.types.Key) -> None:

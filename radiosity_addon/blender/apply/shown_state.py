@@ -40,7 +40,7 @@ _RECORD_FIELDS = (
 
 
 def showing() -> list[bpy.types.Object]:
-    """Return the file's own objects that show anything of a bake, but for stand-ins."""
+    """Return the file's own objects that show anything of a bake, except for stand-ins."""
     dressed = set(_dressed())
     return [
         obj
@@ -191,7 +191,7 @@ def _take_off(obj: bpy.types.Object) -> None:
 
 
 def _switch_on(obj: bpy.types.Object, modifiers: Sequence[tuple[str, bool, bool]]) -> None:
-    """Let modifiers show as they did, but for those that the user switched on since."""
+    """Let modifiers show as they did, except for those that the user switched on since."""
     names = {name for name, _, _ in modifiers}
     renamed = [m for m in obj.modifiers if m.name not in names and not (m.show_viewport or m.show_render)]
     for name, show_viewport, show_render in modifiers:

@@ -56,10 +56,10 @@ def read_world(world: bpy.types.World | None, dark: bool = False) -> Generator[f
     with known_means_only(None):  # an image is not constant
         radiance, warnings = read_radiance(world, "world")
     # The walk through the nodes warns of values that are not constant; Cycles evaluates those.
-    beside = tuple(warning for warning in warnings if "volume" in warning.message)
-    if len(beside) == len(warnings):
-        return _constant(radiance, world.name, dark), beside + limited
-    return (yield from _sampled(world.name_full)), beside + limited
+    other_warnings = tuple(warning for warning in warnings if "volume" in warning.message)
+    if len(other_warnings) == len(warnings):
+        return _constant(radiance, world.name, dark), other_warnings + limited
+    return (yield from _sampled(world.name_full)), other_warnings + limited
 
 
 def _constant(radiance: np.ndarray, name: str, dark: bool) -> list[Light]:

@@ -20,7 +20,8 @@ MADE_MARKER = "radiosity_lightmaps"
 """Custom property of the datablocks that a bake made."""
 
 ORIGINAL = "radiosity_original"
-"""Custom property of a material copy or a stand-in mesh: the user's datablock that it shows."""
+"""Custom property of a stand-in mesh, or of a copy of a material or node group: the user's datablock that it
+shows. Copies of no material have none."""
 
 LAYER = "radiosity_layer"
 """Custom property of a mesh with a UV layer of ours; see `uv_layers.py`."""

@@ -121,7 +121,7 @@ def _missing(tree: dict[str, Any]) -> Iterator[str]:
 
 
 def _has_cycle(children: list[list[int]]) -> bool:
-    """Tell whether following children from some node leads back to it."""
+    """Return whether following children from some node leads back to it."""
     parents = [0] * len(children)
     for row in children:
         for child in row:

@@ -1,4 +1,4 @@
-"""Files that the command line writes by themselves, wherever the user says: `--report`, `--plot`, `restore`.
+"""Single files that the command line writes where the user says: `--report`, `--plot`, `restore`.
 
 None of them may replace the scene, a file the scene reads, a file of the bake, or another of them; what is
 there already is replaced only if it is ours, or with `--overwrite`.
@@ -41,7 +41,7 @@ def check_existing(option: str, path: Path, overwrite: bool, ours: Mapping[str, 
     """Refuse to replace a file that is not ours; once the scene is open.
 
     option: That names it.
-    overwrite: Whether other files may be replaced, too, but for those the scene reads.
+    overwrite: Whether other files may be replaced, too, except for those the scene reads.
     ours: The owner as the report of the bake will say, if a report of that may be replaced.
     Raises BakeError.
     """

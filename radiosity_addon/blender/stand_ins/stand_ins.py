@@ -124,7 +124,7 @@ def is_edited(mesh: bpy.types.Mesh, known: StandIn) -> bool:
 
 
 def own_mesh(obj: bpy.types.Object) -> bpy.types.ID | None:
-    """Return the user's mesh of an object, whatever stands in for it."""
+    """Return the user's mesh of an object, also where another stands in for it."""
     data = obj.data
     if data is not None and is_made(data):
         return data.get(ORIGINAL) or (obj.radiosity_bake.original_mesh if is_recorded(obj) else None)

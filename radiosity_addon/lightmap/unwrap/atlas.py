@@ -2,7 +2,7 @@
 
 Kept UVs (an existing layer) stay as they are, bit for bit, wherever that is possible: on an
 object's own page always, on a shared page when all objects bring UVs and none lies over another's.
-Otherwise each object's kept layout is packed, as one chart of unchanged shape, beside the others.
+Otherwise each object's kept layout is packed, as one chart of unchanged shape, next to the others.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _OVERLAP = 1.01
 """A texel filled to more than this holds triangles that lie over each other."""
 
 _COLLAPSED = 1e-6
-"""Kept UVs whose area is less than this share of their extent, squared, are a line but for rounding."""
+"""Kept UVs whose area is less than this share of their extent, squared, are a line except for rounding."""
 
 
 @dataclass(frozen=True)
@@ -188,7 +188,7 @@ _Laid = list[tuple[list[int], Packing]]
 
 
 def _lay_on_pages(layouts: list[_Layout], options: AtlasOptions, progress: Progress) -> _Laid:
-    """Pack objects on as many pages as are asked for or needed."""
+    """Pack objects on as many pages as are requested or needed."""
     density = options.texel_density
     totals = _totals(layouts, options.limits.padding)
     count = len(layouts)
@@ -205,7 +205,7 @@ def _lay_on_pages(layouts: list[_Layout], options: AtlasOptions, progress: Progr
             for group in groups:
                 laid.append((group, _pack_group([layouts[each] for each in group], options, progress)))
         except BakeError:
-            # What does not fit at the density asked for may fit on more pages.
+            # What does not fit at the requested density may fit on more pages.
             if density is None or len(groups) == len(layouts):
                 raise
             count = max(count, len(groups)) + 1
@@ -257,9 +257,8 @@ def _lay_flat(
         warnings.append(
             BakeWarning(
                 source.name,
-                f"object '{source.name}' took more than {seconds:g} s to unwrap; the rest of it was cut by "
-                "the directions its faces look, which makes more seams: give it a UV layer Lightmap and "
-                "keep UVs, or simplify it",
+                f"object '{source.name}' took more than {seconds:g} s to unwrap; the rest was cut by face "
+                "direction, which makes more seams: give it a UV layer Lightmap and keep UVs, or simplify it",
             )
         )
     return _Layout(source, _scaled(charts, source.scale), kept=False)
