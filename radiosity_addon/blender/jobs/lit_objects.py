@@ -9,11 +9,11 @@ import numpy as np
 from ...bake import LightmappedObject
 from ...numerics import triangle_areas
 from ..datablocks.mesh_arrays import world_from_object
-from ..scene_records.pieces import Collected, Piece
+from ..scene_records.pieces import Piece, SceneContents
 
 
 def lit_objects(
-    chosen: Sequence[Piece], areas: Mapping[int, float], collected: Collected
+    chosen: Sequence[Piece], areas: Mapping[int, float], collected: SceneContents
 ) -> list[LightmappedObject]:
     """Return the objects that get a lightmap.
 
@@ -27,14 +27,14 @@ def lit_objects(
     ]
 
 
-def glass_materials(collected: Collected) -> list[str]:
+def glass_materials(collected: SceneContents) -> list[str]:
     """Return the names of the materials that are glass and nothing else."""
     clear = _clear(collected)
     shown = {row for piece in collected.pieces for row in np.unique(piece.surface[clear[piece.surface]])}
     return sorted({source.name for row in shown if (source := collected.materials[row]) is not None})
 
 
-def _clear(collected: Collected) -> np.ndarray:
+def _clear(collected: SceneContents) -> np.ndarray:
     """Return (s,) bool: the surfaces that are glass and nothing else."""
     return np.array([surface.is_clear for surface in collected.surfaces], dtype=bool)
 

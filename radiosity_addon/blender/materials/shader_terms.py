@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 
 from . import glossy_albedo
-from .node_algebra import Color, NodeAlgebra, Scalar
+from .node_algebra import NodeAlgebra, NodeColor, Scalar
 from .shader_nodes import Feed, default_rgb
 
 Place = TypeVar("Place")
@@ -68,9 +68,9 @@ class Terms:
         The share of light that goes straight through.
     """
 
-    reflected: Color
-    radiance: Color
-    passed: Color
+    reflected: NodeColor
+    radiance: NodeColor
+    passed: NodeColor
 
 
 def nothing() -> Terms:
@@ -79,11 +79,11 @@ def nothing() -> Terms:
 
 
 class ShaderWalk(ABC, Generic[Place, Seen]):
-    """Tells shader nodes apart, for baking and for display; what becomes of each is for others to say."""
+    """Distinguishes shader nodes, for baking and for display; subclasses define the result of each."""
 
     @abstractmethod
     def shader(self, socket: bpy.types.NodeSocket, place: Place) -> Seen:
-        """Return what feeds a shader socket comes to."""
+        """Return the result for what feeds a shader socket."""
 
     @abstractmethod
     def _nothing(self) -> Seen:
@@ -164,7 +164,7 @@ class ShaderTerms(ShaderWalk[Place, Terms]):
     lets_through = False
 
     @abstractmethod
-    def color(self, socket: bpy.types.NodeSocket, place: Place) -> Color:
+    def color(self, socket: bpy.types.NodeSocket, place: Place) -> NodeColor:
         """Return what a color socket holds."""
 
     @abstractmethod
@@ -177,7 +177,7 @@ class ShaderTerms(ShaderWalk[Place, Terms]):
 
     @abstractmethod
     def warn(self, message: str) -> None:
-        """Tell that something is not taken as it is."""
+        """Report something that is not baked as it is."""
 
     def _nothing(self) -> Terms:
         return nothing()
@@ -225,7 +225,7 @@ class ShaderTerms(ShaderWalk[Place, Terms]):
             self._principled_passed(node, place, alpha),
         )
 
-    def _principled_passed(self, node: bpy.types.Node, place: Place, alpha: Scalar) -> Color:
+    def _principled_passed(self, node: bpy.types.Node, place: Place, alpha: Scalar) -> NodeColor:
         """Return (1 − α) + α transmission (1 − metallic) √base.
 
         The root is Cycles': a solid, which is crossed twice, has the base color.
@@ -241,7 +241,7 @@ class ShaderTerms(ShaderWalk[Place, Terms]):
         color = algebra.square_root(self.color(inputs["Base Color"], place))
         return algebra.add(past, algebra.scale(algebra.scale(color, share), alpha))
 
-    def _principled_radiance(self, node: bpy.types.Node, place: Place) -> Color:
+    def _principled_radiance(self, node: bpy.types.Node, place: Place) -> NodeColor:
         strength, color = node.inputs["Emission Strength"], node.inputs["Emission Color"]
         if not strength.is_linked and strength.default_value == 0:
             return np.zeros(3)
@@ -249,7 +249,7 @@ class ShaderTerms(ShaderWalk[Place, Terms]):
             return np.zeros(3)
         return self.algebra(place).scale(self.color(color, place), self.scalar(strength, place))
 
-    def _principled_albedo(self, node: bpy.types.Node, place: Place) -> Color:
+    def _principled_albedo(self, node: bpy.types.Node, place: Place) -> NodeColor:
         """Return metallic · metal + (1 − metallic) · (shine + (1 − shine) (1 − transmission) base).
 
         Where light goes through glass, what is transmitted has no shine either.
