@@ -6,13 +6,14 @@ Canceled or failed, nothing outside was touched.
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from ..base import SILENT, BakeError, Progress, SceneError, UsageError
-from ..lightmap.images import LightmapPage, Seams, find_seams, texel_pages, turned_away
+from ..base import SILENT, BakeError, BakeWarning, Progress, SceneError, UsageError
+from ..lightmap.images import LightmapPage, Seams, find_seams, texel_pages
 from ..lightmap.lighting import (
     LightSoFar,
     light_texels,
@@ -45,6 +46,7 @@ from .result import (
 )
 from .stages import timed
 from .texel_memory import refuse_too_large, share_out_memory, texel_scratch
+from .turned_faces import BackProbe, front_irradiance, turned_away
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,10 +136,11 @@ def _bake(
         lit = _texel_values(bake_scene, solution, geometry, quality.gather, settings, keep, so_far, part)
         del so_far, look, part
     report = solver_part(solution.final_report(), used_settings(quality.solver), bake_scene.objects)
-    from_behind = turned_away(
-        baked, bake_scene.scene.areas, fronts=solution.triangle_irradiance, backs=solution.back_irradiance
+    warnings = (
+        *atlas.warnings,
+        *_from_behind(bake_scene, baked, solution, geometry, lit),
+        *of_solution(solution, quality.solver),
     )
-    warnings = (*atlas.warnings, *from_behind, *of_solution(solution, quality.solver))
     solved = HierarchyReport(report, warnings)
     more = more_of(solution, baked, geometry, lit.light, settings.light)
     part = progress.part(ENCODE, 1.0)
@@ -323,6 +326,22 @@ def _texel_values(
     reflectance, emission = texel_materials(bake_scene.scene, geometry, FOOTPRINT)
     values = shown(light, reflectance, emission, settings, geometry.scratch)
     return TexelValues(values, local.caster, light, relightable, (reflectance, emission))
+
+
+def _from_behind(
+    bake_scene: BakeScene,
+    baked: list[BakeObject],
+    solution: Solution,
+    geometry: TexelGeometry,
+    lit: TexelValues,
+) -> Iterator[BakeWarning]:
+    """Warn of objects that are lit from behind only."""
+    front = solution.triangle_irradiance.max(axis=1)
+    if lit.light is not None:
+        front = front_irradiance(baked, geometry, lit.light, front)
+    probe = BackProbe(bake_scene.scene, solution.local_pass)
+    back = solution.back_irradiance.max(axis=1)
+    return turned_away(baked, bake_scene.scene.areas, front=front, back=back, probe=probe)
 
 
 def _seams(
