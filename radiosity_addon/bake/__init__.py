@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from .bake_warnings import coincident_counts, of_coincident
 from .estimate import Estimate, LightmappedObject, estimate_bake
 from .keep import KeepOptions, can_keep, run_pipeline
 from .plan import SHORT, BakeDigests, BakePlan, ShownBake, ShownLightmap, plan_bake
@@ -21,7 +22,9 @@ __all__ = [
     "ShownBake",
     "ShownLightmap",
     "can_keep",
+    "coincident_counts",
     "estimate_bake",
+    "of_coincident",
     "pages_of",
     "plan_bake",
     "refuse_too_large",

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from ..base import BakeWarning
 from ..lightmap.texels import TexelGeometry
 from ..lightmap.unwrap import greedy_object, share_of
-from ..scene import BakeObject, BakeScene
+from ..scene import BakeObject, BakeScene, Scene, coincident_triangles
 from ..solver import Solution, SolverSettings
 from ..solver.links import COARSEST_FAINT
 from .quality import used_settings
+
+NAMED = 5
+"""So many objects with coincident faces are named."""
 
 FEW_TEXELS = 8
 """An object with fewer than the square of so many texels is warned of."""
@@ -37,6 +40,29 @@ def small_objects(
                 f"object '{item.name}' gets only {own} texels, fewer than {FEW_TEXELS} × {FEW_TEXELS}: "
                 f"{mend}",
             )
+
+
+def coincident_counts(objects: Sequence[BakeObject], scene: Scene) -> dict[str, int]:
+    """Return how many triangles of each object are baked as if alone, though others are in their place."""
+    found = coincident_triangles(scene)
+    counts = {item.name: int(found[item.rows].sum()) for item in objects}
+    return {name: count for name, count in counts.items() if count}
+
+
+def of_coincident(counts: Mapping[str, int]) -> Iterator[BakeWarning]:
+    """Name the objects with the most faces that are in the place of others."""
+    if not counts:
+        return
+    names = sorted(counts, key=lambda name: (-counts[name], name))
+    listed = ", ".join(f"{counts[name]:,} of '{name}'" for name in names[:NAMED])
+    others = sum(counts[name] for name in names[NAMED:])
+    if others:
+        listed += f", {others:,} of {len(names) - NAMED} other objects"
+    yield BakeWarning(
+        names[0],
+        f"triangles in the same place as other faces ({listed}): their lightmaps show the light of each face "
+        "alone, where Cycles bakes black; delete the duplicates, or move them apart",
+    )
 
 
 def of_solution(solution: Solution, settings: SolverSettings) -> tuple[BakeWarning, ...]:

@@ -30,7 +30,7 @@ from ..rays import RayCaster
 from ..scene import BakeObject, BakeScene
 from ..solver import Solution, SolverSettings, SolverState, solve
 from ..solver.element_transport import Relightable
-from .bake_warnings import of_solution, small_objects
+from .bake_warnings import coincident_counts, of_coincident, of_solution, small_objects
 from .estimate import refuse_before_unwrapping
 from .quality import for_error, quality_of, used_settings
 from .relight import HierarchyReport, IncrementalState, KeptBake, are_wanted, check_groups, group_pages, shown
@@ -193,7 +193,8 @@ def finish(
     if settings.quantity == "residual":
         report["error_picture"] = residual_summary(lit.values)
     of_texels = small_objects(bake_scene, baked, geometry)
-    warnings = (*bake_scene.warnings, *of_texels, *solved.warnings)
+    coincident = coincident_counts(baked, bake_scene.scene)
+    warnings = (*bake_scene.warnings, *of_texels, *of_coincident(coincident), *solved.warnings)
     objects = tuple(
         BakedObject(item, placed.uv, placed.page) for item, placed in zip(baked, atlas.objects, strict=True)
     )
@@ -207,6 +208,7 @@ def finish(
         atlas=_page_facts(atlas, pages),
         groups=groups,
         light=light,
+        coincident=coincident,
         details=details,
     )
     return result, kept

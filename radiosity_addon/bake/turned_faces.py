@@ -36,7 +36,7 @@ PROBED, PROBES = 64, 16
 """So many dark triangles of an object are looked at from behind, by so many rays each."""
 
 OPEN = 0.5
-"""A back faces a room, not the inside of a solid, if at least this part of the rays meets fronts or leaves."""
+"""A back does not face the inside of a solid if at least this part of the rays meets fronts, or leaves."""
 
 
 class BackProbe:

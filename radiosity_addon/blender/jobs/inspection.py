@@ -17,7 +17,7 @@ import bpy
 import numpy as np
 
 from ...bake import Estimate, LightmappedObject, estimate_bake, refuse_too_large
-from ...base import RadiosityError
+from ...base import BakeWarning, RadiosityError
 from ...lightmap.unwrap import greedy_object, share_of
 from ...numerics import double_area_vectors
 from ...numerics import folder as scratch_folder
@@ -32,6 +32,7 @@ from ..scene_export.export import check_names, chosen_pieces
 from ..scene_records.object_roles import BAKEABLE_TYPES
 from ..scene_records.pieces import Collected, Piece
 from ..scene_records.render_state import render_depsgraph
+from .coincident_check import coincident_warnings
 
 if TYPE_CHECKING:
     from ..cycles.lamps import LampFactors
@@ -164,7 +165,7 @@ def inspect(
         *_of_shapes(context, collected, shapes),
         *_of_size(shapes),
         *_of_memory(plan, settings),
-        *(Finding(INFO, warning.name, warning.message) for warning in collected.warnings),
+        *(Finding(INFO, warning.name, warning.message) for warning in _more_warnings(collected, chosen)),
     ]
     findings.sort(key=lambda finding: (ERROR, WARNING, INFO).index(finding.level))
     return Inspection(
@@ -174,6 +175,10 @@ def inspect(
         estimate=plan,
         findings=tuple(dict.fromkeys(findings)),
     )
+
+
+def _more_warnings(collected: Collected, chosen: Sequence[Piece]) -> list[BakeWarning]:
+    return [*collected.warnings, *coincident_warnings(collected.pieces, chosen)]
 
 
 def _lit(piece: Piece, shapes: dict[int, _Shape]) -> LightmappedObject:
