@@ -119,7 +119,6 @@ class _ClusterGather:
         self._area, self._center = clusters.area[self._held, None], clusters.center[self._held]
         self._first_face = len(clusters)
         self._face_order = clusters.order
-        self._arm = [(faces.area * along)[self._face_order] for along in faces.center.T]
 
     def __call__(self, radiosity: Array, threads: int) -> Array:
         """Return (f, k): see `gather_at_clusters`."""
@@ -146,7 +145,8 @@ class _ClusterGather:
     def _moments(self, radiosity: Array) -> list[Array]:
         """Return 3 × (n_rows,) each cluster's mean of (y − c) B over its faces [W/m], of nodes' radiosity."""
         sent = radiosity[self._first_face :].take(self._face_order)
-        sums = self._cut.sums_of([sent * arm for arm in self._arm])[self._held_row]
+        arms = (sent * (self._faces.area * along)[self._face_order] for along in self._faces.center.T)
+        sums = self._cut.sums_of(arms, 3)[self._held_row]
         moment = np.zeros((self._cut.n_rows, 3))
         moment[self._held_row] = sums / self._area - self._center * radiosity[self._held, None]
         return [np.ascontiguousarray(along) for along in moment.T]

@@ -157,6 +157,8 @@ def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -
         rounds.append({"error": error, "links_refined": links_refined, "links": len(state.links)})
     iterate(state, settings.tolerance, last=True)
     tell(state, rounds)
+    if state.cut is not None:
+        state.cut.kept = None  # as large as the links, and quickly made again
     return state
 
 
