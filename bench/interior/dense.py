@@ -101,7 +101,7 @@ def build_foliage(triangles: int) -> bpy.types.Scene:
 
 
 def _levels(faces: list[tuple[int, int]], triangles: int) -> list[int]:
-    """Return the level of each object, given its quads and triangles: finer in turn until there are enough."""
+    """Return the level of each object by its quads and triangles; they get finer in turn."""
     levels = [PLAIN] * len(faces)
     total = sum(_subdivided(*face, PLAIN) for face in faces)
     for finer in range(PLAIN + 1, FINEST + 1):

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from .bake_warnings import coincident_counts, of_coincident
-from .estimate import Estimate, LightmappedObject, estimate_bake
+from .estimate import Estimate, LightmappedObject, estimate_bake, refuse_many_triangles
 from .keep import KeepOptions, can_keep, run_pipeline
 from .plan import SHORT, BakeDigests, BakePlan, ShownBake, ShownLightmap, plan_bake
 from .stages import timed
@@ -27,6 +27,7 @@ __all__ = [
     "of_coincident",
     "pages_of",
     "plan_bake",
+    "refuse_many_triangles",
     "refuse_too_large",
     "run_pipeline",
     "timed",

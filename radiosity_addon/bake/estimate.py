@@ -16,6 +16,8 @@ from ..lightmap.unwrap import ChartTotals, Limits, assign_pages, padding_for, pa
 from ..numerics import thread_count
 from ..options import BakeSettings
 from ..scene import BakeScene
+from ..solver.state import refuse_large_scene, refuse_many_faces
+from .quality import quality_of
 from .texel_memory import least_bytes, pages_of, refuse_too_large, room
 
 CHARTS = 6.0
@@ -99,29 +101,41 @@ def estimate_bake(objects: Sequence[LightmappedObject], triangles: int, settings
     pages, texels = _pages(objects, settings)
     total = sum(texels)
     rays = total * RAYS_A_TEXEL[settings.quality] * max(triangles, 1) ** 0.25
-    memory = (
+    of_texels = (
         BYTES_AT_LEAST
         + BYTES_A_RAY * max(triangles, 1) ** 0.14 * rays
-        + BYTES_A_TRIANGLE * triangles
         + BYTES_A_TEXEL * total
         + BYTES_A_PIXEL * sum(page**2 for page in pages)
     )
-    most = max(room(settings), least_bytes(pages, settings))
+    # Only what belongs to texels can be in files.
+    of_scene = BYTES_A_TRIANGLE * triangles
+    most = max(room(settings) - of_scene, least_bytes(pages, settings))
     seconds = None
     if settings.method == "hierarchical" and settings.relative_error is None:
         solving = SOLVE_SECONDS[settings.quality] * max(triangles, 1) ** 0.45
         gathering = SECONDS_A_RAY * rays
         cores = thread_count(settings.threads)
         seconds = UNWRAP_SECONDS * triangles + (solving + gathering) * (CORES / cores) ** 0.6
-    in_memory = min(memory, most)
-    return Estimate(tuple(pages), tuple(texels), in_memory, memory - in_memory, seconds)
+    in_memory = min(of_texels, most)
+    return Estimate(tuple(pages), tuple(texels), of_scene + in_memory, of_texels - in_memory, seconds)
+
+
+def refuse_many_triangles(triangles: int, settings: BakeSettings) -> None:
+    """Refuse a scene of so many two-sided triangles that it will not fit into the memory limit.
+
+    Raises UsageError: Names the number of faces, what they need, and what helps.
+    """
+    if settings.method == "hierarchical":
+        refuse_many_faces(2 * triangles, quality_of(settings).solver)
 
 
 def refuse_before_unwrapping(bake_scene: BakeScene, settings: BakeSettings) -> None:
-    """Refuse pages that will not fit into the memory limit, as far as areas tell how large they get.
+    """Refuse scenes and pages that will not fit into the memory limit, as far as areas tell their size.
 
-    Raises UsageError: See `refuse_too_large`.
+    Raises UsageError: See `refuse_large_scene` and `refuse_too_large`.
     """
+    if settings.method == "hierarchical":
+        refuse_large_scene(bake_scene.scene, quality_of(settings).solver)
     sizes = pages_of(settings)
     if sizes is None:
         areas = bake_scene.scene.areas

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
-from ...bake import Estimate, LightmappedObject, estimate_bake, refuse_too_large
+from ...bake import Estimate, LightmappedObject, estimate_bake, refuse_many_triangles, refuse_too_large
 from ...base import BakeWarning, RadiosityError
 from ...lightmap.unwrap import greedy_object, share_of
 from ...numerics import double_area_vectors
@@ -164,7 +164,7 @@ def inspect(
         *_of_texels(lit, plan),
         *_of_shapes(context, collected, shapes),
         *_of_size(shapes),
-        *_of_memory(plan, settings),
+        *_of_memory(plan, sum(len(p.mesh) for p in collected.pieces if p.role.in_bounces), settings),
         *(Finding(INFO, warning.name, warning.message) for warning in _more_warnings(collected, chosen)),
     ]
     findings.sort(key=lambda finding: (ERROR, WARNING, INFO).index(finding.level))
@@ -353,9 +353,10 @@ def _of_size(shapes: dict[int, _Shape]) -> Iterator[Finding]:
         )
 
 
-def _of_memory(plan: Estimate, settings: BakeSettings) -> Iterator[Finding]:
-    """Say whether pages are too large for the memory limit, and whether memory or disk may not do."""
+def _of_memory(plan: Estimate, triangles: int, settings: BakeSettings) -> Iterator[Finding]:
+    """Say whether triangles or pages exceed the memory limit, and whether memory or disk may not do."""
     try:
+        refuse_many_triangles(triangles, settings)
         refuse_too_large(plan.pages, settings)
     except RadiosityError as error:
         yield Finding(ERROR, "memory", str(error))

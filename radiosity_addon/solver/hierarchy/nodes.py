@@ -66,9 +66,8 @@ class Hierarchy:
             # They become the means of their elements.
             for name in OPTICAL:
                 setattr(self, name, getattr(self, name).copy())
-            self._weights = np.where(
-                self.faces.front[:, None, None], WHOLE_TRIANGLE, WHOLE_TRIANGLE[[0, 2, 1]]
-            )
+            self._weights = np.zeros((0, 3, 2))
+            """Corners of the elements below faces, as weights of the triangle's second and third corner."""
         emits = self.faces.emission.max(axis=1, initial=0.0) > 0
         # Emitters are grouped separately: averaged into a cluster of dark faces a small lamp is
         # missed by a few samples. So are backs: each lies where its front lies, unseen from
@@ -136,7 +135,7 @@ class Hierarchy:
 
     def _look_up(self, elements: Array) -> None:
         """Take the means over the new children of `elements`, and average them upward."""
-        weights = split_in_four(self._weights[elements]).reshape(-1, 3, 2)
+        weights = split_in_four(self._weights_of(elements)).reshape(-1, 3, 2)
         self._weights = np.concatenate([self._weights, weights])
         above = elements[self._detailed[self.face[elements]]]
         rows = (self.first_child[above][:, None] + np.arange(4)).ravel()
@@ -151,9 +150,18 @@ class Hierarchy:
             above = np.unique(self.parent[above])
             above = above[above != LEAF]
 
+    def _weights_of(self, elements: Array) -> Array:
+        """Return (n, 3, 2) the corners of elements, as weights of the triangle's second and third corner."""
+        count = len(self.faces)
+        front = self.faces.front[np.minimum(elements, count - 1)]
+        weights = np.where(front[:, None, None], WHOLE_TRIANGLE, WHOLE_TRIANGLE[[0, 2, 1]])
+        below = elements >= count
+        weights[below] = self._weights[elements[below] - count]
+        return weights
+
     def _means(self, elements: Array) -> Array:
         """Return (n, 7) reflectance, emission and opacity of elements, less the parts that others cover."""
-        triangle, weights = self.faces.triangle[self.face[elements]], self._weights[elements]
+        triangle, weights = self.faces.triangle[self.face[elements]], self._weights_of(elements)
         if self._images is None:
             textured = np.zeros(len(elements), dtype=bool)
         else:

@@ -13,7 +13,10 @@ import numpy as np
 from ...numerics import Array
 
 DEPTH = 5
-"""Steps remembered: two arrays of radiosity each, in single precision: they only decide the next guess."""
+"""Steps remembered: two arrays of radiosity each, …"""
+
+SINGLE = 1 << 18
+"""… in single precision from this number of rows on: they only decide the next guess."""
 
 GROWTH = 2.0
 """When the change grows so many times beyond the least one, all is forgotten."""
@@ -40,11 +43,13 @@ class Anderson:
         if size > GROWTH**2 * self._least:
             self._forget()
         self._least = min(self._least, size)
-        single = change.T.astype(np.float32), image.T.astype(np.float32)
         if self._last is not None and self._depth > 0:
-            self._changes = [*self._changes, single[0] - self._last[0]][-self._depth :]
-            self._images = [*self._images, single[1] - self._last[1]][-self._depth :]
-        self._last = single
+            precision = np.float32 if len(guess) >= SINGLE else np.float64
+            steps = (now.T - before.T for now, before in zip((change, image), self._last, strict=True))
+            for kept, step in zip((self._changes, self._images), steps, strict=True):
+                kept.append(np.ascontiguousarray(step, dtype=precision))
+                del kept[: -self._depth]
+        self._last = change, image
         if not self._changes:
             return image
         mixed = image.copy()

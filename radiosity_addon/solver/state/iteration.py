@@ -53,7 +53,12 @@ def reflect(
     if received is not None:
         # Only leaves count, and these have from their ancestors what is not their own.
         of_leaves = quarters_mean(own)
-        gathered = received[:, 1:] * (gathered - of_leaves) + received[:, :1] * of_leaves
+        gathered -= of_leaves
+        gathered *= received[:, 1:]
+        of_leaves *= received[:, :1]
+        gathered += of_leaves
+        del of_leaves
+    del own, shared, means, sent
     return push_pull(hierarchy, lights, gathered, state.emission, state.reflectance)
 
 
