@@ -15,6 +15,7 @@ import numpy as np
 
 from radiosity_addon.blender.files.files import empty_scene
 
+from ..layout import lay_out, write_layout
 from .office import GLOWS, build_office
 
 SUN = (np.radians(52), 0.0, np.radians(15))
@@ -31,8 +32,12 @@ CARD, FOREST = 0.25, 18.0
 """Sides of a card and of the ground that cards stand on [m]."""
 
 
-def build_dense_office(triangles: int) -> bpy.types.Scene:
-    """Fill the empty open file with the office: its meshes subdivided and textured, sun and sky outside."""
+def build_dense_office(triangles: int, resolution: int = 0) -> bpy.types.Scene:
+    """Fill the empty open file with the office: its meshes subdivided and textured, sun and sky outside.
+
+    resolution: Of the page on which the plain office is laid out, for bakes that keep UVs; 0 leaves that to
+        the bake.
+    """
     scene = build_office()
     for lamp in [obj for obj in scene.objects if obj.type == "LIGHT"]:
         bpy.data.objects.remove(lamp)
@@ -40,6 +45,8 @@ def build_dense_office(triangles: int) -> bpy.types.Scene:
     objects = [obj for obj in scene.objects if obj.type == "MESH"]
     for obj in objects:
         _project_uvs(obj.data)
+    if resolution:
+        write_layout(lay_out(resolution))
     levels = _levels([_quads_and_triangles(obj.data) for obj in objects], triangles)
     for obj, level in zip(objects, levels, strict=True):
         modifier = obj.modifiers.new("Subdivision", "SUBSURF")
@@ -192,5 +199,8 @@ def _add_sun(scene: bpy.types.Scene) -> None:
 if __name__ == "__main__":
     kind, count, path = sys.argv[1], int(sys.argv[2]), Path(sys.argv[3])
     empty_scene()
-    (build_dense_office if kind == "office" else build_foliage)(count)
+    if kind == "foliage":
+        build_foliage(count)
+    else:
+        build_dense_office(count, int(sys.argv[4]) if len(sys.argv) > 4 else 0)
     bpy.ops.wm.save_as_mainfile(filepath=str(path.resolve()), compress=True)

@@ -143,6 +143,7 @@ def _bake(
     )
     solved = HierarchyReport(report, warnings)
     more = more_of(solution, baked, geometry, lit.light, settings.light)
+    del solution  # its elements take as much as seams need
     part = progress.part(ENCODE, 1.0)
     return finish(bake_scene, settings, atlas, geometry, solved, lit, more, seconds, part)
 

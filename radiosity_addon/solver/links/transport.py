@@ -89,11 +89,11 @@ def push(hierarchy: Hierarchy, own: Array) -> Array:
 
 def quarters_mean(values: Array) -> Array:
     """Return (e, k) the mean of (e, 4, k) values; NumPy's own takes many times longer."""
-    mean = values[:, 0] + values[:, 1]
+    mean = np.asarray(values[:, 0] + values[:, 1], dtype=np.float64)
     mean += values[:, 2]
     mean += values[:, 3]
     mean *= 0.25
-    return np.asarray(mean)
+    return mean
 
 
 def pull(hierarchy: Hierarchy, at_leaves: Array) -> Array:
