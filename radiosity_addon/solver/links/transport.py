@@ -122,13 +122,12 @@ def push_pull(
     """Push irradiance to the leaves, reflect it there, and pull radiosity up (handout §4.2).
 
     lights (e, 3): What the leaves get straight from lamps [W/m²].
-    gathered (e, 3): What the leaves got over links, their ancestors' included [W/m²]. It is overwritten.
+    gathered (e, 3): What the leaves got over links, their ancestors' included [W/m²].
     emission, reflectance (e, 3).
     Returns irradiance (e, 3): Area means over the leaves below every element.
     Returns radiosity (e, 3).
     """
-    irradiance = gathered
-    irradiance += lights
+    irradiance = lights + gathered
     radiosity = reflectance * irradiance
     radiosity += emission
     return _pull_in_place(hierarchy, irradiance), _pull_in_place(hierarchy, radiosity)
