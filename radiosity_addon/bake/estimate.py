@@ -41,7 +41,7 @@ UNWRAP_SECONDS = 60e-6
 CORES = 2
 """Of the machine all this was measured on; more help by the power 0.6."""
 
-BYTES_A_RAY, BYTES_A_TRIANGLE, BYTES_A_TEXEL, BYTES_A_PIXEL, BYTES_AT_LEAST = 6.0, 2600.0, 380.0, 40.0, 30e6
+BYTES_A_RAY, BYTES_A_TRIANGLE, BYTES_A_TEXEL, BYTES_A_PIXEL, BYTES_AT_LEAST = 6.0, 2900.0, 380.0, 40.0, 30e6
 """Memory: what rays met is kept while light is swept, more of it in scenes of more triangles, by the power
 0.14; a triangle of the exported scene with its two faces; where texels lie, and their light; the pages
 themselves. What belongs to texels is in files beyond the memory limit."""

@@ -23,7 +23,7 @@ LINK_BYTES = 200
 LIGHT_LINK_BYTES = 80
 """… that a link from a lamp takes, …"""
 
-FACE_BYTES = 800
+FACE_BYTES = 900
 """… that a face takes with its element, its cluster and its part of the scene and of the rays' tree, …"""
 
 ELEMENT_BYTES = 500
