@@ -24,7 +24,7 @@ LIGHT_LINK_BYTES = 80
 """… that a link from a lamp takes, …"""
 
 FACE_BYTES = 900
-"""… that a face takes with its element, its cluster and its part of the scene and of the rays' tree, …"""
+"""… that a face takes with its element and its cluster while light is gathered (docs/decisions/0052), …"""
 
 ELEMENT_BYTES = 500
 """… that an element below a face takes while light is gathered, …"""
