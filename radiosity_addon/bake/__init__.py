@@ -8,9 +8,9 @@ from __future__ import annotations
 from .bake_warnings import coincident_counts, of_coincident
 from .estimate import Estimate, LightmappedObject, estimate_bake, refuse_many_triangles
 from .keep import KeepOptions, can_keep, run_pipeline
-from .plan import SHORT, BakeDigests, BakePlan, ShownBake, ShownLightmap, plan_bake
+from .plan import SHORT, BakeDigests, BakePlan, RememberedLightmap, ShownBake, plan_bake
 from .stages import timed
-from .texel_memory import pages_of, refuse_too_large
+from .texel_memory import pages_of, refuse_large_pages
 
 __all__ = [
     "SHORT",
@@ -19,16 +19,16 @@ __all__ = [
     "Estimate",
     "KeepOptions",
     "LightmappedObject",
+    "RememberedLightmap",
     "ShownBake",
-    "ShownLightmap",
     "can_keep",
     "coincident_counts",
     "estimate_bake",
     "of_coincident",
     "pages_of",
     "plan_bake",
+    "refuse_large_pages",
     "refuse_many_triangles",
-    "refuse_too_large",
     "run_pipeline",
     "timed",
 ]

@@ -18,10 +18,10 @@ from ..options import BakeSettings
 from ..scene import BakeScene
 from ..solver.state import refuse_large_scene, refuse_many_faces
 from .quality import quality_of
-from .texel_memory import least_bytes, pages_of, refuse_too_large, room
+from .texel_memory import least_bytes, pages_of, refuse_large_pages, room
 
 CHARTS = 6.0
-"""Charts of an object whose faces look all ways; a heavy mesh has more: one for so many …"""
+"""Charts of an object whose faces look all ways; a heavy mesh has more: one for this many …"""
 
 TRIANGLES_A_CHART = 24.0
 """… triangles (the office)."""
@@ -80,9 +80,9 @@ class Estimate:
 
     pages: Each page's width and height in texels.
     texels: Parallel to the objects: about how many each gets.
-    memory: What it takes beside what Blender has taken already [bytes], …
+    memory: What it takes in addition to what Blender already uses [bytes], …
     files: … and what does not fit into the memory limit: temporary files take it [bytes].
-    seconds: None where it depends on what is found: an error that is asked for, and methods for study.
+    seconds: None where it depends on the results: bakes to a target error, and methods for study.
     """
 
     pages: tuple[int, ...]
@@ -130,9 +130,9 @@ def refuse_many_triangles(triangles: int, settings: BakeSettings) -> None:
 
 
 def refuse_before_unwrapping(bake_scene: BakeScene, settings: BakeSettings) -> None:
-    """Refuse scenes and pages that will not fit into the memory limit, as far as areas tell their size.
+    """Refuse scenes and pages that will not fit into the memory limit, as far as their size follows from areas.
 
-    Raises UsageError: See `refuse_large_scene` and `refuse_too_large`.
+    Raises UsageError: See `refuse_large_scene` and `refuse_large_pages`.
     """
     if settings.method == "hierarchical":
         refuse_large_scene(bake_scene.scene, quality_of(settings).solver)
@@ -148,7 +148,7 @@ def refuse_before_unwrapping(bake_scene: BakeScene, settings: BakeSettings) -> N
     if settings.texel_density is not None:
         # It is known roughly; what unwrapping finds decides.
         sizes = tuple(int(UNSURE * size) for size in sizes)
-    refuse_too_large(sizes, settings)
+    refuse_large_pages(sizes, settings)
 
 
 def _pages(objects: Sequence[LightmappedObject], settings: BakeSettings) -> tuple[list[int], list[float]]:

@@ -28,7 +28,7 @@ DARK = 0.02
 SEEN = 0.1
 """… if the back gets at least this part of usual light."""
 
-MUCH = 0.1
+MAX_TURNED_SHARE = 0.1
 """Objects are warned of where more than this part of their area is like that: walls often are one object,
 and closed ones, which are dark inside, never are."""
 
@@ -77,18 +77,18 @@ def turned_away(
     for item, area in of:
         suspects = item.first + np.flatnonzero(dark[item.rows])
         share = float(areas[suspects].sum() / area.sum())
-        if share <= MUCH:
+        if share <= MAX_TURNED_SHARE:
             continue
         ends = np.cumsum(areas[suspects])
         chosen = np.searchsorted(ends, (np.arange(PROBED) + 0.5) / PROBED * ends[-1])
         distinct, count = np.unique(np.minimum(chosen, len(suspects) - 1), return_counts=True)
         share *= float(count @ probe.lit(suspects[distinct], SEEN * usual)) / PROBED
-        if share > MUCH:
+        if share > MAX_TURNED_SHARE:
             yield BakeWarning(
                 item.name,
                 f"object '{item.name}' is lit from behind only on {share:.0%} of its surface: normals point "
                 "away from the light, so its lightmap is dark there; flip them (Mesh → Normals → Flip) if "
-                "that side is to be seen",
+                "that side should be visible",
             )
 
 

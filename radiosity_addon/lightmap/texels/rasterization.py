@@ -7,7 +7,7 @@ is the overlap, a convex polygon of up to seven corners, over which the lightmap
 
 Candidates are found by row spans (for each triangle and row the columns the triangle reaches), so
 the work is proportional to the texels covered, not to bounding boxes; temporaries are chunked at
-`CHUNK` pairs, about 60 MB. Footprints are not stored but clipped anew where they are asked for:
+`CHUNK` pairs, about 60 MB. Footprints are not stored but clipped again where they are needed:
 at 4096² they would take a gigabyte.
 """
 

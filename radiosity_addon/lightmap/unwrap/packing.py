@@ -28,13 +28,13 @@ Int = NDArray[np.int64]
 GAP = 2
 """Free texels between charts that bilinear filtering asks for, without mip levels."""
 
-SMALLEST = 0.25
+MIN_CHART_WIDTH = 0.25
 """Texels; a chart that would be narrower is widened to this, so that nothing gets lost."""
 
-FINEST = 2048
+MAX_CELLS = 2048
 """Cells along a page's side; larger pages are packed in cells of several texels."""
 
-FEW = 64
+FEW_CHARTS = 64
 """Up to this many charts several orders, rules and stretches are tried; each costs a packing."""
 
 STRETCHES = (1.0, 0.8, 0.85, 0.9, 0.95, 1.05, 1.1, 1.15, 1.2, 1.25)
@@ -168,7 +168,7 @@ def _job(uv: Float, chart: Int, limits: Limits) -> _Job:
     np.maximum.at(extent, chart, aligned.max(axis=1))
     long, short = extent.max(axis=1), extent.min(axis=1)
     orders = [np.lexsort((np.arange(count), -short, -long))]
-    if count <= FEW:
+    if count <= FEW_CHARTS:
         orders.append(np.lexsort((np.arange(count), -long, -extent.prod(axis=1))))
         orders.append(np.lexsort((np.arange(count), -long, -short)))
     area = float(0.5 * np.abs(signed_double_areas(aligned)).sum())
@@ -176,7 +176,7 @@ def _job(uv: Float, chart: Int, limits: Limits) -> _Job:
 
 
 @dataclass(frozen=True)
-class _Scaled:
+class _ScaledCharts:
     """Cells per meter (count, 2) of each chart and the shapes they have then.
 
     For an even and for an odd number of quarter turns.
@@ -186,17 +186,17 @@ class _Scaled:
     shapes: tuple[Shapes, Shapes]
 
 
-def _scaled(job: _Job, scale: float, cell: int, stretch: float = 1.0) -> _Scaled:
+def _scaled(job: _Job, scale: float, cell: int, stretch: float = 1.0) -> _ScaledCharts:
     """Return the charts at `scale` texels per meter, stretched along the page's u."""
     even = _measured(job, scale * np.array((stretch**0.5, stretch**-0.5)), cell)
     odd = even if stretch == 1.0 else _measured(job, scale * np.array((stretch**-0.5, stretch**0.5)), cell)
-    return _Scaled((even[0], odd[0]), (even[1], odd[1]))
+    return _ScaledCharts((even[0], odd[0]), (even[1], odd[1]))
 
 
 def _measured(job: _Job, scale: Float, cell: int) -> tuple[Float, Shapes]:
     """Return cells per meter (count, 2) at `scale` (2,) texels per meter, and the charts' shapes."""
     extent = job.extent * scale
-    widen = np.where(extent < SMALLEST, SMALLEST / np.maximum(extent, 1e-30), 1.0)
+    widen = np.where(extent < MIN_CHART_WIDTH, MIN_CHART_WIDTH / np.maximum(extent, 1e-30), 1.0)
     cells = scale / cell * widen
     return cells, measure(job.edges * cells[job.owner][:, None], job.owner, job.extent * cells)
 
@@ -206,7 +206,7 @@ def _pack_into(job: _Job, resolution: int, page: int, progress: Progress) -> Pac
 
     `page` is the page's real size when `resolution` is a finer stand-in for it.
     """
-    cell = -(-resolution // FINEST)
+    cell = -(-resolution // MAX_CELLS)
     side = resolution // cell - 2 * job.limits.border(cell)
     count = len(job.extent)
     if side < 1:
@@ -214,7 +214,7 @@ def _pack_into(job: _Job, resolution: int, page: int, progress: Progress) -> Pac
     full = resolution / float(np.sqrt(job.area))
     best: Packing | None = None
     low, scale, trials = 0.0, 0.85 * full, int(np.clip(6000 // count, 6, 40))
-    for stretch in STRETCHES if count <= FEW else (1.0,):
+    for stretch in STRETCHES if count <= FEW_CHARTS else (1.0,):
         high = full
         for _ in range(trials):
             scaled = _scaled(job, scale, cell, stretch)
@@ -226,7 +226,7 @@ def _pack_into(job: _Job, resolution: int, page: int, progress: Progress) -> Pac
                 high = scale
             progress.at(0.0)
             if low == 0.0:
-                if high * job.extent.max() < SMALLEST:
+                if high * job.extent.max() < MIN_CHART_WIDTH:
                     break
                 guess = scale * np.sqrt(side / height) if height else 0.5 * scale
                 scale = float(np.clip(guess, 0.25 * scale, 0.97 * scale))
@@ -253,7 +253,7 @@ def _pack_at(job: _Job, density: float) -> Packing:
     while best is None or best.resolution - too_small > max(4, best.resolution // 256):
         if resolution > largest:
             raise _too_dense(density, largest)
-        cell = -(-resolution // FINEST)
+        cell = -(-resolution // MAX_CELLS)
         side = resolution // cell - 2 * job.limits.border(cell)
         scaled = _scaled(job, density, cell)
         placement, _ = _place(job, scaled.shapes, side, cell) if side > 0 else (None, 0)
@@ -288,7 +288,7 @@ def _place(job: _Job, shapes: tuple[Shapes, Shapes], side: int, cell: int) -> tu
         return None, 0
     if ((even.width + gap) * (even.height + gap) * even.boxy).sum() > 1.3 * (side + gap) ** 2:
         return None, 0
-    few = len(job.extent) <= FEW
+    few = len(job.extent) <= FEW_CHARTS
     for order in job.orders:
         for thrifty in (False, True) if few else (True,):
             placement = place(shapes, order, side, gap, side if few else None, thrifty)
@@ -297,7 +297,7 @@ def _place(job: _Job, shapes: tuple[Shapes, Shapes], side: int, cell: int) -> tu
     return None, placement.height if placement is not None else 0
 
 
-def _moved(job: _Job, scaled: _Scaled, placement: Placement, cell: int) -> Float:
+def _moved(job: _Job, scaled: _ScaledCharts, placement: Placement, cell: int) -> Float:
     """Return (n, 3, 2) chart corners turned and moved to their place [cells]."""
     chart = job.chart
     quarter = placement.quarter[chart]

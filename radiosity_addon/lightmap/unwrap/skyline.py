@@ -81,7 +81,7 @@ class _Strip:
     def put(self, x: int, y: int, bottom: Int, top: Int) -> None:
         """Raise the skyline over a chart, and its margin, and keep the hollows below it."""
         width, gap = len(bottom), self.gap
-        # What hangs down must stay a gap away from a hollow beside it, too.
+        # What hangs down must also stay a gap away from a hollow next to it.
         ceiling, above = bottom + (y - gap), top + (y + gap)
         wide = np.full(width + 2 * gap, -1, dtype=np.int64)
         wide[gap : gap + width] = above
