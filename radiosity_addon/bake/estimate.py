@@ -130,7 +130,7 @@ def refuse_many_triangles(triangles: int, settings: BakeSettings) -> None:
 
 
 def refuse_before_unwrapping(bake_scene: BakeScene, settings: BakeSettings) -> None:
-    """Refuse scenes and pages that will not fit into the memory limit, as far as their size follows from areas.
+    """Refuse scenes and pages that will not fit into the memory limit, as far as areas give their size.
 
     Raises UsageError: See `refuse_large_scene` and `refuse_large_pages`.
     """

@@ -4,7 +4,7 @@ A wall whose normals point out of its room, or a bathtub whose normals point inw
 render, as both sides of a surface show, and black once it is baked. Somebody who does not know that will look
 for a leak.
 
-The solver's elements are too coarse to tell: inside a thin shell they get a tenth of the light around it. So
+The solver's elements are too coarse for this: inside a thin shell they get a tenth of the light around it. So
 fronts are judged by their texels, and backs by rays.
 """
 
