@@ -5,7 +5,8 @@
 
 from __future__ import annotations
 
-from .estimate import Estimate, LightmappedObject, estimate_bake
+from .bake_warnings import coincident_counts, of_coincident
+from .estimate import Estimate, LightmappedObject, estimate_bake, refuse_many_triangles
 from .keep import KeepOptions, can_keep, run_pipeline
 from .plan import SHORT, BakeDigests, BakePlan, RememberedLightmap, ShownBake, plan_bake
 from .stages import timed
@@ -21,10 +22,13 @@ __all__ = [
     "RememberedLightmap",
     "ShownBake",
     "can_keep",
+    "coincident_counts",
     "estimate_bake",
+    "of_coincident",
     "pages_of",
     "plan_bake",
     "refuse_large_pages",
+    "refuse_many_triangles",
     "run_pipeline",
     "timed",
 ]

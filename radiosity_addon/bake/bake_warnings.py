@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from ..base import BakeWarning
 from ..lightmap.texels import TexelGeometry
 from ..lightmap.unwrap import greedy_object, share_of
-from ..scene import BakeObject, BakeScene
+from ..scene import BakeObject, BakeScene, Scene, coincident_triangles
 from ..solver import Solution, SolverSettings
 from ..solver.links import COARSEST_FAINT
 from .quality import used_settings
+
+MAX_NAMED = 5
+"""At most this many objects with coincident faces are named."""
 
 MIN_SIDE = 8
 """Objects with fewer texels than the square of this cause a warning."""
@@ -36,6 +39,29 @@ def small_objects(
                 item.name,
                 f"object '{item.name}' gets only {own} texels, fewer than {MIN_SIDE} × {MIN_SIDE}: {advice}",
             )
+
+
+def coincident_counts(objects: Sequence[BakeObject], scene: Scene) -> dict[str, int]:
+    """Return how many triangles of each object are baked as if alone, though others are in their place."""
+    found = coincident_triangles(scene)
+    counts = {item.name: int(found[item.rows].sum()) for item in objects}
+    return {name: count for name, count in counts.items() if count}
+
+
+def of_coincident(counts: Mapping[str, int]) -> Iterator[BakeWarning]:
+    """Name the objects with the most faces that are in the place of others."""
+    if not counts:
+        return
+    names = sorted(counts, key=lambda name: (-counts[name], name))
+    listed = ", ".join(f"{counts[name]:,} of '{name}'" for name in names[:MAX_NAMED])
+    others = sum(counts[name] for name in names[MAX_NAMED:])
+    if others:
+        listed += f", {others:,} of {len(names) - MAX_NAMED} other objects"
+    yield BakeWarning(
+        names[0],
+        f"triangles in the same place as other faces ({listed}): their lightmaps show the light of each face "
+        "alone, where Cycles bakes black; delete the duplicates, or move them apart",
+    )
 
 
 def of_solution(solution: Solution, settings: SolverSettings) -> tuple[BakeWarning, ...]:

@@ -16,6 +16,8 @@ from ..lightmap.unwrap import ChartTotals, Limits, assign_pages, padding_for, pa
 from ..numerics import thread_count
 from ..options import BakeSettings
 from ..scene import BakeScene
+from ..solver.state import refuse_large_scene, refuse_many_faces
+from .quality import quality_of
 from .texel_memory import least_bytes, pages_of, refuse_large_pages, room
 
 CHARTS = 6.0
@@ -39,10 +41,10 @@ UNWRAP_SECONDS = 60e-6
 CORES = 2
 """Of the machine all this was measured on; more help by the power 0.6."""
 
-BYTES_A_RAY, BYTES_A_TRIANGLE, BYTES_A_TEXEL, BYTES_A_PIXEL, BYTES_AT_LEAST = 6.0, 1700.0, 380.0, 40.0, 30e6
+BYTES_A_RAY, BYTES_A_TRIANGLE, BYTES_A_TEXEL, BYTES_A_PIXEL, BYTES_AT_LEAST = 6.0, 2900.0, 380.0, 40.0, 30e6
 """Memory: what rays met is kept while light is swept, more of it in scenes of more triangles, by the power
-0.14; faces and links; where texels lie, and their light; the pages themselves. Beyond the memory limit it
-is in files."""
+0.14; a triangle of the exported scene with its two faces; where texels lie, and their light; the pages
+themselves. What belongs to texels is in files beyond the memory limit."""
 
 UNSURE = 0.8
 """Pages that follow from a density are refused before they are laid out if so much of their width would."""
@@ -99,29 +101,41 @@ def estimate_bake(objects: Sequence[LightmappedObject], triangles: int, settings
     pages, texels = _pages(objects, settings)
     total = sum(texels)
     rays = total * RAYS_A_TEXEL[settings.quality] * max(triangles, 1) ** 0.25
-    memory = (
+    of_texels = (
         BYTES_AT_LEAST
         + BYTES_A_RAY * max(triangles, 1) ** 0.14 * rays
-        + BYTES_A_TRIANGLE * triangles
         + BYTES_A_TEXEL * total
         + BYTES_A_PIXEL * sum(page**2 for page in pages)
     )
-    most = max(room(settings), least_bytes(pages, settings))
+    # Only what belongs to texels can be in files.
+    of_scene = BYTES_A_TRIANGLE * triangles
+    most = max(room(settings) - of_scene, least_bytes(pages, settings))
     seconds = None
     if settings.method == "hierarchical" and settings.relative_error is None:
         solving = SOLVE_SECONDS[settings.quality] * max(triangles, 1) ** 0.45
         gathering = SECONDS_A_RAY * rays
         cores = thread_count(settings.threads)
         seconds = UNWRAP_SECONDS * triangles + (solving + gathering) * (CORES / cores) ** 0.6
-    in_memory = min(memory, most)
-    return Estimate(tuple(pages), tuple(texels), in_memory, memory - in_memory, seconds)
+    in_memory = min(of_texels, most)
+    return Estimate(tuple(pages), tuple(texels), of_scene + in_memory, of_texels - in_memory, seconds)
+
+
+def refuse_many_triangles(triangles: int, settings: BakeSettings) -> None:
+    """Refuse a scene of so many two-sided triangles that it will not fit into the memory limit.
+
+    Raises UsageError: Names the number of faces, what they need, and what helps.
+    """
+    if settings.method == "hierarchical":
+        refuse_many_faces(2 * triangles, quality_of(settings).solver)
 
 
 def refuse_before_unwrapping(bake_scene: BakeScene, settings: BakeSettings) -> None:
-    """Refuse pages that will not fit into the memory limit, as far as their size follows from areas.
+    """Refuse scenes and pages that will not fit into the memory limit, as far as areas give their size.
 
-    Raises UsageError: See `refuse_large_pages`.
+    Raises UsageError: See `refuse_large_scene` and `refuse_large_pages`.
     """
+    if settings.method == "hierarchical":
+        refuse_large_scene(bake_scene.scene, quality_of(settings).solver)
     sizes = pages_of(settings)
     if sizes is None:
         areas = bake_scene.scene.areas

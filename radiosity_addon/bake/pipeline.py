@@ -6,13 +6,14 @@ Canceled or failed, nothing outside was touched.
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from ..base import SILENT, BakeError, Progress, SceneError, UsageError
-from ..lightmap.images import LightmapPage, Seams, find_seams, texel_pages, turned_away
+from ..base import SILENT, BakeError, BakeWarning, Progress, SceneError, UsageError
+from ..lightmap.images import LightmapPage, Seams, find_seams, texel_pages
 from ..lightmap.lighting import (
     LightSoFar,
     light_texels,
@@ -29,7 +30,7 @@ from ..rays import RayCaster
 from ..scene import BakeObject, BakeScene
 from ..solver import Solution, SolverSettings, SolverState, solve
 from ..solver.element_transport import Relightable
-from .bake_warnings import of_solution, small_objects
+from .bake_warnings import coincident_counts, of_coincident, of_solution, small_objects
 from .estimate import refuse_before_unwrapping
 from .quality import for_error, quality_of, used_settings
 from .relight import (
@@ -53,6 +54,7 @@ from .result import (
 )
 from .stages import timed
 from .texel_memory import refuse_large_pages, share_out_memory, texel_scratch
+from .turned_faces import BackProbe, front_irradiance, turned_away
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,12 +146,14 @@ def _bake(
     report = solver_part(solution.final_report(), used_settings(quality.solver), bake_scene.objects)
     glass = [item.name for item in bake_scene.objects if item.glass is not None]
     report |= {"glass": glass} if glass else {}
-    from_behind = turned_away(
-        baked, bake_scene.scene.areas, fronts=solution.triangle_irradiance, backs=solution.back_irradiance
+    warnings = (
+        *atlas.warnings,
+        *_from_behind(bake_scene, baked, solution, geometry, lit),
+        *of_solution(solution, quality.solver),
     )
-    warnings = (*atlas.warnings, *from_behind, *of_solution(solution, quality.solver))
     solved = HierarchyReport(report, warnings)
     more = more_of(solution, baked, geometry, lit.light, settings.light)
+    del solution  # its elements take as much as seams need
     part = progress.part(ENCODE, 1.0)
     return finish(bake_scene, settings, atlas, geometry, solved, lit, more, seconds, part)
 
@@ -200,7 +204,8 @@ def finish(
     if settings.quantity == "residual":
         report["error_picture"] = residual_summary(lit.values)
     of_texels = small_objects(bake_scene, baked, geometry)
-    warnings = (*bake_scene.warnings, *of_texels, *solved.warnings)
+    coincident = coincident_counts(baked, bake_scene.scene)
+    warnings = (*bake_scene.warnings, *of_texels, *of_coincident(coincident), *solved.warnings)
     objects = tuple(
         BakedObject(item, placed.uv, placed.page) for item, placed in zip(baked, atlas.objects, strict=True)
     )
@@ -214,6 +219,7 @@ def finish(
         atlas=_page_facts(atlas, pages),
         groups=groups,
         light=light,
+        coincident=coincident,
         details=details,
     )
     return result, kept
@@ -349,6 +355,22 @@ def _texel_values(
     reflectance, emission = texel_materials(bake_scene.scene, geometry, FOOTPRINT)
     values = held_values(light, reflectance, emission, settings, geometry.scratch)
     return TexelValues(values, local.caster, light, relightable, (reflectance, emission))
+
+
+def _from_behind(
+    bake_scene: BakeScene,
+    baked: list[BakeObject],
+    solution: Solution,
+    geometry: TexelGeometry,
+    lit: TexelValues,
+) -> Iterator[BakeWarning]:
+    """Warn of objects that are lit from behind only."""
+    front = solution.triangle_irradiance.max(axis=1)
+    if lit.light is not None:
+        front = front_irradiance(baked, geometry, lit.light, front)
+    probe = BackProbe(bake_scene.scene, solution.local_pass)
+    back = solution.back_irradiance.max(axis=1)
+    return turned_away(baked, bake_scene.scene.areas, front=front, back=back, probe=probe)
 
 
 def _seams(

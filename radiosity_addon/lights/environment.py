@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -33,6 +34,9 @@ MAX_PATCHES = 12
 
 _CHUNK = 1 << 20
 """Points times pixels evaluated at once; bounds the temporaries to 8 MB."""
+
+_ROUNDING = 1e-12
+"""Of sines of angles."""
 
 Bounds = tuple[float, float, float, float]
 """Of a window of the sky [rad]: lowest and highest latitude, lowest and highest azimuth."""
@@ -97,8 +101,7 @@ class SkyPatch(Lamp):
     @property
     def direction(self) -> Float64Array:
         """(3,) the way its light travels, in the mean, of length 1."""
-        mean = -(np.asarray(self.share) @ self._toward())
-        return mean / np.linalg.norm(mean)
+        return -self._mean / np.linalg.norm(self._mean)
 
     @property
     def half_angle(self) -> float:
@@ -109,12 +112,31 @@ class SkyPatch(Lamp):
         )
         return float(np.arccos(np.clip(corners @ -self.direction, -1.0, 1.0)).max())
 
-    def unit_irradiance(self, points: Float64Array, normals: Float64Array) -> Float64Array:
-        """Return the sum over the pixels of share × cosθ (see `Lamp.unit_irradiance`)."""
-        toward, share = self._toward().T, np.asarray(self.share)
-        total = np.empty(len(points))
+    @property
+    def is_distant(self) -> bool:
+        """True: a point's normal alone decides what arrives."""
+        return True
+
+    def unit_irradiance(self, points: Float64Array, normals: Float64Array) -> Float64Array:  # noqa: ARG002
+        """Return the sum over the pixels of share × cosθ (see `Lamp.unit_irradiance`).
+
+        Where all pixels are above the horizon, this is n · mean direction; only normals whose horizon cuts
+        the patch are evaluated pixel by pixel, each distinct one once.
+        """
+        rise = -(normals @ self.direction)
+        total = np.where(rise > 0.0, normals @ self._mean, 0.0)
+        cut = np.flatnonzero(np.abs(rise) < self._sine)
+        if len(cut):
+            distinct, where = np.unique(normals[cut], axis=0, return_inverse=True)
+            total[cut] = self._cut_by_horizon(distinct)[where.reshape(-1)]
+        return total
+
+    def _cut_by_horizon(self, normals: Float64Array) -> Float64Array:
+        """Return (n,) the sum of share × cosθ over the pixels above each normal's horizon."""
+        toward, share = self._toward.T, np.asarray(self.share)
+        total = np.empty(len(normals))
         step = max(_CHUNK // len(share), 1)
-        for first in range(0, len(points), step):
+        for first in range(0, len(normals), step):
             rows = slice(first, first + step)
             total[rows] = np.maximum(normals[rows] @ toward, 0.0) @ share
         return total
@@ -128,10 +150,22 @@ class SkyPatch(Lamp):
         endless = np.full(directions.shape[:2], np.inf)
         return directions, endless, row_cosines(directions, normals) / directions.shape[1]
 
+    @cached_property
     def _toward(self) -> Float64Array:
-        """Return (m, 3) the directions of the pixels' middles."""
+        """(m, 3) the directions of the pixels' middles."""
         low, high, left, right = np.asarray(self.bounds).T
         return _directions(0.5 * (np.sin(low) + np.sin(high)), 0.5 * (left + right))
+
+    @cached_property
+    def _mean(self) -> Float64Array:
+        """(3,) the mean of `_toward` by shares."""
+        return np.asarray(self.share) @ self._toward
+
+    @cached_property
+    def _sine(self) -> float:
+        """Sine of the largest angle between a pixel's middle and the mean; 2 if it is 90° or more."""
+        cosine = float((self._toward @ -self.direction).min())
+        return np.sqrt(max(1.0 - cosine * cosine, 0.0)) + _ROUNDING if cosine > 0.0 else 2.0
 
 
 def cell_of(directions: Float64Array, shape: tuple[int, int]) -> npt.NDArray[np.int64]:

@@ -77,6 +77,11 @@ class Lamp(Light, ABC):
 
     casts_shadow: bool = True
 
+    @property
+    def is_distant(self) -> bool:
+        """Whether unoccluded irradiance depends on a receiver's normal alone, not on its place."""
+        return False
+
     @abstractmethod
     def unit_irradiance(self, points: Float64Array, normals: Float64Array) -> Float64Array:
         """Return the unoccluded irradiance per unit of strength, clipped to the receivers' horizons.

@@ -60,6 +60,11 @@ class SunLight(Lamp):
         """(3,) RGB irradiance of what faces it [W/m²]."""
         return np.asarray(self.irradiance, dtype=np.float64)
 
+    @property
+    def is_distant(self) -> bool:
+        """True: a point's normal alone decides what arrives."""
+        return True
+
     def unit_irradiance(self, points: Float64Array, normals: Float64Array) -> Float64Array:  # noqa: ARG002
         """Return cosθ, reduced where the cap is cut by the horizon (see `Lamp.unit_irradiance`)."""
         return cap_cosine(-(normals @ np.asarray(self.direction)), np.sin(0.5 * self.angle))

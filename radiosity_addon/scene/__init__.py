@@ -6,6 +6,7 @@ Also which of several surfaces in one place counts, and rays that pass through c
 from __future__ import annotations
 
 from .bake_scene import LIGHTMAP_UV_LAYER, BakeObject, BakeScene
+from .coincident_faces import coincident_triangles
 from .faces import Faces
 from .opacity import ray_caster
 from .overlaps import OVERLAP, arriving, shares
@@ -24,6 +25,7 @@ __all__ = [
     "Scene",
     "SurfaceImages",
     "arriving",
+    "coincident_triangles",
     "glow_pattern",
     "ray_caster",
     "same_glow",

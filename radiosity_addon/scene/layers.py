@@ -85,6 +85,8 @@ class Layers:
         self._scene = scene
         solid = np.flatnonzero((scene.areas > 0) & scene.in_bounces)
         tolerance = tolerances(scene.triangles)
+        self.tolerance = tolerance
+        """(t,) [m]: triangles no farther apart are in one place"""
         emits = scene.emission.max(axis=1, initial=0.0) > 0
         offset = surface_offset(scene.triangles)
         reach = np.where(emits, np.maximum(tolerance, NEAR_EMITTERS * offset), tolerance)

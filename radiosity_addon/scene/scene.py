@@ -63,7 +63,7 @@ class Scene:
         self.face_normals = cross / np.maximum(double_area, np.finfo(float).tiny)[:, None]
         """(t, 3) float64, unit; zero for a triangle without area"""
         if normals is None:
-            self.normals = np.repeat(self.face_normals[:, None, :], 3, axis=1)
+            self.normals = np.broadcast_to(self.face_normals[:, None, :], self.triangles.shape)
         else:
             self.normals = np.ascontiguousarray(normals, dtype=np.float64)
             if self.normals.shape != self.triangles.shape:

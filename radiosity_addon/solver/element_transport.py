@@ -14,7 +14,7 @@ from ..base import UsageError
 from ..numerics import Array
 from .emitters import LightSources
 from .gather import LocalPass
-from .links import LightLinks, join_light_links, link_lights, push
+from .links import LightLinks, join_light_links, link_lights
 from .methods import HierarchicalState
 from .state import Anderson, SolverState, bounce
 
@@ -92,7 +92,7 @@ class ElementTransport:
         relit = _Relit(**{**own, "history": [], "own_emission": emission, "iterations": 0})
         relit.reset()
         given = strengths[: len(self.sources.lights)]
-        lights = push(hierarchy, self.light_links.irradiance(given, hierarchy.n_elements))
+        lights = self.light_links.at_leaves(hierarchy, given)
         leaves = hierarchy.leaves
         area = hierarchy.area[leaves]
         entering = emission[leaves] + hierarchy.reflectance[leaves] * lights[leaves]

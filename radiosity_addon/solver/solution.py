@@ -39,8 +39,6 @@ class Solution:
         hierarchy = state.hierarchy
         face_count = len(hierarchy.faces)
         shares = state.balanced_closure()
-        self.triangle_radiosity, self.back_radiosity = self._by_side(state.radiosity[:face_count])
-        self.triangle_irradiance, self.back_irradiance = self._by_side(state.irradiance[:face_count])
         fronts, backs = self._by_side(shares[:, None])
         self.triangle_closure, self.back_closure = fronts[:, 0], backs[:, 0]
         lit = state.irradiance[:face_count].max(axis=1, initial=0.0) > 0
@@ -58,6 +56,26 @@ class Solution:
             "history": [asdict(entry) for entry in state.history],
             **state.details,
         }
+
+    @property
+    def triangle_radiosity(self) -> Array:
+        """(t, 3) float64 [W/m²]; made when it is read, as are the next three."""
+        return self._by_side(self._state.radiosity)[0]
+
+    @property
+    def back_radiosity(self) -> Array:
+        """(t, 3) float64 [W/m²]"""
+        return self._by_side(self._state.radiosity)[1]
+
+    @property
+    def triangle_irradiance(self) -> Array:
+        """(t, 3) float64 [W/m²]"""
+        return self._by_side(self._state.irradiance)[0]
+
+    @property
+    def back_irradiance(self) -> Array:
+        """(t, 3) float64 [W/m²]"""
+        return self._by_side(self._state.irradiance)[1]
 
     @property
     def over_budget(self) -> float:
@@ -163,8 +181,9 @@ class Solution:
         return residual.by_rays(face, barycentric, rays, self.local_pass)
 
     def _by_side(self, values: Array) -> tuple[Array, Array]:
-        """Spread (f, k) face values over the triangles' fronts and backs: two (t, k)."""
+        """Spread the faces' rows of (f, k) or (e, k) values over triangles' fronts and backs: two (t, k)."""
         faces = self._state.hierarchy.faces
+        values = values[: len(faces)]
         sides = np.zeros((2, faces.of_triangle.shape[1], values.shape[1]))
         sides[np.where(faces.front, 0, 1), faces.triangle] = values
         return sides[0], sides[1]

@@ -123,3 +123,23 @@ def test_an_even_sky_is_one_light_and_a_gray_one_too() -> None:
     ramp = np.broadcast_to(np.linspace(0, 1, SHAPE[0])[:, None, None], (*SHAPE, 3))
     assert len(even_part(ramp)) == 1
     assert even_part(np.zeros((*SHAPE, 3))) == []
+
+
+def test_a_patch_is_the_sum_over_its_pixels_above_at_and_below_the_horizon() -> None:
+    rng = np.random.default_rng(5)
+    pixels = a_sky()
+    normals = rng.normal(size=(4000, 3))
+    normals[:1000, 2] *= 0.01
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    normals[3000:] = normals[:1000]  # the same ones again
+    patches = [light for light in lights_of(pixels) if isinstance(light, SkyPatch)]
+    everywhere = SkyPatch(1.0, pixel_bounds(SHAPE), solid_angles(pixel_bounds(SHAPE)))
+    for patch in (*patches, everywhere):
+        low, high, left, right = np.asarray(patch.bounds).T
+        sine, azimuth = 0.5 * (np.sin(low) + np.sin(high)), 0.5 * (left + right)
+        across = np.sqrt(1.0 - sine**2)
+        toward = np.stack([across * np.cos(azimuth), across * np.sin(azimuth), sine], axis=1)
+        expected = np.maximum(normals @ toward.T, 0.0) @ np.asarray(patch.share)
+        found = patch.unit_irradiance(np.zeros_like(normals), normals)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-14)
+    assert (found > 0).all()

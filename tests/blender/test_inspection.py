@@ -176,7 +176,18 @@ def test_what_is_inside_out_is_reported_unless_it_is_a_room(tmp_path: Path) -> N
     assert [name for name, text in odd(look(tmp_path)).items() if "inside out" in text] == ["Turned"]
 
 
-def test_forgotten_scales_and_units_are_reported(tmp_path: Path) -> None:
+def test_faces_in_one_place_are_named_with_their_number(tmp_path: Path) -> None:
+    room()
+    add_mesh("Box", CUBE, CUBE_FACES, location=(5, 0, 1))
+    assert not [f for f in look(tmp_path).findings if "in the same place" in f.message]
+    add_mesh("Copy", CUBE, CUBE_FACES, location=(5, 0, 1))
+    (found,) = (f for f in look(tmp_path).findings if "in the same place" in f.message)
+    assert "12 of 'Box'" in found.message
+    assert "12 of 'Copy'" in found.message
+    assert "Floor" not in found.message
+
+
+def test_forgotten_scales_and_units_are_told_of(tmp_path: Path) -> None:
     room()
     add_mesh("Map", [(0.01 * x, 0.01 * y, z) for x, y, z in QUAD], scale=(1000, 1000, 1000))
     assert "scale of 1000 × 1000 × 1000" in odd(look(tmp_path))["Map"]

@@ -158,8 +158,8 @@ def test_every_pair_of_faces_is_linked_once(made) -> None:
 def test_links_are_as_small_as_promised(made) -> None:
     hierarchy, shapes, links, together = made
     area = 2e-5 * float(hierarchy.faces.area.sum())
-    assert (shapes.cone[together.receiver] <= CONE).all()
-    mixed = shapes.cone[together.source] > CONE
+    assert (shapes.cone(together.receiver) <= CONE).all()
+    mixed = shapes.cone(together.source) > CONE
     large = shapes.looks_large(together.receiver, together.source, np.where(mixed, MIXED_SIZE, MAX_RADII))
     assert (hierarchy.clusters.area[together.receiver[large]] <= area).all()
     grouped = links.source < hierarchy.n_clusters

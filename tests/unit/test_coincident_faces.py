@@ -1,14 +1,17 @@
-"""Sheets that lie in one another, linked as clusters, against a single sheet."""
+"""Sheets that lie in one another: linked as clusters, against a single sheet; and how they are reported."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+from radiosity_addon.bake.bake_warnings import coincident_counts, of_coincident
+from radiosity_addon.scene.coincident_faces import coincident_triangles
 from radiosity_addon.solver.methods.hierarchical import HierarchicalState
 from radiosity_addon.solver.state.power import power_balance
-from tests.rooms import CEILING, box_room, gray, gray_scene, rectangle
+from tests.rooms import CEILING, box_room, gray, gray_scene, rectangle, solid_box
 from tests.unit.solved_rooms import solved
+from tests.unit.texel_scenes import bake_scene
 
 REFLECTANCE = 0.6
 ROOM = 6 * 2 * 4**2
@@ -75,3 +78,34 @@ def test_sheets_that_face_the_same_way_make_no_light(single: HierarchicalState) 
     assert walls.mean() == pytest.approx(walls_alone.mean(), rel=2e-3)
     assert up.mean() == pytest.approx(up_alone.mean(), rel=0.02)
     assert down.mean() == pytest.approx(down_alone.mean(), rel=0.05)
+
+
+def test_what_cycles_bakes_black_is_reported_but_not_what_rests_on_it() -> None:
+    """Twice the same wall, a wall of two sheets, a poster in a wall's plane; not a crate on the floor."""
+    floor = rectangle((0, 0, 0), (4, 0, 0), (0, 4, 0))
+    wall = rectangle((0, 4, 0), (4, 0, 0), (0, 0, 3))
+    sheet = rectangle((2, 1, 0.5), (0, 2, 0), (0, 0, 1))
+    parts = {
+        "Floor": floor,
+        "Crate": solid_box((0.5, 0.5, 0), (1, 1, 0.5)),
+        "Wall": wall,
+        "Wall Again": wall,
+        "Sheets": np.concatenate([sheet, sheet[:, ::-1]]),
+        "Alone": rectangle((0, 0, 1), (0, 1, 0), (0, 0, 1)),
+    }
+    scene = gray_scene(np.concatenate(list(parts.values())), two_sided=True)
+    objects = bake_scene(scene, *((name, len(part)) for name, part in parts.items())).objects
+    counts = coincident_counts(objects, scene)
+    assert counts == {"Wall": 2, "Wall Again": 2, "Sheets": 4}
+    (warning,) = of_coincident(counts)
+    assert warning.name == "Sheets"
+    for listed in ("4 of 'Sheets'", "2 of 'Wall'", "2 of 'Wall Again'"):
+        assert listed in warning.message
+    assert not list(of_coincident({}))
+
+
+def test_of_faces_one_closely_above_the_other_the_lower_one_is_reported() -> None:
+    above = rectangle((0, 0, 1.0 + 1e-6), (1, 0, 0), (0, 1, 0))
+    below = rectangle((0, 0, 1.0), (1, 0, 0), (0, 1, 0))
+    scene = gray_scene(np.concatenate([above, below]), two_sided=True)
+    assert coincident_triangles(scene).tolist() == [False, False, True, True]

@@ -38,7 +38,7 @@ def test_nodes_that_touch_exchange_at_most_the_smaller_area() -> None:
     one, other = (each.reshape(-1) for each in np.indices((shapes.count, shapes.count)))
     with np.errstate(all="raise"):
         bound = shapes.exchange_bound(one, other)
-    np.testing.assert_array_equal(bound, np.minimum(shapes.area[one], shapes.area[other]))
+    np.testing.assert_array_equal(bound, np.minimum(shapes.area(one), shapes.area(other)))
 
 
 @pytest.mark.parametrize("faint", [0.0, 1e-5, 1e-3])

@@ -1,57 +1,110 @@
-"""A wall that shows its back to the light is told of, and nothing else is."""
+"""What shows its backs to the light is warned of, and nothing else is."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap.images.turned_faces import turned_away
+from radiosity_addon.bake.turned_faces import BackProbe, turned_away
+from radiosity_addon.lights import EnvironmentLight, SunLight
 from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import PointLight
-from tests.rooms import box_room, gray, gray_scene, rectangle, solid_box
+from tests.rooms import box_room, gray_scene, rectangle, solid_box
 from tests.unit.test_pipeline import run
 from tests.unit.texel_scenes import bake_object, bake_scene
 
 LAMP = PointLight((0.5, 0.4, 0.6), (10.0, 5.0, 2.0), radius=0.05)
 
 
-def room(turned: bool) -> BakeScene:
+class AlwaysLit(BackProbe):
+    """Takes every back for lit."""
+
+    def __init__(self) -> None:
+        pass
+
+    def lit(self, rows: np.ndarray, least: float) -> np.ndarray:
+        return np.full(len(rows), least >= 0.0)
+
+
+def told(scene: BakeScene, **settings: int) -> list[str]:
+    result = run(scene, **settings)
+    return sorted(warning.name for warning in result.warnings if "from behind only" in warning.message)
+
+
+def turned(triangles: np.ndarray) -> np.ndarray:
+    return np.ascontiguousarray(triangles[:, [0, 2, 1]])
+
+
+def room(is_turned: bool) -> BakeScene:
     """A closed room with a screen, lit from both sides by what the walls reflect, and a solid block."""
     triangles, surface = box_room()
     wall = triangles[surface == 5]
     screen = rectangle((0.2, 0.7, 0.2), (0.5, 0, 0), (0, 0, 0.4))
     block = solid_box((0.1, 0.1, 0.1), (0.3, 0.3, 0.3))
-    parts = [triangles[surface != 5], wall[:, ::-1] if turned else wall, screen, block]
+    parts = [triangles[surface != 5], turned(wall) if is_turned else wall, screen, block]
     everything = np.concatenate(parts)
     scene = gray_scene(everything, two_sided=True, lights=[LAMP])
     names = ("Room", "Wall", "Screen", "Block")
     return bake_scene(scene, *((name, len(part)) for name, part in zip(names, parts, strict=True)))
 
 
-@pytest.mark.parametrize("turned", [False, True])
-def test_a_wall_whose_normals_point_out_of_its_room_is_warned_of(turned: bool) -> None:
-    result = run(room(turned))
-    told = [warning.name for warning in result.warnings if "from behind only" in warning.message]
-    assert told == (["Wall"] if turned else [])
-    if turned:
+@pytest.mark.parametrize("is_turned", [False, True])
+def test_a_wall_whose_normals_point_out_of_its_room_is_warned_of(is_turned: bool) -> None:
+    result = run(room(is_turned))
+    names = [warning.name for warning in result.warnings if "from behind only" in warning.message]
+    assert names == (["Wall"] if is_turned else [])
+    if is_turned:
         (message,) = (w.message for w in result.warnings if w.name == "Wall" and "behind" in w.message)
         assert message.startswith("object 'Wall' is lit from behind only on 100% of its surface")
 
 
+def tub(low: tuple[float, float, float], high: tuple[float, float, float]) -> np.ndarray:
+    """A closed tub: a box with a basin of walls 5 cm thick in it; normals point out of the material."""
+    lower, upper = np.array(low), np.array(high)
+    inward, surface = box_room(upper - lower, 2)
+    outside = turned(inward + lower)[surface != 1]
+    inner = lower + 0.05
+    basin, surface = box_room(np.append((upper - 0.05 - inner)[:2], upper[2] - inner[2]), 2)
+    (x0, y0), (x1, y1), (a0, b0), (a1, b1), z = lower[:2], upper[:2], inner[:2], upper[:2] - 0.05, upper[2]
+    strips = ((x0, y0, x1, b0), (x0, b1, x1, y1), (x0, b0, a0, b1), (a1, b0, x1, b1))
+    rim = [rectangle((u0, v0, z), (u1 - u0, 0, 0), (0, v1 - v0, 0)) for u0, v0, u1, v1 in strips]
+    return np.concatenate([outside, (basin + inner)[surface != 1], *rim])
+
+
+@pytest.mark.parametrize("is_turned", [False, True])
+@pytest.mark.parametrize("is_sunny", [False, True])
+def test_closed_things_whose_normals_point_inward_are_warned_of(is_turned: bool, is_sunny: bool) -> None:
+    """Also in a room a hundred times darker than what the sun lights outside."""
+    walls, surface = box_room((3, 4, 2.5), 4)
+    center = walls.mean(axis=1)
+    window = (surface == 2) & (abs(center[:, 1] - 2) < 1) & (abs(center[:, 2] - 1.5) < 0.4)
+    things = [tub((1.2, 2.4, 0.0), (2.9, 3.2, 0.55)), solid_box((1, 3.97, 1.2), (1.8, 4.0, 1.8))]
+    parts = [walls[~window], *(turned(thing) if is_turned else thing for thing in things)]
+    names = ["Room", "Tub", "Frame"]
+    if is_sunny:
+        parts.append(rectangle((-50, -50, -0.1), (100, 0, 0), (0, 100, 0)))
+        names.append("Ground")
+    lights = [SunLight((0.5, 0.2, -0.8), 500.0), EnvironmentLight(5.0)] if is_sunny else [LAMP]
+    scene = gray_scene(np.concatenate(parts), 0.7, two_sided=True, lights=lights)
+    found = bake_scene(scene, *((name, len(part)) for name, part in zip(names, parts, strict=True)))
+    assert told(found, resolution=128) == (["Frame", "Tub"] if is_turned else [])
+
+
 def test_one_wall_of_an_object_counts_but_not_a_scrap_nor_what_is_dark_on_both_sides() -> None:
     areas = np.ones(48)
-    fronts, backs = gray(48, 1.0), gray(48, 0.0)
-    fronts[:2], backs[:2] = 0.0, 1.0
-    fronts[46:], backs[46:] = 0.0, 0.05
+    front, back = np.ones(48), np.zeros(48)
+    front[:2], back[:2] = 0.0, 1.0
+    front[46:], back[46:] = 0.0, 0.05
     many = [bake_object("Mostly Right", 0, 30), bake_object("Closet", 46, 2)]
-    assert list(turned_away(many, areas, fronts, backs)) == []
-    (warning,) = turned_away([bake_object("Four Walls", 0, 8)], areas, fronts, backs)
+    probe = AlwaysLit()
+    assert list(turned_away(many, areas, front, back, probe)) == []
+    (warning,) = turned_away([bake_object("Four Walls", 0, 8)], areas, front, back, probe)
     assert warning.name == "Four Walls"
     assert "on 25% of its surface" in warning.message
-    backs[46:] = 0.5
-    assert [warning.name for warning in turned_away(many, areas, fronts, backs)] == ["Closet"]
+    back[46:] = 0.5
+    assert [warning.name for warning in turned_away(many, areas, front, back, probe)] == ["Closet"]
 
 
 def test_without_light_nothing_is_turned_away() -> None:
     objects = [bake_object("Dark", 0, 2)]
-    assert list(turned_away(objects, np.ones(2), gray(2, 0.0), gray(2, 0.0))) == []
+    assert list(turned_away(objects, np.ones(2), np.zeros(2), np.zeros(2), AlwaysLit())) == []

@@ -83,6 +83,8 @@ class BakeReport:
             }
             if file.scale is not None:
                 entry["scale"] = file.scale
+            if baked.object.name in result.coincident:
+                entry["coincident_triangles"] = result.coincident[baked.object.name]
             objects.append({**entry, **_plain(of_light)})
         solver = {key: value for key, value in result.solver.items() if key != "history"}
         solver["history"] = thinned(result.solver.get("history", ()))

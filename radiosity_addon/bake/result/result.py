@@ -85,6 +85,7 @@ class BakeResult:
         (the share of texels that show a surface) and the number of "objects".
     groups: Those that were requested, and one of all light that is in none of them.
     light: Parallel to `objects`: statistics of the light on their fronts, see `details.py`.
+    coincident: By the names of objects that have some: triangles that are in the place of other faces.
     """
 
     pages: tuple[LightmapPage, ...]
@@ -95,4 +96,5 @@ class BakeResult:
     atlas: tuple[dict[str, float], ...] = ()
     groups: tuple[LightGroup, ...] = ()
     light: tuple[dict[str, Any], ...] = ()
+    coincident: dict[str, int] = field(default_factory=dict)
     details: BakeDetails | None = None

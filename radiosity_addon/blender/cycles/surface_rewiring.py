@@ -14,6 +14,7 @@ from typing import Any
 import bpy
 import numpy as np
 
+from ..datablocks.image_values import known_means_only
 from ..materials.node_algebra import NodeAlgebra, NodeColor, Scalar, is_socket
 from ..materials.shader_nodes import (
     MissingImageError,
@@ -175,7 +176,8 @@ class _Rewiring(ShaderTerms[_Place]):
     def _constant(self, socket: bpy.types.NodeSocket, place: _Place) -> Value | None:
         """Return a socket's constant; None where it varies."""
         try:
-            value = evaluate(socket, place.stack)
+            with known_means_only(None):  # an image varies, whatever its mean
+                value = evaluate(socket, place.stack)
         except MissingImageError:
             return Value(default_rgb(socket))
         except NotConstantError:

@@ -35,7 +35,8 @@ _known: list[ImageMeans | None] = []
 def known_means_only(means: ImageMeans | None) -> Iterator[None]:
     """Have `image_mean` look means up, and raise `UnknownMeanError` where there is none.
 
-    With None it takes 0 for all of them: where it only counts that something is an image.
+    With None it takes 0 for all that have pixels, and reads none: where it only counts that something is
+    an image.
     """
     _known.append(means)
     try:
@@ -49,7 +50,7 @@ def image_mean(image: bpy.types.Image, equirectangular: bool = False) -> np.ndar
     if _known:
         means, wanted = _known[-1], (image.name_full, equirectangular)
         if means is None:
-            return np.zeros(4)
+            return np.zeros(4) if _pixel_count(image) else None
         if wanted not in means:
             raise UnknownMeanError(wanted)
         return means[wanted]
@@ -65,9 +66,9 @@ def mean_of_named(wanted: ImageKey) -> Generator[float, None, np.ndarray | None]
 def pixels_of(image: bpy.types.Image) -> np.ndarray | None:
     """Return (height, width, channels) float32 pixels as the image stores them; None if it has none."""
     width, height = image.size
-    if width * height * image.channels == 0:
+    if _pixel_count(image) == 0:
         return None
-    pixels = np.empty(width * height * image.channels, dtype=np.float32)
+    pixels = np.empty(_pixel_count(image), dtype=np.float32)
     try:
         image.pixels.foreach_get(pixels)
     except (RuntimeError, TypeError):  # a file that Blender names but cannot decode
@@ -95,13 +96,21 @@ def image_mean_steps(
     mean = np.zeros(channels)
     for start in range(0, height, _BAND_ROWS):
         band = rows[start : start + _BAND_ROWS]
-        means = band.mean(axis=1, dtype=np.float64)
         if encoded:
-            codes = np.rint(np.clip(band[..., :3], 0.0, 1.0) * 255.0).astype(np.uint8)
-            means[:, :3] = linear[codes].mean(axis=1)
+            codes = (band[..., :3] * np.float32(255.0) + np.float32(0.5)).astype(np.uint8)
+            color = np.take(linear, codes).mean(axis=1)
+            means = np.concatenate([color, band[..., 3:].mean(axis=1, dtype=np.float64)], axis=1)
+        else:
+            means = band.mean(axis=1, dtype=np.float64)
         mean += weights[start : start + _BAND_ROWS] @ means
         yield start / height
     return _as_rgba(np.nan_to_num(mean, posinf=0.0, neginf=0.0))
+
+
+def _pixel_count(image: bpy.types.Image) -> int:
+    """Return the number of values of an image's pixels; 0 without pixels."""
+    width, height = image.size
+    return width * height * image.channels
 
 
 def linear_from_srgb(values: np.ndarray) -> np.ndarray:

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
-from ...bake import Estimate, LightmappedObject, estimate_bake, refuse_large_pages
-from ...base import RadiosityError
+from ...bake import Estimate, LightmappedObject, estimate_bake, refuse_large_pages, refuse_many_triangles
+from ...base import BakeWarning, RadiosityError
 from ...lightmap.unwrap import greedy_object, share_of
 from ...numerics import double_area_vectors
 from ...numerics import folder as scratch_folder
@@ -32,6 +32,7 @@ from ..scene_export.export import check_names, chosen_pieces
 from ..scene_records.object_roles import BAKEABLE_TYPES
 from ..scene_records.pieces import Piece, SceneContents
 from ..scene_records.render_state import render_depsgraph
+from .coincident_check import coincident_warnings
 from .lit_objects import glass_materials, lit_objects
 
 if TYPE_CHECKING:
@@ -165,8 +166,8 @@ def inspect(
         *_of_texels(lit, plan),
         *_of_shapes(context, collected, shapes),
         *_of_size(shapes),
-        *_of_memory(plan, settings),
-        *(Finding(INFO, warning.name, warning.message) for warning in collected.warnings),
+        *_of_memory(plan, sum(len(p.mesh) for p in collected.pieces if p.role.in_bounces), settings),
+        *(Finding(INFO, warning.name, warning.message) for warning in _more_warnings(collected, chosen)),
     ]
     findings.sort(key=lambda finding: (ERROR, WARNING, INFO).index(finding.level))
     return Inspection(
@@ -185,6 +186,10 @@ def _of_glass(collected: SceneContents) -> Iterator[Finding]:
         listed = ", ".join(f"'{name}'" for name in names)
         message = f"light goes straight through glass, which gets no lightmap: {listed}"
         yield Finding(INFO, names[0], message)
+
+
+def _more_warnings(collected: SceneContents, chosen: Sequence[Piece]) -> list[BakeWarning]:
+    return [*collected.warnings, *coincident_warnings(collected.pieces, chosen)]
 
 
 def _shape(piece: Piece) -> _Shape:
@@ -355,9 +360,10 @@ def _of_size(shapes: dict[int, _Shape]) -> Iterator[Finding]:
         )
 
 
-def _of_memory(plan: Estimate, settings: BakeSettings) -> Iterator[Finding]:
-    """Say whether pages are too large for the memory limit, and whether memory or disk may not do."""
+def _of_memory(plan: Estimate, triangles: int, settings: BakeSettings) -> Iterator[Finding]:
+    """Say whether triangles or pages exceed the memory limit, and whether memory or disk may not do."""
     try:
+        refuse_many_triangles(triangles, settings)
         refuse_large_pages(plan.pages, settings)
     except RadiosityError as error:
         yield Finding(ERROR, "memory", str(error))

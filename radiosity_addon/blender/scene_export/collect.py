@@ -49,8 +49,9 @@ from ..scene_records.scene_objects import (
     visible_objects,
 )
 
-MOMENT = 0.05
-"""Seconds for which the scene is shown as a render would, if that is enough to read an object."""
+MOMENT, NO_WINDOW_MOMENT = 0.05, 1.0
+"""Seconds for which the scene is shown as a render would, if that is enough to read an object: while a window
+waits, and without one. Showing it takes time again each time."""
 
 View = Callable[[], AbstractContextManager[bpy.types.Depsgraph]]
 """Shows the scene as a render would, while it is entered."""
@@ -77,21 +78,23 @@ def collect(
 
 
 def collect_steps(
-    view: View, factors: LampFactors, settings: BakeSettings, dark: bool
+    view: View, factors: LampFactors, settings: BakeSettings, dark: bool, in_background: bool = False
 ) -> Generator[float, None, Callable[[], SceneContents]]:
     """Copy meshes, materials and lamps of a scene, as much a step as fits into a moment.
 
     view: Shows the scene, for a step.
     factors, settings, dark: As for `collect`.
+    in_background: Whether a window waits.
     Returns sorted_out: Works on what was copied alone, in any thread; raises SceneError if a coordinate is
         NaN or infinite.
     """
     collector = _Collector(factors, settings, dark)
     means: ImageMeans = {}
+    moment = MOMENT if in_background else NO_WINDOW_MOMENT
     while True:
         began = time.perf_counter()
         with view() as depsgraph, known_means_only(means):
-            until = max(began + MOMENT, time.perf_counter() + MOMENT / 2)
+            until = max(began + moment, time.perf_counter() + moment / 2)
             done = collector.look(depsgraph, until)
         if done:
             return collector.sorted_out

@@ -69,7 +69,7 @@ def export_steps(
             yield depsgraph
             options[:] = option_warnings(context)
 
-    sorted_out = yield from collect_steps(view, factors, settings, dark)
+    sorted_out = yield from collect_steps(view, factors, settings, dark, in_background)
     collected = yield from elsewhere(sorted_out, in_background)
     collected.warnings.extend(options)
     # Before anything is rendered.

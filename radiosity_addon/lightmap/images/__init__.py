@@ -11,7 +11,6 @@ from .page import LightmapPage
 from .page_assembly import texel_pages
 from .seams import Seams, find_seams
 from .surface_tiles import SurfaceTiles, lay_out_again, lay_out_surfaces
-from .turned_faces import turned_away
 
 __all__ = [
     "LightStatistics",
@@ -28,5 +27,4 @@ __all__ = [
     "presentable",
     "texel_pages",
     "to_quantity",
-    "turned_away",
 ]

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...numerics import Array, run_numbers, run_starts, texels_around, weld
+from ...numerics import Array, run_numbers, run_starts, texels_around, tiles, weld
 from ...rays import SAGITTA, SIGHT_LIFT, RayCaster
 from ...scene import Scene
 from ..texels import NO_TEXEL, TexelGeometry
@@ -81,12 +81,19 @@ def find_seams(scene: Scene, geometry: TexelGeometry, caster: RayCaster | None =
     caster: Detects geometry that stands on seams; None assumes there is none.
     """
     triangle, corner = _shared_edges(scene, geometry)
+    apart = np.zeros(len(triangle), dtype=bool)
+    for rows in tiles(len(triangle)):
+        ends, pages = _on_pages(geometry, triangle[rows], corner[rows])
+        extent = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).max(axis=1)
+        moved = (np.abs(ends[:, 0] - ends[:, 1]) > SAME_UV).any(axis=(1, 2))
+        apart[rows] = (moved | (pages[:, 0] != pages[:, 1])) & (extent > 0)
+    edges = np.flatnonzero(apart)
+    edges = edges[_smooth(scene, triangle[edges], corner[edges])]
+    triangle, corner = triangle[edges].astype(np.int64), corner[edges].astype(np.int64)
     ends, pages = _on_pages(geometry, triangle, corner)
     extent = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
-    apart = (np.abs(ends[:, 0] - ends[:, 1]) > SAME_UV).any(axis=(1, 2)) | (pages[:, 0] != pages[:, 1])
-    edges = np.flatnonzero(apart & (extent.max(axis=1) > 0))
-    count = np.maximum(np.ceil(SAMPLES_PER_TEXEL * extent[edges].max(axis=1)), 1).astype(np.int64)
-    edge, total = np.repeat(edges, count), np.repeat(count, count)
+    count = np.maximum(np.ceil(SAMPLES_PER_TEXEL * extent.max(axis=1)), 1).astype(np.int64)
+    edge, total = np.repeat(np.arange(len(triangle)), count), np.repeat(count, count)
     along = (run_numbers(count) + 0.5) / total
     share = along[:, None, None]
     spots = (1 - share) * ends[edge, :, 0] + share * ends[edge, :, 1]
@@ -126,37 +133,42 @@ def _in_one(geometry: TexelGeometry) -> Array:
 
 
 def _shared_edges(scene: Scene, geometry: TexelGeometry) -> tuple[Array, Array]:
-    """Return the edges of exactly two triangles that continue each other.
+    """Return the edges of exactly two triangles on pages whose fronts face the same way.
 
-    Returns triangle (p, 2) int.
-    Returns corner (p, 2, 2) int: Which of the triangle's corners are the edge's ends, in the same order on
+    Returns triangle (p, 2) int32.
+    Returns corner (p, 2, 2) int8: Which of the triangle's corners are the edge's ends, in the same order on
         both sides.
     """
-    every = np.flatnonzero(scene.areas > 0)
-    vertex = weld(scene.triangles[every].reshape(-1, 3), WELD).reshape(-1, 3)
-    corners = np.array([[0, 1], [1, 2], [2, 0]])
+    every = np.flatnonzero(scene.areas > 0).astype(np.int32)
+    vertex = weld(scene.triangles[every].reshape(-1, 3), WELD).astype(np.int32).reshape(-1, 3)
+    corners = np.array([[0, 1], [1, 2], [2, 0]], dtype=np.int8)
     ends = vertex[:, corners].reshape(-1, 2)
     flip = ends[:, 0] > ends[:, 1]
-    corner = np.where(
-        flip[:, None], np.tile(corners[:, ::-1], (len(every), 1)), np.tile(corners, (len(every), 1))
-    )
-    key = ends.min(axis=1) * (int(vertex.max(initial=0)) + 1) + ends.max(axis=1)
+    key = ends.min(axis=1).astype(np.int64) * (int(vertex.max(initial=0)) + 1) + ends.max(axis=1)
+    del ends, vertex
     order = np.argsort(key, kind="stable")
     key = key[order]
     new = np.flatnonzero(np.concatenate([[True], key[1:] != key[:-1]])) if len(key) else np.zeros(0, np.int64)
     pairs = new[np.diff(np.append(new, len(key))) == 2]
-    first, second = order[pairs], order[pairs + 1]
-    triangle = np.stack([every[first // 3], every[second // 3]], axis=1)
-    corner = np.stack([corner[first], corner[second]], axis=1)
-    kept = (geometry.page_of_triangle[triangle] >= 0).all(axis=1)
-    # Both fronts face the same way: from the other side, the edge runs in the other direction.
-    kept &= flip[first] != flip[second]
+    del key, new
+    sides = np.stack([order[pairs], order[pairs + 1]], axis=1)
+    del order
+    triangle = every[sides // 3]
+    # From the other side, the edge runs in the other direction.
+    kept = (geometry.page_of_triangle[triangle] >= 0).all(axis=1) & (flip[sides[:, 0]] != flip[sides[:, 1]])
+    triangle, sides = triangle[kept], sides[kept]
+    corner = corners[sides % 3]
+    return triangle, np.where(flip[sides][..., None], corner[..., ::-1], corner)
+
+
+def _smooth(scene: Scene, triangle: Array, corner: Array) -> Array:
+    """Return (p,) whether the two triangles of edges continue each other."""
     normal = scene.face_normals[triangle]
-    kept &= np.einsum("pk,pk->p", normal[:, 0], normal[:, 1]) > NO_FOLD
+    smooth = np.einsum("pk,pk->p", normal[:, 0], normal[:, 1]) > NO_FOLD
     shading = scene.normals[triangle[:, :, None], corner]
     shading = shading / np.maximum(np.linalg.norm(shading, axis=3, keepdims=True), 1e-12)
-    kept &= (np.einsum("pek,pek->pe", shading[:, 0], shading[:, 1]) > SAME_NORMAL).all(axis=1)
-    return triangle[kept], corner[kept]
+    smooth &= (np.einsum("pek,pek->pe", shading[:, 0], shading[:, 1]) > SAME_NORMAL).all(axis=1)
+    return np.asarray(smooth)
 
 
 def _bilinear(spots: Array, pages: Array, sizes: Sequence[int]) -> tuple[Array, Array, Array]:

@@ -77,6 +77,11 @@ class EmitterGroup:
         corners = self._corners.reshape(-1, 3)
         return corners.min(axis=0), corners.max(axis=0)
 
+    @property
+    def is_distant(self) -> bool:
+        """False: its light differs from place to place."""
+        return False
+
     def same_as(self, other: EmitterGroup) -> bool:
         """Whether the other's faces are where these are."""
         return self._corners.shape == other._corners.shape and bool((self._corners == other._corners).all())

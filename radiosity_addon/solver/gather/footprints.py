@@ -173,7 +173,7 @@ def _at_centers(
     normals = at.normals[part]
     own = light.unit_irradiance(at.points[part], normals)
     varies, jump = np.zeros((2, len(own)), dtype=bool)
-    if at.sampler is not None:
+    if at.sampler is not None and not light.is_distant:
         if isinstance(light, EmitterGroup) and least:
             varies = (own > least) | light.is_near(at.points[part], spread.width(part))
         else:

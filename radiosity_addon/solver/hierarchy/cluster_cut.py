@@ -7,6 +7,8 @@ little more than one pass over the faces, however deep the tree is.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from ...numerics import Array
@@ -66,12 +68,12 @@ class ClusterCut:
         would drown clusters of tiny ones.
         """
         order = self._clusters.order
-        columns = [np.ascontiguousarray(values[:, column]).take(order) for column in range(values.shape[1])]
-        return self.sums_of(columns)
+        columns = (np.ascontiguousarray(column).take(order) for column in values.T)
+        return self.sums_of(columns, values.shape[1])
 
-    def sums_of(self, columns: list[Array]) -> Array:
-        """Return the same of columns (f,) in the order of the clusters' faces."""
-        total = np.zeros((self.n_rows, len(columns)))
+    def sums_of(self, columns: Iterable[Array], count: int) -> Array:
+        """Return the same of `count` columns (f,) in the order of the clusters' faces."""
+        total = np.zeros((self.n_rows, count))
         if not len(self._area):
             return total
         for column, ordered in enumerate(columns):

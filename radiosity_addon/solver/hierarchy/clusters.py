@@ -30,15 +30,13 @@ class Clusters:
     """c clusters as arrays; node numbers of single faces start at c.
 
     order (f,) int32: Faces such that every cluster is a run of them.
-    start, end (c,) int64: The cluster's run in `order`.
-    children (c, 2) int64: Nodes: clusters, or n_clusters + face.
+    start, end (c,) int32: The cluster's run in `order`.
+    children (c, 2) int32: Nodes: clusters, or n_clusters + face.
     lower, upper (c, 3): Bounding box [m].
     area (c,) [m²].
-    coherence (c,): Length of the area-weighted mean of the unit normals: 1 for a piece of one plane.
     area_before (f + 1,): Running sum of the faces' areas along `order`.
     normal (c, 3): Area-weighted mean of the unit normals; its length is the coherence.
     center (c, 3): Area-weighted centroid [m].
-    radius (c,): Of a sphere around the middle of the box [m].
     cone (c,): Largest angle between the mean normal and a face's [rad].
     levels: Clusters of each depth, the roots first; children lie one level deeper than parents.
     """
@@ -48,16 +46,21 @@ class Clusters:
     def __init__(self, order: Array, start: Array, end: Array, children: Array) -> None:
         self.order, self.start, self.end, self.children = order, start, end, children
         self.lower = self.upper = np.zeros((0, 3))
-        self.area = self.coherence = np.zeros(0)
+        self.area = np.zeros(0)
         self.area_before = np.zeros(1)
         self.normal = self.center = np.zeros((0, 3))
-        self.radius = self.cone = np.zeros(0)
+        self.cone = np.zeros(0)
         self.levels: list[slice] = []
 
     @property
     def middle(self) -> Array:
         """(c, 3) float64: the middle of each box [m]."""
         return np.asarray(0.5 * (self.lower + self.upper))
+
+    @property
+    def coherence(self) -> Array:
+        """(c,) float64: length of the area-weighted mean of the unit normals: 1 for a piece of one plane."""
+        return np.asarray(np.linalg.norm(self.normal, axis=1))
 
     def __len__(self) -> int:
         return len(self.start)
@@ -68,37 +71,41 @@ class Clusters:
         self.area = self.sums(faces.area)
         if len(self) == 0:
             return
-        lower = faces.corners.min(axis=1)[self.order]
-        upper = faces.corners.max(axis=1)[self.order]
         self.normal = self.average(faces.normal, faces.area)
-        self.coherence = np.linalg.norm(self.normal, axis=1)
         self.center = self.average(faces.corners.mean(axis=1), faces.area)
         # reduceat over start, end pairs: every other result is the run itself.
         bounds = np.stack([self.start, self.end], axis=1).ravel()
         padded = np.minimum(bounds, len(self.order) - 1)
         last = self.end == len(self.order)
-        self.lower = np.minimum.reduceat(lower, padded, axis=0)[::2]
-        self.upper = np.maximum.reduceat(upper, padded, axis=0)[::2]
-        self.lower[last] = np.minimum(self.lower[last], lower[-1])
-        self.upper[last] = np.maximum(self.upper[last], upper[-1])
-        self.radius = 0.5 * np.linalg.norm(self.upper - self.lower, axis=1)
+        self.lower, self.upper = np.empty((2, len(self), 3))
+        for axis in range(3):
+            along = faces.corners[..., axis]
+            lower, upper = along.min(axis=1)[self.order], along.max(axis=1)[self.order]
+            self.lower[:, axis] = np.minimum.reduceat(lower, padded)[::2]
+            self.upper[:, axis] = np.maximum.reduceat(upper, padded)[::2]
+            self.lower[last, axis] = np.minimum(self.lower[last, axis], lower[-1])
+            self.upper[last, axis] = np.maximum(self.upper[last, axis], upper[-1])
         self._measure_cones(faces)
 
     def _measure_cones(self, faces: Faces) -> None:
         """Bound the normals of every cluster by a cone about their mean, from the children's up."""
         count = len(self)
-        axis = np.concatenate([self.normal / np.maximum(self.coherence, 1e-300)[:, None], faces.normal])
+        coherence = self.coherence
+        axis = np.concatenate([self.normal / np.maximum(coherence, 1e-300)[:, None], faces.normal])
         angle = np.concatenate([np.full(count, np.pi), np.zeros(len(faces))])
         for level in reversed(self.levels):
             child = self.children[level]
             cosine = np.einsum("nk,nck->nc", axis[level], axis[child])
             apart = np.arccos(np.clip(cosine, -1.0, 1.0))
             angle[level] = np.minimum((apart + angle[child]).max(axis=1), np.pi)
-        self.cone = np.where(self.coherence > 1e-6, angle[:count], np.pi)
+        self.cone = np.where(coherence > 1e-6, angle[:count], np.pi)
 
     def average(self, values: Array, areas: Array) -> Array:
-        """Return the (c, 3) area-weighted means of (f, 3) face `values`."""
-        return np.asarray(self.sums(values * areas[:, None]) / self.area[:, None])
+        """Return the (c, k) area-weighted means of (f, k) face `values`."""
+        mean = np.empty((len(self), values.shape[1]))
+        for column in range(values.shape[1]):
+            mean[:, column] = self.sums(values[:, column] * areas) / self.area
+        return mean
 
     def sums(self, values: Array) -> Array:
         """Return the (c, …) sums of (f, …) face values over each cluster, children first.
@@ -157,6 +164,8 @@ def build_clusters(faces: Faces, groups: Sequence[Array]) -> tuple[Clusters, Arr
         clusters = Clusters(order, none, none, np.zeros((0, 2), dtype=np.int64))
     single = clusters.children < 0
     clusters.children[single] = len(clusters) + order[-1 - clusters.children[single]]
+    for name in ("order", "start", "end", "children"):
+        setattr(clusters, name, getattr(clusters, name).astype(np.int32))
     clusters.levels = levels
     clusters.measure(faces)
 

@@ -18,6 +18,8 @@ from .clusters import Clusters, build_clusters
 
 LEAF = -1
 
+OPTICAL = ("reflectance", "emission", "opacity")
+
 
 class Hierarchy:
     """Faces, the clusters above them and the elements below; grows as links need it.
@@ -41,15 +43,16 @@ class Hierarchy:
     def __init__(self, scene: Scene) -> None:
         self.faces = Faces(scene)
         count = len(self.faces)
-        self.corners = self.faces.corners.copy()
+        # Of the faces themselves there is one copy, which both share (`subdivide`).
+        self.corners = self.faces.corners
         self.face = np.arange(count, dtype=np.int32)
         self.parent = np.full(count, LEAF, dtype=np.int32)
         self.first_child = np.full(count, LEAF, dtype=np.int32)
         self.level = np.zeros(count, dtype=np.int32)
-        self.area = self.faces.area.copy()
-        self.reflectance: Array = self.faces.reflectance.copy()
-        self.emission: Array = self.faces.emission.copy()
-        self.opacity: Array = self.faces.opacity.copy()
+        self.area = self.faces.area
+        self.reflectance: Array = self.faces.reflectance
+        self.emission: Array = self.faces.emission
+        self.opacity: Array = self.faces.opacity
         self._images = scene.images
         self._by_channel: Array | None = None
         self._plain = scene.reflectance, scene.emission, scene.opacity
@@ -61,9 +64,11 @@ class Hierarchy:
             share = self.faces.own.share_of(self.faces.side)
             self._detailed |= (share > 0.0) & (share < 1.0)
         if self._detailed.any():
-            self._weights = np.where(
-                self.faces.front[:, None, None], WHOLE_TRIANGLE, WHOLE_TRIANGLE[[0, 2, 1]]
-            )
+            # They become the means of their elements.
+            for name in OPTICAL:
+                setattr(self, name, getattr(self, name).copy())
+            self._weights = np.zeros((0, 3, 2))
+            """Corners of the elements below faces, as weights of the triangle's second and third corner."""
         emits = self.faces.emission.max(axis=1, initial=0.0) > 0
         # Emitters are grouped separately: averaged into a cluster of dark faces a small lamp is
         # missed by a few samples. So are backs: each lies where its front lies, unseen from
@@ -135,15 +140,18 @@ class Hierarchy:
         self.first_child = np.concatenate([self.first_child, np.full(4 * len(elements), LEAF, np.int32)])
         self.level = np.concatenate([self.level, np.repeat(self.level[elements] + 1, 4).astype(np.int32)])
         self.area = np.concatenate([self.area, np.repeat(self.area[elements] / 4, 4)])
-        for name in ("reflectance", "emission", "opacity"):
+        for name in OPTICAL:
             values = getattr(self, name)
             setattr(self, name, np.concatenate([values, np.repeat(values[elements], 4, axis=0)]))
-        if self._detailed.any():
+        is_detailed = bool(self._detailed.any())
+        if is_detailed:
             self._look_up(elements)
+        for name in ("corners", "area") if is_detailed else ("corners", "area", *OPTICAL):
+            setattr(self.faces, name, getattr(self, name)[: len(self.faces)])
 
     def _look_up(self, elements: Array) -> None:
         """Take the means over the new children of `elements`, and average them upward."""
-        weights = split_in_four(self._weights[elements]).reshape(-1, 3, 2)
+        weights = split_in_four(self._weights_of(elements)).reshape(-1, 3, 2)
         self._weights = np.concatenate([self._weights, weights])
         above = elements[self._detailed[self.face[elements]]]
         rows = (self.first_child[above][:, None] + np.arange(4)).ravel()
@@ -158,9 +166,18 @@ class Hierarchy:
             above = np.unique(self.parent[above])
             above = above[above != LEAF]
 
+    def _weights_of(self, elements: Array) -> Array:
+        """Return (n, 3, 2) the corners of elements, as weights of the triangle's second and third corner."""
+        count = len(self.faces)
+        front = self.faces.front[np.minimum(elements, count - 1)]
+        weights = np.where(front[:, None, None], WHOLE_TRIANGLE, WHOLE_TRIANGLE[[0, 2, 1]])
+        below = elements >= count
+        weights[below] = self._weights[elements[below] - count]
+        return weights
+
     def _means(self, elements: Array) -> Array:
         """Return (n, 7) reflectance, emission and opacity of elements, less the parts that others cover."""
-        triangle, weights = self.faces.triangle[self.face[elements]], self._weights[elements]
+        triangle, weights = self.faces.triangle[self.face[elements]], self._weights_of(elements)
         if self._images is None:
             textured = np.zeros(len(elements), dtype=bool)
         else:

@@ -98,15 +98,18 @@ def gather_at_clusters(
     kept = cut.kept
     if not isinstance(kept, _ClusterGather) or kept.links is not links:
         kept = cut.kept = _ClusterGather(hierarchy, cut, links)
-    return kept(radiosity, threads)
+    return kept(cut, radiosity, threads)
 
 
 class _ClusterGather:
-    """Links to clusters in the order of their receivers, with all data that does not depend on the light."""
+    """Links to clusters in the order of their receivers, with all data that does not depend on the light.
+
+    The cut keeps it, so it does not keep the cut: of two that keep each other, neither is given up at once.
+    """
 
     def __init__(self, hierarchy: Hierarchy, cut: ClusterCut, links: ClusterLinks) -> None:
         clusters, faces = hierarchy.clusters, hierarchy.faces
-        self.links, self._cut, self._faces = links, cut, faces
+        self.links, self._faces = links, faces
         row = cut.row[links.receiver]
         order = np.argsort(row, kind="stable")
         row = row[order]
@@ -127,12 +130,11 @@ class _ClusterGather:
         self._area, self._center = clusters.area[self._held, None], clusters.center[self._held]
         self._first_face = len(clusters)
         self._face_order = clusters.order
-        self._arm = [(faces.area * along)[self._face_order] for along in faces.center.T]
 
-    def __call__(self, radiosity: Array, threads: int) -> Array:
+    def __call__(self, cut: ClusterCut, radiosity: Array, threads: int) -> Array:
         """Return (f, k): see `gather_at_clusters`."""
         channels = radiosity.shape[1]
-        at_rows = np.zeros((self._cut.n_rows, channels, TERMS))
+        at_rows = np.zeros((cut.n_rows, channels, TERMS))
         for channel in range(channels):
             of_nodes = np.ascontiguousarray(radiosity[:, channel])
             sent = of_nodes.take(self._source)
@@ -143,7 +145,7 @@ class _ClusterGather:
             for term, weight in enumerate(self._weights):
                 at_rows[self._rows, channel, term] = np.add.reduceat(weight * sent, self._first)
             if len(self._source_row):
-                moment = self._moments(of_nodes)
+                moment = self._moments(cut, of_nodes)
                 slanted = sum(
                     slope * along.take(self._source_row)
                     for slope, along in zip(self._slope, moment, strict=True)
@@ -151,17 +153,18 @@ class _ClusterGather:
                 if tint is not None:
                     slanted = slanted * tint[self._grouped]
                 at_rows[self._slanted_rows, channel, 6] -= np.add.reduceat(slanted, self._slanted_first)
-        pushed = self._cut.push(at_rows.reshape(-1, channels * TERMS))
+        pushed = cut.push(at_rows.reshape(-1, channels * TERMS))
         irradiance = np.empty((len(self._faces), channels))
-        arrive = partial(_arriving, self._faces, pushed, self._cut.row_of_face)
+        arrive = partial(_arriving, self._faces, pushed, cut.row_of_face)
         fill_chunks(arrive, irradiance, len(irradiance), CHUNK, threads)
         return irradiance
 
-    def _moments(self, radiosity: Array) -> list[Array]:
+    def _moments(self, cut: ClusterCut, radiosity: Array) -> list[Array]:
         """Return 3 × (n_rows,) each cluster's mean of (y − c) B over its faces [W/m], of nodes' radiosity."""
         sent = radiosity[self._first_face :].take(self._face_order)
-        sums = self._cut.sums_of([sent * arm for arm in self._arm])[self._held_row]
-        moment = np.zeros((self._cut.n_rows, 3))
+        arms = (sent * (self._faces.area * along)[self._face_order] for along in self._faces.center.T)
+        sums = cut.sums_of(arms, 3)[self._held_row]
+        moment = np.zeros((cut.n_rows, 3))
         moment[self._held_row] = sums / self._area - self._center * radiosity[self._held, None]
         return [np.ascontiguousarray(along) for along in moment.T]
 

@@ -56,7 +56,7 @@ def measure_cluster_links(
     Returns links: At most n.
     """
     near = shapes.looks_large(receiver, source, NEAR_RADII)
-    wide = shapes.cone[receiver] > MAX_SPREAD
+    wide = shapes.cone(receiver) > MAX_SPREAD
     many = near & ((_held(hierarchy, source) > MOST_FACES) | wide)
     result: list[ClusterLinks] = []
     for kind, chosen in (
@@ -192,7 +192,8 @@ class _ClusterPairs:
         offset = self.x[:, few] - self.x[:, few].mean(axis=1, keepdims=True)
         normal = np.einsum("nsi,nsj->nij", offset, offset)
         # Across a flat cluster nothing varies: a little of the unit matrix keeps that direction at 0.
-        ridge = 1e-3 * FAR_SAMPLES * clusters.radius[self.receiver] ** 2
+        half = 0.5 * (clusters.upper[self.receiver] - clusters.lower[self.receiver])
+        ridge = 1e-3 * FAR_SAMPLES * np.einsum("nk,nk->n", half, half)
         normal += ridge[:, None, None] * np.eye(3)
         right = np.einsum("nsi,ns->ni", offset, values - mean[:, None])
         gradient = np.linalg.solve(normal, right[..., None])[..., 0]

@@ -170,7 +170,7 @@ def _judge(
     may = shapes.may_see(receiver, source)
     receiver, source = receiver[may], source[may]
     coarse = _looks_small(shapes, receiver, source, limits)
-    wide = shapes.cone[receiver] > CONE
+    wide = shapes.cone(receiver) > CONE
     ready = coarse & ~wide
     if limits.faint > 0.0:
         ready |= shapes.exchange_bound(receiver, source) <= limits.faint * limits.area
@@ -182,13 +182,13 @@ def _judge(
 def _looks_small(shapes: NodeShapes, receiver: Array, source: Array, limits: PairLimits) -> Array:
     """Return (n,) which pairs are linked as they are, if the receiver's faces look much the same way."""
     to_face, of_face = receiver >= shapes.count, source >= shapes.count
-    of_mixed = shapes.cone[source] > CONE
+    of_mixed = shapes.cone(source) > CONE
     size = np.where(of_mixed, MIXED_SIZE, MAX_RADII)
     size = np.where(to_face, np.minimum(size, FACE_SIZE), size)
     far = ~shapes.looks_large(receiver, source, size)
     # A face next to a cluster is linked separately: samples would scatter there.
     tiny = limits.tiny * limits.area
-    small = (shapes.area[receiver] <= tiny) & (shapes.area[source] <= tiny) & ~to_face & ~of_mixed
+    small = (shapes.area(receiver) <= tiny) & (shapes.area(source) <= tiny) & ~to_face & ~of_mixed
     return np.asarray(far | small | (to_face & of_face))
 
 
@@ -202,8 +202,8 @@ def _open_larger(
     """Replace pairs by pairs with the two children of their larger cluster."""
     count, children = hierarchy.n_clusters, hierarchy.clusters.children
     # Clusters with many directions are opened instead: they may not receive.
-    weight = np.where(shapes.cone[receiver] > CONE, 2.0, 1.0)
-    larger = weight * shapes.radius[receiver] >= shapes.radius[source]
+    weight = np.where(shapes.cone(receiver) > CONE, 2.0, 1.0)
+    larger = weight * shapes.radius(receiver) >= shapes.radius(source)
     opened = (receiver < count) & ((source >= count) | larger | only_receiver)
     return (
         np.concatenate([children[receiver[opened]].ravel(), np.repeat(receiver[~opened], 2)]),

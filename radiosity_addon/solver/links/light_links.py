@@ -24,6 +24,7 @@ from ...numerics import (
 )
 from ...rays import RayCaster, passing_light
 from ..hierarchy import LEAF, Hierarchy
+from .transport import push
 
 LAMP_SAMPLES = 4
 """Shadow rays of each quarter of an element, each from a point of its own."""
@@ -69,13 +70,22 @@ class LightLinks:
         return self.gain.mean(axis=1) if self.gain.ndim == 2 else self.gain.mean(axis=(1, 2))
 
     def irradiance(self, strengths: Array, n_elements: int) -> Array:
-        """Return (n_elements, 4, 3): each element's share on its quarters, for (n_lights, 3) strengths."""
-        total = np.zeros((n_elements, 4, 3))
-        for channel in range(3):
+        """Return (n_elements, 4, k): each element's share on its quarters, for (n_lights, k) strengths."""
+        total = np.zeros((n_elements, 4, strengths.shape[1]))
+        for channel in range(strengths.shape[1]):
             for quarter in range(4):
                 gain = self.gain[:, quarter] if self.gain.ndim == 2 else self.gain[:, quarter, channel]
                 arriving = gain * strengths[self.light, channel]
                 total[:, quarter, channel] = np.bincount(self.receiver, arriving, minlength=n_elements)
+        return total
+
+    def at_leaves(self, hierarchy: Hierarchy, strengths: Array) -> Array:
+        """Return (e, 3) the irradiance, ancestors' included, for (n_lights, 3) strengths [W/m²]."""
+        total = np.empty((hierarchy.n_elements, 3))
+        # One channel at a time: quarters of all elements are large.
+        for channel in range(3):
+            own = self.irradiance(strengths[:, channel : channel + 1], hierarchy.n_elements)
+            total[:, channel] = push(hierarchy, own)[:, 0]
         return total
 
 

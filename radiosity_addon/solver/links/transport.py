@@ -42,10 +42,10 @@ def gather(
     means, nodes = shared_means(hierarchy, radiosity, scale, cut) if shared is None else shared
     leaves = hierarchy.leaves
     nodes[hierarchy.n_clusters + leaves] = scale[leaves, :1] * radiosity[leaves]
-    child = np.full(len(nodes), LEAF, dtype=np.int64)
-    child[hierarchy.n_clusters :] = hierarchy.first_child
-    inner = np.flatnonzero(child[links.source] != LEAF)
-    children = child[links.source[inner]]
+    element = links.source.astype(np.int64) - hierarchy.n_clusters
+    inner = np.flatnonzero(element >= 0)
+    inner = inner[hierarchy.first_child[element[inner]] != LEAF]
+    children = hierarchy.first_child[element[inner]].astype(np.int64)
     split = hierarchy.first_child[receivers] != LEAF
     weight = links.factor * links.visibility
     for channel in range(channels):
@@ -77,16 +77,25 @@ def push(hierarchy: Hierarchy, own: Array) -> Array:
     own (e, 4, k): On the quarters of each element; child q inherits quarter q.
     Returns total (e, k): Meaningful at the leaves.
     """
+    mean = quarters_mean(own)
+    levels = inner_by_level(hierarchy)
+    if not levels:
+        return mean
     inherited = np.zeros((len(own), own.shape[2]))
-    for parents in inner_by_level(hierarchy):
+    for parents in levels:
         children = hierarchy.first_child[parents][:, None] + np.arange(4)
         inherited[children] = inherited[parents][:, None] + own[parents]
-    return inherited + quarters_mean(own)
+    mean += inherited
+    return mean
 
 
 def quarters_mean(values: Array) -> Array:
     """Return (e, k) the mean of (e, 4, k) values; NumPy's own takes many times longer."""
-    return np.asarray(0.25 * (values[:, 0] + values[:, 1] + values[:, 2] + values[:, 3]))
+    mean = np.asarray(values[:, 0] + values[:, 1], dtype=np.float64)
+    mean += values[:, 2]
+    mean += values[:, 3]
+    mean *= 0.25
+    return mean
 
 
 def pull(hierarchy: Hierarchy, at_leaves: Array) -> Array:
@@ -95,7 +104,10 @@ def pull(hierarchy: Hierarchy, at_leaves: Array) -> Array:
     at_leaves (e, k): Only the leaves' rows count.
     Returns everywhere (e, k).
     """
-    values = at_leaves.copy()
+    return _pull_in_place(hierarchy, at_leaves.copy())
+
+
+def _pull_in_place(hierarchy: Hierarchy, values: Array) -> Array:
     for parents in reversed(inner_by_level(hierarchy)):
         children = hierarchy.first_child[parents][:, None] + np.arange(4)
         values[parents] = values[children].mean(axis=1)
@@ -118,8 +130,9 @@ def push_pull(
     Returns radiosity (e, 3).
     """
     irradiance = lights + gathered
-    radiosity = pull(hierarchy, emission + reflectance * irradiance)
-    return pull(hierarchy, irradiance), radiosity
+    radiosity = reflectance * irradiance
+    radiosity += emission
+    return _pull_in_place(hierarchy, irradiance), _pull_in_place(hierarchy, radiosity)
 
 
 def inner_by_level(hierarchy: Hierarchy) -> list[Array]:

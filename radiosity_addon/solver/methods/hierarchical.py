@@ -157,6 +157,8 @@ def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -
         rounds.append({"error": error, "links_refined": links_refined, "links": len(state.links)})
     iterate(state, settings.tolerance, last=True)
     add_details(state, rounds)
+    if state.cut is not None:
+        state.cut.kept = None  # as large as the links, and quickly made again
     return state
 
 
@@ -233,6 +235,7 @@ def iterate(state: HierarchicalState, tolerance: float, last: bool = False) -> N
     """
     hierarchy, cluster_links = state.hierarchy, state.cluster_links
     assert state.conservation is not None  # set when the state was made
+    state.cut = state.balance = None  # as large as what replaces them
     lights = state.direct()
     state.cut = state.linked_cut()
     state.balance = state.conservation.balance(
@@ -241,7 +244,6 @@ def iterate(state: HierarchicalState, tolerance: float, last: bool = False) -> N
     cut, balance = state.cut, state.balance
     links, scale, received = balance.links, balance.sent, balance.received
     leaves = hierarchy.leaves
-    least = state.emission[leaves]
     mixer = Anderson(hierarchy.area[leaves])
     best, best_at = np.inf, state.iterations
     while not exhausted(state):
@@ -253,7 +255,10 @@ def iterate(state: HierarchicalState, tolerance: float, last: bool = False) -> N
         if state.residual < tolerance or exhausted(state) or state.iterations - best_at > STALLED:
             break
         # Values of a mixture below the emission are not radiosities.
-        state.radiosity[leaves] = np.maximum(mixer.next(before, state.radiosity[leaves]), least)
+        mixed = mixer.next(before, state.radiosity[leaves])
+        del before
+        state.radiosity[leaves] = np.maximum(mixed, state.emission[leaves])
+        del mixed
     if last:
         _, after = reflect(state, links, lights, scale, cluster_links, cut, received)
         state.residual = relative_residual(state, after)

@@ -8,7 +8,14 @@ from __future__ import annotations
 from .anderson import Anderson
 from .iteration import bounce, reflect, relative_residual
 from .link_record import LinkRecord, leaves_on, nearest_leaf, record_links
-from .memory import link_budget, most_light_elements, refinable, refuse_beyond, refuse_large_scene
+from .memory import (
+    link_budget,
+    most_light_elements,
+    refinable,
+    refuse_beyond,
+    refuse_large_scene,
+    refuse_many_faces,
+)
 from .power import link_closure, power_balance
 from .state import SolverState, begin
 
@@ -29,5 +36,6 @@ __all__ = [
     "reflect",
     "refuse_beyond",
     "refuse_large_scene",
+    "refuse_many_faces",
     "relative_residual",
 ]

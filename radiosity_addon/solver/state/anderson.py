@@ -13,7 +13,10 @@ import numpy as np
 from ...numerics import Array
 
 DEPTH = 5
-"""Steps remembered: two arrays of radiosity each."""
+"""Steps remembered: two arrays of radiosity each, …"""
+
+SINGLE = 1 << 18
+"""… in single precision from this number of rows on: they only decide the next guess."""
 
 GROWTH = 2.0
 """When the change exceeds this many times the smallest one, the history is discarded."""
@@ -36,24 +39,36 @@ class Anderson:
     def next(self, guess: Array, image: Array) -> Array:
         """Return the (n, k) guess to try after `guess` gave `image`."""
         change = image - guess
-        size = float(self._weight @ (change * change).sum(axis=1))
+        size = sum(float(self._weight @ (column * column)) for column in change.T)
         if size > GROWTH**2 * self._least:
             self._forget()
         self._least = min(self._least, size)
         if self._last is not None and self._depth > 0:
-            self._changes = [*self._changes, change - self._last[0]][-self._depth :]
-            self._images = [*self._images, image - self._last[1]][-self._depth :]
+            precision = np.float32 if len(guess) >= SINGLE else np.float64
+            steps = (now.T - before.T for now, before in zip((change, image), self._last, strict=True))
+            for kept, step in zip((self._changes, self._images), steps, strict=True):
+                kept.append(np.ascontiguousarray(step, dtype=precision))
+                del kept[: -self._depth]
         self._last = change, image
         if not self._changes:
             return image
         mixed = image.copy()
         for column in range(image.shape[1]):
-            steps = np.stack([step[:, column] for step in self._changes])
-            weighed = steps * self._weight
-            share = _least_squares(weighed @ steps.T, weighed @ change[:, column])
+            share = self._shares(column, change[:, column])
             for part, step in zip(share, self._images, strict=True):
-                mixed[:, column] -= part * step[:, column]
+                mixed[:, column] -= part * step[column]
         return mixed
+
+    def _shares(self, column: int, change: Array) -> Array:
+        """Return (m,) the shares of the remembered steps that cancel the (n,) change best."""
+        count = len(self._changes)
+        normal, right = np.empty((count, count)), np.empty(count)
+        for row, step in enumerate(self._changes):
+            weighed = self._weight * step[column]
+            right[row] = weighed @ change
+            for other in range(row + 1):
+                normal[row, other] = normal[other, row] = weighed @ self._changes[other][column]
+        return _least_squares(normal, right)
 
     def _forget(self) -> None:
         self._least, self._last, self._changes, self._images = np.inf, None, [], []

@@ -45,15 +45,24 @@ def reflect(
     if cluster_links is not None and len(cluster_links) and cut is not None:
         threads = state.settings.threads
         # A face that looks past the horizon of what its neighbors see gets nothing, not less.
-        shared = np.maximum(gather_at_clusters(hierarchy, cut, cluster_links, sent, threads), 0.0)
+        shared = gather_at_clusters(hierarchy, cut, cluster_links, sent, threads)
+        np.maximum(shared, 0.0, out=shared)
     own = gather(hierarchy, links, state.radiosity, scale, cut, (means, sent))
+    # Arrays over a million elements are given up as early as possible.
+    del means, sent
     gathered = push(hierarchy, own)
     if shared is not None:
         gathered += shared.take(hierarchy.face, axis=0)
+        del shared
     if received is not None:
         # Only leaves count, and these have from their ancestors what is not their own.
         of_leaves = quarters_mean(own)
-        gathered = received[:, 1:] * (gathered - of_leaves) + received[:, :1] * of_leaves
+        gathered -= of_leaves
+        gathered *= received[:, 1:]
+        of_leaves *= received[:, :1]
+        gathered += of_leaves
+        del of_leaves
+    del own
     return push_pull(hierarchy, lights, gathered, state.emission, state.reflectance)
 
 
@@ -77,6 +86,7 @@ def bounce(
 
     The step's change at the leaves is taken as the residual, that of the radiosity before.
     """
+    state.irradiance = state.irradiance[:0]  # the step does not need it, and memory is short
     irradiance, radiosity = reflect(state, links, lights, scale, cluster_links, cut, received)
     state.residual = relative_residual(state, radiosity)
     state.irradiance, state.radiosity = irradiance, radiosity

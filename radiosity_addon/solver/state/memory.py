@@ -23,8 +23,8 @@ LINK_BYTES = 200
 LIGHT_LINK_BYTES = 80
 """… that a link from a lamp takes, …"""
 
-FACE_BYTES = 1600
-"""… that a face takes with its element, its cluster and its part of the scene and of the rays' tree, …"""
+FACE_BYTES = 900
+"""… that a face takes with its element and its cluster while light is gathered (docs/decisions/0052), …"""
 
 ELEMENT_BYTES = 500
 """… that an element below a face takes while light is gathered, …"""
@@ -55,18 +55,30 @@ def refuse_beyond(limit: float, needed: float, what: str, advice: str) -> None:
 def refuse_large_scene(scene: Scene, settings: SolverSettings) -> None:
     """Refuse a scene whose faces and coarsest first links do not fit into the memory limit.
 
+    Raises UsageError: See `refuse_many_faces`.
+    """
+    solid = (scene.areas > 0) & scene.in_bounces
+    refuse_many_faces(int(solid.sum() + (solid & scene.two_sided).sum()), settings)
+
+
+def refuse_many_faces(faces: int, settings: SolverSettings) -> None:
+    """Refuse so many faces if they and their coarsest first links do not fit into the memory limit.
+
     Raises UsageError: Names the number of faces, what they need, and what helps.
     """
-    solid = scene.areas > 0
-    faces = int(solid.sum() + (solid & scene.two_sided).sum())
+    what = f"the hierarchical method with {faces:,} faces"
+    advice = "raise the limit, or bake fewer objects"
+    refuse_beyond(settings.memory_limit, least_bytes(faces, settings), what, advice)
+
+
+def least_bytes(faces: int, settings: SolverSettings) -> float:
+    """Return what faces, their coarsest first links and measuring need [bytes]."""
     pairs = float(faces) ** 2
     links = min(LINK_SLACK * MIN_LINKS, pairs)
     threads = settings.threads or os.cpu_count() or 1
     # A thread measures a chunk of pairs at most; small scenes have no more.
     working = (WORKING_BYTES + threads * THREAD_BYTES) * min(1.0, pairs / MIN_LINKS)
-    needed = faces * FACE_BYTES + links * LINK_BYTES + working
-    what = f"the hierarchical method with {faces:,} faces"
-    refuse_beyond(settings.memory_limit, needed, what, "raise the limit, or bake fewer objects")
+    return faces * FACE_BYTES + links * LINK_BYTES + working
 
 
 def free_bytes(hierarchy: Hierarchy, settings: SolverSettings, light_links: int = 0) -> float:

@@ -13,7 +13,7 @@ from ...numerics import Array
 from ...rays import RayCaster
 from ...scene import Scene, ray_caster
 from ..hierarchy import Basis, Hierarchy, constant_basis
-from ..links import LightLinks, link_lights, no_light_links, pull, push
+from ..links import LightLinks, link_lights, no_light_links, pull
 from ..settings import SolverSettings
 from .lamp_power import lamps_within_power, light_power
 
@@ -105,8 +105,7 @@ class SolverState:
 
     def direct(self) -> Array:
         """Return (e, 3): the irradiance straight from lamps and sky [W/m²]; meaningful at the leaves."""
-        strengths = light_strengths(self.scene.lights)
-        return push(self.hierarchy, self.light_links.irradiance(strengths, self.hierarchy.n_elements))
+        return self.light_links.at_leaves(self.hierarchy, light_strengths(self.scene.lights))
 
     def set_leaves(self, irradiance: Array, radiosity: Array) -> None:
         """Take (l, 3) values of the leaves, in their order, and average them upward."""

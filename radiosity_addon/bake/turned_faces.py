@@ -1,0 +1,113 @@
+"""Objects lit from behind only: lightmaps hold the light on fronts, so theirs are black.
+
+A wall whose normals point out of its room, or a bathtub whose normals point inward, looks right in every
+render, as both sides of a surface show, and black once it is baked. Somebody who does not know that will look
+for a leak.
+
+The solver's elements are too coarse for this: inside a thin shell they get a tenth of the light around it. So
+fronts are judged by their texels, and backs by rays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from ..base import BakeWarning
+from ..lightmap.texels import TexelGeometry
+from ..lightmap.transport import TexelLight
+from ..numerics import Array, Stream, cosine_hemisphere, stratified_square, tiles, to_world
+from ..rays import NO_HIT
+from ..scene import BakeObject, Scene
+from ..solver.gather import Footprints, LocalPass
+
+DARK = 0.02
+"""A front that gets less than this part of its back's light, and of usual light, is dark, …"""
+
+SEEN = 0.1
+"""… if the back gets at least this part of usual light."""
+
+MAX_TURNED_SHARE = 0.1
+"""Objects are warned of where more than this part of their area is like that: walls often are one object,
+and closed ones, which are dark inside, never are."""
+
+PROBED, PROBES = 64, 16
+"""So many dark triangles of an object are looked at from behind, by so many rays each."""
+
+OPEN = 0.5
+"""A back does not face the inside of a solid if at least this part of the rays meets fronts, or leaves."""
+
+
+class BackProbe:
+    """Decides by rays whether light reaches triangles from behind."""
+
+    def __init__(self, scene: Scene, local: LocalPass) -> None:
+        self._scene, self._local = scene, local
+
+    def lit(self, rows: Array, least: float) -> Array:
+        """Return (n,) whether the backs of triangles face lit surfaces, or lamps give them `least` [W/m²]."""
+        caster = self._local.caster
+        normals = -self._scene.face_normals[rows]
+        points = self._scene.triangles[rows].mean(axis=1)
+        unit = stratified_square(rows, PROBES, Stream.BACK_PROBES)
+        directions = to_world(cosine_hemisphere(unit), normals).reshape(-1, 3)
+        starts = np.repeat(points + 2.0 * caster.surface_offset * normals, PROBES, axis=0)
+        hits = caster.intersect(starts, directions)
+        is_open = (hits.front | (hits.triangle == NO_HIT)).reshape(-1, PROBES).mean(axis=1) >= OPEN
+        direct = self._local.direct.at(Footprints(points, normals, rows)).max(axis=1)
+        return np.asarray(is_open | (direct > least))
+
+
+def turned_away(
+    objects: Iterable[BakeObject], areas: Array, front: Array, back: Array, probe: BackProbe
+) -> Iterator[BakeWarning]:
+    """Yield a warning for each object with a large area lit from behind.
+
+    objects: Those that get lightmaps.
+    areas (t,) [m²].
+    front, back (t,) [W/m²]: Mean irradiance on both sides of every triangle, of the brightest channel.
+    """
+    of = [(item, areas[item.rows]) for item in objects if areas[item.rows].any()]
+    lit = np.maximum(front, back)
+    levels = [float(area @ lit[item.rows] / area.sum()) for item, area in of]
+    # A median over objects: a ground in the sun is a hundred times as bright and large as a room.
+    usual = float(np.quantile(levels, 0.5, method="higher")) if levels else 0.0
+    dark = (front < DARK * np.minimum(back, usual)) & (back > SEEN * usual)
+    for item, area in of:
+        suspects = item.first + np.flatnonzero(dark[item.rows])
+        share = float(areas[suspects].sum() / area.sum())
+        if share <= MAX_TURNED_SHARE:
+            continue
+        ends = np.cumsum(areas[suspects])
+        chosen = np.searchsorted(ends, (np.arange(PROBED) + 0.5) / PROBED * ends[-1])
+        distinct, count = np.unique(np.minimum(chosen, len(suspects) - 1), return_counts=True)
+        share *= float(count @ probe.lit(suspects[distinct], SEEN * usual)) / PROBED
+        if share > MAX_TURNED_SHARE:
+            yield BakeWarning(
+                item.name,
+                f"object '{item.name}' is lit from behind only on {share:.0%} of its surface: normals point "
+                "away from the light, so its lightmap is dark there; flip them (Mesh → Normals → Flip) if "
+                "that side should be visible",
+            )
+
+
+def front_irradiance(
+    objects: Iterable[BakeObject], geometry: TexelGeometry, light: TexelLight, otherwise: Array
+) -> Array:
+    """Return (t,) [W/m²] of the brightest channel: each triangle's mean over its texels.
+
+    Triangles without texels get their object's mean, those of objects without texels `otherwise`, (t,).
+    """
+    total, count = np.zeros(len(otherwise)), np.zeros(len(otherwise), dtype=np.int64)
+    for rows in tiles(len(geometry)):
+        triangle, where, texels = np.unique(geometry.triangle[rows], return_inverse=True, return_counts=True)
+        arriving = (light.direct[rows] + light.indirect[rows]).max(axis=1)
+        total[triangle] += np.bincount(where.reshape(-1), arriving)
+        count[triangle] += texels
+    front = otherwise.copy()
+    for item in objects:
+        texels = int(count[item.rows].sum())
+        if texels:
+            front[item.rows] = total[item.rows].sum() / texels
+    return np.where(count > 0, total / np.maximum(count, 1), front)
