@@ -23,7 +23,7 @@ from ..lightmap.lighting import (
 from ..lightmap.texels import FOOTPRINT, TexelGeometry, rasterize, texel_materials
 from ..lightmap.transport import GatherSettings, TexelLight
 from ..lightmap.unwrap import Atlas, AtlasInput, AtlasOptions, Limits, build_atlas, padding_for
-from ..numerics import Array, Scratch, tiles
+from ..numerics import Array, Scratch, numbered, tiles
 from ..options import BakeSettings
 from ..rays import RayCaster
 from ..scene import BakeObject, BakeScene
@@ -64,6 +64,9 @@ UNWRAP, RASTERIZE, SOLVE, LIGHT, ENCODE = 0.0, 0.02, 0.04, 0.29, 0.98
 
 MOST_SHOWN = 1 << 22
 """More texels than these are not shown while they are lit: their pictures would take too much memory."""
+
+COLORS = 4.0
+"""Triangles share texels if they emit alike, and their reflectances are alike in units of a quarter."""
 
 DILATED = 8
 """Texels past the charts that are filled ring by ring, if not more are free."""
@@ -218,8 +221,13 @@ def _unwrap(
     bake_scene: BakeScene, baked: list[BakeObject], settings: BakeSettings, progress: Progress
 ) -> Atlas:
     """Lay the objects' charts out on pages."""
+    scene = bake_scene.scene
+    looks = np.column_stack((np.rint(COLORS * scene.reflectance), scene.emission))
+    kind = numbered(looks)
     inputs = [
-        AtlasInput(item.name, bake_scene.scene.triangles[item.rows], item.polygon, item.uv, item.texel_scale)
+        AtlasInput(
+            item.name, scene.triangles[item.rows], item.polygon, item.uv, item.texel_scale, kind[item.rows]
+        )
         for item in baked
     ]
     options = AtlasOptions(
@@ -249,7 +257,11 @@ def _texels(bake_scene: BakeScene, baked: list[BakeObject], atlas: Atlas, scratc
     # What has no area has no side to be lit from, whatever its UVs say.
     page_of_triangle[bake_scene.scene.areas == 0] = -1
     rows = [np.flatnonzero(page_of_triangle == page) for page in range(len(atlas.pages))]
-    texels = [rasterize(uv[of], page.resolution, scratch) for of, page in zip(rows, atlas.pages, strict=True)]
+    areas = bake_scene.scene.areas
+    texels = [
+        rasterize(uv[of], page.resolution, scratch, areas[of])
+        for of, page in zip(rows, atlas.pages, strict=True)
+    ]
     return TexelGeometry(bake_scene.scene, uv, page_of_triangle, texels, rows, scratch)
 
 

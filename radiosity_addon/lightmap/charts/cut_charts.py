@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ...base import SILENT, Progress
 from ...numerics import connected_faces, double_area_vectors, numbered, signed_double_areas
 from .flatten import project, project_polygons, rescale_to_area, undo_stretch
+from .join_coplanar import join_coplanar
 from .overlap import overlapping_triangles
 
 Float = NDArray[np.float64]
@@ -64,7 +65,9 @@ def unwrap(triangles: Float, polygon: Int, grow: GrowCharts | None, progress: Pr
         count = max(count, int(chart.max()) + 1)
         done += len(rows)
         progress.at(done / len(triangles))
-    return Charts(uv, chart, count)
+    if count > 1:
+        uv, chart = join_coplanar(uv, triangles, chart)
+    return Charts(uv, chart, int(chart.max(initial=-1)) + 1)
 
 
 def _pieces(triangles: Float, polygon: Int) -> Iterator[NDArray[np.intp]]:

@@ -15,9 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base import SILENT, BakeError, BakeWarning, Progress
-from ...numerics import signed_double_areas, triangle_areas
+from ...numerics import double_area_vectors, numbered, signed_double_areas, triangle_areas
 from ..charts import Charts, PatientGrower, rescale_to_area, unwrap
 from ..texels import coverage_sum
+from .collapse import ChartPlaces
+from .cut_empty import cut_empty_charts
 from .dominant_object import greedy_object, share_of
 from .packing import Limits, Packing, pack, page_size
 from .page_assignment import ChartTotals, assign_pages
@@ -51,6 +53,8 @@ class AtlasInput:
         UVs to keep; None to unwrap.
     scale : float
         Its texels per meter, relative to the other objects.
+    kind : (n,) int or None
+        Only triangles of one kind share texels; None if all are alike.
     """
 
     name: str
@@ -58,6 +62,7 @@ class AtlasInput:
     polygon: NDArray[np.int32]
     uv: Float32 | None = None
     scale: float = 1.0
+    kind: Int | None = None
 
 
 @dataclass(frozen=True)
@@ -160,6 +165,7 @@ def build_atlas(objects: Sequence[AtlasInput], options: AtlasOptions, progress: 
         layouts.append(_lay_flat(source, probe, warnings, options.unwrap_seconds, part))
         part.at(1.0)
 
+    layouts = _cut_empty(layouts, options)
     laid = _lay_on_pages(layouts, options, progress.part(0.7, 1.0))
     placed: list[AtlasObject | None] = [None] * len(layouts)
     for number, (group, packing) in enumerate(laid):
@@ -211,6 +217,20 @@ def _lay_on_pages(layouts: list[_Layout], options: AtlasOptions, progress: Progr
             count = max(count, len(groups)) + 1
             continue
         return laid
+
+
+def _cut_empty(layouts: list[_Layout], options: AtlasOptions) -> list[_Layout]:
+    """Cut charts that are mostly empty at about the density that there will be."""
+    padding, density = options.limits.padding, options.texel_density
+    if density is None:
+        pages = options.pages if options.shared else len(layouts)
+        density = _totals(layouts, padding).density(float(pages * options.resolution**2))
+    return [
+        layout
+        if layout.kept
+        else replace(layout, charts=cut_empty_charts(layout.charts, layout.source.polygon, density, padding))
+        for layout in layouts
+    ]
 
 
 def _totals(layouts: list[_Layout], padding: int) -> ChartTotals:
@@ -351,11 +371,35 @@ def _pack_page(
     used = np.flatnonzero(chart >= 0)
     if not len(used):
         return Packing(np.full(uv.shape, 0.5, dtype=np.float32), resolution if density is None else 4, 0.0)
-    packing = pack(uv[used], chart[used], resolution, density, limits, progress)
+    places = _chart_places(group, chart, int(first[-1]))
+    packing = pack(uv[used], chart[used], resolution, density, limits, progress, places)
     pages = np.empty(uv.shape, dtype=np.float32)
     pages[used] = packing.uv
     _park(pages, chart, [len(layout.source.triangles) for layout in group])
     return Packing(pages, packing.resolution, packing.density, packing.crowded)
+
+
+def _chart_places(group: list[_Layout], chart: Int, count: int) -> ChartPlaces:
+    """Return where the charts of a page are in the scene; only those of one object and kind share texels."""
+    used = np.flatnonzero(chart >= 0)
+    chart = chart[used]
+    triangles = np.concatenate([np.asarray(layout.source.triangles, dtype=np.float64) for layout in group])[used]
+    number = np.repeat(np.arange(len(group)), [len(layout.source.triangles) for layout in group])[used]
+    kind = np.concatenate([_kinds(layout.source) for layout in group])[used]
+    kept = np.array([layout.kept for layout in group])[number]
+    cross = double_area_vectors(triangles)
+    area, middle = np.linalg.norm(cross, axis=1), triangles.mean(axis=1)
+    total = np.maximum(np.bincount(chart, area, count), 1e-300)
+    center = np.stack([np.bincount(chart, area * middle[:, k], count) / total for k in range(3)], axis=-1)
+    normal = np.stack([np.bincount(chart, cross[:, k], count) for k in range(3)], axis=-1)
+    largest = np.lexsort((-area, chart))
+    owner = largest[np.searchsorted(chart[largest], np.arange(count))]
+    group_of = np.where(kept, -1, numbered(np.column_stack((number, kind))))[owner]
+    return ChartPlaces(np.asarray(group_of), center, np.asarray(normal))
+
+
+def _kinds(source: AtlasInput) -> Int:
+    return np.zeros(len(source.triangles), dtype=np.int64) if source.kind is None else source.kind
 
 
 def _park(uv: Float32, chart: Int, lengths: list[int]) -> None:

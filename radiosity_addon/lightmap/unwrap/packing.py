@@ -10,7 +10,7 @@ a limit on time, and cannot be run twice on one atlas (docs/decisions/0005).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from ...base import SILENT, BakeError, Progress
 from ...numerics import signed_double_areas
 from ...options import MAX_RESOLUTION
 from .chart_profiles import Shapes, align, measure, outline
+from .collapse import ChartPlaces, collapse, collapsed_corners
 from .skyline import Placement, place
 
 Float = NDArray[np.float64]
@@ -110,7 +111,7 @@ def padding_for(mip_levels: int) -> int:
 
 @dataclass(frozen=True)
 class _Job:
-    """Aligned charts, their outlines, and the orders worth trying."""
+    """Aligned charts, their outlines, the orders worth trying, and where charts are if some may collapse."""
 
     uv: Float
     chart: Int
@@ -120,6 +121,7 @@ class _Job:
     orders: tuple[Int, ...]
     area: float
     limits: Limits
+    places: ChartPlaces | None
 
 
 def pack(
@@ -129,6 +131,7 @@ def pack(
     density: float | None,
     limits: Limits | None = None,
     progress: Progress = SILENT,
+    places: ChartPlaces | None = None,
 ) -> Packing:
     """Pack charts into a square page.
 
@@ -145,23 +148,26 @@ def pack(
     limits : Limits or None
     progress : Progress
         How many trials there will be is not known: it stays where it is.
+    places : ChartPlaces or None
+        Where the charts are in the scene: many small ones are then collapsed. None keeps all shapes.
 
     Raises
     ------
     BakeError
         If the density asks for more than the largest page.
     """
-    job = _job(uv, chart, limits or Limits())
+    job = _job(uv, chart, limits or Limits(), places)
     if density is not None:
         return _pack_at(job, density)
     finer = resolution
     while (packing := _pack_into(job, finer, resolution, progress)) is None:
         # Too small to keep the charts apart: pack a finer page and shrink it.
         finer *= 2
+        job = replace(job, places=None)
     return packing
 
 
-def _job(uv: Float, chart: Int, limits: Limits) -> _Job:
+def _job(uv: Float, chart: Int, limits: Limits, places: ChartPlaces | None) -> _Job:
     count = int(chart.max()) + 1
     aligned = align(uv, chart, count)
     extent = np.zeros((count, 2))
@@ -172,7 +178,10 @@ def _job(uv: Float, chart: Int, limits: Limits) -> _Job:
         orders.append(np.lexsort((np.arange(count), -long, -extent.prod(axis=1))))
         orders.append(np.lexsort((np.arange(count), -long, -short)))
     area = float(0.5 * np.abs(signed_double_areas(aligned)).sum())
-    return _Job(aligned, chart, *outline(aligned, chart), extent, tuple(orders), area, limits)
+    edges, owner = outline(aligned, chart)
+    # A few charts have room for their gaps.
+    places = places if count > FEW else None
+    return _Job(aligned, chart, edges, owner, extent, tuple(orders), area, limits, places)
 
 
 @dataclass(frozen=True)
@@ -217,11 +226,10 @@ def _pack_into(job: _Job, resolution: int, page: int, progress: Progress) -> Pac
     for stretch in STRETCHES if count <= FEW else (1.0,):
         high = full
         for _ in range(trials):
-            scaled = _scaled(job, scale, cell, stretch)
-            placement, height = _place(job, scaled.shapes, side, cell)
-            if placement is not None:
+            placed, height = _placed(job, scale, side, cell, stretch)
+            if placed is not None:
                 low = scale
-                best = _packing(_moved(job, scaled, placement, cell) * cell, resolution, page, scale)
+                best = _packing(placed, resolution, page, scale)
             else:
                 high = scale
             progress.at(0.0)
@@ -255,11 +263,9 @@ def _pack_at(job: _Job, density: float) -> Packing:
             raise _too_dense(density, largest)
         cell = -(-resolution // FINEST)
         side = resolution // cell - 2 * job.limits.border(cell)
-        scaled = _scaled(job, density, cell)
-        placement, _ = _place(job, scaled.shapes, side, cell) if side > 0 else (None, 0)
-        if placement is not None:
-            moved = _moved(job, scaled, placement, cell)
-            best = _packing(moved * cell, resolution, resolution, density)
+        placed, _ = _placed(job, density, side, cell) if side > 0 else (None, 0)
+        if placed is not None:
+            best = _packing(placed, resolution, resolution, density)
             resolution = page_size((too_small + best.resolution) / 2)
         else:
             too_small = resolution
@@ -280,19 +286,70 @@ def _too_dense(density: float, largest: int) -> BakeError:
     )
 
 
-def _place(job: _Job, shapes: tuple[Shapes, Shapes], side: int, cell: int) -> tuple[Placement | None, int]:
-    """Return the first placement within a square of `side` cells, else None and the height reached."""
-    gap = job.limits.gap(cell)
-    even = shapes[0]
-    if min(max(shape.width.max(), shape.height.max()) for shape in shapes) > side:
+def _placed(
+    job: _Job, scale: float, side: int, cell: int, stretch: float = 1.0
+) -> tuple[Float | None, int]:
+    """Place the charts within a square of `side` cells, at `scale` texels per meter.
+
+    Returns (n, 3, 2) corners in texels of the page, or None if they do not fit; and the height reached [cells].
+    """
+    block = collapse(job.places, job.extent * scale, scale, side * cell)
+    if block is None:
         return None, 0
-    if ((even.width + gap) * (even.height + gap) * even.boxy).sum() > 1.3 * (side + gap) ** 2:
+    below = -(-block.rows // cell) + job.limits.gap(cell) if block.rows else 0
+    border = job.limits.border(cell)
+    if not block.is_in.any():
+        scaled = _scaled(job, scale, cell, stretch)
+        placement, height = _place(job, scaled.shapes, (side, side), cell)
+        return None if placement is None else _moved(job, scaled, placement, cell) * cell, height
+    corners = collapsed_corners(block, job.uv, job.chart, job.extent) + border * cell
+    part, rows = _without(job, block.is_in)
+    if not len(rows):
+        return (corners if block.rows <= side * cell else None), block.rows // cell
+    if below >= side:
+        return None, below + side
+    scaled = _scaled(part, scale, cell, stretch)
+    placement, height = _place(part, scaled.shapes, (side, side - below), cell)
+    if placement is None:
+        return None, height + below if height else 0
+    corners[rows] = (_moved(part, scaled, placement, cell) + (0, below)) * cell
+    return corners, height + below
+
+
+def _without(job: _Job, left_out: NDArray[np.bool_]) -> tuple[_Job, NDArray[np.intp]]:
+    """Return the other charts, renumbered, and the triangles they have."""
+    number = np.cumsum(~left_out) - 1
+    rows = np.flatnonzero(~left_out[job.chart])
+    edges = ~left_out[job.owner]
+    orders = tuple(number[order[~left_out[order]]] for order in job.orders)
+    part = replace(
+        job,
+        uv=job.uv[rows],
+        chart=number[job.chart[rows]],
+        edges=job.edges[edges],
+        owner=number[job.owner[edges]],
+        extent=job.extent[~left_out],
+        orders=orders,
+    )
+    return part, rows
+
+
+def _place(
+    job: _Job, shapes: tuple[Shapes, Shapes], room: tuple[int, int], cell: int
+) -> tuple[Placement | None, int]:
+    """Return the first placement in a room so wide and high [cells], else None and the height reached."""
+    gap, (width, height) = job.limits.gap(cell), room
+    even = shapes[0]
+    longest = np.maximum(even.width, even.height).max(), np.minimum(even.width, even.height).max()
+    if max(longest) > max(room) or longest[1] > min(room):
+        return None, 0
+    if ((even.width + gap) * (even.height + gap) * even.boxy).sum() > 1.3 * (width + gap) * (height + gap):
         return None, 0
     few = len(job.extent) <= FEW
     for order in job.orders:
         for thrifty in (False, True) if few else (True,):
-            placement = place(shapes, order, side, gap, side if few else None, thrifty)
-            if placement is not None and placement.height <= side:
+            placement = place(shapes, order, width, gap, height if few else None, thrifty)
+            if placement is not None and placement.height <= height:
                 return placement, placement.height
     return None, placement.height if placement is not None else 0
 
