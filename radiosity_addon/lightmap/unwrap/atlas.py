@@ -225,12 +225,15 @@ def _cut_empty(layouts: list[_Layout], options: AtlasOptions) -> list[_Layout]:
     if density is None:
         pages = options.pages if options.shared else len(layouts)
         density = _totals(layouts, padding).density(float(pages * options.resolution**2))
-    return [
-        layout
-        if layout.kept
-        else replace(layout, charts=cut_empty_charts(layout.charts, layout.source.polygon, density, padding))
-        for layout in layouts
-    ]
+    cut = []
+    for layout in layouts:
+        source = layout.source
+        if not layout.kept:
+            size = triangle_areas(np.asarray(source.triangles, dtype=np.float64)) * source.scale**2
+            charts = cut_empty_charts(layout.charts, source.polygon, size, density, padding)
+            layout = replace(layout, charts=charts)
+        cut.append(layout)
+    return cut
 
 
 def _totals(layouts: list[_Layout], padding: int) -> ChartTotals:

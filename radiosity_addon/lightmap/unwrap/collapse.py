@@ -22,6 +22,9 @@ Bool = NDArray[np.bool_]
 THIN = 1.0
 """Texels; what is narrower is collapsed."""
 
+STRETCH = 2.0
+"""What is longer than the page is shrunk along its length by up to this factor."""
+
 NEIGHBORHOOD = 1.0
 """Texels; points share a texel if their centers are in one cell of a lattice of this width."""
 
@@ -77,8 +80,8 @@ def collapse(places: ChartPlaces | None, extent: Float, scale: float, width: int
     is_line = is_in & (long >= 1.0)
     lines = np.flatnonzero(is_line)
     # Both ends lie on the centers of texels.
-    length[lines] = np.ceil(long[lines]).astype(np.int64) + 1
-    if len(lines) and int(length[lines].max()) > width:
+    length[lines] = np.minimum(np.ceil(long[lines]).astype(np.int64) + 1, width)
+    if len(lines) and float(long[lines].max()) > STRETCH * width:
         return None
     lines = lines[np.argsort(-length[lines], kind="stable")]
     filled = []

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...numerics import connected_faces, numbered, signed_double_areas
 from ..charts import Charts
-from .chart_profiles import align
+from .align import align
 from .collapse import THIN
 
 Float = NDArray[np.float64]
@@ -28,18 +28,19 @@ DIRECTIONS = 4
 """Over half a turn."""
 
 
-def cut_empty_charts(charts: Charts, polygon: Int, density: float, padding: int) -> Charts:
+def cut_empty_charts(charts: Charts, polygon: Int, size: Float, density: float, padding: int) -> Charts:
     """Cut the charts of one object where that saves texels.
 
     polygon (n,) int: The polygon of each triangle; it stays whole.
+    size (n,): The area that each triangle ought to have; parts are scaled to it.
     density: About how many texels a meter there will be.
     padding: Free texels between charts.
     """
     if not charts.count or density <= 0.0:
         return charts
     area = _sums(charts.chart, 0.5 * np.abs(signed_double_areas(charts.uv)), charts.count)
-    polygons = _polygons_of(charts, polygon)
-    tried = (polygons > 1) & (area < 0.9 * _extents(charts.uv, charts.chart, charts.count).prod(axis=1))
+    several = _polygons_of(charts, polygon) > 1
+    tried = several & (area < 0.9 * _extents(charts.uv, charts.chart, charts.count).prod(axis=1))
     rows = np.flatnonzero((charts.chart >= 0) & tried[charts.chart])
     if not len(rows):
         return charts
@@ -64,7 +65,11 @@ def cut_empty_charts(charts: Charts, polygon: Int, density: float, padding: int)
     result[rows[chosen]] = charts.count + part[chosen]
     used = result >= 0
     result[used] = numbered(result[used])
-    return Charts(charts.uv, result, int(result.max()) + 1)
+    scaled = charts.uv.copy()
+    flat = _sums(part, 0.5 * np.abs(signed_double_areas(uv)), parts)
+    factor = np.sqrt(_sums(part, size[rows], parts) / np.where(flat > 0, flat, 1.0))
+    scaled[rows[chosen]] *= np.where(flat > 0, factor, 1.0)[part[chosen], None, None]
+    return Charts(scaled, result, int(result.max()) + 1)
 
 
 def _parts(uv: Float, chart: Int, polygon: Int) -> Int:
