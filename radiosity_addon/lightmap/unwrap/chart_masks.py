@@ -6,8 +6,8 @@ column the lowest bit. Charts are never mirrored.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,17 +22,51 @@ _ROUNDING = 1e-6
 """Cells; an edge on a cell's border must not claim the next cell for a rounding error."""
 
 
-class Mask(NamedTuple):
-    """A chart's cells: its width, its rows as integers, and the number of cells."""
+@dataclass(frozen=True, eq=False)
+class Mask:
+    """A chart's cells.
+
+    width: In columns.
+    rows: As integers.
+    bands: The first row and the one past the last of equal rows, and their runs: first column and length.
+        The widest come first: they are met most often.
+    longest (height,) int64: The length of the longest run of cells in each row.
+    """
 
     width: int
     rows: tuple[int, ...]
-    cells: int
+    bands: tuple[tuple[int, int, tuple[tuple[int, int], ...]], ...]
+    longest: Int
 
     @property
     def height(self) -> int:
         """The number of rows."""
         return len(self.rows)
+
+
+def mask_of(width: int, rows: tuple[int, ...]) -> Mask:
+    """Return the mask of some rows."""
+    bands, start = [], 0
+    for end in range(1, len(rows) + 1):
+        if end == len(rows) or rows[end] != rows[start]:
+            bands.append((start, end, tuple(runs_of(rows[start]))))
+            start = end
+    widest = [max((length for _, length in runs), default=0) for _, _, runs in bands]
+    longest = np.repeat(widest, [end - start for start, end, _ in bands])
+    order = sorted(range(len(bands)), key=lambda band: -widest[band])
+    return Mask(width, rows, tuple(bands[band] for band in order), longest)
+
+
+def runs_of(row: int) -> Iterator[tuple[int, int]]:
+    """Yield first column and length of the runs of set bits."""
+    column = 0
+    while row:
+        skip = (row & -row).bit_length() - 1
+        row >>= skip
+        length = (~row & (row + 1)).bit_length() - 1
+        yield column + skip, length
+        row >>= length
+        column += skip + length
 
 
 @dataclass(frozen=True)
@@ -49,6 +83,7 @@ class ChartMasks:
     start: Int
     covered: Bool
     _made: dict[tuple[int, int], Mask] = field(default_factory=dict)
+    _alike: dict[tuple[int, tuple[int, ...]], Mask] = field(default_factory=dict)
 
     @property
     def boxy(self) -> Bool:
@@ -56,7 +91,7 @@ class ChartMasks:
         return np.asarray(np.add.reduceat(self.covered, self.start[:-1]) == self.width * self.height)
 
     def turned(self, chart: int, quarter: int) -> Mask:
-        """Return a chart turned by quarter turns counter-clockwise."""
+        """Return a chart turned by quarter turns counter-clockwise; charts of one shape share a mask."""
         found = self._made.get((chart, quarter))
         if found is None:
             found = self._made[chart, quarter] = self._turned(chart, quarter)
@@ -66,8 +101,10 @@ class ChartMasks:
         cells = self.covered[self.start[chart] : self.start[chart + 1]]
         grid = np.rot90(cells.reshape(-1, self.width[chart]), -quarter)
         packed = np.packbits(grid, axis=1, bitorder="little")
-        rows = tuple(int.from_bytes(row.tobytes(), "little") for row in packed)
-        return Mask(grid.shape[1], rows, int(grid.sum()))
+        key = grid.shape[1], tuple(int.from_bytes(row.tobytes(), "little") for row in packed)
+        if key not in self._alike:
+            self._alike[key] = mask_of(*key)
+        return self._alike[key]
 
 
 def chart_masks(uv: Float, chart: Int, extent: Float) -> ChartMasks:

@@ -7,10 +7,10 @@ long are left out before that. The loop over charts is sequential by nature.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from .chart_masks import ChartMasks, Mask
@@ -82,12 +82,12 @@ class _Page:
             return None
         places = (1 << (self._width - width + 1)) - 1
         fits = self._candidates(mask, first, last)
-        tall = self._windows(height, first, last) if len(set(mask.rows)) == 1 and len(fits) > 1 else None
+        tall = self._windows(height, first, last) if len(mask.bands) == 1 and len(fits) > 1 else None
         for y in (first + fits).tolist():
             if tall is None:
                 free = self._free(mask, y, places)
             else:
-                free = ~_met(tall[y - first], mask.rows[0]) & places
+                free = ~_met(tall[y - first], mask.bands[0][2]) & places
             if free:
                 self._lowest[mask] = y
                 return (free & -free).bit_length() - 1, y
@@ -96,11 +96,11 @@ class _Page:
 
     def _candidates(self, mask: Mask, first: int, last: int) -> Int:
         """Return the rows from `first` on where every row of a chart meets a free run as long as it."""
-        needed = [_longest_run(row) for row in dict.fromkeys(mask.rows)]
-        least = min(needed)
-        short = self._longest[first : last + mask.height] < least
-        blocked = np.concatenate(([0], np.cumsum(short)))
-        return np.flatnonzero(blocked[mask.height :] == blocked[: last + 1 - first])
+        free = self._longest[first : last + mask.height]
+        if len(mask.bands) == 1:
+            blocked = np.concatenate(([0], np.cumsum(free < mask.longest[0])))
+            return np.flatnonzero(blocked[mask.height :] == blocked[: -mask.height])
+        return np.flatnonzero((sliding_window_view(free, mask.height) >= mask.longest).all(axis=1))
 
     def _windows(self, height: int, first: int, last: int) -> list[int]:
         """Return, for each row, what is taken in so many rows from it on."""
@@ -113,16 +113,14 @@ class _Page:
 
     def _free(self, mask: Mask, y: int, places: int) -> int:
         """Return the columns, as bits, where a chart fits at a row."""
-        taken, start, rows = 0, 0, mask.rows
-        while start < len(rows):
-            end, together = start, 0
-            while end < len(rows) and rows[end] == rows[start]:
-                together |= self._rows[y + end]
-                end += 1
-            taken |= _met(together, rows[start])
+        taken = 0
+        for start, end, runs in mask.bands:
+            together = 0
+            for row in self._rows[y + start : y + end]:
+                together |= row
+            taken |= _met(together, runs)
             if taken & places == places:
                 return 0
-            start = end
         return ~taken & places
 
     def put(self, mask: Mask, x: int, y: int) -> None:
@@ -140,28 +138,16 @@ class _Page:
             self._longest[row] = _longest_run(~self._rows[row] & self._full)
 
 
-def _met(taken: int, row: int) -> int:
-    """Return, as bits, the columns from which a chart's row meets taken cells."""
+def _met(taken: int, runs: tuple[tuple[int, int], ...]) -> int:
+    """Return, as bits, the columns from which a chart's row, given by its runs, meets taken cells."""
     met = 0
-    for first, length in _runs(row):
+    for first, length in runs:
         spread, span = taken >> first, 1
         while 2 * span <= length:
             spread |= spread >> span
             span *= 2
         met |= spread | spread >> (length - span)
     return met
-
-
-def _runs(row: int) -> Iterator[tuple[int, int]]:
-    """Yield first column and length of the runs of set bits."""
-    column = 0
-    while row:
-        skip = (row & -row).bit_length() - 1
-        row >>= skip
-        length = (~row & (row + 1)).bit_length() - 1
-        yield column + skip, length
-        row >>= length
-        column += skip + length
 
 
 def _longest_run(row: int) -> int:
