@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from .estimate import Estimate, LightmappedObject, estimate_bake
+from .importance import thinned_out
 from .keep import KeepOptions, can_keep, run_pipeline
 from .plan import SHORT, BakeDigests, BakePlan, ShownBake, ShownLightmap, plan_bake
 from .stages import timed
@@ -26,5 +27,6 @@ __all__ = [
     "plan_bake",
     "refuse_too_large",
     "run_pipeline",
+    "thinned_out",
     "timed",
 ]

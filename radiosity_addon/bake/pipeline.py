@@ -31,6 +31,7 @@ from ..solver import Solution, SolverSettings, SolverState, solve
 from ..solver.element_transport import Relightable
 from .bake_warnings import of_solution, small_objects
 from .estimate import refuse_before_unwrapping
+from .importance import scales_of, thinned_out
 from .quality import for_error, quality_of, used_settings
 from .relight import HierarchyReport, IncrementalState, KeptBake, are_wanted, check_groups, group_pages, shown
 from .result import (
@@ -41,6 +42,7 @@ from .result import (
     Picture,
     TexelPictures,
     more_of,
+    object_density,
     solver_part,
 )
 from .stages import timed
@@ -195,7 +197,8 @@ def finish(
     of_texels = small_objects(bake_scene, baked, geometry)
     warnings = (*bake_scene.warnings, *of_texels, *solved.warnings)
     objects = tuple(
-        BakedObject(item, placed.uv, placed.page) for item, placed in zip(baked, atlas.objects, strict=True)
+        BakedObject(item, placed.uv, placed.page, object_density(geometry, item))
+        for item, placed in zip(baked, atlas.objects, strict=True)
     )
     light, details = more
     result = BakeResult(
@@ -221,14 +224,19 @@ def _unwrap(
     bake_scene: BakeScene, baked: list[BakeObject], settings: BakeSettings, progress: Progress
 ) -> Atlas:
     """Lay the objects' charts out on pages."""
-    scene = bake_scene.scene
+    scene, scales = bake_scene.scene, scales_of(bake_scene, baked, settings)
     looks = np.column_stack((np.rint(COLORS * scene.reflectance), scene.emission))
     kind = numbered(looks)
     inputs = [
         AtlasInput(
-            item.name, scene.triangles[item.rows], item.polygon, item.uv, item.texel_scale, kind[item.rows]
+            item.name,
+            scene.triangles[item.rows],
+            item.polygon,
+            item.uv,
+            item.texel_scale * scale,
+            kind[item.rows],
         )
-        for item in baked
+        for item, scale in zip(baked, scales, strict=True)
     ]
     options = AtlasOptions(
         settings.resolution,
@@ -237,8 +245,11 @@ def _unwrap(
         settings.pages,
         Limits(settings.max_resolution, _padding(settings)),
         settings.unwrap_seconds,
+        settings.threads,
     )
-    return build_atlas(inputs, options, progress)
+    atlas = build_atlas(inputs, options, progress)
+    thinned = thinned_out([item.name for item in baked], scales)
+    return replace(atlas, warnings=(*thinned, *atlas.warnings))
 
 
 def _padding(settings: BakeSettings) -> int:

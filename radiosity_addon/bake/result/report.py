@@ -83,6 +83,8 @@ class BakeReport:
             }
             if file.scale is not None:
                 entry["scale"] = file.scale
+            if baked.density is not None:
+                entry["texels_per_metre"] = baked.density
             objects.append({**entry, **_plain(of_light)})
         solver = {key: value for key, value in result.solver.items() if key != "history"}
         solver["history"] = thinned(result.solver.get("history", ()))

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
-from ...bake import Estimate, LightmappedObject, estimate_bake, refuse_too_large
+from ...bake import Estimate, LightmappedObject, estimate_bake, refuse_too_large, thinned_out
 from ...base import RadiosityError
 from ...lightmap.unwrap import greedy_object, share_of
 from ...numerics import double_area_vectors
@@ -149,7 +149,7 @@ def inspect(
         chosen = []
         findings.append(Finding(ERROR, context.scene.name, str(error)))
     shapes = {id(piece): _shape(piece) for piece in collected.pieces if len(piece.mesh)}
-    lit = [_lit(piece, shapes) for piece in chosen]
+    lit = [_lit(piece, shapes, settings) for piece in chosen]
     triangles = sum(len(piece.mesh) for piece in collected.pieces)
     plan = estimate_bake(lit, triangles, settings)
     refused = None if output is None else refusal(output, settings, collected, chosen, files)
@@ -176,10 +176,13 @@ def inspect(
     )
 
 
-def _lit(piece: Piece, shapes: dict[int, _Shape]) -> LightmappedObject:
+def _lit(piece: Piece, shapes: dict[int, _Shape], settings: BakeSettings) -> LightmappedObject:
     shape = shapes.get(id(piece))
-    area = 0.0 if shape is None else shape.area
-    return LightmappedObject(piece.source.name, len(piece.mesh), area, piece.role.texel_scale)
+    area, box = (0.0, np.zeros((2, 3))) if shape is None else (shape.area, shape.box)
+    keeps = settings.keep_uvs and piece.has_lightmap_layer
+    return LightmappedObject(
+        piece.source.name, len(piece.mesh), area, piece.role.texel_scale, box, keeps_uvs=keeps
+    )
 
 
 def _shape(piece: Piece) -> _Shape:
@@ -285,7 +288,10 @@ def _of_texels(lit: Sequence[LightmappedObject], plan: Estimate) -> Iterator[Fin
         for item, texels in zip(lit, plan.texels, strict=True)
         if item.area > 0 and texels < FEW_TEXELS
     ]
-    greedy = greedy_object([item.name for item in lit], plan.texels)
+    names = [item.name for item in lit]
+    greedy = greedy_object(names, plan.texels)
+    for warning in thinned_out(names, plan.thinned):
+        yield Finding(WARNING, warning.name, warning.message)
     if tiny:
         mend = (
             "raise the resolution or the texel scale"

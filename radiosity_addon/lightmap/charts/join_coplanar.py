@@ -41,7 +41,7 @@ def join_coplanar(uv: Float, triangles: Float, chart: Int) -> tuple[Float, Int]:
         cross = double_area_vectors(triangles[rows])
         count = len(pairs)
         normal = np.stack([np.bincount(number, cross[:, k], count) for k in range(3)], axis=-1)
-        flat = project(triangles[rows], normal[number])
+        flat = project(triangles[rows], np.asarray(normal, dtype=np.float64)[number])
         before = _boxes(uv[rows], numbered(chart[rows]))
         owner = np.zeros(len(before), dtype=np.int64)
         owner[numbered(chart[rows])] = number
@@ -66,7 +66,7 @@ def _neighbors(triangles: Float, chart: Int) -> Int:
     cross = double_area_vectors(triangles)
     unit = cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-300)
     mean = np.stack([np.bincount(chart[rows], cross[rows, k], count) for k in range(3)], axis=-1)
-    mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-300)
+    mean = np.asarray(mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-300))
     flat = np.ones(count, dtype=np.bool_)
     flat[chart[rows[np.linalg.norm(unit[rows] - mean[chart[rows]], axis=1) > _COPLANAR]]] = False
     rows = rows[flat[chart[rows]]]

@@ -111,15 +111,15 @@ class _TexelPairs(NamedTuple):
 
 
 def rasterize(
-    uv: Float32, resolution: int, scratch: Scratch | None = None, area: Float | None = None
+    uv: Float32, resolution: int, scratch: Scratch | None = None, surface: Float | None = None
 ) -> Texels:
     """Find every texel that a triangle overlaps, and the one triangle it belongs to.
 
     uv (n, 3, 2) float32: Triangles in [0, 1], either orientation; what lies outside the page is cut off and
-        triangles without area cover nothing, but see `area`.
+        triangles without area cover nothing, but see `surface`.
     resolution: Width and height of the page in texels.
     scratch: Makes the texels' arrays; None keeps them in memory.
-    area (n,): Of the triangles in the world. If given, what no triangle covers belongs to the collapsed
+    surface (n,): Areas of the triangles in the world. If given, what no triangle covers belongs to the collapsed
         triangle that has the largest piece there.
     Returns row-major; ties go to the larger overlap, then to the lower triangle index.
     """
@@ -134,8 +134,8 @@ def rasterize(
         owner[pairs.texel[wins & (score > before)]] = _NOBODY
         np.minimum.at(owner, pairs.texel[wins], pairs.triangle[wins])
     shared = None
-    if area is not None:
-        texel, triangle_there, centers = largest_piece(collapsed_pieces(uv, resolution), area, resolution)
+    if surface is not None:
+        texel, triangle_there, centers = largest_piece(collapsed_pieces(uv, resolution), surface, resolution)
         free = owner[texel] == _NOBODY
         shared = texel[free], centers[free]
         owner[texel[free]], best[texel[free]] = triangle_there[free], _CENTER + 1

@@ -1,6 +1,6 @@
 """Texels that many small triangles share: points and lines on the page.
 
-A triangle is *collapsed* if its lightmap coordinates are one point, or lie on one horizontal or vertical line.
+A triangle is *collapsed* if its lightmap coordinates are one point, or lie on a horizontal or vertical line.
 The atlas collapses charts that are smaller than a texel to the center of a texel, and charts that are thinner
 to the centers of a row of texels, where bilinear filtering reads no other row. A collapsed triangle
 covers no area of the page, but it is there: along a line each texel holds the triangles' *pieces* between its
@@ -15,7 +15,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...numerics import Array, areas, clip_half_plane, pick_in_runs, run_numbers, running_sums, tiles
+from ...numerics import (
+    Array,
+    areas,
+    clip_half_plane,
+    numbered,
+    pick_in_runs,
+    run_numbers,
+    running_sums,
+    signed_double_areas,
+    tiles,
+)
 from ...scene import Scene
 from .clip import polygon_area_centroid, sample_polygons
 
@@ -27,7 +37,7 @@ class Pieces(NamedTuple):
     """Parts of collapsed triangles, each within one texel.
 
     triangle, row, column (p,) int32.
-    polygon (p, 5, 2): Corners, as weights of the triangle's second and third corner; the last ones may repeat.
+    polygon (p, 5, 2): Corners, as weights of the triangle's second and third corner; the last may repeat.
     share (p,): Of the triangle's area.
     """
 
@@ -46,7 +56,7 @@ def is_collapsed(uv: Array) -> NDArray[np.bool_]:
 def collapsed_pieces(uv: Array, resolution: int) -> Pieces:
     """Cut collapsed triangles at the borders of texels; ascending by triangle.
 
-    uv (n, 3, 2) float32: Triangles in [0, 1]; those that are not collapsed, and what lies outside, are left out.
+    uv (n, 3, 2) float32: Triangles in [0, 1]; what is not collapsed or lies outside is left out.
     """
     place = uv.astype(np.float64) * resolution
     inside = np.isfinite(place).all(axis=(1, 2)) & (place >= 0).all(axis=(1, 2))
@@ -90,6 +100,25 @@ def largest_piece(pieces: Pieces, area: Array, resolution: int) -> tuple[Array, 
     texel, start = np.unique(texel[order], return_index=True)
     chosen = order[start]
     return texel, pieces.triangle[chosen], _centroids(pieces.polygon[chosen])
+
+
+def texel_areas(uv: Array, area: Array, resolution: int) -> Array:
+    """Return (n,) what a texel is of each triangle in the world [m²]: of a collapsed one, all that shares it.
+
+    uv (n, 3, 2) float32, area (n,): All of a page, or of an object that shares texels with no other.
+    """
+    flat = 0.5 * np.abs(signed_double_areas(uv.astype(np.float64))) * resolution**2
+    # Far below what single-precision UVs can enclose, and far enough from 0 for any area.
+    found = area / np.maximum(flat, 1e-200)
+    pieces = collapsed_pieces(uv, resolution)
+    if len(pieces.triangle):
+        own = pieces.share * area[pieces.triangle]
+        texel = numbered(pieces.row.astype(np.int64) * resolution + pieces.column)
+        held = np.bincount(texel, own)[texel]
+        # Of the texel that holds its largest piece.
+        order = np.lexsort((held, own, pieces.triangle))
+        found[pieces.triangle[order]] = held[order]
+    return np.asarray(found)
 
 
 def _centroids(polygon: Array) -> Array:

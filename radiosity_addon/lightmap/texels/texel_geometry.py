@@ -12,7 +12,7 @@ from ...numerics import Array, Scratch, orthonormal_basis, tiles
 from ...rays import Hits, surface_offset
 from ...scene import Scene
 from .rasterization import FOOTPRINT, Texels, sample_footprints
-from .shared_texels import SharedTexels, find_shared
+from .shared_texels import SharedTexels, find_shared, texel_areas
 
 NO_TEXEL = -1
 
@@ -132,7 +132,9 @@ class TexelGeometry:
         """Move texels to barycentric weights (r, 3) of their triangles."""
         triangle, upright = self.triangle[rows], self.surface_normal[rows]
         self.barycentric[rows] = weights[:, 1:]
-        self.position[rows] = self._sunk(triangle[:, None], _at(self.triangles[triangle], weights[:, None]))[:, 0]
+        self.position[rows] = self._sunk(triangle[:, None], _at(self.triangles[triangle], weights[:, None]))[
+            :, 0
+        ]
         shading = np.einsum("nc,nck->nk", weights, self.normals[triangle])
         length = np.linalg.norm(shading, axis=1, keepdims=True)
         # A shading normal that vanished or points behind the surface is not usable.
@@ -165,17 +167,11 @@ class TexelGeometry:
     @cached_property
     def texel_area(self) -> Array:
         """(t,) float64: what a texel is of every triangle [m²]; endless where it has none of a page."""
-        edges = self.uv[:, 1:].astype(np.float64) - self.uv[:, :1]
-        flat = 0.5 * np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
-        flat *= np.array([len(numbers) ** 2 for numbers in self.index])[np.maximum(self.page_of_triangle, 0)]
-        # Far below what single-precision UVs can enclose, and far enough from 0 for any area.
-        area = np.asarray(self._scene.areas / np.maximum(flat, 1e-200))
-        if self.shared is not None:
-            # Of the texel that holds the largest piece.
-            triangle, held = self.shared.triangle, self.shared.area[self.shared.of]
-            order = np.lexsort((held, self.shared.piece_area, triangle))
-            area[triangle[order]] = held[order]
-        return area
+        result = np.full(len(self.triangles), np.inf)
+        for page, numbers in enumerate(self.index):
+            rows = np.flatnonzero(self.page_of_triangle == page)
+            result[rows] = texel_areas(self.uv[rows], self._scene.areas[rows], len(numbers))
+        return result
 
     @property
     def reach(self) -> Array:

@@ -11,6 +11,15 @@ Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
 
+def chart_extents(uv: Float, chart: Int, count: int) -> Float:
+    """Return (count, 2) width and height of charts; triangles of chart −1 are left out."""
+    used = chart >= 0
+    low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
+    np.minimum.at(low, chart[used], uv[used].min(axis=1))
+    np.maximum.at(high, chart[used], uv[used].max(axis=1))
+    return high - low
+
+
 def align(uv: Float, chart: Int, count: int) -> Float:
     """Turn each chart so that its bounding box is smallest; its lower left corner becomes 0.
 

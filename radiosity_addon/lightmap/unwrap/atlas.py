@@ -15,12 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base import SILENT, BakeError, BakeWarning, Progress
-from ...numerics import double_area_vectors, numbered, signed_double_areas, triangle_areas
-from ..charts import Charts, PatientGrower, rescale_to_area, unwrap
+from ...numerics import numbered, signed_double_areas, triangle_areas
+from ..charts import PIECE, Charts, PatientGrower, rescale_to_area, unwrap
 from ..texels import coverage_sum
-from .collapse import ChartPlaces
+from .align import chart_extents
+from .collapse import chart_places
 from .cut_empty import cut_empty_charts
 from .dominant_object import greedy_object, share_of
+from .kept_uvs import are_apart, has_area, overlaps
 from .packing import Limits, Packing, pack, page_size
 from .page_assignment import ChartTotals, assign_pages
 
@@ -30,12 +32,6 @@ Int = NDArray[np.int64]
 
 _PROBE = 1024
 """Kept UVs are searched for overlaps at no more than this resolution: a finer one finds no larger ones."""
-
-_OVERLAP = 1.01
-"""A texel filled to more than this holds triangles that lie over each other."""
-
-_COLLAPSED = 1e-6
-"""Kept UVs whose area is less than this share of their extent, squared, are a line but for rounding."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +79,8 @@ class AtlasOptions:
         Of every page.
     unwrap_seconds : float
         After so long an object's rest is cut into charts by the directions its faces look.
+    threads : int
+        Pieces of large objects that are cut at once; 0 means all cores.
     """
 
     resolution: int = 512
@@ -91,6 +89,7 @@ class AtlasOptions:
     pages: int = 1
     limits: Limits = field(default_factory=Limits)
     unwrap_seconds: float = 60.0
+    threads: int = 0
 
 
 @dataclass(frozen=True)
@@ -162,7 +161,7 @@ def build_atlas(objects: Sequence[AtlasInput], options: AtlasOptions, progress: 
     for source in objects:
         before, done = done, done + len(source.triangles)
         part = progress.part(0.7 * before / max(total, 1), 0.7 * done / max(total, 1))
-        layouts.append(_lay_flat(source, probe, warnings, options.unwrap_seconds, part))
+        layouts.append(_lay_flat(source, probe, warnings, options, part))
         part.at(1.0)
 
     layouts = _cut_empty(layouts, options)
@@ -230,7 +229,9 @@ def _cut_empty(layouts: list[_Layout], options: AtlasOptions) -> list[_Layout]:
         source = layout.source
         if not layout.kept:
             size = triangle_areas(np.asarray(source.triangles, dtype=np.float64)) * source.scale**2
-            charts = cut_empty_charts(layout.charts, source.polygon, size, density, padding)
+            charts = cut_empty_charts(
+                layout.charts, np.asarray(source.polygon, dtype=np.int64), size, density, padding
+            )
             layout = replace(layout, charts=charts)
         cut.append(layout)
     return cut
@@ -239,20 +240,12 @@ def _cut_empty(layouts: list[_Layout], options: AtlasOptions) -> list[_Layout]:
 def _totals(layouts: list[_Layout], padding: int) -> ChartTotals:
     """Return the sums over each object's charts, at its scale."""
     areas = [_surface([layout]) * layout.source.scale**2 for layout in layouts]
-    lengths = [float(_extents(layout.charts).sum()) for layout in layouts]
+    lengths = [
+        float(chart_extents(layout.charts.uv, layout.charts.chart, layout.charts.count).sum())
+        for layout in layouts
+    ]
     counts = [float(layout.charts.count) for layout in layouts]
     return ChartTotals(np.array(areas), np.array(lengths), np.array(counts), padding)
-
-
-def _extents(charts: Charts) -> Float:
-    """Return (c, 2) width and height of each chart [m]."""
-    inside = charts.chart >= 0
-    corners, owner = charts.uv[inside].reshape(-1, 2), np.repeat(charts.chart[inside], 3)
-    low, high = np.full((charts.count, 2), np.inf), np.full((charts.count, 2), -np.inf)
-    np.minimum.at(low, owner, corners)
-    np.maximum.at(high, owner, corners)
-    extents: Float = high - low
-    return extents
 
 
 def _pack_group(group: list[_Layout], options: AtlasOptions, progress: Progress) -> Packing:
@@ -264,7 +257,7 @@ def _pack_group(group: list[_Layout], options: AtlasOptions, progress: Progress)
 
 
 def _lay_flat(
-    source: AtlasInput, probe: int, warnings: list[BakeWarning], seconds: float, progress: Progress
+    source: AtlasInput, probe: int, warnings: list[BakeWarning], options: AtlasOptions, progress: Progress
 ) -> _Layout:
     """Cut one object into charts, or take the UVs it has."""
     triangles = np.asarray(source.triangles, dtype=np.float64).reshape(-1, 3, 3)
@@ -274,8 +267,11 @@ def _lay_flat(
             return _Layout(source, _scaled(kept, source.scale), kept=True)
     if not len(triangles):
         return _Layout(source, Charts(np.zeros((0, 3, 2)), np.zeros(0, dtype=np.int64), 0), kept=False)
-    grower = PatientGrower(seconds, progress.in_window)
-    charts = unwrap(triangles, np.asarray(source.polygon, dtype=np.int64), grower, progress)
+    seconds = options.unwrap_seconds
+    # Pieces of a large object are cut at once: xatlas keeps Python's lock, so in processes of their own.
+    grower = PatientGrower(seconds, progress.in_window or len(triangles) > PIECE)
+    polygon = np.asarray(source.polygon, dtype=np.int64)
+    charts = unwrap(triangles, polygon, grower, progress, options.threads)
     if grower.gave_up:
         warnings.append(
             BakeWarning(
@@ -302,7 +298,7 @@ def _kept_charts(
     """
     assert source.uv is not None
     uv = source.uv.astype(np.float64)
-    if not np.isfinite(uv).all() or not _has_area(uv):
+    if not np.isfinite(uv).all() or not has_area(uv):
         warnings.append(
             BakeWarning(source.name, "its Lightmap UVs have no area or are not numbers; unwrapped again")
         )
@@ -311,18 +307,12 @@ def _kept_charts(
         warnings.append(
             BakeWarning(source.name, "its Lightmap UVs leave the unit square; what is outside gets no light")
         )
-    elif (coverage_sum(source.uv, probe) > _OVERLAP).any():
+    elif overlaps(coverage_sum(source.uv, probe)):
         warnings.append(
             BakeWarning(source.name, "its Lightmap UVs overlap; faces that share texels show the same light")
         )
     chart = np.zeros(len(uv), dtype=np.int64)
     return Charts(rescale_to_area(uv, triangles, chart, 1), chart, 1)
-
-
-def _has_area(uv: Float) -> bool:
-    """Whether (n, 3, 2) UVs cover more than rounding leaves of a line or a point."""
-    area = np.abs(signed_double_areas(uv)).sum()
-    return bool(area > _COLLAPSED * (np.ptp(uv.reshape(-1, 2), axis=0) ** 2).sum())
 
 
 def _kept_as_they_are(
@@ -333,7 +323,7 @@ def _kept_as_they_are(
         return None
     kept = [layout.source.uv for layout in group if layout.source.uv is not None]
     uv = np.concatenate(kept).astype(np.float32, copy=False)
-    if len(group) > 1 and not _apart(kept, min(resolution, _PROBE)):
+    if len(group) > 1 and not are_apart(kept, min(resolution, _PROBE)):
         return None
     surface = _surface(group)
     flat = float(0.5 * np.abs(signed_double_areas(uv.astype(np.float64))).sum())
@@ -346,17 +336,6 @@ def _kept_as_they_are(
             )
         resolution = page_size(size)
     return Packing(uv, resolution, resolution * float(np.sqrt(flat / surface)) if surface > 0 else 0.0)
-
-
-def _apart(layouts: list[Float32], resolution: int) -> bool:
-    """Return whether no object's UVs lie over another's (nor wholly outside the page)."""
-    taken = np.zeros((resolution, resolution))
-    for uv in layouts:
-        if uv.min() < -1e-6 or uv.max() > 1 + 1e-6:
-            return False
-        # An object that overlaps itself is its own affair.
-        taken += np.minimum(coverage_sum(uv, resolution), 1.0)
-    return not (taken > _OVERLAP).any()
 
 
 def _pack_page(
@@ -374,7 +353,7 @@ def _pack_page(
     used = np.flatnonzero(chart >= 0)
     if not len(used):
         return Packing(np.full(uv.shape, 0.5, dtype=np.float32), resolution if density is None else 4, 0.0)
-    places = _chart_places(group, chart, int(first[-1]))
+    places = chart_places(_corners(group)[used], chart[used], _share_groups(group)[used])
     packing = pack(uv[used], chart[used], resolution, density, limits, progress, places)
     pages = np.empty(uv.shape, dtype=np.float32)
     pages[used] = packing.uv
@@ -382,23 +361,12 @@ def _pack_page(
     return Packing(pages, packing.resolution, packing.density, packing.crowded)
 
 
-def _chart_places(group: list[_Layout], chart: Int, count: int) -> ChartPlaces:
-    """Return where the charts of a page are in the scene; only those of one object and kind share texels."""
-    used = np.flatnonzero(chart >= 0)
-    chart = chart[used]
-    triangles = np.concatenate([np.asarray(layout.source.triangles, dtype=np.float64) for layout in group])[used]
-    number = np.repeat(np.arange(len(group)), [len(layout.source.triangles) for layout in group])[used]
-    kind = np.concatenate([_kinds(layout.source) for layout in group])[used]
-    kept = np.array([layout.kept for layout in group])[number]
-    cross = double_area_vectors(triangles)
-    area, middle = np.linalg.norm(cross, axis=1), triangles.mean(axis=1)
-    total = np.maximum(np.bincount(chart, area, count), 1e-300)
-    center = np.stack([np.bincount(chart, area * middle[:, k], count) / total for k in range(3)], axis=-1)
-    normal = np.stack([np.bincount(chart, cross[:, k], count) for k in range(3)], axis=-1)
-    largest = np.lexsort((-area, chart))
-    owner = largest[np.searchsorted(chart[largest], np.arange(count))]
-    group_of = np.where(kept, -1, numbered(np.column_stack((number, kind))))[owner]
-    return ChartPlaces(np.asarray(group_of), center, np.asarray(normal))
+def _share_groups(group: list[_Layout]) -> Int:
+    """Return a number for each triangle: only those of one object and kind share texels, −1 for kept UVs."""
+    number = np.repeat(np.arange(len(group)), [len(layout.source.triangles) for layout in group])
+    kind = np.concatenate([_kinds(layout.source) for layout in group])
+    kept = np.array([layout.kept for layout in group])
+    return np.where(kept[number], -1, numbered(np.column_stack((number, kind))))
 
 
 def _kinds(source: AtlasInput) -> Int:
@@ -423,8 +391,11 @@ def _page(packing: Packing) -> AtlasPage:
 
 def _surface(group: list[_Layout]) -> float:
     """Return the area of all triangles [m²]."""
-    corners = np.concatenate([np.asarray(layout.source.triangles, dtype=np.float64) for layout in group])
-    return float(triangle_areas(corners).sum())
+    return float(triangle_areas(_corners(group)).sum())
+
+
+def _corners(group: list[_Layout]) -> Float:
+    return np.concatenate([np.asarray(layout.source.triangles, dtype=np.float64) for layout in group])
 
 
 def _crowded(group: list[_Layout], resolution: int) -> BakeWarning:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...numerics import numbered, run_chunks, run_numbers, run_starts
+from ...numerics import double_area_vectors, numbered, run_chunks, run_numbers, run_starts
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -44,6 +44,22 @@ class ChartPlaces:
     group: Int
     center: Float
     normal: Float
+
+
+def chart_places(triangles: Float, chart: Int, group: Int) -> ChartPlaces:
+    """Return where charts are; a chart belongs to the group of its largest triangle.
+
+    triangles (n, 3, 3) [m], chart (n,) int64 from 0 without gaps, group (n,) int64.
+    """
+    count = int(chart.max()) + 1
+    cross = double_area_vectors(triangles)
+    area, middle = np.linalg.norm(cross, axis=1), triangles.mean(axis=1)
+    total = np.maximum(np.bincount(chart, area, count), 1e-300)
+    center = np.stack([np.bincount(chart, area * middle[:, k], count) / total for k in range(3)], axis=-1)
+    normal = np.stack([np.bincount(chart, cross[:, k], count) for k in range(3)], axis=-1)
+    order = np.lexsort((-area, chart))
+    largest = order[np.searchsorted(chart[order], np.arange(count))]
+    return ChartPlaces(group[largest], np.asarray(center), np.asarray(normal, dtype=np.float64))
 
 
 @dataclass(frozen=True)

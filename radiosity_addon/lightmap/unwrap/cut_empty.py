@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...numerics import connected_faces, numbered, signed_double_areas
 from ..charts import Charts
-from .align import align
+from .align import align, chart_extents
 from .collapse import THIN
 
 Float = NDArray[np.float64]
@@ -40,14 +40,14 @@ def cut_empty_charts(charts: Charts, polygon: Int, size: Float, density: float, 
         return charts
     area = _sums(charts.chart, 0.5 * np.abs(signed_double_areas(charts.uv)), charts.count)
     several = _polygons_of(charts, polygon) > 1
-    tried = several & (area < 0.9 * _extents(charts.uv, charts.chart, charts.count).prod(axis=1))
+    tried = several & (area < 0.9 * chart_extents(charts.uv, charts.chart, charts.count).prod(axis=1))
     rows = np.flatnonzero((charts.chart >= 0) & tried[charts.chart])
     if not len(rows):
         return charts
     chart = numbered(charts.chart[rows])
     count = int(chart.max()) + 1
     uv = align(charts.uv[rows], chart, count)
-    extent = _extents(uv, chart, count)
+    extent = chart_extents(uv, chart, count)
     filled = _sums(chart, 0.5 * np.abs(signed_double_areas(uv)), count)
     empty = filled < EMPTY * extent.prod(axis=1)
     rows, uv, chart = (values[empty[chart]] for values in (rows, uv, chart))
@@ -56,7 +56,7 @@ def cut_empty_charts(charts: Charts, polygon: Int, size: Float, density: float, 
     part = _parts(uv, chart, numbered(polygon[rows]))
     parts = int(part.max()) + 1
     turned = _upright(uv, part, parts)
-    cost = _texels(_extents(turned, part, parts) * density, padding)
+    cost = _texels(chart_extents(turned, part, parts) * density, padding)
     of = np.zeros(parts, dtype=np.int64)
     of[part] = chart
     cut = _sums(of, cost, count) < GAIN * _texels(extent * density, padding)
@@ -103,22 +103,13 @@ def _texels(extent: Float, padding: int) -> Float:
     return np.where(thin, np.ceil(long) + 1.0, (np.ceil(extent) + padding).prod(axis=1))
 
 
-def _extents(uv: Float, chart: Int, count: int) -> Float:
-    """Return (count, 2) width and height of charts."""
-    used = chart >= 0
-    low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
-    np.minimum.at(low, chart[used], uv[used].min(axis=1))
-    np.maximum.at(high, chart[used], uv[used].max(axis=1))
-    return high - low
-
-
 def _sums(chart: Int, values: Float, count: int) -> Float:
     used = chart >= 0
-    return np.bincount(chart[used], values[used], count)
+    return np.asarray(np.bincount(chart[used], values[used], count), dtype=np.float64)
 
 
 def _polygons_of(charts: Charts, polygon: Int) -> Int:
     """Return (count,) how many polygons each chart has."""
     used = charts.chart >= 0
     pairs = np.unique(np.column_stack((charts.chart[used], polygon[used])), axis=0)
-    return np.bincount(pairs[:, 0], minlength=charts.count)
+    return np.asarray(np.bincount(pairs[:, 0], minlength=charts.count), dtype=np.int64)

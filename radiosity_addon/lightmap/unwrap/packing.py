@@ -349,7 +349,10 @@ def _place(
     longest = np.maximum(even.width, even.height).max(), np.minimum(even.width, even.height).max()
     if longest[0] > max(room) or longest[1] > min(room):
         return None, 0.0
-    needed, free = ((even.width + gap) * (even.height + gap) * even.boxy).sum(), (width + gap) * (height + gap)
+    needed, free = (
+        ((even.width + gap) * (even.height + gap) * even.boxy).sum(),
+        (width + gap) * (height + gap),
+    )
     if needed > free:
         return None, float(free / needed)
     share = 0.0
