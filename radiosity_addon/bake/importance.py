@@ -2,8 +2,8 @@
 
 Texels are as dense everywhere, unless an object says otherwise. But a ground disc 200 m wide around a house
 would take nine tenths of the page, for places that nobody is near to. Where one object would take more than
-all others together, only the part of it that lies among them counts. Neither a camera nor a lamp has a say:
-moving them changes no layout.
+all others together, only the part of it that lies among them counts; unless it encloses them, as a room does.
+Neither a camera nor a lamp has a say: moving them changes no layout.
 """
 
 from __future__ import annotations
@@ -20,6 +20,9 @@ from ..scene import BakeObject, BakeScene
 
 AMONG = 0.25
 """The box around all other objects is grown by this part of its diagonal on all sides."""
+
+ENCLOSED = 0.01
+"""Parts of the diagonal by which the others may stick out of an object that encloses them."""
 
 LEAST_SHARE = 0.25
 """An object is never given less than this part of the page, if it would take more by its surface."""
@@ -50,8 +53,12 @@ def justified_scales(extents: Sequence[Extent]) -> list[float]:
     if not extents[largest].free or not 0.0 < rest < surface[largest]:
         return scales
     low, high = boxes[others, 0].min(axis=0), boxes[others, 1].max(axis=0)
-    margin = AMONG * float(np.linalg.norm(high - low))
-    part = _part_within(extents[largest].box, np.stack([low - margin, high + margin]))
+    diagonal = float(np.linalg.norm(high - low))
+    box, slack = boxes[largest], ENCLOSED * diagonal
+    if (box[0] <= low + slack).all() and (box[1] >= high - slack).all():
+        return scales
+    margin = AMONG * diagonal
+    part = _part_within(box, np.stack([low - margin, high + margin]))
     if part < MARKED:
         least = LEAST_SHARE / (1.0 - LEAST_SHARE) * rest / surface[largest]
         scales[largest] = float(np.sqrt(min(max(part, least), 1.0)))

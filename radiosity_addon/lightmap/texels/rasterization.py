@@ -119,8 +119,8 @@ def rasterize(
         triangles without area cover nothing, but see `surface`.
     resolution: Width and height of the page in texels.
     scratch: Makes the texels' arrays; None keeps them in memory.
-    surface (n,): Areas of the triangles in the world. If given, what no triangle covers belongs to the collapsed
-        triangle that has the largest piece there.
+    surface (n,): Areas of the triangles in the world. If given, what no triangle covers belongs to the
+        collapsed triangle that has the largest piece there.
     Returns row-major; ties go to the larger overlap, then to the lower triangle index.
     """
     uv = np.ascontiguousarray(uv, dtype=np.float32)

@@ -98,7 +98,7 @@ def _upright(uv: Float, part: Int, count: int) -> Float:
 
 
 def _texels(extent: Float, padding: int) -> Float:
-    """Return (count,) texels that charts of an extent (count, 2) [texels] take, with a gap if they need one."""
+    """Return (count,) texels that charts of an extent (count, 2) [texels] take, gaps included."""
     long, thin = extent.max(axis=1), extent.min(axis=1) < THIN
     return np.where(thin, np.ceil(long) + 1.0, (np.ceil(extent) + padding).prod(axis=1))
 
