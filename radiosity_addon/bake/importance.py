@@ -2,7 +2,8 @@
 
 Texels are as dense everywhere, unless an object says otherwise. But a ground disc 200 m wide around a house
 would take nine tenths of the page, for places that nobody is near to. Where one object would take more than
-all others together, only the part of it that lies among them counts; unless it encloses them, as a room does.
+all others together, only the part of it that lies among them counts; unless it encloses them, as a room does,
+or they are too few to say where the scene is.
 Neither a camera nor a lamp has a say: moving them changes no layout.
 """
 
@@ -24,8 +25,14 @@ AMONG = 0.25
 ENCLOSED = 0.01
 """Parts of the diagonal by which the others may stick out of an object that encloses them."""
 
+OTHERS = 8
+"""So many other objects are a scene; a pebble on a floor is not."""
+
+LEAST_SCALE = 0.125
+"""An object is never thinned out further, …"""
+
 LEAST_SHARE = 0.25
-"""An object is never given less than this part of the page, if it would take more by its surface."""
+"""… nor given less than this part of the page, if it would take more by its surface."""
 
 MARKED = 0.5
 """An object is thinned out only if the part of it that counts is less than this."""
@@ -43,14 +50,14 @@ class Extent:
 def justified_scales(extents: Sequence[Extent]) -> list[float]:
     """Return a factor for each object's texels per meter: 1, or less for what is thinned out."""
     scales = [1.0] * len(extents)
-    if len(extents) < 2:
+    if len(extents) <= OTHERS:
         return scales
     boxes = np.array([extent.box for extent in extents])
     surface = np.array([extent.surface for extent in extents])
     largest = int(surface.argmax())
     others = (surface > 0) & (np.arange(len(extents)) != largest)
     rest = float(surface[others].sum())
-    if not extents[largest].free or not 0.0 < rest < surface[largest]:
+    if not extents[largest].free or others.sum() < OTHERS or rest >= surface[largest]:
         return scales
     low, high = boxes[others, 0].min(axis=0), boxes[others, 1].max(axis=0)
     diagonal = float(np.linalg.norm(high - low))
@@ -61,7 +68,7 @@ def justified_scales(extents: Sequence[Extent]) -> list[float]:
     part = _part_within(box, np.stack([low - margin, high + margin]))
     if part < MARKED:
         least = LEAST_SHARE / (1.0 - LEAST_SHARE) * rest / surface[largest]
-        scales[largest] = float(np.sqrt(min(max(part, least), 1.0)))
+        scales[largest] = float(np.sqrt(min(max(part, least, LEAST_SCALE**2), 1.0)))
     return scales
 
 

@@ -48,7 +48,7 @@ bring up to a quarter more of them.
 
 
 TRIALS, PRECISION = (12, 40), (1.004, 1.002)
-"""Scales tried at most, and the ratio between one that fits and one that does not: for many charts, and for few."""
+"""Scales tried at most, and the ratio of one that does not fit to one that does: for many charts, for few."""
 
 
 @dataclass(frozen=True)
@@ -198,7 +198,7 @@ class _Scaled:
 
 
 def _scaled(job: _Job, scale: float, cell: int, side: int, stretch: float = 1.0) -> _Scaled:
-    """Return the charts at `scale` texels per meter, stretched along the page's u, for a room of `side` cells."""
+    """Return the charts at `scale` texels per meter, stretched along u, for a room of `side` cells."""
     even = _measured(job, scale * np.array((stretch**0.5, stretch**-0.5)), cell, side)
     if stretch == 1.0:
         return _Scaled((even[0], even[0]), (even[1], even[1]))
