@@ -320,7 +320,7 @@ def _placed(
         return None, side * cell / block.rows
     corners = collapsed_corners(block, job.uv, job.chart, job.extent) + job.limits.border(cell) * cell
     if len(rows):
-        corners[rows] = placed + (0, below * cell)
+        corners[rows] = placed + np.array((0, below * cell))
         return corners, side / height
     return corners, side * cell / block.rows
 
