@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """One front door for everything a developer does: `python3 build.py VERB ...`, standard library only.
 
-It sets itself up: the first verb that needs packages makes `.venv` beside this file with the
+It sets itself up: the first verb that needs packages makes `.venv` next to this file with the
 pinned versions of `requirements/`, later ones only check that the pins have not changed.
 """
 
@@ -41,8 +41,8 @@ usage: python3 build.py VERB [arguments]
   bake [SCENE] [options]     bake a scene, or the bundled Cornell box (bake --help lists the options)
   restore SCENE [options]    take a bake out of a .blend again
   test [WHICH] ...           run all tests but a few slow ones; what follows goes to pytest instead
-                             --quick: the fast ones that need neither bpy nor a window, in three minutes, in
-                             an environment without bpy; --full: the slow ones too;
+                             --quick: the fast ones that need neither bpy nor a window, in a minute, in an
+                             environment without bpy; --full: the slow ones too;
                              --bpy 4.2 or 5.2: with that bpy, in an environment of its own
   fuzz [--seeds A:B]         bake random scenes and check what must hold of each (default 0:500)
   bench [--case NAME] ...    measure against Cycles into bench/results and the README; --small tries
@@ -190,7 +190,7 @@ def package(_: list[str]) -> int:
 
 
 def prepare_real_blender(_: list[str]) -> int:
-    """Install the Blender that the tests need beside the module, if it is not there yet."""
+    """Install the Blender that the tests need in addition to the module, if it is not there yet."""
     from build_tools import real_blender
 
     print(f"Blender is in {real_blender.prepare().root}")

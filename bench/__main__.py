@@ -67,7 +67,7 @@ def parser() -> argparse.ArgumentParser:
     add(
         "--small", action="store_true", help="small versions, in a minute, to out/bench: that everything runs"
     )
-    add("--presets", action="store_true", help="draft, medium and high alone, no errors that are asked for")
+    add("--presets", action="store_true", help="draft, medium and high alone, no target errors")
     add("--references", action="store_true", help="only make what is cached: scenes and references")
     add("--calibrate", action="store_true", help="vary each setting alone, for what the error setting needs")
     add("--table", action="store_true", help="only write the README's table from the results that are there")

@@ -1,4 +1,4 @@
-"""What each setting does to the error: data for choosing settings by the error that is asked for."""
+"""The effect of each setting on the error: data for choosing settings by a target error."""
 
 from __future__ import annotations
 

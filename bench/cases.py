@@ -20,7 +20,7 @@ QUALITIES: tuple[dict[str, Any], ...] = ({"quality": "draft"}, {"quality": "medi
 ERROR_SETTING = next(
     (n for n in ("target_error", "relative_error") if n in BakeSettings.__annotations__), None
 )
-"""The field by which a bake is asked for an error, where this version has it."""
+"""The field of the target error, where this version has it."""
 
 ASKED_ERRORS = (0.05, 0.03, 0.02, 0.01)
 
@@ -164,7 +164,7 @@ ROOMS = "rooms"
 
 
 def with_asked_errors(case: Case) -> tuple[dict[str, Any], ...]:
-    """Return our bakes of a case, and those that are asked for an error."""
+    """Return our bakes of a case, and those to a target error."""
     if ERROR_SETTING is None:
         return case.runs
     return (*case.runs, *({ERROR_SETTING: error} for error in ASKED_ERRORS))

@@ -37,7 +37,7 @@ class Bench:
     small : bool
     threads : int
     presets : bool
-        Draft, medium and high alone, no errors that are asked for.
+        Draft, medium and high alone, no target errors.
     """
 
     cache: Path

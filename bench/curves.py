@@ -43,7 +43,7 @@ def time_to_reach(points: Sequence[Point], error: float) -> Reading | None:
     """Return the time to an error by what was measured alone, None if no bake reaches it.
 
     Between two bakes log error is linear in log time. The quickest bake is the least that can be
-    paid: where it is better than asked for, its whole time counts.
+    paid: where it is better than the target, its whole time counts.
     """
     best = frontier(points)
     if not best or best[-1].error > error:
@@ -83,7 +83,7 @@ def time_of_sampling(points: Sequence[Point], error: float) -> Reading | None:
 
 
 def seconds_per_sample(points: Sequence[Point]) -> float:
-    """Return the slope of time against samples; the two bakes of most samples tell it best."""
+    """Return the slope of time against samples; the two bakes of most samples show it best."""
     by_samples = sorted(points, key=lambda p: p.samples or 0)
     if len(by_samples) == 1:
         return by_samples[0].seconds / float(by_samples[0].samples or 1)

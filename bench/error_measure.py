@@ -1,4 +1,4 @@
-"""How far a bake is from the truth, told by two noisy references that know nothing of each other."""
+"""The error of a bake, measured against two independent noisy references."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def error_figures(values: np.ndarray, first: np.ndarray, second: np.ndarray) -> 
     Returns
     -------
     dict
-        "relative_rmse"; "error": the same, but not less than these references can tell from 0, which is
+        "relative_rmse"; "error": the same, but at least what these can distinguish from 0, which is
         what times are compared at; "uncertainty": its standard error by the texels' spread;
         "mean_ratio": mean of the bake by that of the references;
         "percentile_99": of |x − r| / mean r, r the mean of both references, whose noise it includes.

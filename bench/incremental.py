@@ -1,7 +1,7 @@
-"""What baking anew costs after one object moved, in parts of a bake: `python3 -m bench.incremental`.
+"""The cost of baking again after one object moved, as parts of a bake: `python3 -m bench.incremental`.
 
 Processor seconds, a thread. The same lightmap coordinates, resolution, quality and seed on both sides; errors
-are between the two, beside those between full bakes of two seeds: over all texels, over those no farther
+are between the two, next to those between full bakes of two seeds: over all texels, over those no farther
 than 0.3 m from where the object stood or stands, and over its own.
 """
 
@@ -65,7 +65,7 @@ SCENES = {"cornell": box, "office": office}
 
 
 def measure(name: str, seeds: bool, **settings: Any) -> dict[str, Any]:
-    """Bake a scene, move its object, bake anew both ways, and return what that took."""
+    """Bake a scene, move its object, bake again both ways, and return the costs."""
     scene, moved, place = SCENES[name]()
     chosen = BakeSettings(threads=1, **settings)
     (_, kept), keeping = _timed(lambda: bake_and_keep(scene, chosen))
@@ -112,7 +112,7 @@ def measure(name: str, seeds: bool, **settings: Any) -> dict[str, Any]:
 def _placed(
     about: Any, degrees: float, axis: int, by: tuple[float, float, float]
 ) -> Callable[[np.ndarray], np.ndarray]:
-    """Return what turns vectors (…, 3) about an upright axis, and, unless told not to, moves points."""
+    """Return a function that turns vectors (…, 3) about an upright axis, and moves points."""
     angle = np.radians(degrees)
     one, other = (axis + 1) % 3, (axis + 2) % 3
     turn = np.eye(3)

@@ -94,10 +94,10 @@ def settings_of(run: dict[str, Any], **more: Any) -> Any:
 
     given = {name: value for name, value in run.items() if name not in ("solver", "gather")}
     settings = BakeSettings(**given, **more)
-    preset = quality.QUALITIES[settings.quality]
+    preset = quality.QUALITY_SETTINGS[settings.quality]
     solver, gather = replace(preset.solver, **run.get("solver", {})), run.get("gather", {})
     gather = {name: tuple(value) if isinstance(value, list) else value for name, value in gather.items()}
-    quality.QUALITIES[settings.quality] = replace(
+    quality.QUALITY_SETTINGS[settings.quality] = replace(
         preset, solver=solver, gather=replace(preset.gather, **gather)
     )
     return settings

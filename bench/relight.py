@@ -1,4 +1,4 @@
-"""How long lighting a kept bake anew takes, in parts of the bake: `python3 -m bench.relight`.
+"""The time to relight a kept bake, as parts of the bake: `python3 -m bench.relight`.
 
 Processor seconds, a thread. Each line is a change of the lights: how far the result is from a full bake
 of them, and how far apart two full bakes of different seeds are. Then the same through the panel's buttons
@@ -53,12 +53,12 @@ def box(strengths: np.ndarray) -> BakeScene:
 def measure(
     name: str, scene: Baker, strengths: list[tuple[str, np.ndarray]], **settings: Any
 ) -> dict[str, Any]:
-    """Bake a scene of the first strengths, light it anew by the others, and say what that took."""
+    """Bake a scene with the first strengths, relight it with the others, and report the time."""
     say(name)
     chosen = BakeSettings(threads=1, **settings)
     _, plain = _timed(lambda: bake(scene(strengths[0][1]), chosen))
     (result, kept), seconds = _timed(lambda: bake_and_keep(scene(strengths[0][1]), chosen))
-    told: dict[str, Any] = {
+    found: dict[str, Any] = {
         "scene": name,
         "texels": len(kept.geometry),
         "bake_seconds": plain,
@@ -67,7 +67,7 @@ def measure(
         "changes": [],
     }
     say(f"bake {plain:.2f} s, kept {seconds:.2f} s and {kept.nbytes / 1e6:.0f} MB")
-    told["sidecar"] = _sidecar(kept, result, scene(strengths[0][1]), told["texels"])
+    found["sidecar"] = _sidecar(kept, result, scene(strengths[0][1]), found["texels"])
     rays = kept.solved.local.caster.rays
     for change, wanted in strengths:
         first, once = _timed(partial(relight_pages, kept, wanted))
@@ -82,15 +82,15 @@ def measure(
             "error": _error(first, full),
             "error_of_another_seed": _error(other, full),
         }
-        told["changes"].append(entry)
+        found["changes"].append(entry)
         say(
             f"{change}: {once:.3f} s, {once / plain:.1%} of the bake; again {again / plain:.1%}; "
             f"relRMSE {entry['error']:.3%}, of another seed {entry['error_of_another_seed']:.2%}"
         )
-    told["rays"] = kept.solved.local.caster.rays - rays
-    say(f"rays traced while lighting anew: {told['rays']}")
-    told["response"] = _response(kept, strengths[0][1], result.pages)
-    return told
+    found["rays"] = kept.solved.local.caster.rays - rays
+    say(f"rays traced while relighting: {found['rays']}")
+    found["response"] = _response(kept, strengths[0][1], result.pages)
+    return found
 
 
 def _sidecar(kept: KeptBake, result: Any, scene: BakeScene, texels: int) -> dict[str, float]:
@@ -123,7 +123,7 @@ def _response(kept: KeptBake, strengths: np.ndarray, pages: tuple[LightmapPage, 
 
 
 def measure_panel(resolution: int, quality: str) -> dict[str, Any]:
-    """Bake the bundled Cornell box in Blender, light it anew by the button, and follow a slider."""
+    """Bake the bundled Cornell box in Blender, relight it with the button, and follow a slider."""
     import bpy
 
     import radiosity_addon
@@ -159,7 +159,7 @@ def measure_panel(resolution: int, quality: str) -> dict[str, Any]:
             latencies.append(time.perf_counter() - started)
         session.stop_live()
     radiosity_addon.unregister()
-    told = {
+    found = {
         "scene": "cornell",
         "bake_seconds": plain,
         "kept_bake_seconds": kept,
@@ -171,7 +171,7 @@ def measure_panel(resolution: int, quality: str) -> dict[str, Any]:
     }
     say(f"bake {plain:.2f} s, kept {kept:.2f} s; Relight {button:.3f} s, {button / plain:.1%}")
     say(f"from the sidecar {from_sidecar:.3f} s; Live follows within {1e3 * np.median(latencies):.1f} ms")
-    return told
+    return found
 
 
 def _clocked(action: Callable[[], Any]) -> float:

@@ -64,13 +64,13 @@ def _must(done: subprocess.CompletedProcess[str]) -> None:
         sys.exit(done.stdout)
 
 
-def tell(seen: dict) -> None:
-    """Say the figures that count."""
+def print_figures(seen: dict) -> None:
+    """Print the main figures."""
     idle = seen["idle"]["idle"]
     say(f"frames without a bake: median {idle['median_ms']} ms, longest {idle['longest_ms']} ms")
     for bake in seen["bakes"]:
-        worst = {stage: told["longest_ms"] for stage, told in bake["stages"].items()}
-        work = {stage: told["longest_work_ms"] for stage, told in bake["stages"].items()}
+        worst = {stage: found["longest_ms"] for stage, found in bake["stages"].items()}
+        work = {stage: found["longest_work_ms"] for stage, found in bake["stages"].items()}
         say(f"bake of {bake['seconds']} s at load {bake['load_before']}: longest frames [ms] {worst}")
         say(f"  longest work of the main thread in a frame [ms] {work}")
     for pressed in seen["escapes"]:
@@ -92,7 +92,7 @@ def main() -> None:
     parser.add_argument("--try", action="store_true", dest="trial", help="write no result")
     options = parser.parse_args()
     seen = measure(options.quality, options.resolution, options.bakes, options.priority)
-    tell(seen)
+    print_figures(seen)
     if not options.trial:
         chosen = {name: getattr(options, name) for name in ("quality", "resolution", "priority")}
         RESULT.write_text(json.dumps({**chosen, **seen, "context": context(0)}, indent=1) + "\n")

@@ -16,7 +16,7 @@ from .measure import TASKS
 
 
 class Others:
-    """What the machine does beside this process, from now on."""
+    """The load of the machine by other processes, from now on."""
 
     def __init__(self) -> None:
         self.wall, self.busy, self.own = self._now()

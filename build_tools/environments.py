@@ -26,12 +26,12 @@ class Environment:
     ----------
     root : the checkout, which commands import the project from
     folder : the virtual environment
-    beside : folders of further packages, which it imports too
+    more_paths : folders of further packages, which it imports too
     """
 
     root: Path
     folder: Path
-    beside: tuple[Path, ...] = ()
+    more_paths: tuple[Path, ...] = ()
 
     @property
     def python(self) -> Path:
@@ -50,7 +50,7 @@ class Environment:
         return self.run(*arguments)
 
     def _variables(self) -> dict[str, str]:
-        paths = [str(self.root), *map(str, self.beside), *filter(None, [os.environ.get("PYTHONPATH")])]
+        paths = [str(self.root), *map(str, self.more_paths), *filter(None, [os.environ.get("PYTHONPATH")])]
         return {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
 
 
@@ -86,7 +86,7 @@ def docs_environment(root: Path) -> Environment:
 
 
 def bench_environment(root: Path) -> Environment:
-    """The main environment, and beside it in `.envs/bench` what only the benchmarks need."""
+    """The main environment, and next to it in `.envs/bench` what only the benchmarks need."""
     main = main_environment(root)
     pins, folder = root / "requirements" / "bench.txt", root / ".envs" / "bench"
     stamp = folder / "pins.sha256"

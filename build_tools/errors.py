@@ -2,4 +2,4 @@
 
 
 class BuildError(Exception):
-    """Something the reader has to mend; the message is one line that says how."""
+    """Something the reader has to fix; the message is one line that says how."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from radiosity_addon.bake.quality import QUALITIES, quality_of
+from radiosity_addon.bake.quality import QUALITY_SETTINGS, quality_of
 from radiosity_addon.cli.command_options import BAKE_COMMAND, EVERY_COMMAND
 from radiosity_addon.options import (
     MAIN,
@@ -77,7 +77,7 @@ def _general(options: list[Option]) -> str:
 
 def _of_methods(options: list[Option]) -> str:
     rows = ((_flag(option), _label(option), _meaning(option), _by_quality(option)) for option in options)
-    return _table(("option", "in the panel", "meaning", ", ".join(QUALITIES)), rows)
+    return _table(("option", "in the panel", "meaning", ", ".join(QUALITY_SETTINGS)), rows)
 
 
 def _methods() -> str:
@@ -143,7 +143,7 @@ def _by_quality(option: Option) -> str:
     """Return what the qualities give a setting, and methods for which that is something else."""
     values: dict[str, list[str]] = {}
     for method in option.methods:
-        settings = (BakeSettings(quality=quality, method=method) for quality in QUALITIES)
+        settings = (BakeSettings(quality=quality, method=method) for quality in QUALITY_SETTINGS)
         given = [_value(getattr(quality_of(each).solver, option.name)) for each in settings]
         text = given[0] if len(set(given)) == 1 else ", ".join(given)
         values.setdefault(text, []).append(method)

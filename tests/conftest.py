@@ -1,4 +1,4 @@
-"""What all tests share: the scenes beside the checkout, and an end that Blender survives."""
+"""What all tests share: the scenes next to the checkout, and an end that Blender survives."""
 
 from __future__ import annotations
 

@@ -6,10 +6,10 @@ from collections.abc import Iterable
 
 
 def says(message: str, *words: str) -> bool:
-    """Tell whether a message holds all words."""
+    """Return whether a message holds all words."""
     return all(word in message for word in words)
 
 
 def one_says(messages: Iterable[str], *words: str) -> bool:
-    """Tell whether one of the messages holds all words."""
+    """Return whether one of the messages holds all words."""
     return any(says(message, *words) for message in messages)

@@ -10,7 +10,7 @@ from measures import assembled
 
 from radiosity_addon.solver import Scene
 from radiosity_addon.solver.equations.decomposition import independent_sets
-from radiosity_addon.solver.equations.matrix_report import matrix_properties, symmetrised
+from radiosity_addon.solver.equations.matrix_report import matrix_properties, symmetric_form
 
 
 def figure(small: bool) -> Figure:
@@ -49,7 +49,7 @@ def figure(small: bool) -> Figure:
         np.testing.assert_allclose(measured.dominance, 1.0 - reflectance, atol=2e-3)
         radius.append(measured.spectral_radius)
         condition.append(measured.condition)
-        exact = np.linalg.cond(balanced(symmetrised(cube, 0)[0]))
+        exact = np.linalg.cond(balanced(symmetric_form(cube, 0)[0]))
         np.testing.assert_allclose(measured.condition, exact, rtol=0.02)
     np.testing.assert_allclose(radius, values, rtol=2e-3)
     bound = (1 + values) / (1 - values)

@@ -8,9 +8,9 @@ from __future__ import annotations
 from .estimate import Estimate, LightmappedObject, estimate_bake
 from .importance import thinned_out
 from .keep import KeepOptions, can_keep, run_pipeline
-from .plan import SHORT, BakeDigests, BakePlan, ShownBake, ShownLightmap, plan_bake
+from .plan import SHORT, BakeDigests, BakePlan, RememberedLightmap, ShownBake, plan_bake
 from .stages import timed
-from .texel_memory import pages_of, refuse_too_large
+from .texel_memory import pages_of, refuse_large_pages
 
 __all__ = [
     "SHORT",
@@ -19,13 +19,13 @@ __all__ = [
     "Estimate",
     "KeepOptions",
     "LightmappedObject",
+    "RememberedLightmap",
     "ShownBake",
-    "ShownLightmap",
     "can_keep",
     "estimate_bake",
     "pages_of",
     "plan_bake",
-    "refuse_too_large",
+    "refuse_large_pages",
     "run_pipeline",
     "thinned_out",
     "timed",

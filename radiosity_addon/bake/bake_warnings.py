@@ -14,8 +14,8 @@ from ..solver import Solution, SolverSettings
 from ..solver.links import COARSEST_FAINT
 from .quality import used_settings
 
-FEW_TEXELS = 8
-"""An object with fewer than the square of so many texels is warned of."""
+MIN_SIDE = 8
+"""Objects with fewer texels than the square of this cause a warning."""
 
 
 def small_objects(
@@ -25,17 +25,16 @@ def small_objects(
     counts = geometry.counts
     texels = [int(counts[item.rows].sum()) for item in baked]
     greedy = greedy_object([item.name for item in baked], texels)
-    mend = "raise the resolution or its texel scale"
+    advice = "raise the resolution or its texel scale"
     if greedy is not None:
         taken = share_of(max(texels), sum(texels))
-        mend = f"object '{greedy}' takes {taken} of all texels; lower its texel scale"
+        advice = f"object '{greedy}' takes {taken} of all texels; lower its texel scale"
     for item, own in zip(baked, texels, strict=True):
         surface = bake_scene.scene.areas[item.rows].sum()
-        if surface > 0 and own < FEW_TEXELS**2:
+        if surface > 0 and own < MIN_SIDE**2:
             yield BakeWarning(
                 item.name,
-                f"object '{item.name}' gets only {own} texels, fewer than {FEW_TEXELS} × {FEW_TEXELS}: "
-                f"{mend}",
+                f"object '{item.name}' gets only {own} texels, fewer than {MIN_SIDE} × {MIN_SIDE}: {advice}",
             )
 
 
@@ -54,7 +53,7 @@ def of_solution(solution: Solution, settings: SolverSettings) -> tuple[BakeWarni
         warnings.append(
             BakeWarning(
                 "scene",
-                f"refinement stopped at its budget of links; single links may misplace up to "
+                f"refinement stopped at the maximum number of links; single links may misplace up to "
                 f"{solution.over_budget:.2%} of the light: bake at a lower quality, or fewer objects",
             )
         )
@@ -64,7 +63,7 @@ def of_solution(solution: Solution, settings: SolverSettings) -> tuple[BakeWarni
                 "scene",
                 f"so many small surfaces that links begin coarse, between parts that may exchange up to "
                 f"{solution.first_faint:.2%} of all light: single small faces may be lit unevenly; "
-                "raise the most links and the memory limit, or bake fewer objects",
+                "raise Max Links and the memory limit, or bake fewer objects",
             )
         )
     residual, tolerance = solution.report["residual"], used_settings(settings).get("tolerance", np.inf)

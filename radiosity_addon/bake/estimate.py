@@ -17,10 +17,10 @@ from ..numerics import Array, thread_count
 from ..options import BakeSettings
 from ..scene import BakeScene
 from .importance import Extent, justified_scales, may_thin_out
-from .texel_memory import least_bytes, pages_of, refuse_too_large, room
+from .texel_memory import least_bytes, pages_of, refuse_large_pages, room
 
 CHARTS = 6.0
-"""Charts of an object whose faces look all ways; a heavy mesh has more: one for so many …"""
+"""Charts of an object whose faces look all ways; a heavy mesh has more: one for this many …"""
 
 TRIANGLES_A_CHART = 24.0
 """… triangles (the office)."""
@@ -85,9 +85,9 @@ class Estimate:
     texels: Parallel to the objects: about how many each gets.
     densities: Parallel to the objects: about how many texels per meter.
     thinned: Parallel to the objects: below 1 for those that reach far beyond the others.
-    memory: What it takes beside what Blender has taken already [bytes], …
+    memory: What it takes in addition to what Blender already uses [bytes], …
     files: … and what does not fit into the memory limit: temporary files take it [bytes].
-    seconds: None where it depends on what is found: an error that is asked for, and methods for study.
+    seconds: None where it depends on the results: bakes to a target error, and methods for study.
     """
 
     pages: tuple[int, ...]
@@ -153,9 +153,9 @@ def _thinned(objects: Sequence[LightmappedObject], settings: BakeSettings) -> li
 
 
 def refuse_before_unwrapping(bake_scene: BakeScene, settings: BakeSettings) -> None:
-    """Refuse pages that will not fit into the memory limit, as far as areas tell how large they get.
+    """Refuse pages that will not fit into the memory limit, as far as their size follows from areas.
 
-    Raises UsageError: See `refuse_too_large`.
+    Raises UsageError: See `refuse_large_pages`.
     """
     sizes = pages_of(settings)
     if sizes is None:
@@ -169,7 +169,7 @@ def refuse_before_unwrapping(bake_scene: BakeScene, settings: BakeSettings) -> N
     if settings.texel_density is not None:
         # It is known roughly; what unwrapping finds decides.
         sizes = tuple(int(UNSURE * size) for size in sizes)
-    refuse_too_large(sizes, settings)
+    refuse_large_pages(sizes, settings)
 
 
 def _pages(objects: Sequence[LightmappedObject], settings: BakeSettings) -> tuple[list[int], list[float]]:

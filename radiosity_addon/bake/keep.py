@@ -1,4 +1,4 @@
-"""Bakes that are kept for relighting, if that is asked for: in memory, or in a sidecar."""
+"""Bakes that are kept for relighting, if requested: in memory, or in a sidecar."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .sidecar import write_sidecar
 class KeepOptions:
     """How a bake is kept.
 
-    sidecar: Whether it is written to a file beside its lightmaps.
+    sidecar: Whether it is written to a file next to its lightmaps.
     mark: The bake's own name, by which its images and its sidecar are known to belong together.
     earlier: A kept bake of the same scene, to be updated if only places of objects have changed since.
     """
@@ -31,14 +31,14 @@ class KeepOptions:
 
 
 def can_keep(settings: BakeSettings) -> bool:
-    """Tell whether bakes of these settings can be relit."""
+    """Return whether bakes of these settings can be relit."""
     return settings.method == "hierarchical" and settings.quantity != "residual"
 
 
 def run_pipeline(
     plan: BakePlan, keeping: KeepOptions | None, sidecar: Path | None, progress: Progress = SILENT
 ) -> tuple[BakeResult, KeptBake | None]:
-    """Bake as planned, and keep the bake if that is asked for.
+    """Bake as planned, and keep the bake if requested.
 
     plan: One that moves objects in a kept bake is for a bake that is kept again.
     sidecar: Where its file goes, to be published with the bake; None writes none.

@@ -33,7 +33,15 @@ from .bake_warnings import of_solution, small_objects
 from .estimate import refuse_before_unwrapping
 from .importance import scales_of, thinned_out
 from .quality import for_error, quality_of, used_settings
-from .relight import HierarchyReport, IncrementalState, KeptBake, are_wanted, check_groups, group_pages, shown
+from .relight import (
+    HierarchyReport,
+    IncrementalState,
+    KeptBake,
+    are_wanted,
+    check_groups,
+    group_pages,
+    held_values,
+)
 from .result import (
     BakedObject,
     BakeResult,
@@ -46,7 +54,7 @@ from .result import (
     solver_part,
 )
 from .stages import timed
-from .texel_memory import refuse_too_large, share_out_memory, texel_scratch
+from .texel_memory import refuse_large_pages, share_out_memory, texel_scratch
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +101,7 @@ def bake_and_keep(
 ) -> tuple[BakeResult, KeptBake]:
     """Bake lightmaps, and keep what relighting needs (`kept_bake.py`).
 
-    Every lamp is asked for with all its shadow rays, those that are dark now too, so that scenes of
+    Every lamp gets all its shadow rays, also those that are dark now, so that scenes of
     many lamps take longer than by `bake`. Parameters and errors are those of `bake`.
 
     Raises UsageError if the method keeps no links, or the quantity is the residual.
@@ -124,7 +132,7 @@ def _bake(
         atlas = _unwrap(bake_scene, baked, settings, part)
     progress.stage("rasterise", RASTERIZE, SOLVE).at(0.0)
     sizes = [page.resolution for page in atlas.pages]
-    refuse_too_large(sizes, settings)
+    refuse_large_pages(sizes, settings)
     scratch = texel_scratch(sizes, settings)
     with timed(seconds, "rasterise"):
         geometry = _texels(bake_scene, baked, atlas, scratch)
@@ -160,7 +168,7 @@ def finish(
     seconds: dict[str, float],
     progress: Progress,
 ) -> tuple[BakeResult, KeptBake | None]:
-    """Put what texels hold on pages, and tell of the bake; what was kept goes on in the kept bake."""
+    """Put texel values on pages, and report the bake; data to keep goes into the kept bake."""
     baked = baked_objects(bake_scene)
     progress.stage("encode", 0.0, 0.0).at(0.0)
     with timed(seconds, "encode"):
@@ -265,7 +273,7 @@ def _texels(bake_scene: BakeScene, baked: list[BakeObject], atlas: Atlas, scratc
     for item, placed in zip(baked, atlas.objects, strict=True):
         uv[item.rows] = placed.uv
         page_of_triangle[item.rows] = placed.page
-    # What has no area has no side to be lit from, whatever its UVs say.
+    # Triangles without area have no side to be lit from, even if their UVs have one.
     page_of_triangle[bake_scene.scene.areas == 0] = -1
     rows = [np.flatnonzero(page_of_triangle == page) for page in range(len(atlas.pages))]
     areas = bake_scene.scene.areas
@@ -322,7 +330,7 @@ def _texel_values(
     so_far: LightSoFar | None,
     progress: Progress,
 ) -> TexelValues:
-    """Compute the quantity asked for at all texels, and estimate the light's relative error."""
+    """Compute the requested quantity at all texels, and estimate the light's relative error."""
     if settings.quantity == "residual":
         residual = texel_residual(solution, geometry, gather, progress)
         return TexelValues(residual, solution.local_pass.caster)
@@ -344,7 +352,7 @@ def _texel_values(
         # Hits were looked up in it: it is large, and stays in memory.
         light = replace(light, table=None)
     reflectance, emission = texel_materials(bake_scene.scene, geometry, FOOTPRINT)
-    values = shown(light, reflectance, emission, settings, geometry.scratch)
+    values = held_values(light, reflectance, emission, settings, geometry.scratch)
     return TexelValues(values, local.caster, light, relightable, (reflectance, emission))
 
 
@@ -365,8 +373,8 @@ def _check(report: dict[str, Any], pages: tuple[LightmapPage, ...]) -> None:
     )
     if not np.isfinite(report["residual"]) or not finite:
         raise BakeError(
-            "the solution is not finite: this is a defect of the solver; please report the scene, "
-            "and try another quality meanwhile"
+            "the solution is not finite: this is a bug of the solver; please report it with the scene, "
+            "and try another quality"
         )
 
 

@@ -22,13 +22,13 @@ from .relight import KeptBake
 from .scene_diff import Part, compare, light_digest, rounded_digest, scene_record
 
 SHORT = 16
-"""Characters of the digests by which objects that are gone are told from renamed ones."""
+"""Characters of the digests that distinguish objects that are gone from renamed ones."""
 
 _NAMED = 5
 """Objects that a message names."""
 
 
-class ShownLightmap(NamedTuple):
+class RememberedLightmap(NamedTuple):
     """What is remembered of an object's lightmap.
 
     digest, light: Those of the object and of the light it was baked in.
@@ -45,12 +45,12 @@ class ShownLightmap(NamedTuple):
 class ShownBake(NamedTuple):
     """What is remembered of a scene's lightmaps.
 
-    lightmaps mapping of str to ShownLightmap: Of the objects that show one.
+    lightmaps mapping of str to RememberedLightmap: Of the objects that show one.
     objects mapping of str to str: Digest of each object that the last bake had, with a lightmap or not, cut
         to `SHORT`.
     """
 
-    lightmaps: Mapping[str, ShownLightmap]
+    lightmaps: Mapping[str, RememberedLightmap]
     objects: Mapping[str, str]
 
 
@@ -97,12 +97,12 @@ class BakePlan:
 
     @property
     def warnings(self) -> tuple[BakeWarning, ...]:
-        """What the bake does not renew."""
+        """What the bake does not update."""
         if self.kind != "changed":
             return ()
         message = (
-            f"{len(self.unchanged)} unchanged objects kept their lightmaps: light and shadow that the "
-            "changed ones throw on them are as before; bake all to renew them"
+            f"{len(self.unchanged)} unchanged objects kept their lightmaps, without the new light and shadow "
+            "of the changed ones; bake all to update them"
         )
         return (BakeWarning("scene", f"{message}; {self._gone}" if self.gone else message),)
 
@@ -110,7 +110,7 @@ class BakePlan:
     def _gone(self) -> str:
         named = ", ".join(f"'{name}'" for name in self.gone[:_NAMED])
         more = f" and {len(self.gone) - _NAMED} more" if len(self.gone) > _NAMED else ""
-        return f"gone since the last bake: {named}{more}; light and shadow from there stay until you bake all"
+        return f"removed since the last bake: {named}{more}; their light and shadow stay until you bake all"
 
 
 def plan_bake(
@@ -171,6 +171,8 @@ def _moved_alone(kept: KeptBake, bake_scene: BakeScene, settings: BakeSettings) 
 
 
 def _gone(shown: ShownBake, digests: BakeDigests) -> list[str]:
-    """Return the objects that the last bake had and the scene has not, but for renamed ones."""
-    now = {digest[:SHORT] for digest in digests.objects.values()}
-    return [name for name in shown.objects if name not in digests.objects and shown.objects[name] not in now]
+    """Return the objects that the last bake had and the scene has not, except for renamed ones."""
+    present = {digest[:SHORT] for digest in digests.objects.values()}
+    return [
+        name for name in shown.objects if name not in digests.objects and shown.objects[name] not in present
+    ]

@@ -19,7 +19,7 @@ class Quality:
     gather: GatherSettings
 
 
-QUALITIES = {
+QUALITY_SETTINGS = {
     "draft": Quality(
         SolverSettings(
             shadow_rays=4,
@@ -63,26 +63,26 @@ COARSEST = Quality(
     SolverSettings(shadow_rays=2, error=3e-3, min_area=3e-4),
     GatherSettings(strides=(4, 2, 1), support=0.2, rays=32, tolerance=2e-3),
 )
-"""What is bought for the largest errors that are asked for."""
+"""The settings for the largest target errors."""
 
 LADDER = (
     (0.029, COARSEST),
-    (0.0125, QUALITIES["draft"]),
-    (0.0077, QUALITIES["medium"]),
-    (0.0057, QUALITIES["high"]),
+    (0.0125, QUALITY_SETTINGS["draft"]),
+    (0.0077, QUALITY_SETTINGS["medium"]),
+    (0.0057, QUALITY_SETTINGS["high"]),
 )
 """Relative RMS errors in the Cornell box at 256², the larger of estimated and measured against Cycles
 (docs/decisions/0020)."""
 
 FEWEST_RAYS, MOST_RAYS = COARSEST.gather.rays, 2048
-"""A gather point's rays, whatever error is asked for."""
+"""Limits of a gather point's rays, for every target error."""
 
 
 def for_error(error: float) -> Quality:
     """Return what would reach a relative RMS error in the Cornell box: between the qualities, and beyond.
 
     Every number follows a power of the error, from one quality to the next; other scenes take
-    more or less, which the estimate of the error then tells.
+    more or less, which the estimate of the error then shows.
     """
     rung = sum(error <= step for step, _ in LADDER[1:-1])
     (low_error, low), (high_error, high) = LADDER[rung : rung + 2]
@@ -123,7 +123,7 @@ def quality_of(settings: BakeSettings) -> Quality:
 
     A preset gives way to what was given: patches never outnumber elements.
     """
-    preset = QUALITIES[settings.quality]
+    preset = QUALITY_SETTINGS[settings.quality]
     if settings.relative_error is not None:
         preset = for_error(settings.relative_error)
     given = settings.method_settings()

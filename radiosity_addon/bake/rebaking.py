@@ -18,7 +18,7 @@ from ..scene import BakeObject, BakeScene, Scene
 from ..solver.moved_elements import carried
 from .pipeline import TexelValues, baked_objects, finish
 from .plan import moved_objects
-from .relight import HierarchyReport, KeptBake, shown
+from .relight import HierarchyReport, KeptBake, held_values
 from .result import BakeResult, statistics
 from .stages import timed
 
@@ -58,7 +58,7 @@ def bake_moved(
         gather = moves.traced.settings
         light = light_texels(bake_scene.scene, solved.local, geometry, gather, before, progress=lighting)
         local = lit_as_texels(solved.local, kept.lit.element, light)
-    values = shown(light, kept.reflectance, kept.emission, settings, geometry.scratch)
+    values = held_values(light, kept.reflectance, kept.emission, settings, geometry.scratch)
     materials = kept.reflectance, kept.emission
     lit = TexelValues(values, local.caster, light, replace(solved, local=local), materials)
     report = moves.solved.report
@@ -85,7 +85,7 @@ def _resized(moved: list[BakeObject], before: Scene, now: Scene) -> tuple[BakeWa
                 BakeWarning(
                     item.name,
                     f"object '{item.name}' has another size or shape but keeps its texels: "
-                    "bake again to distribute them again",
+                    "bake again for an even density",
                 )
             )
     return tuple(found)

@@ -27,7 +27,7 @@ WORKING_BYTES, THREAD_BYTES = 120e6, 60e6
 """Temporaries of a tile, and of each thread, of pages of at least …"""
 
 WORKING_PIXELS = 1 << 20
-"""… so many pixels; of smaller ones in proportion."""
+"""… this many pixels; of smaller ones in proportion."""
 
 BEFORE_SOLVING = 0.25
 """Share of the free memory that the places of texels may take before the scene is solved."""
@@ -37,7 +37,7 @@ SHOWN_BYTES, SHOWN_SHARE = 200.0, 0.3
 of what is free then."""
 
 PROCESS_BYTES = 600e6
-"""What Blender and a scene take where the system does not tell."""
+"""What Blender and a scene take if the system does not report it."""
 
 
 def memory_limit(settings: BakeSettings) -> float:
@@ -53,7 +53,7 @@ def room(settings: BakeSettings) -> float:
 
 
 def least_bytes(pages: Sequence[int], settings: BakeSettings) -> float:
-    """Return what pages of some sizes take at least, whatever lives in files [bytes]."""
+    """Return the least that pages of these sizes take outside temporary files [bytes]."""
     pixels = float(sum(size**2 for size in pages))
     # Besides the image there are its copy for Cycles, and those of light groups.
     images = IMAGE_BYTES * (2 + len(settings.groups)) * pixels
@@ -61,7 +61,7 @@ def least_bytes(pages: Sequence[int], settings: BakeSettings) -> float:
     return most + working_bytes(settings) * min(pixels / WORKING_PIXELS, 1.0)
 
 
-def refuse_too_large(pages: Sequence[int], settings: BakeSettings) -> None:
+def refuse_large_pages(pages: Sequence[int], settings: BakeSettings) -> None:
     """Refuse pages that do not fit into the memory limit, even in tiles.
 
     pages: The width and height of each in texels.

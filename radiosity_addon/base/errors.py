@@ -1,4 +1,4 @@
-"""The errors a bake can end with, each one line that names the culprit and the mend.
+"""The errors that a bake can end with, each one line that names the cause and the fix.
 
 Every front door (command line, N-panel, Python) reports these and lets anything else
 through: an exception that is not a `RadiosityError` is a defect of ours.
@@ -14,7 +14,7 @@ class RadiosityError(Exception):
 
 
 class SceneError(RadiosityError):
-    """The scene cannot be baked as it is; the message names the object and the mend."""
+    """The scene cannot be baked as it is; the message names the object and the fix."""
 
 
 class BakeError(RadiosityError):
@@ -28,4 +28,4 @@ class UsageError(RadiosityError):
 
 
 class NothingToDoError(RadiosityError):
-    """What was asked for is done already."""
+    """The requested work is already done."""

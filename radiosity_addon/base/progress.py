@@ -1,4 +1,4 @@
-"""How far long work is: one object, passed down to all who do it, that also tells them to stop."""
+"""The progress of long work: one object, passed down to all parts of it, which also cancels them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Status:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Progress:
-    """Tells a listener how far work is. May be used from any thread.
+    """Reports the progress of work to a listener. May be used from any thread.
 
     listener: Takes a `Status`. Raises `Cancelled` to stop the work. None: nobody listens.
     name: The stage.

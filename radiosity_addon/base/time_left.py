@@ -8,18 +8,18 @@ from collections import deque
 from collections.abc import Callable
 
 FIRST_SECONDS, FIRST_FRACTION = 1.0, 0.1
-"""Nothing is said before so much time and so much of the work: the first steps tell nothing of the others."""
+"""No estimate before this time and this part of the work: the first steps do not predict the others."""
 
 RECENT = 0.35
 """The pace is that of this last part of the time so far, …"""
 
 SLOWEST = 0.5
-"""… but no less than this share of the mean pace: a step that stands still will not do so for ever."""
+"""… but no less than this share of the mean pace: a step that makes no progress will end."""
 
 SHORTEST_MEMORY, MEMORY = 0.7, 0.08
-"""What is shown follows a new estimate within so many seconds, or this share of it."""
+"""The shown time follows a new estimate within this many seconds, or this share of it."""
 
-APART = 0.05
+READING_INTERVAL = 0.05
 """Seconds between two readings that are remembered."""
 
 
@@ -56,8 +56,8 @@ class RemainingTime:
         return self._shown
 
     def _remember(self, now: float, fraction: float) -> None:
-        """Note a reading, and forget those before the recent past, but for the last of them."""
-        if now - self._readings[-1][0] >= APART:
+        """Note a reading, and forget those before the recent past, except for the last of them."""
+        if now - self._readings[-1][0] >= READING_INTERVAL:
             self._readings.append((now, fraction))
         since = now - RECENT * (now - self._start)
         while len(self._readings) > 1 and self._readings[1][0] <= since:

@@ -12,8 +12,11 @@ from typing import Any, TextIO
 from ..base import RemainingTime, duration, one_of_each
 from .path_checks import escaped
 
-STEP = 10
-"""Without a terminal a stage prints a line again after this many per cent."""
+STAGE_NAMES = {"rasterise": "rasterize"}
+"""Names of stages that are shown differently from the report's keys, which scripts read."""
+
+PERCENT_STEP = 10
+"""Without a terminal a stage prints a line again after this many percent."""
 
 
 class Console:
@@ -31,7 +34,7 @@ class Console:
         self._theirs: TextIO = sys.stdout
         self._saved: int | None = None
         self._stage = ""
-        self._percent = -STEP
+        self._percent = -PERCENT_STEP
         self._open_line = False
         self._remaining = RemainingTime()
 
@@ -69,6 +72,7 @@ class Console:
         """Show the stage, the overall progress (0 to 1), and the estimated time left."""
         if self.quiet:
             return
+        stage = STAGE_NAMES.get(stage, stage)
         seconds = self._remaining.update(fraction)
         left = "" if seconds is None or fraction >= 1.0 else f", about {duration(seconds)} left"
         percent = int(100 * min(max(fraction, 0.0), 1.0))
@@ -77,7 +81,7 @@ class Console:
                 self._write(f"\r\x1b[K[{percent:3d} %] {stage}{left}")
                 self._open_line = True
                 self._stage, self._percent = stage, percent
-        elif stage != self._stage or percent >= self._percent + STEP:
+        elif stage != self._stage or percent >= self._percent + PERCENT_STEP:
             self._write(f"[{percent:3d} %] {stage}{left}\n")
             self._stage, self._percent = stage, percent
 
@@ -141,7 +145,7 @@ def summary(where: str, files: Iterable[tuple[str, str]], report: dict[str, Any]
             f"share of light that meets a surface: {solver['closure_area_mean']:.4f} (closed scenes: 1)"
         )
     seconds = report["seconds"]
-    lines += [f"  {stage:<24} {taken:7.2f} s" for stage, taken in seconds.items()]
+    lines += [f"  {STAGE_NAMES.get(stage, stage):<24} {taken:7.2f} s" for stage, taken in seconds.items()]
     lines.append(f"  {'total':<24} {sum(seconds.values()):7.2f} s")
     warnings = report["warnings"]
     if warnings:

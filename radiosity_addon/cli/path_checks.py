@@ -14,7 +14,7 @@ MAX_NAME = 255
 MAX_PATH = 1023
 """Bytes of a path that Blender can hold."""
 
-OWN_NAMES = 290
+OWN_NAMES = 310
 """Bytes that the names of our own files take inside an output folder, the hidden folder included."""
 
 SHOWN = 60

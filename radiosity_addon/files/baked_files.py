@@ -53,10 +53,10 @@ class Owner:
     def is_source_of(self, report: Report, folder: Path) -> bool:
         """Return whether a report that lies in `folder` is of any scene of this file."""
         said = report[OWNER]
-        mine = self.recorded(folder)["file"]
-        if _is_same_path(folder, said["file"], mine):
+        own_file = self.recorded(folder)["file"]
+        if _is_same_path(folder, said["file"], own_file):
             return True
-        return BLEND_NAME in report[LISTED] and _is_same_path(folder, BLEND_NAME, mine)
+        return BLEND_NAME in report[LISTED] and _is_same_path(folder, BLEND_NAME, own_file)
 
 
 class NoReportError(Exception):
@@ -181,8 +181,8 @@ def _seal_of(report: Report) -> str:
 def _checked(files: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
     """Return a report's list as it should be; names that no bake gives are left out."""
     return {
-        name: {"bytes": int(of["bytes"]), "sha256": str(of["sha256"])}
-        for name, of in files.items()
+        name: {"bytes": int(entry["bytes"]), "sha256": str(entry["sha256"])}
+        for name, entry in files.items()
         if is_bake_name(name)
     }
 

@@ -5,13 +5,13 @@ Points, polygons, triangles, discs and spheres; no visibility.
 
 from __future__ import annotations
 
-from .geometry_kernel import LEAST, kernel, ray_geometry_term, throughput, visibility_of
+from .geometry_kernel import MIN_SHARE, kernel, ray_geometry_term, throughput, visibility_of
 from .polygon import point_to_polygon
 from .round_shapes import cap_cosine, point_to_ellipse
 from .triangle_pairs import triangle_to_triangle, weighted_sums
 
 __all__ = [
-    "LEAST",
+    "MIN_SHARE",
     "cap_cosine",
     "kernel",
     "point_to_ellipse",

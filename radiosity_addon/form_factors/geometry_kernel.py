@@ -18,7 +18,7 @@ import numpy as np
 from ..numerics import Array
 from ..rays import RayCaster
 
-LEAST = 1e-6
+MIN_SHARE = 1e-6
 """Lower bound of the shares that cut-outs pass and stop, in results of `visibility_of`."""
 
 _TINY = 1e-150
@@ -90,4 +90,4 @@ def visibility_of(
     start = points + caster.surface_offset * normals
     along = other_points + caster.surface_offset * other_normals - start
     distance = np.linalg.norm(along, axis=1)
-    return caster.passing(start, along / np.maximum(distance, _TINY)[:, None], distance, LEAST)
+    return caster.passing(start, along / np.maximum(distance, _TINY)[:, None], distance, MIN_SHARE)

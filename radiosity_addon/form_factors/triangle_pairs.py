@@ -19,7 +19,7 @@ import numpy.typing as npt
 from ..numerics import clip_half_plane, double_area_vectors
 from .polygon import CONTACT, IN_PLANE, Float64Array, point_to_polygon
 
-FAR = 0.4
+MAX_CUBATURE_RATIO = 0.4
 """Radius of the smaller triangle over its distance to the larger one, below which cubature does."""
 
 TOLERANCE = 2e-5
@@ -89,7 +89,7 @@ def triangle_to_triangle(receivers: npt.ArrayLike, sources: npt.ArrayLike) -> Fl
 
     receivers, sources (n, 3, 3): Corners, counter-clockwise from the front.
     Returns factors (n,) float64 in [0, 1]: Within 3e-5 for touching and crossing pairs, 1e-6 for far ones
-        (see `FAR`).
+        (see `MAX_CUBATURE_RATIO`).
     Raises ValueError if shapes do not match.
     """
     receivers, sources = np.asarray(receivers, dtype=np.float64), np.asarray(sources, dtype=np.float64)
@@ -125,7 +125,7 @@ def _chunk_factors(receivers: Float64Array, sources: Float64Array) -> Float64Arr
     facing = solid & (outer_height.max(axis=1) > 0.0) & (inner_height.max(axis=1) > 0.0)
     whole = facing & (outer_height.min(axis=1) >= 0.0) & (inner_height.min(axis=1) >= 0.0)
     distance = np.maximum(apart - inner_radius, outer_height.mean(axis=1))
-    far = whole & (outer_radius < FAR * distance)
+    far = whole & (outer_radius < MAX_CUBATURE_RATIO * distance)
     opposite = np.einsum("ij,ij->i", outer_normal, inner_normal) < CONTACT - 1.0
     touching = solid & opposite & ~outer_height.any(axis=1) & ~inner_height.any(axis=1)
 
@@ -250,8 +250,8 @@ def _outline_factor(outer: Float64Array, inner: Float64Array, area: Float64Array
             if bisection < BLIND_BISECTIONS:
                 middle = start[part] + (from_t[part, None] + 0.5 * width) * edge[part]
                 square = width * width * np.einsum("ij,ij->i", edge[part], edge[part])
-                beside = _square_distances(middle, inner[row[part]]) < square
-                error[part] = np.maximum(error[part], np.where(beside, BLIND_ERROR * square, 0.0))
+                near = _square_distances(middle, inner[row[part]]) < square
+                error[part] = np.maximum(error[part], np.where(near, BLIND_ERROR * square, 0.0))
         again = error > TOLERANCE * scale[row]
         if bisection == MAX_BISECTIONS:
             again[:] = False

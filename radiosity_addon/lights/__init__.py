@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from .area import AreaLight
 from .environment import (
-    WHOLE,
+    WHOLE_SPHERE,
     Bounds,
     EnvironmentImage,
     SkyPatch,
@@ -22,7 +22,7 @@ from .point import PointLight, SpotLight
 from .sun_and_sky import EnvironmentLight, SunLight, light_strengths
 
 __all__ = [
-    "WHOLE",
+    "WHOLE_SPHERE",
     "AreaLight",
     "Bounds",
     "Emitter",

@@ -18,7 +18,7 @@ from ..numerics import irradiance_under_sky, pick_in_runs, running_sums
 from .light import Float64Array, Lamp, Light, Rays, Samples, row_cosines
 from .sun_and_sky import EnvironmentLight
 
-CELLS = (64, 128)
+SKY_CELLS = (64, 128)
 """Rows and columns of the even part: cells of 2.8°."""
 
 BRIGHT = 4.0
@@ -37,7 +37,7 @@ _CHUNK = 1 << 20
 Bounds = tuple[float, float, float, float]
 """Of a window of the sky [rad]: lowest and highest latitude, lowest and highest azimuth."""
 
-WHOLE: Bounds = (-0.5 * np.pi, 0.5 * np.pi, -np.pi, np.pi)
+WHOLE_SPHERE: Bounds = (-0.5 * np.pi, 0.5 * np.pi, -np.pi, np.pi)
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +150,7 @@ def cell_directions(shape: tuple[int, int]) -> Float64Array:
     return _directions(0.5 * (np.sin(low) + np.sin(high)), 0.5 * (left + right))
 
 
-def pixel_bounds(shape: tuple[int, int], window: Bounds = WHOLE) -> Float64Array:
+def pixel_bounds(shape: tuple[int, int], window: Bounds = WHOLE_SPHERE) -> Float64Array:
     """Return (h w, 4) the bounds of a picture's pixels; azimuths fall from left to right."""
     (height, width), (low, high, left, right) = shape, window
     latitude = np.linspace(low, high, height + 1)
@@ -193,10 +193,10 @@ def bright_patches(pixels: Float64Array) -> tuple[Float64Array, list[npt.NDArray
 def even_part(pixels: Float64Array, name: str = "") -> list[EnvironmentLight]:
     """Return a sky as lights: one if it has no color or is the same all around, else one a channel.
 
-    pixels (h, w, 3): Radiance; h and w are multiples of `CELLS`, or smaller and taken as they are.
+    pixels (h, w, 3): Radiance; h and w are multiples of `SKY_CELLS`, or smaller and taken as they are.
     """
     height, width = pixels.shape[:2]
-    rows, columns = min(CELLS[0], height), min(CELLS[1], width)
+    rows, columns = min(SKY_CELLS[0], height), min(SKY_CELLS[1], width)
     angle = solid_angles(pixel_bounds((height, width))).reshape(height, width, 1)
     blocks = (rows, height // rows, columns, width // columns)
     power = (pixels * angle).reshape(*blocks, 3).sum(axis=(1, 3))

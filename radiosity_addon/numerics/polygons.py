@@ -50,8 +50,8 @@ def _cut_half_plane(polygon: Array, distance: Array) -> Array:
     place = np.cumsum(given, axis=1) - 1
     kept = np.flatnonzero(given)
     result = np.zeros((count * (size + 1), width))
-    to = place.ravel().take(kept) + (size + 1) * (kept // (2 * size))
-    result[to] = corners.reshape(-1, width).take(kept, axis=0)
+    target = place.ravel().take(kept) + (size + 1) * (kept // (2 * size))
+    result[target] = corners.reshape(-1, width).take(kept, axis=0)
     last = np.minimum(np.arange(size + 1), place[:, -1:]) + (size + 1) * np.arange(count)[:, None]
     return np.asarray(result.take(last, axis=0))
 
@@ -59,8 +59,8 @@ def _cut_half_plane(polygon: Array, distance: Array) -> Array:
 def _outside_once(distance: Array) -> Array:
     """Return (t, k) distances that are negative along one run of corners, the one with the smallest.
 
-    A line meets the outline of a convex polygon twice; where corners lie on it but for rounding, it seems to
-    more often.
+    A line meets the outline of a convex polygon twice; where corners lie on it, except for rounding, it
+    seems to meet it more often.
     """
     size = distance.shape[1]
     turned = (np.argmin(distance, axis=1)[:, None] + np.arange(size)) % size

@@ -26,7 +26,7 @@ import numpy.typing as npt
 from ..base import BakeError
 from .arrays import Array
 
-SMALLEST = 1 << 20
+MIN_FILE_BYTES = 1 << 20
 """Smaller arrays stay in memory, and are not counted [bytes]."""
 
 TILE = 1 << 18
@@ -58,7 +58,7 @@ class Scratch:
         """Return an uninitialized array."""
         size = math.prod(shape) if isinstance(shape, Sequence) else shape
         size *= np.dtype(dtype).itemsize
-        if size < SMALLEST:
+        if size < MIN_FILE_BYTES:
             return np.empty(shape, dtype)
         if size <= self.room():
             return self.counted(np.empty(shape, dtype))
@@ -84,7 +84,7 @@ class Scratch:
 
     def counted(self, array: Array) -> Array:
         """Count an array in memory until it is freed."""
-        if array.nbytes < SMALLEST:
+        if array.nbytes < MIN_FILE_BYTES:
             return array
         with _lock:
             self.in_memory += array.nbytes
@@ -115,7 +115,7 @@ class Rows:
         self._count += count
         # Blocks in memory are joined at the end: they briefly exist twice.
         size = self._count * row
-        if self._file is None and size >= SMALLEST and size + count * row > self._scratch.room():
+        if self._file is None and size >= MIN_FILE_BYTES and size + count * row > self._scratch.room():
             self._file = _temporary_file()
         if self._file is None or count == 0:
             block = self._scratch.counted(np.empty((count, self._width), self._dtype))

@@ -1,4 +1,4 @@
-"""What a bake can be asked to do: one table of options, from which all front doors are made.
+"""The options of a bake: one table, from which command line, panel, presets and docs are generated.
 
 Needs nothing but Python, so that panels and the command line can show it at once.
 """

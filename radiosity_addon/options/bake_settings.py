@@ -11,7 +11,7 @@ from .constants import MAX_RESOLUTION
 from .methods import ALL, ITERATIVE, LINKS, MATRIX
 from .option_record import UNBOUNDED, Choice, PanelRow, option, options_of
 
-MOST = 10_000_000
+MAX_ELEMENTS = 10_000_000
 """Elements, patches: what no machine has room for need not be tried."""
 
 GroupSetting = tuple[str, tuple[str, ...]]
@@ -225,7 +225,7 @@ class BakeSettings:
         None,
         "Approximate number of elements that surfaces are divided into; at least one per triangle",
         "Solver",
-        limits=(1, MOST),
+        limits=(1, MAX_ELEMENTS),
         methods=("two-level", "shooting", *MATRIX),
         preset=True,
         panel=PanelRow("Elements"),
@@ -243,7 +243,7 @@ class BakeSettings:
         None,
         "Approximate number of patches that elements are grouped into",
         "Solver",
-        limits=(1, MOST),
+        limits=(1, MAX_ELEMENTS),
         methods=("two-level",),
         preset=True,
         panel=PanelRow("Patches"),

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import re
+import secrets
 import shutil
 import stat
 import tempfile
@@ -16,11 +17,12 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
-MARK = ".owner"
+OWNER_FILE = ".owner"
 
 _MARK_TEXT = "made by Radiosity Lightmaps while it bakes; it cleans up by itself\n"
-_SUFFIX = r"[a-z0-9_]{8}"
-"""What `tempfile` adds to a prefix."""
+_RANDOM_BYTES = 8
+_SUFFIX = rf"[0-9a-f]{{{2 * _RANDOM_BYTES}}}-[a-z0-9_]{{8}}"
+"""What follows the prefix: nobody else names a folder so, which makes an empty one ours without a mark."""
 
 _ATTEMPTS = 3
 
@@ -33,11 +35,12 @@ class MarkedFolder:
 
     def __init__(self, parent: Path, prefix: str) -> None:
         for attempt in range(_ATTEMPTS):
-            self.path = Path(tempfile.mkdtemp(prefix=prefix, dir=parent))
+            name = f"{prefix}{secrets.token_hex(_RANDOM_BYTES)}-"
+            self.path = Path(tempfile.mkdtemp(prefix=name, dir=parent))
             made = self.path.lstat()
             self._identity = made.st_dev, made.st_ino
             try:
-                self._mark = _new_mark(self.path / MARK)
+                self._mark = _new_mark(self.path / OWNER_FILE)
             except FileNotFoundError:
                 # Somebody who cleans up took it for the empty folder of a killed process.
                 if attempt == _ATTEMPTS - 1:
@@ -82,7 +85,7 @@ def clean_up_folders(
 def _remove(folder: Path) -> None:
     """Remove a folder, its mark last: what a kill leaves of it must still be known as ours."""
     with suppress(OSError), os.scandir(folder) as entries:
-        for entry in [entry for entry in entries if entry.name != MARK]:
+        for entry in [entry for entry in entries if entry.name != OWNER_FILE]:
             if entry.is_dir(follow_symlinks=False):
                 shutil.rmtree(entry.path, ignore_errors=True)
             else:
@@ -126,13 +129,13 @@ def _claimed(folder: Path) -> Iterator[bool]:
     mark = None
     try:
         mark = os.fdopen(
-            os.open(folder / MARK, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0)), "r+", encoding="utf-8"
+            os.open(folder / OWNER_FILE, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0)), "r+", encoding="utf-8"
         )
         found = os.fstat(mark.fileno())
         _lock(mark)
         text = mark.read(len(_MARK_TEXT) + 1)
         # An empty mark is that of a process killed while it wrote it; nothing else was in the folder then.
-        ours = text == _MARK_TEXT or (not text and list(folder.iterdir()) == [folder / MARK])
+        ours = text == _MARK_TEXT or (not text and list(folder.iterdir()) == [folder / OWNER_FILE])
         ours = ours and stat.S_ISREG(found.st_mode) and is_own(found)
     except (OSError, ValueError):
         ours = False

@@ -34,7 +34,7 @@ Check = Callable[[str, str | None], None]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class _Replaced:
+class _FileDigests:
     """Digests of a file that is published, and of the file that it replaces, if there is one."""
 
     new: str
@@ -81,7 +81,7 @@ class Staging(MarkedFolder):
         earlier = self.path / EARLIER
         earlier.mkdir()
         found: dict[str, os.stat_result | None] = {}
-        files: dict[str, _Replaced] = {}
+        files: dict[str, _FileDigests] = {}
         name: str | None = None
         try:
             for name in names:
@@ -89,7 +89,7 @@ class Staging(MarkedFolder):
                 found[name] = _regular(self.target / name)
                 old = None if found[name] is None else _kept(self.target / name, earlier / name)
                 check(name, old)
-                files[name] = _Replaced((known or {}).get(name) or digest_of_file(self.path / name), old)
+                files[name] = _FileDigests((known or {}).get(name) or digest_of_file(self.path / name), old)
             _sync_folder(earlier)
             write_journal(self.path, files)
             for name in names:
@@ -109,7 +109,7 @@ class Staging(MarkedFolder):
             raise
 
     def close(self) -> None:
-        """Remove the folder and whatever is left in it; it stays if earlier files could not be put back."""
+        """Remove the folder and everything left in it; it stays if earlier files could not be put back."""
         for aside in _asides(self.target, self.path):
             _remove_file(aside)
         if (self.path / JOURNAL).exists():
@@ -209,7 +209,7 @@ _Step = tuple[Path | None, Path]
 """A kept file and the place it goes back to; or None and a file that was not there before."""
 
 
-def _to_take_back(staging: Path, target: Path, files: Mapping[str, _Replaced]) -> list[_Step]:
+def _to_take_back(staging: Path, target: Path, files: Mapping[str, _FileDigests]) -> list[_Step]:
     """Return what has to be done to have the earlier files back.
 
     Raises
@@ -222,14 +222,14 @@ def _to_take_back(staging: Path, target: Path, files: Mapping[str, _Replaced]) -
     steps: list[_Step] = []
     for name, file in files.items():
         place, kept = target / name, staging / EARLIER / name
-        now = _digest_of(place)
-        if now == file.old:
+        present = _digest_of(place)
+        if present == file.old:
             continue
         if file.old is None:
-            if now == file.new:
+            if present == file.new:
                 steps.append((None, place))
             continue  # else somebody else put a file where there was none
-        if now is not None and now != file.new:
+        if present is not None and present != file.new:
             raise BakeError(
                 f"a bake was interrupted while it replaced '{place}', and the file was changed since: "
                 "move it away, and bake again to have the earlier result back"
@@ -251,7 +251,7 @@ def _take_back(steps: Sequence[_Step]) -> None:
         _sync_folder(folder)
 
 
-def _read_journal(staging: Path) -> dict[str, _Replaced]:
+def _read_journal(staging: Path) -> dict[str, _FileDigests]:
     """Return what a journal says, checked; see `_to_take_back` for the files themselves.
 
     Raises
@@ -270,15 +270,15 @@ def _read_journal(staging: Path) -> dict[str, _Replaced]:
     if journal["version"] != _VERSION:
         raise ValueError(path)
     files = {}
-    for name, of in journal["files"].items():
-        new, old = of["new"], of["old"]
+    for name, digests in journal["files"].items():
+        new, old = digests["new"], digests["old"]
         if not is_bake_name(name) or not isinstance(new, str) or not isinstance(old, str | None):
             raise ValueError(name)
-        files[name] = _Replaced(new, old)
+        files[name] = _FileDigests(new, old)
     return files
 
 
-def write_journal(staging: Path, files: Mapping[str, _Replaced]) -> None:
+def write_journal(staging: Path, files: Mapping[str, _FileDigests]) -> None:
     """Write the journal so that it is there, whole, even if the machine stops at the next instant."""
     journal = {name: {"new": file.new, "old": file.old} for name, file in files.items()}
     aside = staging / f"{JOURNAL}.part"

@@ -3,7 +3,7 @@
 The back of a one-sided triangle is black. Where another surface lies in it and faces the ray, that
 one is in front, but Embree reports either, as rounding has it. So sides of which a black back may lie
 in the same plane get a copy, moved out toward where they look: seen from there it comes first. The
-triangle itself stays, so nothing opens beside it.
+triangle itself stays, so no gap opens next to it.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ COPY_LIFT = 0.25
 """How far copies lie off their triangles, in units of the offset that rays start with: beyond the rounding of
 hits, below the start of rays."""
 
-TURN = 0.01
+MAX_TURN = 0.01
 """Normals of one plane differ by less than this, rounded corners of small triangles included, …"""
 
-APART = 128.0
+MAX_PLANE_DISTANCE = 128.0
 """… and their planes' distances from the scene's center by less than this, in units of the offset: about a
 thousandth of the extent. Both are wide: what is only near a black back gets a copy that changes nothing."""
 
@@ -41,8 +41,8 @@ def facing_copies(triangles: Array, two_sided: Array, offset: float) -> tuple[Ar
     solid = np.flatnonzero(double_area > 0)
     normal = cross[solid] / double_area[solid, None]
     plane = np.empty((len(solid), 4))
-    plane[:, :3] = normal / TURN
-    plane[:, 3] = np.einsum("nk,nk->n", normal, triangles[solid, 0]) / (APART * offset)
+    plane[:, :3] = normal / MAX_TURN
+    plane[:, 3] = np.einsum("nk,nk->n", normal, triangles[solid, 0]) / (MAX_PLANE_DISTANCE * offset)
     backs = two_sided[solid]
     in_black = np.zeros((2, len(solid)), dtype=bool)
     for shift in SHIFTS:

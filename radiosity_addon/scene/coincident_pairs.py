@@ -13,7 +13,7 @@ TOLERANCE = 1e-6
 """Faces that are no farther apart than this [m], …"""
 
 SPACINGS = 8.0
-"""… or than so many float32 spacings of their coordinates, are in one place."""
+"""… or than this many float32 spacings of their coordinates, coincide."""
 
 SLACK = 1.25
 """Factor on the tolerance: a distance of a micrometer may be slightly more in float32."""
@@ -170,9 +170,9 @@ def _near_pairs(low: Array, high: Array) -> Iterator[tuple[Array, Array]]:
         hosts = hosts[np.argsort(key[hosts], kind="stable")]
         begin = np.searchsorted(key[hosts], key, side="left")
         count = np.searchsorted(key[hosts], key, side="right") - begin
-        asked = np.flatnonzero(count)
-        for chunk in run_chunks(count[asked], CHUNK_PAIRS):
-            chunk_rows = asked[chunk]
+        candidates = np.flatnonzero(count)
+        for chunk in run_chunks(count[candidates], CHUNK_PAIRS):
+            chunk_rows = candidates[chunk]
             small = np.repeat(chunk_rows, count[chunk_rows])
             large = hosts[run_numbers(count[chunk_rows], begin[chunk_rows])]
             one, other = asking[row[small]], asking[row[large]]

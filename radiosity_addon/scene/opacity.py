@@ -1,11 +1,11 @@
 """Rays through surfaces that are only partly there: leaves, fences, veils.
 
-Triangles that anything may be seen through are kept in a second ray caster, so that the others
-are asked as ever, and a scene without any has no second one. A ray that meets such a triangle
-looks up the opacity there. Asked how much light passes, what it leaves is multiplied up. Asked what
-is hit first, the surface is hit if a number drawn for the ray and the triangle is below it: where
-opacity is 0 or 1 no chance is left. That number depends on nothing but the two, so results do not
-depend on how rays are divided among threads.
+Triangles that are partly transparent are kept in a second ray caster, so that the others are traced
+as usual, and a scene without any has no second one. A ray that meets such a triangle looks up the
+opacity there. For the share of light that passes, transparencies are multiplied. For the first hit,
+the surface is hit if a random number of the ray and the triangle is below the opacity; where opacity
+is 0 or 1 nothing is random. The number depends on these two alone, so results do not depend on how
+rays are divided among threads.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Coincident surfaces: limits what an element sends and sees.
 
 Of coplanar surfaces in one place one counts (`layers.py`). Where others are too close for rays to
-tell which is in front, both are seen, ΣFV comes to 2, and light would grow without end. So an element
-sends only the share 1 / ΣFV of its radiosity: matrix methods, shooting and two-level alike, hence they still
-agree. Assemblies that are not reciprocal scale what an element receives.
+determine which is in front, both are seen, ΣFV becomes 2, and light would grow without end. So an element
+sends only the share 1 / ΣFV of its radiosity: in matrix methods, shooting and two-level alike, so that they
+still agree. Assemblies that are not reciprocal scale the light that an element receives.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Cut-outs in one place: a ray that meets one of them meets them all.
 
-A ray that passes a cut-out goes on a little behind it, and so misses what lies in the same place. `Stacks`
-tells what that is, the outermost first.
+A ray that passes a cut-out continues slightly behind it, and so misses other surfaces in the same place.
+`Stacks` lists these, the outermost first.
 """
 
 from __future__ import annotations

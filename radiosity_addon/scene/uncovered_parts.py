@@ -22,10 +22,10 @@ from .surfaces import Surfaces
 NOTHING_LEFT = 1e-9
 """Parts of a side smaller than this share of it are dropped."""
 
-EVEN = 0.05
+EVEN_OPACITY = 0.05
 """A cover whose opacity varies less over a part hides its mean, …"""
 
-FINEST = 5
+MAX_DIVISIONS = 5
 """… otherwise the part is split in four, at most this many times."""
 
 CHUNK_PAIRS = 1 << 17
@@ -118,23 +118,24 @@ def own_parts(side: Array, part: Array, by: Array, in_cover: Array, scene: Surfa
     order = np.lexsort((-areas(part), np.repeat(np.arange(len(sides)), count)))
     for number in range(int(count.max(initial=0))):
         cover = np.where(count > number, order[np.minimum(first + number, len(side) - 1)], -1)[own]
-        asked = np.flatnonzero(cover >= 0)
-        if len(asked) == 0:
+        covered = np.flatnonzero(cover >= 0)
+        if len(covered) == 0:
             continue
-        chosen = cover[asked]
-        inner = _clipped(corners[asked], part[chosen])
+        chosen = cover[covered]
+        inner = _clipped(corners[covered], part[chosen])
         met = areas(inner) > NOTHING_LEFT
-        asked, chosen, inner = asked[met], chosen[met], inner[met]
+        covered, chosen, inner = covered[met], chosen[met], inner[met]
         left = np.ones(len(own), dtype=bool)
-        left[asked] = False
+        left[covered] = False
         pieces = [(own[left], corners[left], level[left])]
         pieces += [
-            (own[asked[row]], each, level[asked[row]]) for row, each in _outside(corners[asked], part[chosen])
+            (own[covered[row]], each, level[covered[row]])
+            for row, each in _outside(corners[covered], part[chosen])
         ]
         seen_through = np.flatnonzero(cut[by[chosen] // 2])
         if len(seen_through):
             row, each = _fans(inner[seen_through])
-            piece_row, piece_cover = asked[seen_through[row]], chosen[seen_through[row]]
+            piece_row, piece_cover = covered[seen_through[row]], chosen[seen_through[row]]
             pieces.append(
                 _shining_through(
                     own[piece_row], each, level[piece_row], piece_cover, part, in_cover, by, scene
@@ -192,13 +193,13 @@ def _shining_through(
     assert scene.images is not None
     images = scene.images
     done = []
-    for depth in range(FINEST + 1):
+    for depth in range(MAX_DIVISIONS + 1):
         place = _moved(corners, part[cover], in_cover[cover])
         opacity = images.area_means(by[cover] // 2, place)[:, 6]
         spots = place[:, :1] + np.einsum("sw,nwk->nsk", _SPOTS, place[:, 1:] - place[:, :1])
         there = np.repeat(by[cover] // 2, len(_SPOTS))
         each = images.opacity_at(there, spots.reshape(-1, 2)).reshape(-1, len(_SPOTS))
-        ready = (np.ptp(each, axis=1) < EVEN) | (depth == FINEST)
+        ready = (np.ptp(each, axis=1) < EVEN_OPACITY) | (depth == MAX_DIVISIONS)
         done.append((own[ready], corners[ready], level[ready] * (1.0 - opacity[ready])))
         open_ = ~ready
         if not open_.any():

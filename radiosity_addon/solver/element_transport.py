@@ -18,7 +18,7 @@ from .links import LightLinks, join_light_links, link_lights, push
 from .methods import HierarchicalState
 from .state import Anderson, SolverState, bounce
 
-ITERATIONS = 100
+MAX_ITERATIONS = 100
 """At most: accelerated, a digit takes some three."""
 
 
@@ -104,7 +104,7 @@ class ElementTransport:
         if state.balance is not None:
             links, scale, received = state.balance.links, state.balance.sent, state.balance.received
         least, mixer = emission[leaves], Anderson(area)
-        for _ in range(ITERATIONS):
+        for _ in range(MAX_ITERATIONS):
             before = relit.radiosity[leaves]
             bounce(relit, links, lights, scale, relit.cluster_links, relit.cut, received)
             if relit.residual < state.settings.tolerance:

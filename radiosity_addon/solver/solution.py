@@ -31,7 +31,7 @@ class Solution:
     report : dict
         "method", "elements", "links", "rays", "iterations", "residual", "power_W" (emitted,
         absorbed, escaped), "closure_area_mean" (over the sides that receive light),
-        "history" (a dict for each `HistoryEntry`), and what the method itself has to tell.
+        "history" (a dict for each `HistoryEntry`), and details of the method.
     """
 
     def __init__(self, state: SolverState) -> None:
@@ -139,7 +139,7 @@ class Solution:
         front : bool or (n,) bool
             Which side of it.
         rays : int or None
-            None sums over all elements, point by point; a number gathers with so many rays.
+            None sums over all elements, point by point; a number gathers with that many rays.
 
         Returns
         -------

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from bench.rooms import room
-from radiosity_addon.bake.quality import QUALITIES
+from radiosity_addon.bake.quality import QUALITY_SETTINGS
 from radiosity_addon.numerics.sampling import cosine_hemisphere, points_on_triangles, to_world
 from radiosity_addon.solver import PointLight, Scene, Solution
 from radiosity_addon.solver.methods.hierarchical import HierarchicalState, solve
@@ -86,7 +86,7 @@ SCENES = {
 
 @cache
 def solved(name: str) -> HierarchicalState:
-    return solve(SCENES[name](), QUALITIES["medium"].solver)
+    return solve(SCENES[name](), QUALITY_SETTINGS["medium"].solver)
 
 
 DARK = {"boxes that touch": 17, "cornell with a front": 4}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from radiosity_addon.lights.environment import (
-    CELLS,
+    SKY_CELLS,
     EnvironmentImage,
     SkyPatch,
     bright_patches,
@@ -71,7 +71,7 @@ def test_parts_and_patches_add_up_to_the_sky(normal: tuple[float, float, float])
             total += light.unit_irradiance(np.zeros((1, 3)), facing[None])[0] * light.strength
         else:
             assert isinstance(light, EnvironmentImage)
-            toward, angle = cell_directions(CELLS), solid_angles(pixel_bounds(CELLS))
+            toward, angle = cell_directions(SKY_CELLS), solid_angles(pixel_bounds(SKY_CELLS))
             share = light.relative(toward) * np.maximum(toward @ facing, 0.0)
             total += light.strength * float(share @ angle)
     assert sum(isinstance(light, SkyPatch) for light in lights) >= 2

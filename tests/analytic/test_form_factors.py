@@ -66,7 +66,7 @@ def test_room_of_cie_171_seen_from_wall_and_ceiling() -> None:
         assert 100 * factor((2, y, 3), (0, 0, -1), floor) == pytest.approx(percent, abs=1e-2)
 
 
-def test_only_the_front_counts_unless_asked() -> None:
+def test_only_the_front_counts_unless_requested() -> None:
     behind = SQUARE_ABOVE[::-1]
     assert factor((0.5, 0.5, 0), (0, 0, 1), behind) == 0.0
     assert factor((0.5, 0.5, 0), (0, 0, 1), behind, both_sides=True) == pytest.approx(0.2394564705, abs=1e-9)

@@ -39,7 +39,7 @@ def light_of(
     return geometry, light_texels(scene, local, geometry, GatherSettings(rays=256))
 
 
-def test_beside_a_bar_the_sky_is_hidden_as_the_closed_form_says() -> None:
+def test_next_to_a_bar_the_sky_is_hidden_as_the_closed_form_says() -> None:
     """A black bar, a texel high, along a black floor: the open's light does not reach beside it."""
     column, height = 9, TEXEL
     at = (column + 0.5) * TEXEL

@@ -10,7 +10,6 @@ import pytest
 from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.solver import PointLight, Scene, Solution, SolverSettings, solve
 from radiosity_addon.solver.equations.exchange import exchange_areas
-from radiosity_addon.solver.equations.fixed_elements import subdivide_below
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from radiosity_addon.solver.methods import hierarchical, multi_level
 from radiosity_addon.solver.methods.hierarchical import HierarchicalState
@@ -306,11 +305,13 @@ def test_an_open_room_loses_what_leaves_it() -> None:
 
 
 def test_finest_links_are_those_between_the_finest_elements() -> None:
-    """The leaves of F_ε = 0 are those of `subdivide_below`, whatever the order they were made in."""
+    """The leaves of F_ε = 0 are those of splitting every leaf above the smallest area, in any order."""
     scene = furnished()
     state = solved(scene, 0.0, 5e-3)
     plain = Hierarchy(scene)
-    subdivide_below(plain, 4 * 5e-3 * float(plain.faces.area.sum()) * (1 - 1e-6))
+    above = 4 * 5e-3 * float(plain.faces.area.sum()) * (1 - 1e-6)
+    while len(large := plain.leaves[plain.area[plain.leaves] > above]):
+        plain.subdivide(large)
 
     def keys(hierarchy: Hierarchy) -> list[tuple[float, ...]]:
         return sorted(map(tuple, hierarchy.corners[hierarchy.leaves].reshape(-1, 9).round(9).tolist()))

@@ -316,7 +316,7 @@ def test_the_methods_agree_on_the_same_elements() -> None:
 
 
 @pytest.mark.parametrize("method", ["jacobi", "gauss-seidel", "conjugate-gradient"])
-def test_the_history_tells_every_iteration(method: str) -> None:
+def test_the_history_reports_every_iteration(method: str) -> None:
     state = solved(cornell_box(), method, elements=100, tolerance=1e-5)
     assert [entry.iteration for entry in state.history] == list(range(state.iterations + 1))
     residuals = np.array([entry.residual for entry in state.history])

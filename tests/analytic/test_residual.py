@@ -209,7 +209,7 @@ def test_rays_find_the_same_residual() -> None:
     assert abs((gathered - exact).mean()) < 2e-4
 
 
-def test_a_solution_tells_its_residual_at_either_side() -> None:
+def test_a_solution_reports_its_residual_at_either_side() -> None:
     """At triangles' centroids; a side that does not exist has none."""
     state = solved(lit_from_above(), 48, "collocation")
     state.set_leaves(np.zeros_like(state.values), state.values)

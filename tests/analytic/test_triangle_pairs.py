@@ -133,7 +133,7 @@ def test_far_and_near_rules_agree(monkeypatch: pytest.MonkeyPatch) -> None:
     first = shape @ np.stack([random_rotation(rng) for _ in range(2000)])
     second = shape @ np.stack([random_rotation(rng) for _ in range(2000)]) + 3 * rng.normal(size=(2000, 1, 3))
     mixed = triangle_to_triangle(first, second)
-    monkeypatch.setattr(triangle_pairs, "FAR", 0.0)
+    monkeypatch.setattr(triangle_pairs, "MAX_CUBATURE_RATIO", 0.0)
     outline = triangle_to_triangle(first, second)
     assert (mixed != outline).mean() > 0.05
     np.testing.assert_allclose(mixed, outline, atol=2e-5)
@@ -220,7 +220,7 @@ def test_parts_behind_the_other_plane_do_not_count() -> None:
     assert triangle_to_triangle(floor, wall)[0] == pytest.approx(expected, abs=1e-5)
 
 
-def test_tiny_receiver_beside_a_huge_source() -> None:
+def test_tiny_receiver_next_to_a_huge_source() -> None:
     """A thousandth's width from the foot of a wall: what a point there sees."""
     size = 1e-4
     tiny = size * np.array([[[1.0, 0, 0], [2, 0, 0], [1, 1, 0]]]) + [0, 0.3, 0]

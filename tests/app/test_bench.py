@@ -58,7 +58,7 @@ def test_both_programs_are_measured_and_compared(output: Path) -> None:
     assert results["context"]["machine"]["cores"] == os.cpu_count()
 
 
-def test_pixels_of_all_bakes_are_kept_beside_the_references(output: Path) -> None:
+def test_pixels_of_all_bakes_are_kept_next_to_the_references(output: Path) -> None:
     (folder,) = (output / "c").glob("cornell-48-*")
     with np.load(folder / "texels.npz") as file:
         compared = file["compared"]

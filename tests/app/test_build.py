@@ -90,7 +90,7 @@ def test_an_environment_is_made_once(checkout: Path, monkeypatch: pytest.MonkeyP
     assert environments.main_environment(checkout) == made
 
 
-def test_what_only_the_benchmarks_need_lies_beside_the_main_environment(
+def test_what_only_the_benchmarks_need_lies_next_to_the_main_environment(
     checkout: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (checkout / "requirements" / "bench.txt").write_text("# nothing\n")
@@ -128,7 +128,7 @@ def test_changed_pins_and_interrupted_installations_are_brought_up_to_date_in_pl
     assert installed == [made.folder, made.folder]
 
 
-def test_a_half_made_environment_is_made_anew(checkout: Path) -> None:
+def test_a_half_made_environment_is_made_again(checkout: Path) -> None:
     folder = checkout / ".venv"
     (folder / "bin").mkdir(parents=True)
     (folder / "bin" / "python").write_text("")

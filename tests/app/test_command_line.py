@@ -217,7 +217,7 @@ def test_other_scene_files(kind: str, run: Run, tmp_path: Path) -> None:
 # --- odd scenes that bake, with a warning ---
 
 
-def test_no_light_is_black_with_a_warning_and_sky_mends_it(run: Run, tmp_path: Path) -> None:
+def test_no_light_is_black_with_a_warning_and_sky_fixes_it(run: Run, tmp_path: Path) -> None:
     add_quad("Floor", ((-2, -2, 0), (2, -2, 0), (2, 2, 0), (-2, 2, 0)))
     scene = save(tmp_path / "dark.blend")
     assert run("bake", scene, "--output", tmp_path / "dark", *QUICK).code == 0

@@ -93,7 +93,7 @@ def test_each_method_bakes_the_same_light(
     np.testing.assert_allclose(pixels, reference, rtol=0, atol=0.005 * reference.max())
 
 
-def test_the_plot_is_drawn_where_asked_and_named(run: Run, small_room: Path, tmp_path: Path) -> None:
+def test_the_plot_is_drawn_where_requested_and_named(run: Run, small_room: Path, tmp_path: Path) -> None:
     plot = tmp_path / "plots" / "history.svg"
     words = ("--method", "jacobi", "--elements", "40", "--plot", plot)
     done = run("bake", small_room, "--output", tmp_path / "out", *TINY, *words)

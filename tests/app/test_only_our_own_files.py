@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
+import numpy as np
 import pytest
 
 from .conftest import QUICK, add_lamp, add_quad, build_room, digest, read_report, save
@@ -147,6 +148,71 @@ def test_the_scene_s_own_textures_and_libraries_are_never_replaced(run: Run, tmp
     library.unlink()
     with nothing_changed(out):
         refused(run(*words), out / "Floor.exr", "reads")
+
+
+def save_gltf(folder: Path) -> Path:
+    """Write a textured quad as a .gltf with a buffer and an image beside it."""
+    folder.mkdir()
+    picture = bpy.data.images.new("Picture", 2, 2)
+    picture.filepath_raw, picture.file_format = str(folder / "Floor.png"), "PNG"
+    picture.save()
+    positions = np.array([[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], dtype=np.float32)
+    uvs = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=np.float32)
+    indices = np.array([0, 1, 2, 0, 2, 3], dtype=np.uint16)
+    parts = [part.tobytes() for part in (positions, uvs, indices)]
+    (folder / "the floor.bin").write_bytes(b"".join(parts))
+    starts = [0, *np.cumsum([len(part) for part in parts])]
+    tree = {
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0, "name": "Floor"}],
+        "meshes": [
+            {"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "indices": 2, "material": 0}]}
+        ],
+        "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+        "textures": [{"source": 0}],
+        "images": [{"uri": "Floor.png"}],
+        "buffers": [{"uri": "the%20floor.bin", "byteLength": int(starts[-1])}],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": int(start), "byteLength": len(part)}
+            for start, part in zip(starts, parts, strict=False)
+        ],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3",
+             "min": [-1, 0, -1], "max": [1, 0, 1]},
+            {"bufferView": 1, "componentType": 5126, "count": 4, "type": "VEC2"},
+            {"bufferView": 2, "componentType": 5123, "count": 6, "type": "SCALAR"},
+        ],
+    }  # fmt: skip
+    (folder / "floor.gltf").write_text(json.dumps(tree))
+    return folder / "floor.gltf"
+
+
+def save_obj(folder: Path) -> Path:
+    """Write a textured quad as an .obj with its materials and an image beside it."""
+    folder.mkdir()
+    picture = bpy.data.images.new("Picture", 2, 2)
+    picture.filepath_raw, picture.file_format = str(folder / "Floor.png"), "PNG"
+    picture.save()
+    (folder / "the floor.mtl").write_text("newmtl White\nKd 1 1 1\nmap_Kd Floor.png\n")
+    (folder / "floor.obj").write_text(
+        "mtllib the floor.mtl\no Floor\nv -1 0 1\nv 1 0 1\nv 1 0 -1\nv -1 0 -1\n"
+        "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl White\nf 1/1 2/2 3/3 4/4\n"
+    )
+    return folder / "floor.obj"
+
+
+@pytest.mark.parametrize(("save_scene", "part"), [(save_gltf, "the floor.bin"), (save_obj, "the floor.mtl")])
+def test_the_parts_of_an_imported_scene_are_never_replaced(
+    save_scene: Callable[[Path], Path], part: str, run: Run, tmp_path: Path
+) -> None:
+    """Also where Blender packs what it imports, and reads it no more."""
+    scene, out = save_scene(tmp_path / "scene"), tmp_path / "out"
+    words = ("bake", scene, *TINY, "--sky", "--overwrite", "--output")
+    with nothing_changed(tmp_path):
+        own = (scene.parent, "--atlas", "per-object", "--format", "png16")
+        refused(run(*words, *own), "Floor.png", "reads")
+        refused(run(*words, out, "--report", scene.parent / part), part, code=2)
 
 
 def test_a_report_of_the_first_version_is_refused_by_name(run: Run, small: Path, tmp_path: Path) -> None:

@@ -6,8 +6,7 @@ from collections.abc import Callable
 
 import bpy
 
-from radiosity_addon.blender.datablocks.bake_record import is_made
-from radiosity_addon.blender.material_copies.copy_marks import ORIGINAL
+from radiosity_addon.blender.datablocks.bake_record import ORIGINAL, is_made
 from tests.blender.hand_bake import BASE, add_plane, add_shader, bake_by_hand, principled_material
 from tests.blender.material_zoo import ZOO
 from tests.blender.scenes import add_node, with_nodes

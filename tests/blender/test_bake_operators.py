@@ -57,7 +57,7 @@ def test_an_unsaved_file_gets_packed_lightmaps(box: bpy.types.Scene) -> None:
     assert last.folder == ""
 
 
-def test_a_saved_file_gets_a_folder_beside_it(tmp_path: Path) -> None:
+def test_a_saved_file_gets_a_folder_next_to_it(tmp_path: Path) -> None:
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
     assert bake() == {"FINISHED"}
     assert sorted(path.name for path in tmp_path.iterdir()) == ["lightmaps", "room.blend"]
@@ -257,7 +257,7 @@ def test_an_empty_scene_is_refused_by_name() -> None:
         list(run_bake(bpy.context, QUICK, None))
 
 
-def test_the_cornell_box_goes_into_a_scene_of_its_own_beside_other_objects(box: bpy.types.Scene) -> None:
+def test_with_other_objects_the_cornell_box_goes_into_a_scene_of_its_own(box: bpy.types.Scene) -> None:
     assert bpy.ops.radiosity.add_cornell_box() == {"FINISHED"}
     assert len(bpy.data.scenes) == 2
     assert bpy.context.scene != box
@@ -270,7 +270,7 @@ def test_what_somebody_else_wrote_is_no_last_bake(box: bpy.types.Scene) -> None:
         assert last_bake.read(box) is None
 
 
-def test_the_panel_shows_what_is_said_once_beside_many_warnings_alike(box: bpy.types.Scene) -> None:
+def test_the_panel_shows_what_is_said_once_next_to_many_warnings_alike(box: bpy.types.Scene) -> None:
     names = [f"slot{number}" for number in range(120)]
     missing = [{"name": name, "message": f"material '{name}': '{name}.jpg' is missing"} for name in names]
     small = {"name": "map", "message": "map: 256 px is too small"}

@@ -23,7 +23,7 @@ from tests.blender.exporting import (
 from tests.blender.scenes import add_lamp, add_mesh
 
 
-def test_only_the_objects_asked_for_are_baked_the_rest_blocks() -> None:
+def test_only_the_objects_requested_are_baked_the_rest_blocks() -> None:
     for name in ("A", "B", "C"):
         add_cube(name)
     export = export_with(objects=("C", "A"))

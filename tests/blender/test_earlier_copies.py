@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from radiosity_addon.blender.apply.restore import restore
-from radiosity_addon.blender.datablocks.bake_record import is_made
-from radiosity_addon.blender.material_copies.copy_marks import ORIGINAL
+from radiosity_addon.blender.datablocks.bake_record import ORIGINAL, is_made
 from radiosity_addon.blender.material_copies.material_digest import digest_of_material, links_of
 from radiosity_addon.blender.material_edits.material_edits import carry_material_edits
 from radiosity_addon.blender.materials.materials import read_material
@@ -79,7 +78,7 @@ def test_a_base_color_edited_on_a_copy_of_an_earlier_version_is_kept(name: str, 
 
 
 @pytest.mark.usefixtures("earlier")
-def test_an_original_edited_beside_a_copy_of_an_earlier_version_stays_alone() -> None:
+def test_an_original_edited_next_to_a_copy_of_an_earlier_version_stays_alone() -> None:
     shader(bpy.data.materials["Plain"]).inputs["Base Color"].default_value = GREEN
     shader(bpy.data.materials["Glow"]).inputs["Emission Strength"].default_value = 5.0
     before = users_materials()

@@ -8,7 +8,7 @@ import bpy
 import pytest
 
 from radiosity_addon.blender.apply.restore import restore
-from radiosity_addon.blender.material_copies.copy_marks import ORIGINAL
+from radiosity_addon.blender.datablocks.bake_record import ORIGINAL
 from tests.blender.edited_copies import GREEN, base_color, color_node
 from tests.blender.hand_bake import add_plane, bake_by_hand, principled_material
 

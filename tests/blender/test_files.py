@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import addon_utils
@@ -116,7 +117,7 @@ def _triangle(damage: dict) -> bytes:
         ({"nodes": [{"name": "Empty", "extensions": []}]}, "parse glTF"),
     ],
 )
-def test_the_cause_is_told_and_nothing_is_printed(
+def test_the_cause_is_reported_and_nothing_is_printed(
     damage: dict, words: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "damaged.gltf"
@@ -128,6 +129,21 @@ def test_the_cause_is_told_and_nothing_is_printed(
     assert "Location:" not in message
     assert "\n" not in message
     assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="devices of POSIX")
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("scene.gltf", '{"asset": {"version": "2.0"}, "buffers": [{"uri": "/dev/null", "byteLength": 4}]}'),
+        ("scene.obj", "mtllib /dev/null\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
+    ],
+)
+def test_a_scene_that_refers_to_a_device_is_refused(name: str, text: str, tmp_path: Path) -> None:
+    """One like /dev/zero would be read until the memory is full."""
+    (tmp_path / name).write_text(text)
+    with pytest.raises(SceneError, match="/dev/null"):
+        open_scene(tmp_path / name)
 
 
 def test_a_missing_file_and_a_folder_are_errors(tmp_path: Path) -> None:

@@ -69,13 +69,13 @@ def test_nothing_is_changed_by_looking(tmp_path: Path) -> None:
     assert floor.hide_get()
 
 
-def test_an_unsaved_file_is_told_of() -> None:
+def test_an_unsaved_file_is_reported() -> None:
     room()
     found = inspect(bpy.context, SETTINGS, None)
     assert ["not saved" in finding.message for finding in found.findings if finding.name == "file"] == [True]
 
 
-def test_a_folder_that_cannot_be_written_is_told_of(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_written_is_reported(tmp_path: Path) -> None:
     room()
     (tmp_path / "file").write_text("in the way")
     found = inspect(bpy.context, SETTINGS, tmp_path / "file" / "lightmaps")
@@ -120,7 +120,7 @@ def test_files_of_the_last_bake_are_replaced_and_not_odd(tmp_path: Path) -> None
     assert "changed" in found.findings[0].message
 
 
-def test_darkness_is_told_of(tmp_path: Path) -> None:
+def test_darkness_is_reported(tmp_path: Path) -> None:
     add_mesh("Floor")
     assert "has no light" in odd(look(tmp_path))[bpy.context.scene.name]
     assert odd(look(tmp_path, BakeSettings(sky=True))) == {}
@@ -128,7 +128,7 @@ def test_darkness_is_told_of(tmp_path: Path) -> None:
     assert odd(look(tmp_path)) == {}
 
 
-def test_hidden_objects_are_told_of(tmp_path: Path) -> None:
+def test_hidden_objects_are_reported(tmp_path: Path) -> None:
     room()
     add_mesh("Left out", location=(3, 0, 0)).hide_render = True
     add_mesh("Unseen", location=(6, 0, 0)).hide_set(True)
@@ -137,7 +137,7 @@ def test_hidden_objects_are_told_of(tmp_path: Path) -> None:
     assert "part of the bake" in found["Unseen"]
 
 
-def test_tiny_objects_and_greedy_ones_are_told_of(tmp_path: Path) -> None:
+def test_tiny_objects_and_greedy_ones_are_reported(tmp_path: Path) -> None:
     room()
     add_mesh("Pebble", [(0.01 * x, 0.01 * y, z) for x, y, z in QUAD], location=(0, 0, 0.5))
     found = odd(look(tmp_path))
@@ -152,7 +152,7 @@ def test_tiny_objects_and_greedy_ones_are_told_of(tmp_path: Path) -> None:
     assert "raise the resolution" not in tiny
 
 
-def test_uv_layers_are_told_of(tmp_path: Path) -> None:
+def test_uv_layers_are_reported(tmp_path: Path) -> None:
     room()
     found = look(tmp_path, BakeSettings(keep_uvs=True))
     assert "to keep" in odd(found)["Floor"]
@@ -166,7 +166,7 @@ def test_uv_layers_are_told_of(tmp_path: Path) -> None:
     assert [(f.level, f.name) for f in full.findings if "room" in f.message] == [(ERROR, "Floor")]
 
 
-def test_what_is_inside_out_is_told_of_unless_it_is_a_room(tmp_path: Path) -> None:
+def test_what_is_inside_out_is_reported_unless_it_is_a_room(tmp_path: Path) -> None:
     room()
     inwards = [face[::-1] for face in CUBE_FACES]
     add_mesh("Good", CUBE, CUBE_FACES, location=(5, 0, 1))
@@ -176,7 +176,7 @@ def test_what_is_inside_out_is_told_of_unless_it_is_a_room(tmp_path: Path) -> No
     assert [name for name, text in odd(look(tmp_path)).items() if "inside out" in text] == ["Turned"]
 
 
-def test_forgotten_scales_and_units_are_told_of(tmp_path: Path) -> None:
+def test_forgotten_scales_and_units_are_reported(tmp_path: Path) -> None:
     room()
     add_mesh("Map", [(0.01 * x, 0.01 * y, z) for x, y, z in QUAD], scale=(1000, 1000, 1000))
     assert "scale of 1000 × 1000 × 1000" in odd(look(tmp_path))["Map"]
@@ -226,7 +226,7 @@ def test_many_triangles_take_a_moment_only(tmp_path: Path) -> None:
     assert time.process_time() - start < 2.0
 
 
-def test_the_operator_tells_and_the_panel_remembers() -> None:
+def test_the_operator_reports_and_the_panel_remembers() -> None:
     build_cornell_box()
     scene = bpy.context.scene
     assert checks.last_check(scene) is None

@@ -228,3 +228,14 @@ def test_nodes_that_change_light_with_distance_warn(meter: bpy.types.Object, out
     said = [warning.message for warning in _exported()[1]]
     assert len(said) == (output != "Quadratic")
     assert all(says(message, "Lamp", "nodes", "distance") for message in said)
+
+
+def test_a_spot_sends_what_its_cone_holds_wherever_it_is() -> None:
+    """Intensity power/4π, times the solid angle 2π(1 − cos(angle/2)), times 1 − blend/2 for the edge."""
+    add_mesh("Floor")
+    power, angle, blend = 5.0, 0.9, 0.5
+    turned = {"location": (3.0, -2.0, 7.0), "rotation_euler": (0.4, 0.2, 0.1), "scale": (2.0, 2.0, 2.0)}
+    add_lamp("SPOT", energy=power, spot_size=angle, spot_blend=blend, transform=turned)
+    (light,) = _exported()[0]
+    flux = power / (4 * math.pi) * 2 * math.pi * (1 - math.cos(angle / 2)) * (1 - blend / 2)
+    np.testing.assert_allclose(light.flux, flux, rtol=1e-6)

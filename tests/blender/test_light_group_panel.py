@@ -11,6 +11,7 @@ from radiosity_addon.blender.scene_records.light_membership import NAME
 from radiosity_addon.blender.settings.light_group_properties import list_groups
 from radiosity_addon.blender.settings.properties import settings_of
 from tests.blender.group_bake import bake_groups, lit_plane, slide
+from tests.blender.note_layout import NoteLayout, Notes, labels
 from tests.blender.scenes import add_lamp, add_mesh, set_world, shader_material
 
 
@@ -115,30 +116,15 @@ def test_every_name_and_button_has_a_tooltip() -> None:
         assert all(prop.description for prop in told.properties if prop.identifier != "rna_type")
 
 
-class _Layout:
-    """A layout that notes what is drawn into it; Blender has none without a window."""
-
-    def __init__(self, notes: list) -> None:
-        self.notes = notes
-
-    def __getattr__(self, name: str):
-        def draw(*args: object, **words: object) -> _Layout:
-            self.notes.append((name, args, words))
-            return self
-
-        return draw
-
-
 def test_the_panel_draws_groups_and_sliders(lamps: dict) -> None:
     lit_plane().active_material.radiosity_light_group = "Glow"
     lamps["one"].radiosity_light_group = "Lamps"
     bake_groups()
-    notes: list = []
-    light_group_panels.LightGroupSection.draw(_Layout(notes), bpy.context)
-    labels = [words.get("text") for name, _, words in notes if name == "label"]
+    notes: Notes = []
+    light_group_panels.LightGroupSection.draw(NoteLayout(notes), bpy.context)
     # Each group in the list with the numbers of what is in it (an object and a material, whose lightmap
     # copy does not count), and again with its sliders.
-    assert labels == ["Glow", "1", "1", "Lamps", "1", "Lamps", "Glow"]
+    assert labels(notes) == ["Glow", "1", "1", "Lamps", "1", "Lamps", "Glow"]
     drawn = [args[0] for name, args, _ in notes if name == "prop" and args[1] == "default_value"]
     assert drawn == [
         socket for sliders in sliders_of(mixers()[0]) for socket in (sliders.color, sliders.strength)

@@ -54,14 +54,14 @@ def lamp() -> bpy.types.Object:
         ),
     ],
 )
-def test_a_lamps_linking_is_told(lamp: bpy.types.Object, kind: str, states: dict, words: str) -> None:
+def test_a_lamps_linking_is_reported(lamp: bpy.types.Object, kind: str, states: dict, words: str) -> None:
     link(lamp, kind, **states)
     ((name, message),) = told()
     assert name == "Key"
     assert says(message, "Key", KINDS[kind], words)
 
 
-def test_both_kinds_and_collections_in_the_collection_are_told(lamp: bpy.types.Object) -> None:
+def test_both_kinds_and_collections_in_the_collection_are_reported(lamp: bpy.types.Object) -> None:
     link(lamp, "receiver_collection", Chair="INCLUDE")
     outer = link(lamp, "blocker_collection")
     inner = bpy.data.collections.new("Inner")
@@ -81,7 +81,7 @@ def test_an_empty_collection_links_nothing(lamp: bpy.types.Object) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_an_emissive_objects_linking_is_told(lamp: bpy.types.Object, kind: str) -> None:
+def test_an_emissive_objects_linking_is_reported(lamp: bpy.types.Object, kind: str) -> None:
     glowing = bpy.data.objects["Bench"]
     glowing.data.materials.append(shader_material("Glow", "ShaderNodeEmission"))
     link(glowing, kind, Chair="INCLUDE")
@@ -90,6 +90,6 @@ def test_an_emissive_objects_linking_is_told(lamp: bpy.types.Object, kind: str) 
     assert says(message, "Bench", KINDS[kind], "only 'Chair'")
 
 
-def test_linking_of_an_object_that_does_not_glow_is_not_told(lamp: bpy.types.Object) -> None:
+def test_linking_of_an_object_that_does_not_glow_is_not_reported(lamp: bpy.types.Object) -> None:
     link(bpy.data.objects["Bench"], "receiver_collection", Chair="INCLUDE")
     assert told() == []

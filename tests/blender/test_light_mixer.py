@@ -193,7 +193,7 @@ def test_materials_that_read_many_images_are_warned_of() -> None:
     assert f"{MANY_IMAGES + 1} images" in warning.message
 
 
-def test_materials_can_be_made_anew_from_what_is_shown(tmp_path: Path, plane: bpy.types.Object) -> None:
+def test_materials_can_be_made_again_from_what_is_shown(tmp_path: Path, plane: bpy.types.Object) -> None:
     paint = plane.active_material
     bake_groups()
     slide("Glow", 2.0)

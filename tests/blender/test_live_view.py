@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import pairwise
+from itertools import pairwise, product
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -54,6 +55,16 @@ def test_soft_highlights_reach_white_only_at_the_white_point() -> None:
     assert colors[-1] == pytest.approx(1.0, abs=1e-6)
     # Shadows keep their brightness: the compression is L − L² to first order.
     assert display_colors(np.full((1, 3), np.pi * 1e-3), 1.0, 16.0)[0, 0] == pytest.approx(12.92e-3, rel=2e-3)
+
+
+@pytest.mark.parametrize("kind", ["SOLID", "MATERIAL", "RENDERED"])
+def test_a_viewport_that_any_light_of_the_scene_lights_shows_its_exposure(kind: str) -> None:
+    """A render has switches of its own; a solid viewport is taken for the material preview."""
+    names = ("use_scene_lights", "use_scene_world", "use_scene_lights_render", "use_scene_world_render")
+    for values in product((False, True), repeat=4):
+        shading = SimpleNamespace(type=kind, **dict(zip(names, values, strict=True)))
+        in_use = values[2:] if kind == "RENDERED" else values[:2]
+        assert live_view.uses_exposure(shading) == any(in_use)
 
 
 def test_corners_of_an_element_share_its_color() -> None:

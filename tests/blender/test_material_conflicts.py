@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from radiosity_addon.blender.apply.restore import restore
-from radiosity_addon.blender.datablocks.bake_record import is_made
-from radiosity_addon.blender.material_copies.copy_marks import ORIGINAL
+from radiosity_addon.blender.datablocks.bake_record import ORIGINAL, is_made
 from radiosity_addon.blender.material_edits.material_edits import carry_material_edits
 from radiosity_addon.blender.materials.materials import read_material
 from tests.blender.edited_copies import (
@@ -126,7 +125,7 @@ def test_a_renamed_copy_renames_the_original(paint: Material) -> None:
     assert [m.name for m in bpy.data.materials] == ["Tile"]
 
 
-def test_an_original_from_a_library_gets_a_local_one_beside_it(tmp_path: Path) -> None:
+def test_an_original_from_a_library_gets_a_local_one_next_to_it(tmp_path: Path) -> None:
     principled_material().use_fake_user = True
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"))
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)

@@ -11,8 +11,7 @@ import pytest
 
 from radiosity_addon.blender.apply.rebake import originals_shown
 from radiosity_addon.blender.apply.restore import restore
-from radiosity_addon.blender.datablocks.bake_record import is_made
-from radiosity_addon.blender.material_copies.copy_marks import ORIGINAL
+from radiosity_addon.blender.datablocks.bake_record import ORIGINAL, is_made
 from radiosity_addon.blender.material_copies.material_digest import digest_of_material
 from radiosity_addon.blender.material_edits.material_edits import carry_material_edits
 from radiosity_addon.blender.material_edits.stripping import stripped_copy

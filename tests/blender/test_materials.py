@@ -355,7 +355,7 @@ def _through_shader_to_rgb(target: str) -> bpy.types.Material:
 
 
 @pytest.mark.parametrize("target", ["Color", "Surface"])
-def test_shader_to_rgb_is_unknown_to_cycles_and_told(target: str) -> None:
+def test_shader_to_rgb_is_unknown_to_cycles_and_reported(target: str) -> None:
     material = _through_shader_to_rgb(target)
     floor = add_mesh("Floor")
     add_mesh("Toon", material=material, location=(0, 0, 1))
@@ -366,7 +366,7 @@ def test_shader_to_rgb_is_unknown_to_cycles_and_told(target: str) -> None:
     np.testing.assert_allclose(measure_irradiance(floor, samples=64), 0.4153 * ours, rtol=0.02)
 
 
-def test_transparent_shadows_that_are_off_are_told() -> None:
+def test_transparent_shadows_that_are_off_are_reported() -> None:
     material = shader_material("Pane", "ShaderNodeBsdfTransparent", Color=(0.5, 0.5, 0.5, 1.0))
     add_mesh("Pane", material=material)
 
@@ -379,7 +379,7 @@ def test_transparent_shadows_that_are_off_are_told() -> None:
     assert says(said(), "Pane", "Transparent Shadows")
 
 
-def test_emission_for_diffuse_rays_is_told() -> None:
+def test_emission_for_diffuse_rays_is_reported() -> None:
     material = shader_material("Glow", "ShaderNodeEmission")
     tree = material.node_tree
     glow = next(node for node in tree.nodes if node.type == "EMISSION")

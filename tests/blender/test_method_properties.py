@@ -161,7 +161,7 @@ def test_the_assembly_is_given_as_chosen(group: bpy.types.PropertyGroup) -> None
     assert settings_of(bpy.context).assembly is None
 
 
-def test_the_last_bake_tells_how_it_was_solved() -> None:
+def test_the_last_bake_reports_how_it_was_solved() -> None:
     from radiosity_addon.blender.session import last_bake
 
     solver = {

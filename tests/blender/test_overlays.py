@@ -18,13 +18,13 @@ from radiosity_addon.blender.overlays.color_scale import ColorScale, automatic_s
 from radiosity_addon.blender.overlays.lightmap_values import lightmap_of, object_statistics, page_values
 from radiosity_addon.blender.overlays.overlay_pictures import (
     CHECKERS,
+    MAX_PICTURE_WIDTH,
     STATE_COLORS,
-    WIDEST,
     OverlayPicture,
     chosen_elements,
+    coarse_page,
     missing,
     overlay_picture,
-    thinned,
 )
 from radiosity_addon.blender.session.kept_details import details_of
 from radiosity_addon.blender.session.state import session
@@ -136,7 +136,7 @@ def test_numbers_of_an_object_are_the_reports(opened: dict[str, Any], kept: bool
             assert of[0].maximum == pytest.approx(entry[told]["maximum"], rel=1e-3) or not kept
 
 
-def test_density_is_told_by_uvs_and_image_size(opened: dict[str, Any]) -> None:
+def test_density_follows_from_uvs_and_image_size(opened: dict[str, Any]) -> None:
     picture = shown(kinds.DENSITY)
     density = opened["report"]["pages"][0]["texels_per_metre"]
     assert picture.legend.scale.high == pytest.approx(2.0 * density, rel=0.02)  # type: ignore[union-attr]
@@ -221,7 +221,7 @@ def test_errors_are_signed_where_they_can_be(opened: dict[str, Any], of: str) ->
     assert scale.low == (-scale.high if of == "ELEMENTS" else 0.0)  # type: ignore[union-attr]
 
 
-def test_after_a_reload_only_what_the_file_tells_is_left(opened: dict[str, Any]) -> None:
+def test_after_a_reload_only_data_of_the_file_is_left(opened: dict[str, Any]) -> None:
     session.kept_details.clear()
     for kind in EVERY:
         settings().show = kind
@@ -278,11 +278,11 @@ def test_an_unregistered_overlay_leaves_nothing() -> None:
 
 
 def test_large_pages_are_drawn_coarser() -> None:
-    page = np.arange(2 * WIDEST)[:, None] + np.zeros(2 * WIDEST)
-    thin = thinned(page)
-    assert thin.shape == (WIDEST, WIDEST)
-    assert np.abs(thin[:, 0] / 2 - np.arange(WIDEST)).max() <= 1.0
-    assert thinned(thin) is thin
+    page = np.arange(2 * MAX_PICTURE_WIDTH)[:, None] + np.zeros(2 * MAX_PICTURE_WIDTH)
+    thin = coarse_page(page)
+    assert thin.shape == (MAX_PICTURE_WIDTH, MAX_PICTURE_WIDTH)
+    assert np.abs(thin[:, 0] / 2 - np.arange(MAX_PICTURE_WIDTH)).max() <= 1.0
+    assert coarse_page(thin) is thin
 
 
 def test_scales_end_at_round_numbers_and_clip() -> None:

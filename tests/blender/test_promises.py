@@ -13,6 +13,7 @@ import bpy
 import numpy as np
 import pytest
 
+from radiosity_addon.files import digest_of_file
 from tests.blender.promised import (
     QUAD,
     QUICK,
@@ -58,7 +59,7 @@ def test_the_command_line_replaces_no_foreign_file(
     assert (out / name).read_text() == "mine"
 
 
-def test_the_command_line_replaces_a_foreign_file_when_told_to(room: Path, run: Run) -> None:
+def test_the_command_line_replaces_a_foreign_file_on_request(room: Path, run: Run) -> None:
     out = room / "out"
     out.mkdir()
     (out / "lightmap.exr").write_text("mine")
@@ -213,19 +214,24 @@ def test_opening_a_file_touches_nothing(room: Path, tmp_path: Path) -> None:
     save(room / "room.blend")
     outside = tmp_path / "mine.txt"
     outside.write_text("mine")
-    staging = room / "lightmaps" / ".radiosity-x"
+    staging = room / "lightmaps" / ".radiosity-0123456789abcdef-abcd1234"
     (staging / "earlier").mkdir(parents=True)
     (staging / ".owner").write_text("made by Radiosity Lightmaps while it bakes; it cleans up by itself\n")
-    names = ["../../mine.txt", str(outside), "../room.blend", "notes.txt"]
-    (staging / ".publishing.json").write_text(json.dumps({"names": names}))
-    (room / "lightmaps" / "notes.txt").write_text("mine")
+    notes = room / "lightmaps" / "notes.txt"
+    notes.write_text("mine")
+    names = {"../../mine.txt": outside, str(outside): outside, "../room.blend": room / "room.blend"}
+    files = {
+        name: {"new": digest_of_file(path), "old": None}
+        for name, path in {**names, notes.name: notes}.items()
+    }
+    (staging / ".publishing.json").write_text(json.dumps({"version": 2, "files": files}))
     before = tree(tmp_path)
     bpy.ops.wm.open_mainfile(filepath=str(room / "room.blend"))
     assert changes(before, tree(tmp_path)) == []
     bpy.context.scene.radiosity.resolution = 12
     bake()
     assert outside.read_text() == "mine"
-    assert (room / "lightmaps" / "notes.txt").read_text() == "mine"
+    assert notes.read_text() == "mine"
 
 
 def test_relight_writes_nothing_but_lightmaps(room: Path, tmp_path: Path) -> None:

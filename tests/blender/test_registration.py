@@ -17,8 +17,8 @@ from tests.processes import run_python
 ROOT = Path(__file__).resolve().parents[2]
 
 
-OURS = str(["base", "blender", "files", "options"])
-"""What registering imports beside Blender's side; none of it is heavy."""
+OURS = str(["base", "blender", "files", "options", "publishing"])
+"""The rooms that registering imports: those that need nothing but Python, and Blender's side."""
 
 
 def traces() -> set[str]:
@@ -77,6 +77,20 @@ def test_registering_imports_no_solver(tmp_path: Path) -> None:
     assert (done.returncode, done.stderr) == (0, "")
     lines = dict(line.split(": ", 1) for line in done.stdout.splitlines() if ": [" in line)
     assert lines == {"heavy": "[]", "ours": OURS}
+
+
+def test_leaving_python_takes_out_what_was_registered() -> None:
+    """The module bpy ends with Python, and in some versions crashes there while classes are registered."""
+    code = (
+        "import atexit, bpy, radiosity_addon\n"
+        # Called last, for it was asked for first.
+        "atexit.register(lambda: print('left:', hasattr(bpy.types, 'RADIOSITY_PT_main'), flush=True))\n"
+        "radiosity_addon.register()\n"
+        "print('there:', hasattr(bpy.types, 'RADIOSITY_PT_main'), flush=True)\n"
+    )
+    done = run_python(code)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert [line for line in done.stdout.splitlines() if ": " in line] == ["there: True", "left: False"]
 
 
 @pytest.mark.parametrize(

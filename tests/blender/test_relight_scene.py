@@ -189,12 +189,12 @@ def test_undo_brings_the_earlier_light_back(baked: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ("move", "object 'Floor' has moved"),
-        ("paint", "object 'Floor' has another material"),
-        ("add", "object 'More' was not there"),
-        ("hide", "object 'Panel' is not there any more"),
-        ("move lamp", "lamp 'Bulb' has changed in more than its strength"),
-        ("add lamp", "lamp or world 'Sun' is new"),
+        ("move", "'Floor'.* moved"),
+        ("paint", "'Floor'.* material"),
+        ("add", "'More'"),
+        ("hide", "'Panel'.* missing"),
+        ("move lamp", "'Bulb'.* strength"),
+        ("add lamp", "'Sun'.* new"),
     ],
 )
 def test_what_else_has_changed_is_named_and_nothing_is_written(
@@ -230,12 +230,12 @@ def test_a_hidden_lamp_is_dark(baked: Path) -> None:
     np.testing.assert_allclose(lightmap(), hidden, rtol=1e-3, atol=1e-4)
 
 
-@pytest.mark.parametrize("wrong", ["cut off", "damaged", "another bake", "missing", "image"])
+@pytest.mark.parametrize("wrong", ["incomplete", "damaged", "another bake", "missing", "image"])
 def test_sidecars_that_do_not_fit_are_refused(baked: Path, wrong: str) -> None:
     path = baked / "lightmaps" / SIDECAR
     content = path.read_bytes()
-    message = f"is not used: it is {wrong}"
-    if wrong == "cut off":
+    message = f"{SIDECAR}.* {wrong}"
+    if wrong == "incomplete":
         path.write_bytes(content[:40])
     elif wrong == "damaged":
         path.write_bytes(content[:-1] + bytes([content[-1] ^ 1]))
@@ -253,7 +253,7 @@ def test_sidecars_that_do_not_fit_are_refused(baked: Path, wrong: str) -> None:
         relight()
 
 
-def test_packed_lightmaps_are_packed_anew() -> None:
+def test_packed_lightmaps_are_packed_again() -> None:
     room()
     scene = bpy.context.scene
     scene.radiosity.resolution, scene.radiosity_relight.sidecar = 16, True

@@ -36,7 +36,7 @@ def light(names: dict[str, str]) -> dict[str, np.ndarray]:
 
 
 @pytest.mark.parametrize("kept", ["in memory", "in the sidecar"])
-def test_groups_are_lit_anew_too(names: dict[str, str], kept: str) -> None:
+def test_groups_are_relit_too(names: dict[str, str], kept: str) -> None:
     assert list(names) == ["", "Glow", "Lamps", "others"]
     if kept != "in memory":
         session.kept_bakes.clear()

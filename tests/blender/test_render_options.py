@@ -40,7 +40,7 @@ def test_the_view_layer_s_world_lights_as_in_cycles(settings: dict[str, Any]) ->
     np.testing.assert_allclose(ours, measure_irradiance(floor), rtol=0.01, atol=1e-6)
 
 
-def test_what_is_not_followed_is_told() -> None:
+def test_what_is_not_followed_is_reported() -> None:
     scene = bpy.context.scene
     add_lamp("POINT", energy=1.0)
     add_mesh("Floor")
@@ -73,7 +73,7 @@ def test_a_library_that_is_missing_is_named(tmp_path: Path) -> None:
     assert says(message, "lamps.blend", "relink")
 
 
-def test_a_driven_viewport_is_told() -> None:
+def test_a_driven_viewport_is_reported() -> None:
     add_mesh("Floor")
     add_lamp("POINT", energy=1.0)
     hidden, plain = add_cube("Hidden"), add_cube("Plain")
@@ -89,7 +89,7 @@ def test_a_driven_viewport_is_told() -> None:
 
 
 @pytest.mark.skipif(not hasattr(bpy.data, "colorspace"), reason="files have no working space here")
-def test_an_unusual_working_space_is_told() -> None:
+def test_an_unusual_working_space_is_reported() -> None:
     add_mesh("Floor")
     add_lamp("POINT", energy=1.0)
     bpy.ops.wm.set_working_color_space(working_space="ACEScg")
@@ -97,7 +97,7 @@ def test_an_unusual_working_space_is_told() -> None:
     assert "ACEScg" in told
 
 
-def test_nodes_that_ask_for_the_viewport_are_told() -> None:
+def test_nodes_that_ask_for_the_viewport_are_reported() -> None:
     inner = bpy.data.node_groups.new("Inner", "GeometryNodeTree")
     inner.nodes.new("GeometryNodeIsViewport")
     outer = bpy.data.node_groups.new("Outer", "GeometryNodeTree")

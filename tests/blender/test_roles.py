@@ -107,7 +107,7 @@ def test_nan_coordinates_of_what_is_ignored_do_no_harm() -> None:
     assert objects_by_name(export_with(sky=True, ignore=("Broken",)))["Broken"].count == 0
 
 
-def test_what_is_ignored_still_shows_beside_a_baked_instance(registered: None) -> None:
+def test_what_is_ignored_still_shows_next_to_a_baked_instance(registered: None) -> None:
     group = bpy.data.collections.new("Group")
     add_cube("Baked", collection=group)
     add_cube("Left", collection=group, location=(3, 0, 0)).radiosity_mode = "IGNORE"

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from radiosity_addon.blender.apply.restore import restore
-from radiosity_addon.blender.material_copies.copy_marks import ORIGINAL
+from radiosity_addon.blender.datablocks.bake_record import ORIGINAL
 from radiosity_addon.blender.material_copies.lightmap_materials import set_lightmap_only
 from radiosity_addon.blender.material_copies.material_digest import digest_of_material, links_of
 from radiosity_addon.blender.material_edits.material_edits import carry_material_edits

@@ -32,7 +32,7 @@ def test_cycles_light_goes_through_a_volume_without_surface() -> None:
     assert measure_irradiance(meter) == pytest.approx(2.0, rel=1e-3)
 
 
-def test_a_box_of_fog_is_left_out_and_told() -> None:
+def test_a_box_of_fog_is_left_out_and_reported() -> None:
     add_mesh("Meter")
     add_lamp("SUN")
     fog_box()

@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import bpy
 import numpy as np
 import pytest
+from mathutils import Vector
 
+from radiosity_addon.blender.cycles import world_pixels
 from radiosity_addon.blender.scene_export.export import export_scene
 from radiosity_addon.form_factors.formulas import point_to_polygon
-from radiosity_addon.lights.environment import CELLS, cell_directions, pixel_bounds, solid_angles
+from radiosity_addon.lights.environment import (
+    BRIGHT,
+    SKY_CELLS,
+    SkyPatch,
+    cell_directions,
+    pixel_bounds,
+    solid_angles,
+)
 from radiosity_addon.lights.sun_and_sky import EnvironmentLight
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
@@ -72,6 +82,91 @@ def test_a_world_image_lights_as_in_cycles(turn: float) -> None:
     np.testing.assert_allclose(_irradiance(scene, normal), measure_irradiance(meter, samples=256), rtol=5e-3)
 
 
+SUN, GLOW, SPOT = (1e5, 0.27), (20.0, 9.0), (12.0, 0.8)
+"""Radiance [W/m²/sr], and half angle [degrees]."""
+
+
+def _set_discs(discs: Sequence[tuple[tuple[float, float], Vector]]) -> None:
+    """Set a sky of radiance 1 with brighter discs: each a radiance and half angle, and a direction."""
+    tree = set_world(1, 1, 1).node_tree
+    toward = tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"]
+    strength = next(node for node in tree.nodes if node.type == "BACKGROUND").inputs["Strength"]
+    total = tree.nodes.new("ShaderNodeValue").outputs[0]
+    total.default_value = 1.0
+
+    def calculated(kind: str, operation: str, *values: object, output: str = "Value") -> bpy.types.NodeSocket:
+        node = tree.nodes.new(kind)
+        node.operation = operation
+        for socket, value in zip(node.inputs, values, strict=False):
+            if isinstance(value, bpy.types.NodeSocket):
+                tree.links.new(value, socket)
+            else:
+                socket.default_value = value
+        return node.outputs[output]
+
+    for (radiance, degrees), direction in discs:
+        # The sine of a small angle is exact to float32, unlike its cosine.
+        across = calculated("ShaderNodeVectorMath", "CROSS_PRODUCT", toward, direction, output="Vector")
+        sine = calculated("ShaderNodeVectorMath", "LENGTH", across)
+        ahead = calculated("ShaderNodeVectorMath", "DOT_PRODUCT", toward, direction)
+        near = calculated("ShaderNodeMath", "LESS_THAN", sine, math.sin(math.radians(degrees)))
+        there = calculated(
+            "ShaderNodeMath", "MULTIPLY", near, calculated("ShaderNodeMath", "GREATER_THAN", ahead, 0.0)
+        )
+        total = calculated("ShaderNodeMath", "MULTIPLY_ADD", there, radiance, total)
+    tree.links.new(total, strength)
+
+
+@pytest.mark.parametrize("degrees", [(15.0, 0.0), (40.2, 77.0), (3.1, -179.9), (88.0, 30.0)])
+def test_a_sun_in_a_wide_glow_has_its_power_and_size(degrees: tuple[float, float]) -> None:
+    """The first look at the sky, with pixels of 0.7°, hits it with a handful of samples."""
+    add_mesh("Floor")
+    latitude, azimuth = np.radians(degrees)
+    sun = Vector(
+        (math.cos(latitude) * math.cos(azimuth), math.cos(latitude) * math.sin(azimuth), math.sin(latitude))
+    )
+    _set_discs([(SUN, sun), (GLOW, sun)])
+    scene = _exported()
+    discs = sum(radiance * math.sin(math.radians(angle)) ** 2 for radiance, angle in (SUN, GLOW))
+    np.testing.assert_allclose(_irradiance(scene, np.array(sun)), math.pi * (1.0 + discs), rtol=5e-3)
+    brightest = max(
+        (light for light in scene.scene.lights if isinstance(light, SkyPatch)),
+        key=lambda light: light.strength.sum(),
+    )
+    rays, _, _ = brightest.shadow_rays(
+        np.zeros((1, 3)), np.array(sun)[None], np.random.default_rng(0).random((1, 4096, 2))
+    )
+    angles = np.degrees(np.arccos(np.clip(rays[0] @ np.array(sun), -1.0, 1.0)))
+    mean = 1.0 + sum(
+        0.5 * radiance * (1.0 - math.cos(math.radians(angle))) for radiance, angle in (SUN, GLOW)
+    )
+    of_sun, of_glow = (
+        above * math.sin(math.radians(angle)) ** 2
+        for above, angle in ((SUN[0], SUN[1]), (1.0 + GLOW[0] - BRIGHT * mean, GLOW[1]))
+    )
+    # Next to the sun there is nothing but glow, little of it.
+    share = (angles < 1.1 * SUN[1]).mean()
+    np.testing.assert_allclose(share, of_sun / (of_sun + of_glow), atol=0.02)
+
+
+def test_a_sky_is_looked_at_again_only_for_a_sun(monkeypatch: pytest.MonkeyPatch) -> None:
+    add_mesh("Floor")
+    spots = [(SPOT, Vector((math.cos(angle), math.sin(angle), 0.3)).normalized()) for angle in range(1, 6)]
+    sun = Vector((0, 0.6, 0.8))
+    _set_discs([(SUN, sun), *spots])
+    looks = []
+    render = world_pixels.look_around
+
+    def noted(*args: object) -> np.ndarray:
+        looks.append(args)
+        return render(*args)
+
+    monkeypatch.setattr(world_pixels, "look_around", noted)
+    scene = _exported()
+    assert len([light for light in scene.scene.lights if isinstance(light, SkyPatch)]) == 6
+    assert len(looks) == 2
+
+
 def test_what_only_the_camera_sees_does_not_light() -> None:
     add_mesh("Floor")
     tree = set_world(0.2, 0.3, 0.4).node_tree
@@ -88,7 +183,7 @@ def test_what_only_the_camera_sees_does_not_light() -> None:
 def _irradiance(scene: BakeScene, normal: np.ndarray) -> np.ndarray:
     """What an open plane receives of the exported sky, (3,) [W/m²]."""
     total = np.zeros(3)
-    toward, angle = cell_directions(CELLS), solid_angles(pixel_bounds(CELLS))
+    toward, angle = cell_directions(SKY_CELLS), solid_angles(pixel_bounds(SKY_CELLS))
     for light in scene.scene.lights:
         if isinstance(light, EnvironmentLight):
             share = light.relative(toward) * np.maximum(toward @ normal, 0.0)

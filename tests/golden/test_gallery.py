@@ -32,7 +32,7 @@ def copied(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_a_missing_a_wrong_and_a_spare_picture_are_told(copied: Path) -> None:
+def test_a_missing_a_wrong_and_a_spare_picture_are_reported(copied: Path) -> None:
     (copied / "images" / "point-hard.png").unlink()
     shutil.copy(copied / "images" / "sun-hard.png", copied / "images" / "sun-angle.png")
     shutil.copy(copied / "images" / "sun-hard.png", copied / "images" / "moon.png")
@@ -42,7 +42,7 @@ def test_a_missing_a_wrong_and_a_spare_picture_are_told(copied: Path) -> None:
         assert line.startswith(part)
 
 
-def test_a_changed_row_and_a_changed_page_are_told(copied: Path) -> None:
+def test_a_changed_row_and_a_changed_page_are_reported(copied: Path) -> None:
     page = copied / "gallery.md"
     page.write_text(page.read_text(encoding="utf-8") + "And more.\n", encoding="utf-8")
     (line,) = gallery.complaints()

@@ -50,7 +50,7 @@ def test_numbers_of_about_one_size_take_less_than_they_are(path: Path) -> None:
 def test_what_is_cut_off_is_refused(path: Path, share: float) -> None:
     content = path.read_bytes()
     path.write_bytes(content[: int(share * len(content))])
-    with pytest.raises(ArrayFileError, match=r"cut off|damaged"):
+    with pytest.raises(ArrayFileError, match=r"incomplete|damaged"):
         read_arrays(path, MAGIC, 3)
 
 
@@ -64,7 +64,7 @@ def test_a_flipped_bit_is_noticed(path: Path, at: int) -> None:
 
 
 def test_other_kinds_and_formats_are_refused(path: Path) -> None:
-    with pytest.raises(ArrayFileError, match="no such file"):
+    with pytest.raises(ArrayFileError, match="not a"):
         read_arrays(path, b"OTHERS", 3)
     with pytest.raises(ArrayFileError, match=r"format 3.*format 4"):
         read_arrays(path, MAGIC, 4)
@@ -108,7 +108,7 @@ def test_bombs_are_refused_before_anything_of_their_size_is_allocated(
 ) -> None:
     """100 MB of zeros in half a megabyte, and claims that a file of this size cannot keep."""
     path, packed = tmp_path / "bomb", zeros
-    blocks = [len(packed)] * -(-claimed // array_file.BLOCK)
+    blocks = [len(packed)] * -(-claimed // array_file.BLOCK_BYTES)
     forged(
         path,
         {"description": None, "arrays": [{"kind": "uint8", "shape": [claimed], "blocks": blocks}]},
@@ -146,7 +146,7 @@ def test_what_is_no_file_is_refused_at_once(tmp_path: Path) -> None:
     """A pipe that nobody writes to would be waited for without end."""
     os.mkfifo(tmp_path / "pipe")
     for path in (tmp_path / "pipe", Path("/dev/zero"), tmp_path):
-        with pytest.raises(ArrayFileError, match="no such file"):
+        with pytest.raises(ArrayFileError, match="not a"):
             read_arrays(path, MAGIC, 3)
 
 

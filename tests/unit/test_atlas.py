@@ -190,9 +190,16 @@ def test_a_density_sets_the_page(density):
         assert page.utilisation > 0.6
 
 
-def test_a_density_beyond_the_largest_page_names_the_mend():
+def test_a_density_beyond_the_largest_page_names_the_fix():
     with pytest.raises(BakeError, match="lower the density"):
         run_atlas(inputs(box((1, 1, 1))), texel_density=20_000)
+
+
+@pytest.mark.parametrize("others", [0, 3])
+def test_a_density_that_one_huge_object_exceeds_names_it(others: int) -> None:
+    objects = inputs(*[box((1, 1, 1))] * others, box((9000, 9000, 1)))
+    with pytest.raises(BakeError, match=objects[-1].name):
+        run_atlas(objects, texel_density=10)
 
 
 @pytest.mark.parametrize("resolution", [1, 2, 4, 8])
@@ -216,7 +223,7 @@ def test_a_crowded_page_names_the_object_that_takes_it_all():
     assert "resolution" not in warning.message
 
 
-def test_a_tiny_object_beside_a_huge_one_gets_a_texel():
+def test_a_tiny_object_next_to_a_huge_one_gets_a_texel():
     atlas = run_atlas(inputs(box((100, 100, 100)), box((1e-3, 1e-3, 1e-3)), box((30, 1e-4, 1e-4))), 128)
     texels = rasterize(page_uv(atlas), 128)
     owner = np.repeat([0, 1, 2], 12)[texels.triangle]

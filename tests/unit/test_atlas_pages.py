@@ -53,7 +53,7 @@ def test_a_density_that_needs_more_than_the_largest_page_makes_more_pages():
 
 
 @pytest.mark.parametrize("mip_levels", [0, 1, 2, 3])
-def test_down_to_the_mip_level_asked_for_no_texel_shows_two_charts(mip_levels):
+def test_down_to_the_mip_level_requested_no_texel_shows_two_charts(mip_levels):
     """Bilinear filtering at level L reads whole texels of that level; one may hold one chart only."""
     triangles, polygon = box((1, 1, 1))
     # Far apart in space, so that every polygon is a chart.

@@ -10,7 +10,7 @@ from collections.abc import Generator
 import pytest
 
 from radiosity_addon.base.progress import Progress
-from radiosity_addon.blender.session.background import TURN, in_thread
+from radiosity_addon.blender.session.background import SWITCH_INTERVAL, in_thread
 
 
 def finish(steps: Generator) -> tuple[list[float], object]:
@@ -26,7 +26,7 @@ def finish(steps: Generator) -> tuple[list[float], object]:
 
 
 @pytest.mark.parametrize("in_window", [True, False])
-def test_what_it_tells_and_returns_comes_through(in_window: bool) -> None:
+def test_what_it_reports_and_returns_comes_through(in_window: bool) -> None:
     threads = set()
 
     def work(progress: Progress) -> str:
@@ -87,7 +87,7 @@ def test_the_work_goes_on_while_the_caller_does_something_else() -> None:
 
 
 @pytest.mark.parametrize("in_window", [True, False])
-def test_closed_it_cancels_the_work_where_it_next_tells_how_far_it_is(in_window: bool) -> None:
+def test_closed_it_cancels_the_work_at_its_next_progress(in_window: bool) -> None:
     """In a window closing does not wait for that."""
     go_on, cleaned_up, goes_on = threading.Event(), threading.Event(), []
 
@@ -124,7 +124,7 @@ def test_turns_are_short_while_it_runs_and_as_before_afterwards() -> None:
         progress.at(1.0)
 
     finish(in_thread(work))
-    assert during == [pytest.approx(TURN)]
+    assert during == [pytest.approx(SWITCH_INTERVAL)]
     assert sys.getswitchinterval() == before
     steps = in_thread(work)
     next(steps)

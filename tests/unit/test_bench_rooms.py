@@ -85,7 +85,7 @@ def signed_volume(corners: np.ndarray) -> float:
 
 
 def closed(corners: np.ndarray) -> bool:
-    """Tell whether every edge is passed as often in one direction as in the other."""
+    """Return whether every edge is passed as often in one direction as in the other."""
     points = np.round(corners, 6) + 0.0
     _, number = np.unique(points.reshape(-1, 3), axis=0, return_inverse=True)
     number = number.reshape(-1, 3)

@@ -7,8 +7,13 @@ import pytest
 
 from radiosity_addon.numerics.sampling import stratified_square
 from radiosity_addon.solver import PointLight, SolverSettings, solve
-from radiosity_addon.solver.gather import Footprints, Gathered, LocalPass
-from radiosity_addon.solver.gather.bright_patches import CONTRAST, MOST, AimedRays, BrightElements
+from radiosity_addon.solver.gather import Footprints, GatheredHits, LocalPass
+from radiosity_addon.solver.gather.bright_patches import (
+    CONTRAST,
+    MAX_BRIGHT_ELEMENTS,
+    AimedRays,
+    BrightElements,
+)
 from radiosity_addon.solver.gather.hit_numbers import NOTHING
 from tests.rooms import box_room, gray_scene, solid_box
 
@@ -26,7 +31,9 @@ def local() -> LocalPass:
     return solve(scene, SolverSettings(error=5e-4)).local_pass
 
 
-def gathered(local: LocalPass, rays: int, expected: float | None, seed: int, count: int = POINTS) -> Gathered:
+def gathered(
+    local: LocalPass, rays: int, expected: float | None, seed: int, count: int = POINTS
+) -> GatheredHits:
     """Gather `count` times at one place, each time with other samples."""
     up = np.tile([0.0, 0.0, 1.0], (count, 1))
     at = Footprints(np.tile(AT, (count, 1)), up, seed + np.arange(count))
@@ -34,7 +41,7 @@ def gathered(local: LocalPass, rays: int, expected: float | None, seed: int, cou
     return local.gather.at(at, up, rays, local.elements.leaves_of, noise)
 
 
-def irradiance(local: LocalPass, found: Gathered) -> np.ndarray:
+def irradiance(local: LocalPass, found: GatheredHits) -> np.ndarray:
     """(n,) what the elements' reflected light sends there along the rays."""
     table = np.append(local.elements.reflected()[:, 0], [0.0, 0.0])
     total = table[found.sources].mean(axis=1)
@@ -79,7 +86,7 @@ def test_bright_elements_are_few_and_far_above_the_mean(local: LocalPass) -> Non
     bright = BrightElements(hierarchy, reflected)
     leaves = hierarchy.leaves
     mean = reflected[leaves, 0] @ hierarchy.area[leaves] / hierarchy.area[leaves].sum()
-    assert 0 < len(bright) <= MOST
+    assert 0 < len(bright) <= MAX_BRIGHT_ELEMENTS
     assert (reflected[bright.element, 0] > CONTRAST * mean).all()
     assert (hierarchy.first_child[bright.element] < 0).all()
     others = np.setdiff1d(leaves, bright.element)

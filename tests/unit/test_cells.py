@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.lightmap.texels.cells import ALONG, CELLS, TexelCells
+from radiosity_addon.lightmap.texels.cells import ALONG, CELLS_PER_TEXEL, TexelCells
 from radiosity_addon.lightmap.texels.occlusion import find_crossings
 from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
 from radiosity_addon.rays.caster import Hits
@@ -82,11 +82,11 @@ def test_cells_of_a_texel_tile_it() -> None:
     """Without the wall's shade their samples have the texel's mean, and each its own sixteenth."""
     cells, geometry = cells_of(wall(5.4))
     whole = np.flatnonzero(geometry.whole[cells.texel])[0]
-    mine = CELLS * whole + np.arange(CELLS)
+    mine = CELLS_PER_TEXEL * whole + np.arange(CELLS_PER_TEXEL)
     texel = cells.texel[whole]
     anchors = cells.footprints(mine).points[:, :2] * SIZE
     place = anchors - np.stack([geometry.column[texel], geometry.row[texel]])
-    assert len(np.unique(np.floor(place * ALONG), axis=0)) == CELLS
+    assert len(np.unique(np.floor(place * ALONG), axis=0)) == CELLS_PER_TEXEL
     assert (np.floor(place * ALONG) >= 0).all()
     assert (np.floor(place * ALONG) < ALONG).all()
 

@@ -98,7 +98,7 @@ def test_a_floor_whose_corners_are_rounded_is_clear_still() -> None:
 
 
 def test_where_it_would_take_too_many_pieces_nothing_is_clear(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(clearance, "MOST_PIECES", 1)
+    monkeypatch.setattr(clearance, "MAX_PIECES", 1)
     geometry, caster = setting(*(rectangle((0, 0, z), (1, 0, 0), (0, 1, 0)) for z in np.arange(1, 40) / 40))
     assert not clear(geometry, caster).any()
 

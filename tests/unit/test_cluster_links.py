@@ -14,7 +14,7 @@ from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from radiosity_addon.solver.links.cluster_links import ClusterLinks, gather_at_clusters, no_cluster_links
 from radiosity_addon.solver.links.cluster_pairs import measure_cluster_links
 from radiosity_addon.solver.links.element_links import Links
-from radiosity_addon.solver.links.initial import CONE, FACE_SIZE, MIXED_SIZE, SIZE, first_links
+from radiosity_addon.solver.links.initial import CONE, FACE_SIZE, MAX_RADII, MIXED_SIZE, first_links
 from radiosity_addon.solver.links.transport import node_radiosity
 from radiosity_addon.solver.state.power import link_closure
 from tests.rooms import box_room, gray, gray_scene, rectangle, sphere
@@ -160,7 +160,7 @@ def test_links_are_as_small_as_promised(made) -> None:
     area = 2e-5 * float(hierarchy.faces.area.sum())
     assert (shapes.cone[together.receiver] <= CONE).all()
     mixed = shapes.cone[together.source] > CONE
-    large = shapes.looks_large(together.receiver, together.source, np.where(mixed, MIXED_SIZE, SIZE))
+    large = shapes.looks_large(together.receiver, together.source, np.where(mixed, MIXED_SIZE, MAX_RADII))
     assert (hierarchy.clusters.area[together.receiver[large]] <= area).all()
     grouped = links.source < hierarchy.n_clusters
     receiver = links.receiver[grouped] + hierarchy.n_clusters

@@ -120,7 +120,7 @@ def test_faces_in_one_place_do_not_stop_the_tree() -> None:
     assert sorted(members(clusters, roots[0])) == list(range(16))
 
 
-def test_tiny_faces_keep_their_means_beside_large_ones() -> None:
+def test_tiny_faces_keep_their_means_next_to_large_ones() -> None:
     """Areas 10^20 apart: the mean of a cluster of tiny faces is theirs, not the rounding of the large."""
     large = rectangle((0, 0, 0), (1e3, 0, 0), (0, 1e3, 0))
     tiny = rectangle((0, 0, 1), (1e-7, 0, 0), (0, 1e-7, 0), 2)

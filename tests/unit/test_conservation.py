@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.solver.balance.conservation import LIMIT, LIMIT_CLOSED, LIMIT_RECEIVED, Conservation
+from radiosity_addon.solver.balance.conservation import LIMIT_CLOSED, LIMIT_RECEIVED, MAX_FACTOR, Conservation
 from radiosity_addon.solver.balance.link_sums import sent, sent_by_leaves
 from radiosity_addon.solver.hierarchy.nodes import LEAF
 from radiosity_addon.solver.links.cluster_links import gather_at_clusters
@@ -73,7 +73,7 @@ def test_factors_are_bounded_and_only_the_leaves(closed: HierarchicalState) -> N
     assert (factor[hierarchy.first_child != LEAF] == 1).all()
     # However little rows leave: what rounding leaves of a sum must not be blown up to 1.
     assert (closed.balance.sent <= [1.0, LIMIT_CLOSED]).all()
-    assert (closed.balance.received <= [LIMIT_RECEIVED, LIMIT]).all()
+    assert (closed.balance.received <= [LIMIT_RECEIVED, MAX_FACTOR]).all()
 
 
 def test_sent_is_the_transpose_of_gather(closed: HierarchicalState) -> None:

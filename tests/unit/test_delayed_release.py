@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import weakref
 
-from radiosity_addon.lightmap.charts.delayed_release import Resting
+from radiosity_addon.lightmap.charts.delayed_release import DelayedRelease
 
 
 class Clock:
@@ -22,7 +22,7 @@ class Worker:
     pass
 
 
-def kept(resting: Resting, clock: Clock, seconds: float) -> weakref.ref[Worker]:
+def kept(resting: DelayedRelease, clock: Clock, seconds: float) -> weakref.ref[Worker]:
     """Have a worker rest, `seconds` after the last one."""
     clock.now += seconds
     worker = Worker()
@@ -32,7 +32,7 @@ def kept(resting: Resting, clock: Clock, seconds: float) -> weakref.ref[Worker]:
 
 def test_each_is_kept_for_its_rest_and_then_let_go() -> None:
     clock = Clock()
-    resting = Resting(rest=0.5, most=10, clock=clock, sleep=clock.sleep)
+    resting = DelayedRelease(rest=0.5, most=10, clock=clock, sleep=clock.sleep)
     first = kept(resting, clock, 0.0)
     second = kept(resting, clock, 0.4)
     assert first() is not None
@@ -44,7 +44,7 @@ def test_each_is_kept_for_its_rest_and_then_let_go() -> None:
 
 def test_too_many_make_the_next_wait_for_the_oldest() -> None:
     clock = Clock()
-    resting = Resting(rest=0.5, most=3, clock=clock, sleep=clock.sleep)
+    resting = DelayedRelease(rest=0.5, most=3, clock=clock, sleep=clock.sleep)
     workers = [kept(resting, clock, 0.01) for _ in range(20)]
     assert [worker() is not None for worker in workers] == [False] * 17 + [True] * 3
     # Three at a time, half a second each.

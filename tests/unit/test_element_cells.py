@@ -7,7 +7,7 @@ import pytest
 
 from radiosity_addon.rays.caster import Hits
 from radiosity_addon.rays.embree import EmbreeCaster
-from radiosity_addon.solver.gather.element_cells import CELLS, ElementCells
+from radiosity_addon.solver.gather.element_cells import CELLS_PER_ELEMENT, ElementCells
 from radiosity_addon.solver.gather.hit_numbers import NOTHING
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from tests.rooms import gray_scene, rectangle, solid_box
@@ -84,7 +84,7 @@ def test_inside_a_box_only_cells_inside_answer() -> None:
     anchor = parts.footprints(part).points
     assert ((anchor[:, :2] > low[:2]) & (anchor[:, :2] < high[:2])).all()
     assert len(np.unique(part)) > 1
-    assert part.max() < len(parts) == (1 + CELLS) * hierarchy.n_elements
+    assert part.max() < len(parts) == (1 + CELLS_PER_ELEMENT) * hierarchy.n_elements
 
 
 def test_a_box_between_all_anchors_is_dark() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from radiosity_addon.scene.opacity import ray_caster
 from radiosity_addon.solver.balance import enclosure
-from radiosity_addon.solver.balance.enclosure import HELD_RAYS, LAMP_RAYS, RAYS, Arrivals
+from radiosity_addon.solver.balance.enclosure import EMISSIVE_LEAF_RAYS, HELD_RAYS, LEAF_RAYS, Arrivals
 from radiosity_addon.solver.hierarchy.nodes import Hierarchy
 from tests.rooms import CEILING, FLOOR, box_room, gray, gray_scene, rectangle
 
@@ -70,17 +70,17 @@ def test_black_backs_take_what_does_not_escape() -> None:
     assert (found.error(above) > 0).all()
     floor = np.flatnonzero(surface == FLOOR)
     assert (found.share[floor] == 1.0).all()
-    assert (found.rays[floor] == RAYS).all()
+    assert (found.rays[floor] == LEAF_RAYS).all()
 
 
 @pytest.mark.usefixtures("alike")
 def test_what_shines_into_the_open_asks_more() -> None:
     triangles, surface = open_box()
     found = measured(triangles, 0.0, surface == FLOOR)
-    assert (found.rays[surface == FLOOR] == LAMP_RAYS).all()
+    assert (found.rays[surface == FLOOR] == EMISSIVE_LEAF_RAYS).all()
     others = (surface != FLOOR) & found.escapes
     assert others.sum() > 10
-    assert (found.rays[others] == RAYS).all()
+    assert (found.rays[others] == LEAF_RAYS).all()
 
 
 @pytest.mark.usefixtures("alike")
@@ -95,7 +95,7 @@ def test_faces_average_their_leaves() -> None:
     for face in range(5):
         children = hierarchy.first_child[face] + np.arange(4)
         assert share[face] == pytest.approx(found.share[children].mean())
-        assert error[face] == pytest.approx(np.sqrt(share[face] * (1 - share[face]) / (4 * RAYS)))
+        assert error[face] == pytest.approx(np.sqrt(share[face] * (1 - share[face]) / (4 * LEAF_RAYS)))
         assert escapes[face] == found.escapes[children].any()
 
 

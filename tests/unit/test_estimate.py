@@ -58,7 +58,7 @@ def test_what_does_not_fit_one_page_takes_more() -> None:
     assert max(plan.pages) <= 256
 
 
-def test_each_object_has_its_own_page_if_asked() -> None:
+def test_each_object_has_its_own_page_on_request() -> None:
     plan = estimate_bake(BOX, 34, BakeSettings(atlas="per-object", resolution=64))
     assert plan.pages == (64,) * 7
 
@@ -75,6 +75,6 @@ def test_wider_padding_leaves_fewer_texels() -> None:
     assert apart > 0
 
 
-def test_nobody_knows_how_long_an_error_that_is_asked_for_takes() -> None:
+def test_there_is_no_time_estimate_for_a_target_error() -> None:
     assert estimate_bake(BOX, 34, BakeSettings(relative_error=0.02)).seconds is None
     assert estimate_bake(BOX, 34, BakeSettings(method="jacobi")).seconds is None

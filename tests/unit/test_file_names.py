@@ -80,7 +80,7 @@ def test_long_names_that_begin_alike_stay_different() -> None:
     assert one.report != other.report
 
 
-def test_names_that_differ_in_case_or_form_only_are_told_apart() -> None:
+def test_names_that_differ_only_in_case_or_form_get_different_files() -> None:
     found = unique_names(["Wall", "wall", "Straße", "STRASSE", "e\u0301", "\u00e9"], ".exr", set())
     assert found == ["Wall.exr", "wall_2.exr", "Straße.exr", "STRASSE_2.exr", "e\u0301.exr", "\u00e9_2.exr"]
 

@@ -15,7 +15,7 @@ def hierarchy_of(triangles: np.ndarray) -> Hierarchy:
 
 
 @pytest.mark.parametrize("count", [1, 12, 100, 777, 2000])
-def test_never_more_than_asked_and_nearly_as_many(count: int) -> None:
+def test_never_more_than_requested_and_nearly_as_many(count: int) -> None:
     hierarchy = hierarchy_of(box_room()[0])
     subdivide_evenly(hierarchy, count)
     leaves = hierarchy.leaves

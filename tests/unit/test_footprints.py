@@ -81,7 +81,7 @@ def test_the_threads_change_no_share() -> None:
         np.testing.assert_array_equal(share_of(floor(1.0), blocker(), threads=threads), one)
 
 
-def test_a_glowing_edge_beside_the_center_shines_on_its_part_of_the_footprint() -> None:
+def test_a_glowing_edge_next_to_the_center_shines_on_its_part_of_the_footprint() -> None:
     """A wide sheet a hair off the surface begins near a footprint's end: the center gets next to nothing."""
     half, begins, height = 0.5, 0.4, 0.02
     sheet = rectangle((begins, -50, height), (0, 100, 0), (100, 0, 0))
@@ -104,12 +104,12 @@ def test_a_glowing_edge_beside_the_center_shines_on_its_part_of_the_footprint() 
     assert gain[-1] == group.unit_irradiance(at.points[-1:], at.normals[-1:])[0]
 
 
-def test_what_lies_beside_a_face_is_told_by_the_boxes_of_faces() -> None:
+def test_what_lies_next_to_a_face_is_found_by_the_boxes_of_faces() -> None:
     """One box around all faces would take in what lies between them."""
     left = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0))
     right = rectangle((9, 0, 0), (1, 0, 0), (0, 1, 0))
     group = EmitterGroup(np.concatenate([left, right]), np.tile([0.0, 0.0, 1.0], (4, 1)), np.ones(3), 1e-6)
     points = np.array([[0.5, 0.5, 0.3], [1.2, 1.2, 0.0], [5.0, 0.5, 0.0], [9.5, 0.5, -0.5], [12.0, 0.5, 0.0]])
     reach = np.array([0.31, 0.28, 0.3, 0.4, 2.1])
-    np.testing.assert_array_equal(group.beside(points, reach), [True, False, False, False, True])
-    assert group.beside(points[1:2], np.array([0.29]))[0]
+    np.testing.assert_array_equal(group.is_near(points, reach), [True, False, False, False, True])
+    assert group.is_near(points[1:2], np.array([0.29]))[0]

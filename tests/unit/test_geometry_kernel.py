@@ -47,7 +47,7 @@ def test_it_is_zero_where_either_faces_away() -> None:
     assert geometry_term(np.zeros(3), normal[0], np.zeros(3), normal[0]) == 0
 
 
-def test_a_ray_tells_the_same() -> None:
+def test_one_ray_gives_the_same() -> None:
     at, normal, other, other_normal = random_pairs()
     distance = np.linalg.norm(other - at, axis=1)
     along = (other - at) / distance[:, None]

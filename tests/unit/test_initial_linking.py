@@ -42,7 +42,7 @@ def test_nodes_that_touch_exchange_at_most_the_smaller_area() -> None:
 
 
 @pytest.mark.parametrize("faint", [0.0, 1e-5, 1e-3])
-def test_the_estimate_tells_how_many_links_there_are(
+def test_the_estimate_predicts_the_number_of_links(
     clutter: Scene, faint: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Whole if nothing is thinned, and within five standard errors or so if most is."""
@@ -63,7 +63,7 @@ def test_the_order_in_which_pairs_are_walked_changes_none(
     shapes, limits = NodeShapes(hierarchy), limits_of(hierarchy)
     found = []
     for block in (10**9, 1000):
-        monkeypatch.setattr(initial, "BLOCK", block)
+        monkeypatch.setattr(initial, "BLOCK_PAIRS", block)
         pairs = initial.first_pairs(hierarchy, shapes, limits, 10**9)
         assert pairs is not None
         found.append(np.sort(pairs[0].astype(np.int64) << 32 | pairs[1]))
@@ -83,11 +83,11 @@ def test_a_small_budget_makes_links_coarse_and_says_so(
     monkeypatch.setattr(initial, "WANTED", np.inf)
     *_, faint = made(clutter, 10**9)
     assert faint == 0.0
-    monkeypatch.setattr(initial, "FEWEST", 1)
+    monkeypatch.setattr(initial, "MIN_LINKS", 1)
     told = []
     for budget in (40_000, 10_000):
         links, together, faint = made(clutter, budget)
-        assert len(links) + len(together) <= initial.SLACK * initial.BUDGET * budget
+        assert len(links) + len(together) <= initial.LINK_SLACK * initial.BUDGET * budget
         told.append(faint)
     assert 0 < told[0] < told[1] < 0.1
 
@@ -101,7 +101,7 @@ def test_links_are_few_while_the_error_asks_for_no_finer(
     caster = EmbreeCaster(clutter.triangles, 1)
     monkeypatch.setattr(initial, "WANTED", 600.0)
     links, together, faint = initial.first_links(hierarchy, shapes, caster, SolverSettings(error=1e-3), 10**6)
-    assert len(links) + len(together) <= initial.SLACK * 600 / 1e-3**0.5
+    assert len(links) + len(together) <= initial.LINK_SLACK * 600 / 1e-3**0.5
     assert 0.0 < faint <= initial.COARSEST_FAINT * 1e-3
     monkeypatch.setattr(initial, "WANTED", 1.0)
     links, together, faint = initial.first_links(hierarchy, shapes, caster, SolverSettings(error=1e-3), 10**6)
@@ -112,7 +112,7 @@ def test_links_are_few_while_the_error_asks_for_no_finer(
 def test_coarse_first_links_still_send_what_there_is(clutter: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every leaf sends no more than it has, and the mean light is that of the fine links."""
     fine = hierarchical.solve(clutter, SolverSettings(error=1e-3))
-    monkeypatch.setattr(initial, "FEWEST", 1)
+    monkeypatch.setattr(initial, "MIN_LINKS", 1)
     settings = SolverSettings(error=1e-3, max_links=10_000)
     coarse = hierarchical.solve(clutter, settings)
     # Finer than BF_ε asks for none need be; a short budget alone makes them coarser.

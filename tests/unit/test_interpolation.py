@@ -138,7 +138,7 @@ def test_over_a_dome_neighbors_see_each_other() -> None:
     assert (weight.reshape(near.shape)[reached] > 0).all()
 
 
-def test_charts_beside_each_other_on_the_page_and_far_apart_in_the_world_do_not_mix() -> None:
+def test_charts_next_to_each_other_on_the_page_and_far_apart_in_the_world_do_not_mix() -> None:
     here, there = PLANE, PLANE + np.array([50.0, 0, 0])
     uv = np.concatenate([in_cell((0, 0), (0.5, 1)), in_cell((0.5, 0), (1, 1))])
     geometry = geometry_of(here, there, uv=uv)
@@ -236,7 +236,7 @@ def test_a_tight_bunch_of_points_far_away_cannot_make_light():
     assert np.abs(weights).sum() <= 3.0 + 1e-5
 
 
-def test_what_was_weighed_before_is_not_weighed_anew_but_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_earlier_weights_are_kept_and_not_computed_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """The weights of a bake that asked for support are those of one that never did."""
     geometry = geometry_of(rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0.5)))
     asked = points_of(geometry, 4, 2, 1, closeness=2.0)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from radiosity_addon.bake.pipeline import bake
-from radiosity_addon.bake.relight.light_groups import are_wanted, check_groups, members, split_by_group
+from radiosity_addon.bake.relight.light_groups import are_wanted, check_groups, members, share_out
 from radiosity_addon.base.errors import UsageError
 from radiosity_addon.options import MAX_GROUPS, OTHERS, BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
@@ -29,7 +29,7 @@ def test_the_scene_s_groups_come_by_name_and_the_others_last() -> None:
     assert list(found(light_groups=True).items()) == [("left", [0]), ("right", [1, 4]), (OTHERS, [2, 3])]
 
 
-def test_without_being_asked_for_the_scene_s_groups_do_not_count() -> None:
+def test_without_being_requested_the_scene_s_groups_do_not_count() -> None:
     assert found(groups=(("sky", ("World",)),)) == {"sky": [3], OTHERS: [0, 1, 2, 4]}
 
 
@@ -83,5 +83,5 @@ def test_settings_refuse_methods_and_quantities_without_groups() -> None:
 
 def test_what_nobody_has_goes_to_the_largest() -> None:
     parts = np.array([[2.0, 0.0, -1.0], [6.0, 0.0, 3.0]])
-    shares = split_by_group(np.array([4.0, 0.5, 3.0]), parts)
-    np.testing.assert_allclose(shares, [[1.0, 0.0, 0.0], [3.0, 0.5, 3.0]])
+    share_out(np.array([4.0, 0.5, 3.0]), list(parts))
+    np.testing.assert_allclose(parts, [[1.0, 0.0, 0.0], [3.0, 0.5, 3.0]])

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_addon.bake.relight.light_groups import split_by_group
+from radiosity_addon.bake.relight.light_groups import share_out
 from radiosity_addon.base.errors import SceneError
-from radiosity_addon.lightmap.transport.warm_start import MOST, WarmStart
+from radiosity_addon.lightmap.transport.warm_start import MAX_SOLUTIONS, WarmStart
 from radiosity_addon.rays.embree import EmbreeCaster
 from radiosity_addon.scene.faces import Faces
 from radiosity_addon.solver import PointLight, Scene
@@ -27,7 +27,7 @@ def sources(emitter: np.ndarray | None = None) -> tuple[LightSources, Scene]:
     return LightSources(scene, Faces(scene), EmbreeCaster(triangles), emitter), scene
 
 
-def test_every_color_is_a_source_if_nothing_tells_them_apart() -> None:
+def test_every_color_is_a_source_if_nothing_distinguishes_them() -> None:
     found, scene = sources()
     assert sorted(map(tuple, found.strengths)) == sorted([(3.0, 2.0, 1.0), RED, ORANGE, BLUE])
     assert (found.emitter[4:] == -1).all()
@@ -101,14 +101,14 @@ def test_the_first_light_is_never_forgotten() -> None:
     for strengths in one[1:]:
         earlier.add(strengths, np.ones((1, 3), dtype=np.float32))
     known = [number for number in range(20) if earlier.mixed(one[number]) is not None]
-    assert known == [0, *range(20 - MOST + 1, 20)]
+    assert known == [0, *range(20 - MAX_SOLUTIONS + 1, 20)]
 
 
 def test_parts_are_scaled_to_sum_to_the_whole() -> None:
     parts = np.array([[1.0, 0.0, -0.1, 0.0], [3.0, 2.0, 0.4, 0.0]])
     whole = np.array([5.0, 2.0, 0.2, 0.1])
-    found = split_by_group(whole, parts)
-    np.testing.assert_allclose(found, [[1.25, 0, 0, 0], [3.75, 2, 0.2, 0.1]], rtol=1e-6)
+    share_out(whole, list(parts))
+    np.testing.assert_allclose(parts, [[1.25, 0, 0, 0], [3.75, 2, 0.2, 0.1]], rtol=1e-6)
 
 
 def test_what_is_known_is_taken_off_and_nothing_falls_below_0() -> None:

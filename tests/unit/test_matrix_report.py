@@ -12,10 +12,10 @@ from radiosity_addon.solver.equations.matrix_report import (
     asymmetry,
     diagonal_dominance,
     extreme_eigenvalues,
-    fill,
+    filled_share,
     matrix_properties,
     reciprocity_error,
-    symmetrised,
+    symmetric_form,
 )
 from radiosity_addon.solver.methods.dense import dense
 from tests.systems import cornell_system, cube_system, with_reflectance
@@ -32,13 +32,13 @@ def test_size_and_fill() -> None:
     system = cube_system()
     assert matrix_properties(system).size == len(system) == 192
     # Every element sees those of the five other walls; 32 are on its own.
-    assert fill(system) == pytest.approx((1 + 160) / 192)
+    assert filled_share(system) == pytest.approx((1 + 160) / 192)
     black = system.reflectance.copy()
     black[:48] = 0.0
-    assert fill(replace(system, reflectance=black)) == pytest.approx((0.75 * 161 + 0.25) / 192)
+    assert filled_share(replace(system, reflectance=black)) == pytest.approx((0.75 * 161 + 0.25) / 192)
     one_channel = black.copy()
     one_channel[:48, 2] = 0.1
-    assert fill(replace(system, reflectance=one_channel)) == fill(system)
+    assert filled_share(replace(system, reflectance=one_channel)) == filled_share(system)
 
 
 @pytest.mark.parametrize("reflectance", [0.2, 0.5, 0.9])
@@ -96,7 +96,7 @@ def test_spectral_radius_of_other_assemblies(assembly: str) -> None:
 def test_condition_is_that_of_the_scaled_symmetric_matrix() -> None:
     """… and at most (1 + ρ) / (1 − ρ)."""
     system = with_reflectance(cornell_system(), 0.8)
-    matrix, _, rows = symmetrised(system, 0)
+    matrix, _, rows = symmetric_form(system, 0)
     scale = np.sqrt(np.diagonal(matrix))
     exact = float(np.linalg.cond(matrix / scale[:, None] / scale))
     found = matrix_properties(system).condition
@@ -113,7 +113,7 @@ def test_the_symmetric_form_has_the_same_solution() -> None:
     system = replace(system, reflectance=reflectance)
     truth = dense(system)
     for channel in range(3):
-        matrix, right_side, rows = symmetrised(system, channel)
+        matrix, right_side, rows = symmetric_form(system, channel)
         assert (matrix == matrix.T).all()
         np.testing.assert_array_equal(rows, np.flatnonzero(reflectance[:, channel] > 0))
         np.testing.assert_allclose(np.linalg.solve(matrix, right_side), truth[rows, channel], rtol=1e-10)
@@ -131,7 +131,7 @@ def test_scaling_by_area_alone_is_not_enough() -> None:
 
 def test_the_symmetric_form_needs_constant_elements() -> None:
     with pytest.raises(ValueError, match="constant elements"):
-        symmetrised(cornell_system("linear"), 0)
+        symmetric_form(cornell_system("linear"), 0)
 
 
 def test_exchange_is_reciprocal_bit_for_bit() -> None:

@@ -36,7 +36,7 @@ UP = np.array([0.0, 0.0, 1.0])
 @pytest.fixture
 def in_files(monkeypatch: pytest.MonkeyPatch) -> Scratch:
     """Return what puts every array of a kilobyte or more into a file."""
-    monkeypatch.setattr(scratch_module, "SMALLEST", 1 << 10)
+    monkeypatch.setattr(scratch_module, "MIN_FILE_BYTES", 1 << 10)
     return Scratch(0.0)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from radiosity_addon.bake.quality import QUALITIES, quality_of, used_settings
+from radiosity_addon.bake.quality import QUALITY_SETTINGS, quality_of, used_settings
 from radiosity_addon.base.errors import UsageError
 from radiosity_addon.options import METHODS, OPTIONS, BakeSettings, options_of_method
 from radiosity_addon.solver import SolverSettings
@@ -65,15 +65,15 @@ def test_an_unknown_method_is_named_with_those_there_are() -> None:
         BakeSettings(method="best")
 
 
-@pytest.mark.parametrize("quality", QUALITIES)
+@pytest.mark.parametrize("quality", QUALITY_SETTINGS)
 def test_presets_keep_to_the_ranges_and_grow_finer(quality: str) -> None:
-    solver = QUALITIES[quality].solver
+    solver = QUALITY_SETTINGS[quality].solver
     for name, setting in SETTINGS.items():
         setting.check(getattr(solver, name))
     assert solver.patches <= solver.elements
-    ranks = list(QUALITIES)
+    ranks = list(QUALITY_SETTINGS)
     if quality != ranks[0]:
-        coarser = QUALITIES[ranks[ranks.index(quality) - 1]].solver
+        coarser = QUALITY_SETTINGS[ranks[ranks.index(quality) - 1]].solver
         for name in ("elements", "patches"):
             assert getattr(solver, name) > getattr(coarser, name)
         for name in ("error", "form_factor_error", "min_area", "contrast"):

@@ -48,7 +48,7 @@ def test_links_carry_less_than_the_error_or_join_the_finest() -> None:
 # --- the budget -------------------------------------------------------------------------------
 
 
-def test_the_budget_limits_the_links_and_what_is_left_is_told() -> None:
+def test_the_budget_limits_the_links_and_what_is_left_is_reported() -> None:
     scene, budget = furnished(), 3000
     whole = multi_level_state(scene, form_factor_error=0.01, min_area=1e-3)
     assert len(whole.links) > 3 * budget

@@ -96,9 +96,9 @@ def test_a_high_gap_and_what_lies_below_the_surface_hood_nothing(height: float) 
     assert not crossings_of(slab(6.5, 11.5, height)).alone.any()
 
 
-def test_texels_beside_crossed_ones_are_told() -> None:
+def test_texels_next_to_crossed_ones_are_reported() -> None:
     """A wall cuts column 6; a board hoods columns 11 to 13, with rims in 11 and 13."""
     wall = rectangle((6.5 / SIZE, -1, -0.5), (0, 3, 0), (0, 0, 1))
     crossings = crossings_of(wall, slab(11.5, 13.5, 0.05))
     expected = np.broadcast_to(np.isin(np.arange(SIZE), [5, 7, 10, 14]), (SIZE, SIZE))
-    np.testing.assert_array_equal(crossings.beside[crossings.geometry.index[0]], expected)
+    np.testing.assert_array_equal(crossings.next_to_crossed[crossings.geometry.index[0]], expected)

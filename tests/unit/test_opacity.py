@@ -84,6 +84,23 @@ def test_holes_let_pass_and_the_rest_blocks() -> None:
     assert cast.intersect(origins[:1], -directions[:1]).triangle[0] == NO_HIT
 
 
+def test_each_ray_counts_once_however_many_veils_it_meets() -> None:
+    """Those of the caster for lamps count along."""
+    triangles, images = stack(np.full((LAYERS, 4, 4), 0.5))
+    lamps = CutOutCaster(triangles, images)
+    cast = CutOutCaster(triangles, images, for_lamps=lamps)
+    origins, directions = downward(100)
+    reach = np.full(100, 2.0 * LAYERS)
+    cast.intersect(origins[:1], directions[:1])
+    assert cast.rays == 1
+    cast.unoccluded(origins[:10], directions[:10], reach[:10])
+    assert cast.rays == 11
+    cast.passing(origins, directions, reach)
+    assert (cast.rays, lamps.rays) == (111, 0)
+    cast.for_lamps.intersect(origins, directions)
+    assert (cast.rays, lamps.rays) == (211, 100)
+
+
 def test_veils_multiply() -> None:
     """The share that passes is the product of 1 − α, exactly; rays pass as often, and independently."""
     opacity = np.array([0.1, 0.5, 0.3, 0.0, 0.6])

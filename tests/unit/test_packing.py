@@ -211,3 +211,10 @@ def test_no_texel_is_stretched_by_more_than_two() -> None:
         scales = np.linalg.svd(flat.transpose(0, 2, 1) @ np.linalg.inv(across), compute_uv=False)
         np.testing.assert_allclose(scales, atlas.pages[0].density, rtol=1e-3)
     assert len(np.unique(islands(atlas.objects[0].uv))) <= 6
+
+
+@pytest.mark.parametrize("count", [8, 72])
+def test_triangles_lie_in_each_others_boxes(count: int) -> None:
+    """A right triangle fills half of every box around it: with boxes apart no more than half is covered."""
+    triangles = np.repeat([[(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]], count, axis=0)
+    assert area_uv(pack(triangles, np.arange(count), 256, None).uv).sum() > 0.5

@@ -10,19 +10,20 @@ import numpy as np
 import pytest
 
 from radiosity_addon.bake.pipeline import bake, bake_and_keep
-from radiosity_addon.bake.quality import QUALITIES, quality_of
+from radiosity_addon.bake.quality import QUALITY_SETTINGS, quality_of
 from radiosity_addon.bake.result.pictures import Picture
 from radiosity_addon.bake.result.result import BakeResult
 from radiosity_addon.base.errors import SceneError
 from radiosity_addon.base.progress import Cancelled, Progress, Status
-from radiosity_addon.lightmap.images.seam_steps import seam_steps
 from radiosity_addon.options import METHODS, BakeSettings, options_of_method
 from radiosity_addon.scene.bake_scene import BakeScene
 from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, solve
 from radiosity_addon.solver.links import initial
 from tests.rooms import FLOOR, box_room, gray, gray_scene, rectangle, solid_box, sphere
+from tests.seam_steps import seam_steps
 from tests.unit.texel_scenes import QUAD_UV, bake_object, bake_scene, in_cell
 from tests.watched import noting
+from tests.wording import says
 
 
 def run(scene: BakeScene, **settings: Any) -> BakeResult:
@@ -338,7 +339,7 @@ def test_triangles_without_area_do_no_harm(lamp_lit: BakeResult) -> None:
     assert texels(result).mean() == pytest.approx(texels(lamp_lit).mean(), rel=0.02)
 
 
-def test_links_that_had_to_begin_coarse_are_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_links_that_had_to_begin_coarse_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     """Many small curved things, and a budget that does not do for the links they ask for."""
     chance = np.random.default_rng(5)
     balls = [0.06 * sphere(1)[:, ::-1] + chance.uniform(0.1, 0.9, 3) for _ in range(10)]
@@ -346,7 +347,7 @@ def test_links_that_had_to_begin_coarse_are_told_of(monkeypatch: pytest.MonkeyPa
     count = len(triangles)
     scene = gray_scene(triangles, lights=[LAMP])
     clutter = bake_scene(scene, ("Room", 12), ("Balls", count - 12))
-    monkeypatch.setattr(initial, "FEWEST", 1)
+    monkeypatch.setattr(initial, "MIN_LINKS", 1)
 
     def told(**settings: Any) -> list[str]:
         warnings = run(clutter, resolution=16, **settings).warnings
@@ -355,5 +356,5 @@ def test_links_that_had_to_begin_coarse_are_told_of(monkeypatch: pytest.MonkeyPa
     assert told() == []
     (message,) = told(max_links=2_000)
     share = float(message.split("up to ")[1].split("%")[0])
-    assert 100 * initial.COARSEST_FAINT * QUALITIES["draft"].solver.error < share < 100
-    assert "raise the most links and the memory limit" in message
+    assert 100 * initial.COARSEST_FAINT * QUALITY_SETTINGS["draft"].solver.error < share < 100
+    assert says(message, "Max Links", "memory limit")

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from radiosity_addon.bake.plan import SHORT, BakeDigests, ShownBake, ShownLightmap, plan_bake
+from radiosity_addon.bake.plan import SHORT, BakeDigests, RememberedLightmap, ShownBake, plan_bake
 from radiosity_addon.bake.scene_diff import Part, compare, scene_record
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeScene
@@ -78,7 +78,7 @@ def shown(has_groups: bool = False) -> ShownBake:
     """What is remembered of a bake of the room, at 10 texels per meter."""
     digests = BakeDigests.of(lit_bake(), SETTINGS)
     lightmaps = {
-        item.name: ShownLightmap(digests.objects[item.name], digests.light, 10.0, has_groups)
+        item.name: RememberedLightmap(digests.objects[item.name], digests.light, 10.0, has_groups)
         for item in lit_bake().objects
         if item.bake
     }

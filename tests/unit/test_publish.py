@@ -14,7 +14,7 @@ import pytest
 from radiosity_addon.base.errors import BakeError
 from radiosity_addon.files.baked_files import digest_of_file
 from radiosity_addon.publishing import publish as staging_module
-from radiosity_addon.publishing.marked_folders import MARK
+from radiosity_addon.publishing.marked_folders import OWNER_FILE
 from radiosity_addon.publishing.publish import (
     EARLIER,
     JOURNAL,
@@ -26,6 +26,9 @@ from radiosity_addon.publishing.publish import (
 )
 
 ROOT = Path(__file__).resolve().parents[2]
+OURS = "0123456789abcdef-abcd1234"
+"""What follows the prefix in the name of a folder of ours."""
+
 A, B, C = "a.exr", "b.exr", "c.exr"
 
 KILLED = """
@@ -114,10 +117,10 @@ def test_folders_without_our_mark_are_left_alone(tmp_path: Path) -> None:
     mine = tmp_path / f"{PREFIX}notes"
     (mine / EARLIER).mkdir(parents=True)
     (mine / JOURNAL).write_text('{"names": ["thesis"]}')
-    others = [tmp_path / f"{PREFIX}other", tmp_path / f"{PREFIX}12345678"]
+    others = [tmp_path / f"{PREFIX}other", tmp_path / f"{PREFIX}{OURS}"]
     for other in others:
         other.mkdir()
-        (other / MARK).write_text("somebody else's mark")
+        (other / OWNER_FILE).write_text("somebody else's mark")
     (tmp_path / "thesis").write_text("years of work")
     assert not clean_up(tmp_path)
     assert mine.exists()
@@ -206,8 +209,8 @@ def test_links_in_a_staging_folder_are_not_followed(tmp_path: Path, what: str) -
     files = {A: {"new": digest_of_file(folder / A), "old": digest_of_file(elsewhere / A)}}
     made = crafted(folder, files, {A: "secret"})
     if what == "mark":
-        (made / MARK).rename(elsewhere / "mark")
-        (made / MARK).symlink_to(elsewhere / "mark")
+        (made / OWNER_FILE).rename(elsewhere / "mark")
+        (made / OWNER_FILE).symlink_to(elsewhere / "mark")
     elif what == "earlier":
         (made / EARLIER / A).unlink()
         (made / EARLIER).rmdir()
@@ -311,12 +314,20 @@ def test_a_file_that_appears_while_publishing_is_not_replaced(
 
 
 def test_what_kills_leave_half_made_is_removed(tmp_path: Path) -> None:
-    empty, marked = tmp_path / f"{PREFIX}abcd1234", tmp_path / f"{PREFIX}abcd5678"
+    empty, marked = tmp_path / f"{PREFIX}{OURS}", tmp_path / f"{PREFIX}{OURS[:-1]}5"
     empty.mkdir()
     marked.mkdir()
-    (marked / MARK).touch()
+    (marked / OWNER_FILE).touch()
     clean_up(tmp_path)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["projects", "12345678", "versions-abcd1234"])
+def test_an_empty_folder_that_somebody_else_made_stays(tmp_path: Path, name: str) -> None:
+    """A word of eight letters looks like what `tempfile` adds to a prefix."""
+    (tmp_path / f"{PREFIX}{name}").mkdir()
+    clean_up(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == [f"{PREFIX}{name}"]
 
 
 def test_a_single_file_is_replaced_as_a_whole_or_not(tmp_path: Path) -> None:

@@ -114,7 +114,7 @@ def test_facing_pairs_are_those_with_a_factor(monkeypatch: pytest.MonkeyPatch) -
     assert set(zip(receiver.tolist(), source.tolist(), strict=True)) == set(
         zip(source.tolist(), receiver.tolist(), strict=True)
     )
-    monkeypatch.setattr(refine_patch, "BLOCK", 3 * count)
+    monkeypatch.setattr(refine_patch, "BLOCK_PAIRS", 3 * count)
     np.testing.assert_array_equal(np.stack(facing_pairs(hierarchy)), expected)
 
 

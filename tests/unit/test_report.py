@@ -77,7 +77,7 @@ def test_the_file_holds_what_the_format_promises(tmp_path: Path) -> None:
     }
 
 
-def test_a_scale_is_told_where_the_file_has_one() -> None:
+def test_a_scale_is_reported_where_the_file_has_one() -> None:
     objects = _report((LightmapFile("a.png", 12.5), LightmapFile("b.png", 1.0))).as_dict()["objects"]
     assert [entry["scale"] for entry in objects] == [12.5, 1.0]
 
@@ -100,7 +100,7 @@ def test_a_history_keeps_both_ends_and_even_steps(count: int) -> None:
         assert steps.max() - steps.min() <= 1
 
 
-def test_the_solver_part_tells_method_settings_and_whose_the_blocks_are() -> None:
+def test_the_solver_part_reports_method_settings_and_whose_the_blocks_are() -> None:
     objects = [bake_object("Left", 0, 4), bake_object("Empty", 4, 0), bake_object("Right", 4, 3)]
     found = {
         "method": "dense",
@@ -121,7 +121,7 @@ def test_the_solver_part_tells_method_settings_and_whose_the_blocks_are() -> Non
     }
 
 
-def test_light_groups_are_told_with_their_sources_and_files() -> None:
+def test_light_groups_are_reported_with_their_sources_and_files() -> None:
     pages = (LightmapPage(np.zeros((4, 8, 3), np.float32), np.ones((4, 8), bool)),)
     groups = (LightGroup("Day", pages, ("Sun", "World")), LightGroup("Night", pages, ("Lamp",)))
     result = BakeResult(pages, (), SOLVER, (), groups=groups)

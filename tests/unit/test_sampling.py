@@ -16,7 +16,7 @@ def test_an_aligned_run_has_one_point_in_every_elementary_box(first: int, boxes:
     assert (np.sort(cell, axis=1) == np.arange(16)).all()
 
 
-def test_points_do_not_depend_on_the_rows_and_runs_they_are_asked_in() -> None:
+def test_points_do_not_depend_on_the_rows_and_runs_they_are_evaluated_in() -> None:
     keys = np.array([0, 7, 1 << 20, (1 << 40) + 3])
     whole = sampling.stratified_square(keys, 24, seed=5)
     by_row = np.concatenate([sampling.stratified_square(keys[i : i + 1], 24, seed=5) for i in range(4)])

@@ -15,21 +15,21 @@ from radiosity_addon.bake.pipeline import bake
 from radiosity_addon.bake.result.result import BakeResult
 from radiosity_addon.base.errors import BakeError
 from radiosity_addon.numerics import scratch as module
-from radiosity_addon.numerics.scratch import SMALLEST, Scratch, is_in_file, row_numbers
+from radiosity_addon.numerics.scratch import MIN_FILE_BYTES, Scratch, is_in_file, row_numbers
 from radiosity_addon.options.bake_settings import BakeSettings
 from tests.cornell import cornell_box
 from tests.unit.texel_scenes import bake_scene
 
-COUNT = SMALLEST // 4
+COUNT = MIN_FILE_BYTES // 4
 """Numbers of four bytes that are just counted."""
 
 
 def test_arrays_go_to_files_when_the_budget_is_used_up() -> None:
-    scratch = Scratch(1.5 * SMALLEST)
+    scratch = Scratch(1.5 * MIN_FILE_BYTES)
     first = scratch.empty(COUNT, np.int32)
     second = scratch.zeros((COUNT, 1), np.int32)
     assert (is_in_file(first), is_in_file(second)) == (False, True)
-    assert (scratch.in_memory, scratch.in_files) == (SMALLEST, SMALLEST)
+    assert (scratch.in_memory, scratch.in_files) == (MIN_FILE_BYTES, MIN_FILE_BYTES)
     assert not second.any()
     second[:] = 7
     module.trim()
@@ -44,7 +44,7 @@ def test_small_arrays_stay_in_memory() -> None:
     assert not is_in_file(Scratch(0.0).empty(COUNT - 1, np.int32))
 
 
-@pytest.mark.parametrize("budget", [0.0, 3.0 * SMALLEST, np.inf])
+@pytest.mark.parametrize("budget", [0.0, 3.0 * MIN_FILE_BYTES, np.inf])
 def test_rows_are_the_same_wherever_they_are(budget: float) -> None:
     """Blocks that begin in memory and go on in a file."""
     table = Scratch(budget).rows(3, np.int32)
@@ -88,7 +88,7 @@ def test_row_numbers_are_those_of_flatnonzero(monkeypatch: pytest.MonkeyPatch) -
 def test_tiles_give_the_same_bytes_in_a_fraction_of_the_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     """The Cornell box at 64² with all arrays in memory, and with every one of 1 KB or more in a file."""
     whole, most = baked()
-    monkeypatch.setattr(module, "SMALLEST", 1 << 10)
+    monkeypatch.setattr(module, "MIN_FILE_BYTES", 1 << 10)
     monkeypatch.setattr(pipeline, "texel_scratch", lambda *_: Scratch(0.0))
     monkeypatch.setattr(pipeline, "share_out_memory", lambda *_: None)
     tiled, least = baked()

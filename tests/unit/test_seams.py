@@ -8,18 +8,24 @@ import numpy as np
 import pytest
 
 from radiosity_addon.lightmap.images.dilate import dilate
-from radiosity_addon.lightmap.images.seam_steps import seam_steps
 from radiosity_addon.lightmap.images.seams import Seams, find_seams
-from radiosity_addon.lightmap.images.stitch import stitch, stitch_pages
+from radiosity_addon.lightmap.images.stitch import stitch, stitch_in_place
 from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
 from radiosity_addon.lightmap.unwrap.atlas import AtlasInput, run_atlas
 from radiosity_addon.rays.caster import BruteForceCaster
 from radiosity_addon.solver import Scene
 from tests.rooms import gray, gray_scene, rectangle, solid_box
+from tests.seam_steps import seam_steps
 from tests.unit.lightmap_meshes import quads, uv_sphere
 from tests.unit.texel_scenes import QUAD_UV, in_cell, texel_geometry
 
 Field = Callable[[np.ndarray], np.ndarray]
+
+
+def stitch_pages(pages: list[np.ndarray], geometry: TexelGeometry, seams: Seams) -> list[np.ndarray]:
+    stitched = [page.copy() for page in pages]
+    stitch_in_place(stitched, geometry, seams)
+    return stitched
 
 
 def two_tiles(
@@ -122,7 +128,7 @@ def test_a_flat_shaded_box_has_no_seams() -> None:
     np.testing.assert_array_equal(stitch(values, np.ones(len(values)), seams), values)
 
 
-def test_backs_beside_fronts_are_no_seam() -> None:
+def test_backs_next_to_fronts_are_no_seam() -> None:
     scene, geometry = two_tiles()
     turned = scene.triangles.copy()
     turned[2:] = turned[2:, ::-1]

@@ -26,7 +26,7 @@ def test_few_alike_stay_as_they_are() -> None:
     assert one_of_each(warnings) == [missing(1), missing(2), missing(3), TOO_SMALL]
 
 
-def test_many_alike_become_one_that_tells_of_the_others() -> None:
+def test_many_alike_become_one_that_stands_for_the_others() -> None:
     shown = one_of_each([*map(missing, range(84)), TOO_SMALL])
     assert shown[1:] == [TOO_SMALL]
     assert shown[0]["name"] == "slot0"

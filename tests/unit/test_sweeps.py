@@ -10,7 +10,7 @@ from radiosity_addon.lightmap.points.interpolation import Interpolation
 from radiosity_addon.lightmap.texels.texel_geometry import TexelGeometry
 from radiosity_addon.lightmap.transport.gather_links import GatherLinks
 from radiosity_addon.lightmap.transport.gather_settings import GatherSettings
-from radiosity_addon.lightmap.transport.source_means import Means, mean_of_sources
+from radiosity_addon.lightmap.transport.source_means import SourceMeans, mean_of_sources
 from radiosity_addon.lightmap.transport.sub_cells import SWEEPS, SubCellLinks, SubCells, SubCellSweeps
 from radiosity_addon.lightmap.transport.sweeps import TexelLight, TexelTransport, sweep
 from radiosity_addon.solver import EnvironmentLight, PointLight, Scene, SolverSettings, solve
@@ -128,11 +128,11 @@ def test_direct_and_indirect_are_apart() -> None:
     assert light.direct[~on_wall].mean() > 5 * light.indirect[~on_wall].mean()
 
 
-def test_only_what_sees_a_change_is_asked_again() -> None:
+def test_only_rows_that_see_a_change_are_computed_again() -> None:
     random = np.random.default_rng(2)
     sources = random.integers(-2, 40, (300, 8)).astype(np.int32)
     table = random.random((42, 3)).astype(np.float32)
-    means = Means(sources, 3, 2)
+    means = SourceMeans(sources, 3, 2)
     means.of(table, np.zeros(42, dtype=bool))
     changed = np.zeros(42, dtype=bool)
     changed[[7, 41]] = True

@@ -11,10 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from radiosity_addon.publishing.marked_folders import MARK, MarkedFolder
+from radiosity_addon.publishing.marked_folders import OWNER_FILE, MarkedFolder
 from tests.processes import run_python
 
 ROOT = Path(__file__).resolve().parents[2]
+
+OTHER = "radiosity-0123456789abcdef-12345678"
+"""A folder with a name of ours that somebody else has made."""
 
 posix = pytest.mark.skipif(os.name == "nt", reason="kills as POSIX does")
 
@@ -51,11 +54,16 @@ def run(code: str, tmpdir: Path, **more: str) -> subprocess.CompletedProcess[str
 def test_the_folder_for_temporary_files_itself_is_never_removed(tmp_path: Path, no_folders: str) -> None:
     tmp_path = tmp_path / "tmp"
     (tmp_path / "radiosity-notes").mkdir(parents=True)
+    (tmp_path / "radiosity-projects").mkdir()
     (tmp_path / "mine.txt").write_text("years of work")
     done = run(RUN, tmp_path, NO_FOLDERS=no_folders)
     assert (done.returncode, done.stderr) == (0, "")
     assert (tmp_path / "mine.txt").read_text() == "years of work"
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.txt", "radiosity-notes"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "mine.txt",
+        "radiosity-notes",
+        "radiosity-projects",
+    ]
 
 
 @pytest.mark.parametrize("content", ["", "quit.blend"])
@@ -79,14 +87,14 @@ def test_an_empty_folder_that_blender_was_given_stays(tmp_path: Path) -> None:
 
 @posix
 def test_what_a_kill_leaves_is_removed_at_the_next_start_alone(tmp_path: Path) -> None:
-    (tmp_path / "radiosity-12345678").mkdir()
-    (tmp_path / "radiosity-12345678" / "mine.txt").write_text("of somebody else")
+    (tmp_path / OTHER).mkdir()
+    (tmp_path / OTHER / "mine.txt").write_text("of somebody else")
     assert run(KILLED, tmp_path).returncode == -signal.SIGKILL
-    (left,) = [path for path in tmp_path.iterdir() if path.name != "radiosity-12345678"]
+    (left,) = [path for path in tmp_path.iterdir() if path.name != OTHER]
     assert (left / "blender_abc" / "quit.blend").exists()
     assert run(RUN, tmp_path).returncode == 0
-    assert [path.name for path in tmp_path.iterdir()] == ["radiosity-12345678"]
-    assert (tmp_path / "radiosity-12345678" / "mine.txt").exists()
+    assert [path.name for path in tmp_path.iterdir()] == [OTHER]
+    assert (tmp_path / OTHER / "mine.txt").exists()
 
 
 def test_the_folder_of_a_living_process_is_left_alone(
@@ -140,4 +148,4 @@ def test_a_folder_loses_its_mark_last(tmp_path: Path, monkeypatch: pytest.Monkey
             patch.setattr(os, name, noted(getattr(os, name)))
         folder.close()
     assert not folder.path.exists()
-    assert removed[-2:] == [MARK, folder.path.name]
+    assert removed[-2:] == [OWNER_FILE, folder.path.name]

@@ -12,7 +12,7 @@ import pytest
 from radiosity_addon.bake import pipeline, texel_memory
 from radiosity_addon.bake.estimate import LightmappedObject, estimate_bake
 from radiosity_addon.bake.pipeline import bake
-from radiosity_addon.bake.texel_memory import least_bytes, pages_of, process_bytes, refuse_too_large
+from radiosity_addon.bake.texel_memory import least_bytes, pages_of, process_bytes, refuse_large_pages
 from radiosity_addon.base.errors import UsageError
 from radiosity_addon.options.bake_settings import BakeSettings
 from tests.rooms import box_room, gray_scene
@@ -50,12 +50,12 @@ def test_no_bake_that_fitted_into_eight_gigabytes_is_refused(limit: float | None
     settings = BakeSettings(memory_limit=limit, threads=8)
     for pages in ([5477], [4096], [1024] * 28, [8]):
         assert sum(size**2 for size in pages) <= ON_8_GB
-        refuse_too_large(pages, settings)
+        refuse_large_pages(pages, settings)
 
 
 def test_what_cannot_be_done_is_refused_with_the_figure() -> None:
     with pytest.raises(UsageError) as caught:
-        refuse_too_large([16384], BakeSettings(resolution=16384))
+        refuse_large_pages([16384], BakeSettings(resolution=16384))
     message = str(caught.value)
     assert "\n" not in message
     figure = least_bytes([16384], BakeSettings()) / 2**30
@@ -65,12 +65,17 @@ def test_what_cannot_be_done_is_refused_with_the_figure() -> None:
 
 
 @pytest.mark.parametrize("size", [12_000, 12_300, 12_600, 12_900, 16_384])
-def test_the_limit_that_is_named_suffices(size: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_limit_that_is_named_is_the_least_that_suffices(
+    size: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """To the tenth of a GiB that it is named with."""
     monkeypatch.setattr(texel_memory, "process_bytes", lambda: 0.3e9)
     with pytest.raises(UsageError) as caught:
-        refuse_too_large([size], BakeSettings(resolution=size))
+        refuse_large_pages([size], BakeSettings(resolution=size))
     raised = float(str(caught.value).split("to ")[-1])
-    refuse_too_large([size], BakeSettings(resolution=size, memory_limit=raised))
+    refuse_large_pages([size], BakeSettings(resolution=size, memory_limit=raised))
+    with pytest.raises(UsageError):
+        refuse_large_pages([size], BakeSettings(resolution=size, memory_limit=raised - 0.1))
 
 
 @pytest.mark.parametrize("size", [{"resolution": 16384}, {"texel_density": 20_000.0}])
@@ -121,4 +126,4 @@ def test_the_peak_of_a_process_stays_within_the_limit() -> None:
 
 def test_working_memory_does_not_refuse_small_pages() -> None:
     assert np.isfinite(least_bytes([32], BakeSettings(threads=64)))
-    refuse_too_large([32], BakeSettings(memory_limit=0.01, threads=64))
+    refuse_large_pages([32], BakeSettings(memory_limit=0.01, threads=64))

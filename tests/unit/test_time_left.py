@@ -32,7 +32,7 @@ def told(course, total: float, step: float = 0.1) -> list[tuple[float, float]]:
     return pairs
 
 
-def test_even_progress_is_told_exactly() -> None:
+def test_even_progress_is_predicted_exactly() -> None:
     pairs = told(lambda share: share, 60.0)
     assert len(pairs) > 500
     for left, said in pairs:

@@ -12,7 +12,7 @@ from radiosity_addon.base.errors import UsageError
 from radiosity_addon.solver import PointLight, Scene, Solution, SolverSettings
 from radiosity_addon.solver.equations.exchange import exchange_areas
 from radiosity_addon.solver.methods import two_level
-from radiosity_addon.solver.methods.two_level import FINEST, TwoLevelState, contrasts, solve
+from radiosity_addon.solver.methods.two_level import MIN_ELEMENT_SHARE, TwoLevelState, contrasts, solve
 from tests.cornell import cornell_box
 from tests.rooms import box_room, gray, gray_scene
 from tests.watched import watching
@@ -115,7 +115,7 @@ def test_neighbors_differ_by_less_than_the_contrast_or_are_finest(contrast: floa
     start = run(cornell_box(), elements=100, patches=32)
     mean = area[start.leaves].mean()
     fewer = np.setdiff1d(state.leaves, start.leaves)
-    assert area[fewer].min() >= FINEST * mean == state.smallest
+    assert area[fewer].min() >= MIN_ELEMENT_SHARE * mean == state.smallest
 
 
 def test_seams_between_materials_do_not_count() -> None:

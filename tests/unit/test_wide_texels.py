@@ -7,7 +7,7 @@ import pytest
 
 from radiosity_addon.lightmap.lighting.reconstruction import light_texels
 from radiosity_addon.lightmap.transport.gather_settings import GatherSettings
-from radiosity_addon.lightmap.transport.hit_table import WIDE
+from radiosity_addon.lightmap.transport.hit_table import WIDE_TEXEL
 from radiosity_addon.lights.sun_and_sky import PointLight
 from radiosity_addon.solver import Scene, SolverSettings, solve
 from tests.rooms import gray, rectangle
@@ -58,4 +58,4 @@ def test_the_size_of_a_texel_on_each_triangle() -> None:
     np.testing.assert_allclose(geometry.texel_area[:2], (2 / SIZE) ** 2)
     np.testing.assert_allclose(geometry.texel_area[2:], 8 / (0.125 * SIZE**2))
     assert geometry.texel_size == pytest.approx(2 / SIZE)
-    assert not (geometry.texel_area > (WIDE * geometry.texel_size) ** 2).any()
+    assert not (geometry.texel_area > (WIDE_TEXEL * geometry.texel_size) ** 2).any()

@@ -31,7 +31,7 @@ def test_the_other_process_gives_the_same_charts(bowl) -> None:
     np.testing.assert_array_equal(found[1], chart)
 
 
-def test_only_much_to_do_beside_a_window_asks_for_a_process(bowl, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_long_work_with_a_window_starts_a_process(bowl, monkeypatch: pytest.MonkeyPatch) -> None:
     asked = []
 
     def apart(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

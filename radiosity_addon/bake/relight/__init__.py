@@ -8,8 +8,8 @@ from .kept_bake import (
     IncrementalState,
     KeptBake,
     damaged,
+    held_values,
     relight_pages,
-    shown,
 )
 from .light_groups import are_wanted, check_groups, group_of, group_pages
 from .responses import Responses
@@ -26,7 +26,7 @@ __all__ = [
     "damaged",
     "group_of",
     "group_pages",
+    "held_values",
     "relight_pages",
-    "shown",
     "strengths_in",
 ]

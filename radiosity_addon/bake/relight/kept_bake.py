@@ -2,7 +2,7 @@
 
 What is kept is light-independent (geometry and reflectance): gather hits, each lamp's gain at each texel,
 the hierarchy's links. Color and power of lamps, emission, and the world's color and strength may change;
-whatever moves, turns or reflects otherwise needs a new bake.
+anything that moves, turns or reflects differently needs a new bake.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ DAMAGED = (
 
 @dataclass(frozen=True, eq=False)
 class HierarchyReport:
-    """What a bake tells of its hierarchy: the solver's part of the report, and warnings."""
+    """What a bake reports of its hierarchy: the solver's part of the report, and warnings."""
 
     report: dict[str, Any]
     warnings: tuple[BakeWarning, ...]
@@ -163,13 +163,13 @@ def _relight(kept: KeptBake, wanted: Array, progress: Progress) -> tuple[Lightma
     scratch = kept.geometry.scratch
     light = relight_texels(kept.lit, kept.solved, wanted, scratch, progress.part(0.0, 0.95))
     emission = kept.sources.emission(kept.emission, kept.geometry.triangle, wanted)
-    values = shown(light, kept.reflectance, emission, kept.settings, scratch)
+    values = held_values(light, kept.reflectance, emission, kept.settings, scratch)
     pages = presentable(texel_pages(kept.geometry, values, kept.seams, kept.rings))
     progress.at(1.0)
     return pages
 
 
-def shown(
+def held_values(
     light: TexelLight, reflectance: Array, emission: Array, settings: BakeSettings, scratch: Scratch
 ) -> Array:
     """Return (n, 3) float32 what texels are to hold of their light; reflectance and emission as they show."""

@@ -19,7 +19,7 @@ BAND = 64
 
 
 def are_wanted(bake_scene: BakeScene, settings: BakeSettings) -> bool:
-    """Tell whether a bake makes lightmaps of light groups."""
+    """Return whether a bake makes lightmaps of light groups."""
     known = any((*bake_scene.light_groups, *bake_scene.emitter_groups))
     return bool(settings.groups) or (settings.light_groups and known)
 
@@ -94,13 +94,6 @@ def group_pages(
     )
 
 
-def split_by_group(whole: Array, parts: Array) -> Array:
-    """Return (g, …) float32 what `share_out` makes of parts."""
-    result = parts.astype(np.float64)
-    share_out(whole, list(result))
-    return result.astype(np.float32)
-
-
 def share_out(whole: Array, parts: Sequence[Array]) -> None:
     """Scale parts of an image where they are, so that they sum to the `whole` (height, …), none below 0.
 
@@ -122,10 +115,10 @@ def share_out(whole: Array, parts: Sequence[Array]) -> None:
 def members(
     settings: BakeSettings, names: Sequence[str], of_scene: Sequence[str], strengths: Array
 ) -> list[tuple[str, Array]]:
-    """Tell which sources are in which group.
+    """Return which sources are in which group.
 
     names, of_scene: The s sources' names, and the groups that the scene puts them in.
-    strengths (s, 3): Theirs: `OTHERS` is there only if it was asked for, or something in it shines.
+    strengths (s, 3): Theirs: `OTHERS` is there only if it was requested, or something in it shines.
     Returns members list of (str, (s,) bool): The settings' groups in their order, then the scene's by name,
         `OTHERS` last.
     Raises UsageError if a member is no source.
@@ -133,10 +126,10 @@ def members(
     _check_members(settings, names)
     groups = [group_of(name, own, settings) for name, own in zip(names, of_scene, strict=True)]
     label = np.array(groups, dtype=object)
-    asked = [name for name, _ in settings.groups]
-    rest = sorted(set(label) - {*asked, OTHERS})
-    found = [(name, label == name) for name in (*asked, *rest)]
+    chosen = [name for name, _ in settings.groups]
+    rest = sorted(set(label) - {*chosen, OTHERS})
+    found = [(name, label == name) for name in (*chosen, *rest)]
     left = label == OTHERS
-    if OTHERS not in asked and (left & strengths.any(axis=1)).any():
+    if OTHERS not in chosen and (left & strengths.any(axis=1)).any():
         found.append((OTHERS, left))
     return found

@@ -14,7 +14,7 @@ from ...lightmap.images import LightmapPage
 from ...numerics import Array
 from .kept_bake import KeptBake, relight_pages
 
-MOST = 1 << 28
+MAX_RESPONSE_BYTES = 1 << 28
 """Bytes that responses may take when lightmaps are exact; the last ones are kept, and four in any case."""
 
 
@@ -34,7 +34,7 @@ class Responses:
         """Start from other pages, lit exactly."""
         self.strengths = strengths.copy()
         self._pages = tuple(page.pixels for page in pages)
-        self.room = max(MOST // max(sum(page.nbytes for page in self._pages), 1), 4)
+        self.room = max(MAX_RESPONSE_BYTES // max(sum(page.nbytes for page in self._pages), 1), 4)
         """So many sources' responses are kept."""
         self._of = dict(list(self._of.items())[-self.room :])
 

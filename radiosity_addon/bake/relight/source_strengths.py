@@ -10,7 +10,7 @@ from ...scene import BakeScene
 from ..scene_diff import RELIGHTABLE, aligned, compare, scene_record
 from .kept_bake import KeptBake
 
-SAME = 1e-5
+SAME_EMISSION = 1e-5
 """Emission that differs from what its material's strength says by no more than this part is as expected."""
 
 
@@ -30,6 +30,6 @@ def strengths_in(kept: KeptBake, bake_scene: BakeScene) -> Array:
     lamps = np.array([light.strength for light in lights]).reshape(-1, 3)
     strengths = sources.checked(np.concatenate([lamps, exitance]))
     expected = sources.emission(before.emission, np.arange(len(now)), strengths)
-    if np.abs(expected - now.emission).max(initial=0.0) > SAME * now.emission.max(initial=0.0):
+    if np.abs(expected - now.emission).max(initial=0.0) > SAME_EMISSION * now.emission.max(initial=0.0):
         raise SceneError("emission has changed in more than its strength, or is new somewhere: bake again")
     return strengths

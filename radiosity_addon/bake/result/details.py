@@ -21,7 +21,7 @@ from .result import BakeDetails, PageDetails
 MEANS = np.full(3, 1.0 / 3.0)
 """Weights of the channels in what the report gives in W/m²."""
 
-TILE = 1 << 16
+CHUNK = 1 << 16
 """Texels looked up at once; bounds the temporaries to about 30 MB."""
 
 More: TypeAlias = tuple[tuple[dict[str, Any], ...], BakeDetails | None]
@@ -54,7 +54,7 @@ def details(solution: Solution, links: LinkRecord, geometry: TexelGeometry, ligh
     misfit = scratch.empty(len(geometry))
     noise = scratch.zeros(len(geometry), np.float32) if light.noise is None else light.noise
     unit = 0.0
-    for rows in tiles(len(geometry), TILE):
+    for rows in tiles(len(geometry), CHUNK):
         irradiance = (light.direct[rows] + light.indirect[rows]) @ MEANS
         expected = local.elements.irradiance_at(geometry.triangle[rows], geometry.barycentric[rows])
         misfit[rows] = expected - irradiance
@@ -63,15 +63,15 @@ def details(solution: Solution, links: LinkRecord, geometry: TexelGeometry, ligh
     state = texel_state(light)
     pages = []
     for index in geometry.index:
-        of, errors = scratch.empty(index.shape, np.uint8), scratch.empty((2, *index.shape), np.float16)
-        for rows in tiles(len(index), max(TILE // len(index), 1)):
+        states, errors = scratch.empty(index.shape, np.uint8), scratch.empty((2, *index.shape), np.float16)
+        for rows in tiles(len(index), max(CHUNK // len(index), 1)):
             here = index[rows] >= 0
             number = index[rows][here]
-            of[rows], errors[:, rows] = NO_TEXEL_HERE, 0.0
-            of[rows][here] = state[number]
+            states[rows], errors[:, rows] = NO_TEXEL_HERE, 0.0
+            states[rows][here] = state[number]
             errors[0, rows][here] = noise[number] / unit
             errors[1, rows][here] = misfit[number] / unit
-        pages.append(PageDetails(of, errors[0], errors[1], unit))
+        pages.append(PageDetails(states, errors[0], errors[1], unit))
     return BakeDetails(links, tuple(pages))
 
 
@@ -110,14 +110,14 @@ def statistics(
     owner = np.full(len(geometry.triangles), -1, dtype=np.int32)
     for number, item in enumerate(baked):
         owner[item.rows] = number
-    for rows in tiles(len(geometry), TILE):
-        of = owner[geometry.triangle[rows]]
-        order = np.argsort(of, kind="stable")
-        numbers, first, count = np.unique(of[order], return_index=True, return_counts=True)
-        for number, start, some in zip(numbers, first, count, strict=True):
+    for rows in tiles(len(geometry), CHUNK):
+        object_of = owner[geometry.triangle[rows]]
+        order = np.argsort(object_of, kind="stable")
+        numbers, first, count = np.unique(object_of[order], return_index=True, return_counts=True)
+        for number, start, run in zip(numbers, first, count, strict=True):
             if number >= 0:
-                texels[place[number] : place[number] + some] = rows.start + order[start : start + some]
-                place[number] += some
+                texels[place[number] : place[number] + run] = rows.start + order[start : start + run]
+                place[number] += run
     found: list[dict[str, Any]] = []
     for start, stop in pairwise(ends):
         watts, lumens, areas = lit_values(texels[start:stop], parts, geometry, state)
@@ -147,11 +147,11 @@ def lit_values(
     lit = lit_texels(state[texels]) if len(texels) else np.zeros(0, dtype=bool)
     watts, lumens, areas = (geometry.scratch.empty(np.count_nonzero(lit)) for _ in range(3))
     at = 0
-    for rows in tiles(len(texels), TILE):
-        mine = texels[rows][lit[rows]]
-        irradiance = np.asarray(sum(part[mine] for part in parts))
-        here = slice(at, at + len(mine))
+    for rows in tiles(len(texels), CHUNK):
+        covered = texels[rows][lit[rows]]
+        irradiance = np.asarray(sum(part[covered] for part in parts))
+        here = slice(at, at + len(covered))
         watts[here], lumens[here] = irradiance @ MEANS, luminous(irradiance, EFFICACY)
-        areas[here] = geometry.texel_area[geometry.triangle[mine]] * geometry.share[mine]
-        at += len(mine)
+        areas[here] = geometry.texel_area[geometry.triangle[covered]] * geometry.share[covered]
+        at += len(covered)
     return watts, lumens, areas

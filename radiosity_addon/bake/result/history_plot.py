@@ -23,7 +23,7 @@ ROWS = (
 """What each row shows: its name, keys of a history's entries, top and bottom [pixels]."""
 
 COLORS = {"residual": "#0072b2", "elements": "#009e73", "links": "#d55e00"}
-"""Those of Okabe and Ito, which the color-blind can tell apart."""
+"""Those of Okabe and Ito, which the color-blind can distinguish."""
 
 MAX_DOTS = 40
 """A curve of more points is drawn without dots."""

@@ -1,4 +1,4 @@
-"""Pictures of the light so far, for whoever watches a bake."""
+"""Pictures of the light so far, shown while a bake runs."""
 
 from __future__ import annotations
 
@@ -52,13 +52,13 @@ class TexelSurfaces:
 
     def only(self, triangles: Array) -> TexelSurfaces:
         """Return those of the scene's triangles that are marked in a (scene triangles,) mask."""
-        mine = triangles[self.triangle]
+        shown = triangles[self.triangle]
         return replace(
             self,
-            corners=self.corners[mine],
-            uv=self.uv[mine],
-            page=self.page[mine],
-            triangle=self.triangle[mine],
+            corners=self.corners[shown],
+            uv=self.uv[shown],
+            page=self.page[shown],
+            triangle=self.triangle[shown],
         )
 
 

@@ -19,7 +19,7 @@ from .result import BakeResult
 
 T = TypeVar("T")
 
-VERSION = 2
+REPORT_VERSION = 2
 MAX_HISTORY = 200
 """Entries of the solver's history that a report keeps; shooting makes one a shot."""
 
@@ -94,7 +94,7 @@ class BakeReport:
         ]
         return cls(
             {
-                "version": VERSION,
+                "version": REPORT_VERSION,
                 "objects": objects,
                 "pages": pages,
                 **({"light_groups": shares} if shares else {}),
@@ -189,7 +189,7 @@ def _named(block: Mapping[str, Any], objects: Sequence[BakeObject]) -> dict[str,
 
 
 def _file(file: LightmapFile) -> dict[str, Any]:
-    """Tell of an image: its name, and its scale where it has one."""
+    """Return an image's entry: its name, and its scale if it has one."""
     return {"image": file.path} if file.scale is None else {"image": file.path, "scale": file.scale}
 
 

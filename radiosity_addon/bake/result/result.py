@@ -79,13 +79,12 @@ class BakeResult:
     """All that a bake yields.
 
     solver: What the report says of the solver: "method", its "settings", "elements", "links", "rays",
-        "iterations", "residual", "power_W", "closure_area_mean", "history", and what the method itself has to
-        tell.
+        "iterations", "residual", "power_W", "closure_area_mean", "history", and details of the method.
     warnings: The scene's and the bake's own.
     seconds: Wall-clock time of each stage.
     atlas: Parallel to `pages`: "resolution", "texels_per_metre" of objects at texel scale 1, "utilisation"
         (the share of texels that show a surface) and the number of "objects".
-    groups: Those that were asked for, and one of what is in none of them.
+    groups: Those that were requested, and one of all light that is in none of them.
     light: Parallel to `objects`: statistics of the light on their fronts, see `details.py`.
     """
 

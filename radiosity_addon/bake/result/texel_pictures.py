@@ -17,7 +17,7 @@ SECONDS = 0.25
 SHARE = 0.01
 """Of the time at most goes into making pictures."""
 
-WIDEST = 1024
+MAX_PICTURE_WIDTH = 1024
 """Pages of more pixels are shown coarser: what is drawn live has to get to the graphics card each time."""
 
 
@@ -48,7 +48,7 @@ def lit_surfaces(geometry: TexelGeometry) -> TexelSurfaces:
     """Return the triangles with a lightmap, and which texels lie on them."""
     triangle = np.flatnonzero(geometry.page_of_triangle >= 0).astype(np.int32)
     page = geometry.page_of_triangle[triangle]
-    pages = [coarser(index, WIDEST) for index in geometry.index]
+    pages = [coarser(index, MAX_PICTURE_WIDTH) for index in geometry.index]
     stretch = np.array([stretch for _, stretch in pages], dtype=np.float32)
     return TexelSurfaces(
         geometry.triangles[triangle].astype(np.float32),

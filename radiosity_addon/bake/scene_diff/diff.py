@@ -16,25 +16,25 @@ from .record import ObjectRecord, SceneRecord
 class Part(Enum):
     """What may differ, and the message about it; the first of them is reported."""
 
-    REMOVED = "object '{}' is not there any more, or hidden from renders"
+    REMOVED = "object '{}' is missing, or hidden from renders"
     ADDED = "object '{}' was not there when the lightmaps were baked"
-    ORDER = "the objects have another order than when the lightmaps were baked"
+    ORDER = "the order of the objects has changed since the lightmaps were baked"
     MESH = "object '{}' has another mesh or texel scale"
-    ROLE = "object '{}' has another role in the light, or is baked in another way"
+    ROLE = "the role of object '{}' has changed, or how it is baked"
     UV = "object '{}' has other lightmap coordinates"
     PLACE = "object '{}' has moved, or changed its shape"
     SURFACE = "object '{}' has another material"
     MATERIAL = "material '{}' reflects differently"
     TEXTURE = "a texture of object '{}', or its UV map, has changed"
     GLOW = "the pattern that object '{}' emits has changed, or its UV map"
-    EMISSION = "object '{}' emits other light"
+    EMISSION = "the emission of object '{}' has changed"
     LIGHT_ADDED = "lamp or world '{}' is new"
-    LIGHT_REMOVED = "lamp or world '{}' is not there any more"
+    LIGHT_REMOVED = "lamp or world '{}' is missing"
     LIGHT_COUNT = "the number of lights '{}' has changed"
-    LIGHT_ORDER = "the lights have another order than when the lightmaps were baked"
+    LIGHT_ORDER = "the order of the lights has changed since the lightmaps were baked"
     LIGHT = "lamp '{}' has changed in more than its strength"
     STRENGTH = "lamp '{}' has another color or strength"
-    SETTINGS = "the settings are not those of the bake"
+    SETTINGS = "the settings differ from those of the bake"
 
 
 RELIGHTABLE = frozenset(

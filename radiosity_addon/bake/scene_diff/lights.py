@@ -14,7 +14,7 @@ from ...numerics import Array
 STRENGTHS = ("power", "irradiance", "radiance")
 """The fields of lights that relighting can change."""
 
-SAME = 1e-5
+SAME_SKY = 1e-5
 """Skies, whose pictures are rendered again for every export, may differ by this part."""
 
 
@@ -55,4 +55,4 @@ def _equal(one: Array | str | float, other: Array | str | float) -> bool:
         return bool(one == other)
     if one.shape != other.shape:
         return False
-    return bool(np.abs(one - other).max(initial=0.0) <= SAME * np.abs(one).max(initial=0.0))
+    return bool(np.abs(one - other).max(initial=0.0) <= SAME_SKY * np.abs(one).max(initial=0.0))

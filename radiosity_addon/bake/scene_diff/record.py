@@ -18,7 +18,7 @@ from ...numerics import Array
 from ...options import BakeSettings
 from ...scene import BakeObject, BakeScene, Glow, glow_pattern, texture_digest
 
-STEP = 1.0 / 256.0
+DIGEST_STEP = 1.0 / 256.0
 """Smallest change of reflectance or opacity that a rounded digest shows."""
 
 _POINTS = np.array([[1, 1], [4, 1], [1, 4], [2, 2]]) / 6.0
@@ -97,7 +97,7 @@ def rounded_digest(bake_scene: BakeScene, item: BakeObject) -> str:
     scene, rows = bake_scene.scene, item.rows
     digest = hashlib.sha256(f"{item.texel_scale:.6g}".encode())
     shape = (scene.triangles[rows], scene.normals[rows])
-    for values in (*shape, scene.reflectance[rows] / STEP, scene.opacity[rows] / STEP):
+    for values in (*shape, scene.reflectance[rows] / DIGEST_STEP, scene.opacity[rows] / DIGEST_STEP):
         digest.update(np.round(values, 4 if values.ndim == 3 else 0).astype(np.float32).tobytes())
     for values in (scene.in_bounces[rows], scene.in_shadows[rows]):
         digest.update(np.ascontiguousarray(values).tobytes())
@@ -106,7 +106,7 @@ def rounded_digest(bake_scene: BakeScene, item: BakeObject) -> str:
         for point in _POINTS:
             seen = scene.images.at(triangle, np.broadcast_to(point, (len(triangle), 2)))
             weighed = np.concatenate([seen[:, :3], seen[:, 6:]], axis=1)
-            digest.update(np.round(weighed / STEP).astype(np.int16).tobytes())
+            digest.update(np.round(weighed / DIGEST_STEP).astype(np.int16).tobytes())
     return digest.hexdigest()
 
 

@@ -24,13 +24,13 @@ from ...base import BakeError
 
 Array = npt.NDArray[Any]
 
-BLOCK = 1 << 22
+BLOCK_BYTES = 1 << 22
 """Bytes of an array that are compressed at a time: blocks are independent, a thread each."""
 
 LEVEL = 1
 """Of zlib: more takes several times as long for a tenth less."""
 
-KINDS = (
+ARRAY_TYPES = (
     "bool",
     "int8",
     "int16",
@@ -45,7 +45,7 @@ KINDS = (
 )
 """Types of arrays that may be stored: plain numbers, never objects."""
 
-MOST = 1 << 38
+MAX_FILE_BYTES = 1 << 38
 """Bytes that a file may claim to hold, unless the caller allows fewer."""
 
 RATIO, SPARE = 32, 1 << 24
@@ -83,17 +83,21 @@ def write_arrays(path: Path, magic: bytes, format_number: int, description: Any,
 
     magic: 16 of them at most: the kind of file.
     description: What JSON can hold.
-    arrays list of arrays of the `KINDS`.
+    arrays list of arrays of the `ARRAY_TYPES`.
     Raises OSError if the file cannot be written.
     """
     with ThreadPoolExecutor() as threads:
         blocks = [list(threads.map(_compressed, _blocks(array))) for array in arrays]
     entries = [
-        {"kind": array.dtype.name, "shape": list(array.shape), "blocks": [len(block) for block in some]}
-        for array, some in zip(arrays, blocks, strict=True)
+        {
+            "kind": array.dtype.name,
+            "shape": list(array.shape),
+            "blocks": [len(block) for block in array_blocks],
+        }
+        for array, array_blocks in zip(arrays, blocks, strict=True)
     ]
     head = zlib.compress(json.dumps({"description": description, "arrays": entries}).encode())
-    body = [head, *(block for some in blocks for block in some)]
+    body = [head, *(block for array_blocks in blocks for block in array_blocks)]
     digest = hashlib.blake2b(digest_size=32)
     for part in body:
         digest.update(part)
@@ -103,7 +107,9 @@ def write_arrays(path: Path, magic: bytes, format_number: int, description: Any,
         return file.tell()
 
 
-def read_arrays(path: Path, magic: bytes, format_number: int, most: int = MOST) -> tuple[Any, list[Array]]:
+def read_arrays(
+    path: Path, magic: bytes, format_number: int, most: int = MAX_FILE_BYTES
+) -> tuple[Any, list[Array]]:
     """Read what `write_arrays` wrote.
 
     most: Bytes that it may take in memory; what would take more is refused before it is unpacked.
@@ -123,7 +129,7 @@ def read_arrays(path: Path, magic: bytes, format_number: int, most: int = MOST) 
         raise ArrayFileError("it is damaged")
     try:
         head = json.loads(_unpacked(body[:length], min(HEAD_RATIO * length + HEAD_SPARE, MOST_HEAD)))
-        entries, room = head["arrays"], min(RATIO * len(body) + SPARE, MOST)
+        entries, room = head["arrays"], min(RATIO * len(body) + SPARE, MAX_FILE_BYTES)
         total = _total(entries)
         if total > room:
             raise ArrayFileError(f"it claims to hold {total >> 20} MB, which a file of its size cannot")
@@ -143,28 +149,28 @@ def read_digest(path: Path, magic: bytes, format_number: int) -> str:
 def _opened(path: Path) -> BinaryIO:
     """Open a file to read; a device or a pipe, which may have no end, is none."""
     if path.exists() and not path.is_file():
-        raise ArrayFileError("it is no such file")
+        raise ArrayFileError("it is not a sidecar")
     return path.open("rb")
 
 
 def _check_head(content: bytes, magic: bytes, format_number: int) -> tuple[bytes, int]:
     """Return the digest and the description's length that a file's first bytes hold."""
     if len(content) < _HEAD.size:
-        raise ArrayFileError("it is cut off")
+        raise ArrayFileError("it is incomplete")
     kind, found, digest, length = _HEAD.unpack_from(content)
     if kind != magic.ljust(16, b"\0"):
-        raise ArrayFileError("it is no such file")
+        raise ArrayFileError("it is not a sidecar")
     if found != format_number:
         raise ArrayFileError(f"it has format {found}, and this version reads format {format_number}")
     return digest, length
 
 
 def _unpacked(packed: memoryview, most: int) -> bytes:
-    """Expand bytes, to so many at most."""
+    """Expand bytes, to at most `most`."""
     expander = zlib.decompressobj()
     content = expander.decompress(packed, most + 1)
     if len(content) > most or not expander.eof:
-        raise ValueError("too long, or cut off")
+        raise ValueError("too long, or incomplete")
     return content
 
 
@@ -172,11 +178,11 @@ def _total(entries: list[dict[str, Any]]) -> int:
     """Return the bytes that arrays would take, which may be any number."""
     total = 0
     for entry in entries:
-        if entry["kind"] not in KINDS or len(entry["shape"]) > MOST_AXES:
+        if entry["kind"] not in ARRAY_TYPES or len(entry["shape"]) > MOST_AXES:
             raise ValueError("unknown kind of array")
         count = 1
         for size in entry["shape"]:
-            if type(size) is not int or not 0 <= size <= MOST:
+            if type(size) is not int or not 0 <= size <= MAX_FILE_BYTES:
                 raise ValueError("impossible shape")
             count *= size
         total += count * np.dtype(entry["kind"]).itemsize
@@ -185,10 +191,10 @@ def _total(entries: list[dict[str, Any]]) -> int:
 
 def _blocks(array: Array) -> list[Array]:
     """Cut an array into flat blocks."""
-    if array.dtype.name not in KINDS:
+    if array.dtype.name not in ARRAY_TYPES:
         raise TypeError(f"arrays of {array.dtype} cannot be stored")
     flat = np.ascontiguousarray(array).reshape(-1)
-    step = BLOCK // array.dtype.itemsize
+    step = BLOCK_BYTES // array.dtype.itemsize
     return [flat[first : first + step] for first in range(0, len(flat), step)]
 
 
@@ -204,7 +210,7 @@ def _read(body: memoryview, entries: list[dict[str, Any]]) -> list[Array]:
     for entry in entries:
         dtype, shape = np.dtype(entry["kind"]), tuple(entry["shape"])
         count = math.prod(shape)
-        step = BLOCK // dtype.itemsize
+        step = BLOCK_BYTES // dtype.itemsize
         if len(entry["blocks"]) != -(-count // step):
             raise ValueError("impossible array")
         flat = np.empty(count, dtype=dtype)

@@ -14,7 +14,7 @@ from ...solver.hierarchy import LEAF, Clusters, Hierarchy
 from ...solver.links import ClusterLinks, LightLinks, Links
 from ...solver.methods import HierarchicalState
 from ...solver.settings import SolverSettings
-from .value_checks import LARGE, SLACK, instance, integers, number, numbers, require, whole
+from .value_checks import LARGE, SHARE_TOLERANCE, instance, integers, number, numbers, require, whole
 
 MOST_THREADS, MOST_LEVELS = 4096, 64
 
@@ -55,7 +55,7 @@ def _check_hierarchy(hierarchy: Hierarchy, triangles: int) -> None:
     faces, clusters = instance(hierarchy.faces, Faces), instance(hierarchy.clusters, Clusters)
     f, c, e = len(faces.triangle), len(clusters.start), len(hierarchy.face)
     integers(faces.triangle, (f,), 0, triangles - 1)
-    numbers(faces.normal, (f, 3), -1.0 - SLACK, 1.0 + SLACK)
+    numbers(faces.normal, (f, 3), -1.0 - SHARE_TOLERANCE, 1.0 + SHARE_TOLERANCE)
     numbers(faces.center, (f, 3), -LARGE)
     numbers(faces.area, (f,), 0.0)
     integers(clusters.order, (f,), 0, f - 1)
@@ -85,7 +85,7 @@ def _check_hierarchy(hierarchy: Hierarchy, triangles: int) -> None:
     numbers(hierarchy.area, (e,), 0.0)
     numbers(hierarchy.reflectance, (e, 3), 0.0, 1.0)
     numbers(hierarchy.emission, (e, 3), 0.0)
-    numbers(hierarchy.opacity, (e,), 0.0, 1.0 + SLACK)
+    numbers(hierarchy.opacity, (e,), 0.0, 1.0 + SHARE_TOLERANCE)
 
 
 def _check_levels(levels: Any, count: int) -> None:
@@ -105,9 +105,9 @@ def _check_links(links: Links, clusters: int, elements: int) -> None:
     require((np.diff(links.receiver) >= 0).all(), "links in no order")
     integers(links.source, (count,), 0, clusters + elements - 1)
     numbers(links.factor, (count,), 0.0, MOST_FACTOR)
-    numbers(links.visibility, (count,), 0.0, 1.0 + SLACK)
-    numbers(links.to_quarter, (count, 4), 0.0, 4.0 + SLACK)
-    numbers(links.of_quarter, (count, 4), 0.0, 4.0 + SLACK)
+    numbers(links.visibility, (count,), 0.0, 1.0 + SHARE_TOLERANCE)
+    numbers(links.to_quarter, (count, 4), 0.0, 4.0 + SHARE_TOLERANCE)
+    numbers(links.of_quarter, (count, 4), 0.0, 4.0 + SHARE_TOLERANCE)
 
 
 def _check_cluster_links(links: ClusterLinks, clusters: int, elements: int) -> None:

@@ -45,12 +45,12 @@ from .plain_objects import flatten, restore
 from .sidecar_checks import check_stored, stored_layout
 
 MAGIC, FORMAT = b"RADIOSITYRELIGHT", 3
-"""The format rises with whatever is stored: classes say it themselves (`plain_objects.stored_names`)."""
+"""The format rises with every change of the stored fields (`plain_objects.stored_names`)."""
 
 OF_SOURCES = ("emitter", "emitter_names", "light_groups", "emitter_groups")
 """What a scene says of its sources besides their strengths: it stays as it was baked."""
 
-KINDS: tuple[type, ...] = (
+STORED_CLASSES: tuple[type, ...] = (
     *(PointLight, SpotLight, SunLight, AreaLight, EnvironmentLight, EnvironmentImage, SkyPatch),
     *(LightSources, EmitterGroup, SolverSettings, ElementTransport, HierarchicalState),
     *(Hierarchy, Faces, Clusters, Links, ClusterLinks, LightLinks, Balance),
@@ -89,8 +89,8 @@ class StoredBake:
             If the file is not of the scene that it says it is of.
         """
         stored = self._stored
-        now = scene_record(bake_scene)
-        compare(SceneRecord(stored["objects"], now.lights), now).refuse_all_but(RELIGHTABLE)
+        present = scene_record(bake_scene)
+        compare(SceneRecord(stored["objects"], present.lights), present).refuse_all_but(RELIGHTABLE)
         baked = sum(item.bake and item.count > 0 for item in bake_scene.objects)
         if stored_layout(stored) != (len(bake_scene.scene), baked):
             raise damaged(self.path)
@@ -155,7 +155,7 @@ def write_sidecar(path: Path, kept: KeptBake, result: BakeResult, bake_id: str) 
         "texel_reflectance": kept.reflectance,
         "texel_emission": kept.emission,
     }
-    description, arrays = flatten(stored, KINDS)
+    description, arrays = flatten(stored, STORED_CLASSES)
     try:
         return write_arrays(path, MAGIC, FORMAT, description, arrays)
     except OSError as error:
@@ -178,7 +178,7 @@ def read_sidecar(path: Path, memory_limit: float | None = None) -> StoredBake:
     most = int((memory_limit or SolverSettings.memory_limit) * (1 << 30))
     try:
         description, arrays = read_arrays(path, MAGIC, FORMAT, most)
-        stored = restore(description, arrays, KINDS)
+        stored = restore(description, arrays, STORED_CLASSES)
         check_stored(stored)
         return StoredBake(stored["bake_id"], BakeSettings(**stored["settings"]), path, stored)
     except FileNotFoundError:

@@ -31,7 +31,17 @@ from ...solver.emitters import NO_SOURCE, EmitterGroup, LightSources
 from ...solver.gather import NOTHING, AimedRays, LightGains, lowest_number
 from ..scene_diff import as_object_records
 from .hierarchy_checks import MOST_LEVELS, MOST_THREADS, check_elements
-from .value_checks import LARGE, SLACK, array_of, instance, integers, number, numbers, require, whole
+from .value_checks import (
+    LARGE,
+    SHARE_TOLERANCE,
+    array_of,
+    instance,
+    integers,
+    number,
+    numbers,
+    require,
+    whole,
+)
 
 MOST_ROUNDS, MOST_RINGS = 1 << 20, 4096
 
@@ -161,7 +171,7 @@ def _check_light(light: Any) -> None:
             raise ValueError(f"a light's {name}")
     numbers(np.asarray(light.strength), (3,), 0.0)
     if isinstance(made, SkyPatch):
-        numbers(made.share, np.shape(made.bounds)[:1], 0.0, 1.0 + SLACK)
+        numbers(made.share, np.shape(made.bounds)[:1], 0.0, 1.0 + SHARE_TOLERANCE)
 
 
 def _check_geometry(geometry: TexelGeometry, triangles: int) -> int:
@@ -173,7 +183,7 @@ def _check_geometry(geometry: TexelGeometry, triangles: int) -> int:
     numbers(geometry.uv, (triangles, 3, 2), -LARGE)
     integers(geometry.page_of_triangle, (triangles,), -1, pages - 1)
     shown = geometry.uv[geometry.page_of_triangle >= 0]
-    require(((shown >= -SLACK) & (shown <= 1.0 + SLACK)).all(), "UVs outside their page")
+    require(((shown >= -SHARE_TOLERANCE) & (shown <= 1.0 + SHARE_TOLERANCE)).all(), "UVs outside their page")
     integers(geometry.page_start, (pages + 1,), 0, n)
     require(geometry.page_start[0] == 0 and geometry.page_start[-1] == n, "texels of no page")
     require((np.diff(geometry.page) >= 0).all(), "pages in no order")
@@ -209,13 +219,13 @@ def _check_lit(lit: RelightableTexels, sources: LightSources, texels: int, eleme
     numbers(transport.reflectance, (texels, 3), 0.0, 1.0)
     numbers(cells.start, (surfaces - texels, 3), 0.0)
     integers(cells.element, (surfaces - texels,), NOTHING, elements - 1)
-    for some in instance(cells.links, list):
-        count = len(instance(some, SubCellLinks).rows)
-        integers(some.rows, (count,), texels, surfaces - 1)
-        require(np.shape(some.sources)[1] > 0, "no rays")
-        integers(some.sources, (count, np.shape(some.sources)[1]), lowest, surfaces - 1)
-        numbers(some.reflectance, (count, 3), 0.0, 1.0)
-        _check_gains(instance(some.gains, LightGains), count, lamps)
+    for level in instance(cells.links, list):
+        count = len(instance(level, SubCellLinks).rows)
+        integers(level.rows, (count,), texels, surfaces - 1)
+        require(np.shape(level.sources)[1] > 0, "no rays")
+        integers(level.sources, (count, np.shape(level.sources)[1]), lowest, surfaces - 1)
+        numbers(level.reflectance, (count, 3), 0.0, 1.0)
+        _check_gains(instance(level.gains, LightGains), count, lamps)
     _check_gains(instance(lit.gains, LightGains), texels, lamps)
     integers(lit.element, (texels,), NOTHING, elements - 1)
     whole(lit.sweeps, 0, MOST_ROUNDS)
@@ -235,7 +245,7 @@ def _check_interpolation(spread: Interpolation, texels: int, gather: int) -> Non
     numbers(spread.weight, (entries,), -MOST_WEIGHT, MOST_WEIGHT)
     if texels:
         sums = np.add.reduceat(spread.weight.astype(np.float64), spread.first)
-        require((np.abs(sums - 1.0) < SLACK).all(), "weights that do not sum to 1")
+        require((np.abs(sums - 1.0) < SHARE_TOLERANCE).all(), "weights that do not sum to 1")
 
 
 def _check_gains(gains: LightGains, count: int, lamps: int) -> None:
@@ -254,8 +264,8 @@ def _check_seams(seams: Seams, geometry: TexelGeometry, triangles: int) -> None:
     count = len(seams.length)
     pixels = sum(index.size for index in geometry.index)
     integers(seams.texel, (count, 2, 4), 0, pixels - 1)
-    numbers(seams.weight, (count, 2, 4), -SLACK, 1.0 + SLACK)
-    numbers(seams.length, (count,), 0.0, 1.0 + SLACK)
+    numbers(seams.weight, (count, 2, 4), -SHARE_TOLERANCE, 1.0 + SHARE_TOLERANCE)
+    numbers(seams.length, (count,), 0.0, 1.0 + SHARE_TOLERANCE)
     integers(seams.triangle, (count, 2), 0, triangles - 1)
 
 

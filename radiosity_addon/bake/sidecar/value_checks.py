@@ -10,7 +10,7 @@ import numpy as np
 LARGE = 1e15
 """Radiometric values and coordinates beyond this are no scene's."""
 
-SLACK = 1e-3
+SHARE_TOLERANCE = 1e-3
 """Rounding that shares may miss 0, 1 or a sum of 1 by."""
 
 T = TypeVar("T")

@@ -116,8 +116,8 @@ class EarlierBake:
         """Take lightmaps off all objects but those to keep; `targets` are about to be changed, too."""
         going = [obj for obj in showing() if obj.name not in self.keep]
         meshes = {own_mesh(obj) for obj in targets}
-        beside = [obj for obj in showing() if own_mesh(obj) in meshes]
-        self._state = ShownState(list(dict.fromkeys([*going, *targets, *beside])))
+        sharing = [obj for obj in showing() if own_mesh(obj) in meshes]
+        self._state = ShownState(list(dict.fromkeys([*going, *targets, *sharing])))
         take_off(going)
 
     def show_again(self) -> None:
@@ -164,7 +164,7 @@ def _is_there(block: bpy.types.ID) -> bool:
 def replacing_earlier(
     context: bpy.types.Context, keep: Collection[str] = (), is_partial: bool = False
 ) -> Iterator[EarlierBake]:
-    """Replace the earlier bake by what `apply_lightmaps` shows in this block, but for objects to `keep`.
+    """Replace the earlier bake by what `apply_lightmaps` shows in this block, except for objects to `keep`.
 
     A failure in it leaves what was there before.
     """

@@ -17,7 +17,7 @@ from .sweep import sweep
 
 
 @dataclass(frozen=True)
-class Restored:
+class RestoreResult:
     """What Restore did: how many objects it brought back, and what the user should know of edits."""
 
     count: int
@@ -29,7 +29,7 @@ def restore(context: bpy.types.Context) -> int:
     return restore_scene(context, None).count
 
 
-def restore_scene(context: bpy.types.Context, scene: bpy.types.Scene | None) -> Restored:
+def restore_scene(context: bpy.types.Context, scene: bpy.types.Scene | None) -> RestoreResult:
     """Take the lightmaps off the objects of a scene, or of the whole file.
 
     Meshes, UV layers, materials, slots, modifiers and visibility are as they were, with the user's edits
@@ -38,7 +38,7 @@ def restore_scene(context: bpy.types.Context, scene: bpy.types.Scene | None) -> 
     scene: None restores the whole file. Objects of no scene go with any of them.
     """
     if next(made_datablocks(), None) is None and not recorded_objects():
-        return Restored(0, ())
+        return RestoreResult(0, ())
     warnings = carry_edits(context)
     shown = showing()
     if scene is not None:
@@ -49,7 +49,7 @@ def restore_scene(context: bpy.types.Context, scene: bpy.types.Scene | None) -> 
     take_off_unused()
     sweep(stand_ins)
     context.view_layer.update()
-    return Restored(count, warnings)
+    return RestoreResult(count, warnings)
 
 
 def is_of_scene(obj: bpy.types.Object, scene: bpy.types.Scene) -> bool:

@@ -6,7 +6,7 @@ import json
 
 import bpy
 
-from ...bake import SHORT, BakeDigests, ShownBake, ShownLightmap
+from ...bake import SHORT, BakeDigests, RememberedLightmap, ShownBake
 from ...bake.result import BakeResult
 from ..datablocks.bake_record import shows_lightmap
 from ..scene_records.export_sources import Export
@@ -27,7 +27,7 @@ def shown_bake(scene: bpy.types.Scene, export: Export) -> ShownBake | None:
         record, files = obj.radiosity_bake, files_of(obj)
         if record.scene in {"", scene.name} and record.is_baked and shows_lightmap(obj) and files:
             light = record.light or scene.radiosity.baked_light
-            lightmap = ShownLightmap(record.fingerprint, light, record.texels_per_metre, len(files) > 1)
+            lightmap = RememberedLightmap(record.fingerprint, light, record.texels_per_metre, len(files) > 1)
             lightmaps[target.name] = lightmap
     return ShownBake(lightmaps, json.loads(scene.radiosity.baked_objects or "{}"))
 

@@ -40,7 +40,7 @@ _RECORD_FIELDS = (
 
 
 def showing() -> list[bpy.types.Object]:
-    """Return the file's own objects that show anything of a bake, but for stand-ins."""
+    """Return the file's own objects that show anything of a bake, except for stand-ins."""
     dressed = set(_dressed())
     return [
         obj
@@ -170,16 +170,17 @@ def _take_off(obj: bpy.types.Object) -> None:
     recorded = is_recorded(obj)
     known = stand_in_of(obj.data) if isinstance(obj.data, bpy.types.Mesh) else None
     original = obj.data.get(ORIGINAL) if known is not None else None
+    record = obj.radiosity_bake.modifiers if recorded else ()
+    modifiers = tuple((each.name, each.show_viewport, each.show_render) for each in record)
     if known is not None and original is not None:
         obj.data = original
         if recorded or obj.override_library is not None:
             for slot in known.object_slots:
                 if slot < len(obj.material_slots):
                     link_to_object(obj, slot)
-            _switch_on(obj, known.modifiers)
             obj.active_material_index = known.active_slot
-    elif recorded and obj.radiosity_bake.modifiers:
-        _switch_on(obj, [(m.name, m.show_viewport, m.show_render) for m in obj.radiosity_bake.modifiers])
+            modifiers = modifiers or known.modifiers
+    _switch_on(obj, modifiers)
     show_own_originals(obj)
     if recorded and obj.radiosity_bake.is_hidden:
         # What was made visible meanwhile stays so.
@@ -190,7 +191,7 @@ def _take_off(obj: bpy.types.Object) -> None:
 
 
 def _switch_on(obj: bpy.types.Object, modifiers: Sequence[tuple[str, bool, bool]]) -> None:
-    """Let modifiers show as they did, but for those that the user switched on since."""
+    """Let modifiers show as they did, except for those that the user switched on since."""
     names = {name for name, _, _ in modifiers}
     renamed = [m for m in obj.modifiers if m.name not in names and not (m.show_viewport or m.show_render)]
     for name, show_viewport, show_render in modifiers:

@@ -29,7 +29,7 @@ def sweep(stand_ins: Iterable[bpy.types.Object] = ()) -> None:
 
     What something of the user's refers to is replaced by the original it stands for, or else stays as the
     user's own: a stand-in that was edited or is a parent or a target, a lightmap in a material of the user's,
-    whatever is marked as an asset or to be kept.
+    and everything that is marked as an asset or to be kept.
     """
     _remove_stand_ins(list(stand_ins))
     _remove_meshes()

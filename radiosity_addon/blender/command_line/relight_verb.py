@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Generator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import bpy
 
@@ -15,13 +14,17 @@ from ...bake.result import BakeReport
 from ...bake.sidecar import StoredBake, check_belongs, read_sidecar
 from ...base import BakeWarning, Status, UsageError, staged
 from ...cli import Console, Interrupts, Permissions, summary
-from ...files import BLEND_NAME, PREVIEW_NAME, SIDECAR_NAME
+from ...files import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, SIDECAR_NAME
 from ...options import BakeSettings
+from ..apply.rebake import Originals
+from ..files.output import OutputFolder
 from ..files.single_files import check_places
+from ..images.images import group_file_names, page_file_names
+from ..jobs.finish import Copies, finish
+from ..jobs.preview import QUICK_SAMPLES
+from ..relight.relight_scene import lit
+from ..scene_export.export import export_steps
 from .verbs import open_or_build, output_of, registered, run_through, same_file, written_files
-
-if TYPE_CHECKING:
-    from ..files.output import OutputFolder
 
 EXPORT, RELIGHT, APPLY = 0.1, 0.2, 0.5
 """How far the whole is when each part begins; rough."""
@@ -44,7 +47,7 @@ def relight(
     Parameters
     ----------
     scene, loaded, report_copy, allowed, console, interrupts, preview
-        As for `commands.bake`.
+        As for `verbs.bake`.
     output : Path
         The folder with the bake and its sidecar.
     settings : BakeSettings
@@ -56,8 +59,6 @@ def relight(
         If the sidecar cannot be used, or the scene differs in more than strengths of its lights.
     """
     with registered():
-        from ...files import BLEND_NAME, REPORT_NAME
-
         source = scene or loaded
         if source is not None and same_file(source, output / BLEND_NAME):
             raise UsageError(
@@ -93,13 +94,6 @@ def relight_into(
     ------
     RadiosityError
     """
-    from ..apply.rebake import Originals
-    from ..images.images import group_file_names, page_file_names
-    from ..jobs.finish import Copies, finish
-    from ..jobs.preview import QUICK_SAMPLES
-    from ..relight.relight_scene import lit
-    from ..scene_export.export import export_steps
-
     seconds: dict[str, float] = {}
     with folder as output:
         output.expect((BLEND_NAME, PREVIEW_NAME, output.names.sidecar))

@@ -5,26 +5,32 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import bpy
 
 from ...bake import KeepOptions
+from ...bake.result import BakeReport, write_history
 from ...base import BakeWarning, SceneError, UsageError
 from ...cli import Console, Interrupts, Permissions, summary
+from ...files import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, SIDECAR_NAME
 from ...options import BakeSettings
+from ..apply.restore import restore_scene
+from ..files.cornell import build_cornell_box
+from ..files.files import empty_scene, open_scene
+from ..files.output import OutputFolder
+from ..files.ownership import CORNELL_BOX, owner_of
+from ..files.saved_files import save_restored
 from ..files.single_files import check_existing, check_places, make_folder_of, owner_record
+from ..jobs.finish import WRITING_STAGES, BakeJob
+from ..jobs.inspection import ERROR, inspect
+from ..jobs.job import run_bake
+from ..operators.checks import figures
 from ..registration import register, unregister
 from ..relight import kept_bakes
 from ..session import last_bake
 
-if TYPE_CHECKING:
-    from ...bake.result import BakeReport
-    from ..files.output import OutputFolder
-    from ..jobs.finish import BakeJob
-
 MAX_IMAGES = 8
-"""The closing lines name so many lightmaps one by one."""
+"""The closing lines name at most this many lightmaps one by one."""
 
 
 def bake(
@@ -65,9 +71,6 @@ def bake(
         Whether a picture of the result is rendered.
     """
     with registered():
-        from ...files import BLEND_NAME
-        from ..jobs.job import run_bake
-
         source = scene or loaded
         if source is not None and same_file(source, output / BLEND_NAME):
             raise UsageError(f"--output {output} would overwrite the scene '{source}'; choose another folder")
@@ -90,8 +93,6 @@ def bake(
             report.write_copy(report_copy)
         files = written_files(report.as_dict(), preview, keep)
         if plot is not None:
-            from ...bake.result import write_history
-
             console.progress("plot", 1.0)
             write_history(report.as_dict(), plot.resolve())
             files.append((str(plot), "history of the solution"))
@@ -100,8 +101,6 @@ def bake(
 
 def run_through(job: BakeJob, console: Console, interrupts: Interrupts) -> BakeReport:
     """Run a job to its end and return its report; interrupts end it, but not while it writes files."""
-    from ..jobs.finish import WRITING_STAGES
-
     try:
         while True:
             try:
@@ -136,9 +135,6 @@ def output_of(
     ------
     BakeError
     """
-    from ..files.output import OutputFolder
-    from ..files.ownership import CORNELL_BOX, owner_of
-
     came_from = CORNELL_BOX if source is None else str(source.expanduser().resolve())
     owner = owner_of(bpy.context.scene, came_from)
     if report_copy is not None:
@@ -167,10 +163,6 @@ def check(
         Where the bake would write.
     """
     with registered():
-        from ...files import BLEND_NAME, PREVIEW_NAME
-        from ..jobs.inspection import ERROR, inspect
-        from ..operators.checks import figures
-
         console.progress("open", 0.0)
         open_or_build(scene, loaded, allowed)
         folder = output.expanduser().resolve() if output is not None else Path.cwd()
@@ -198,10 +190,6 @@ def restore(
         If the file shows no bake, or the other may not be written.
     """
     with registered():
-        from ..apply.restore import restore_scene
-        from ..files.files import open_scene
-        from ..files.saved_files import save_restored
-
         if scene is None and loaded is None:
             raise UsageError("restore needs SCENE, a baked .blend")
         check_places({"--output": output}, scene or loaded)
@@ -223,9 +211,6 @@ def restore(
 
 def open_or_build(scene: Path | None, loaded: Path | None, allowed: Permissions) -> tuple[BakeWarning, ...]:
     """Have the scene to bake as the open file's scene; returns what to warn of."""
-    from ..files.cornell import build_cornell_box
-    from ..files.files import empty_scene, open_scene
-
     if scene is not None:
         return open_scene(scene, allowed.scripts)
     if loaded is None:
@@ -236,8 +221,6 @@ def open_or_build(scene: Path | None, loaded: Path | None, allowed: Permissions)
 
 def written_files(report: dict, preview: bool = True, kept: bool = False) -> list[tuple[str, str]]:
     """What a bake, with a preview or a sidecar or without, has left in its folder, for people to read."""
-    from ...files import BLEND_NAME, PREVIEW_NAME, REPORT_NAME, SIDECAR_NAME
-
     images = list(dict.fromkeys(entry["image"] for entry in report["objects"]))
     shown = images if len(images) <= MAX_IMAGES else [f"{images[0]} … {images[-1]}"]
     return [

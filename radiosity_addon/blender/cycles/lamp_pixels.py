@@ -9,7 +9,7 @@ import numpy as np
 from ...numerics import brdf_of_reflectance, intensity_of_flux
 from .world_pixels import look_around, only_for_now, panorama_scene
 
-SIZE = (16, 32)
+PICTURE_SIZE = (16, 32)
 """Rows and columns of the picture: directions in which the lamp is evaluated."""
 
 _SUBDIVISIONS = 5
@@ -37,7 +37,7 @@ def lamp_factor(lamp: bpy.types.Light) -> tuple[np.ndarray, float]:
         scene.collection.objects.link(_sphere())
         scene.cycles.max_bounces = 0
         scene.cycles.light_sampling_threshold = 0.0
-        pixels = look_around(scene, SIZE, f"lamp '{lamp.name}'").reshape(-1, 3)
+        pixels = look_around(scene, PICTURE_SIZE, f"lamp '{lamp.name}'").reshape(-1, 3)
     factors = pixels / (brdf_of_reflectance(_REFLECTANCE) * intensity_of_flux(1.0))
     mean = factors.mean(axis=0)
     return mean, float(factors.std(axis=0).max() / max(float(mean.max()), 1e-12))

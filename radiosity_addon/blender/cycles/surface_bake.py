@@ -1,8 +1,8 @@
 """A temporary scene in which Cycles evaluates materials.
 
-One mesh in it holds triangles of many objects, and copies of their materials glow with what is
-asked for: a bake of emission at one sample is exact. Nothing that was in the file is touched,
-and all that is added to it is removed again.
+One mesh in it holds triangles of many objects, and copies of their materials emit the quantity
+to evaluate: a bake of emission at one sample is exact. Nothing that was in the file is changed,
+and everything that is added is removed again.
 """
 
 from __future__ import annotations

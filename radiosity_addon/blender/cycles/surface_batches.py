@@ -16,7 +16,7 @@ from ...lightmap.images import SurfaceTiles, lay_out_again
 from ..datablocks.bake_record import remove_datablocks
 from ..scene_records.export_sources import MaterialSource
 from .surface_bake import DrawnSurfaces, attribute_names, drawn_surfaces
-from .surface_rewiring import CHANNELS, RewiredMaterial
+from .surface_rewiring import EXPRESSIONS, RewiredMaterial
 
 MOMENT = 0.04
 """Maximum seconds of rewiring materials per step, if one material takes less."""
@@ -79,7 +79,7 @@ def material_facts(
             yield len(facts) / len(materials)
             until = time.perf_counter() + MOMENT
         rewired = RewiredMaterial(source.find(), attribute_names(inputs))
-        varying = frozenset(channel for channel in CHANNELS if not rewired.is_constant(channel))
+        varying = frozenset(channel for channel in EXPRESSIONS if not rewired.is_constant(channel))
         facts[row] = MaterialFacts(varying, rewired.node_count)
         remove_datablocks(rewired.made)
     return facts

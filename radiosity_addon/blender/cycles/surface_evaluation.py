@@ -25,7 +25,7 @@ from ..scene_records.pieces import Piece
 from ..session.background import elsewhere
 from .surface_bake import SurfaceBake
 from .surface_batches import Batch, batches, material_facts
-from .surface_rewiring import CHANNELS
+from .surface_rewiring import EXPRESSIONS
 
 MIN_SIDE, MIN_CUT_OUT_SIDE, MAX_SIDE = 256, 1024, 2048
 """Texels along the image's side."""
@@ -67,7 +67,7 @@ def evaluate_surfaces(
         for row, one in enumerate(surfaces)
     ]
     # Where no material varies in a channel, the constants apply.
-    varying = [channel for channel in CHANNELS if any(channel in each.varying for each in facts.values())]
+    varying = [channel for channel in EXPRESSIONS if any(channel in each.varying for each in facts.values())]
     yield 0.1
 
     def laid_out() -> tuple[SurfaceTiles, dict[str, np.ndarray], list[Batch]]:
@@ -131,7 +131,7 @@ def _terms_of_constants(
 ) -> dict[str, np.ndarray]:
     """Return the three channels (h, w, 3) with what is constant filled in."""
     shape = (tiles.height, tiles.width, 3)
-    terms = {channel: np.zeros(shape, dtype=np.float32) for channel in CHANNELS}
+    terms = {channel: np.zeros(shape, dtype=np.float32) for channel in EXPRESSIONS}
     opacity = np.array([one.opacity for one in surfaces])
     constants = {
         "reflected": np.array([one.reflectance for one in surfaces]) * opacity[:, None],
@@ -147,7 +147,7 @@ def _terms_of_constants(
 def _images(
     tiles: SurfaceTiles, terms: Mapping[str, np.ndarray], rows: np.ndarray, count: int
 ) -> SurfaceImages:
-    reflectance, radiance, opacity = surface_of_terms(*(terms[channel] for channel in CHANNELS))
+    reflectance, radiance, opacity = surface_of_terms(*(terms[channel] for channel in EXPRESSIONS))
     values = np.empty((tiles.height, tiles.width, 7), dtype=np.float32)
     values[..., :3] = np.clip(np.nan_to_num(reflectance), 0.0, MAX_REFLECTANCE)
     values[..., 3:6] = radiosity_of_radiance(np.maximum(np.nan_to_num(radiance, posinf=0.0), 0.0))

@@ -1,6 +1,6 @@
 """Copies of materials that emit what the originals reflect, emit or transmit.
 
-The shader tree is followed once and three expressions are built beside it, of Math nodes on the
+The shader tree is followed once. Next to it, three expressions are built of Math nodes on the
 sockets that feed the shaders; Cycles then evaluates them. Node groups are copied for each use,
 and what crosses a group's border does so through sockets added to it.
 """
@@ -14,7 +14,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..materials.node_algebra import Color, NodeAlgebra, Scalar, is_socket
+from ..materials.node_algebra import NodeAlgebra, NodeColor, Scalar, is_socket
 from ..materials.shader_nodes import (
     MissingImageError,
     NotConstantError,
@@ -30,7 +30,7 @@ from ..materials.shader_nodes import (
 from ..materials.shader_terms import ShaderTerms, Terms, nothing
 from ..materials.shading_inputs import LIGHT_PATHS, asked_by_default, asked_by_outputs
 
-CHANNELS = ("reflected", "radiance", "passed")
+EXPRESSIONS = ("reflected", "radiance", "passed")
 
 
 class RewiredMaterial:
@@ -67,7 +67,7 @@ class RewiredMaterial:
         return not is_socket(getattr(self._terms, channel))
 
     def show(self, channel: str, image: bpy.types.Image) -> None:
-        """Make the material emit one of `CHANNELS`, and bake into an image."""
+        """Make the material emit one of `EXPRESSIONS`, and bake into an image."""
         value = getattr(self._terms, channel)
         color = self._emission.inputs["Color"]
         for link in list(color.links):
@@ -149,7 +149,7 @@ class _Rewiring(ShaderTerms[_Place]):
             return self._from_outside(feed.socket.identifier, place)
         return self.fed_by(feed, socket, place, place)
 
-    def color(self, socket: bpy.types.NodeSocket, place: _Place) -> Color:
+    def color(self, socket: bpy.types.NodeSocket, place: _Place) -> NodeColor:
         constant = self._constant(socket, place)
         return socket.links[0].from_socket if constant is None else constant.rgb
 
@@ -212,7 +212,7 @@ class _Rewiring(ShaderTerms[_Place]):
 def _each(terms: Terms, carry: Callable[[bpy.types.NodeSocket], bpy.types.NodeSocket]) -> Terms:
     """Carry those terms that are sockets over a border."""
     carried: dict[str, Any] = {}
-    for channel in CHANNELS:
+    for channel in EXPRESSIONS:
         value = getattr(terms, channel)
         carried[channel] = carry(value) if is_socket(value) else np.asarray(value)
     return Terms(**carried)

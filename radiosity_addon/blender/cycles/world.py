@@ -23,8 +23,14 @@ from ..materials.materials import read_radiance, uses_nodes
 from .lamps import ALL_BOUNCES
 from .world_pixels import world_pixels
 
+_CORE = 0.05
+"""The core of a patch is what is above this fraction of its brightest pixel: a sun without its glow."""
+
 _SMALL = np.radians(10.0)
-"""A bright patch that spans less is looked at closely: it may be a sun."""
+"""A core that spans less is looked at closely: it may be a sun, which the first look hits by few samples."""
+
+_WORTH = 0.01
+"""Of the sky's light: a core with less is not worth a look, which takes Blender up to a second."""
 
 _CLOSE = (96, 96)
 """Pixels of that look."""
@@ -50,10 +56,10 @@ def read_world(world: bpy.types.World | None, dark: bool = False) -> Generator[f
     with known_means_only(None):  # an image is not constant
         radiance, warnings = read_radiance(world, "world")
     # The walk through the nodes warns of values that are not constant; Cycles evaluates those.
-    beside = tuple(warning for warning in warnings if "volume" in warning.message)
-    if len(beside) == len(warnings):
-        return _constant(radiance, world.name, dark), beside + limited
-    return (yield from _sampled(world.name_full)), beside + limited
+    other_warnings = tuple(warning for warning in warnings if "volume" in warning.message)
+    if len(other_warnings) == len(warnings):
+        return _constant(radiance, world.name, dark), other_warnings + limited
+    return (yield from _sampled(world.name_full)), other_warnings + limited
 
 
 def _constant(radiance: np.ndarray, name: str, dark: bool) -> list[Light]:
@@ -99,35 +105,46 @@ def _sampled(full_name: str) -> Generator[float, None, list[Light]]:
 
 
 def _patch(world: bpy.types.World, pixels: np.ndarray, excess: np.ndarray, rows: np.ndarray) -> SkyPatch:
-    """Return the excess of some pixels as a light, looked at closely if it is small."""
+    """Return the excess of some pixels as a light; its core is looked at closely if it is small."""
     bounds = pixel_bounds((pixels.shape[0], pixels.shape[1]))
-    window = _around(bounds[rows])
-    if window is not None:
+    angle = solid_angles(bounds)
+    flat = pixels.reshape(-1, 3)
+    brightness = excess[rows].mean(axis=1)
+    core = rows[brightness > _CORE * brightness.max()]
+    power = excess * angle[:, None]
+    window = _around(bounds[core], margin=np.pi / len(pixels))
+    if window is not None and power[core].sum() > _WORTH * (flat * angle[:, None]).sum():
+        # What is not the patch's there stays in the even part of the sky, or in another patch.
+        kept = flat.copy()
+        kept[rows] -= excess[rows]
+        inside = _inside(bounds, window)
         close = pixel_bounds(_CLOSE, window)
         radiance = world_pixels(world, window, _CLOSE).reshape(-1, 3)
-        power = radiance * solid_angles(close)[:, None]
-        # What stays in the even part of the sky there is not the patch's.
-        inside = _inside(bounds, window)
-        flat = pixels.reshape(-1, 3)
-        even = ((flat - excess)[inside] * solid_angles(bounds[inside])[:, None]).sum(axis=0)
-        irradiance = np.maximum(power.sum(axis=0) - even, 0.0)
-        above = radiance.mean(axis=1) - (flat - excess)[rows].mean(axis=1).max()
+        total = (radiance * solid_angles(close)[:, None]).sum(axis=0)
+        of_core = np.maximum(total - (kept[inside] * angle[inside, None]).sum(axis=0), 0.0)
+        above = radiance.mean(axis=1) - kept[rows].mean(axis=1).max()
         share = np.maximum(above, 0.0) * solid_angles(close)
-        if irradiance.any() and share.any():
-            bright = share > 0.0
-            return SkyPatch(irradiance, close[bright], share[bright], name=world.name)
-    power = excess[rows] * solid_angles(bounds[rows])[:, None]
-    return SkyPatch(power.sum(axis=0), bounds[rows], power.mean(axis=1), name=world.name)
+        if of_core.any() and share.any():
+            share *= of_core.mean() / share.sum()
+            rest = rows[~inside[rows]]
+            return SkyPatch(
+                of_core + power[rest].sum(axis=0),
+                np.concatenate([close[share > 0.0], bounds[rest]]),
+                np.concatenate([share[share > 0.0], power[rest].mean(axis=1)]),
+                name=world.name,
+            )
+    return SkyPatch(power[rows].sum(axis=0), bounds[rows], power[rows].mean(axis=1), name=world.name)
 
 
-def _around(bounds: np.ndarray) -> Bounds | None:
-    """Return the window around pixels; None if it is not small."""
+def _around(bounds: np.ndarray, margin: float) -> Bounds | None:
+    """Return the window around pixels, and so much around them [rad]; None if it is not small."""
     left, right = bounds[:, 2], bounds[:, 3]
     if right.max() - left.min() > np.pi:  # they lie on both sides of where azimuths jump
         left, right = (np.where(side < 0, side + 2.0 * np.pi, side) for side in (left, right))
         right = np.where(right < left, right + 2.0 * np.pi, right)
-    low, high = float(bounds[:, 0].min()), float(bounds[:, 1].max())
-    start, end = float(left.min()), float(right.max())
+    low = max(float(bounds[:, 0].min()) - margin, -0.5 * np.pi)
+    high = min(float(bounds[:, 1].max()) + margin, 0.5 * np.pi)
+    start, end = float(left.min()) - margin, float(right.max()) + margin
     wide = (end - start) * np.cos(0.5 * (low + high))
     small = high - low < _SMALL and wide < _SMALL and end - start < np.pi
     return (low, high, start, end) if small else None

@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 
 from ...base import BakeError
-from ...lights import WHOLE, Bounds
+from ...lights import WHOLE_SPHERE, Bounds
 
 WIDTH, HEIGHT = 512, 256
 SAMPLES = 16
@@ -23,7 +23,7 @@ _AS_DIFFUSE_RAYS = {"Is Diffuse Ray": 1.0, "Is Reflection Ray": 1.0, "Ray Length
 
 
 def world_pixels(
-    world: bpy.types.World, window: Bounds = WHOLE, size: tuple[int, int] = (HEIGHT, WIDTH)
+    world: bpy.types.World, window: Bounds = WHOLE_SPHERE, size: tuple[int, int] = (HEIGHT, WIDTH)
 ) -> np.ndarray:
     """Return the radiance of a world by direction.
 
@@ -43,7 +43,7 @@ def world_pixels(
         return look_around(panorama_scene(copy, window), size, f"world '{world.name}'")
 
 
-def panorama_scene(world: bpy.types.World | None, window: Bounds = WHOLE) -> bpy.types.Scene:
+def panorama_scene(world: bpy.types.World | None, window: Bounds = WHOLE_SPHERE) -> bpy.types.Scene:
     """Make a scene that holds nothing but a world, and a camera that looks around."""
     scene = bpy.data.scenes.new("Radiosity World")
     scene.world = world

@@ -24,3 +24,11 @@ def take_marks(target: bpy.types.ID | None, source: bpy.types.ID) -> None:
             setattr(taken, name, getattr(given, name))
     for tag in given.tags:
         taken.tags.new(tag.name)
+
+
+def move_marks(target: bpy.types.ID, source: bpy.types.ID) -> None:
+    """The same, and take them off the other one."""
+    take_marks(target, source)
+    source.use_fake_user = False
+    if source.asset_data is not None:
+        source.asset_clear()

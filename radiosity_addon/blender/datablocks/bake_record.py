@@ -20,7 +20,8 @@ MADE_MARKER = "radiosity_lightmaps"
 """Custom property of the datablocks that a bake made."""
 
 ORIGINAL = "radiosity_original"
-"""Custom property of a material copy or a stand-in mesh: the user's datablock that it shows."""
+"""Custom property of a stand-in mesh, or of a copy of a material or node group: the user's datablock that it
+shows. Copies of no material have none."""
 
 LAYER = "radiosity_layer"
 """Custom property of a mesh with a UV layer of ours; see `uv_layers.py`."""
@@ -168,6 +169,17 @@ def record_hiding(obj: bpy.types.Object, scene: bpy.types.Scene) -> None:
     record.hide_viewport = obj.hide_viewport
     record.hide_render = obj.hide_render
     record.scene = scene.name
+
+
+def record_modifiers(obj: bpy.types.Object) -> None:
+    """Remember which modifiers show, for as long as they are switched off.
+
+    The stand-in mesh knows them too, for library overrides keep no list; but the object may get another mesh.
+    """
+    for modifier in obj.modifiers if obj.override_library is None else ():
+        entry = obj.radiosity_bake.modifiers.add()
+        entry.name = modifier.name
+        entry.show_viewport, entry.show_render = modifier.show_viewport, modifier.show_render
 
 
 def forget(obj: bpy.types.Object) -> None:

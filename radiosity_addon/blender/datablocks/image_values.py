@@ -14,25 +14,25 @@ _ENCODED = ("sRGB", "AgX Base sRGB", "Filmic sRGB")
 _BAND_ROWS = 256  # rows decoded at a time: bounds the temporaries of a large image
 
 
-Wanted = tuple[str, bool]
+ImageKey = tuple[str, bool]
 """An image's full name, and whether it is equirectangular."""
 
-Means = dict[Wanted, "np.ndarray | None"]
+ImageMeans = dict[ImageKey, "np.ndarray | None"]
 
 
 class UnknownMeanError(Exception):
     """An image's mean is needed but not known yet; computing it now would take too long."""
 
-    def __init__(self, wanted: Wanted) -> None:
+    def __init__(self, wanted: ImageKey) -> None:
         super().__init__(wanted[0])
         self.wanted = wanted
 
 
-_known: list[Means | None] = []
+_known: list[ImageMeans | None] = []
 
 
 @contextmanager
-def known_means_only(means: Means | None) -> Iterator[None]:
+def known_means_only(means: ImageMeans | None) -> Iterator[None]:
     """Have `image_mean` look means up, and raise `UnknownMeanError` where there is none.
 
     With None it takes 0 for all of them: where it only counts that something is an image.
@@ -56,7 +56,7 @@ def image_mean(image: bpy.types.Image, equirectangular: bool = False) -> np.ndar
     return drain(image_mean_steps(image, equirectangular))
 
 
-def mean_of_named(wanted: Wanted) -> Generator[float, None, np.ndarray | None]:
+def mean_of_named(wanted: ImageKey) -> Generator[float, None, np.ndarray | None]:
     """Return an image's mean, found by its name; None if there is none of that name any more."""
     image = next((each for each in bpy.data.images if each.name_full == wanted[0]), None)
     return None if image is None else (yield from image_mean_steps(image, wanted[1]))

@@ -11,6 +11,7 @@ import bpy
 from ...base import BakeWarning, SceneError
 from ..datablocks.quiet_output import silenced
 from .gltf_check import gltf_fault
+from .scene_parts import scene_parts
 
 
 def open_scene(path: str | Path, scripts: bool = False) -> tuple[BakeWarning, ...]:
@@ -53,6 +54,11 @@ def open_scene(path: str | Path, scripts: bool = False) -> tuple[BakeWarning, ..
     if opener is _open_blend:
         _open_blend(path, scripts)
         return _blocked_scripts()
+    for part in scene_parts(path):
+        if part.exists() and not part.is_file():  # an importer would read a device without end
+            raise SceneError(
+                f"{path} cannot be read: its part '{part}' is not a file; export the scene again"
+            )
     opener(path)
     return ()
 

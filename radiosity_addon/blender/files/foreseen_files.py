@@ -8,14 +8,14 @@ import numpy as np
 
 from ...options import BakeSettings
 from ..images.images import names_of_any
-from ..scene_records.pieces import Collected, Piece
+from ..scene_records.pieces import Piece, SceneContents
 from .output import OutputFolder
 
 
-def refusal(
+def file_refusal(
     output: OutputFolder,
     settings: BakeSettings,
-    collected: Collected,
+    collected: SceneContents,
     chosen: Sequence[Piece],
     more: Collection[str] = (),
 ) -> str | None:
@@ -32,7 +32,7 @@ def refusal(
     return output.refusal([*more, *names])
 
 
-def _light_groups(collected: Collected) -> list[str]:
+def _light_groups(collected: SceneContents) -> list[str]:
     """Return the light groups of all sources, "" for none."""
     on_material = [getattr(material, "group", "") for material in collected.materials]
     of_surfaces = [

@@ -26,7 +26,7 @@ def gltf_fault(path: Path) -> str | None:
     Returns fault: In words that follow the file's name.
     """
     try:
-        tree = json.loads(_json_of(path.read_bytes()))
+        tree = gltf_tree(path)
     except (ValueError, struct.error, RecursionError):
         return None  # the importer says where
     if not isinstance(tree, dict):
@@ -35,6 +35,14 @@ def gltf_fault(path: Path) -> str | None:
         return next(_faults(tree), None)
     except (TypeError, AttributeError, KeyError, IndexError, ValueError):
         return "its parts do not fit together"
+
+
+def gltf_tree(path: Path) -> Any:
+    """Return the JSON of a .gltf or .glb file.
+
+    Raises OSError, ValueError, RecursionError or struct.error if there is none.
+    """
+    return json.loads(_json_of(path.read_bytes()))
 
 
 def _json_of(content: bytes) -> bytes:
@@ -113,7 +121,7 @@ def _missing(tree: dict[str, Any]) -> Iterator[str]:
 
 
 def _has_cycle(children: list[list[int]]) -> bool:
-    """Tell whether following children from some node leads back to it."""
+    """Return whether following children from some node leads back to it."""
     parents = [0] * len(children)
     for row in children:
         for child in row:

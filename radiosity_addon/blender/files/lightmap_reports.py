@@ -18,7 +18,7 @@ Listed = Mapping[str, Mapping[str, Any]]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class _Read:
-    """What is asked of a report: the files that it lists, and the mark of the bake in its sidecar."""
+    """The needed part of a report: the files that it lists, and the mark of the bake in its sidecar."""
 
     listed: Listed = field(default_factory=dict)
     kept: str = ""
@@ -76,5 +76,5 @@ def images_described(contents: Mapping[str, Any]) -> set[str]:
 
 
 def forget_reports() -> None:
-    """Read all of them again when they are asked for."""
+    """Read all of them again when they are needed."""
     _known.clear()

@@ -80,7 +80,7 @@ def report_listing(path: Path, scenes: Collection[bpy.types.Scene]) -> OwnReport
                 read_report(path.with_name(name))
             except NoReportError as error:
                 raise BakeError(f"'{path.with_name(name)}' {error}: move it away and bake again") from None
-    raise BakeError(f"no report of this file and scene lists '{path}': move it away and bake again")
+    raise BakeError(f"no report of this file and scene lists '{path}': bake again")
 
 
 def is_read(path: Path) -> bool:
@@ -91,11 +91,14 @@ def is_read(path: Path) -> bool:
 
 
 def _read_files() -> Iterator[Path]:
-    """Yield all files that the open file refers to, and itself; our own lightmaps are none."""
+    """Yield all files that the open file refers to, and itself; our own lightmaps are none.
+
+    Files of packed images are among them: importing glTF packs what it has read.
+    """
     made: set[str] = set()
     others: set[str] = set()
     for image in bpy.data.images:
-        if image.packed_file is None and image.filepath_raw:
+        if image.filepath_raw:
             path = os.path.normpath(bpy.path.abspath(image.filepath_raw, library=image.library))
             (made if is_made(image) else others).add(path)
     if bpy.data.filepath:

@@ -42,9 +42,9 @@ def save_restored(path: Path) -> None:
     """
     try:
         with replacing(path) as aside:
-            beside = aside.parent.with_name(f"{aside.parent.name}.blend")
-            _save(beside, path)
-            beside.replace(aside)
+            saved = aside.parent.with_name(f"{aside.parent.name}.blend")
+            _save(saved, path)
+            saved.replace(aside)
     except OSError as error:
         raise BakeError(f"cannot write '{path}': {error.strerror}") from error
 

@@ -1,4 +1,4 @@
-"""Files that the command line writes by themselves, wherever the user says: `--report`, `--plot`, `restore`.
+"""Single files that the command line writes where the user says: `--report`, `--plot`, `restore`.
 
 None of them may replace the scene, a file the scene reads, a file of the bake, or another of them; what is
 there already is replaced only if it is ours, or with `--overwrite`.
@@ -14,6 +14,7 @@ from ...base import BakeError, UsageError
 from ...files import OWNER, NoReportError, Owner, read_report
 from .output import is_same_file, refuse_special
 from .ownership import is_read
+from .scene_parts import scene_parts
 
 
 def check_places(places: Mapping[str, Path], scene: Path | None) -> None:
@@ -23,7 +24,10 @@ def check_places(places: Mapping[str, Path], scene: Path | None) -> None:
     scene: The scene's file, if there is one.
     Raises RadiosityError: Naming the option.
     """
-    taken: dict[str, Path] = {} if scene is None else {"the scene itself": scene}
+    taken: dict[str, Path] = {}
+    if scene is not None and places:
+        taken = {f"a part of the scene, '{part.name}'": part for part in scene_parts(scene)}
+        taken["the scene itself"] = scene
     for option, path in places.items():
         for what, other in taken.items():
             if is_same_file(_absolute(path), _absolute(other)):
@@ -37,7 +41,7 @@ def check_existing(option: str, path: Path, overwrite: bool, ours: Mapping[str, 
     """Refuse to replace a file that is not ours; once the scene is open.
 
     option: That names it.
-    overwrite: Whether other files may be replaced, too, but for those the scene reads.
+    overwrite: Whether other files may be replaced, too, except for those the scene reads.
     ours: The owner as the report of the bake will say, if a report of that may be replaced.
     Raises BakeError.
     """

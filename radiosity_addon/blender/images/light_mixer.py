@@ -14,13 +14,13 @@ from dataclasses import dataclass
 import bpy
 
 from ..datablocks.bake_record import is_made, mark_made
+from .node_group import LIGHTMAP
 
 MIXER_NAME = "Radiosity Light Groups"
 SLIDERS_NAME = "Radiosity Light Group"
 
 COLOR, STRENGTH, TEXEL, SCALE = "Color", "Strength", "Texel", "Scale"
 FACTOR, LIGHT = "Factor", "Light"
-LIGHTMAP = "Lightmap"
 
 KIND = "radiosity_mixer"
 """Custom property of the mixer, also where it is set aside."""
@@ -152,9 +152,9 @@ def _set_tree(node: bpy.types.Node, sliders: bpy.types.NodeTree) -> None:
 def _sliders_tree() -> bpy.types.NodeTree:
     """Return the node group of one light group, created if the file has none of ours."""
     for tree in bpy.data.node_groups:
-        mine = is_made(tree) and tree.library is None and tree.get(KIND) is None
+        is_ours = is_made(tree) and tree.library is None and tree.get(KIND) is None
         # The mixer's name begins with the same words.
-        if mine and tree.name.startswith(SLIDERS_NAME) and not tree.name.startswith(MIXER_NAME):
+        if is_ours and tree.name.startswith(SLIDERS_NAME) and not tree.name.startswith(MIXER_NAME):
             return tree
     tree = bpy.data.node_groups.new(SLIDERS_NAME, "ShaderNodeTree")
     mark_made(tree)

@@ -1,7 +1,7 @@
 """End a job whose file is no longer the one that it began in: another window may undo, or open another.
 
-Between two steps of a job a second window is free. What is edited there is survived, or found out by whoever
-needs it; an undo replaces everything at once, and what is shown may be another scene.
+Between two steps of a job a second window is free. Edits there are survived, or noticed by the step that they
+affect; but an undo replaces everything at once, and the window may show another scene.
 """
 
 from __future__ import annotations

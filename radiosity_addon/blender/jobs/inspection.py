@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
-from ...bake import Estimate, LightmappedObject, estimate_bake, refuse_too_large, thinned_out
+from ...bake import Estimate, LightmappedObject, estimate_bake, refuse_large_pages, thinned_out
 from ...base import RadiosityError
 from ...lightmap.unwrap import greedy_object, share_of
 from ...numerics import double_area_vectors
@@ -25,12 +25,12 @@ from ...options import BakeSettings
 from ...scene import LIGHTMAP_UV_LAYER
 from ..apply.rebake import originals_shown
 from ..datablocks.mesh_arrays import world_from_object
-from ..files.foreseen_files import refusal
+from ..files.foreseen_files import file_refusal
 from ..materials.materials import uses_nodes
 from ..scene_export.collect import collect
 from ..scene_export.export import check_names, chosen_pieces
 from ..scene_records.object_roles import BAKEABLE_TYPES
-from ..scene_records.pieces import Collected, Piece
+from ..scene_records.pieces import Piece, SceneContents
 from ..scene_records.render_state import render_depsgraph
 
 if TYPE_CHECKING:
@@ -40,10 +40,10 @@ if TYPE_CHECKING:
 ERROR, WARNING, INFO = "ERROR", "WARNING", "INFO"
 """The bake would stop; the result may disappoint; worth knowing."""
 
-FEW_TEXELS = 64
+TINY_TEXELS = 64
 """Objects with fewer texels are called tiny: 8 × 8."""
 
-BLACK = 0.01
+MAX_BLACK = 0.01
 """What reflects less is called black."""
 
 ODD_SCALE = 100.0
@@ -58,7 +58,7 @@ CLOSED = 1e-4
 NOTED_FILES = 1e9
 """Temporary files are reported from this size on [bytes]."""
 
-NAMED = 3
+MAX_NAMED = 3
 """So many objects are named in a finding."""
 
 
@@ -152,7 +152,7 @@ def inspect(
     lit = [_lit(piece, shapes, settings) for piece in chosen]
     triangles = sum(len(piece.mesh) for piece in collected.pieces)
     plan = estimate_bake(lit, triangles, settings)
-    refused = None if output is None else refusal(output, settings, collected, chosen, files)
+    refused = None if output is None else file_refusal(output, settings, collected, chosen, files)
     if refused is not None:
         findings.append(Finding(ERROR, "file", refused))
     findings += [
@@ -209,7 +209,9 @@ def _of_the_file(folder: Path | None) -> Iterator[Finding]:
         yield Finding(ERROR, "file", f"cannot write to the output folder '{folder}': choose another")
 
 
-def _of_light(context: bpy.types.Context, collected: Collected, settings: BakeSettings) -> Iterator[Finding]:
+def _of_light(
+    context: bpy.types.Context, collected: SceneContents, settings: BakeSettings
+) -> Iterator[Finding]:
     """Say whether anything shines, and which surfaces are black."""
     shown = {row for piece in collected.pieces for row in np.unique(piece.surface).tolist()}
     surfaces = [(row, collected.surfaces[row]) for row in sorted(shown)]
@@ -225,14 +227,14 @@ def _of_light(context: bpy.types.Context, collected: Collected, settings: BakeSe
             yield Finding(WARNING, scene, message)
     for row, surface in surfaces:
         material = collected.materials[row]
-        black = surface.reflectance.max() < BLACK and not surface.emission.any() and not surface.varies
+        black = surface.reflectance.max() < MAX_BLACK and not surface.emission.any() and not surface.varies
         if material is not None and black and surface.opacity > 0:
             message = f"material '{material.name}' is black: surfaces with it look black in any light"
             yield Finding(INFO, material.name, message)
 
 
 def _shines(world: bpy.types.World | None) -> bool:
-    """Tell whether a world may give light, without rendering it."""
+    """Return whether a world may give light, without rendering it."""
     if world is None:
         return False
     if not uses_nodes(world):
@@ -286,19 +288,19 @@ def _of_texels(lit: Sequence[LightmappedObject], plan: Estimate) -> Iterator[Fin
     tiny = [
         item.name
         for item, texels in zip(lit, plan.texels, strict=True)
-        if item.area > 0 and texels < FEW_TEXELS
+        if item.area > 0 and texels < TINY_TEXELS
     ]
     names = [item.name for item in lit]
     greedy = greedy_object(names, plan.texels)
     for warning in thinned_out(names, plan.thinned):
         yield Finding(WARNING, warning.name, warning.message)
     if tiny:
-        mend = (
+        advice = (
             "raise the resolution or the texel scale"
             if greedy is None
             else f"'{greedy}' takes nearly all of them"
         )
-        yield Finding(WARNING, tiny[0], f"{_names(tiny)} about to get fewer than 8 × 8 texels: {mend}")
+        yield Finding(WARNING, tiny[0], f"{_names(tiny)} about to get fewer than 8 × 8 texels: {advice}")
     if greedy is not None:
         taken = share_of(max(plan.texels), sum(plan.texels))
         message = (
@@ -309,7 +311,7 @@ def _of_texels(lit: Sequence[LightmappedObject], plan: Estimate) -> Iterator[Fin
 
 
 def _of_shapes(
-    context: bpy.types.Context, collected: Collected, shapes: dict[int, _Shape]
+    context: bpy.types.Context, collected: SceneContents, shapes: dict[int, _Shape]
 ) -> Iterator[Finding]:
     """Name objects that are inside out, and scales that look forgotten."""
     pieces = [piece for piece in collected.pieces if id(piece) in shapes]
@@ -357,7 +359,7 @@ def _of_size(shapes: dict[int, _Shape]) -> Iterator[Finding]:
 def _of_memory(plan: Estimate, settings: BakeSettings) -> Iterator[Finding]:
     """Say whether pages are too large for the memory limit, and whether memory or disk may not do."""
     try:
-        refuse_too_large(plan.pages, settings)
+        refuse_large_pages(plan.pages, settings)
     except RadiosityError as error:
         yield Finding(ERROR, "memory", str(error))
         return
@@ -379,7 +381,7 @@ def _of_memory(plan: Estimate, settings: BakeSettings) -> Iterator[Finding]:
 
 
 def free_memory() -> float | None:
-    """Return the memory that is free [bytes]; None where the system does not tell."""
+    """Return the memory that is free [bytes]; None if the system does not report it."""
     try:
         lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
         values = {line.split(":")[0]: float(line.split()[1]) for line in lines}
@@ -392,5 +394,5 @@ def _names(names: Sequence[str]) -> str:
     """Say which objects, with the verb: "object 'A' is", "5 objects ('A', 'B', 'C' …) are"."""
     if len(names) == 1:
         return f"object '{names[0]}' is"
-    named = ", ".join(f"'{name}'" for name in names[:NAMED])
-    return f"{len(names)} objects ({named}{' …' if len(names) > NAMED else ''}) are"
+    named = ", ".join(f"'{name}'" for name in names[:MAX_NAMED])
+    return f"{len(names)} objects ({named}{' …' if len(names) > MAX_NAMED else ''}) are"

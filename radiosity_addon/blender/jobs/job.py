@@ -9,7 +9,7 @@ from functools import partial
 
 import bpy
 
-from ...bake import BakePlan, KeepOptions, pages_of, plan_bake, refuse_too_large, run_pipeline, timed
+from ...bake import BakePlan, KeepOptions, pages_of, plan_bake, refuse_large_pages, run_pipeline, timed
 from ...bake.relight import KeptBake
 from ...bake.result import BakeResult
 from ...base import BakeWarning, NothingToDoError, Progress, Status, staged
@@ -27,7 +27,7 @@ from ..scene_export.export import export_steps
 from ..scene_records.export_sources import Export
 from ..session.background import in_thread
 from .finish import APPLYING, BakeJob, Copies, Scope, finish
-from .live_picture import Seen, seen_triangles
+from .live_picture import ViewportFilter, seen_triangles
 from .preview import SAMPLES
 
 SOLVE = 0.03
@@ -64,7 +64,7 @@ def run_bake(
     with_copy: Write `baked.blend` and `preview.png` into the output folder as well.
     in_background: Return from every `next` within a moment, for a window: the steps between the export and
         the lightmaps, which know nothing of Blender, run in a thread.
-    keeping: If given, the bake is kept for relighting: in memory, and in a sidecar if that is asked for.
+    keeping: If given, the bake is kept for relighting: in memory, and in a sidecar if requested.
     only_changed: Give new lightmaps to objects that changed since the last bake; the bake cannot be kept
         then. If objects have only moved since a bake that was kept, all lightmaps follow (`bake/plan.py`).
     notes: What is known before the bake and belongs into its report.
@@ -73,8 +73,8 @@ def run_bake(
     Raises RadiosityError: Whatever cannot be baked or written, in one line.
     """
     seconds: dict[str, float] = {}
-    # Now, not after the export: large pages need much memory whatever is on them.
-    refuse_too_large(pages_of(settings) or (), settings)
+    # Now, not after the export: large pages need much memory, even if they are nearly empty.
+    refuse_large_pages(pages_of(settings) or (), settings)
     lightmap_versions.flush()
     with ExitStack() as stack:
         if output is not None:
@@ -83,9 +83,9 @@ def run_bake(
         yield Status("export", 0.0)
         if output is not None:
             preview = (PREVIEW_NAME,) if with_preview else ()
-            beside = (BLEND_NAME, *preview) if with_copy else ()
+            own_copies = (BLEND_NAME, *preview) if with_copy else ()
             sidecars = (output.names.sidecar,) if keeping and keeping.sidecar else ()
-            for _ in output.expecting((*beside, *sidecars)):
+            for _ in output.expecting((*own_copies, *sidecars)):
                 yield Status("export", 0.0)
         originals = Originals(context)
         with timed(seconds, "export"):
@@ -161,7 +161,7 @@ def _solve(
 ) -> Generator[Status, None, tuple[BakeResult, KeptBake | None]]:
     """Run the pipeline, its progress scaled to its share of the whole, its pictures to what is `seen`."""
     steps = in_thread(lambda progress: baking(progress.part(SOLVE, end)), in_background)
-    status, only = Status("unwrap", SOLVE), Seen(seen)
+    status, only = Status("unwrap", SOLVE), ViewportFilter(seen)
     try:
         while True:
             try:

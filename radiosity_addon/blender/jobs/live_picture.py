@@ -19,7 +19,7 @@ _SEEN_THROUGH = frozenset({"WIRE", "BOUNDS"})
 
 
 def seen_triangles(context: bpy.types.Context, export: Export) -> Array:
-    """Tell which of the scene's triangles the viewports show as surfaces.
+    """Return which of the scene's triangles the viewports show as surfaces.
 
     What is hidden there, so that one can look into a room, is baked but stays hidden.
 
@@ -33,7 +33,7 @@ def seen_triangles(context: bpy.types.Context, export: Export) -> Array:
     return seen
 
 
-class Seen:
+class ViewportFilter:
     """Leaves out of pictures what the viewports do not show.
 
     triangles (t,) bool: From `seen_triangles`.
@@ -54,8 +54,8 @@ class Seen:
         return replace(picture, surfaces=self._surfaces[1])
 
 
-def beside(picture: Picture, surfaces: TexelSurfaces) -> Picture:
-    """Return the picture of what texels do not show: backs, and surfaces without a lightmap."""
+def without_texels(picture: Picture, surfaces: TexelSurfaces) -> Picture:
+    """Return the part of a picture that texels do not show: backs, and surfaces without a lightmap."""
     lit = np.isin(picture.triangle, surfaces.triangle) & picture.front
     return picture.only(~lit)
 
@@ -72,7 +72,7 @@ def page_colors(picture: TexelPicture, exposure: float, white: float) -> list[Ar
 
 @lru_cache(maxsize=4)
 def _colors_of_halves(exposure: float, white: float) -> Array:
-    """Return (65536,) float32 what `display_colors` makes of each float16, by its bits; 0 below 0."""
+    """Return (65536,) float32: `display_colors` of each float16, indexed by its bits; 0 below 0."""
     values = np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(np.float64)
     values = np.nan_to_num(values, nan=0.0, posinf=HALF_MAX, neginf=0.0)
     return display_colors(values, exposure, white)

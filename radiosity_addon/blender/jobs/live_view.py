@@ -12,6 +12,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import bpy
+import gpu
 from bpy.app.handlers import persistent
 
 from ..overlays.drawing import PagedSurfaces, over_the_objects
@@ -20,7 +21,7 @@ from ..session.redraw import redraw_viewports as _redraw
 if TYPE_CHECKING:
     from ...bake.result import Picture, TexelPicture, TexelSurfaces
 
-WHITE = 16.0
+WHITE_RADIANCE = 16.0
 """Radiance that view transforms with soft highlights (AgX, Filmic) show white, at exposure 0 [W/m²/sr]."""
 
 _HARD = frozenset({"Standard", "Raw", "False Color"})
@@ -34,7 +35,7 @@ class _LiveView:
         # By name: undo would make a reference stale.
         self._scene = scene.name_full
         self._exposure = 2.0**scene.view_settings.exposure
-        self._white = 1.0 if scene.view_settings.view_transform in _HARD else WHITE
+        self._white = 1.0 if scene.view_settings.view_transform in _HARD else WHITE_RADIANCE
         self._picture: Picture | None = None
         self._texels: TexelPicture | None = None
         self._lit: tuple[TexelSurfaces, PagedSurfaces] | None = None
@@ -46,11 +47,11 @@ class _LiveView:
     def show(self, picture: Picture | TexelPicture) -> None:
         """Draw this from now on; texels in place of the elements below them."""
         from ...bake.result import TexelPicture
-        from .live_picture import beside
+        from .live_picture import without_texels
 
         if isinstance(picture, TexelPicture):
             if self._picture is not None and self._texels is None:
-                self.show(beside(self._picture, picture.surfaces))
+                self.show(without_texels(self._picture, picture.surfaces))
             self._texels = picture
         else:
             self._picture, self._batches = picture, {}
@@ -66,7 +67,7 @@ class _LiveView:
         if (self._picture is None and self._texels is None) or bpy.context.scene.name_full != self._scene:
             return
         shading = bpy.context.space_data.shading
-        exposure = self._exposure if _uses_exposure(shading) else 1.0
+        exposure = self._exposure if uses_exposure(shading) else 1.0
         if self._picture is not None and exposure not in self._batches:
             self._batches[exposure] = self._upload(self._picture, exposure)
         # The two sides of a triangle lie in one place, each counter-clockwise as seen from its own.
@@ -92,7 +93,6 @@ class _LiveView:
 
     def _upload(self, picture: Picture, exposure: float) -> list[tuple[bool, Any]]:
         """Hand the picture to the graphics card, fronts and backs apart: once, however often it is drawn."""
-        import gpu
         from gpu_extras.batch import batch_for_shader
 
         from .live_picture import corner_arrays
@@ -109,8 +109,8 @@ class _LiveView:
         return batches
 
 
-def _uses_exposure(shading: bpy.types.View3DShading) -> bool:
-    """Tell whether a viewport will show the lightmaps with the scene's exposure.
+def uses_exposure(shading: bpy.types.View3DShading) -> bool:
+    """Return whether a viewport will show the lightmaps with the scene's exposure.
 
     As Blender does: not in a material preview that is lit by a studio light alone. One that is
     solid now is taken for the material preview it can be switched to.
@@ -151,7 +151,7 @@ def end() -> None:
 
 
 def is_active() -> bool:
-    """Tell whether pictures are being drawn."""
+    """Return whether pictures are being drawn."""
     return _view is not None
 
 

@@ -36,7 +36,7 @@ def render_preview(
 
     The scene and its render settings stay as they are.
 
-    path: Lightmaps that are not where their images say yet are looked for beside it.
+    path: Lightmaps that are not yet where their images say are looked for next to it.
     settings: Its seed and threads.
     samples: A pixel's.
     Raises BakeError if the picture could not be rendered or written.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...base import duration
-from ..session.state import Running
+from ..session.state import RunningJob
 
 STAGES = {
     "export": "Reading the scene",
@@ -23,7 +23,7 @@ STAGES = {
 }
 
 
-def progress_text(running: Running) -> str:
+def progress_text(running: RunningJob) -> str:
     """Return stage, share done and time left, such as 'Solving  34 %  about 12 s left'."""
     text = f"{STAGES.get(running.stage, running.stage)}  {int(100 * running.fraction)} %"
     if running.seconds_left is None:

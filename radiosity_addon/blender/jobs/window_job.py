@@ -105,7 +105,7 @@ class WindowJob:
         return self._finish(context)
 
     def _is_our_turn(self) -> bool:
-        """Tell whether our timer has come: events do not say whose they are, but it counts on."""
+        """Return whether our timer has come: events do not say whose they are, but it counts on."""
         now = 0.0 if self._timer is None else self._timer.time_duration
         if now == self._ticked:
             return False
@@ -121,10 +121,10 @@ class WindowJob:
         raise NotImplementedError
 
     def _follow(self, progress: Any) -> None:
-        """Show what a step of the work brings, beside how far it is."""
+        """Show the picture that a step of the work brings, if any, in addition to its progress."""
 
     def _undone(self, context: bpy.types.Context) -> None:
-        """Go on as before the work, which was cancelled or failed."""
+        """Go on as before the work, which was canceled or failed."""
 
     def _succeeded(self, context: bpy.types.Context, in_window: bool) -> None:
         """Report on what was done."""
@@ -174,7 +174,7 @@ class WindowJob:
         return {"CANCELLED"}
 
     def _end(self, context: bpy.types.Context) -> None:
-        """Close the work, whatever state it is in, and everything shown about it."""
+        """Close the work in any state, and everything shown about it."""
         job, self._job = self._job, None
         try:
             if job is not None:

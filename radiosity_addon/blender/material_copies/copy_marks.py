@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import bpy
 
-from ..datablocks.bake_record import MADE_MARKER, is_made
+from ..datablocks.bake_record import MADE_MARKER, ORIGINAL, is_made
 from ..datablocks.image_marks import GROUP
 
 SUFFIX = " (Lightmap)"
@@ -18,14 +18,11 @@ SUFFIX = " (Lightmap)"
 
 NO_MATERIAL = f"No Material{SUFFIX}"
 
-ORIGINAL = "radiosity_original"
-"""On a copy: the material or node group that it is of; missing for a copy of no material."""
-
 COPY_NAME = "radiosity_copy_name"
 """On a copied material: the name we gave it."""
 
 TOKEN = "radiosity_token"
-"""On a copied material: shared with no other, but for those that the user duplicated from it."""
+"""On a copied material: shared with no other, except for those that the user duplicated from it."""
 
 SAMPLING = "radiosity_emission_sampling"
 """On a copied material: how Cycles sampled the original's emission."""
@@ -97,7 +94,7 @@ def is_added(node: bpy.types.Node) -> bool:
     return name is not None and (name == node.name or _is_ours(node))
 
 
-def source_name(socket: bpy.types.NodeSocket) -> str:
+def linked_output(socket: bpy.types.NodeSocket) -> str:
     """Return a name for the output that is linked to an input; "" where none is."""
     if not socket.is_linked:
         return ""

@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import bpy
 
-from .copy_marks import CONTENT, ORIGINAL, SOURCE, STATE, copied_groups
+from ..datablocks.bake_record import ORIGINAL
+from .copy_marks import CONTENT, SOURCE, STATE, copied_groups
 from .material_digest import digest_of_material, tree_digest
 
 

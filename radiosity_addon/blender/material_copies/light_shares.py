@@ -64,7 +64,7 @@ class LightShares:
     def wire(
         self, tree: bpy.types.NodeTree, page: bpy.types.Node, uv: bpy.types.NodeSocket
     ) -> bpy.types.Node:
-        """Put the images of a page's groups beside the page, and the mixer after them.
+        """Put the images of a page's groups next to the page, and the mixer after them.
 
         tree: Of a material.
         page: The Image Texture of all light; nothing reads it, which keeps it out of the shader.

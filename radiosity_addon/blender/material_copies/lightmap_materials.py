@@ -14,7 +14,7 @@ import bpy
 
 from ...numerics import brdf_of_reflectance, radiance_of_radiosity
 from ...scene import LIGHTMAP_UV_LAYER
-from ..datablocks.bake_record import is_made, mark_made
+from ..datablocks.bake_record import ORIGINAL, is_made, mark_made
 from ..datablocks.image_marks import GROUP
 from ..images.images import image_scale
 from ..images.light_mixer import factor_of
@@ -36,14 +36,13 @@ from .copy_marks import (
     FED,
     FED_BY,
     NO_MATERIAL,
-    ORIGINAL,
     PLAIN,
     SAMPLING,
     SUFFIX,
     TOKEN,
     copied_groups,
+    linked_output,
     mark_added,
-    source_name,
 )
 from .copy_record import record
 from .false_colors import false_colors
@@ -181,7 +180,7 @@ class LightmapMaterials:
             feed_color(tree, group.inputs[EMISSION], surface.emission)
         fed = group.inputs[BASE_COLOR], group.inputs[EMISSION]
         group[FED] = [component for socket in fed for component in socket.default_value]
-        group[FED_BY] = [source_name(socket) for socket in fed]
+        group[FED_BY] = [linked_output(socket) for socket in fed]
 
         shader = group.outputs[SHADER]
         if surface.alpha != 1.0:

@@ -13,10 +13,11 @@ from typing import Any, TypeAlias
 
 import bpy
 
+from ..datablocks.bake_record import ORIGINAL
 from ..datablocks.keyed_paths import curves, path_of
 from ..images.node_group import BASE_COLOR, EMISSION
 from ..materials.materials import uses_nodes
-from .copy_marks import COPY_MARKS, FED, NODE_MARKS, ORIGINAL, is_added, is_copied_group
+from .copy_marks import COPY_MARKS, FED, NODE_MARKS, is_added, is_copied_group
 
 Reader: TypeAlias = Callable[[Any], Any]
 Readers: TypeAlias = tuple[Reader, tuple[tuple[str, Reader], ...]]
@@ -121,7 +122,7 @@ def _settable(node: bpy.types.Node) -> list[bpy.types.NodeSocket]:
 
 
 def _values(sockets: Any, keyed: set[str]) -> list[Any]:
-    """Return sockets' constants, but for those that keyframes and drivers move."""
+    """Return sockets' constants, except for those that keyframes and drivers move."""
     if keyed:
         sockets = [socket for socket in sockets if path_of(socket) not in keyed]
     values = [getattr(socket, "default_value", None) for socket in sockets]
@@ -138,7 +139,7 @@ def _interface(tree: bpy.types.NodeTree) -> list[Any]:
 
 
 def _custom(owner: Any, marks: tuple[str, ...]) -> list[tuple[str, Any]]:
-    """Return the custom properties, but for ours and those that are registered."""
+    """Return the custom properties, except for ours and those that are registered."""
     known = owner.bl_rna.properties
     keys = [key for key in sorted(owner.keys()) if key not in marks and key not in known]
     return [(key, _plain(owner[key])) for key in keys]

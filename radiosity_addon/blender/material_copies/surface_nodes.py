@@ -12,12 +12,12 @@ from typing import Any, TypeAlias
 
 import bpy
 
-from ..datablocks.bake_record import mark_made
+from ..datablocks.bake_record import ORIGINAL, mark_made
 from ..datablocks.keyed_paths import is_keyed
 from ..images.node_group import socket_by_identifier
 from ..materials.shader_nodes import default_rgb, feed_of
 from ..materials.shader_terms import ShaderWalk
-from .copy_marks import FOLLOWS, ORIGINAL, SOCKETS, VALUE, is_copied_group
+from .copy_marks import FOLLOWS, SOCKETS, VALUE, is_copied_group
 
 Color: TypeAlias = tuple[float, float, float]
 ColorSource: TypeAlias = Color | bpy.types.NodeSocket

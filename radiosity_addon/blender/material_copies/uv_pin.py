@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import bpy
 
-from ..datablocks.bake_record import mark_made
-from .copy_marks import ORIGINAL, THROUGH
+from ..datablocks.bake_record import ORIGINAL, mark_made
+from .copy_marks import THROUGH
 
 
 def pin_uvs(tree: bpy.types.NodeTree) -> None:

@@ -99,9 +99,9 @@ def _write_node(target: bpy.types.Node, source: bpy.types.Node) -> bool:
     pairs = list(zip(target.inputs, source.inputs, strict=True))
     if source.type in OUTPUTS_WITH_VALUES:
         pairs += zip(target.outputs, source.outputs, strict=True)
-    for to, of in pairs:
-        if hasattr(of, "default_value"):
-            _set(to, of.default_value)
+    for copied, original in pairs:
+        if hasattr(original, "default_value"):
+            _set(copied, original.default_value)
     _write_custom(target, source, NODE_MARKS)
     return True
 

@@ -8,13 +8,13 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..datablocks.bake_record import is_made
+from ..datablocks.bake_record import ORIGINAL, is_made
 from ..images.node_group import BASE_COLOR, EMISSION, SHADER
-from ..material_copies.copy_marks import COPY_MARKS, ORIGINAL, STATE
+from ..material_copies.copy_marks import COPY_MARKS, STATE
 from ..material_copies.material_digest import digest_of_material
 from ..materials.materials import DEFAULT_GRAY
 from ..materials.shader_nodes import feed_of
-from .stripping import COLORS
+from .stripping import COLOR_INPUTS
 
 _OURS = {"UVMAP", "MIX", "VECT_MATH", "MATH", "COMBXYZ", "MIX_SHADER", "BSDF_TRANSPARENT"}
 """Kinds of nodes that were added, besides images and groups of ours."""
@@ -86,7 +86,7 @@ def _main(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
     for output in tree.nodes:
         if output.type == "OUTPUT_MATERIAL":
             node = feed_of(output.inputs["Surface"], enter_groups=False).node
-            if node is not None and node.type in COLORS:
+            if node is not None and node.type in COLOR_INPUTS:
                 return node
     return None
 
@@ -96,7 +96,7 @@ def _constants(tree: bpy.types.NodeTree) -> Constants | None:
     node = _main(tree)
     if node is None:
         return None
-    base, color, strength = (None if name is None else node.inputs[name] for name in COLORS[node.type])
+    base, color, strength = (None if name is None else node.inputs[name] for name in COLOR_INPUTS[node.type])
     if any(socket is not None and socket.is_linked for socket in (base, color, strength)):
         return None
     reflected = np.zeros(3) if base is None else np.array(base.default_value[:3])
@@ -118,12 +118,12 @@ def _set_constants(
     node = _main(tree)
     if node is None or wanted is None:
         return
-    for name in filter(None, COLORS[node.type]):
+    for name in filter(None, COLOR_INPUTS[node.type]):
         if of is not None and of.type == node.type:
             node.inputs[name].default_value = of.inputs[name].default_value
     if of is not None:
         return
-    base, color, strength = COLORS[node.type]
+    base, color, strength = COLOR_INPUTS[node.type]
     if base is not None and not np.allclose(own[0], wanted[0]):
         node.inputs[base].default_value = (*wanted[0], 1.0)
     if color is not None and not np.allclose(own[1], wanted[1]):

@@ -15,13 +15,12 @@ import numpy as np
 
 from ...base import BakeWarning
 from ..datablocks.asset_marks import take_marks
-from ..datablocks.bake_record import is_made
+from ..datablocks.bake_record import ORIGINAL, is_made
 from ..material_copies.copy_marks import (
     CARRIED,
     CONTENT,
     COPY_NAME,
     NO_MATERIAL,
-    ORIGINAL,
     PLAIN,
     SOURCE,
     STATE,
@@ -246,6 +245,6 @@ def _duplicates(copies: Sequence[bpy.types.Material]) -> set[bpy.types.Material]
 
 
 def _base_name(name: str) -> str:
-    """Return the name that a copy's name says of its original's, whatever number Blender gave the copy."""
+    """Return the original's name as a copy's name has it, without the number that Blender gave the copy."""
     head, suffix, rest = name.rpartition(SUFFIX)
     return head if suffix and re.fullmatch(r"(\.\d+)?", rest) else name

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..datablocks.bake_record import is_made
+from ..datablocks.bake_record import ORIGINAL, is_made
 from ..datablocks.keyed_paths import move_keys, path_of
 from ..images.node_group import BASE_COLOR, EMISSION, SHADER, SURFACE
 from ..material_copies.copy_marks import (
@@ -12,18 +12,17 @@ from ..material_copies.copy_marks import (
     FED,
     FED_BY,
     NODE_MARKS,
-    ORIGINAL,
     SAMPLING,
     SOCKETS,
     THROUGH,
     VALUE,
     is_added,
     is_copied_group,
-    source_name,
+    linked_output,
 )
 from ..materials.shader_nodes import feed_of
 
-COLORS = {
+COLOR_INPUTS = {
     "BSDF_PRINCIPLED": ("Base Color", "Emission Color", "Emission Strength"),
     "BSDF_DIFFUSE": ("Color", None, None),
     "EMISSION": (None, "Color", "Strength"),
@@ -143,7 +142,7 @@ def _values(socket: bpy.types.NodeSocket) -> list[float]:
 def _keep_overrides(tree: bpy.types.NodeTree, node: bpy.types.Node) -> bool:
     """Give the shader what the user fed the lightmap's node instead; False where no shader can take it."""
     shader = feed_of(node.inputs[SURFACE], enter_groups=False).node
-    base, color, strength = (None,) * 3 if shader is None else COLORS.get(shader.type, (None,) * 3)
+    base, color, strength = (None,) * 3 if shader is None else COLOR_INPUTS.get(shader.type, (None,) * 3)
     constants, sources = list(node.get(FED, ())), list(node.get(FED_BY, ("", "")))
     complete = True
     for name, wanted, before, source_before in (
@@ -151,7 +150,7 @@ def _keep_overrides(tree: bpy.types.NodeTree, node: bpy.types.Node) -> bool:
         (EMISSION, color, constants[4:], sources[1]),
     ):
         given = node.inputs[name]
-        if given.is_linked and source_name(given) == source_before:
+        if given.is_linked and linked_output(given) == source_before:
             continue
         own = None if shader is None or wanted is None else shader.inputs[wanted]
         source = feed_of(given, enter_groups=False)

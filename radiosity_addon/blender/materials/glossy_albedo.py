@@ -1,6 +1,6 @@
 """What rough mirrors reflect in all, so that they can bounce light as matte surfaces do.
 
-Hemispherical albedos, of light that comes from everywhere alike, fitted to what Cycles does.
+Hemispherical albedos, of light that comes evenly from all directions, fitted to Cycles.
 Over roughness 0 to 1 they are within 0.02 of it for metals, and within 0.01 for what lies
 over a matte base (decision record 0022 has the figures).
 """
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .node_algebra import Color, NodeAlgebra, Scalar
+from .node_algebra import NodeAlgebra, NodeColor, Scalar
 
 _EXPONENT = 3.5
 _WHITE_LOSS = 1.375
@@ -21,7 +21,7 @@ _FAINT = 0.003
 """Where F0 is not much more than this, there is less to add at grazing angles: none at 0."""
 
 
-def metal(algebra: NodeAlgebra, base: Color, roughness: Scalar, multiple: bool) -> Color:
+def metal(algebra: NodeAlgebra, base: NodeColor, roughness: Scalar, multiple: bool) -> NodeColor:
     """Return the albedo of a metal of color `base`.
 
     multiple: With multiple scattering, by which a rough metal is not darker but deeper in color.

@@ -13,7 +13,7 @@ from .shader_nodes import output_node
 Input = tuple[Any, str]
 """The owner of a property, None if there is none, and the property's name."""
 
-NOTHING: Input = (None, "")
+NO_INPUT: Input = (None, "")
 
 _EMISSIVE = {
     "EMISSION": ("Color", "Strength"),
@@ -29,8 +29,8 @@ class LightInputs:
 
     icon: str
     block: bpy.types.ID
-    color: Input = NOTHING
-    strength: Input = NOTHING
+    color: Input = NO_INPUT
+    strength: Input = NO_INPUT
 
 
 def inputs_of(scene: bpy.types.Scene, name: str, emits: bool) -> LightInputs | None:
@@ -60,7 +60,7 @@ def shown_world(scene: bpy.types.Scene, name: str) -> bpy.types.World | None:
 def _of_nodes(owner: Any, icon: str) -> LightInputs:
     """Return the inputs of the node that feeds an owner's surface, or the first one that emits."""
     if not uses_nodes(owner):
-        return LightInputs(icon, owner, (owner, "color") if isinstance(owner, bpy.types.World) else NOTHING)
+        return LightInputs(icon, owner, (owner, "color") if isinstance(owner, bpy.types.World) else NO_INPUT)
     output = output_node(owner.node_tree)
     links = output.inputs["Surface"].links if output is not None else ()
     nodes = [link.from_node for link in links] + list(owner.node_tree.nodes)
@@ -73,4 +73,4 @@ def _of_nodes(owner: Any, icon: str) -> LightInputs:
 
 def _socket(node: bpy.types.Node, name: str) -> Input:
     socket = node.inputs.get(name)
-    return NOTHING if socket is None or socket.is_linked else (socket, "default_value")
+    return NO_INPUT if socket is None or socket.is_linked else (socket, "default_value")

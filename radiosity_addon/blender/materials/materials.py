@@ -107,7 +107,7 @@ def ray_doubts(material: bpy.types.Material, surface: Surface) -> list[str]:
 
 
 def _may_pass(tree: bpy.types.NodeTree) -> bool:
-    """Tell whether a tree has what could let light through."""
+    """Return whether a tree has what could let light through."""
     for node in tree.nodes:
         alpha = node.inputs.get("Alpha") if node.type == "BSDF_PRINCIPLED" else None
         if node.type == "BSDF_TRANSPARENT" or (alpha is not None and alpha.is_linked):
@@ -118,7 +118,7 @@ def _may_pass(tree: bpy.types.NodeTree) -> bool:
 
 
 def is_volume(output: bpy.types.Node | None) -> bool:
-    """Tell whether a material's output has a volume and no surface."""
+    """Return whether a material's output has a volume and no surface."""
     if output is None or feed_of(output.inputs["Surface"]).node is not None:
         return False
     return feed_of(output.inputs["Volume"]).node is not None
@@ -152,7 +152,7 @@ def read_radiance(
 
 
 def uses_nodes(owner: bpy.types.ID) -> bool:
-    """Tell whether a material, lamp or world is rendered by its node tree."""
+    """Return whether a material, lamp or world is rendered by its node tree."""
     if owner.node_tree is None:
         return False
     # Always true for materials and worlds from 5.0 on and for lamps a little later, gone in

@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 Scalar: TypeAlias = float | bpy.types.NodeSocket
-Color: TypeAlias = np.ndarray | bpy.types.NodeSocket
+NodeColor: TypeAlias = np.ndarray | bpy.types.NodeSocket
 
 _COMPUTE = {
     "ADD": lambda a, b: a + b,
@@ -22,8 +22,8 @@ _COMPUTE = {
 }
 
 
-def is_socket(value: Scalar | Color) -> bool:
-    """Tell whether a value is only known where it is rendered."""
+def is_socket(value: Scalar | NodeColor) -> bool:
+    """Return whether a value is only known where it is rendered."""
     return isinstance(value, bpy.types.NodeSocket)
 
 
@@ -37,7 +37,7 @@ class NodeAlgebra:
         self._tree = tree
 
     def calculate(self, operation: str, a: Scalar, b: Scalar) -> Scalar:
-        """Return what a Math node makes of two scalars."""
+        """Return the result of a Math node for two scalars."""
         if not is_socket(a) and not is_socket(b):
             return float(_COMPUTE[operation](a, b))
         node = self._new("ShaderNodeMath", operation)
@@ -59,7 +59,7 @@ class NodeAlgebra:
         """Return 1 − a."""
         return self.calculate("SUBTRACT", 1.0, a)
 
-    def add(self, a: Color, b: Color) -> Color:
+    def add(self, a: NodeColor, b: NodeColor) -> NodeColor:
         """Return a + b."""
         if not is_socket(a) and not is_socket(b):
             return a + b
@@ -67,7 +67,7 @@ class NodeAlgebra:
             return b
         return a if _is_zero(b) else self._vector("ADD", a, b)
 
-    def multiply(self, a: Color, b: Color) -> Color:
+    def multiply(self, a: NodeColor, b: NodeColor) -> NodeColor:
         """Return a · b, channel by channel."""
         if not is_socket(a) and not is_socket(b):
             return a * b
@@ -75,13 +75,13 @@ class NodeAlgebra:
             return np.zeros(3)
         return self._vector("MULTIPLY", a, b)
 
-    def divide(self, a: Color, b: Color) -> Color:
+    def divide(self, a: NodeColor, b: NodeColor) -> NodeColor:
         """Return a / b, channel by channel, and 0 for division by 0."""
         if not is_socket(a) and not is_socket(b):
             return np.divide(a, b, out=np.zeros(3), where=b != 0)
         return self._vector("DIVIDE", a, b)
 
-    def scale(self, a: Color, factor: Scalar) -> Color:
+    def scale(self, a: NodeColor, factor: Scalar) -> NodeColor:
         """Return a color times a scalar."""
         if not is_socket(a) and not is_socket(factor):
             return a * factor
@@ -94,17 +94,19 @@ class NodeAlgebra:
         self._feed(node.inputs["Scale"], factor)
         return node.outputs["Vector"]
 
-    def blend(self, share: Scalar, a: Color, b: Color) -> Color:
+    def blend(self, share: Scalar, a: NodeColor, b: NodeColor) -> NodeColor:
         """Return a · (1 − share) + b · share; the share is a saturated one."""
         return self.add(self.scale(a, self.complement(share)), self.scale(b, share))
 
-    def mean(self, a: Color) -> Scalar:
+    def mean(self, a: NodeColor) -> Scalar:
         """Return the mean of the three channels."""
         if not is_socket(a):
             return float(a.mean())
         return self._vector("DOT_PRODUCT", a, np.full(3, 1 / 3), "Value")
 
-    def _vector(self, operation: str, a: Color, b: Color, output: str = "Vector") -> bpy.types.NodeSocket:
+    def _vector(
+        self, operation: str, a: NodeColor, b: NodeColor, output: str = "Vector"
+    ) -> bpy.types.NodeSocket:
         node = self._new("ShaderNodeVectorMath", operation)
         self._feed(node.inputs[0], a)
         self._feed(node.inputs[1], b)
@@ -117,12 +119,12 @@ class NodeAlgebra:
         node.operation = operation
         return node
 
-    def _feed(self, target: bpy.types.NodeSocket, value: Scalar | Color) -> None:
+    def _feed(self, target: bpy.types.NodeSocket, value: Scalar | NodeColor) -> None:
         if is_socket(value):
             target.id_data.links.new(value, target)
         else:
             target.default_value = value
 
 
-def _is_zero(value: Color) -> bool:
+def _is_zero(value: NodeColor) -> bool:
     return not is_socket(value) and not value.any()

@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 
 from . import glossy_albedo
-from .node_algebra import Color, NodeAlgebra, Scalar
+from .node_algebra import NodeAlgebra, NodeColor, Scalar
 from .shader_nodes import Feed, default_rgb
 
 Place = TypeVar("Place")
@@ -62,9 +62,9 @@ class Terms:
         The share of light that goes straight through.
     """
 
-    reflected: Color
-    radiance: Color
-    passed: Color
+    reflected: NodeColor
+    radiance: NodeColor
+    passed: NodeColor
 
 
 def nothing() -> Terms:
@@ -73,11 +73,11 @@ def nothing() -> Terms:
 
 
 class ShaderWalk(ABC, Generic[Place, Seen]):
-    """Tells shader nodes apart, for baking and for display; what becomes of each is for others to say."""
+    """Distinguishes shader nodes, for baking and for display; subclasses define the result of each."""
 
     @abstractmethod
     def shader(self, socket: bpy.types.NodeSocket, place: Place) -> Seen:
-        """Return what feeds a shader socket comes to."""
+        """Return the result for what feeds a shader socket."""
 
     @abstractmethod
     def _nothing(self) -> Seen:
@@ -146,7 +146,7 @@ class ShaderTerms(ShaderWalk[Place, Terms]):
     """Comes from shader nodes to their terms; what their sockets hold is for others to say."""
 
     @abstractmethod
-    def color(self, socket: bpy.types.NodeSocket, place: Place) -> Color:
+    def color(self, socket: bpy.types.NodeSocket, place: Place) -> NodeColor:
         """Return what a color socket holds."""
 
     @abstractmethod
@@ -159,7 +159,7 @@ class ShaderTerms(ShaderWalk[Place, Terms]):
 
     @abstractmethod
     def warn(self, message: str) -> None:
-        """Tell that something is not taken as it is."""
+        """Report something that is not baked as it is."""
 
     def _nothing(self) -> Terms:
         return nothing()
@@ -197,7 +197,7 @@ class ShaderTerms(ShaderWalk[Place, Terms]):
             algebra.scale(np.ones(3), algebra.complement(alpha)),
         )
 
-    def _principled_radiance(self, node: bpy.types.Node, place: Place) -> Color:
+    def _principled_radiance(self, node: bpy.types.Node, place: Place) -> NodeColor:
         strength, color = node.inputs["Emission Strength"], node.inputs["Emission Color"]
         if not strength.is_linked and strength.default_value == 0:
             return np.zeros(3)
@@ -205,7 +205,7 @@ class ShaderTerms(ShaderWalk[Place, Terms]):
             return np.zeros(3)
         return self.algebra(place).scale(self.color(color, place), self.scalar(strength, place))
 
-    def _principled_albedo(self, node: bpy.types.Node, place: Place) -> Color:
+    def _principled_albedo(self, node: bpy.types.Node, place: Place) -> NodeColor:
         """Return metallic · metal + (1 − metallic) · (shine + (1 − shine) (1 − transmission) base)."""
         algebra, inputs = self.algebra(place), node.inputs
         base = self.color(inputs["Base Color"], place)

@@ -59,14 +59,14 @@ def asked_by_outputs(node: bpy.types.Node) -> dict[str, tuple[str, str]]:
         that gives it.
     """
     if node.type == "TEX_COORD":
-        asked = {
+        names = {
             "Generated": ("generated", "Vector"),
             "Normal": ("normal", "Vector"),
             "UV": ("uv", "Vector"),
         }
         if node.object is None:
-            asked["Object"] = ("object", "Vector")
-        return asked
+            names["Object"] = ("object", "Vector")
+        return names
     if node.type == "UVMAP":
         return {"UV": (_named("uv", node.uv_map), "Vector")}
     if node.type == "VERTEX_COLOR":
@@ -101,15 +101,15 @@ def asked_by_default(node: bpy.types.Node) -> str | None:
 
 def asked_by_material(tree: bpy.types.NodeTree) -> frozenset[str]:
     """Return the inputs that a material's nodes ask for, groups included."""
-    asked = set()
+    names = set()
     for node in _all_nodes(tree):
         for identifier, (name, _) in asked_by_outputs(node).items():
             if node.outputs[identifier].is_linked:
-                asked.add(name)
+                names.add(name)
         default = asked_by_default(node)
         if default is not None:
-            asked.add(default)
-    return frozenset(asked)
+            names.add(default)
+    return frozenset(names)
 
 
 def unreliable_nodes(tree: bpy.types.NodeTree) -> list[str]:
@@ -140,7 +140,7 @@ def eevee_only(tree: bpy.types.NodeTree) -> list[str]:
 
 
 def asks_light_path(tree: bpy.types.NodeTree, names: tuple[str, ...]) -> bool:
-    """Tell whether one of these outputs of a Light Path node is linked in a tree or its groups."""
+    """Return whether one of these outputs of a Light Path node is linked in a tree or its groups."""
     nodes = (node for node in _all_nodes(tree) if node.type == "LIGHT_PATH")
     return any(output.is_linked for node in nodes for output in node.outputs if output.name in names)
 
@@ -178,7 +178,7 @@ def read_mesh_inputs(mesh: bpy.types.Mesh, loops: np.ndarray, asked: Iterable[st
 
 
 def read_object_inputs(instance: bpy.types.DepsgraphObjectInstance, asked: Iterable[str]) -> ObjectValues:
-    """Read what an instance has for all its corners alike: (4,) float32 by input."""
+    """Read the inputs that are the same at all corners of an instance: (4,) float32 by input."""
     obj = instance.object
     values: ObjectValues = {}
     for name in asked:
@@ -294,7 +294,7 @@ def _padded(values: np.ndarray) -> np.ndarray:
 def _random_id(instance: bpy.types.DepsgraphObjectInstance) -> int:
     """Return Object Info's Random as an integer: an instance's own, or of the object's name.
 
-    Cycles mixes what it makes of the name by the last rounds of Jenkins' lookup3.
+    Cycles mixes its hash of the name by the last rounds of Jenkins' lookup3.
     """
     if instance.is_instance:
         return int(instance.random_id)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import bpy
 
 from ...base import RadiosityError, one_of_each
+from ..files.ownership import own_reports, panel_names
 from ..jobs import live_view
 from ..jobs.window_job import WindowJob
 from ..relight import kept_bakes
@@ -18,6 +19,7 @@ from ..session.state import session
 from ..settings.preferences import output_folder
 from ..settings.properties import settings_of
 from .checks import look_first
+from .cleaning import look_for_interrupted
 from .polls import Conditional, has_folder, has_scene, no_bake_runs
 
 if TYPE_CHECKING:
@@ -50,7 +52,6 @@ class RADIOSITY_OT_bake(Conditional, WindowJob, bpy.types.Operator):
 
     def _start(self, context: bpy.types.Context, in_window: bool) -> Any:
         from ..files.output import OutputFolder
-        from ..files.ownership import panel_names
         from ..jobs.job import run_bake
 
         session.stop_live()
@@ -88,7 +89,6 @@ class RADIOSITY_OT_bake(Conditional, WindowJob, bpy.types.Operator):
 
     def _succeeded(self, context: bpy.types.Context, in_window: bool) -> None:
         from ..material_copies.lightmap_materials import set_lightmap_only
-        from .cleaning import look_for_interrupted
 
         look_for_interrupted(context)
 
@@ -107,7 +107,7 @@ class RADIOSITY_OT_bake(Conditional, WindowJob, bpy.types.Operator):
 
 
 class RADIOSITY_OT_restore(Conditional, bpy.types.Operator):
-    """Take the lightmaps off this scene: what you edited since the bake stays"""
+    """Remove the lightmaps from this scene. What you edited since the bake is kept"""
 
     bl_idname = "radiosity.restore"
     bl_label = "Restore"
@@ -137,7 +137,7 @@ class RADIOSITY_OT_restore(Conditional, bpy.types.Operator):
 
 
 class RADIOSITY_OT_add_cornell_box(Conditional, bpy.types.Operator):
-    """Add the Cornell box, ready to bake, to this scene if it is empty, else in a scene of its own"""
+    """Add a Cornell box that is ready to bake: to this scene if it is empty, otherwise in a new scene"""
 
     bl_idname = "radiosity.add_cornell_box"
     bl_label = "Add Cornell Box"
@@ -161,8 +161,6 @@ class RADIOSITY_OT_open_folder(Conditional, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Open the folder, if it really is that of a bake of this scene."""
-        from ..files.ownership import own_reports
-
         last = last_bake.read(context.scene)
         folder = bpy.path.abspath(last.folder) if last is not None else ""
         if not Path(folder).is_dir():

@@ -8,6 +8,7 @@ from typing import Any
 import bpy
 
 from ...base import duration
+from ..files.ownership import panel_names
 from ..relight.relight_properties import keeps, relight_of
 from ..session import last_bake
 from ..session.state import session
@@ -18,7 +19,6 @@ from ..settings.properties import settings_of
 def look(context: bpy.types.Context) -> Any:
     """Inspect the context's scene as the panel would bake it, and remember what was found."""
     from ..files.output import OutputFolder
-    from ..files.ownership import panel_names
     from ..jobs.inspection import inspect
 
     editing = context.mode == "EDIT_MESH"
@@ -40,7 +40,7 @@ def last_check(scene: bpy.types.Scene) -> Any:
 
 
 def look_first(context: bpy.types.Context) -> bool:
-    """Tell whether a scene that was neither baked nor checked is odd, so that the user should look first."""
+    """Return whether a scene that was neither baked nor checked has problems the user should see first."""
     scene = context.scene
     known = last_bake.read(scene) is not None or last_check(scene) is not None
     if known or not preferences(context).check_first:

@@ -14,6 +14,19 @@ from pathlib import Path
 import bpy
 
 from ...base import BakeError
+from ...files import (
+    BLEND_NAME,
+    LIGHTMAPS,
+    LISTED,
+    PREVIEW_NAME,
+    is_as_written,
+    read_report,
+    reports_in,
+    text_of,
+    without,
+)
+from ...publishing import clean_up, is_interrupted, write_text
+from ..files.ownership import owner_of
 from ..session import last_bake
 from ..session.redraw import redraw_sidebars
 from ..session.state import session
@@ -22,7 +35,7 @@ from .polls import Conditional
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Unused:
+class UnusedFiles:
     """What nothing shows any more.
 
     Parameters
@@ -42,11 +55,8 @@ class Unused:
         return sum(map(len, self.files.values()))
 
 
-def unused_lightmaps(context: bpy.types.Context) -> Unused:
+def unused_lightmaps(context: bpy.types.Context) -> UnusedFiles:
     """Find the lightmaps that bakes of the open file wrote and that it does not show."""
-    from ...files import BLEND_NAME, LIGHTMAPS, LISTED, PREVIEW_NAME, is_as_written, reports_in
-    from ..files.ownership import owner_of
-
     images = [image for image in bpy.data.images if image.filepath_raw]
     shown = {Path(bpy.path.abspath(each.filepath_raw, library=each.library)).resolve() for each in images}
     here = Path(bpy.data.filepath).resolve() if bpy.data.filepath else None
@@ -58,20 +68,20 @@ def unused_lightmaps(context: bpy.types.Context) -> Unused:
             copy = folder / BLEND_NAME
             if BLEND_NAME in contents[LISTED] and copy.exists() and copy.resolve() != here:
                 continue
-            for name, of in contents[LISTED].items():
+            for name, entry in contents[LISTED].items():
                 path = folder / name
                 if path.suffix.lower() not in LIGHTMAPS or name == PREVIEW_NAME or not path.is_file():
                     continue
                 if path.resolve() in shown:
                     continue
-                if is_as_written(path, of):
+                if is_as_written(path, entry):
                     files.setdefault(folder / report, []).append(name)
                 else:
                     changed.append(path)
-    return Unused(files, tuple(changed))
+    return UnusedFiles(files, tuple(changed))
 
 
-def delete(unused: Unused) -> int:
+def delete(unused: UnusedFiles) -> int:
     """Delete the files that nothing shows, and take them off their reports; returns how many.
 
     Raises
@@ -79,9 +89,6 @@ def delete(unused: Unused) -> int:
     OSError, BakeError
         If one cannot be deleted, or its report cannot be written; those before it are gone.
     """
-    from ...files import read_report, text_of, without
-    from ...publishing import write_text
-
     for report, names in unused.files.items():
         contents = read_report(report)
         for name in names:
@@ -92,8 +99,6 @@ def delete(unused: Unused) -> int:
 
 def interrupted_folders(context: bpy.types.Context) -> list[Path]:
     """Return the folders of this file's bakes in which one was killed while it published; only looks."""
-    from ...publishing import is_interrupted
-
     return [folder for folder in _folders(context) if is_interrupted(folder)]
 
 
@@ -112,7 +117,7 @@ def _is_remote(folder: Path) -> bool:
 
 
 class RADIOSITY_OT_clean(Conditional, bpy.types.Operator):
-    """Delete lightmap files that bakes of this file have written and that nothing in it shows any more"""
+    """Delete lightmap files that bakes of this file wrote and that it no longer shows"""
 
     bl_idname = "radiosity.clean"
     bl_label = "Clean Up Lightmaps"
@@ -147,7 +152,7 @@ class RADIOSITY_OT_clean(Conditional, bpy.types.Operator):
 
 
 class RADIOSITY_OT_recover(Conditional, bpy.types.Operator):
-    """Put the files of the last whole bake back: a bake was interrupted while it replaced them"""
+    """Recover the files of the last complete bake: a bake was interrupted while it replaced them"""
 
     bl_idname = "radiosity.recover"
     bl_label = "Recover Lightmaps"
@@ -155,8 +160,6 @@ class RADIOSITY_OT_recover(Conditional, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Put them back, and have the open file show them."""
-        from ...publishing import clean_up
-
         done: list[Path] = []
         try:
             done = [folder.resolve() for folder in interrupted_folders(context) if clean_up(folder)]

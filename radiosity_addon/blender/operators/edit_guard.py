@@ -1,7 +1,7 @@
 """Edits that a stand-in cannot take over are refused at once: what modifiers or instances make is made again.
 
 Blender says after every change what it concerns. That is only noted; a timer looks at it, puts stand-ins back
-and says what to do. What a script does all the same is kept (`edits.py`).
+and says what to do. Edits by scripts are kept nevertheless (`edits.py`).
 """
 
 from __future__ import annotations

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..images.light_mixer import WHITE, mixers, sliders_of
 from ..scene_records.light_membership import NAME, Membership, name_on
 from ..session import facts
 from ..settings.light_group_properties import LONGEST_NAME
@@ -47,7 +48,7 @@ class RADIOSITY_OT_light_group_assign(Conditional, bpy.types.Operator):
 
 
 class RADIOSITY_OT_light_group_remove(Conditional, bpy.types.Operator):
-    """Take the light group's name off the selected objects; their material's or collection's then holds"""
+    """Remove the selected objects from this light group. That of their material or collection then applies"""
 
     bl_idname = "radiosity.light_group_remove"
     bl_label = "Remove from Light Group"
@@ -99,8 +100,6 @@ class RADIOSITY_OT_light_group_reset(Conditional, bpy.types.Operator):
 
     def execute(self, _context: bpy.types.Context) -> set[str]:
         """Set every slider."""
-        from ..images.light_mixer import WHITE, mixers, sliders_of
-
         for tree in mixers():
             for sliders in sliders_of(tree):
                 sliders.color.default_value, sliders.strength.default_value = WHITE, 1.0

@@ -9,7 +9,11 @@ from typing import Any, NamedTuple
 
 import bpy
 
+from ..datablocks.bake_record import is_baked
+from ..images.light_mixer import mixers, sliders_of
+from ..overlays.overlay_properties import overlay_of
 from ..relight import kept_bakes
+from ..relight.kept_sidecars import why_not_relit
 from ..scene_records.object_roles import has_role
 from ..session.facts import fact
 from ..settings.light_group_properties import ListedGroup, list_groups
@@ -17,7 +21,7 @@ from ..settings.light_group_properties import ListedGroup, list_groups
 SHOWN_LIGHTS = 16
 
 
-class Place(NamedTuple):
+class PropertyPath(NamedTuple):
     """A property of a datablock.
 
     Parameters
@@ -50,7 +54,7 @@ class LightRow(NamedTuple):
 
     name: str
     icon: str
-    places: tuple[Place, ...] = ()
+    places: tuple[PropertyPath, ...] = ()
 
 
 @fact(unknown=True)
@@ -77,17 +81,13 @@ def has_copy_targets(context: bpy.types.Context) -> bool:
 @fact(unknown=False)
 def can_restore(_context: bpy.types.Context) -> bool:
     """Whether the file shows a bake."""
-    from ..datablocks.bake_record import is_baked
-
     return is_baked()
 
 
 @fact(unknown="")
 def relight_refusal(context: bpy.types.Context) -> str:
     """Why the scene's bake cannot be relit; empty if it can."""
-    from ..relight.kept_sidecars import refusal
-
-    return refusal(context.scene)
+    return why_not_relit(context.scene)
 
 
 @fact(unknown=())
@@ -104,8 +104,6 @@ def has_light_mixers(context: bpy.types.Context) -> bool:
 @fact(unknown=())
 def light_mixers(_context: bpy.types.Context) -> tuple[tuple[str, tuple[LightRow, ...]], ...]:
     """The node groups that mix baked light groups, each with its groups."""
-    from ..images.light_mixer import mixers, sliders_of
-
     found = []
     for tree in mixers():
         rows = []
@@ -149,7 +147,6 @@ def overlay_message(context: bpy.types.Context) -> str:
 def light_on_active(context: bpy.types.Context) -> tuple[tuple[str, str], ...]:
     """Minimum, mean, maximum and uniformity of the light on the active object; empty without a lightmap."""
     from ..overlays.lightmap_values import lightmap_of, object_statistics
-    from ..overlays.overlay_properties import overlay_of
 
     obj, settings = context.view_layer.objects.active, overlay_of(context)
     if obj is None or lightmap_of(obj) is None:
@@ -157,12 +154,12 @@ def light_on_active(context: bpy.types.Context) -> tuple[tuple[str, str], ...]:
     found = object_statistics(obj, context.scene, settings.unit, settings.efficacy)
     if found is None:
         return ()
-    of, unit = found
+    statistics, unit = found
     return (
-        ("Minimum", f"{of.minimum:.4g} {unit}"),
-        ("Mean", f"{of.mean:.4g} {unit}"),
-        ("Maximum", f"{of.maximum:.4g} {unit}"),
-        ("Uniformity", "–" if of.uniformity is None else f"{of.uniformity:.2f}"),
+        ("Minimum", f"{statistics.minimum:.4g} {unit}"),
+        ("Mean", f"{statistics.mean:.4g} {unit}"),
+        ("Maximum", f"{statistics.maximum:.4g} {unit}"),
+        ("Uniformity", "–" if statistics.uniformity is None else f"{statistics.uniformity:.2f}"),
     )
 
 
@@ -174,7 +171,7 @@ _COLLECTIONS = (
 )
 
 
-def _place(block: bpy.types.ID, owner: Any, attribute: str) -> Place:
+def _place(block: bpy.types.ID, owner: Any, attribute: str) -> PropertyPath:
     """Return where a property is: of a datablock itself, or of a socket in its node tree."""
     collection = next(name for kind, name in _COLLECTIONS if isinstance(block, kind))
     path = ""
@@ -182,4 +179,4 @@ def _place(block: bpy.types.ID, owner: Any, attribute: str) -> Place:
         inside = "" if isinstance(block, bpy.types.NodeTree) else "node_tree."
         path = inside + owner.path_from_id()
     library = None if block.library is None else block.library.filepath
-    return Place(collection, (block.name, library), path, attribute)
+    return PropertyPath(collection, (block.name, library), path, attribute)

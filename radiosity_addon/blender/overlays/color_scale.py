@@ -1,4 +1,4 @@
-"""False colors: numbers as colors, and the numbers that stand beside the scale."""
+"""False colors: numbers as colors, and the numbers next to the scale."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _BLUE_TO_RED = (
 _ROUND = (1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12)
 
 NEARLY_ALL = 98.0
-"""Percentile that an automatic scale reaches: a few texels beside a lamp would leave the rest no colors."""
+"""Percentile that an automatic scale reaches: a few texels next to a lamp would leave the rest no colors."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class ColorScale:
         return np.stack([np.interp(share, at, channel) for channel in stops.T], axis=-1).astype(np.float32)
 
     def ticks(self) -> tuple[tuple[float, str], ...]:
-        """Return the values to write beside the scale, and how."""
+        """Return the values to write next to the scale, and their texts."""
         return tuple((value, tick_label(value)) for value in linear_ticks(self.low, self.high))
 
 

@@ -7,6 +7,9 @@ from contextlib import contextmanager
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+import gpu
+from mathutils import Matrix
+
 if TYPE_CHECKING:
     from ...numerics import Array
 
@@ -44,8 +47,6 @@ void main()
 @cache
 def page_shader() -> Any:
     """Return the shader that shows texels as they are, none of them smoothed into its neighbors."""
-    import gpu
-
     between = gpu.types.GPUStageInterfaceInfo("radiosity_page")
     between.smooth("VEC2", "spot")
     info = gpu.types.GPUShaderCreateInfo()
@@ -75,17 +76,16 @@ class PagedSurfaces:
         shader = page_shader()
         self._batches = {}
         for number in np.unique(page):
-            mine = page == number
+            on_page = page == number
             given = {
-                "pos": np.ascontiguousarray(corners[mine].reshape(-1, 3), dtype=np.float32),
-                "uv": np.ascontiguousarray(uv[mine].reshape(-1, 2), dtype=np.float32),
+                "pos": np.ascontiguousarray(corners[on_page].reshape(-1, 3), dtype=np.float32),
+                "uv": np.ascontiguousarray(uv[on_page].reshape(-1, 2), dtype=np.float32),
             }
             self._batches[int(number)] = batch_for_shader(shader, "TRIS", given)
         self._textures: list[Any] = []
 
     def paint(self, pages: Sequence[Array]) -> None:
         """Give the pages their colors: (height, width, 4) float32 each; what has no alpha is not drawn."""
-        import gpu
         import numpy as np
 
         self._textures = []
@@ -96,8 +96,6 @@ class PagedSurfaces:
 
     def draw(self) -> None:
         """Draw them into the viewport whose turn it is."""
-        import gpu
-
         shader = page_shader()
         shader.bind()
         shader.uniform_float(
@@ -116,9 +114,6 @@ def over_the_objects(culled: bool = True, nearer: float = NEARER) -> Iterator[No
     culled: Whether only what is counter-clockwise is seen.
     nearer: In what has been drawn so before, more brings it in front.
     """
-    import gpu
-    from mathutils import Matrix
-
     depth_test, depth_mask = gpu.state.depth_test_get(), gpu.state.depth_mask_get()
     projection = Matrix.Translation((0.0, 0.0, -nearer)) @ gpu.matrix.get_projection_matrix()
     gpu.state.depth_test_set("LESS_EQUAL")

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import blf
+import gpu
 import numpy as np
+from gpu_extras.batch import batch_for_shader
 
 from .overlay_pictures import Legend
 
@@ -21,8 +24,6 @@ _STRIPS = 64
 
 def draw_legend(legend: Legend, ui_scale: float) -> None:
     """Draw it into the viewport whose turn it is; in pixels from its lower left corner."""
-    import gpu
-
     blend = gpu.state.blend_get()
     gpu.state.blend_set("ALPHA")
     try:
@@ -69,21 +70,18 @@ def _draw_entries(legend: Legend, size: float) -> None:
 
 def _rectangles(places: list[tuple[float, float, float, float]], colors: list[tuple[float, ...]]) -> None:
     """Fill rectangles, given as (left, bottom, width, height)."""
-    import gpu
-    from gpu_extras.batch import batch_for_shader
-
     shader: Any = gpu.shader.from_builtin("FLAT_COLOR")
-    corners, of = [], []
+    corners, vertex_colors = [], []
     for (left, bottom, width, height), color in zip(places, colors, strict=True):
         right, top = left + width, bottom + height
         corners += [(left, bottom), (right, bottom), (right, top), (left, bottom), (right, top), (left, top)]
-        of += [color] * 6
-    batch_for_shader(shader, "TRIS", {"pos": [(*at, 0.0) for at in corners], "color": of}).draw(shader)
+        vertex_colors += [color] * 6
+    batch_for_shader(shader, "TRIS", {"pos": [(*at, 0.0) for at in corners], "color": vertex_colors}).draw(
+        shader
+    )
 
 
 def _write(text: str, x: float, y: float, size: float) -> None:
-    import blf
-
     blf.size(FONT, size * TEXT)
     blf.color(FONT, *_WHITE)
     blf.position(FONT, x, y, 0)
@@ -91,7 +89,5 @@ def _write(text: str, x: float, y: float, size: float) -> None:
 
 
 def _width(text: str, size: float) -> float:
-    import blf
-
     blf.size(FONT, size * TEXT)
     return float(blf.dimensions(FONT, text)[0])

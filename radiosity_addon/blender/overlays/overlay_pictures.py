@@ -32,16 +32,16 @@ STATE_COLORS = {
 }
 """Display colors of the states of texels, and what they are."""
 
-WIDEST = 2048
+MAX_PICTURE_WIDTH = 2048
 """Pages of more pixels are drawn coarser: as colors they would take a quarter of a gigabyte at 4096."""
 
 CHECKERS = ((0.25, 0.25, 0.27), (0.85, 0.85, 0.82))
-EDGE = (0.05, 0.05, 0.05, 1.0)
+EDGE_COLOR = (0.05, 0.05, 0.05, 1.0)
 CHOSEN = (1.0, 1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True)
-class Surfaces:
+class PagedTriangles:
     """Triangles that show pages.
 
     Attributes
@@ -102,7 +102,7 @@ class Legend:
 class OverlayPicture:
     """One overlay, ready to be drawn."""
 
-    surfaces: Surfaces | None = None
+    surfaces: PagedTriangles | None = None
     lines: tuple[Lines, ...] = ()
     legend: Legend | None = None
 
@@ -148,7 +148,7 @@ def missing(context: bpy.types.Context) -> str:
     return "" if laid_out else "No visible object has a UV layer 'Lightmap'; bake first"
 
 
-def page_size(context: bpy.types.Context, image: str | None) -> int:
+def lightmap_width(context: bpy.types.Context, image: str | None) -> int:
     """Return how wide a lightmap is; before a bake, how wide it is going to be [pixels]."""
     found = None if image is None else bpy.data.images.get(image)
     return context.scene.radiosity.resolution if found is None else int(found.size[0])
@@ -167,7 +167,7 @@ def _false_colors(context: bpy.types.Context, shown: list[ShownLightmap]) -> Ove
     # Pixels that show no surface are filled from those that do, or 0 farther off.
     values = np.concatenate([page[page != 0.0] for page in measured.values()])
     scale = _scale(context, values, quantity == "residual")
-    painted = {name: _opaque(scale(thinned(page))) for name, page in measured.items()}
+    painted = {name: _opaque(scale(coarse_page(page))) for name, page in measured.items()}
     titles = {"residual": "Residual", "radiosity": "Radiosity"}
     title = titles.get(quantity, "Illuminance" if settings.unit == "LUX" else "Irradiance")
     legend = Legend(title, unit_name(quantity, settings.unit), scale)
@@ -177,7 +177,7 @@ def _false_colors(context: bpy.types.Context, shown: list[ShownLightmap]) -> Ove
 def _density(context: bpy.types.Context, shown: list[ShownLightmap]) -> OverlayPicture:
     """Show how dense texels are as a color of each triangle, or the texels themselves."""
     settings = overlay_of(context)
-    sizes = [page_size(context, found.image) for found in shown]
+    sizes = [lightmap_width(context, found.image) for found in shown]
     if settings.show == kinds.CHECKER:
         pages = {str(size): _checker(size, settings.squares) for size in set(sizes)}
         named = [replace(found, image=str(size)) for found, size in zip(shown, sizes, strict=True)]
@@ -200,7 +200,9 @@ def _density(context: bpy.types.Context, shown: list[ShownLightmap]) -> OverlayP
     spot = (np.stack([column, row], axis=1) + 0.5) / side
     corners = np.concatenate([found.corners for found in shown])
     uv = np.repeat(spot[:, None].astype(np.float32), 3, axis=1)
-    surfaces = Surfaces(corners, uv, np.zeros(len(corners), dtype=np.int32), [page.reshape(side, side, 4)])
+    surfaces = PagedTriangles(
+        corners, uv, np.zeros(len(corners), dtype=np.int32), [page.reshape(side, side, 4)]
+    )
     return OverlayPicture(surfaces, legend=Legend("Texel Density", "px/m", scale))
 
 
@@ -220,7 +222,7 @@ def _texels(context: bpy.types.Context, kept: KeptDetails) -> OverlayPicture | N
         table = np.zeros((256, 4), dtype=np.float32)
         for state, (color, _) in STATE_COLORS.items():
             table[state] = (*color, 1.0)
-        painted = {name: table[thinned(page.state)] for name, page in pages.items()}
+        painted = {name: table[coarse_page(page.state)] for name, page in pages.items()}
         entries = tuple(STATE_COLORS.values())
         return OverlayPicture(_surfaces(shown, painted), legend=Legend("Problem Texels", entries=entries))
     signed = settings.error_of == "ELEMENTS"
@@ -230,7 +232,7 @@ def _texels(context: bpy.types.Context, kept: KeptDetails) -> OverlayPicture | N
     }
     known = np.concatenate([errors[name][page.state != NO_TEXEL_HERE] for name, page in pages.items()])
     scale = _scale(context, known, signed)
-    painted = {name: _opaque(scale(thinned(values))) for name, values in errors.items()}
+    painted = {name: _opaque(scale(coarse_page(values))) for name, values in errors.items()}
     title = "Elements Minus Texels" if signed else "Estimated Noise"
     return OverlayPicture(_surfaces(shown, painted), legend=Legend(title, "W/m²", scale))
 
@@ -239,7 +241,7 @@ def _elements(kept: KeptDetails) -> OverlayPicture:
     record, seen = kept.details.links, kept.seen()
     leaves = np.flatnonzero(record.leaf & record.front)
     corners = record.corners[leaves[seen[record.triangle[leaves]]]]
-    return OverlayPicture(lines=(_edges(corners, EDGE),))
+    return OverlayPicture(lines=(_edges(corners, EDGE_COLOR),))
 
 
 def _links(context: bpy.types.Context, kept: KeptDetails) -> OverlayPicture | None:
@@ -260,7 +262,7 @@ def _links(context: bpy.types.Context, kept: KeptDetails) -> OverlayPicture | No
 
 
 def chosen_elements(context: bpy.types.Context, kept: KeptDetails) -> Array:
-    """Return the leaf elements whose links are asked for; none if the active face was not baked."""
+    """Return the leaf elements whose links are to be shown; none if the active face was not baked."""
     record = kept.details.links
     if overlay_of(context).links_of == "CURSOR":
         nearest = nearest_leaf(record, np.array(context.scene.cursor.location, dtype=np.float64))
@@ -269,8 +271,8 @@ def chosen_elements(context: bpy.types.Context, kept: KeptDetails) -> Array:
     item = None if obj is None else kept.objects.get(obj.name.removesuffix(STAND_IN_SUFFIX))
     if item is None or obj.type != "MESH" or len(obj.data.polygons) == 0:
         return np.zeros(0, dtype=np.int64)
-    mine = np.flatnonzero(item.polygon == obj.data.polygons.active) + item.first
-    return leaves_on(record, mine)
+    triangles = np.flatnonzero(item.polygon == obj.data.polygons.active) + item.first
+    return leaves_on(record, triangles)
 
 
 def _scale(context: bpy.types.Context, values: Array, signed: bool) -> ColorScale:
@@ -281,23 +283,23 @@ def _scale(context: bpy.types.Context, values: Array, signed: bool) -> ColorScal
     return ColorScale(settings.low, settings.high, signed)
 
 
-def _surfaces(shown: Sequence[ShownLightmap], pages: dict[str, Array]) -> Surfaces:
+def _surfaces(shown: Sequence[ShownLightmap], pages: dict[str, Array]) -> PagedTriangles:
     """Return objects with the pages that are theirs by name."""
     number = {name: row for row, name in enumerate(pages)}
-    of = [np.full(len(found.corners), number[str(found.image)], dtype=np.int32) for found in shown]
-    return Surfaces(
+    page = [np.full(len(found.corners), number[str(found.image)], dtype=np.int32) for found in shown]
+    return PagedTriangles(
         np.concatenate([found.corners for found in shown]),
         np.concatenate([found.uv for found in shown]),
-        np.concatenate(of),
+        np.concatenate(page),
         list(pages.values()),
     )
 
 
-def thinned(page: Array) -> Array:
-    """Return a page of at most `WIDEST` pixels: of more it leaves some out."""
-    if len(page) <= WIDEST:
+def coarse_page(page: Array) -> Array:
+    """Return a page of at most `MAX_PICTURE_WIDTH` pixels: of more it leaves some out."""
+    if len(page) <= MAX_PICTURE_WIDTH:
         return page
-    kept = ((np.arange(WIDEST) + 0.5) * len(page) / WIDEST).astype(np.int64)
+    kept = ((np.arange(MAX_PICTURE_WIDTH) + 0.5) * len(page) / MAX_PICTURE_WIDTH).astype(np.int64)
     return np.asarray(page[np.ix_(kept, kept)])
 
 

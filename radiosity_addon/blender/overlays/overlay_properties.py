@@ -32,7 +32,7 @@ class RadiosityOverlay(bpy.types.PropertyGroup):
             (NONE, "None", "Nothing"),
             (FALSE_COLOR, "False Color", "The light that the lightmaps hold, as colors with a scale"),
             (DENSITY, "Texel Density", "Lightmap pixels per meter of surface, as colors with a scale"),
-            (CHECKER, "Texel Checker", "The lightmap's pixels themselves, light and dark in turn"),
+            (CHECKER, "Texel Checker", "A checker of the lightmap's pixels"),
             (
                 TEXELS,
                 "Problem Texels",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import bpy
+import gpu
 
 from ..session.redraw import redraw_viewports
 from ..session.state import session
@@ -71,7 +72,7 @@ def _current(context: bpy.types.Context) -> OverlayPicture | None:
 
 
 def _key(context: bpy.types.Context) -> tuple[object, ...]:
-    """Return what a picture depends on, but for objects and lightmaps, whose changes are reported."""
+    """Return what a picture depends on, except for objects and lightmaps, whose changes are reported."""
     settings, scene = overlay_of(context), context.scene
     names = [
         prop.identifier for prop in settings.bl_rna.properties if prop.type not in ("POINTER", "COLLECTION")
@@ -87,7 +88,6 @@ def _key(context: bpy.types.Context) -> tuple[object, ...]:
 
 def _upload(picture: OverlayPicture) -> None:
     """Hand a picture to the graphics card."""
-    import gpu
     import numpy as np
     from gpu_extras.batch import batch_for_shader
 
@@ -106,8 +106,6 @@ def _upload(picture: OverlayPicture) -> None:
 
 
 def _draw_lines(context: bpy.types.Context, lines: Lines, batch: Any) -> None:
-    import gpu
-
     shader = gpu.shader.from_builtin("POLYLINE_FLAT_COLOR")
     shader.bind()
     shader.uniform_float("viewportSize", (context.region.width, context.region.height))

@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 
 from ...options import Option, sections_of
-from ..settings.option_properties import PREFERRED, PROPERTIES, automatic_source, shown
+from ..settings.option_properties import PREFERRED, PROPERTIES, automatic_source, is_shown
 from ..settings.preferences import preferences
 
 
@@ -19,7 +19,7 @@ def draw_options(layout: Any, part: str, context: bpy.types.Context, in_header: 
     settings = context.scene.radiosity
     for section in sections_of(part):
         options = [option for option in PROPERTIES if option.section == section]
-        rows = [option for option in options if shown(option, settings) and option.name != in_header]
+        rows = [option for option in options if is_shown(option, settings) and option.name != in_header]
         if not rows:
             continue
         # Only next to a check box there is room for a heading.

@@ -24,7 +24,7 @@ class Section:
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
-        """Tell whether to show it."""
+        """Return whether to show it."""
         return True
 
     @classmethod

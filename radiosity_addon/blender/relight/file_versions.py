@@ -15,7 +15,7 @@ MOST_FILES, MOST_BYTES = 128, 2 << 30
 """So many files and bytes are held; the oldest are dropped first."""
 
 FREE = 4
-"""Of the space that is free where they are held, no more than one part in so many is taken."""
+"""Held files take at most this fraction of the free space: 1 / SHARE."""
 
 _CHUNK = 1 << 20
 

@@ -65,7 +65,7 @@ def put(scene: bpy.types.Scene, mark: str, bake: KeptBake) -> InMemory:
 
 
 def make_room(newest: str = "") -> None:
-    """Forget the oldest of the bakes that no scene shows, but for what `MOST_EARLIER` has room for."""
+    """Forget the oldest of the bakes that no scene shows, except what `MOST_EARLIER` has room for."""
     shown = {newest, *map(mark_of, bpy.data.scenes)}
     earlier = [mark for mark in session.kept_bakes if mark not in shown]
     while sum(session.kept_bakes[mark].bake.nbytes for mark in earlier) > MOST_EARLIER:

@@ -24,7 +24,7 @@ def sidecar_of(mark: str) -> Path | None:
     return path if path.is_file() else None
 
 
-def refusal(scene: bpy.types.Scene) -> str:
+def why_not_relit(scene: bpy.types.Scene) -> str:
     """Return why the scene's bake cannot be relit; empty if it is in memory or in a sidecar of its own."""
     mark = kept_bakes.mark_of(scene)
     if not mark:

@@ -28,6 +28,7 @@ from ..files.lightmap_reports import forget_reports, images_described, listed_in
 from ..files.ownership import own_reports
 from ..session.redraw import redraw_sidebars, redraw_viewports
 from ..session.state import session
+from .file_versions import MOST_FILES, HeldFiles
 
 if TYPE_CHECKING:
     from ...bake.result import BakeReport
@@ -39,7 +40,7 @@ TICK = 0.02
 FOREIGN = "The lightmaps on disk are from another bake than this file: bake again"
 
 
-class Wanted(NamedTuple):
+class WantedFile(NamedTuple):
     """An image whose file has other bytes than it should.
 
     Attributes
@@ -100,8 +101,6 @@ def publish(output: OutputFolder, report: BakeReport) -> None:
 
 def _hold(output: OutputFolder) -> None:
     """Hold what is about to be replaced in a folder, with what its report says of it."""
-    from .file_versions import MOST_FILES, HeldFiles  # needed when something is replaced
-
     report = output.earlier
     if report is None:
         return
@@ -126,7 +125,7 @@ def lightmaps() -> list[bpy.types.Image]:
     return [image for image in own if PAGE in image.keys() and image.get(VERSION)]  # noqa: SIM118 (an ID)
 
 
-def differing() -> list[Wanted]:
+def differing() -> list[WantedFile]:
     """Return the images whose files have, by the reports next to them, other bytes than they should."""
     found = []
     for image in lightmaps():
@@ -135,7 +134,7 @@ def differing() -> list[Wanted]:
         path, report = Path(bpy.path.abspath(image.filepath_raw)), report_of(image)
         listed = listed_in(report).get(path.name)
         if listed is not None and listed["sha256"] != image[VERSION]:
-            found.append(Wanted(image.name, path, image[VERSION], report))
+            found.append(WantedFile(image.name, path, image[VERSION], report))
     return found
 
 
@@ -175,7 +174,7 @@ def check(*_: Any) -> None:
 class _Swap:
     """Files on their way back."""
 
-    def __init__(self, wanted: Sequence[Wanted]) -> None:
+    def __init__(self, wanted: Sequence[WantedFile]) -> None:
         self.wanted = tuple(wanted)
         self.outputs: dict[Path, OutputFolder] = {}
         self.error = ""
@@ -210,7 +209,7 @@ class _Swap:
         self.outputs = {}
 
 
-def _begin(wanted: Sequence[Wanted]) -> None:
+def _begin(wanted: Sequence[WantedFile]) -> None:
     """Begin to bring files back, those that are held; say so of the others."""
     held = state.held
     there = [one for one in wanted if held is not None and one.version in held]
@@ -248,13 +247,13 @@ def _cancel() -> None:
         swap.close()
 
 
-def _report_with(output: OutputFolder, wanted: Sequence[Wanted]) -> BakeReport:
+def _report_with(output: OutputFolder, wanted: Sequence[WantedFile]) -> BakeReport:
     """Return the report that the files had, with all that lies in the folder now."""
     from ...bake.result import BakeReport
 
-    now = output.earlier or {}
-    stored = next((state.reports[one.version] for one in wanted if one.version in state.reports), now)
-    before, listed = (report.get(LISTED, {}) for report in (stored, now))
+    current = output.earlier or {}
+    stored = next((state.reports[one.version] for one in wanted if one.version in state.reports), current)
+    before, listed = (report.get(LISTED, {}) for report in (stored, current))
     if before.get(output.names.sidecar) != listed.get(output.names.sidecar):
         # Its sidecar is not there any more.
         stored = {key: value for key, value in stored.items() if key != KEPT}
@@ -284,7 +283,7 @@ def _reload(image: bpy.types.Image) -> None:
 
 
 def is_at_work() -> bool:
-    """Tell whether files or images are still being brought to what undo asked for."""
+    """Return whether files or images are still being changed after an undo or redo."""
     return bpy.app.timers.is_registered(_tick)
 
 

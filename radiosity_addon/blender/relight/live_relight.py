@@ -1,10 +1,9 @@
 """Live: lightmaps that follow the lights while somebody drags their sliders.
 
-Blender tells a handler what has changed. That only takes a note; a timer does the rest a moment later, so
-that of many changes only the last one counts. While things change, the images follow by responses
-(`responses.py`); once they rest the kept bake is lit exactly, in a thread, and the files are written. What is
-written to images and materials comes back to the handler as a change, but strengths are then as they were,
-and nothing follows from it.
+Blender calls a handler with what has changed. The handler only takes a note; a timer does the rest a moment
+later, so that only the last of many changes counts. During changes the images follow by responses
+(`responses.py`); afterward the kept bake is lit exactly, in a thread, and the files are written. Writing to
+images and materials calls the handler again, but strengths are then unchanged, so nothing follows from it.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ from .relit_materials import show_emission
 TICK = 0.02
 """Seconds between two looks while something is going on."""
 
-REST = 0.4
+QUIET_SECONDS = 0.4
 """Seconds without a change after which the light is made exact."""
 
 AHEAD = 8
@@ -79,7 +78,7 @@ class LiveRelight:
         self._end_work()
 
     def is_at_work(self) -> bool:
-        """Tell whether the timer still has something to do."""
+        """Return whether the timer still has something to do."""
         return bpy.app.timers.is_registered(_tick)
 
     def settle(self) -> None:
@@ -183,7 +182,7 @@ class LiveRelight:
         if missing:
             self._start(missing[0], partial(self._responses.find, missing[0]))
             return True
-        resting = time.perf_counter() - self._noticed > REST or not in_background
+        resting = time.perf_counter() - self._noticed > QUIET_SECONDS or not in_background
         if not self._exact and resting:
             self._start(None, partial(lit, self._held().bake, self._strengths))
             return True

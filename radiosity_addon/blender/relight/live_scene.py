@@ -11,7 +11,7 @@ from ...bake.scene_diff import Part, SceneDiff
 from ..datablocks.bake_record import is_made
 from .live_strengths import StrengthReader
 
-STILL = 1e-6
+SAME_MATRIX = 1e-6
 """Matrices that differ by no more than this are the same."""
 
 
@@ -58,7 +58,7 @@ class LiveScene:
         obj = bpy.data.objects.get(name)
         if obj is None or name not in self._matrix:
             return False
-        if np.abs(_matrix(obj) - self._matrix[name]).max() > STILL:
+        if np.abs(_matrix(obj) - self._matrix[name]).max() > SAME_MATRIX:
             return True
         return isinstance(obj.data, bpy.types.Mesh) and self._shape.get(name) != _shape(obj.data)
 

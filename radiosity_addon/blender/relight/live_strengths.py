@@ -1,7 +1,7 @@
 """Strengths of a kept bake's sources as the file has them now, without exporting the scene.
 
-Lamps, materials and the world are read as constants. Where nodes make a light vary, which only Cycles can
-tell, its constant still follows its sliders: then its ratio to what it was at the start is taken.
+Lamps, materials and the world are read as constants. Where nodes make a light vary, only Cycles
+knows its strength, but its constant still follows its sliders: then the ratio to its first value is used.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ..cycles.lamps import read_lamp
 from ..materials.light_inputs import shown_world
 from ..materials.materials import read_material, read_radiance, uses_nodes
 
-SAME = 1e-5
+SAME_STRENGTH = 1e-5
 """A constant that is off by no more than this part is what the export found."""
 
 
@@ -39,7 +39,9 @@ class StrengthReader:
         }
         self._first = self._constants()
         with np.errstate(divide="ignore", invalid="ignore"):
-            off = np.abs(self._first - strengths) > SAME * np.abs(strengths).max(axis=1, keepdims=True)
+            off = np.abs(self._first - strengths) > SAME_STRENGTH * np.abs(strengths).max(
+                axis=1, keepdims=True
+            )
         self._varies = off.any(axis=1)
 
     def read(self) -> Array:
@@ -57,10 +59,10 @@ class StrengthReader:
         material, before = bpy.data.materials.get(name), self._reflectance.get(name)
         if material is None or before is None:
             return False
-        return bool(np.abs(read_material(material).reflectance - before).max() > SAME)
+        return bool(np.abs(read_material(material).reflectance - before).max() > SAME_STRENGTH)
 
     def _constants(self) -> Array:
-        """Return (s, 3) the sources' strengths as far as constants tell them."""
+        """Return (s, 3) the sources' strengths as far as constants determine them."""
         lights = self._kept.bake_scene.scene.lights
         rows = [self._of_light(light) for light in lights]
         rows += [_of_material(name) for name in self._kept.names[len(lights) :]]

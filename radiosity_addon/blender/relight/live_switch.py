@@ -26,8 +26,8 @@ def register() -> None:
     """Hang the switch on the session."""
     bpy.types.WindowManager.radiosity_live = bpy.props.BoolProperty(
         name="Live",
-        description="Update the lightmaps while power and color of lamps, emission or world are being "
-        "changed. Any other change switches it off",
+        description="Update the lightmaps while you change the power or color of lamps, emission or the "
+        "world. Any other change turns this off",
         default=False,
         update=_switched,
         options={"SKIP_SAVE"},

@@ -37,7 +37,7 @@ def relight_of(scene: bpy.types.Scene) -> Any:
 
 
 def keeps(scene: bpy.types.Scene, settings: BakeSettings) -> bool:
-    """Tell whether a bake of the scene from the panel is to be kept, and can be."""
+    """Return whether a bake of the scene from the panel is to be kept, and can be."""
     from ...bake import can_keep
 
     chosen = relight_of(scene)

@@ -24,7 +24,7 @@ from .kept_bakes import InMemory
 from .kept_sidecars import NO_BAKE, NO_DATA, sidecar_of
 from .relight_properties import relight_of
 from .relit_images import rewrite
-from .relit_materials import refresh
+from .relit_materials import refresh_copies
 
 READ, LIT = 0.3, 0.95
 """How far the whole is when the scene is read, and when it is lit."""
@@ -145,7 +145,7 @@ def note_shown(scene: bpy.types.Scene, held: InMemory, strengths: Array) -> None
     changed = (strengths != held.shown).any(axis=1)
     names = {name for row, name in enumerate(held.bake.names) if changed[row] and row >= lights}
     if held.bake.settings.quantity != "radiosity":  # there the lightmap itself holds it
-        refresh(names)
+        refresh_copies(names)
     held.shown = strengths
     scene.radiosity_relight.strengths = json.dumps(strengths.tolist())
 

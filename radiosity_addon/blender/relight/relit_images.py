@@ -75,7 +75,7 @@ def check_images(images: Images, pages: Sequence[LightmapPage]) -> None:
 
 
 def store(images: Sequence[bpy.types.Image], seconds: float) -> None:
-    """Write the images to their files, and to the report beside them; pack those that are packed again.
+    """Write the images to their files, and to the report next to them; pack those that are packed again.
 
     Only files that a report of their scene lists are replaced, wherever the images point.
 

@@ -7,9 +7,9 @@ from collections.abc import Collection, Iterator
 import bpy
 
 from ...numerics import radiance_of_radiosity
-from ..datablocks.bake_record import is_made
+from ..datablocks.bake_record import ORIGINAL, is_made
 from ..images.node_group import EMISSION
-from ..material_copies.copy_marks import ORIGINAL, PLAIN, STATE
+from ..material_copies.copy_marks import PLAIN, STATE
 from ..material_copies.copy_record import is_untouched
 from ..material_copies.material_digest import digest_of_material
 from ..material_edits.copy_values import take_values
@@ -19,7 +19,7 @@ from ..materials.materials import read_material, uses_nodes
 _EMISSION_SOCKETS = {"Color", "Strength", "Emission Color", "Emission Strength"}
 
 
-def refresh(names: Collection[str]) -> None:
+def refresh_copies(names: Collection[str]) -> None:
     """Have the lightmap copies of some materials glow as their originals do.
 
     The copies hold the originals' nodes: all their values are taken over, but by a copy that the user edited

@@ -20,7 +20,7 @@ from ...lights import Light
 from ...options import BakeSettings
 from ..cycles.lamps import LampFactors, read_lamp
 from ..cycles.surface_bake import can_evaluate
-from ..datablocks.image_values import Means, UnknownMeanError, Wanted, known_means_only, mean_of_named
+from ..datablocks.image_values import ImageKey, ImageMeans, UnknownMeanError, known_means_only, mean_of_named
 from ..datablocks.mesh_arrays import MeshArrays, RawMesh, copy_mesh_data, mesh_arrays, no_triangles
 from ..materials.materials import Surface, ray_doubts, read_material, uses_nodes
 from ..materials.shading_inputs import (
@@ -35,7 +35,7 @@ from ..scene_records.export_sources import MaterialSource
 from ..scene_records.light_linking import linking_warnings
 from ..scene_records.light_membership import Membership, PlaceGroups, name_on
 from ..scene_records.object_roles import BAKE, BAKEABLE_TYPES, IGNORE, role_of
-from ..scene_records.pieces import Collected, Found, names_of, piece_of
+from ..scene_records.pieces import Found, SceneContents, names_of, piece_of
 from ..scene_records.render_state import background_scenes
 from ..scene_records.scene_objects import (
     identity_of,
@@ -62,7 +62,7 @@ def collect(
     factors: LampFactors,
     settings: BakeSettings | None = None,
     dark: bool = False,
-) -> Collected:
+) -> SceneContents:
     """Read meshes, materials and lamps of an evaluated scene; `factors` are those of `lamp_factors`.
 
     `settings.ignore` and `settings.light_only` name objects to leave out, or without lightmaps; `dark` takes
@@ -77,7 +77,7 @@ def collect(
 
 def collect_steps(
     view: View, factors: LampFactors, settings: BakeSettings, dark: bool
-) -> Generator[float, None, Callable[[], Collected]]:
+) -> Generator[float, None, Callable[[], SceneContents]]:
     """Copy meshes, materials and lamps of a scene, as much a step as fits into a moment.
 
     view: Shows the scene, for a step.
@@ -86,7 +86,7 @@ def collect_steps(
         NaN or infinite.
     """
     collector = _Collector(factors, settings, dark)
-    means: Means = {}
+    means: ImageMeans = {}
     while True:
         began = time.perf_counter()
         with view() as depsgraph, known_means_only(means):
@@ -114,8 +114,8 @@ class _Collector:
         self._surface_of: dict[str | None, int] = {}
         # A curve's mesh comes as an instance, and may have the curve's own name.
         self._taken = {obj.name for obj in bpy.data.objects if obj.library is None and obj.type == "MESH"}
-        self.wanted: set[Wanted] = set()
-        """Images whose means are asked for before what shows them can be read."""
+        self.wanted: set[ImageKey] = set()
+        """Images whose means are needed before the surfaces that show them can be read."""
 
     @property
     def fraction(self) -> float:
@@ -145,9 +145,9 @@ class _Collector:
             self._unknown.append(BakeWarning(name, message))
         return complete
 
-    def sorted_out(self) -> Collected:
+    def sorted_out(self) -> SceneContents:
         """Return what was found and is still there, in the scene's order; needs no Blender."""
-        collected = Collected([], [], [], [], [], [])
+        collected = SceneContents([], [], [], [], [], [])
         rows: dict[int, int] = {}
         read: dict[int, MeshArrays | None] = {}
         for key in self._order:
@@ -251,7 +251,7 @@ class _Collector:
     def _read(
         self, instance: bpy.types.DepsgraphObjectInstance, asked: frozenset[str]
     ) -> tuple[RawMesh, MeshValues]:
-        """Return a mesh's data, and what is asked of it at its triangles' corners."""
+        """Return a mesh's data, and the inputs of its materials at its triangles' corners."""
         obj = instance.object
         key = (obj.data.as_pointer(), asked)
         if key not in self._meshes:
@@ -298,17 +298,17 @@ class _Collector:
                 unreliable = _warnings_of(material, unreliable_nodes(material.node_tree))
                 warnings += unreliable if can_evaluate() else surface.fallbacks
             self._surface_of[key] = len(self._surfaces)
-            of = (
+            source = (
                 None if material is None else MaterialSource.of(material.original, name_on(material.original))
             )
-            self._surfaces.append((surface, of, warnings, asked))
+            self._surfaces.append((surface, source, warnings, asked))
         return self._surface_of[key]
 
 
 def _with_keys(
     depsgraph: bpy.types.Depsgraph,
 ) -> Iterator[tuple[_Key, bpy.types.DepsgraphObjectInstance]]:
-    """Yield what a scene shows, each with what tells it from all else as long as nothing is renamed."""
+    """Yield the objects that a scene shows, each with a key that is unique as long as nothing is renamed."""
     seen: Counter[_Key] = Counter()
     for instance in visible_objects(depsgraph):
         identity = identity_of(instance)

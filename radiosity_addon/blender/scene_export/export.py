@@ -23,7 +23,7 @@ from ..datablocks.uv_layers import MAX_UV_LAYERS
 from ..scene_records.export_sources import Export
 from ..scene_records.light_membership import blender_groups, group_on
 from ..scene_records.object_roles import BAKE, BAKEABLE_TYPES, half_visible
-from ..scene_records.pieces import Collected, Piece
+from ..scene_records.pieces import Piece, SceneContents
 from ..scene_records.render_options import option_warnings, world_of
 from ..scene_records.render_state import leave_edit_mode, render_depsgraph
 from ..session.background import elsewhere
@@ -153,7 +153,7 @@ def _triangles(pieces: list[Piece], chosen: set[str], settings: BakeSettings) ->
 
 def _assemble(
     context: bpy.types.Context,
-    collected: Collected,
+    collected: SceneContents,
     chosen: set[str],
     settings: BakeSettings,
     in_background: bool,
@@ -178,7 +178,7 @@ def _assemble(
 
 def _export(
     scene_name: str,
-    collected: Collected,
+    collected: SceneContents,
     triangles: _Triangles,
     images: SurfaceImages | None,
     settings: BakeSettings,
@@ -234,7 +234,7 @@ def _export(
 
 
 def _emitters(
-    scene: Scene, surface: np.ndarray, collected: Collected
+    scene: Scene, surface: np.ndarray, collected: SceneContents
 ) -> tuple[np.ndarray, tuple[str, ...], tuple[str, ...]]:
     """Number the materials that emit, each once for every light group that it is in.
 
@@ -251,8 +251,8 @@ def _emitters(
         numbers[list(here)] = [names.index(name) for name in here.values()]
         place.append(numbers[piece.surface])
     emits = scene.emission.any(axis=1)
-    of = np.stack([surface, np.concatenate(place)], axis=1)[emits]
-    rows, number = np.unique(of, axis=0, return_inverse=True)
+    origin = np.stack([surface, np.concatenate(place)], axis=1)[emits]
+    rows, number = np.unique(origin, axis=0, return_inverse=True)
     emitter = np.zeros(len(scene), dtype=np.int32)
     emitter[emits] = number.reshape(-1)
     # Without a material nothing emits.
@@ -265,7 +265,7 @@ def chosen_pieces(
 ) -> list[Piece]:
     """Return the pieces that get a lightmap.
 
-    Raises SceneError, UsageError if there is none, or one that was asked for by name can have none.
+    Raises SceneError, UsageError if there is none, or if one that is given by name can have none.
     """
     if names is None:
         bakeable = [piece for piece in pieces if piece.bakeable]

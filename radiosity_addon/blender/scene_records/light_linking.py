@@ -12,7 +12,7 @@ import bpy
 
 from ...base import BakeWarning
 
-NAMED = 3
+MAX_NAMED = 3
 """So many objects are named; of more, the number is given."""
 
 
@@ -52,6 +52,6 @@ def _limits(collection: bpy.types.Collection) -> str:
 
 def _list_of(names: Iterable[str]) -> str:
     ordered = sorted(names)
-    listed = ", ".join(f"'{name}'" for name in ordered[:NAMED])
-    more = len(ordered) - NAMED
+    listed = ", ".join(f"'{name}'" for name in ordered[:MAX_NAMED])
+    more = len(ordered) - MAX_NAMED
     return f"{listed} and {more} more" if more > 0 else listed

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import bpy
 
+from ...base import BakeWarning
+
 if TYPE_CHECKING:
-    from ...base import BakeWarning
     from ...options import BakeSettings
 
 BAKE, LIGHT_ONLY, IGNORE = "BAKE", "LIGHT_ONLY", "IGNORE"
@@ -30,7 +31,7 @@ BAKEABLE_TYPES = frozenset({"MESH", "CURVE", "SURFACE", "FONT", "META"})
 
 
 def has_role(obj: bpy.types.Object | None) -> bool:
-    """Tell whether an object can light, block or be baked: surfaces, and instances of collections."""
+    """Return whether an object can light, block or be baked: surfaces, and instances of collections."""
     return obj is not None and (obj.type in BAKEABLE_TYPES or obj.instance_type == "COLLECTION")
 
 
@@ -100,8 +101,6 @@ def role_of(
     background : str or None
         The background scene it is of; None for what is of the scene itself.
     """
-    from ...base import BakeWarning  # with the solver, which registering is not to load
-
     both = (shown,) if shown == owner else (shown, owner)
     modes = {getattr(obj, "radiosity_mode", BAKE) for obj in both}
     mode = IGNORE if IGNORE in modes else LIGHT_ONLY if LIGHT_ONLY in modes else BAKE
@@ -138,8 +137,6 @@ def role_of(
 
 def half_visible(name: str) -> BakeWarning:
     """Say what is not as in Cycles for an object that only one kind of rays meets."""
-    from ...base import BakeWarning
-
     return BakeWarning(
         name,
         f"object '{name}': Ray Visibility has only one of Diffuse and Shadow on; lamps go by Shadow, "

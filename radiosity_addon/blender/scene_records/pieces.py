@@ -27,7 +27,7 @@ class Piece:
     mesh : MeshArrays
     matrix : (4, 4) float64
     surface : (t,) int32
-        Rows of `Collected.surfaces`.
+        Rows of `SceneContents.surfaces`.
     role : Role
         Of what is ignored, `mesh` is empty.
     asked : frozenset of str
@@ -35,7 +35,7 @@ class Piece:
     inputs : dict of str to (t, 3, 4) or (4,) float32
         What was found of it: not what follows from `mesh` and `matrix`, nor what is missing.
     bakeable : bool
-        It is to have a lightmap, if it is asked for, and can: it may be edited.
+        It may get a lightmap, if requested: the object is editable.
     linked : bool
         It would be bakeable, were it not linked from a library.
     uv_layers : int
@@ -100,7 +100,7 @@ class Found:
 
 
 @dataclass(frozen=True)
-class Collected:
+class SceneContents:
     """All that was found. `surfaces` and `materials` are indexed by `Piece.surface`.
 
     `groups` are the lights' light groups, parallel to them, "" for those in none.
@@ -114,7 +114,9 @@ class Collected:
     groups: list[str]
 
 
-def piece_of(found: Found, mesh: MeshArrays | None, rows: np.ndarray, collected: Collected) -> Piece | None:
+def piece_of(
+    found: Found, mesh: MeshArrays | None, rows: np.ndarray, collected: SceneContents
+) -> Piece | None:
     """Make a piece of what was found, if it is one, and add its warnings."""
     role, name = found.role, found.source.name
     surface, asked = np.zeros(0, dtype=np.int32), found.asked

@@ -50,7 +50,9 @@ def _missing_links() -> Iterator[BakeWarning]:
                 missing.setdefault(block.library.filepath, []).append(block.name)
     for path, names in missing.items():
         more = f" and {len(names) - 1} more" if len(names) > 1 else ""
-        message = f"library '{path}' lacks '{names[0]}'{more}: what is linked from it is left out; relink it"
+        message = (
+            f"library '{path}' has no '{names[0]}'{more}: objects linked from it are left out; relink it"
+        )
         yield BakeWarning(path, message)
 
 
@@ -82,11 +84,11 @@ def _still_as_in_the_viewport(objects: Iterable[bpy.types.Object]) -> Iterator[B
 
 
 def _asks(tree: bpy.types.NodeTree | None, known: dict[str, bool]) -> bool:
-    """Tell whether a node tree, or a group in it, asks if it is evaluated for the viewport."""
+    """Return whether a node tree, or a group in it, asks if it is evaluated for the viewport."""
     if tree is None:
         return False
     if tree.name_full not in known:
-        known[tree.name_full] = False  # while its groups are asked
+        known[tree.name_full] = False  # while its groups are searched
         groups = [node.node_tree for node in tree.nodes if node.type == "GROUP"]
         itself = any(node.bl_idname == "GeometryNodeIsViewport" for node in tree.nodes)
         known[tree.name_full] = itself or any(_asks(group, known) for group in groups)

@@ -2,7 +2,7 @@
 
 Python can only reach the graph that the viewport evaluates: objects hidden there are not
 in it, and modifiers run at viewport levels. A graph in render mode exists only inside a
-render engine. So whatever has a viewport and a render setting is switched to the render's
+render engine. So everything with a viewport and a render setting is switched to the render's
 for a moment, and put back after.
 
 What this does not see: the *Is Viewport* node of geometry nodes, and settings that an
@@ -48,13 +48,23 @@ def render_depsgraph(context: bpy.types.Context) -> Iterator[bpy.types.Depsgraph
     """
     layer = context.view_layer
     layers = [layer, *(_render_layer(scene) for scene in background_scenes(context.scene))]
-    selected = [(obj, of) for of in layers for obj in of.objects if obj.select_get(view_layer=of)]
-    active = [of.objects.active for of in layers]
+    selected = [
+        (obj, view_layer)
+        for view_layer in layers
+        for obj in view_layer.objects
+        if obj.select_get(view_layer=view_layer)
+    ]
+    active = [view_layer.objects.active for view_layer in layers]
     changes = _Changes()
-    hidden = [(obj, of) for of in layers for obj in of.objects if obj.hide_get(view_layer=of)]
+    hidden = [
+        (obj, view_layer)
+        for view_layer in layers
+        for obj in view_layer.objects
+        if obj.hide_get(view_layer=view_layer)
+    ]
     try:
-        for obj, of in hidden:
-            obj.hide_set(False, view_layer=of)
+        for obj, view_layer in hidden:
+            obj.hide_set(False, view_layer=view_layer)
         _switch_visibility(layers, changes)
         _switch_levels(context.scene, changes)
         layer.update()
@@ -62,13 +72,13 @@ def render_depsgraph(context: bpy.types.Context) -> Iterator[bpy.types.Depsgraph
     finally:
         changes.undo()
         layer.update()
-        for obj, of in hidden:
-            obj.hide_set(True, view_layer=of)
+        for obj, view_layer in hidden:
+            obj.hide_set(True, view_layer=view_layer)
         # Hiding an object deselects it, so this comes last.
-        for of, was_active in zip(layers, active, strict=True):
-            of.objects.active = was_active
-        for obj, of in selected:
-            obj.select_set(True, view_layer=of)
+        for view_layer, was_active in zip(layers, active, strict=True):
+            view_layer.objects.active = was_active
+        for obj, view_layer in selected:
+            obj.select_set(True, view_layer=view_layer)
 
 
 def background_scenes(scene: bpy.types.Scene) -> list[bpy.types.Scene]:

@@ -86,7 +86,7 @@ def unknown_objects(depsgraph: bpy.types.Depsgraph) -> dict[str, str]:
 
 
 def _shown_by_parent(obj: bpy.types.Object) -> bool:
-    """Tell whether an object appears on its parent's vertices or faces, and so not by itself.
+    """Return whether an object appears on its parent's vertices or faces, and so not by itself.
 
     Renders leave it out then; the viewport's graph does not.
     """
@@ -100,7 +100,7 @@ def original_object(instance: bpy.types.DepsgraphObjectInstance) -> bpy.types.Ob
 
 
 def is_generated(instance: bpy.types.DepsgraphObjectInstance) -> bool:
-    """Tell whether an instance shows geometry of its own: made by nodes, or a curve's mesh.
+    """Return whether an instance shows geometry of its own: made by nodes, or a curve's mesh.
 
     Blender hands these out under the object that made them, whose evaluated mesh they are
     not: only `object.data` is right then (and `to_mesh` crashes Blender 4.2).
@@ -171,7 +171,7 @@ def copy_evaluated_meshes(
 
 
 def identity_of(instance: bpy.types.DepsgraphObjectInstance) -> tuple[str, str | None, str, tuple[int, ...]]:
-    """Return what tells an instance from all others: object, library, instancer, persistent id."""
+    """Return what identifies an instance: object, library, instancer, persistent id."""
     shown = original_object(instance)
     library = shown.library.filepath if shown.library else None
     instancer = instance.parent.original.name if instance.is_instance else ""

@@ -13,10 +13,10 @@ from ...base import Cancelled, Progress, Status
 
 R = TypeVar("R")
 
-PATIENCE = 0.005
+POLL_SECONDS = 0.005
 """Seconds that one `next` waits for news."""
 
-TURN = 0.001
+SWITCH_INTERVAL = 0.001
 """Seconds after which a thread that runs Python hands over to one that waits, instead of Python's 5 ms: to
 draw a window once takes dozens of turns."""
 
@@ -25,13 +25,13 @@ def in_thread(work: Callable[[Progress], R], in_window: bool = True) -> Generato
     """Do work in a thread of its own.
 
     Only for work on plain arrays: Blender's data must not be touched from a thread.
-    The thread does not wait for the caller, who may be drawing a window: pictures that it
-    tells of must not change afterward.
+    The thread does not wait for the caller, which may be drawing a window: pictures that it
+    reports must not change afterward.
 
     Parameters
     ----------
     work : callable
-        Takes the progress to tell of. What it returns or raises comes through as it is.
+        Takes the progress to report. Its result or exception is passed on.
     in_window : bool
         Return from every `next` within a moment. Else only with news.
 
@@ -42,8 +42,8 @@ def in_thread(work: Callable[[Progress], R], in_window: bool = True) -> Generato
 
     Notes
     -----
-    Closed, this cancels the work, which ends when it next tells of its progress. In a window this returns at
-    once; else it waits for that, since nobody else would.
+    Closing the generator cancels the work, which ends when it next reports its progress. In a window this
+    returns at once; otherwise it waits for the end of the work.
     """
     news: SimpleQueue[Status] = SimpleQueue()
     closed = threading.Event()
@@ -55,14 +55,14 @@ def in_thread(work: Callable[[Progress], R], in_window: bool = True) -> Generato
 
     turn = sys.getswitchinterval()
     if in_window:
-        sys.setswitchinterval(min(turn, TURN))
+        sys.setswitchinterval(min(turn, SWITCH_INTERVAL))
     thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="radiosity")
     running = thread.submit(work, Progress(listen, in_window=in_window))
     try:
         while True:
             over = running.done()
             try:
-                status = news.get(timeout=0.0 if over else PATIENCE)
+                status = news.get(timeout=0.0 if over else POLL_SECONDS)
             except Empty:
                 if over:
                     return running.result()

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import bpy
+import numpy as np
 
 from .state import session
 
@@ -43,8 +44,6 @@ class KeptDetails:
 
     def seen(self) -> Array:
         """Return (t,) bool which of the scene's triangles are on objects with a lightmap that are shown."""
-        import numpy as np
-
         record = self.details.links
         ends = [item.first + item.count for item in self.objects.values()]
         seen = np.zeros(max([int(record.triangle.max(initial=-1)) + 1, *ends]), dtype=bool)
@@ -69,6 +68,6 @@ def details_of(scene: bpy.types.Scene) -> KeptDetails | None:
 
 
 def _is_shown(name: str) -> bool:
-    """Tell whether an object, or the stand-in of an instance "Instancer/Object", is seen."""
+    """Return whether an object, or the stand-in of an instance "Instancer/Object", is seen."""
     there = [bpy.data.objects.get(name + ending) for ending in ("", STAND_IN_SUFFIX)]
     return any(obj.visible_get() for obj in there if obj is not None)

@@ -11,7 +11,7 @@ import bpy
 # Plain classes: decorators of records would take a third of the time to load this.
 
 
-class Running:
+class RunningJob:
     """The bake or relighting in progress, if any.
 
     seconds_left: None while no estimate is possible.
@@ -82,7 +82,7 @@ class Session:
     """
 
     def __init__(self) -> None:
-        self.running = Running()
+        self.running = RunningJob()
         self.interrupted = False
         self.live: Any = None
         self.live_message = ""
@@ -113,7 +113,7 @@ class Session:
             manager.radiosity_live = False
 
     def lightmaps_changed(self) -> None:
-        """Tell everything that draws or caches lightmaps."""
+        """Notify everything that draws or caches lightmaps."""
         for listener in self.on_lightmaps_changed:
             listener()
 

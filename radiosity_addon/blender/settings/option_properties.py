@@ -71,8 +71,8 @@ class OptionProperties:
     __annotations__ = properties_of("radiosity")
 
 
-def shown(option: Option, group: Any) -> bool:
-    """Tell whether the panel shows an option, and a bake listens to it, as the other ones are chosen.
+def is_shown(option: Option, group: Any) -> bool:
+    """Return whether the panel shows an option, and a bake listens to it, as the other ones are chosen.
 
     group: `scene.radiosity`.
     """
@@ -88,13 +88,13 @@ def chosen_options(group: Any) -> dict[str, Any]:
     values = {
         name: _typed(getattr(group, option.identifier))
         for name, option in OPTIONS.items()
-        if shown(option, group)
+        if is_shown(option, group)
     }
     return {name: value for name, value in values.items() if _chosen(OPTIONS[name], value)}
 
 
 def _chosen(option: Option, value: Any) -> bool:
-    """Tell whether a value says something: 0 may leave it to the quality, a last choice to another option."""
+    """Return whether a value is a choice: 0 may leave it to the quality, a last choice to another option."""
     if option.choices:
         return value in option.values
     return option.default is not None or bool(value)

@@ -46,7 +46,7 @@ class RADIOSITY_PT_presets(PresetPanel, bpy.types.Panel):
 
 
 def register() -> None:
-    """Tell Blender where our presets are."""
+    """Register the folder of our presets with Blender."""
     bpy.utils.register_preset_path(str(Path(__file__).parent))
 
 

@@ -46,7 +46,7 @@ def settings_of(context: bpy.types.Context) -> BakeSettings:
     Raises
     ------
     UsageError
-        If a value is out of range, or nothing is selected where the selection is asked for.
+        If a value is out of range, or nothing is selected although only the selection is to be baked.
     """
     group = context.scene.radiosity
     objects = selected_meshes(context) if group.scope == "selected" else None

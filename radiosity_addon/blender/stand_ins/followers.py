@@ -50,8 +50,10 @@ def left_behind(context: bpy.types.Context, before: Mapping[str, Matrix]) -> tup
     for name in sorted(moved):
         parent = bpy.data.objects[name, None].parent
         if parent is None or parent.name not in moved:
-            message = f"object '{name}' is elsewhere while lightmaps show, as a copy replaces the mesh that"
-            found[name] = f"{message} it follows: it was baked in its own place, and Restore brings it back"
+            message = f"object '{name}' is displaced while lightmaps show, because a copy replaces the mesh"
+            found[name] = (
+                f"{message} that it follows: it was baked in its own place, and Restore moves it back"
+            )
     shown = [obj for obj in context.view_layer.objects if obj.data is not None and is_made(obj.data)]
     for owner, driver in _drivers_reading(shown):
         for target in _targets(driver):

@@ -140,7 +140,7 @@ def _animation(owner: bpy.types.ID) -> tuple[str, list[tuple[str, int, str]], li
 
 
 def _settings(mesh: bpy.types.Mesh) -> list[tuple[str, object]]:
-    """Return the mesh's plain settings and custom properties, but for ours."""
+    """Return the mesh's plain settings and custom properties, except for ours."""
     plain = [
         (prop.identifier, getattr(mesh, prop.identifier))
         for prop in mesh.bl_rna.properties

@@ -10,7 +10,7 @@ from mathutils import Matrix
 
 from ...bake.result import BakedObject
 from ...base import BakeError
-from ..datablocks.bake_record import ORIGINAL, mark_made, record_baked, record_hiding
+from ..datablocks.bake_record import ORIGINAL, mark_made, record_baked, record_hiding, record_modifiers
 from ..datablocks.uv_layers import check_room, layer_record, put_layer_on, set_record
 from ..material_copies.light_shares import LightShares
 from ..material_copies.lightmap_materials import LightmapMaterials
@@ -191,6 +191,7 @@ def _show_in_place(obj: bpy.types.Object, replacement: Replacement) -> None:
 def _swap_mesh(obj: bpy.types.Object, replacement: Replacement) -> None:
     """Show a stand-in mesh on the source's own object."""
     if replacement.source.needs_evaluated_mesh:
+        record_modifiers(obj)
         for modifier in obj.modifiers:
             modifier.show_viewport = modifier.show_render = False
     obj.data = replacement.mesh

@@ -14,7 +14,7 @@ import bpy
 
 from ..datablocks.bake_record import ASIDE, LAYER, MADE_MARKER, ORIGINAL, is_made, is_recorded, unmark_made
 from ..datablocks.uv_layers import take_layer_off
-from ..material_copies.material_slots import is_copy, original_of, show_originals
+from ..material_copies.material_slots import original_of, show_originals
 from .mesh_digest import digest_of_mesh
 
 STAND_IN = "radiosity_stand_in"
@@ -109,9 +109,12 @@ def stood_for(mesh: bpy.types.Mesh, slot: int) -> bpy.types.Material | None:
 
 
 def has_edited_slots(mesh: bpy.types.Mesh, known: StandIn) -> bool:
-    """Whether the user has assigned other materials to a stand-in, added slots or removed some."""
+    """Whether the user has assigned other materials to a stand-in, added slots or removed some.
+
+    Another lightmap copy is another material too: the user picked it, or made a new one of it.
+    """
     slots = enumerate(mesh.materials)
-    other = any(not is_copy(material) and material != stood_for(mesh, slot) for slot, material in slots)
+    other = any(original_of(material) != stood_for(mesh, slot) for slot, material in slots)
     return other or len(mesh.materials) != known.slots
 
 
@@ -121,7 +124,7 @@ def is_edited(mesh: bpy.types.Mesh, known: StandIn) -> bool:
 
 
 def own_mesh(obj: bpy.types.Object) -> bpy.types.ID | None:
-    """Return the user's mesh of an object, whatever stands in for it."""
+    """Return the user's mesh of an object, also where another stands in for it."""
     data = obj.data
     if data is not None and is_made(data):
         return data.get(ORIGINAL) or (obj.radiosity_bake.original_mesh if is_recorded(obj) else None)

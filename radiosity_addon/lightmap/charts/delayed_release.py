@@ -14,14 +14,14 @@ import time
 from collections import deque
 from collections.abc import Callable
 
-REST = 0.5
+RELEASE_DELAY = 0.5
 """Seconds."""
 
-MOST = max(8, min(256, 1024 // (os.cpu_count() or 1)))
+MAX_WAITING = max(8, min(256, 1024 // (os.cpu_count() or 1)))
 """Maximum number of waiting objects: each keeps as many threads as the machine has cores."""
 
 
-class Resting:
+class DelayedRelease:
     """Keeps objects alive for a while; expired ones are released when a new one arrives.
 
     rest: Seconds that each is kept at least.
@@ -31,8 +31,8 @@ class Resting:
 
     def __init__(
         self,
-        rest: float = REST,
-        most: int = MOST,
+        rest: float = RELEASE_DELAY,
+        most: int = MAX_WAITING,
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:

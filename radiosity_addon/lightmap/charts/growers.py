@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .box_charts import box_charts
-from .delayed_release import Resting
+from .delayed_release import DelayedRelease
 from .xatlas_worker import WORTH_A_PROCESS, run_apart, run_xatlas
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
-resting = Resting()
+resting = DelayedRelease()
 """The latest of xatlas' atlases: destroyed right after their work they may hang."""
 
 

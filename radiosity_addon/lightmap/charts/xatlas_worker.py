@@ -23,7 +23,7 @@ Int = NDArray[np.int64]
 WORTH_A_PROCESS = 2000
 """Triangles that take about as long as a process takes to start, and less than a frame."""
 
-PATIENCE = 600.0
+TIMEOUT = 600.0
 """Seconds after which the other process is given up, and the work done in this one."""
 
 LONGEST_CHART = 2048
@@ -74,7 +74,7 @@ def run_apart(vertices: Float, faces: Int) -> tuple[Float, Int] | None:
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-            timeout=PATIENCE,
+            timeout=TIMEOUT,
             check=True,
             creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
         )

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 Float32 = NDArray[np.float32]
 Bool = NDArray[np.bool_]
 
-BAND = 1 << 20
+CHUNK = 1 << 20
 """Texels that are halved at once; bounds the temporaries to about 40 MB."""
 
 _NEIGHBORS = tuple(
@@ -83,7 +83,7 @@ def _fill_coarsely(pixels: Float32, filled: Bool) -> None:
     coarse = np.empty(((height + 1) // 2, (width + 1) // 2, pixels.shape[2]), dtype=np.float32)
     known = np.empty(coarse.shape[:2], dtype=bool)
     # In bands of an even number of rows.
-    band = max(BAND // width // 2, 1)
+    band = max(CHUNK // width // 2, 1)
     for first in range(0, len(coarse), band):
         in_band = slice(first, first + band)
         coarse[in_band], known[in_band] = _halved(

@@ -11,7 +11,7 @@ from ...numerics import Array
 class LightmapPage:
     """One baked image.
 
-    pixels (height, width, 3) float32: Linear RGB of the quantity asked for. Row 0 is v = 0: the bottom, as in
+    pixels (height, width, 3) float32: Linear RGB of the requested quantity. Row 0 is v = 0: the bottom, as in
         Blender.
     coverage (height, width) bool: True where a triangle covers part of the texel; the rest was dilated.
     """

@@ -32,7 +32,7 @@ SAMPLES_PER_TEXEL = 2.0
 SAME_UV = 1e-3
 """Sides that lie closer than this on the page [texels] are one."""
 
-NEAR = 3.0
+MAX_SEAM_DISTANCE = 3.0
 """Texels this far [texels] from a place on a seam do not belong to it."""
 
 CHUNK = 1 << 16
@@ -178,7 +178,7 @@ def _own_texels_only(geometry: TexelGeometry, numbers: Array, weight: Array, at:
     """
     covered = (numbers != NO_TEXEL) & (weight > 0)
     distance = np.linalg.norm(geometry.position[numbers] - at[:, None, None], axis=3)
-    own = ~covered | (distance < NEAR * size[:, None, None])
+    own = ~covered | (distance < MAX_SEAM_DISTANCE * size[:, None, None])
     return np.asarray(own.all(axis=(1, 2)) & covered.any(axis=2).all(axis=1))
 
 

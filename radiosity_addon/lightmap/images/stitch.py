@@ -4,7 +4,7 @@ Least squares over the texels that are read along seams: Σ length (a(x) − b(x
 the seams, where a and b are bilinear look-ups on either side, plus Σ λ (v − v₀)² over the texels,
 solved by conjugate gradients. Texels outside the charts, which dilation made up, give way easily;
 those whose center is on the surface hardly. No texel leaves the range of the values that were
-read beside it, so what is dark stays dark, and nothing turns negative.
+read next to it, so dark texels stay dark, and nothing turns negative.
 """
 
 from __future__ import annotations
@@ -24,25 +24,18 @@ Float32 = NDArray[np.float32]
 HOLD_COVERED, HOLD_EDGE, HOLD_OUTSIDE = 1.0, 0.1, 0.01
 """λ of texels whose center is on the surface, of those of which only a part is, and of dilated ones."""
 
-ITERATIONS = 40
+MAX_ITERATIONS = 40
 """Conjugate-gradient steps at most; …"""
 
 TOLERANCE = 1e-4
 """… or until the residual has fallen to this part."""
 
 
-def stitch_pages(pages: Sequence[Float32], geometry: TexelGeometry, seams: Seams) -> list[Float32]:
-    """Stitch dilated pages, (height, width, channels) each; returns new ones.
-
-    What lies farther outside the charts than filtering reaches keeps what dilation gave it.
-    """
-    stitched = [page.copy() for page in pages]
-    stitch_in_place(stitched, geometry, seams)
-    return stitched
-
-
 def stitch_in_place(pages: Sequence[Float32], geometry: TexelGeometry, seams: Seams) -> None:
-    """Stitch dilated pages where they are."""
+    """Stitch dilated pages, (height, width, channels) each, where they are.
+
+    Texels farther outside the charts than filtering reaches keep their dilated values.
+    """
     if not len(seams):
         return
     texel, inverse = np.unique(seams.texel, return_inverse=True)
@@ -113,7 +106,7 @@ class _System:
         ahead = self._inverse_diagonal * residual
         direction = ahead.copy()
         product = (residual * ahead).sum(axis=0)
-        for _ in range(ITERATIONS):
+        for _ in range(MAX_ITERATIONS):
             going = np.sqrt((residual**2).sum(axis=0)) > TOLERANCE * start
             if not going.any():
                 break

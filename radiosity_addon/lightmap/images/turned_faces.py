@@ -20,7 +20,7 @@ DARK = 0.02
 SEEN = 0.1
 """… if the back gets at least this part of the mean light of lit sides."""
 
-MUCH = 0.1
+MAX_TURNED_SHARE = 0.1
 """Objects are warned of where more than this part of their area is like that: walls often are one object,
 and closed ones, which are dark inside, never are."""
 
@@ -44,10 +44,10 @@ def turned_away(
     for item in objects:
         area = areas[item.rows]
         share = float(area @ turned[item.rows]) / max(float(area.sum()), 1e-300)
-        if share > MUCH:
+        if share > MAX_TURNED_SHARE:
             yield BakeWarning(
                 item.name,
                 f"object '{item.name}' is lit from behind only on {share:.0%} of its surface: normals point "
                 "away from the light, so its lightmap is dark there; flip them (Mesh → Normals → Flip) if "
-                "that side is to be seen",
+                "that side should be visible",
             )

@@ -1,4 +1,4 @@
-"""Light texels to an error that was asked for: look harder until the estimate says it is reached."""
+"""Light texels to a target error: with more and more rays, until the estimated error is below it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .reconstruction import light_texels
 TRIES = 4
 """Times the texels are lit at most: each time the error is known better."""
 
-MARGIN = 0.9
+TARGET_SHARE = 0.9
 """The next try aims at this part of what would just do."""
 
 
@@ -38,7 +38,7 @@ def light_within(
     settings = settings_for(goal)
     for tries in range(TRIES, 0, -1):
         light = light_texels(scene, local, geometry, settings, so_far=so_far, progress=next(turns))
-        goal *= MARGIN * error / max(light.error, 1e-9)
+        goal *= TARGET_SHARE * error / max(light.error, 1e-9)
         before, settings = settings, settings_for(goal)
         if light.error <= error or settings == before:
             break

@@ -1,9 +1,8 @@
 """The residual of the elements' solution at every texel: an error picture.
 
-What is baked otherwise is not the elements' radiosity but light asked for anew at each texel.
-Here it is the elements that are judged: their radiosity B̂ at the texel, less what it would be
-by the light that B̂ itself sends there (handout (3.5)). So hits are looked up in the elements,
-and no sweep corrects them.
+Other bakes do not show the elements' radiosity but light that is gathered again at each texel. Here
+the elements are judged: their radiosity B̂ at the texel, less what it would be by the light that B̂
+itself sends there (handout (3.5)). So hits are looked up in the elements, and no sweep corrects them.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from ..texels import TexelGeometry, find_crossings
 from ..transport import GatherSettings, gather_texels
 from .reconstruction import CROSSED, DIRECT, footprints
 
-GATHERED = 0.8
+TRACED_FRACTION = 0.8
 """How much is done when rays have been traced; rough."""
 
 SAMPLES = 4
@@ -39,9 +38,9 @@ def texel_residual(
     direct = local.direct.at(footprints(geometry, local), progress=progress.part(0.0, DIRECT))
     part = progress.part(DIRECT, CROSSED)
     crossings = find_crossings(geometry, local.caster, local.threads, progress=part)
-    part = progress.part(CROSSED, GATHERED)
+    part = progress.part(CROSSED, TRACED_FRACTION)
     links, _ = gather_texels(local, crossings, settings, local.elements.leaves_of, progress=part)
-    part = progress.part(GATHERED, 1.0)
+    part = progress.part(TRACED_FRACTION, 1.0)
     direct += links.irradiance(residual.gathered(local), local.threads, progress=part)
     return _residual_at(residual, geometry, direct)
 

@@ -1,8 +1,8 @@
 """The light of texels while it is still being computed, to be looked at.
 
-At first it is the hierarchy's. As lamps are asked, texels get the detail of direct light that elements are
-too large for; as gather points are done, they and the texels around them get what their rays brought; and
-each sweep replaces it all. Nothing of it goes into the result.
+At first it is the hierarchy's. After each lamp, texels get the detail of direct light that elements are too
+large for; after gather points, they and the texels around them get what their rays brought; each sweep
+replaces it all. Nothing of it goes into the result.
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ from __future__ import annotations
 import numpy as np
 
 from ...numerics import Array
-from ...solver.gather import NOTHING, Gathered, LocalPass, values_of
+from ...solver.gather import NOTHING, GatheredHits, LocalPass, values_of
 from ..texels import NO_TEXEL, TexelGeometry
 from ..transport import HitTable
 
 EVERY = 4
-"""One of so many gather rays is looked up: a picture needs no more, and is to cost next to nothing."""
+"""One of this many gather rays is looked up: a picture needs no more, and must cost next to nothing."""
 
 ALIKE = 0.9
 """Cosine between the normals of a gather point and of a texel it may stand for."""
@@ -38,7 +38,7 @@ class LightSoFar:
         self._table: HitTable | None = None
         self._element = np.zeros(0, dtype=np.int32)
         self._direct = self._reflectance = self._emission = np.zeros((0, 3))
-        self._waiting: list[tuple[Array, Gathered, int]] = []
+        self._waiting: list[tuple[Array, GatheredHits, int]] = []
         self._expected: Array | None = None
         self._indirect: Array | None = None
         self._gathered = np.zeros(0, dtype=bool)
@@ -59,7 +59,7 @@ class LightSoFar:
         element : (n,) int32
             The leaf element below each texel, or NOTHING.
         direct : (n, 3) float64 [W/m²]
-            All 0; it grows as lamps are asked.
+            All 0; it grows lamp by lamp.
         materials : reflectance and emission, (n, 3) float64 each
         """
         self.geometry, self._local, self._element = geometry, local, element
@@ -68,11 +68,11 @@ class LightSoFar:
         self._gathered = np.zeros(len(geometry), dtype=bool)
         self.version += 1
 
-    def asked(self) -> None:
+    def lamp_done(self) -> None:
         """Note that another lamp has been asked everywhere."""
         self.version += 1
 
-    def met(self, table: HitTable, rows: Array, gathered: Gathered, stride: int) -> None:
+    def met(self, table: HitTable, rows: Array, gathered: GatheredHits, stride: int) -> None:
         """Note what (g,) texels gathered that lie `stride` texels apart."""
         if len(rows):
             self._table = table
@@ -128,15 +128,15 @@ class LightSoFar:
         )
         texel = np.full(row.shape, NO_TEXEL, dtype=np.int32)
         for page, numbers in enumerate(geometry.index):
-            mine = (geometry.page[rows] == page)[:, None] & (row < len(numbers)) & (column < len(numbers))
-            texel[mine] = numbers[row[mine], column[mine]]
+            on_page = (geometry.page[rows] == page)[:, None] & (row < len(numbers)) & (column < len(numbers))
+            texel[on_page] = numbers[row[on_page], column[on_page]]
         normal = geometry.surface_normal
         near = np.einsum("gk,gsk->gs", normal[rows], normal[texel]) > ALIKE
         point = np.broadcast_to(np.arange(len(rows))[:, None], texel.shape)
         found = (texel != NO_TEXEL) & near
         return texel[found], point[found]
 
-    def _brought(self, gathered: Gathered) -> Array:
+    def _brought(self, gathered: GatheredHits) -> Array:
         """Return (g, 3) what rays brought by the hierarchy's light [W/m²]."""
         mean = self._values_at(gathered.sources[:, ::EVERY]).mean(axis=1)
         aimed = gathered.aimed

@@ -1,12 +1,12 @@
 """Irradiance of every texel from a solved scene: direct light, gather points, sweeps.
 
-Direct light is asked for at every texel. Indirect light is gathered at few texels, dense
-near contacts, and interpolated. Each gather ray remembers what it hit, most often another
-texel: that is a link at the finest level, so a few Jacobi sweeps over the texels, which
-trace nothing, remove what the coarse hierarchy got wrong.
+Direct light is evaluated at every texel. Indirect light is gathered at few texels, dense near contacts,
+and interpolated. What each gather ray hit is stored, most often another texel: that is a link at the
+finest level, so a few Jacobi sweeps over the texels, which trace nothing, remove the errors of the
+coarse hierarchy.
 
-After something moved the steps are the same. Each keeps what was found before and asks again only where
-what moved was or is in the way; the sweeps go over all texels, for indirect light changes everywhere.
+After objects moved the steps are the same. Each keeps earlier results and traces again only where the moved
+objects were or are in the way; the sweeps go over all texels, because indirect light changes everywhere.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from .partial_light import LightSoFar
 DIRECT, CROSSED, PARTS = 0.25, 0.3, 0.9
 """How much is done when a part ends; rough, from rooms at medium quality."""
 
-GATHERED = 5 / 6
+GATHER_FRACTION = 5 / 6
 """The part of tracing that gathers at texels."""
 
 RETRACED = 0.5
@@ -66,14 +66,14 @@ def light_texels(
     ----------
     scene : Scene
     local : LocalPass
-        If it can ask for every light apart, what lights the texels anew is kept.
+        If it evaluates every light separately, the data to relight the texels is kept.
     geometry : TexelGeometry
     settings : GatherSettings
     previous : PreviousLight or None
         The light before something moved; what it does not affect is kept. `local` is then of the same
-        elements with the light they had, able to ask for every light apart.
+        elements with the light they had, and evaluates every light separately.
     so_far : LightSoFar or None
-        Is told what is known on the way.
+        Gets intermediate results.
     """
     reflectance, emission = texel_materials(scene, geometry)
     element = elements_below(local, geometry)
@@ -89,7 +89,7 @@ def light_texels(
         local.caster,
         local.threads,
         before=None if previous is None else previous.traced.table.crossings,
-        anew=None if previous is None else np.flatnonzero(previous.affected.near),
+        again=None if previous is None else np.flatnonzero(previous.affected.near),
         progress=progress.part(DIRECT, CROSSED),
     )
     table = HitTable(local, geometry, crossings)
@@ -139,8 +139,9 @@ def _direct_light(
         lamps += local.direct.lit_by(gains)
         return gains
     kept = local.direct.new_gains(len(geometry), geometry.scratch)
-    tell = None if so_far is None else so_far.asked
-    local.direct.at(footprints(geometry, local), gains=kept, total=lamps, tell=tell, progress=progress)
+    on_light = None if so_far is None else so_far.lamp_done
+    at = footprints(geometry, local)
+    local.direct.at(at, gains=kept, total=lamps, on_light=on_light, progress=progress)
     return kept
 
 
@@ -153,12 +154,12 @@ def _trace(
     so_far: LightSoFar | None,
     progress: Progress,
 ) -> tuple[TexelTransport, GatherPointLayout | None, TableRows]:
-    """Gather at texels and at the cells that their rays met, but for what stands.
+    """Gather at texels and at the cells that their rays met, except what stands.
 
     Returns also where points were chosen, if lights are kept apart, and the rows of the table of radiosity.
     """
     met = None if so_far is None else partial(so_far.met, table)
-    gathering, parts = progress.part(0.0, GATHERED), progress.part(GATHERED, 1.0)
+    gathering, parts = progress.part(0.0, GATHER_FRACTION), progress.part(GATHER_FRACTION, 1.0)
     kept, known = None, []
     if standing is not None:
         kept = kept_points(standing, gathering.part(0.0, RETRACED))

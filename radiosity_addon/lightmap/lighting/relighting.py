@@ -1,4 +1,4 @@
-"""Texels lit anew by kept links and gains: no ray is traced.
+"""Texels relit by kept links and gains, without tracing rays.
 
 The same equation as in a bake (`transport/sweeps.py`), with other strengths of the lights: gains times
 strengths for what comes straight from lamps, cells of the sky times its radiance, and the hierarchy, solved
@@ -44,7 +44,9 @@ def relight_texels(
     given = sources.of_lamps(strengths)
     cells = kept.transport.cells
     links = [
-        replace(some, lamps=some.gains.irradiance(given)) for some in cells.links if some.gains is not None
+        replace(level, lamps=level.gains.irradiance(given))
+        for level in cells.links
+        if level.gains is not None
     ]
     assert len(links) == len(cells.links)  # a kept bake keeps them all
     known = kept.warm_start.mixed(strengths)
@@ -54,8 +56,8 @@ def relight_texels(
         first, count = table, len(kept.element)
         for rows in tiles(len(table)):
             after = slice(max(rows.start - count, 0), max(rows.stop - count, 0))
-            of = np.concatenate([kept.element[rows], cells.element[after]])
-            first[rows] = table[rows] + values_of(reflected, of)
+            element = np.concatenate([kept.element[rows], cells.element[after]])
+            first[rows] = table[rows] + values_of(reflected, element)
     else:
         first = known
     start, of_cells = first[: len(kept.element)], first[len(kept.element) :]
@@ -85,6 +87,6 @@ def kept_bytes(kept: RelightableTexels) -> int:
     links, cells = kept.transport.links, kept.transport.cells
     total = links.sources.nbytes + links.aimed.sources.nbytes + links.aimed.weights.nbytes
     total += kept.gains.nbytes + kept.element.nbytes + kept.transport.reflectance.nbytes
-    for some in cells.links:
-        total += some.sources.nbytes + (0 if some.gains is None else some.gains.nbytes)
+    for level in cells.links:
+        total += level.sources.nbytes + (0 if level.gains is None else level.gains.nbytes)
     return int(np.int64(total))

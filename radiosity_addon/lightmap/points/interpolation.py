@@ -4,7 +4,7 @@ A gather point may speak for a texel as far as irradiance can be expected to sta
 same: distance times the mean closeness of what the point sees, plus the turn of the
 normal (the split-sphere estimate of Ward, Rubinstein and Clear 1988). Near a contact that
 reach goes to zero. What neighbors of a texel see d away, it sees no farther away than that and the
-way to them: so no point in the open speaks for texels beside a contact (neighbor clamping, Křivánek,
+way to them: so no point in the open speaks for texels next to a contact (neighbor clamping, Křivánek,
 Bouatouch, Pattanaik and Žára 2006). A point must also see the texel, just above the surface: in the
 open the reach is long, and a wall thin.
 """
@@ -21,7 +21,7 @@ from ...numerics import Array, Scratch, fill_chunks, map_chunks, run_starts, til
 from ...rays import SAGITTA, SIGHT_LIFT, RayCaster
 from ..texels import TexelGeometry
 from .point_grid import NONE, PointGrid
-from .weighed_pairs import Weighed, run_of
+from .weighted_pairs import WeightedPairs, run_of
 
 REACH = 0.35
 """Largest split-sphere change at which a gather point still counts."""
@@ -55,7 +55,7 @@ class GatherPoints:
         self.level = np.zeros(0, dtype=np.int8)
         """(g,) int8: as which level each was added, from 0"""
         self._grids: list[PointGrid] = []
-        self._weighed = Weighed.nothing()
+        self._weighed = WeightedPairs.nothing()
         scratch = geometry.scratch
         self._number = scratch.empty(len(geometry), np.int32)
         self.farthest = scratch.empty(len(geometry))
@@ -154,7 +154,7 @@ class GatherPoints:
         scratch = self._geometry.scratch
         total = scratch.empty(len(texels))
         kept = scratch.rows(1, np.int32), scratch.rows(1, np.int32), scratch.rows(1, np.float32)
-        self._weighed = Weighed.nothing()
+        self._weighed = WeightedPairs.nothing()
         for rows, (weights, farthest, pairs) in map_chunks(
             partial(_supported, self, texels), len(texels), CHUNK, self.threads, progress
         ):
@@ -163,7 +163,7 @@ class GatherPoints:
                 table.extend(values)
         in_order = all((np.diff(texels[rows]) > 0).all() for rows in tiles(len(texels)))
         if in_order and len(texels):
-            self._weighed = Weighed(len(self._grids), texels, *(table.all()[:, 0] for table in kept))
+            self._weighed = WeightedPairs(len(self._grids), texels, *(table.all()[:, 0] for table in kept))
         return total
 
     def weights_of(self, texels: slice) -> tuple[Array, Array, Array]:
@@ -173,9 +173,9 @@ class GatherPoints:
         """
         known = self._weighed
         run = np.arange(texels.start, texels.stop)
-        mine = run_of(known.texels, texels)
+        entries = run_of(known.texels, texels)
         old = np.zeros(len(run), dtype=bool)
-        old[known.texels[mine] - texels.start] = True
+        old[known.texels[entries] - texels.start] = True
         # What has become a point since has learned how close things are to it.
         old &= self._number[run] < 0
         kept = known.pairs_of(texels)

@@ -34,16 +34,16 @@ class PointGrid:
     ) -> None:
         self._size = size
         keys = scratch.empty(len(rows), np.int64)
-        for some in tiles(len(rows), CHUNK):
-            of = rows[some]
-            keys[some] = _hash((position[of] / size).T) + _facing(normal[of])
+        for tile in tiles(len(rows), CHUNK):
+            point = rows[tile]
+            keys[tile] = _hash((position[point] / size).T) + _facing(normal[point])
         order = np.argsort(keys, kind="stable")
         # Looked up past its end, the last cell answers that it has no more.
         end = PER_CELL if len(rows) else 0
         self._sorted = scratch.empty(len(rows) + end, np.int64)
         self._numbers = scratch.empty(len(rows) + end, np.int32)
-        for some in tiles(len(rows)):
-            self._sorted[some], self._numbers[some] = keys[order[some]], first + order[some]
+        for tile in tiles(len(rows)):
+            self._sorted[tile], self._numbers[tile] = keys[order[tile]], first + order[tile]
         if end:
             self._sorted[-end:], self._numbers[-end:] = keys[order[-1]], NONE
 

@@ -46,9 +46,9 @@ def _weights_around(
     """Return how many entries each of (k,) ascending texels has, and their points and weights in order."""
     counts, numbers, weights = [np.zeros(0, np.int64)], [np.zeros(0, np.int32)], [np.zeros(0, np.float32)]
     for start in range(0, len(texels), CHUNK):
-        some = texels[start : start + CHUNK]
-        texel, point, kernel = points.weighed(some)
-        count = np.bincount(np.searchsorted(some, texel), minlength=len(some))
+        chunk = texels[start : start + CHUNK]
+        texel, point, kernel = points.weighed(chunk)
+        count = np.bincount(np.searchsorted(chunk, texel), minlength=len(chunk))
         if not count.all():
             raise ValueError("a texel has no gather point in reach: it should have become one")
         along = geometry.position[points.texel[point]] - geometry.position[texel]

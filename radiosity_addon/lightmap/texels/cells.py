@@ -2,7 +2,7 @@
 
 A texel that a wall stands on, or that a window's frame covers in part, shows the mean of what it
 holds, as it should. Light that comes back from it must not be the mean: a ray from inside a closed
-box would then bring the lit floor outside. Nor can a whole neighbor answer, for the strip beside a
+box would then bring the lit floor outside. Nor can a whole neighbor answer, for the strip next to a
 frame is darker than what lies a texel farther in the open. So a divided texel answers in cells,
 each as those of its points that see the cell's *anchor* in a straight line just above the surface;
 a hit asks the nearest cell whose anchor it sees (`element_cells.py` does the same for elements).
@@ -25,7 +25,7 @@ from .texel_geometry import TexelGeometry
 ALONG = 4
 """Cells along a texel's side."""
 
-CELLS = ALONG**2
+CELLS_PER_TEXEL = ALONG**2
 
 ANCHOR = np.array([0.54, 0.47])
 """Of a cell. Near the middle, but off it: walls stand on round fractions of a floor."""
@@ -33,13 +33,13 @@ ANCHOR = np.array([0.54, 0.47])
 STARTS = 4
 """Points of a cell that its gather rays start from: each costs a ray to the anchor."""
 
-SAME_SURFACE = 0.9
+SURFACE_COSINE = 0.9
 """Cosine between the normals of a texel's triangle and of another one that the texel lies on as well."""
 
 CHUNK_TEXELS = 1 << 13
 """Texels divided at once; bounds the temporaries to about 20 MB."""
 
-_FIRST = np.stack(np.divmod(np.arange(CELLS), ALONG)[::-1], axis=1) / ALONG
+_FIRST = np.stack(np.divmod(np.arange(CELLS_PER_TEXEL), ALONG)[::-1], axis=1) / ALONG
 """(16, 2): the corner of every cell next to the texel's own first one, in the texel's unit square."""
 
 
@@ -56,23 +56,23 @@ class TexelCells:
         """(d,) The divided texels."""
         self._divided = divided
         self._rank = np.cumsum(divided, dtype=np.int32) - 1
-        self._anchors = geometry.scratch.empty((len(self.texel), CELLS, 3))
-        self._below = np.zeros((len(self.texel), CELLS), dtype=bool)
+        self._anchors = geometry.scratch.empty((len(self.texel), CELLS_PER_TEXEL, 3))
+        self._below = np.zeros((len(self.texel), CELLS_PER_TEXEL), dtype=bool)
         place = partial(_anchors, geometry, elements.caster, self._rim, self.texel)
         into = (self._anchors, self._below)
         fill_chunks(place, into, len(self.texel), CHUNK_TEXELS, elements.threads)
 
     def __len__(self) -> int:
-        return CELLS * len(self.texel)
+        return CELLS_PER_TEXEL * len(self.texel)
 
     def texel_of(self, cell: Array) -> Array:
         """Return (p,) the texel that each cell is of."""
-        return np.asarray(self.texel[cell // CELLS])
+        return np.asarray(self.texel[cell // CELLS_PER_TEXEL])
 
     def renumbered(self, other: TexelCells) -> Array:
         """Return (cells,) int32 the numbers that these cells have among another's, or NOTHING."""
         number = np.where(other._divided[self.texel], other._rank[self.texel], NOTHING)
-        cell = CELLS * number[:, None] + np.arange(CELLS)
+        cell = CELLS_PER_TEXEL * number[:, None] + np.arange(CELLS_PER_TEXEL)
         return np.where(number[:, None] == NOTHING, NOTHING, cell).ravel().astype(np.int32)
 
     def at(self, texel: Array, hits: Hits) -> Array:
@@ -81,15 +81,15 @@ class TexelCells:
         found = np.full(len(texel), NOTHING, dtype=np.int32)
         normal = geometry.surface_normal[texel]
         # On the page a texel may extend beyond its triangle onto one with another normal.
-        alike = np.einsum("hk,hk->h", geometry.face_normals[hits.triangle], normal) > SAME_SURFACE
+        alike = np.einsum("hk,hk->h", geometry.face_normals[hits.triangle], normal) > SURFACE_COSINE
         waiting = np.flatnonzero(alike)
         position = geometry.positions_of(hits) + self._lift(texel)
         rank = self._rank[texel]
-        order = np.zeros((len(texel), CELLS), dtype=np.int8)
+        order = np.zeros((len(texel), CELLS_PER_TEXEL), dtype=np.int8)
         apart = self._anchors[rank[waiting]] - position[waiting, None]
         order[waiting] = np.einsum("hkx,hkx->hk", apart, apart).argsort(axis=1, kind="stable")
         below = self._below_hood(texel, geometry.positions_of(hits)[:, None])[:, 0]
-        for turn in range(CELLS):
+        for turn in range(CELLS_PER_TEXEL):
             if len(waiting) == 0:
                 break
             cell = order[waiting, turn]
@@ -97,16 +97,16 @@ class TexelCells:
             alike = np.flatnonzero(seen)
             asking = waiting[alike]
             seen[alike] = free_segment(caster, position[asking], self._anchors[rank[asking], cell[alike]])
-            found[waiting[seen]] = CELLS * rank[waiting[seen]] + cell[seen]
+            found[waiting[seen]] = CELLS_PER_TEXEL * rank[waiting[seen]] + cell[seen]
             waiting = waiting[~seen]
         return found
 
     def footprints(self, cell: Array) -> Footprints:
         """Return cells as footprints: their samples see the anchor."""
         geometry, texel = self._geometry, self.texel_of(cell)
-        lift, below = self._lift(texel), self._below[cell // CELLS, cell % CELLS]
-        anchor = self._anchors[cell // CELLS, cell % CELLS] - lift
-        cells = _ChosenCells(texel, _FIRST[cell % CELLS], anchor, lift, below)
+        lift, below = self._lift(texel), self._below[cell // CELLS_PER_TEXEL, cell % CELLS_PER_TEXEL]
+        anchor = self._anchors[cell // CELLS_PER_TEXEL, cell % CELLS_PER_TEXEL] - lift
+        cells = _ChosenCells(texel, _FIRST[cell % CELLS_PER_TEXEL], anchor, lift, below)
         sample = partial(_sample, geometry, self.elements.caster, self._rim, cells)
         return Footprints(anchor, geometry.normal[texel], self._keys(cell), sample, starts=STARTS)
 
@@ -118,13 +118,13 @@ class TexelCells:
         """Return cells as footprints for the light of lamps: their anchors alone."""
         texel, geometry = self.texel_of(cell), self._geometry
         expected = self.elements.irradiance_at(geometry.triangle[texel], geometry.barycentric[texel])
-        anchor = self._anchors[cell // CELLS, cell % CELLS] - self._lift(texel)
+        anchor = self._anchors[cell // CELLS_PER_TEXEL, cell % CELLS_PER_TEXEL] - self._lift(texel)
         return Footprints(anchor, geometry.normal[texel], self._keys(cell), expected=expected)
 
     def _keys(self, cell: Array) -> Array:
         """Return (p,) int64 sampling keys of cells, which do not depend on other divided texels."""
         texel = self.texel_of(cell).astype(np.int64)
-        return np.asarray(len(self._geometry) + CELLS * texel + cell % CELLS)
+        return np.asarray(len(self._geometry) + CELLS_PER_TEXEL * texel + cell % CELLS_PER_TEXEL)
 
     def _below_hood(self, texel: Array, points: Array) -> Array:
         return _below_rim(self._geometry, self.elements.caster, self._rim, texel, points)
@@ -163,7 +163,7 @@ def _anchors(
 ) -> tuple[Array, Array]:
     """Return (r, cells, 3) the anchors of divided texels, and (r, cells) whether they are below a hood."""
     texel = texel[rows]
-    spots = np.broadcast_to(_FIRST + ANCHOR / ALONG, (len(texel), CELLS, 2))
+    spots = np.broadcast_to(_FIRST + ANCHOR / ALONG, (len(texel), CELLS_PER_TEXEL, 2))
     spread = geometry.sample(texel, spots, 1.0)
     below = _below_rim(geometry, caster, rim, texel, spread)
     return spread + _lifted(geometry, caster, texel)[:, None], below

@@ -2,8 +2,8 @@
 
 Space is cut into cells a few texels wide, and every cell that a piece of a triangle may reach remembers a
 plane, or that there are several. A texel whose surroundings lie in cells of its own plane, and in
-empty ones, is clear. All is judged to the safe side: a texel beside a wall is not clear though
-it ends before it, nor is one on a curved surface.
+empty ones, is clear. The test errs on the safe side: a texel next to a wall is not clear although it
+ends before the wall, nor is one on a curved surface.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ CELL = 2.0
 MOST_CELLS = 1 << 24
 """Beyond, cells share places: some 80 MB."""
 
-MOST_PIECES = 1 << 16
+MAX_PIECES = 1 << 16
 """More pieces of triangles than this and than four a texel are not made: then no texel is clear."""
 
-FLAT = 0.45
+PLANE_DISTANCE = 0.45
 """Surfaces this near each other's planes, as a part of the clearance, are one: twice that still is within."""
 
 ROUNDED = 1e-7
-"""A sine less than this, of planes that are the same but for rounding, is 0."""
+"""A sine less than this, of planes that are the same except for rounding, is 0."""
 
 CHUNK = 1 << 13
 """Texels worked on at once; bounds the temporaries to about 5 MB a thread."""
@@ -57,12 +57,12 @@ def clear_texels(
         return clear
     low, high = _surroundings(geometry, outset, height, clearance, threads)
     cells = _Cells(*_extent(low, high))
-    pieces = _pieces(geometry.triangles, cells, max(MOST_PIECES, 4 * len(geometry)), geometry.scratch)
+    pieces = _pieces(geometry.triangles, cells, max(MAX_PIECES, 4 * len(geometry)), geometry.scratch)
     if pieces is None:
         return clear
-    cells.fill(geometry, *pieces, FLAT * clearance)
+    cells.fill(geometry, *pieces, PLANE_DISTANCE * clearance)
     del pieces
-    judge = partial(_all_flat, cells, geometry, low, high, FLAT * clearance)
+    judge = partial(_all_flat, cells, geometry, low, high, PLANE_DISTANCE * clearance)
     fill_chunks(judge, clear, len(clear), CHUNK, threads)
     return clear
 

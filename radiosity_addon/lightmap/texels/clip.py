@@ -47,9 +47,9 @@ def area_in_unit_square(triangles: Float) -> Float:
         low_in, high_in = np.clip(low, 0.0, 1.0), np.clip(high, 0.0, 1.0)
         flat = height == 0.0
         per_height = 1.0 / np.where(flat, 1.0, height)
-        beside = np.where(flat, (low >= 0.0) & (low <= 1.0), (high_in - low_in) * per_height)
+        level = np.where(flat, (low >= 0.0) & (low <= 1.0), (high_in - low_in) * per_height)
         above = np.where(flat, low > 1.0, (np.maximum(high, 1.0) - np.maximum(low, 1.0)) * per_height)
-        total += (stop - begin) * (beside * 0.5 * (low_in + high_in) + above)
+        total += (stop - begin) * (level * 0.5 * (low_in + high_in) + above)
     return np.abs(total)
 
 

@@ -10,10 +10,10 @@ from ...solver.gather import NOTHING
 from .occlusion import Crossings
 from .texel_geometry import NO_TEXEL
 
-SAME_PLANE = 0.1
+MAX_RISE = 0.1
 """A neighbor's center may rise so much over the hit's plane, as a part of its distance."""
 
-SAME_SURFACE = 0.9
+NEIGHBOR_COSINE = 0.9
 """Cosine between the normals of a texel and its neighbor: on the page it may be anything."""
 
 _AROUND = np.array([[r, c] for r in (-1, 0, 1) for c in (-1, 0, 1) if r or c])
@@ -44,8 +44,8 @@ def whole_neighbor(
     normal = geometry.surface_normal[texel]
     along = geometry.position[around] - position[:, None]
     distance = np.linalg.norm(along, axis=2)
-    whole &= np.abs(np.einsum("hak,hk->ha", along, normal)) <= SAME_PLANE * distance
-    whole &= np.einsum("hak,hk->ha", geometry.surface_normal[around], normal) > SAME_SURFACE
+    whole &= np.abs(np.einsum("hak,hk->ha", along, normal)) <= MAX_RISE * distance
+    whole &= np.einsum("hak,hk->ha", geometry.surface_normal[around], normal) > NEIGHBOR_COSINE
     lift = SIGHT_LIFT * caster.surface_offset
     hit, which = np.nonzero(whole)
     end = geometry.position[around[hit, which]] + lift * geometry.surface_normal[around[hit, which]]

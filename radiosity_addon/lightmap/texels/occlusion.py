@@ -3,10 +3,10 @@
 Such a texel shows the mean of both sides, as it should, but answers no ray with it: see
 `cells.py`.
 
-What hovers closely over a surface (a window's frame a millimeter off the wall, a door in its
-frame) parts light from dark likewise, though nothing stands on the texel, and the gap lets lines
-of sight along the surface through. Short probes along the normal tell which texels are *hooded*,
-and which only partly.
+Geometry that hovers closely over a surface (a window's frame a millimeter off the wall, a door in its
+frame) separates light from dark in the same way, although nothing stands on the texel, and lines of
+sight along the surface pass through the gap. Short probes along the normal find the texels that are
+*hooded*, in full or in part.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ class Crossings:
         return self.crossed | self.occluded
 
     @cached_property
-    def beside(self) -> Array:
+    def next_to_crossed(self) -> Array:
         """Texels next to a crossed one: geometry there blocks half of their view."""
         return self.geometry.neighborhood(self.crossed) & ~self.alone
 
@@ -88,20 +88,20 @@ def find_crossings(
     caster: RayCaster,
     threads: int = 0,
     before: Crossings | None = None,
-    anew: Array | None = None,
+    again: Array | None = None,
     progress: Progress = SILENT,
 ) -> Crossings:
     """Find the texels that geometry divides, touches or occludes.
 
-    Given how it was `before`, only some texels, row numbers, are tried `anew`.
+    With the crossings `before` something moved, only the texels `again` (row numbers) are tested.
     """
-    if before is None or anew is None:
+    if before is None or again is None:
         result = Crossings(geometry, *np.zeros((4, len(geometry)), dtype=bool))
         clear = clear_texels(geometry, OUTSET, HOOD, SIGHT_LIFT * caster.surface_offset, threads)
         doubted = row_numbers(~clear)
     else:
         were = (before.cut, before.touched, before.rim, before.occluded)
-        result, doubted = Crossings(geometry, *(flags.copy() for flags in were)), anew
+        result, doubted = Crossings(geometry, *(flags.copy() for flags in were)), again
 
     into = (result.cut, result.touched, result.rim, result.occluded)
     find = partial(_find, geometry, caster, doubted)

@@ -8,7 +8,7 @@ triangle covers may be shared by triangles without an area on the page (`shared_
 
 Candidates are found by row spans (for each triangle and row the columns the triangle reaches), so
 the work is proportional to the texels covered, not to bounding boxes; temporaries are chunked at
-`CHUNK` pairs, about 60 MB. Footprints are not stored but clipped anew where they are asked for:
+`CHUNK` pairs, about 60 MB. Footprints are not stored but clipped again where they are needed:
 at 4096² they would take a gigabyte.
 """
 

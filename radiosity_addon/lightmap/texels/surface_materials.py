@@ -15,13 +15,13 @@ SAMPLES = 16
 CHUNK = 1 << 14
 """Texels looked up at once; their temporaries take about 60 MB."""
 
-WHOLE = 1.0
+WHOLE_TEXEL = 1.0
 """The width of whole texels, whose mean reflectance counts where other surfaces see them."""
 
-__all__ = ["FOOTPRINT", "WHOLE", "texel_materials"]
+__all__ = ["FOOTPRINT", "WHOLE_TEXEL", "texel_materials"]
 
 
-def texel_materials(scene: Scene, geometry: TexelGeometry, width: float = WHOLE) -> tuple[Array, Array]:
+def texel_materials(scene: Scene, geometry: TexelGeometry, width: float = WHOLE_TEXEL) -> tuple[Array, Array]:
     """Average reflectance and emission over the middle `width` of every texel.
 
     Returns reflectance, emission (n, 3): Of the existing part of the surface; emission in W/m².

@@ -88,13 +88,15 @@ class TexelGeometry:
         self.position, self.normal = scratch.empty((count, 3)), scratch.empty((count, 3))
         for number, (of, page) in enumerate(zip(rows, self.texels, strict=True)):
             for tile in tiles(len(page), CHUNK):
-                mine = slice(self.page_start[number] + tile.start, self.page_start[number] + tile.stop)
+                texels_of_tile = slice(
+                    self.page_start[number] + tile.start, self.page_start[number] + tile.stop
+                )
                 triangle = of[page.triangle[tile]]
-                self.page[mine], self.triangle[mine] = number, triangle
-                self.whole[mine] = page.area[tile] >= 1.0
-                self.surface_normal[mine] = scene.face_normals[triangle]
+                self.page[texels_of_tile], self.triangle[texels_of_tile] = number, triangle
+                self.whole[texels_of_tile] = page.area[tile] >= 1.0
+                self.surface_normal[texels_of_tile] = scene.face_normals[triangle]
                 centroid = page.centroid[tile].astype(np.float64)
-                self._put(mine, self._drawn_in(centroid[:, None], triangle)[:, 0])
+                self._put(texels_of_tile, self._drawn_in(centroid[:, None], triangle)[:, 0])
         self.shared = find_shared(scene, uv, page_of_triangle, self.index, self.triangle)
         if self.shared is not None:
             many = np.flatnonzero(self.shared.number >= 0)
@@ -120,12 +122,12 @@ class TexelGeometry:
         return [
             replace(
                 page,
-                row=self.row[mine],
-                column=self.column[mine],
-                center_inside=self.center_inside[mine],
-                area=self.share[mine],
+                row=self.row[of_page],
+                column=self.column[of_page],
+                center_inside=self.center_inside[of_page],
+                area=self.share[of_page],
             )
-            for mine, page in zip(rows, texels, strict=True)
+            for of_page, page in zip(rows, texels, strict=True)
         ]
 
     def _put(self, rows: slice, weights: Array) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...base import SILENT, Progress
 from ...numerics import Array, marked, row_numbers, tiles
-from ...solver.gather import AimedRays, Footprints, Gathered, LocalPass, Resolver
+from ...solver.gather import AimedRays, Footprints, GatheredHits, LocalPass, Resolver
 from ..points import GatherPoints, Interpolation, fit, refit
 from ..texels import Crossings, TexelGeometry
 from .gather_links import GatherLinks
@@ -30,7 +30,7 @@ STARTS = 16
 FIT = 0.15
 """The part of gathering that weighs the points."""
 
-Met = Callable[[Array, Gathered, int], None]
+Met = Callable[[Array, GatheredHits, int], None]
 """Is given texels that have gathered, what they met, and how many texels they lie apart."""
 
 
@@ -48,14 +48,16 @@ class KeptPoints:
     before: GatherPointLayout
     spread: Interpolation
     rows: Array
-    gathered: Gathered
+    gathered: GatheredHits
     unsure: Array
 
-    def of_level(self, level: int) -> tuple[Array, Gathered]:
+    def of_level(self, level: int) -> tuple[Array, GatheredHits]:
         """Return the texels of a level's points, and what they meet."""
-        mine, found = self.before.level[self.rows] == level, self.gathered
-        kept = Gathered(found.sources[mine], found.closeness[mine], found.aimed.of_points(mine))
-        return self.before.texel[self.rows[mine]], kept
+        at_level, found = self.before.level[self.rows] == level, self.gathered
+        kept = GatheredHits(
+            found.sources[at_level], found.closeness[at_level], found.aimed.of_points(at_level)
+        )
+        return self.before.texel[self.rows[at_level]], kept
 
     def refitted(self, points: GatherPoints, geometry: TexelGeometry) -> Interpolation:
         """Return how `points`, these and further ones, speak for the texels."""
@@ -96,15 +98,15 @@ def gather_texels(
         # Across a rim light changes by more than noise: there every ray starts from a point of its own.
         edge = crossings.crossed[chosen]
         done = 0.2
-        for some, starts in ((chosen[~edge], STARTS), (chosen[edge], None)):
-            before, done = done, done + 0.8 * len(some) / max(len(chosen), 1)
+        for batch, starts in ((chosen[~edge], STARTS), (chosen[edge], None)):
+            before, done = done, done + 0.8 * len(batch) / max(len(chosen), 1)
             part = of_level.part(before, done)
             first.append(len(sources))
-            into = sources.more(len(some))
-            gathered = gather_at(local, geometry, some, starts, settings.rays, resolve, into, part)
+            into = sources.more(len(batch))
+            gathered = gather_at(local, geometry, batch, starts, settings.rays, resolve, into, part)
             if met is not None:
-                met(some, gathered, stride)
-            texels.append(some)
+                met(batch, gathered, stride)
+            texels.append(batch)
             closeness.append(gathered.closeness)
             aimed.append(gathered.aimed)
         points.add(stride, np.concatenate(texels), np.concatenate(closeness))
@@ -124,19 +126,19 @@ def gather_at(
     resolve: Resolver,
     into: Array | None = None,
     progress: Progress = SILENT,
-) -> Gathered:
+) -> GatheredHits:
     """Gather at some texels. `into` (c, rays) int32 takes the sources, if given."""
     at = gather_footprints(geometry, chosen, starts)
-    expected, upright = (geometry.scratch.empty((len(chosen), *of)) for of in ((), (3,)))
+    expected, upright = (geometry.scratch.empty((len(chosen), *shape)) for shape in ((), (3,)))
     for tile in tiles(len(chosen), CHUNK):
-        some = chosen[tile]
-        expected[tile] = local.elements.irradiance_at(geometry.triangle[some], geometry.barycentric[some])
-        upright[tile] = geometry.surface_normal[some]
+        texels = chosen[tile]
+        expected[tile] = local.elements.irradiance_at(geometry.triangle[texels], geometry.barycentric[texels])
+        upright[tile] = geometry.surface_normal[texels]
     return local.gather.at(at, upright, rays, resolve, expected, into, progress)
 
 
 def gather_footprints(geometry: TexelGeometry, chosen: Array, starts: int | None) -> Footprints:
-    """Return where some texels gather, each from so many points."""
+    """Return where texels gather, each from `starts` points."""
     position, normal = (geometry.scratch.empty((len(chosen), 3)) for _ in range(2))
     for tile in tiles(len(chosen)):
         position[tile], normal[tile] = geometry.position[chosen[tile]], geometry.normal[chosen[tile]]
@@ -159,7 +161,7 @@ def _choose(
 ) -> Array:
     """Find the texels on a lattice that no point so far reaches, among the unsure ones if some points stay.
 
-    Those beside something are chosen as well: points in the open do not know how close it is to them.
+    Texels next to a crossed one are chosen as well: points in the open do not know how close it is to them.
     """
     candidates = _on_lattice(crossings.geometry, stride)
     if kept is not None:
@@ -170,11 +172,11 @@ def _choose(
     candidates = row_numbers(candidates)
     if len(points):
         reached = points.support(candidates, progress)
-        candidates = candidates[(reached < support) | crossings.beside[candidates]]
+        candidates = candidates[(reached < support) | crossings.next_to_crossed[candidates]]
     return candidates
 
 
 def _on_lattice(geometry: TexelGeometry, stride: int) -> Array:
-    """Return (n,) bool: the texels in every so many rows and columns of their page."""
+    """Return (n,) bool: the texels in every `stride`-th row and column of their page."""
     row, column = geometry.row, geometry.column
     return marked(len(geometry), lambda tile: (row[tile] % stride == 0) & (column[tile] % stride == 0))

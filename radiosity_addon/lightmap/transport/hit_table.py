@@ -16,8 +16,8 @@ from ...rays import SIGHT_LIFT, Hits, free_segment
 from ...solver.gather import NOTHING, Footprints, LocalPass
 from ..texels import NO_TEXEL, Crossings, TexelCells, TexelGeometry, below_hood, whole_neighbor
 
-WIDE = 4.0
-"""Texels this many times wider than the median tell less of the light than leaf elements that are smaller."""
+WIDE_TEXEL = 4.0
+"""Texels this many times wider than the median show less detail than leaf elements that are smaller."""
 
 TILE_HITS = 1 << 22
 """Stored hits that are counted or numbered at once; bounds the temporaries to about 60 MB."""
@@ -37,7 +37,7 @@ class HitTable:
         self.first_small = self.texel_count + local.elements.hierarchy.n_elements
         self.first_cell = self.texel_count + len(local.elements.cells)
         self.end = self.first_cell + len(self.texel_cells)
-        self._wide = geometry.texel_area > (WIDE * geometry.texel_size) ** 2
+        self._wide = geometry.texel_area > (WIDE_TEXEL * geometry.texel_size) ** 2
 
     def number(self, hits: Hits) -> Array:
         """Return (h,) int32 the numbers of hits: of their texel, if it can answer."""

@@ -12,12 +12,12 @@ from ...numerics import Array, Scratch, fill_chunks, map_chunks, tiles
 CHUNK_HITS = 1 << 18
 """Hits averaged at once: their values stay in the processor's cache."""
 
-MUCH = 0.1
-"""A change of more of the table than this part asks all rows again."""
+MANY_CHANGED = 0.1
+"""If more than this part of the table changed, all rows are computed again."""
 
 
-class Means:
-    """Means over rows of sources, of which only those are made anew that see something changed.
+class SourceMeans:
+    """Means over rows of sources; only those whose sources changed are computed again.
 
     sources (g, rays) int32.
     scratch: Makes the array of means; None keeps it in memory.
@@ -37,9 +37,9 @@ class Means:
         """
         columns = _columns(table)
         # Where much changed every row sees some of it: to look for those that do not takes as long.
-        anew = not self._known or float(changed.mean()) > MUCH
+        refresh_all = not self._known or float(changed.mean()) > MANY_CHANGED
         chunk = max(CHUNK_HITS // max(self._sources.shape[1], 1), 1)
-        if anew:
+        if refresh_all:
             average = partial(_mean_of_rows, columns, self._sources)
             fill_chunks(average, self._mean, len(self._sources), chunk, self._threads, progress)
         elif changed.any():

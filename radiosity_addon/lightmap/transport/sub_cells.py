@@ -17,10 +17,10 @@ from ...numerics import Array, marked, tiles
 from ...solver.gather import LightGains, values_of
 from .gather_links import GatherLinks
 from .hit_table import TILE_HITS, HitTable, TableRows
-from .source_means import Means
+from .source_means import SourceMeans
 
 OFTEN = 32
-"""A cell that so many rays met matters: …"""
+"""A cell that this many rays met matters: …"""
 
 RAYS, MANY_RAYS = 16, 64
 """… it gathers with more rays. Cells that few rays met answer few, and their noise averages out."""
@@ -222,7 +222,7 @@ class SubCellSweeps:
     def __init__(self, cells: SubCells, texel_count: int, threads: int) -> None:
         self._links, self._surfaces = cells.links, texel_count + len(cells.start)
         self._texel_count = texel_count
-        self._means = [Means(links.sources, links.lamps.shape[1], threads) for links in cells.links]
+        self._means = [SourceMeans(links.sources, links.lamps.shape[1], threads) for links in cells.links]
         self._unseen: Array | None = None
 
     def lit_or_unknown(self, direct: Array) -> Array:

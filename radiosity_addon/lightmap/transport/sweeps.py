@@ -14,7 +14,7 @@ from ...base import SILENT, Progress
 from ...numerics import Array, Scratch, row_numbers, tiles, trim
 from ...solver.gather import LightGains
 from .gather_links import GatherLinks
-from .source_means import CHUNK_HITS, Means, by_channel, mean_of_sources
+from .source_means import CHUNK_HITS, SourceMeans, by_channel, mean_of_sources
 from .sub_cells import SubCells, SubCellSweeps
 from .traced_texels import LightingRecord
 from .warm_start import WarmStart
@@ -24,9 +24,9 @@ TOLERANCE = 2e-4
 there at once; a dark closet next to a bright room, into which the hierarchy's elements leak across the
 wall's foot, takes as many sweeps as light would bounce in it."""
 
-STILL = 0.1
-"""A row of the table moves once it is off by this part of the tolerance: what sees only rows that rest
-need not be asked again, and most rest after a few sweeps."""
+REST_SHARE = 0.1
+"""A row of the table moves once it is off by this part of the tolerance: rows that see only resting rows
+are not computed again, and most rest after a few sweeps."""
 
 SWEPT = 0.3
 """A sweep takes this part of the progress left: how many there will be is not known."""
@@ -41,11 +41,11 @@ class TexelLight:
     direct, indirect : (n, 3) float64 [W/m²]
         Their sum is the whole.
     error : float
-        Estimate of the whole's RMS error, relative to its mean; 0 if it was not asked for.
+        Estimate of the whole's RMS error, relative to its mean; 0 if not requested.
     table : (surfaces, 3) float32 or None [W/m²]
         What texels and cells reflected in the end.
     kept : RelightableTexels or None
-        What lights them anew, if it is kept, …
+        The data to relight them, if it is kept, …
     traced : LightingRecord or None
         … and how they were lit.
     noise : (n,) float32 or None [W/m²]
@@ -132,7 +132,7 @@ def sweep(
     beyond : (sky cells + 2, 3) float64 [W/m²]
         Radiosity of the sky and of nothing, see `table_end`.
     sweeps : int
-        At most so many, …
+        Maximum number, …
     tolerance : float
         … or until no texel changes by more than this part of the mean.
     estimate : bool
@@ -165,8 +165,8 @@ def sweep(
     del reached
     indirect = scratch.zeros(direct.shape)
     changed = np.ones(len(table), dtype=bool)
-    means = Means(links.sources, table.shape[1], threads, scratch)
-    still = STILL * tolerance * float(table[:texel_count].mean()) if texel_count else 0.0
+    means = SourceMeans(links.sources, table.shape[1], threads, scratch)
+    still = REST_SHARE * tolerance * float(table[:texel_count].mean()) if texel_count else 0.0
     for _, turn in zip(range(sweeps), progress.part(0.1, 1.0).turns(SWEPT), strict=False):
         cells.sweep(table, changed, still)
         table[surfaces:] = 0.0
@@ -249,8 +249,8 @@ def _reached(links: GatherLinks, cells: SubCellSweeps, direct: Array, beyond: in
     while True:
         dark, step = row_numbers(~aims), max(CHUNK_HITS // links.sources.shape[1], 1)
         for first in range(0, len(dark), step):
-            some = dark[first : first + step]
-            aims[some] = padded[links.sources[some]].any(axis=1)
+            chunk = dark[first : first + step]
+            aims[chunk] = padded[links.sources[chunk]].any(axis=1)
             trim()
         links.mark_aims(aims, padded)
         more = ~padded[: len(direct)] & links.spread.any_of(aims)

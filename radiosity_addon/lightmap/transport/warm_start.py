@@ -10,7 +10,7 @@ import numpy as np
 
 from ...numerics import Array
 
-MOST = 6
+MAX_SOLUTIONS = 6
 """Solutions remembered: 12 bytes a texel each."""
 
 MIXED = 1e-6
@@ -44,7 +44,7 @@ class WarmStart:
     def add(self, strengths: Array, table: Array) -> None:
         """Remember another solution, for the oldest if there are many."""
         first, *others = self.solutions
-        self.solutions = [first, *others[-(MOST - 2) :], (strengths.copy(), table)]
+        self.solutions = [first, *others[-(MAX_SOLUTIONS - 2) :], (strengths.copy(), table)]
 
     def first(self) -> WarmStart:
         """Return what remembers the first solution alone."""

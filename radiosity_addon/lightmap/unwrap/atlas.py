@@ -2,7 +2,7 @@
 
 Kept UVs (an existing layer) stay as they are, bit for bit, wherever that is possible: on an
 object's own page always, on a shared page when all objects bring UVs and none lies over another's.
-Otherwise each object's kept layout is packed, as one chart of unchanged shape, beside the others.
+Otherwise each object's kept layout is packed, as one chart of unchanged shape, next to the others.
 """
 
 from __future__ import annotations
@@ -193,7 +193,7 @@ _Laid = list[tuple[list[int], Packing]]
 
 
 def _lay_on_pages(layouts: list[_Layout], options: AtlasOptions, progress: Progress) -> _Laid:
-    """Pack objects on as many pages as are asked for or needed."""
+    """Pack objects on as many pages as are requested or needed."""
     density = options.texel_density
     totals = _totals(layouts, options.limits.padding)
     count = len(layouts)
@@ -210,7 +210,7 @@ def _lay_on_pages(layouts: list[_Layout], options: AtlasOptions, progress: Progr
             for group in groups:
                 laid.append((group, _pack_group([layouts[each] for each in group], options, progress)))
         except BakeError:
-            # What does not fit at the density asked for may fit on more pages.
+            # What does not fit at the requested density may fit on more pages.
             if density is None or len(groups) == len(layouts):
                 raise
             count = max(count, len(groups)) + 1
@@ -276,9 +276,8 @@ def _lay_flat(
         warnings.append(
             BakeWarning(
                 source.name,
-                f"object '{source.name}' took more than {seconds:g} s to unwrap; the rest of it was cut by "
-                "the directions its faces look, which makes more seams: give it a UV layer Lightmap and "
-                "keep UVs, or simplify it",
+                f"object '{source.name}' took more than {seconds:g} s to unwrap; the rest was cut by face "
+                "direction, which makes more seams: give it a UV layer Lightmap and keep UVs, or simplify it",
             )
         )
     return _Layout(source, _scaled(charts, source.scale), kept=False)
@@ -354,7 +353,11 @@ def _pack_page(
     if not len(used):
         return Packing(np.full(uv.shape, 0.5, dtype=np.float32), resolution if density is None else 4, 0.0)
     places = chart_places(_corners(group)[used], chart[used], _share_groups(group)[used])
-    packing = pack(uv[used], chart[used], resolution, density, limits, progress, places)
+    try:
+        packing = pack(uv[used], chart[used], resolution, density, limits, progress, places)
+    except BakeError as error:
+        alone = f"object '{group[0].source.name}': " if len(group) == 1 else ""
+        raise BakeError(f"{alone}{error}{_greedy(group)[1]}") from None
     pages = np.empty(uv.shape, dtype=np.float32)
     pages[used] = packing.uv
     _park(pages, chart, [len(layout.source.triangles) for layout in group])
@@ -398,15 +401,19 @@ def _corners(group: list[_Layout]) -> Float:
     return np.concatenate([np.asarray(layout.source.triangles, dtype=np.float64) for layout in group])
 
 
+def _greedy(group: list[_Layout]) -> tuple[str, str]:
+    """Return which object takes nearly all of the surface, and words on it; empty if none does."""
+    surfaces = [_surface([layout]) * layout.source.scale**2 for layout in group]
+    name = greedy_object([layout.source.name for layout in group], surfaces) or ""
+    taken = share_of(max(surfaces), sum(surfaces)) if name else ""
+    return name, name and f"; object '{name}' takes {taken} of the surface: lower its texel scale"
+
+
 def _crowded(group: list[_Layout], resolution: int) -> BakeWarning:
     count = sum(layout.charts.count for layout in group)
-    surfaces = [_surface([layout]) * layout.source.scale**2 for layout in group]
-    greedy = greedy_object([layout.source.name for layout in group], surfaces)
-    fix = "raise the resolution or the number of pages"
-    if greedy is not None:
-        taken = share_of(max(surfaces), sum(surfaces))
-        fix = f"object '{greedy}' takes {taken} of the surface; lower its texel scale"
+    greedy, fix = _greedy(group)
     return BakeWarning(
         group[0].source.name if len(group) == 1 else greedy or "atlas",
-        f"{resolution} px is too small to keep {count} charts apart, so light bleeds between them; {fix}",
+        f"{resolution} px is too small to keep {count} charts apart, so light bleeds between them"
+        + (fix or "; raise the resolution or the number of pages"),
     )

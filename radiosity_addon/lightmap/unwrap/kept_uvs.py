@@ -15,7 +15,7 @@ _OVERLAP = 1.01
 """A texel filled to more than this holds triangles that lie over each other."""
 
 _COLLAPSED = 1e-6
-"""Kept UVs whose area is less than this share of their extent, squared, are a line but for rounding."""
+"""Kept UVs whose area is less than this share of their extent, squared, are a line except for rounding."""
 
 
 def overlaps(coverage: Float) -> bool:

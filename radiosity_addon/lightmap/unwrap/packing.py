@@ -30,13 +30,13 @@ Int = NDArray[np.int64]
 GAP = 2
 """Free texels between charts that bilinear filtering asks for, without mip levels."""
 
-SMALLEST = 0.25
+MIN_CHART_WIDTH = 0.25
 """Texels; a chart that would be narrower is widened to this, so that nothing gets lost."""
 
-FINEST = 2048
+MAX_CELLS = 2048
 """Cells along a page's side; larger pages are packed in cells of several texels."""
 
-FEW = 64
+FEW_CHARTS = 64
 """Up to this many charts several orders, rules and stretches are tried; each costs a packing."""
 
 STRETCHES = (1.0, 0.8, 0.85, 0.9, 0.95, 1.05, 1.1, 1.15, 1.2, 1.25)
@@ -177,17 +177,17 @@ def _job(uv: Float, chart: Int, limits: Limits, places: ChartPlaces | None) -> _
     np.maximum.at(extent, chart, aligned.max(axis=1))
     long, short = extent.max(axis=1), extent.min(axis=1)
     orders = [np.lexsort((np.arange(count), -short, -long))]
-    if count <= FEW:
+    if count <= FEW_CHARTS:
         orders.append(np.lexsort((np.arange(count), -long, -extent.prod(axis=1))))
         orders.append(np.lexsort((np.arange(count), -long, -short)))
     area = float(0.5 * np.abs(signed_double_areas(aligned)).sum())
     # A few charts have room for their gaps.
-    places = places if count > FEW else None
+    places = places if count > FEW_CHARTS else None
     return _Job(aligned, chart, extent, tuple(orders), area, limits, places)
 
 
 @dataclass(frozen=True)
-class _Scaled:
+class _ScaledCharts:
     """Cells per meter (count, 2) of each chart and the cells that it covers then.
 
     For an even and for an odd number of quarter turns.
@@ -197,19 +197,19 @@ class _Scaled:
     masks: tuple[ChartMasks, ChartMasks]
 
 
-def _scaled(job: _Job, scale: float, cell: int, side: int, stretch: float = 1.0) -> _Scaled:
+def _scaled(job: _Job, scale: float, cell: int, side: int, stretch: float = 1.0) -> _ScaledCharts:
     """Return the charts at `scale` texels per meter, stretched along u, for a room of `side` cells."""
     even = _measured(job, scale * np.array((stretch**0.5, stretch**-0.5)), cell, side)
     if stretch == 1.0:
-        return _Scaled((even[0], even[0]), (even[1], even[1]))
+        return _ScaledCharts((even[0], even[0]), (even[1], even[1]))
     odd = _measured(job, scale * np.array((stretch**-0.5, stretch**0.5)), cell, side)
-    return _Scaled((even[0], odd[0]), (even[1], odd[1]))
+    return _ScaledCharts((even[0], odd[0]), (even[1], odd[1]))
 
 
 def _measured(job: _Job, scale: Float, cell: int, side: int) -> tuple[Float, ChartMasks]:
     """Return cells per meter (count, 2) at `scale` (2,) texels per meter, and the cells charts cover."""
     extent = job.extent * scale
-    widen = np.where(extent < SMALLEST, SMALLEST / np.maximum(extent, 1e-30), 1.0)
+    widen = np.where(extent < MIN_CHART_WIDTH, MIN_CHART_WIDTH / np.maximum(extent, 1e-30), 1.0)
     if job.places is not None:
         too_long = (extent > side * cell) & (extent <= STRETCH * side * cell)
         widen = np.where(too_long, side * cell / extent, widen)
@@ -222,14 +222,14 @@ def _pack_into(job: _Job, resolution: int, page: int, progress: Progress) -> Pac
 
     `page` is the page's real size when `resolution` is a finer stand-in for it.
     """
-    cell = -(-resolution // FINEST)
+    cell = -(-resolution // MAX_CELLS)
     side = resolution // cell - 2 * job.limits.border(cell)
     count = len(job.extent)
     if side < 1:
         return None
     full = resolution / float(np.sqrt(job.area))
     best: Packing | None = None
-    few = count <= FEW
+    few = count <= FEW_CHARTS
     low, scale = 0.0, (0.85 if few else 0.75) * full
     for stretch in STRETCHES if few else (1.0,):
         high = np.inf
@@ -242,7 +242,7 @@ def _pack_into(job: _Job, resolution: int, page: int, progress: Progress) -> Pac
                 high = scale
             progress.at(0.0)
             if low == 0.0:
-                if high * job.extent.max() < SMALLEST:
+                if high * job.extent.max() < MIN_CHART_WIDTH:
                     break
                 scale *= float(np.clip(np.sqrt(room), 0.25, 0.98)) if room else 0.5
             elif high < low * PRECISION[few]:
@@ -270,7 +270,7 @@ def _pack_at(job: _Job, density: float) -> Packing:
     while best is None or best.resolution - too_small > max(4, best.resolution // 256):
         if resolution > largest:
             raise _too_dense(density, largest)
-        cell = -(-resolution // FINEST)
+        cell = -(-resolution // MAX_CELLS)
         side = resolution // cell - 2 * job.limits.border(cell)
         placed, _ = _placed(job, density, side, cell) if side > 0 else (None, 0)
         if placed is not None:
@@ -364,7 +364,7 @@ def _place(
     return None, share
 
 
-def _moved(job: _Job, scaled: _Scaled, placement: Placement, cell: int) -> Float:
+def _moved(job: _Job, scaled: _ScaledCharts, placement: Placement, cell: int) -> Float:
     """Return (n, 3, 2) chart corners turned and moved to their place [cells]."""
     chart = job.chart
     quarter = placement.quarter[chart]

@@ -12,14 +12,14 @@ import numpy as np
 
 from ...numerics import Array
 from ...rays import SIGHT_LIFT, EmbreeCaster, RayCaster
-from ...solver.gather import UNNUMBERED, Boxes, ElementLookup, Moved
+from ...solver.gather import UNNUMBERED, Boxes, ElementLookup, MovedGeometry
 from ..texels import Crossings, SmoothLift, TexelGeometry
 from ..transport import HitTable
 
-NEAR = 1.5
+AFFECTED_REACH = 1.5
 """What is farther from a texel than this many times its size neither touches nor hoods it."""
 
-MARGIN = 4.0
+BOX_MARGIN = 4.0
 """Boxes are this many surface offsets larger than what moved."""
 
 
@@ -51,27 +51,27 @@ class AffectedTexels:
         for rows in parts:
             moved[rows] = True
         places = [triangles[rows] for rows in parts for triangles in (before.triangles, geometry.triangles)]
-        return AffectedTexels(before, geometry, moved, Boxes.around(places, MARGIN * offset))
+        return AffectedTexels(before, geometry, moved, Boxes.around(places, BOX_MARGIN * offset))
 
     @cached_property
     def texels(self) -> Array:
         """(n,) bool: those that moved."""
         return np.asarray(self.moved[self.geometry.triangle])
 
-    def traced(self, before: RayCaster) -> Moved:
-        """Return what tells the rays that what moved is in the way of; `before` casts those of before."""
-        return Moved(self.boxes, self._alone, before)
+    def traced(self, before: RayCaster) -> MovedGeometry:
+        """Return what finds the rays that moved objects block; `before` casts rays in the scene as it was."""
+        return MovedGeometry(self.boxes, self._alone, before)
 
     @cached_property
     def _alone(self) -> RayCaster:
-        both = [some.triangles[self.moved] for some in (self.before, self.geometry)]
+        both = [geometry.triangles[self.moved] for geometry in (self.before, self.geometry)]
         return EmbreeCaster(np.concatenate(both), threads=1)
 
     @cached_property
     def near(self) -> Array:
         """(n,) bool: texels that moved, and those that what moved may stand on, touch or hood."""
         geometry = self.geometry
-        return self.texels | self.boxes.near(geometry.position, NEAR * geometry.reach)
+        return self.texels | self.boxes.near(geometry.position, AFFECTED_REACH * geometry.reach)
 
     @cached_property
     def widen(self) -> Array:
@@ -87,23 +87,23 @@ class AffectedTexels:
     def renumbered(self, old: HitTable, table: HitTable, divided: Array) -> Array:
         """Return (numbers,) int32: what each hit of before is numbered now, or UNNUMBERED.
 
-        Stale is what moved, what is beside it, and parts of leaves that it may cut.
+        Texels that moved, those next to them, and parts of leaves that they may cut get new numbers.
 
         Parameters
         ----------
         divided : (n,) bool
             See `divided`.
         """
-        now = np.arange(old.end, dtype=np.int32)
+        numbers = np.arange(old.end, dtype=np.int32)
         # A hit on a divided texel may have been answered by a neighbor.
         texels = self.texels | self.geometry.neighborhood(divided)
-        now[: old.texel_count][texels] = UNNUMBERED
-        now[old.texel_count : old.first_cell][self._cells_near(table.local.elements)] = UNNUMBERED
+        numbers[: old.texel_count][texels] = UNNUMBERED
+        numbers[old.texel_count : old.first_cell][self._cells_near(table.local.elements)] = UNNUMBERED
         cells = old.texel_cells.renumbered(table.texel_cells)
-        of = old.texel_cells.texel_of(np.arange(len(cells)))
-        stale = (cells < 0) | texels[of]
-        now[old.first_cell :] = np.where(stale, UNNUMBERED, cells + table.first_cell)
-        return now
+        texel = old.texel_cells.texel_of(np.arange(len(cells)))
+        stale = (cells < 0) | texels[texel]
+        numbers[old.first_cell :] = np.where(stale, UNNUMBERED, cells + table.first_cell)
+        return numbers
 
     def _cells_near(self, elements: ElementLookup) -> Array:
         """Return (cells,) bool: those of elements that moved, or that a box touches."""

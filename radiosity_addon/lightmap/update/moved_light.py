@@ -16,12 +16,12 @@ from .previous import PreviousLight
 
 def changed_lights(local: LocalPass, before: LocalPass) -> list[tuple[LightQuery, bool]]:
     """Pair the lights that shine on points with whether they themselves moved."""
-    old = {asked.number: asked.light for asked in before.direct.lights()}
+    old = {query.number: query.light for query in before.direct.lights()}
     result = []
-    for asked in local.direct.lights():
-        was = old.get(asked.number)
-        same_as = getattr(asked.light, "same_as", None)
-        result.append((asked, was is None or (same_as is not None and not same_as(was))))
+    for query in local.direct.lights():
+        was = old.get(query.number)
+        same_as = getattr(query.light, "same_as", None)
+        result.append((query, was is None or (same_as is not None and not same_as(was))))
     return result
 
 
@@ -30,16 +30,16 @@ def texel_gains(previous: PreviousLight, local: LocalPass, progress: Progress) -
     affected = previous.affected
     geometry, lift = affected.geometry, SmoothLift(affected.geometry)
     gains = LightGains(len(geometry))
-    for (asked, moved), part in progress.each(changed_lights(local, previous.local)):
-        gain = previous.lit.gains.of(asked.number)
+    for (query, moved), part in progress.each(changed_lights(local, previous.local)):
+        gain = previous.lit.gains.of(query.number)
         touched = affected.texels.copy()
-        touched |= moved | affected.boxes.between(geometry.position, asked.light, affected.widen)
+        touched |= moved | affected.boxes.between(geometry.position, query.light, affected.widen)
         # One texel more: a penumbra is followed from neighbor to neighbor.
         around = np.flatnonzero(geometry.neighborhood(touched))
-        found = local.direct.gain(asked, _footprints(geometry, around, lift), progress=part)
+        found = local.direct.gain(query, _footprints(geometry, around, lift), progress=part)
         own = touched[around]
         gain[around[own]] = found[own]
-        gains.put(asked.number, gain)
+        gains.put(query.number, gain)
     return gains
 
 
@@ -50,12 +50,12 @@ def sub_cell_gains(
     assert hits.gains is not None  # kept cells keep them
     local, boxes = table.local, previous.affected.boxes
     gains = LightGains(len(hits.number))
-    for (asked, moved), part in progress.each(changed_lights(local, previous.local)):
-        gain = hits.gains.of(asked.number)
-        rows = np.flatnonzero(moved | boxes.between(at, asked.light, widen))
+    for (query, moved), part in progress.each(changed_lights(local, previous.local)):
+        gain = hits.gains.of(query.number)
+        rows = np.flatnonzero(moved | boxes.between(at, query.light, widen))
         points = table.lit_footprints(hits.number[rows], hits.of_element)
-        gain[rows] = local.direct.gain(asked, points, hits.shadow_rays, part)
-        gains.put(asked.number, gain)
+        gain[rows] = local.direct.gain(query, points, hits.shadow_rays, part)
+        gains.put(query.number, gain)
     return gains
 
 

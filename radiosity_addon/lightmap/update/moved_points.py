@@ -14,7 +14,7 @@ import numpy as np
 from ...base import Progress
 from ...numerics import Array, run_numbers, run_starts
 from ...rays import SAGITTA, SIGHT_LIFT
-from ...solver.gather import AimedRays, Before, Gathered
+from ...solver.gather import AimedRays, Before, GatheredHits
 from ..points import Interpolation
 from ..transport import STARTS, GatherLinks, KeptPoints, gather_footprints
 from .previous import StandingHits
@@ -38,26 +38,28 @@ def kept_points(standing: StandingHits, progress: Progress) -> KeptPoints:
     return KeptPoints(points, links.spread, rows, gathered, _unsure(standing, links.spread, closer))
 
 
-def _traced_again(standing: StandingHits, links: GatherLinks, rows: Array, progress: Progress) -> Gathered:
+def _traced_again(
+    standing: StandingHits, links: GatherLinks, rows: Array, progress: Progress
+) -> GatheredHits:
     """Trace again what is touched of the rays of some points."""
     points = standing.previous.traced.points
     sources, closeness = links.sources[rows], points.closeness[rows].copy()
     aimed: list[AimedRays] = []
     # Across a rim every ray starts from a point of its own.
     edge = standing.table.crossings.crossed[points.texel[rows]]
-    for (mine, starts), part in progress.each(((~edge, STARTS), (edge, None))):
+    for (group, starts), part in progress.each(((~edge, STARTS), (edge, None))):
         chosen = np.zeros(len(points.texel), dtype=bool)
-        chosen[rows[mine]] = True
-        before = Gathered(sources[mine], closeness[mine], links.aimed.of_points(chosen))
-        found = _gathered_again(standing, before, points.texel[rows[mine]], starts, part)
-        sources[mine], closeness[mine] = found.sources, found.closeness
-        aimed.append(replace(found.aimed, row=np.flatnonzero(mine)[found.aimed.row]))
-    return Gathered(sources, closeness, AimedRays.joined(aimed, [0, 0]))
+        chosen[rows[group]] = True
+        before = GatheredHits(sources[group], closeness[group], links.aimed.of_points(chosen))
+        found = _gathered_again(standing, before, points.texel[rows[group]], starts, part)
+        sources[group], closeness[group] = found.sources, found.closeness
+        aimed.append(replace(found.aimed, row=np.flatnonzero(group)[found.aimed.row]))
+    return GatheredHits(sources, closeness, AimedRays.joined(aimed, [0, 0]))
 
 
 def _gathered_again(
-    standing: StandingHits, before: Gathered, texel: Array, starts: int | None, progress: Progress
-) -> Gathered:
+    standing: StandingHits, before: GatheredHits, texel: Array, starts: int | None, progress: Progress
+) -> GatheredHits:
     previous, table = standing.previous, standing.table
     geometry, local = table.geometry, table.local
     corners = previous.local.elements.hierarchy.corners[before.aimed.element]
@@ -84,19 +86,19 @@ def _unsure(standing: StandingHits, spread: Interpolation, closer: Array) -> Arr
     """Return (n,) bool: texels whose points are weighed again, `closer` (g,) or hidden ones among them."""
     traced, moved, geometry = standing.previous.traced, standing.previous.affected, standing.table.geometry
     unsure = moved.texels | geometry.neighborhood(standing.divided) | spread.any_of(closer)
-    # A texel's points are in cells beside its own, no wider than the coarsest lattice.
+    # A texel's points are in cells next to its own, no wider than the coarsest lattice.
     farthest = CELLS_ACROSS * max(*traced.settings.strides, 1.5) * geometry.texel_size
-    some = np.flatnonzero(moved.boxes.near(geometry.position, np.full(len(geometry), farthest)))
+    near = np.flatnonzero(moved.boxes.near(geometry.position, np.full(len(geometry), farthest)))
     ends = np.append(spread.first, len(spread.point))
-    count = ends[some + 1] - ends[some]
-    texel = np.repeat(some, count)
-    point = traced.points.texel[spread.point[run_numbers(count, ends[some])]]
+    count = ends[near + 1] - ends[near]
+    texel = np.repeat(near, count)
+    point = traced.points.texel[spread.point[run_numbers(count, ends[near])]]
     start, normal = geometry.position[texel], geometry.normal[texel]
     along = geometry.position[point] - start
     bend = np.sqrt(np.maximum(1.0 - np.einsum("pk,pk->p", normal, geometry.normal[point]), 0.0))
     lift = SIGHT_LIFT * standing.table.local.caster.surface_offset
     rise = lift + SAGITTA * np.linalg.norm(along, axis=1) * bend
     crosses = moved.boxes.met_by(start, along[:, None], rise, 1.0)[:, 0]
-    if len(some):
-        unsure[some] |= np.logical_or.reduceat(crosses, run_starts(count))
+    if len(near):
+        unsure[near] |= np.logical_or.reduceat(crosses, run_starts(count))
     return np.asarray(unsure)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...base import Progress
-from ...solver.gather import UNNUMBERED, AimedRays, Before, Gathered, LightGains
+from ...solver.gather import UNNUMBERED, AimedRays, Before, GatheredHits, LightGains
 from ..transport import SubCellHits
 from .moved_light import sub_cell_gains
 from .previous import StandingHits
@@ -50,7 +50,7 @@ def _traced_again(hits: SubCellHits, standing: StandingHits, progress: Progress)
     nowhere = np.zeros((0, 1, 3))
     # Cells speak for nobody: how close things are to them is not asked.
     unasked = np.full(len(hits.number), np.inf)
-    gathered = Gathered(hits.sources, unasked, AimedRays.none())
+    gathered = GatheredHits(hits.sources, unasked, AimedRays.none())
     earlier = Before(
         gathered,
         aimed_at=(nowhere, nowhere),

@@ -10,7 +10,7 @@ So rays find what share of each leaf's light arrives anywhere at all, in a close
 simply all of it. What the leaf's own links leave of that is what it sends over shared ones:
 its radiosity is scaled when they take their mean. Where its own links alone send more than
 it has (faces closer together than rays can resolve are all hit), those are scaled too: so no leaf ever
-sends more than it has, and the iteration converges (but for what gradients of clusters make negative:
+sends more than it has, and the iteration converges (except what gradients of clusters make negative:
 `hierarchical.STALLED`).
 
 What a leaf receives is the same the other way round: where nothing escapes ΣFV = 1, and what its own links
@@ -34,7 +34,7 @@ from .enclosure import Arrivals
 from .link_sums import received_by_leaves, received_over_clusters, sent_by_leaves
 from .visibility_correction import corrected
 
-ROUNDS = 8
+BALANCE_ROUNDS = 8
 """Maximum number of rounds of both balances, …"""
 
 ENOUGH = 2e-3
@@ -53,7 +53,7 @@ SURE = 0.01
 """In faces that receive less than this over links to clusters, which miss more than rays do, the lack can be
 assigned to visibilities."""
 
-LIMIT = 2.0
+MAX_FACTOR = 2.0
 """Largest factor, which limits leaves with hardly any links, …"""
 
 LIMIT_CLOSED = 32.0
@@ -119,7 +119,7 @@ class Conservation:
         if not (known & closed).any():
             return Balance(links, self.factors(hierarchy, cut, links, cluster_links), received)
         leaves = hierarchy.leaves[known[hierarchy.face[hierarchy.leaves]]]
-        for number in range(ROUNDS):
+        for number in range(BALANCE_ROUNDS):
             own, shared = received_by_leaves(hierarchy, cut, links, cluster_links, scale)
             if number > 0:
                 sums = pull(hierarchy, received * np.stack([own, shared], axis=1)).sum(axis=1)
@@ -152,7 +152,7 @@ class Conservation:
         own, shared = sent_by_leaves(hierarchy, cut, links, cluster_links, received)
         result = np.ones((hierarchy.n_elements, 2))
         arriving = self.arrivals.share[leaves]
-        limit = np.where(arriving == 1.0, LIMIT_CLOSED, LIMIT)
+        limit = np.where(arriving == 1.0, LIMIT_CLOSED, MAX_FACTOR)
         result[leaves] = _over_shared(arriving, own[leaves], shared[leaves], limit)
         # Own links are better than few rays: scaled down for rays' noise, and not up, they would lose power.
         most = np.minimum(arriving + STANDARD_ERRORS * self.arrivals.error(leaves), 1.0)
@@ -172,7 +172,7 @@ def _receive(
     of_faces = pull(hierarchy, np.stack([own, shared], axis=1))[: len(closed)]
     own = np.where(closed[face], own[leaves], of_faces[face, 0])
     shared = np.where(closed[face], shared[leaves], of_faces[face, 1])
-    result = _over_shared(wanted[face], own, shared, LIMIT)
+    result = _over_shared(wanted[face], own, shared, MAX_FACTOR)
     whole = leaves < len(closed)
     result[whole] = _over_all(wanted[face], own + shared)[whole, None]
     return result

@@ -15,10 +15,10 @@ from ...rays import RayCaster
 from ..hierarchy import ClusterCut, Hierarchy
 from ..links import node_samples, pull
 
-RAYS = 32
+LEAF_RAYS = 32
 """Hemisphere rays of a leaf; in a closed scene they all agree, and there is no noise at all."""
 
-LAMP_RAYS = 512
+EMISSIVE_LEAF_RAYS = 512
 """Rays of an emissive leaf, where not all of the others arrive: most power starts there."""
 
 HELD_RAYS = 128
@@ -42,7 +42,7 @@ class Arrivals:
 
     share (e,): Of leaves, what part of their light arrives; of those that never were leaves NaN.
     escapes (e,) bool: Whether any ray left the scene.
-    rays (e,) int32: How many were asked.
+    rays (e,) int32: How many were traced.
     """
 
     def __init__(self, caster: RayCaster, min_area: float, seed: int, threads: int = 0) -> None:
@@ -56,7 +56,7 @@ class Arrivals:
         more = hierarchy.n_elements - len(self.share)
         self.share = np.concatenate([self.share, np.full(more, np.nan)])
         self.escapes = np.concatenate([self.escapes, np.zeros(more, dtype=bool)])
-        self.rays = np.concatenate([self.rays, np.full(more, RAYS, dtype=np.int32)])
+        self.rays = np.concatenate([self.rays, np.full(more, LEAF_RAYS, dtype=np.int32)])
         leaves = hierarchy.leaves
         new = leaves[np.isnan(self.share[leaves])]
         faces = new[new < len(hierarchy.faces)]
@@ -64,16 +64,16 @@ class Arrivals:
             # Neighbors that together are no larger than an element may be share their rays.
             large = np.flatnonzero(hierarchy.clusters.area > self._min_area)
             cut = ClusterCut(hierarchy, large)
-            share, escapes = self._trace(hierarchy, cut.nodes, RAYS)
+            share, escapes = self._trace(hierarchy, cut.nodes, LEAF_RAYS)
             node = cut.row_of_face[faces] - cut.n_inner
             self.share[faces], self.escapes[faces] = share[node], escapes[node]
             apart = faces[(share[node] > 0.0) & (share[node] < 1.0) & (np.bincount(node)[node] > 1)]
-            if len(apart) * RAYS <= MOST_RAYS:
-                self._ask(hierarchy, apart, RAYS)
-        self._ask(hierarchy, new[len(faces) :], RAYS)
+            if len(apart) * LEAF_RAYS <= MOST_RAYS:
+                self._ask(hierarchy, apart, LEAF_RAYS)
+        self._ask(hierarchy, new[len(faces) :], LEAF_RAYS)
         doubtful = new[(self.share[new] > 0.0) & (self.share[new] < 1.0)]
         rays = self._wanted(hierarchy, doubtful)
-        for count in np.unique(rays[rays > RAYS]):
+        for count in np.unique(rays[rays > LEAF_RAYS]):
             self._ask(hierarchy, doubtful[rays == count], int(count))
 
     def _wanted(self, hierarchy: Hierarchy, leaves: Array) -> Array:
@@ -83,11 +83,11 @@ class Arrivals:
         """
         part = hierarchy.area[leaves] / float(hierarchy.faces.area.sum())
         # By powers of four, so that many leaves are traced together.
-        power = np.rint(0.5 * np.log2(np.maximum(part * (SPREAD_RAYS / RAYS), 1.0)))
-        rays = np.minimum(RAYS * 4 ** power.astype(np.int64), MOST_OF_ONE)
+        power = np.rint(0.5 * np.log2(np.maximum(part * (SPREAD_RAYS / LEAF_RAYS), 1.0)))
+        rays = np.minimum(LEAF_RAYS * 4 ** power.astype(np.int64), MOST_OF_ONE)
         large = hierarchy.area[leaves] >= self._min_area
         shines = hierarchy.emission[leaves].any(axis=1)
-        rays[large & shines] = np.maximum(rays[large & shines], LAMP_RAYS)
+        rays[large & shines] = np.maximum(rays[large & shines], EMISSIVE_LEAF_RAYS)
         held = large & ~shines & ~self.escapes[leaves]
         rays[held] = np.maximum(rays[held], HELD_RAYS)
         return np.asarray(rays)
@@ -121,7 +121,7 @@ class Arrivals:
         """Return (n,) the share of the light of nodes that arrives, and whether any ray leaves the scene."""
         share, escapes = np.empty(len(nodes)), np.empty(len(nodes), dtype=bool)
         measure = partial(_arriving, hierarchy, self._caster, nodes, rays, self._seed)
-        fill_chunks(measure, (share, escapes), len(nodes), CHUNK * RAYS // rays, self._threads)
+        fill_chunks(measure, (share, escapes), len(nodes), CHUNK * LEAF_RAYS // rays, self._threads)
         return share, escapes
 
 

@@ -13,7 +13,7 @@ from ..hierarchy import LEAF, ClusterCut, Hierarchy
 from ..links import ClusterLinks, Links, gather, gather_at_clusters, node_radiosity, pull, push, quarters_mean
 
 
-class Arriving:
+class ClusterLinkLight:
     """Light that the receivers of links to clusters take, times opacity, per unit of the source's radiosity.
 
     received (e, 2): What the leaves' gathered light is scaled with.
@@ -53,7 +53,7 @@ def sent_by_leaves(
     at_links = taken_at_links(hierarchy, links, received)
     sums = sent(hierarchy, links, at_links)
     own = quarters_mean(sums)[:, 0]
-    at_clusters = Arriving(hierarchy, cut, cluster_links, received)
+    at_clusters = ClusterLinkLight(hierarchy, cut, cluster_links, received)
     sums = sums + sent_to_clusters(hierarchy, cluster_links, at_clusters)
     from_clusters = _from_clusters(hierarchy, cut, links, at_links, cluster_links, at_clusters)
     return own, push(hierarchy, sums + from_clusters)[:, 0] - own
@@ -89,7 +89,7 @@ def _from_clusters(
     links: Links,
     at_links: Array,
     cluster_links: ClusterLinks,
-    arriving: Arriving,
+    arriving: ClusterLinkLight,
 ) -> Array:
     """Return (e, 4, 1) the share that the links of the clusters above each face carry."""
     clusters, faces, count = hierarchy.clusters, hierarchy.faces, hierarchy.n_clusters
@@ -117,7 +117,7 @@ def _from_clusters(
     return total
 
 
-def sent_to_clusters(hierarchy: Hierarchy, links: ClusterLinks, arriving: Arriving) -> Array:
+def sent_to_clusters(hierarchy: Hierarchy, links: ClusterLinks, arriving: ClusterLinkLight) -> Array:
     """Return (e, 1, 1): the share of the light of each element that its own links to clusters carry."""
     single = links.source >= hierarchy.n_clusters
     element = links.source[single] - hierarchy.n_clusters

@@ -17,13 +17,13 @@ from ...numerics import Array
 from ..hierarchy import Hierarchy
 from ..links import Links
 
-ROUNDS = 6
+CORRECTION_ROUNDS = 6
 """How often the lack of receivers and of sources is distributed in turn."""
 
-LIMIT = 1.0
+MAX_CORRECTION = 1.0
 """Maximum that one side adds or takes, as a part of V (1 − V)."""
 
-LEAST = 1e-9
+MIN_EXCHANGE = 1e-9
 """A face exchanges at least this share over uncertain links; otherwise they cannot be corrected."""
 
 
@@ -40,25 +40,32 @@ def corrected(hierarchy: Hierarchy, links: Links, closed: Array, received: Array
     rows = np.flatnonzero((source >= 0) & (links.visibility > 0) & (links.visibility < 1))
     faces, area = len(hierarchy.faces), hierarchy.faces.area
     receiver, source = links.receiver[rows], source[rows]
-    to, of = hierarchy.face[receiver], hierarchy.face[source]
+    receiver_face, source_face = hierarchy.face[receiver], hierarchy.face[source]
     visibility = links.visibility[rows].astype(np.float64)
     doubtful = hierarchy.area[receiver] * links.factor[rows] * visibility * (1.0 - visibility)
     # A partly opaque surface receives and sends only that part.
     arriving, leaving = doubtful * hierarchy.opacity[source], doubtful * hierarchy.opacity[receiver]
-    at_receivers, at_sources = np.bincount(to, arriving, faces), np.bincount(of, leaving, faces)
+    at_receivers, at_sources = (
+        np.bincount(receiver_face, arriving, faces),
+        np.bincount(source_face, leaving, faces),
+    )
     of_receiver, of_source = np.zeros(faces), np.zeros(faces)
-    for _ in range(ROUNDS):
-        lacking = area * (1.0 - received) - np.bincount(to, arriving * of_source[of], faces)
+    for _ in range(CORRECTION_ROUNDS):
+        lacking = area * (1.0 - received) - np.bincount(
+            receiver_face, arriving * of_source[source_face], faces
+        )
         of_receiver = _shared_out(lacking, at_receivers, closed, area)
-        lacking = area * (1.0 - sent) - np.bincount(of, leaving * of_receiver[to], faces)
+        lacking = area * (1.0 - sent) - np.bincount(source_face, leaving * of_receiver[receiver_face], faces)
         of_source = _shared_out(lacking, at_sources, closed, area)
     everywhere = links.visibility.copy()
-    changed = visibility * (1.0 + (1.0 - visibility) * (of_receiver[to] + of_source[of]))
+    changed = visibility * (1.0 + (1.0 - visibility) * (of_receiver[receiver_face] + of_source[source_face]))
     everywhere[rows] = np.clip(changed, 0.0, 1.0)
     return replace(links, visibility=everywhere)
 
 
 def _shared_out(lacking: Array, doubtful: Array, closed: Array, area: Array) -> Array:
     """Return (f,) the correction of each face's exchange over uncertain links [m²]."""
-    helps = closed & (doubtful > LEAST * area)
-    return np.where(helps, np.clip(lacking / np.where(helps, doubtful, 1.0), -LIMIT, LIMIT), 0.0)
+    helps = closed & (doubtful > MIN_EXCHANGE * area)
+    return np.where(
+        helps, np.clip(lacking / np.where(helps, doubtful, 1.0), -MAX_CORRECTION, MAX_CORRECTION), 0.0
+    )

@@ -1,10 +1,10 @@
 """Lamps of very many faces: from afar, groups of faces send like a rectangle.
 
-A bulb of ten thousand triangles cannot be asked triangle by triangle from every texel. A binary tree
-groups the faces by place and way of facing; each point goes down it until what is left is small for
-its distance and faces one way (Walter et al., Lightcuts: a scalable approach to illumination, 2005).
+A bulb of ten thousand triangles cannot be evaluated triangle by triangle at every texel. A binary tree
+groups the faces by position and orientation; each point descends it until a group is small for its
+distance and faces one way (Walter et al., Lightcuts: a scalable approach to illumination, 2005).
 Such a group sends like the rectangle that has its area vector, its centroid and its second moments;
-single faces are asked exactly. Which groups a point asks depends on the point alone.
+single faces are evaluated exactly. Which groups a point uses depends on the point alone.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from ...form_factors import point_to_polygon
 from ...numerics import Array, running_sums, triangle_areas
 
 NEAREST = 3.0
-"""A flat group is asked as one from this many times its radius on, …"""
+"""A flat group is evaluated as one from this many times its radius on, …"""
 
 CURVED = 4.0
-"""… one that is not flat from so many, if its normals span little …"""
+"""… one that is not flat from this many, if its normals span little …"""
 
 MOST_SLANT = 0.35
 """… (the sine of the angle to the farthest from their mean), and none of its faces is turned away."""
 
-FLAT = 1e-5
+FLAT_SINE = 1e-5
 """Sine of the angle to the farthest normal of a flat group."""
 
 THINNEST = 1e-3
@@ -33,8 +33,8 @@ THINNEST = 1e-3
 
 
 @dataclass(frozen=True)
-class Asked:
-    """The nodes that n points ask, p pairs sorted by point.
+class EmitterPairs:
+    """The nodes that light n points: p pairs sorted by point.
 
     row, node (p,) int.
     factor (p,): What the point gets from the node per unit of strength; above 0.
@@ -94,13 +94,13 @@ class EmitterTree:
         self.polygon = self.center[:, None] + around[:, :1] * one[:, None] + around[:, 1:] * other[:, None]
         self._scale = length / np.maximum(4.0 * half.prod(axis=1), 1e-300)
         single = np.flatnonzero(self._single)
-        of = self.begin[single]
+        face = self.begin[single]
         # A repeated corner is an edge of no length.
-        self.polygon[single] = corners[of][:, [0, 1, 2, 2]]
-        self._scale[single] = weight[of] / np.maximum(triangle_areas(local[of]), 1e-300)
+        self.polygon[single] = corners[face][:, [0, 1, 2, 2]]
+        self._scale[single] = weight[face] / np.maximum(triangle_areas(local[face]), 1e-300)
         self.facing = facing
         self.radius, self._slant = self._extremes(corners, normals)
-        flat, coherent = self._slant <= FLAT, self._slant <= MOST_SLANT
+        flat, coherent = self._slant <= FLAT_SINE, self._slant <= MOST_SLANT
         self._smallness = np.where(flat, 1.0 / NEAREST, np.where(coherent, 1.0 / CURVED, 0.0))
 
     def _sums(self, values: Array) -> Array:
@@ -113,15 +113,15 @@ class EmitterTree:
         radius, cosine = np.zeros((2, len(self.begin)))
         for first, last in zip(self._levels[:-1], self._levels[1:], strict=True):
             held = first + np.flatnonzero(self.end[first:last] > self.begin[first:last])
-            of = np.repeat(held, self.end[held] - self.begin[held])
-            apart = np.linalg.norm(corners - self.center[of][:, None], axis=2).max(axis=1)
+            node = np.repeat(held, self.end[held] - self.begin[held])
+            apart = np.linalg.norm(corners - self.center[node][:, None], axis=2).max(axis=1)
             radius[held] = np.maximum.reduceat(apart, self.begin[held])
-            along = np.einsum("mi,mi->m", normals, self.facing[of])
+            along = np.einsum("mi,mi->m", normals, self.facing[node])
             cosine[held] = np.minimum.reduceat(along, self.begin[held])
         sine = np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
         return radius, np.where(cosine > 0.0, sine, 1.0)
 
-    def ask(self, points: Array, normals: Array) -> Asked:
+    def ask(self, points: Array, normals: Array) -> EmitterPairs:
         """Return what points (n, 3) that face along `normals` get from nodes that together are all faces."""
         row, node = np.arange(len(points)), np.zeros(len(points), dtype=np.int64)
         rows, nodes = [], []
@@ -136,12 +136,12 @@ class EmitterTree:
             front = np.einsum("pk,pk->p", along, self.facing.take(node, axis=0))
             seen = (height <= radius) & (front >= -(radius + slant))
             single = self._single.take(node)
-            whole = (slant <= FLAT * distance) | (front >= radius + slant)
-            asked = single | (whole & (radius <= self._smallness.take(node) * distance))
-            done = np.flatnonzero(seen & asked)
+            whole = (slant <= FLAT_SINE * distance) | (front >= radius + slant)
+            settled = single | (whole & (radius <= self._smallness.take(node) * distance))
+            done = np.flatnonzero(seen & settled)
             rows.append(row[done])
             nodes.append(node[done])
-            more = np.flatnonzero(seen & ~asked)
+            more = np.flatnonzero(seen & ~settled)
             child = self._child.take(node[more])
             row = np.repeat(row[more], 2)
             node = np.stack([child, child + 1], axis=1).ravel()
@@ -149,9 +149,9 @@ class EmitterTree:
         shapes = self.polygon.take(node, axis=0)
         factor = point_to_polygon(points.take(row, axis=0), normals.take(row, axis=0), shapes, contact=False)
         factor *= self._scale.take(node)
-        some = np.flatnonzero(factor > 0)
-        some = some[np.argsort(row[some], kind="stable")]
-        return Asked(row[some], node[some], factor[some])
+        lit = np.flatnonzero(factor > 0)
+        lit = lit[np.argsort(row[lit], kind="stable")]
+        return EmitterPairs(row[lit], node[lit], factor[lit])
 
 
 def _sorted_tree(places: Array, normals: Array) -> tuple[Array, list[Array]]:

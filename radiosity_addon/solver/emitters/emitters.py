@@ -25,7 +25,7 @@ CHUNK_PAIRS = 1 << 18
 """Point and face pairs evaluated at once; bounds the temporaries to about 50 MB a thread."""
 
 MANY = 256
-"""More faces than these are asked in groups where they are far."""
+"""More faces than these are evaluated in groups where they are far."""
 
 CHUNK_POINTS = 1 << 12
 """Points that go down a tree of faces at once: each of them visits some hundred nodes."""
@@ -35,7 +35,7 @@ ENDS = 2.0
 must not put their ends back on the face."""
 
 NEAR_HORIZON = 1e-9
-"""So much of the group's extent a corner may seem to lie below the horizon and still be asked for."""
+"""A corner may lie below the horizon by this share of the group's extent, by rounding, and still count."""
 
 
 class EmitterGroup:
@@ -94,8 +94,8 @@ class EmitterGroup:
         offset = end_offset(caster)
         lamps = []
         for number, color in enumerate(colors):
-            mine = group == number
-            whole, dim = np.flatnonzero(mine & (level == 1.0)), np.flatnonzero(mine & (level < 1.0))
+            in_group = group == number
+            whole, dim = np.flatnonzero(in_group & (level == 1.0)), np.flatnonzero(in_group & (level < 1.0))
             merged, first = merge_flat(corners[whole])
             normals = faces.normal[rows[whole][first]]
             if len(dim) == 0:
@@ -113,8 +113,8 @@ class EmitterGroup:
         if self._tree is not None:
             for first in range(0, len(points), CHUNK_POINTS):
                 rows = slice(first, first + CHUNK_POINTS)
-                asked = self._tree.ask(points[rows], normals[rows])
-                gain[rows] = np.bincount(asked.row, asked.factor, minlength=len(points[rows]))
+                pairs = self._tree.ask(points[rows], normals[rows])
+                gain[rows] = np.bincount(pairs.row, pairs.factor, minlength=len(points[rows]))
             return gain
         step = max(CHUNK_PAIRS // len(self._corners), 1)
         for first in range(0, len(points), step):
@@ -122,24 +122,24 @@ class EmitterGroup:
             gain[rows] = self.factors(points[rows], normals[rows]).sum(axis=1)
         return gain
 
-    def beside(self, points: Array, reach: Array) -> Array:
+    def is_near(self, points: Array, reach: Array) -> Array:
         """Whether the box around one of the faces is within `reach` (n,) [m] of points, (n,) bool."""
         low, high = self._corners.min(axis=1), self._corners.max(axis=1)
         close = _box_distance(points, low.min(axis=0), high.max(axis=0)) <= reach
         rows = np.flatnonzero(close)
         step = max(CHUNK_PAIRS // len(self._corners), 1)
         for first in range(0, len(rows), step):
-            some = rows[first : first + step]
-            apart = _box_distance(points[some, None], low, high)
-            close[some] = (apart <= reach[some, None]).any(axis=1)
+            chunk = rows[first : first + step]
+            apart = _box_distance(points[chunk, None], low, high)
+            close[chunk] = (apart <= reach[chunk, None]).any(axis=1)
         return np.asarray(close)
 
     def shadow_rays(self, points: Array, normals: Array, u: Array) -> tuple[Array, Array, Array]:
         """Aim (n, k) rays at the faces in proportion to their factors.
 
-        The weights tell apart the rays to one face only; every face weighs as much as it has rays.
-        Else, so near a large face that no ray finds the spot most light comes from, the few rays to a
-        far and perhaps hidden face would decide.
+        The weights distinguish only the rays to one face; every face weighs as much as it has rays.
+        Otherwise, so near a large face that no ray finds the spot that most light comes from, the few
+        rays to a far and perhaps hidden face would decide.
 
         Returns
         -------
@@ -161,17 +161,17 @@ class EmitterGroup:
         self, tree: EmitterTree, points: Array, normals: Array, u: Array
     ) -> tuple[Array, Array, Array]:
         """Aim (n, k) rays at nodes by what they send, and at faces of a node by their weights."""
-        asked = tree.ask(points, normals)
-        count = np.bincount(asked.row, minlength=len(points))
+        pairs = tree.ask(points, normals)
+        count = np.bincount(pairs.row, minlength=len(points))
         lit = np.flatnonzero(count)
         directions, (distances, weights) = np.zeros((*u.shape[:2], 3)), np.zeros((2, *u.shape[:2]))
         directions[..., 2] = 1.0
         if len(lit) == 0:
             return directions, distances, weights
         first = run_starts(count)[lit, None]
-        running = running_sums(asked.factor)
+        running = running_sums(pairs.factor)
         which, along = pick_in_runs(running, u[lit, :, 0], first, first + count[lit, None])
-        node = asked.node[which]
+        node = pairs.node[which]
         begin, end = tree.begin[node], tree.end[node]
         slot, along = pick_in_runs(tree.running, along, begin, end)
         inside = np.stack([along, u[lit, :, 1]], axis=-1)
@@ -180,7 +180,7 @@ class EmitterGroup:
         )
         # A point of a node's faces stands for what the whole node would send, were it all there.
         sent = radiance_of_radiosity(thrown * (tree.running[end] - tree.running[begin]))
-        weights[lit] = _balanced(sent / np.maximum(asked.factor[which], 1e-300), which, len(asked.row))
+        weights[lit] = _balanced(sent / np.maximum(pairs.factor[which], 1e-300), which, len(pairs.row))
         return directions, distances, weights
 
     def _rays_to(

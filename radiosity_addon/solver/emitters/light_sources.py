@@ -1,7 +1,7 @@
 """The sources of a scene's light that can be changed apart: lamps, the sky, and emissive materials.
 
 Everything a bake computes is linear in their strengths, channel by channel. Shadow rays of emissive
-surfaces are asked for groups of faces that cannot be told apart by color (`textured_emitters.py`);
+surfaces are traced for groups of faces of one emission (`textured_emitters.py`);
 here the groups stay within one source, so that its strength can change alone.
 """
 
@@ -95,9 +95,9 @@ class LightSources:
         triangle (n,) int: Whose surfaces they are.
         """
         result = emission.copy()
-        of = self.emitter[triangle]
+        emitter = self.emitter[triangle]
         for source in range(len(self.strengths) - len(self.lights)):
-            rows = np.flatnonzero(of == source)
+            rows = np.flatnonzero(emitter == source)
             result[rows] = self._changed(emission[rows], source, strengths)
         return result
 

@@ -1,9 +1,9 @@
 """Faces of one plane merged: a panel of ten thousand triangles is a lamp of two.
 
-What a point gets from emissive faces is asked of each of them, exactly. Where the faces tile a flat
-polygon, few triangles tile it as well, and send the same. Joined are faces across shared edges; the
-outline of what is joined, without the corners on its sides, is cut into triangles by their ears
-(Meisters, Polygons have ears, 1975). Whatever is not one plain outline stays as it was.
+The light of emissive faces at a point is evaluated exactly, face by face. Where the faces tile a flat
+polygon, a few triangles that tile it send the same light. Faces are joined across shared edges; the
+outline of the result, without the corners on its sides, is cut into triangles by their ears (Meisters,
+Polygons have ears, 1975). Faces whose outline is not one simple polygon stay as they were.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from ...numerics import Array, connected_components, double_area_vectors, numbered, weld
 
-FLAT = 1e-6
+PLANE_TOLERANCE = 1e-6
 """Faces lie in one plane if their normals agree to this, and their corners to this part of their extent."""
 
 WELD = 1e-9
@@ -24,7 +24,7 @@ SAME_AREA = 1e-7
 """A triangulation must have the area of what it replaces, to this part."""
 
 _ASIDE = np.array([0.358, 0.471, 0.806])
-"""Faces turned along it and against it are told apart: a direction that hardly a surface lies along."""
+"""Separates faces turned along it from those turned against it: hardly any surface is parallel to it."""
 
 MOST_CORNERS = 64
 """Outlines of more corners are left: the ears of k corners take k² steps."""
@@ -49,7 +49,7 @@ def merge_flat(corners: Array) -> tuple[Array, Array]:
     points, index = points[np.unique(place, return_index=True)[1]], place.reshape(-1, 3)
     start, end, twin = _edges(index, len(points))
     one, other = np.flatnonzero(twin >= 0) // 3, twin[twin >= 0] // 3
-    alike = (np.abs(normal[one] - normal[other]) <= FLAT).all(axis=1)
+    alike = (np.abs(normal[one] - normal[other]) <= PLANE_TOLERANCE).all(axis=1)
     label = connected_components(len(corners), one[alike], other[alike])
     inner = twin >= 0
     inner[inner] = label[one] == label[other]
@@ -62,7 +62,9 @@ def merge_flat(corners: Array) -> tuple[Array, Array]:
         rim = (3 * faces[:, None] + np.arange(3)).ravel()
         rim = rim[~inner[rim]]
         frame = normal[faces[0]]
-        flat = (np.abs(normal[faces] - frame) <= 2.0 * FLAT).all() and _in_plane(corners[faces], frame)
+        flat = (np.abs(normal[faces] - frame) <= 2.0 * PLANE_TOLERANCE).all() and _in_plane(
+            corners[faces], frame
+        )
         loop = _outline(start[rim], end[rim]) if flat else None
         fewer = None
         if loop is not None:
@@ -95,7 +97,7 @@ def _in_plane(corners: Array, normal: Array) -> bool:
     """Return whether (f, 3, 3) triangles lie in one plane."""
     points = corners.reshape(-1, 3)
     height = (points - points[0]) @ normal
-    return bool(np.ptp(height) <= FLAT * np.ptp(points, axis=0).max())
+    return bool(np.ptp(height) <= PLANE_TOLERANCE * np.ptp(points, axis=0).max())
 
 
 def _outline(start: Array, end: Array) -> Array | None:
@@ -123,7 +125,7 @@ def _triangulated(loop: Array, normal: Array, area: float, most: int) -> Array |
     along = flat - np.roll(flat, 1, axis=0)
     turn = _cross(along, np.roll(along, -1, axis=0))
     # What bends no more than rounding does is on a side. Corners that turn back are not.
-    straight = np.abs(turn) <= FLAT * FLAT * scale * scale
+    straight = np.abs(turn) <= PLANE_TOLERANCE * PLANE_TOLERANCE * scale * scale
     straight &= np.einsum("nk,nk->n", along, np.roll(along, -1, axis=0)) > 0
     loop, flat = loop[~straight], flat[~straight]
     if not 3 <= len(loop) <= MOST_CORNERS or len(loop) - 2 >= most:

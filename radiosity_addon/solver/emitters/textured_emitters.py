@@ -2,7 +2,7 @@
 
 A face with an image of emission becomes pieces of constant emission. Shadow rays ask what share of a
 lamp is seen, one number for all colors; so where pieces differ in color each channel is a lamp
-of its own, lest a red half of a screen be hidden by what stands before the green one.
+of its own, so that an object in front of the green half of a screen does not hide the red half.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from ...rays import RayCaster
 from ...scene import Faces, Scene, SurfaceImages
 from .emitters import EmitterGroup, corners_of_parts, end_offset, upright
 
-MOST_PIECES = 256
+MAX_PIECES = 256
 """Of all textured faces together, if no more faces shine: every lit point asks every piece."""
 
 SMOOTH = 0.002
@@ -56,18 +56,18 @@ def emissive_pieces(faces: Faces, rows: Array, images: SurfaceImages) -> tuple[A
     weights = upright(faces, face, weights)
     parts = _part_emissions(faces, face, weights, images) * level[:, None, None]
     power = float(area @ parts.mean(axis=(1, 2)))
-    while len(face) < MOST_PIECES:
+    while len(face) < MAX_PIECES:
         spread = area * np.abs(parts - parts.mean(axis=1, keepdims=True)).mean(axis=(1, 2))
         chosen = np.flatnonzero(spread > SMOOTH * power)
         if len(chosen) == 0:
             break
-        room = max((MOST_PIECES - len(face)) // 3, 1)
+        room = max((MAX_PIECES - len(face)) // 3, 1)
         chosen = np.sort(chosen[np.argsort(-spread[chosen], kind="stable")[:room]])
         children = split_in_four(weights[chosen]).reshape(-1, 3, 2)
-        of = np.repeat(face[chosen], 4)
-        new = _part_emissions(faces, of, children, images) * np.repeat(level[chosen], 4)[:, None, None]
+        parent = np.repeat(face[chosen], 4)
+        new = _part_emissions(faces, parent, children, images) * np.repeat(level[chosen], 4)[:, None, None]
         kept = np.delete(np.arange(len(face)), chosen)
-        face = np.concatenate([face[kept], of])
+        face = np.concatenate([face[kept], parent])
         level = np.concatenate([level[kept], np.repeat(level[chosen], 4)])
         weights = np.concatenate([weights[kept], children])
         area = np.concatenate([area[kept], np.repeat(area[chosen] / 4, 4)])

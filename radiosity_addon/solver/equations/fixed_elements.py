@@ -32,13 +32,3 @@ def subdivide_evenly(hierarchy: Hierarchy, count: int) -> None:
             hierarchy.subdivide(leaves[large])
             return
         hierarchy.subdivide(leaves[large])
-
-
-def subdivide_below(hierarchy: Hierarchy, area: float) -> None:
-    """Split every leaf above `area` [m²] until none is."""
-    while True:
-        leaves = hierarchy.leaves
-        large = leaves[hierarchy.area[leaves] > area * (1.0 + 1e-9)]
-        if len(large) == 0:
-            return
-        hierarchy.subdivide(large)

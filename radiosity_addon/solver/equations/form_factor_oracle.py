@@ -11,7 +11,7 @@ import numpy as np
 from ...numerics import Array
 from ..hierarchy import Hierarchy
 
-COPLANAR = 1e-9
+HEIGHT_TOLERANCE = 1e-9
 """Heights below this share of the two radii count as 0, as in `pairs.element_factors`."""
 
 CHUNK = 1 << 18
@@ -46,7 +46,7 @@ def _chunk_bounds(hierarchy: Hierarchy, receiver: Array, source: Array) -> Array
     over_to = np.einsum("nck,nk->nc", source_corners - center_to[:, None], hierarchy.normal[receiver])
     over_of = np.einsum("nck,nk->nc", receiver_corners - center_of[:, None], hierarchy.normal[source])
     rise_to, rise_of = over_to.max(axis=1), over_of.max(axis=1)
-    mutual = (rise_to > COPLANAR * sizes) & (rise_of > COPLANAR * sizes)
+    mutual = (rise_to > HEIGHT_TOLERANCE * sizes) & (rise_of > HEIGHT_TOLERANCE * sizes)
 
     apart = np.linalg.norm(center_of - center_to, axis=1) - sizes
     nearest = np.maximum.reduce(

@@ -2,7 +2,7 @@
 
 Radiosity jumps at creases, and the kernel κ is discontinuous there. So faces share vertices
 only across edges where nothing but they meet, coplanar and of one material; and the nodes at
-the rim of such a patch are moved slightly into their face before the equation is asked there.
+the rim of such a patch are moved slightly into their face before the equation is evaluated there.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ..hierarchy import Basis, Hierarchy
 INWARD = 0.2
 """Nodes at the boundary move this part of the way to the centroid of an adjacent leaf."""
 
-COPLANAR = 1e-9
+COPLANAR_COSINE = 1e-9
 """Faces whose normals' cosine is above 1 less this lie in one plane where they share an edge."""
 
 ON_EDGE = 1e-9
@@ -104,7 +104,7 @@ def _smooth_edges(faces: Faces) -> tuple[Array, Array]:
     first = np.zeros(len(triangles), dtype=np.int64)
     first[line[::-1]] = owner[::-1]
     cosine = np.einsum("nk,nk->n", faces.normal[owner], faces.normal[first[line]])
-    sheet = np.where(cosine > 1.0 - COPLANAR, 0, np.where(cosine < COPLANAR - 1.0, 1, 2))
+    sheet = np.where(cosine > 1.0 - COPLANAR_COSINE, 0, np.where(cosine < COPLANAR_COSINE - 1.0, 1, 2))
     look = np.concatenate([faces.reflectance, faces.emission], axis=1)
     material = numbered(look)[owner]
     edge = numbered(np.stack([line, sheet, material], axis=1))

@@ -92,7 +92,7 @@ class LinearSystem:
     def take(self, rows: Array) -> LinearSystem:
         """Return the system of selected unknowns among themselves, without the light of the others.
 
-        A copy, but for all rows in order, which is the system itself.
+        A copy, except for all rows in order, which is the system itself.
         """
         if np.array_equal(rows, np.arange(len(self))):
             return self

@@ -31,7 +31,7 @@ class MatrixProperties:
         per iteration in the long run. At most the largest ρ.
     condition: (1 − λ_min) / (1 − λ_max) with the extreme eigenvalues of that matrix: the condition of the
         symmetrized system, scaled to a diagonal of 1. Infinite if λ_max reaches 1.
-    symmetrised: Size of the symmetrized system, see `symmetrised`: rows with ρ > 0, in the channel with the
+    symmetrised: Size of the symmetric system (`symmetric_form`): rows with ρ > 0, in the channel with the
         most. The others are eliminated.
     asymmetry: max |T − Tᵀ| / max |T|: 0 where A_i F_ij = A_j F_ji (3.30).
     """
@@ -56,7 +56,7 @@ def matrix_properties(system: LinearSystem) -> MatrixProperties:
     condition = float(((1.0 - low) / np.where(beyond > 0, beyond, np.nan)).max()) if len(system) else 1.0
     return MatrixProperties(
         size=len(system),
-        fill=fill(system),
+        fill=filled_share(system),
         dominance=diagonal_dominance(system),
         spectral_radius=float(np.maximum(high, -low).max()) if len(system) else 0.0,
         condition=condition if np.isfinite(condition) else float("inf"),
@@ -65,7 +65,7 @@ def matrix_properties(system: LinearSystem) -> MatrixProperties:
     )
 
 
-def fill(system: LinearSystem) -> float:
+def filled_share(system: LinearSystem) -> float:
     """Return the share of K's entries that are not 0 in any channel."""
     count = len(system)
     reflects = (system.reflectance > 0).any(axis=1)
@@ -163,7 +163,7 @@ def reciprocity_error(area: Array, transport: Array) -> float:
     return asymmetry(np.asarray(area)[:, None] * transport)
 
 
-def symmetrised(system: LinearSystem, channel: int) -> tuple[Array, Array, Array]:
+def symmetric_form(system: LinearSystem, channel: int) -> tuple[Array, Array, Array]:
     """Scale row i by A_i/ρ_i, which makes a reciprocal system symmetric: (A/ρ − A F) B = A E/ρ.
 
     (The handout scales by A_i alone, which suffices for uniform ρ only.) Rows with ρ = 0 have

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...form_factors import LEAST, kernel, point_to_polygon
+from ...form_factors import MIN_SHARE, kernel, point_to_polygon
 from ...numerics import Array, point_on_each_triangle, split_in_four, stratified_square
 from ...rays import RayCaster
 
-NEAR = ((1.21, 4), (2.07, 2), (4.13, 1))
+NEAR_SPLITS = ((1.21, 4), (2.07, 2), (4.13, 1))
 """(Distance over radius, generations): a nearer triangle is split this often before each part is
 shared out among the corners. Odd numbers: on a regular grid rounding must not decide between two."""
 
@@ -55,7 +55,7 @@ def visible_share(
         start = (points[rows] + caster.surface_offset * normals[rows])[pair]
         along = ends[pair, sample] + caster.surface_offset * source_normals[rows[pair]] - start
         distance = np.linalg.norm(along, axis=1)
-        free = caster.passing(start, along / np.maximum(distance, 1e-300)[:, None], distance, LEAST)
+        free = caster.passing(start, along / np.maximum(distance, 1e-300)[:, None], distance, MIN_SHARE)
         lit[rows] += np.bincount(pair, weight[pair, sample] * free, minlength=len(rows))
         total[rows] += weight.sum(axis=1)
         rows, first = np.flatnonzero((lit > 0) & (lit < total)), count
@@ -78,7 +78,7 @@ def corner_factors(points: Array, normals: Array, corners: Array, source_normals
     radius = np.linalg.norm(corners - center[:, None], axis=2).max(axis=1)
     ratio = np.linalg.norm(center - points, axis=1) / radius
     nearest = 0.0
-    for farthest, generations in (*NEAR, (np.inf, 0)):
+    for farthest, generations in (*NEAR_SPLITS, (np.inf, 0)):
         rows = np.flatnonzero((ratio >= nearest) & (ratio < farthest))
         step = max(CHUNK_PARTS // 4**generations, 1)
         for start in range(0, len(rows), step):
@@ -95,7 +95,7 @@ def _split_factors(
 ) -> Array:
     """Return (n, 3) corner factors as sums over 4^generations parts of each triangle.
 
-    A part's factor is exact; a few values of the kernel tell where on the part it comes from.
+    A part's factor is exact; a few values of the kernel determine where on the part it comes from.
     """
     parts, weights = corners, np.eye(3)[None]
     for _ in range(generations):

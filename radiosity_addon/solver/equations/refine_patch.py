@@ -12,7 +12,7 @@ from ...numerics import Array
 from ..hierarchy import LEAF, Hierarchy
 from .form_factor_oracle import oracle1, source_factor_bounds
 
-BLOCK = 1 << 22
+BLOCK_PAIRS = 1 << 22
 """Pairs of faces tested together for facing each other; some 100 MB."""
 
 
@@ -34,7 +34,7 @@ def facing_pairs(hierarchy: Hierarchy) -> tuple[Array, Array]:
     radius = np.linalg.norm(corners - center[:, None], axis=2).max(axis=1)
     # Slightly below the plane still counts: the exact bound decides.
     slack = 1e-12 * float(np.abs(corners).max())
-    step = max(BLOCK // count, 1)
+    step = max(BLOCK_PAIRS // count, 1)
     receivers, sources = [], []
     for start in range(0, count, step):
         rows = slice(start, start + step)

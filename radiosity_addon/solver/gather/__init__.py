@@ -9,14 +9,14 @@ from .boxes import Boxes
 from .bright_patches import AimedRays
 from .direct_light import DirectLight, LightQuery
 from .element_lookup import ElementLookup
-from .final_gather import Gathered
+from .final_gather import GatheredHits
 from .footprints import Footprints
 from .gather_rays import Gather
 from .hit_numbers import NOTHING, UNNUMBERED, Resolver, lowest_number, table_end, values_of
 from .light_gains import LightGains
 from .local_pass import LocalPass
 from .residual import Residual
-from .retracing import Before, Moved
+from .retracing import Before, MovedGeometry
 
 __all__ = [
     "NOTHING",
@@ -28,11 +28,11 @@ __all__ = [
     "ElementLookup",
     "Footprints",
     "Gather",
-    "Gathered",
+    "GatheredHits",
     "LightGains",
     "LightQuery",
     "LocalPass",
-    "Moved",
+    "MovedGeometry",
     "Residual",
     "Resolver",
     "lowest_number",

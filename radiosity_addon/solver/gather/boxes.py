@@ -12,7 +12,7 @@ from ...lights import AreaLight, Lamp, PointLight, SkyPatch, SpotLight, SunLight
 from ...numerics import Array
 from ..emitters import EmitterGroup
 
-WIDEST = 1.5
+MAX_SKY_ANGLE = 1.5
 """A part of the sky farther than this from its middle [rad] is everywhere."""
 
 
@@ -56,7 +56,7 @@ class Boxes:
         return found
 
     def met_by(self, start: Array, along: Array, widen: Array, end: float = np.inf) -> Array:
-        """Tell which rays meet a box that is `widen` larger on all sides.
+        """Return which rays meet a box that is `widen` larger on all sides.
 
         start (n, 3).
         along (n, k, 3).
@@ -81,7 +81,7 @@ class Boxes:
         return found
 
     def met_by_fans(self, start: Array, along: Array, grow: Array, widen: Array, end: float = 1.0) -> Array:
-        """Tell which fans of rays meet a box: from a point to all of another box, or of a patch of the sky.
+        """Return which fans of rays meet a box: from a point to all of another box, or of a patch of the sky.
 
         start (n, 3).
         along (n, k, 3): To the middle of what is at the fan's end.
@@ -141,4 +141,4 @@ def _extent(light: Lamp | EmitterGroup) -> tuple[float, Array, Array]:
 
 def _opening(half_angle: float) -> Array:
     """Return (3,) how far off its axis a cone gets for each meter along it."""
-    return np.full(3, np.tan(half_angle) if half_angle < WIDEST else np.inf)
+    return np.full(3, np.tan(half_angle) if half_angle < MAX_SKY_ANGLE else np.inf)

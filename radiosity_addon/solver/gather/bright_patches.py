@@ -1,8 +1,8 @@
 """Rays aimed at the few elements that are far brighter than the rest.
 
-A small bright patch, the wall beside a lamp, is hit by few of a point's cosine-distributed
-rays, and each hit is a speck. So the patch's elements are asked apart, like lamps: rays aimed
-at them in proportion to what each would send. What is aimed at, cosine rays leave out; which
+A small bright patch, such as the wall next to a lamp, is hit by few of a point's cosine-distributed
+rays, and each hit makes a speck. So the patch's elements are sampled separately, like lamps: by rays
+aimed at them in proportion to what each would send. Cosine rays leave out what is aimed at; which
 elements those are depends on the point alone, so that the two together are unbiased.
 """
 
@@ -30,17 +30,17 @@ from ...numerics import (
 from ...rays import Hits
 from ..hierarchy import Hierarchy
 
-EVEN = 0.2
-"""This part of the rays at an element spreads over it evenly: lamps do not tell what other light there
-is, nor shadows."""
+EVEN_SHARE = 0.2
+"""This part of the rays at an element spreads over it evenly: lamps do not show other
+light, nor shadows."""
 
 CONTRAST = 6.0
 """Elements are bright from this many times the mean reflected radiosity …"""
 
-MOST = 128
-"""… and so many at most, the brightest: all are tried at every point."""
+MAX_BRIGHT_ELEMENTS = 128
+"""… and at most this many, the brightest: all are tried at every point."""
 
-FAR = 0.05
+MAX_HEMISPHERE_SHARE = 0.05
 """Aimed at are elements that fill less than this of the hemisphere: others many rays hit anyway."""
 
 NOISE = 0.002
@@ -86,8 +86,8 @@ class AimedRays:
 
     def of_points(self, chosen: Array) -> AimedRays:
         """Return those of the gather points that a mask (g,) has chosen, numbered among these."""
-        mine = self.entries(chosen[self.row])
-        return replace(mine, row=(np.cumsum(chosen) - 1)[mine.row])
+        rays = self.entries(chosen[self.row])
+        return replace(rays, row=(np.cumsum(chosen) - 1)[rays.row])
 
 
 class AimedTable:
@@ -106,11 +106,14 @@ class AimedTable:
             return
         if not self._columns:
             width, make = rays.sources.shape[1], self._scratch.rows
-            self._columns = make(1, np.int64), *(make(width, of) for of in (np.int32, np.float32, np.int32))
+            self._columns = (
+                make(1, np.int64),
+                *(make(width, kind) for kind in (np.int32, np.float32, np.int32)),
+            )
         for rows in tiles(len(rays.row), TABLE_ROWS):
             values = rays.row[rows] + first, rays.sources[rows], rays.weights[rows], rays.element[rows]
-            for column, some in zip(self._columns, values, strict=True):
-                column.extend(some)
+            for column, added in zip(self._columns, values, strict=True):
+                column.extend(added)
 
     def all(self) -> AimedRays:
         """Return all rays, and give the table up."""
@@ -152,7 +155,7 @@ class BrightElements:
         level, area = reflected[leaves].mean(axis=1), hierarchy.area[leaves]
         mean = float(level @ area) / max(float(area.sum()), 1e-300)
         bright = np.flatnonzero(level > CONTRAST * mean)
-        bright = bright[np.argsort(-level[bright], kind="stable")[:MOST]]
+        bright = bright[np.argsort(-level[bright], kind="stable")[:MAX_BRIGHT_ELEMENTS]]
         self.element = leaves[bright].astype(np.int32)
         """(m,) int32"""
         self._level, self._area = level[bright], area[bright]
@@ -177,7 +180,7 @@ class BrightElements:
         level = lit(places, np.repeat(self._normals, 64, axis=0)).reshape(-1, 16, 4).mean(axis=2)
         total = level.sum(axis=1, keepdims=True)
         uneven = np.where(total > 0, level / np.where(total > 0, total, 1.0), chance)
-        return np.asarray(EVEN * chance + (1.0 - EVEN) * uneven)
+        return np.asarray(EVEN_SHARE * chance + (1.0 - EVEN_SHARE) * uneven)
 
     def shares(self, points: Array, normals: Array, rays: int, irradiance: Array) -> Array:
         """Return (n, m) what each element would send to points [W/m²], roughly; 0 is left to chance.
@@ -195,7 +198,7 @@ class BrightElements:
         # Seen whole: no corner below the horizon.
         lowest = (normals @ self._corners.reshape(-1, 3).T).reshape(len(points), -1, 3).min(axis=2)
         lowest -= np.einsum("nk,nk->n", points, normals)[:, None]
-        far = (lowest > 0) & (cos_s > 0) & (self._area < FAR * np.pi * square)
+        far = (lowest > 0) & (cos_s > 0) & (self._area < MAX_HEMISPHERE_SHARE * np.pi * square)
         factor = np.where(far, self._area * cos_r * cos_s / np.maximum(np.pi * square * square, 1e-300), 0.0)
         noise = factor @ (self._level**2) / rays
         factor[noise <= (NOISE * irradiance) ** 2] = 0.0
@@ -206,7 +209,7 @@ class BrightElements:
 
         shares (n, m).
         hits: k of each point, one point after the other.
-        leaves_of: Tells the leaf elements hit.
+        leaves_of: Returns the leaf elements that were hit.
         """
         out = np.zeros(len(hits.triangle), dtype=bool)
         aims = np.repeat(shares.any(axis=1), len(out) // len(shares))

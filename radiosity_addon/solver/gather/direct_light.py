@@ -18,7 +18,7 @@ from .footprints import Footprints, SpreadPoints
 from .light_gains import LightGains
 from .soft_shadows import ShadowShare
 
-NEAR = 0.05
+NEAR_FACTOR = 0.05
 """Form factor beyond which emissive faces are so near that it may change over a texel."""
 
 
@@ -51,7 +51,7 @@ class DirectLight:
         rays: int | None = None,
         gains: LightGains | None = None,
         total: Array | None = None,
-        tell: Callable[[], None] | None = None,
+        on_light: Callable[[], None] | None = None,
         progress: Progress = SILENT,
     ) -> Array:
         """Return (n, 3) float64 the irradiance at points [W/m²].
@@ -61,21 +61,21 @@ class DirectLight:
             without strength too, then emissive groups. Each is measured as if it were the only one, which
             it may become.
         total (n, 3): If given, all 0, the result grows in it, one light after the other, …
-        tell: … and this is called after each.
+        on_light: … and this is called after each.
         """
         total = points.scratch.zeros((len(points), 3)) if total is None else total
         lights = self.lights(include_dark_lights=gains is not None)
         if gains is not None:
             points = replace(points, expected=None)
         spread = self._spread(points)
-        for asked, part in progress.each(lights):
-            arriving = self._arriving(asked, spread, rays, part)
+        for query, part in progress.each(lights):
+            arriving = self._arriving(query, spread, rays, part)
             for rows in tiles(len(total)):
-                total[rows] += arriving[rows, None] * asked.light.strength
+                total[rows] += arriving[rows, None] * query.light.strength
             if gains is not None:
-                gains.put(asked.number, arriving)
-            if tell is not None:
-                tell()
+                gains.put(query.number, arriving)
+            if on_light is not None:
+                on_light()
         return total
 
     def lights(self, include_dark_lights: bool = True) -> list[LightQuery]:
@@ -87,9 +87,13 @@ class DirectLight:
         ]
         first, seed, step = len(self._state.scene.lights), self._state.settings.seed, SHADOW_STEP
         of_lamps, of_groups = seed + Stream.LAMP_SHADOWS, seed + Stream.EMITTER_SHADOWS
-        asked = [LightQuery(lit, row, of_lamps + step * place) for place, (row, lit) in enumerate(lamps)]
+        lamps_asked = [
+            LightQuery(lit, row, of_lamps + step * place) for place, (row, lit) in enumerate(lamps)
+        ]
         groups = enumerate(self.emitters)
-        return asked + [LightQuery(lit, first + place, of_groups + step * place) for place, lit in groups]
+        return lamps_asked + [
+            LightQuery(lit, first + place, of_groups + step * place) for place, lit in groups
+        ]
 
     def gain(
         self, asked: LightQuery, points: Footprints, rays: int | None = None, progress: Progress = SILENT
@@ -108,7 +112,7 @@ class DirectLight:
         light, settings = asked.light, self._state.settings
         glows = isinstance(light, EmitterGroup)
         caster = self._state.caster if glows else self._state.caster.for_lamps
-        gain = spread.gain(light, NEAR if glows else 0.0, progress.part(0.0, 0.1))
+        gain = spread.gain(light, NEAR_FACTOR if glows else 0.0, progress.part(0.0, 0.1))
         share = ShadowShare(caster, light, spread, asked.seed, settings.threads)
         unblocked = share.at_points(gain, rays or settings.shadow_rays, progress.part(0.1, 1.0))
         for rows in tiles(len(gain)):

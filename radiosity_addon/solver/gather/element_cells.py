@@ -18,7 +18,7 @@ from ..hierarchy import Hierarchy
 from .footprints import Footprints
 from .hit_numbers import NOTHING
 
-CELLS = 16
+CELLS_PER_ELEMENT = 16
 """Smaller parts of a leaf: two levels of its quadtree further down."""
 
 ANCHOR = np.array([0.3595, 0.3218, 0.3187])
@@ -38,12 +38,12 @@ class ElementCells:
         self._hierarchy, self._caster = hierarchy, caster
 
     def __len__(self) -> int:
-        return (1 + CELLS) * self._hierarchy.n_elements
+        return (1 + CELLS_PER_ELEMENT) * self._hierarchy.n_elements
 
     def leaf_of(self, part: Array) -> Array:
         """Return (p,) the leaf that each part is of."""
         count = self._hierarchy.n_elements
-        return np.asarray(np.where(part < count, part, (part - count) // CELLS))
+        return np.asarray(np.where(part < count, part, (part - count) // CELLS_PER_ELEMENT))
 
     def at(self, leaf: Array, hits: Hits) -> Array:
         """Return (h,) int32: the part of its `leaf` that each hit sees the anchor of, the nearest of them.
@@ -84,11 +84,11 @@ class ElementCells:
         order = np.linalg.norm(anchors - position[:, None], axis=2).argsort(axis=1, kind="stable")
         found = np.full(len(leaf), NOTHING, dtype=np.int32)
         waiting = np.arange(len(leaf))
-        for turn in range(CELLS):
+        for turn in range(CELLS_PER_ELEMENT):
             cell = order[waiting, turn]
             seen = free_segment(self._caster, position[waiting], anchors[waiting, cell])
-            some = waiting[seen]
-            found[some] = self._hierarchy.n_elements + CELLS * leaf[some] + cell[seen]
+            rows = waiting[seen]
+            found[rows] = self._hierarchy.n_elements + CELLS_PER_ELEMENT * leaf[rows] + cell[seen]
             waiting = waiting[~seen]
         return found
 
@@ -98,7 +98,7 @@ class ElementCells:
         count = self._hierarchy.n_elements
         small = np.flatnonzero(part >= count)
         cells = split_in_sixteen(corners[small])
-        corners[small] = cells[np.arange(len(small)), (part[small] - count) % CELLS]
+        corners[small] = cells[np.arange(len(small)), (part[small] - count) % CELLS_PER_ELEMENT]
         return np.asarray(corners)
 
     def _positions(self, hits: Hits) -> Array:

@@ -110,7 +110,7 @@ class ElementLookup:
         return np.asarray(hierarchy.reflectance[elements] / hierarchy.opacity_where_hit[elements, None])
 
     def lit_cells(self, cells: Array) -> Footprints:
-        """Return cells as footprints at which lamps are asked, and the irradiance expected there."""
+        """Return cells as footprints at which lamps are evaluated, and the irradiance expected there."""
         expected = self.irradiance[self.cells.leaf_of(cells)].mean(axis=1)
         return replace(self.cells.footprints(cells), expected=expected)
 

@@ -23,14 +23,14 @@ CHUNK_RAYS = 1 << 16
 """Rays a thread prepares at once; bounds its temporaries to about 10 MB."""
 
 AIMED_PART = 4
-"""One ray is aimed for so many cosine-distributed ones, where any are aimed."""
+"""One ray is aimed for this many cosine-distributed ones, where any are aimed."""
 
 SAME_PLACE = 1e-5
 """Barycentric weights that differ by less are one place on a triangle."""
 
 
 @dataclass(frozen=True)
-class Gathered:
+class GatheredHits:
     """What the rays of n points met.
 
     Attributes
@@ -48,7 +48,7 @@ class Gathered:
     aimed: AimedRays
 
 
-class Gathering:
+class FinalGather:
     """Traces the rays of some points.
 
     Parameters
@@ -61,7 +61,7 @@ class Gathering:
     rays : int
         Cosine-distributed ones a point; each stands for a form factor of 1 / rays.
     resolve, leaves_of : callable
-        Number the hits, and tell the leaf elements hit.
+        Number the hits, and return the leaf elements that were hit.
     seed, threads : int
     sky : SkyTable
     """
@@ -88,7 +88,7 @@ class Gathering:
         irradiance: Array,
         into: Array | None = None,
         progress: Progress = SILENT,
-    ) -> Gathered:
+    ) -> GatheredHits:
         """Trace all.
 
         Parameters
@@ -107,17 +107,17 @@ class Gathering:
         for part, found in map_chunks(trace, count, chunk, self.threads, progress):
             sources[part], closeness[part] = found.sources, found.closeness
             aimed.extend(found.aimed, part.start)
-        return Gathered(sources, closeness, aimed.all())
+        return GatheredHits(sources, closeness, aimed.all())
 
     def shares(self, rows: Array, bright: BrightElements, irradiance: Array) -> Array:
         """Return (r, m) how some rows would share their aimed rays out."""
         return bright.shares(self._at.points[rows], self._at.normals[rows], self._rays, irradiance[rows])
 
-    def trace_rows(self, rows: Array, bright: BrightElements | None, shares: Array | None) -> Gathered:
+    def trace_rows(self, rows: Array, bright: BrightElements | None, shares: Array | None) -> GatheredHits:
         """Trace all rays of some rows; aimed ones have their rows numbered among these."""
         if bright is None or shares is None or not shares.any():
-            return Gathered(*self._cosine(rows, None, None), AimedRays.none())
-        return Gathered(*self._cosine(rows, bright, shares), self._aim(rows, bright, shares))
+            return GatheredHits(*self._cosine(rows, None, None), AimedRays.none())
+        return GatheredHits(*self._cosine(rows, bright, shares), self._aim(rows, bright, shares))
 
     def on_any(self, elements: Array, hosts: Array, hits: Hits) -> Array:
         """Return (h,) whether hits are on some elements, (e,) bool, of some triangles, (t,) bool."""
@@ -157,8 +157,8 @@ class Gathering:
         stale : (p,) bool
             Whether what was hit must be numbered again even if it is hit again.
         casters : RayCaster twice
-            Of what moved alone, where it was and where it is: who meets none of it has not changed. And of
-            the scene as it was: it tells how far rays went.
+            Of what moved alone, at both places: rays that meet none of it have not changed. And of the scene
+            as it was: it gives the lengths of the rays.
 
         Returns
         -------
@@ -174,13 +174,13 @@ class Gathering:
         moved, before = casters
         start = self._starts_of(rows, ray)
         missed = moved.unoccluded(start, directions, np.full(len(rows), np.inf))
-        asked = np.flatnonzero(~missed | stale)
-        start, along = start[asked], directions[asked]
+        retraced = np.flatnonzero(~missed | stale)
+        start, along = start[retraced], directions[retraced]
         hits, old = self._caster.intersect(start, along), before.intersect(start, along)
-        same = (hits.triangle == old.triangle) & (hits.front == old.front) & ~stale[asked]
+        same = (hits.triangle == old.triangle) & (hits.front == old.front) & ~stale[retraced]
         same &= (np.abs(hits.barycentric - old.barycentric) < SAME_PLACE).all(axis=1)
         other = np.flatnonzero(~same)
-        changed, hits, old = asked[other], hits.take(other), old.take(other)
+        changed, hits, old = retraced[other], hits.take(other), old.take(other)
         least = self._caster.surface_offset
         nearer = 1.0 / np.maximum(hits.distance, least) - 1.0 / np.maximum(old.distance, least)
         nearer = nearer.astype(np.float64) / self._rays
@@ -189,7 +189,7 @@ class Gathering:
     def _cosine(
         self, rows: Array, bright: BrightElements | None, shares: Array | None
     ) -> tuple[Array, Array]:
-        """Trace the cosine-distributed rays of some rows; return sources and closeness (see `Gathered`)."""
+        """Trace the cosine-distributed rays of rows; return `sources` and `closeness` of `GatheredHits`."""
         rays = self._rays
         directions, upward = self.directions(rows)
         start = self._starts(rows, rays, self._seed + Stream.GATHER_STARTS)
@@ -236,9 +236,9 @@ class Gathering:
         lift = self._caster.surface_offset * self._surface_normals[rows][:, None]
         if at.sampler is None:
             return np.repeat(at.points[rows][:, None] + lift, rays, axis=1)
-        some = min(at.starts or rays, rays)
-        starts = at.sampler(rows, stratified_square(at.keys[rows], some, seed)) + lift
-        return np.asarray(starts[:, np.arange(rays) * some // rays])
+        starts_used = min(at.starts or rays, rays)
+        starts = at.sampler(rows, stratified_square(at.keys[rows], starts_used, seed)) + lift
+        return np.asarray(starts[:, np.arange(rays) * starts_used // rays])
 
     def _starts_of(self, rows: Array, ray: Array) -> Array:
         """Return (p, 3) where some cosine-distributed rays, by row and number, start: as in `_starts`."""
@@ -246,16 +246,18 @@ class Gathering:
         lift = self._caster.surface_offset * self._surface_normals[rows]
         if at.sampler is None:
             return np.asarray(at.points[rows] + lift)
-        some = min(at.starts or self._rays, self._rays)
-        distinct, of = np.unique(rows, return_inverse=True)
-        of, place = of.reshape(-1), ray * some // self._rays
-        unit = stratified_square(at.keys[distinct], some, self._seed + Stream.GATHER_STARTS)
-        if len(rows) < some * len(distinct):
-            return np.asarray(at.sampler(rows, unit[of, place][:, None])[:, 0] + lift)
-        return np.asarray(at.sampler(distinct, unit)[of, place] + lift)
+        starts_used = min(at.starts or self._rays, self._rays)
+        distinct, number = np.unique(rows, return_inverse=True)
+        number, place = number.reshape(-1), ray * starts_used // self._rays
+        unit = stratified_square(at.keys[distinct], starts_used, self._seed + Stream.GATHER_STARTS)
+        if len(rows) < starts_used * len(distinct):
+            return np.asarray(at.sampler(rows, unit[number, place][:, None])[:, 0] + lift)
+        return np.asarray(at.sampler(distinct, unit)[number, place] + lift)
 
 
-def _trace(gathering: Gathering, bright: BrightElements | None, irradiance: Array, part: slice) -> Gathered:
+def _trace(
+    gathering: FinalGather, bright: BrightElements | None, irradiance: Array, part: slice
+) -> GatheredHits:
     """Trace all rays of a run of points."""
     rows = np.arange(part.start, part.stop)
     shares = None if bright is None or not len(bright) else gathering.shares(rows, bright, irradiance)

@@ -1,4 +1,4 @@
-"""Where light is asked for: points, and the footprints that samples are spread over."""
+"""Where light is evaluated: points, and the footprints that samples are spread over."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ SAME_GAIN = 0.02
 part, the center stands for all: what bends that little bends a mean by its square."""
 
 UNEVEN, MORE_GAINS = 0.02, 64
-"""Where the few points differ by more than this part, as beside a lamp and at the rim of a spot's cone,
-so many are asked."""
+"""Where the few points differ by more than this part, as next to a lamp and at the rim of a spot's cone,
+this many are evaluated."""
 
-EDGE = 0.5
+EDGE_DIFFERENCE = 0.5
 """Where center and farthest point differ by more than this part, an edge of the lamp's beam crosses."""
 
 DARKEST = 0.25
@@ -43,7 +43,7 @@ Lift = Callable[[Array, Array, Array], Array]
 
 @dataclass(frozen=True)
 class Footprints:
-    """Where light is asked for.
+    """Where light is evaluated.
 
     points, normals (n, 3): Centers of the footprints, unit normals.
     keys (n,) int: With the seed, what places each point's samples.
@@ -53,7 +53,7 @@ class Footprints:
     starts: From how many samples a point's gather rays start, each of them a run that is stratified by
         itself; None gives every ray its own.
     expected (n,) or None [W/m²]: About how much light there is, a mean of the channels: a lamp that can add
-        little to it is asked with few shadow rays. None asks all lamps alike.
+        little to it gets few shadow rays. With None all lamps get the same number.
     lift: Moves the starts of shadow rays off a smooth surface's flat triangles.
     scratch: Makes arrays of what is found at the points.
     """
@@ -111,7 +111,7 @@ class SpreadPoints:
         """Return (n,) the unoccluded irradiance per unit of strength, a mean over the footprint.
 
         Where it is no more than `least` in the center, that stands for all, unless a glowing face is
-        no farther than the footprint is wide: it may shine on what is beside the center only. Without
+        no farther than the footprint is wide: it may light only what is next to the center. Without
         `least`, where the farthest point gets the same.
         """
         at = self.at
@@ -144,10 +144,10 @@ class SpreadPoints:
         mean = np.empty(len(rows))
         step = CHUNK_POINTS // MORE_GAINS * SPREAD
         for start in range(0, len(rows), step):
-            some = rows[start : start + step]
-            unit = stratified_square(self.at.keys[some], MORE_GAINS, self._seed)
+            chunk = rows[start : start + step]
+            unit = stratified_square(self.at.keys[chunk], MORE_GAINS, self._seed)
             assert self.at.sampler is not None
-            mean[start : start + step] = self.gains(light, some, self.at.sampler(some, unit)).mean(axis=1)
+            mean[start : start + step] = self.gains(light, chunk, self.at.sampler(chunk, unit)).mean(axis=1)
         return mean
 
     def gains(self, light: Lamp | EmitterGroup, rows: Array, points: Array) -> Array:
@@ -175,11 +175,11 @@ def _at_centers(
     varies, jump = np.zeros((2, len(own)), dtype=bool)
     if at.sampler is not None:
         if isinstance(light, EmitterGroup) and least:
-            varies = (own > least) | light.beside(at.points[part], spread.width(part))
+            varies = (own > least) | light.is_near(at.points[part], spread.width(part))
         else:
             other = light.unit_irradiance(spread.farthest(part), normals)
             varies = np.abs(other - own) > SAME_GAIN * np.maximum(own, other)
-            jump = np.abs(other - own) > EDGE * np.maximum(own, other)
+            jump = np.abs(other - own) > EDGE_DIFFERENCE * np.maximum(own, other)
     return own, varies, jump
 
 

@@ -11,7 +11,7 @@ from ...lights import Lamp
 from ...numerics import Array
 from .bright_patches import BrightElements
 from .element_lookup import ElementLookup
-from .final_gather import Gathered, Gathering
+from .final_gather import FinalGather, GatheredHits
 from .footprints import Footprints
 from .hit_numbers import Resolver
 from .retracing import Before, retrace
@@ -35,7 +35,7 @@ class Gather:
         irradiance: Array | None = None,
         into: Array | None = None,
         progress: Progress = SILENT,
-    ) -> Gathered:
+    ) -> GatheredHits:
         """Trace the rays of points.
 
         surface_normals (n, 3): `points.normals` shade; a ray that dips below these carries nothing.
@@ -57,7 +57,7 @@ class Gather:
         before: Before,
         irradiance: Array | None = None,
         progress: Progress = SILENT,
-    ) -> Gathered:
+    ) -> GatheredHits:
         """Trace those rays again that something which moved touches; the others stay as they were.
 
         Parameters are those of `at`; `before` is what the same rays met.
@@ -90,9 +90,9 @@ class Gather:
 
     def _gathering(
         self, points: Footprints, surface_normals: Array, rays: int, resolve: Resolver
-    ) -> Gathering:
+    ) -> FinalGather:
         elements = self._elements
-        return Gathering(
+        return FinalGather(
             elements.caster,
             points,
             surface_normals,

@@ -1,6 +1,6 @@
 """Numbers of what rays find where no surface answers: they index a table of radiosity from its end.
 
-Numbers of surfaces start at 0; whoever gathers says what they are of (`lightmap/transport/hit_table.py`).
+Numbers of surfaces start at 0; the caller of a gather defines them (`lightmap/transport/hit_table.py`).
 """
 
 from __future__ import annotations

@@ -43,7 +43,7 @@ class Residual:
     Parameters
     ----------
     state : SolverState
-        A scene and its B̂, whoever made it.
+        A scene and its B̂, from any method.
     """
 
     def __init__(self, state: SolverState) -> None:
@@ -213,7 +213,7 @@ def _sent_by(
     share = visible_share(caster, points[point], normals[point], corners, leaf_normals, pair, seed)
     arriving = np.einsum("nc,nck->nk", factors, elements.values[source]) * share[:, None]
     own, points_here = point - rows.start, rows.stop - rows.start
-    return np.stack([np.bincount(own, of, minlength=points_here) for of in arriving.T], axis=1)
+    return np.stack([np.bincount(own, channel, minlength=points_here) for channel in arriving.T], axis=1)
 
 
 def _constant_factors(points: Array, normals: Array, corners: Array, _: Array) -> Array:

@@ -16,7 +16,7 @@ from ...numerics import Array, map_chunks
 from ...rays import RayCaster
 from .boxes import Boxes
 from .bright_patches import AimedRays, BrightElements
-from .final_gather import CHUNK_RAYS, Gathered, Gathering
+from .final_gather import CHUNK_RAYS, FinalGather, GatheredHits
 from .hit_numbers import UNNUMBERED
 
 RENEWED = 0.3
@@ -25,7 +25,7 @@ a sum that a few very short ones dominate may leave anything, even less than not
 
 
 @dataclass(frozen=True)
-class Moved:
+class MovedGeometry:
     """What moved, where it was and where it is.
 
     Attributes
@@ -49,33 +49,33 @@ class Before:
 
     Attributes
     ----------
-    gathered : Gathered
+    gathered : GatheredHits
         Sources numbered as they are now, or UNNUMBERED.
     aimed_at : (a, k, 3) float64 twice
         Of its aimed rays: the middles of the boxes around the elements aimed at, and half their sizes.
-    moved : Moved
+    moved : MovedGeometry
     widen : (g,) float64 [m]
         How far from a point its rays start.
     bright, hosts : (e,) bool, (t,) bool
         Elements that are or were bright enough to aim at, and triangles that have some.
     """
 
-    gathered: Gathered
+    gathered: GatheredHits
     aimed_at: tuple[Array, Array]
-    moved: Moved
+    moved: MovedGeometry
     widen: Array
     bright: Array
     hosts: Array
 
 
 def retrace(
-    gathering: Gathering,
+    gathering: FinalGather,
     before: Before,
     bright: BrightElements | None,
     irradiance: Array,
     progress: Progress = SILENT,
-) -> Gathered:
-    """Trace again what the boxes touch. Parameters as of `Gathering.trace`.
+) -> GatheredHits:
+    """Trace again what the boxes touch. Parameters as of `FinalGather.trace`.
 
     Which bright elements a point aims at decides what its other rays leave out. So where an aimed ray is
     touched, or another one meets a bright element now, the point is gathered again as a whole.
@@ -100,14 +100,14 @@ def retrace(
         rays_aimed = found.gathered.aimed
         new.append(replace(rays_aimed, row=found.whole[rays_aimed.row]))
     parts = [aimed.entries(~whole[aimed.row]), *new]
-    return Gathered(sources, closeness, AimedRays.joined(parts, [0] * len(parts)))
+    return GatheredHits(sources, closeness, AimedRays.joined(parts, [0] * len(parts)))
 
 
-class _Retraced(NamedTuple):
+class _RetracedRays(NamedTuple):
     """What changes at points.
 
     row, ray (c,) int: Rays that meet something else now; `sources` (c,) and how much `nearer` (c,) that is.
-    whole (w,) int: Points that are gathered from anew, and what they `gathered`.
+    whole (w,) int: Points that gather again with all their rays, and what they `gathered`.
     """
 
     row: Array
@@ -115,27 +115,27 @@ class _Retraced(NamedTuple):
     sources: Array
     nearer: Array
     whole: Array
-    gathered: Gathered
+    gathered: GatheredHits
 
 
 def _retrace(
-    gathering: Gathering,
+    gathering: FinalGather,
     before: Before,
     bright: BrightElements | None,
     irradiance: Array,
     aims: Array,
     aims_past: Array,
     part: slice,
-) -> _Retraced | None:
+) -> _RetracedRays | None:
     """Trace again what is touched of a run of points.
 
     aims, aims_past (g,) bool: Which points aim rays, and which such that a box may stop.
     """
     rows = np.arange(part.start, part.stop)
     stale = before.gathered.sources[rows] == UNNUMBERED
-    asked = stale.any(axis=1) | aims_past[rows]
-    asked |= before.moved.boxes.above(*gathering.planes(rows), before.widen[rows])
-    rows, stale = rows[asked], stale[asked]
+    retraced = stale.any(axis=1) | aims_past[rows]
+    retraced |= before.moved.boxes.above(*gathering.planes(rows), before.widen[rows])
+    rows, stale = rows[retraced], stale[retraced]
     if len(rows) == 0:
         return None
     directions, upward = gathering.directions(rows)
@@ -163,10 +163,10 @@ def _retrace(
     else:
         whole = rows[renewed | (past & aims[rows])]
     gathered = gathering.trace_rows(whole, bright, shares)
-    return _Retraced(rows[row[changed]], ray[changed], sources, nearer, whole, gathered)
+    return _RetracedRays(rows[row[changed]], ray[changed], sources, nearer, whole, gathered)
 
 
-def _aims_past_boxes(gathering: Gathering, before: Before) -> Array:
+def _aims_past_boxes(gathering: FinalGather, before: Before) -> Array:
     """Return (g,) which points aim rays that a box may stop, or might have stopped."""
     row = before.gathered.aimed.row
     found = np.zeros(len(before.gathered.sources), dtype=bool)

@@ -27,9 +27,9 @@ MORE_RAYS = 16
 MAIN_PART = 0.6
 """… and a lamp gives this part of the light, or more."""
 
-FEWEST = 2
-"""Shadow rays of a lamp that adds hardly anything. A single one would tell the share of the lamp that is
-seen, not that of its light: 0.40 for 0.44 behind a plate half way to a near lamp; two tell 0.43."""
+MIN_SHADOW_RAYS = 2
+"""Shadow rays of a lamp that adds hardly anything. A single one would measure the visible share of the lamp,
+not of its light: 0.40 instead of 0.44 behind a plate half way to a near lamp; two measure 0.43."""
 
 STARTS = 16
 """Points of a footprint that the many rays start from, each of them a run that is stratified by itself."""
@@ -68,18 +68,18 @@ class ShadowShare:
         if isinstance(self._light, Lamp) and not self._light.casts_shadow:
             return np.ones(len(gain))
         count, near, strength = len(gain), self._at.near, self._light.strength.mean()
-        facing = marked(count, lambda some: gain[some] > 0)
+        facing = marked(count, lambda tile: gain[tile] > 0)
         few, many = np.empty((2, count), dtype=np.int32)
-        for some in tiles(count):
-            part = self._at.weight_of(gain[some] * strength, some)
-            few[some] = _power_of_two(rays * np.sqrt(part / MAIN_PART), rays)
-            many[some] = _power_of_two(MORE_RAYS * rays * (part / MAIN_PART) ** 0.8, MORE_RAYS * rays)
+        for tile in tiles(count):
+            part = self._at.weight_of(gain[tile] * strength, tile)
+            few[tile] = _power_of_two(rays * np.sqrt(part / MAIN_PART), rays)
+            many[tile] = _power_of_two(MORE_RAYS * rays * (part / MAIN_PART) ** 0.8, MORE_RAYS * rays)
         self._shadow(row_numbers(facing), few, progress.part(0.0, 0.5))
         # Few rays miss the faint ends of a penumbra: where many rays found one, ask around it.
         open_rows = facing & (many > few)
-        partial = marked(count, lambda some: facing[some] & _is_partial(self._share(some)))
+        partial = marked(count, lambda tile: facing[tile] & _is_partial(self._share(tile)))
         if near is not None:
-            bright = marked(count, lambda some: facing[some] & (self._share(some) > 0.5))
+            bright = marked(count, lambda tile: facing[tile] & (self._share(tile) > 0.5))
             partial = near(partial) | (near(bright) & near(facing & ~bright))
         for _, turn in zip(range(PENUMBRA_STEPS), progress.part(0.5, 1.0).turns(0.5), strict=False):
             rows = row_numbers(partial & open_rows)
@@ -93,8 +93,8 @@ class ShadowShare:
             partial = np.zeros(len(facing), dtype=bool)
             partial[rows[_is_partial(share)]] = True
             partial = near(partial)
-        for some in tiles(count):
-            self._lit[some] = self._share(some)
+        for tile in tiles(count):
+            self._lit[tile] = self._share(tile)
         return self._lit
 
     def _share(self, rows: Array | slice = slice(None)) -> Array:
@@ -106,9 +106,9 @@ class ShadowShare:
         each = counts[rows]
         total, done = max(int(each.sum()), 1), 0
         for count in np.unique(each):
-            some = rows[each == count]
-            before, done = done, done + int(count) * len(some)
-            self._shadow_alike(some, int(count), progress.part(before / total, done / total))
+            batch = rows[each == count]
+            before, done = done, done + int(count) * len(batch)
+            self._shadow_alike(batch, int(count), progress.part(before / total, done / total))
 
     def _shadow_alike(self, rows: Array, count: int, progress: Progress) -> None:
         """Ask `count` shadow rays a row."""
@@ -159,9 +159,9 @@ def _starts(spread: SpreadPoints, rows: Array, count: int, seed: int) -> Array:
     if count <= spread.count:
         return spread.points(rows)[:, :count]
     assert at.sampler is not None
-    some = min(count, STARTS)
-    starts = at.sampler(rows, stratified_square(at.keys[rows], some, seed + Stream.SHADOW_STARTS))
-    return np.asarray(starts[:, np.arange(count) * some // count])
+    starts_used = min(count, STARTS)
+    starts = at.sampler(rows, stratified_square(at.keys[rows], starts_used, seed + Stream.SHADOW_STARTS))
+    return np.asarray(starts[:, np.arange(count) * starts_used // count])
 
 
 def _is_partial(share: Array) -> Array:
@@ -170,6 +170,6 @@ def _is_partial(share: Array) -> Array:
 
 
 def _power_of_two(wanted: Array, most: int) -> Array:
-    """Return (n,) int64 powers of two no less than what is wanted, from `FEWEST` up to `most` itself."""
-    exponent = np.ceil(np.log2(np.maximum(wanted, FEWEST)))
+    """Return (n,) int64 powers of two, at least `wanted`, from `MIN_SHADOW_RAYS` up to `most` itself."""
+    exponent = np.ceil(np.log2(np.maximum(wanted, MIN_SHADOW_RAYS)))
     return np.asarray(np.minimum(2.0**exponent, most), dtype=np.int64)

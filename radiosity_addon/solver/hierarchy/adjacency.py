@@ -18,7 +18,7 @@ ACROSS = 0.02
 RISE = 4.0
 """Rays down to a coplanar face start this many surface offsets above the plane."""
 
-COPLANAR = 1e-3
+COPLANAR_ANGLE = 1e-3
 """Coplanar faces' normals differ by less than this [radians]."""
 
 
@@ -68,7 +68,7 @@ def _across_faces(hierarchy: Hierarchy, caster: RayCaster, leaf: Array, points: 
     face = faces.of_triangle[(~hits.front).astype(np.int8), hits.triangle]
     level = np.abs(hits.distance - rise) < 0.5 * rise
     found = (hits.triangle >= 0) & (face >= 0) & level
-    found[found] = np.einsum("nk,nk->n", faces.normal[face[found]], normal[found]) > np.cos(COPLANAR)
+    found[found] = np.einsum("nk,nk->n", faces.normal[face[found]], normal[found]) > np.cos(COPLANAR_ANGLE)
     result = np.full(len(leaf), -1, dtype=np.int64)
     result[found] = hierarchy.leaf_at(face[found], hits.barycentric[found])
     return result

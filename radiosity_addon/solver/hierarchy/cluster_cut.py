@@ -1,8 +1,8 @@
 """A cut through the cluster tree at the lowest linked clusters.
 
-Of a million faces most are never told apart: links end at clusters of hundreds. Below the nodes of
-the cut nothing need be added up cluster by cluster, so sums upward and pushes downward
-cost one pass over the faces and little more, however deep the tree is.
+In a scene of a million faces most links end at clusters of hundreds of faces. Below the nodes of the
+cut nothing has to be added up cluster by cluster, so sums upward and pushes downward cost
+little more than one pass over the faces, however deep the tree is.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ from .census import elements_by_level, leaves_by_level, linked_leaves, links_by_
 from .cluster_links import ClusterLinks, gather_at_clusters, join_cluster_links, no_cluster_links
 from .cluster_pairs import measure_cluster_links
 from .element_links import Links, join, measure_links, no_links
-from .initial import COARSEST_FAINT, FEWEST, SLACK, first_links
+from .initial import COARSEST_FAINT, LINK_SLACK, MIN_LINKS, first_links
 from .light_at_points import lamp_irradiance
 from .light_links import LightLinks, join_light_links, link_lights, no_light_links
 from .node_sampling import node_samples
@@ -19,8 +19,8 @@ from .transport import gather, node_radiosity, pull, push, push_pull, quarters_m
 
 __all__ = [
     "COARSEST_FAINT",
-    "FEWEST",
-    "SLACK",
+    "LINK_SLACK",
+    "MIN_LINKS",
     "ClusterLinks",
     "LightLinks",
     "Links",

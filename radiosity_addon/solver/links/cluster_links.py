@@ -3,7 +3,7 @@
 The faces of a cluster look much the same way and see the same sources, but not equally. So
 such a link carries a vector v and a gradient g in place of one number: a face with normal n
 at x receives (n·v + g·(x − c)) B over it, c the cluster's centroid. Vectors and gradients of
-all links of a cluster, and of the clusters above it, add up before the faces are asked.
+all links of a cluster, and of the clusters above it, are added up before the faces are evaluated.
 
 The kernel depends on the difference of the two points, so its derivative by the source's
 point is −g: a source whose faces y are not equally bright sends g·(c_s − y) B more, on the

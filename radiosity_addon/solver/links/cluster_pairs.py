@@ -3,7 +3,7 @@
 Far pairs are sampled: stratified point pairs give the mean of the kernel without the
 receiver's cosine, as a vector, and of the kernel's derivative. Where the two sides nearly
 touch samples would scatter wildly; there Lambert's formula, summed over the source's faces,
-is asked at points of the receiver, and a plane is fitted to the answers.
+is evaluated at points of the receiver, and a plane is fitted to the results.
 
 Receivers that look many ways are linked only where they exchange hardly anything. What such
 faces receive is no plane of their normal n: over all directions max(n·d, 0) is nearest to
@@ -31,7 +31,7 @@ CHUNK_SAMPLES = 1 << 18
 FAR_SAMPLES, NEAR_SAMPLES = 16, 64
 FIRST_RAYS = 4
 
-NEAR = 0.9
+NEAR_RADII = 0.9
 """Pairs whose radii together exceed this part of their distance are near."""
 
 MOST_FACES = 64
@@ -54,8 +54,8 @@ def measure_cluster_links(
     receiver, source (n,) int: Clusters and nodes.
     Returns links: At most n.
     """
-    near = shapes.looks_large(receiver, source, NEAR)
-    wide = shapes.cone[receiver] > WIDE
+    near = shapes.looks_large(receiver, source, NEAR_RADII)
+    wide = shapes.cone[receiver] > MAX_SPREAD
     many = near & ((_held(hierarchy, source) > MOST_FACES) | wide)
     result: list[ClusterLinks] = []
     for kind, chosen in (
@@ -75,7 +75,7 @@ def measure_cluster_links(
     return join_cluster_links(result)
 
 
-WIDE = 1.0
+MAX_SPREAD = 1.0
 """Faces of which some are turned further than this from their mean [rad] look many ways: on the far side
 of such a cluster n·v is below 0, and would eat up what arrives there from elsewhere."""
 

@@ -2,8 +2,8 @@
 
 Nowhere are all faces paired with all: a pair of nodes is dropped once one lies behind the
 other, linked once both look small, and opened on its larger side otherwise. Faces far
-smaller than the smallest element that is asked for are never told apart: clusters below A_ε
-are linked however near they are.
+smaller than the smallest requested element are never separated: clusters below A_ε are linked
+however near they are.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .cluster_links import ClusterLinks
 from .cluster_pairs import measure_cluster_links
 from .element_links import Links, measure_links
 
-SIZE = 0.5
+MAX_RADII = 0.5
 """Nodes are linked where their radii together are at most this part of their distance, …"""
 
 MIXED_SIZE = 0.4
@@ -35,7 +35,7 @@ CONE = 0.35
 BUDGET = 0.4
 """Initial links may take this part of `SolverSettings.max_links`; refinement needs the rest …"""
 
-FEWEST = 200_000
+MIN_LINKS = 200_000
 """… but at least this many: with fewer, the solution would be meaningless."""
 
 WANTED = 6000.0
@@ -58,10 +58,10 @@ FAINTER = 2.0
 THINNED = 1 << 14
 """Pairs followed at a time to estimate the number of initial links."""
 
-SLACK = 1.25
+LINK_SLACK = 1.25
 """Initial links may exceed the estimate by this factor."""
 
-BLOCK = 1 << 16
+BLOCK_PAIRS = 1 << 16
 """Pairs processed together: their temporaries, some 20 MB, stay near the processor."""
 
 
@@ -76,7 +76,7 @@ def first_links(
     Returns faint: Pairs that exchange less than this share of all area had to be linked however large they
         look, to keep within the budget; 0 if none.
     """
-    most = max(int(BUDGET * max_links), FEWEST)
+    most = max(int(BUDGET * max_links), MIN_LINKS)
     wanted = WANTED / max(settings.error, 1e-9) ** 0.5
     limits, pairs = PairLimits(float(hierarchy.faces.area.sum()), settings.min_area), None
     while True:
@@ -86,7 +86,7 @@ def first_links(
             if count <= min(wanted, most) or (count <= most and not may_be_coarser):
                 break
             limits = limits.looser()
-        pairs = first_pairs(hierarchy, shapes, limits, int(SLACK * most))
+        pairs = first_pairs(hierarchy, shapes, limits, int(LINK_SLACK * most))
         if pairs is not None:
             break
         limits = limits.looser()
@@ -125,9 +125,9 @@ def first_pairs(
     while waiting:
         # The latest first, block by block: what waits never grows to a whole generation.
         receiver, source = waiting.pop()
-        if len(receiver) > BLOCK:
-            waiting.append((receiver[BLOCK:], source[BLOCK:]))
-            receiver, source = receiver[:BLOCK], source[:BLOCK]
+        if len(receiver) > BLOCK_PAIRS:
+            waiting.append((receiver[BLOCK_PAIRS:], source[BLOCK_PAIRS:]))
+            receiver, source = receiver[:BLOCK_PAIRS], source[:BLOCK_PAIRS]
         ready, opened = _judge(hierarchy, shapes, receiver, source, limits)
         receivers.append(ready[0].astype(np.int32))
         sources.append(ready[1].astype(np.int32))
@@ -183,7 +183,7 @@ def _looks_small(shapes: NodeShapes, receiver: Array, source: Array, limits: Pai
     """Return (n,) which pairs are linked as they are, if the receiver's faces look much the same way."""
     to_face, of_face = receiver >= shapes.count, source >= shapes.count
     of_mixed = shapes.cone[source] > CONE
-    size = np.where(of_mixed, MIXED_SIZE, SIZE)
+    size = np.where(of_mixed, MIXED_SIZE, MAX_RADII)
     size = np.where(to_face, np.minimum(size, FACE_SIZE), size)
     far = ~shapes.looks_large(receiver, source, size)
     # A face next to a cluster is linked separately: samples would scatter there.

@@ -29,10 +29,10 @@ LAMP_SAMPLES = 4
 """Shadow rays of each quarter of an element, each from a point of its own."""
 SKY_RAYS = 16
 """Hemisphere rays of each quarter of an element."""
-COARSEST = 512
+MAX_ELEMENTS_SHARE = 512
 """An element larger than the scene's area over this is split before its light is measured."""
 
-NEAR = 0.5
+NEAR_ANGLE = 0.5
 """So is one that looks larger than this (radius over distance) from the lamp, or than this part
 of a spot's cone."""
 
@@ -107,7 +107,7 @@ def link_lights(
     as_if (n_lights,): What the lights count for instead of their strengths; those at 0 get no links.
     """
     receivers, numbers, gains = [], [], []
-    coarse_area = float(hierarchy.faces.area.sum()) / COARSEST
+    coarse_area = float(hierarchy.faces.area.sum()) / MAX_ELEMENTS_SHARE
     for (number, light), part in progress.each(list(enumerate(lights))):
         strength = float(np.max(light.strength)) if as_if is None else float(as_if[number])
         if strength <= 0.0 or not isinstance(light, Lamp | EnvironmentLight):
@@ -164,7 +164,7 @@ def too_near(light: Light, hierarchy: Hierarchy, elements: Array) -> Array:
     along = center - np.asarray(position)
     distance = np.linalg.norm(along, axis=1)
     before = np.einsum("nk,nk->n", along, hierarchy.faces.normal[hierarchy.face[elements]]) < 0
-    near = radius > NEAR * distance
+    near = radius > NEAR_ANGLE * distance
     if isinstance(light, SpotLight):
         # The element's bounding sphere, as the lamp sees it, touches the cone and is not small compared with
         # it.
@@ -172,7 +172,7 @@ def too_near(light: Light, hierarchy: Hierarchy, elements: Array) -> Array:
         axis = np.asarray(light.direction)
         off = np.arccos(np.clip(along @ axis / np.maximum(distance, 1e-300), -1.0, 1.0))
         narrow, wide = light.half_angles
-        near |= (off - seen < wide) & (seen > NEAR * narrow)
+        near |= (off - seen < wide) & (seen > NEAR_ANGLE * narrow)
     return np.asarray(before & near)
 
 
@@ -217,10 +217,10 @@ def _measure(
     rows: slice,
 ) -> tuple[Array, Array]:
     """Measure one light on elements, whole or in four pieces (see `measure_light`)."""
-    asked = _pieces(hierarchy, elements[rows], pieces)
+    parts = _pieces(hierarchy, elements[rows], pieces)
     if isinstance(light, EnvironmentLight):
-        return _measure_sky(asked, light, caster, seed, divisor)
-    return _measure_lamp(asked, light, caster, seed, divisor)
+        return _measure_sky(parts, light, caster, seed, divisor)
+    return _measure_lamp(parts, light, caster, seed, divisor)
 
 
 @dataclass(frozen=True)

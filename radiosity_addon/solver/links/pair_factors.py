@@ -72,7 +72,7 @@ def trace_pairs(caster: RayCaster, samples: PairSamples, empty_too: bool = False
 
     empty_too: All sixteen also where the four carry nothing. Not for links: their error estimate is about
         such pairs, and has them refined.
-    Returns traced (n, 16) bool: Which samples were asked.
+    Returns traced (n, 16) bool: Which samples were traced.
     Returns free (n, 16): What share of these passes: 0 or 1 where there are no cut-outs.
     """
     traced = np.zeros(samples.transfer.shape, dtype=bool)

@@ -57,7 +57,7 @@ COARSENING = (64.0, 16.0, 4.0, 1.0)
 ROUGH = 0.03
 """Residual of the rounds before the last one: enough to decide which links matter."""
 
-FEW = 1e-3
+MIN_REFINED_SHARE = 1e-3
 """A smaller share of refined links is not worth a gather: their children are evaluated before it, and
 what else it would show is left to the next round, if there is one."""
 
@@ -152,11 +152,11 @@ def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -
             refined = 0 if exhausted(state) else settle(state, shapes, error * state.power, min_area)
             links_refined += refined
             progress.at(0.3 + 0.65 * (done + 0.5) / len(COARSENING), state)
-            if not refined or (coarsening > 1.0 and refined <= FEW * state.n_links):
+            if not refined or (coarsening > 1.0 and refined <= MIN_REFINED_SHARE * state.n_links):
                 break
         rounds.append({"error": error, "links_refined": links_refined, "links": len(state.links)})
     iterate(state, settings.tolerance, last=True)
-    tell(state, rounds)
+    add_details(state, rounds)
     return state
 
 
@@ -166,7 +166,7 @@ def settle(state: HierarchicalState, shapes: NodeShapes, threshold: float, min_a
     while True:
         refined = refine(state, shapes, threshold, min_area)
         total += refined
-        if refined == 0 or refined > FEW * state.n_links:
+        if refined == 0 or refined > MIN_REFINED_SHARE * state.n_links:
             return total
         state.cut = state.linked_cut()
 
@@ -265,7 +265,7 @@ def exhausted(state: HierarchicalState) -> bool:
     return state.iterations >= state.settings.max_iterations
 
 
-def tell(state: HierarchicalState, rounds: list[dict[str, float]]) -> None:
+def add_details(state: HierarchicalState, rounds: list[dict[str, float]]) -> None:
     """Add to the report how BF_ε fell, and the elements and links per level.
 
     rounds list of {"error", "links_refined", "links"}: For each BF_ε, as a share of the light's power: how

@@ -34,7 +34,7 @@ Iterate = tuple[Array, Array]
 Solver = Callable[[LinearSystem], Iterator[Iterate]]
 """Yields the iterates from iteration 0 on; ends when there is no better one."""
 
-ASSEMBLIES = {"galerkin": galerkin, "collocation": collocation, "linear": linear}
+ASSEMBLERS = {"galerkin": galerkin, "collocation": collocation, "linear": linear}
 
 GIB = float(1 << 30)
 
@@ -129,7 +129,7 @@ def check_memory(unknowns: int, copies: int, settings: SolverSettings, faces: in
 
 def _assemble(state: MatrixState, basis: Basis, progress: Progress) -> tuple[LinearSystem, Array]:
     """Return the system with the lamps' light in it, and that, (n, 3) [W/m²]."""
-    settings, assemble = state.settings, ASSEMBLIES[state.settings.assembly]
+    settings, assemble = state.settings, ASSEMBLERS[state.settings.assembly]
     part = progress.part(0.02, ASSEMBLY_SHARE)
     system = assemble(state.hierarchy, state.caster, basis, settings.seed, settings.threads, part)
     direct = _lamps(state, basis)

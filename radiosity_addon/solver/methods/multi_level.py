@@ -73,7 +73,7 @@ def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -
         exchange.append(exchange_areas(hierarchy, state.caster, one, other, settings.seed, settings.threads))
         progress.at(0.15 + 0.65 * start / len(unordered), state)
     state.links = link(hierarchy, receiver, source, np.concatenate([np.zeros(0), *exchange])[of_pair])
-    tell(state)
+    add_details(state)
     state.note()
     progress.at(0.8, state)
 
@@ -150,7 +150,7 @@ def power_over(state: MultiLevelState, pairs: Array) -> float:
     return float((sent * bound).max(initial=0.0)) / state.power
 
 
-def tell(state: MultiLevelState) -> None:
+def add_details(state: MultiLevelState) -> None:
     """Add the elements and links per level to the report."""
     hierarchy, links = state.hierarchy, state.links
     state.details["multi_level"] = {

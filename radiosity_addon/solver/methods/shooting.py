@@ -12,7 +12,7 @@ from S, and is what is shown.
 Memory grows as O(n): columns are made for the few elements that will shoot next, together,
 which is quicker than one by one, and forgotten when they have shot. An element shoots again
 only after nearly all others have, so keeping columns would help by k/n for k of them (of the
-latest 64 of 500 in the Cornell box 0.2 % were asked for again): that would be the matrix.
+latest 64 of 500 in the Cornell box 0.2 % were needed again): that would be the matrix.
 """
 
 from __future__ import annotations

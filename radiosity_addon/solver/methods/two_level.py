@@ -27,7 +27,7 @@ from ..hierarchy import LEAF, neighbors
 from ..settings import SolverSettings
 from ..state import SolverState, begin, refuse_beyond
 
-FINEST = 1.0 / 64
+MIN_ELEMENT_SHARE = 1.0 / 64
 """Adaptive subdivision makes no element smaller than this part of the mean of step 1: three levels."""
 
 BLOCK_PAIRS = 1 << 19
@@ -85,7 +85,7 @@ def solve(scene: Scene, settings: SolverSettings, progress: Progress = SILENT) -
     progress.at(0.01, state)
     if not state.has_light:
         return state
-    refuse_too_large(len(state.hierarchy.faces), settings)
+    refuse_large_matrix(len(state.hierarchy.faces), settings)
     divide(state)
     state.link_lights_to_leaves()
     progress.at(0.05, state)
@@ -132,8 +132,8 @@ def add_rows(state: TwoLevelState, new: Array, progress: Progress = SILENT) -> N
         exchange = exchange_areas(
             hierarchy, state.caster, one, other, state.settings.seed, state.settings.threads
         )
-        to = kept + start + np.arange(len(block))
-        state.factors[to] = exchange.reshape(len(block), -1) / hierarchy.area[block][:, None]
+        target = kept + start + np.arange(len(block))
+        state.factors[target] = exchange.reshape(len(block), -1) / hierarchy.area[block][:, None]
         progress.at((start + len(block)) / len(new), state)
     state.details["two_level"]["elements"].append(len(state.leaves))
     state.details["two_level"]["rows"].append(len(new))
@@ -223,7 +223,7 @@ def _start_comparing(state: TwoLevelState) -> None:
     area = hierarchy.area[leaves]
     mean = area @ (state.reflectance[leaves] * state.irradiance[leaves]) / area.sum()
     state.limit = state.settings.contrast * float(mean.max())
-    state.smallest = FINEST * float(area.mean())
+    state.smallest = MIN_ELEMENT_SHARE * float(area.mean())
 
 
 def _finish(state: TwoLevelState) -> None:
@@ -276,7 +276,7 @@ def _most_elements(patches: int, memory_limit: float) -> int:
     return int(max(room, 0.0) / (2 * 8 * patches))
 
 
-def refuse_too_large(faces: int, settings: SolverSettings) -> None:
+def refuse_large_matrix(faces: int, settings: SolverSettings) -> None:
     """Refuse, before anything is allocated, a system that does not fit into the memory limit.
 
     Faces are the least that patches and elements can be.

@@ -1,4 +1,4 @@
-"""What the solver can be asked: the method, its accuracy, its budget and chance."""
+"""The settings of the solver: the method, its accuracy, its limits and its seed."""
 
 from __future__ import annotations
 

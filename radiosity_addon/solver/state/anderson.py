@@ -3,7 +3,7 @@
 Plain iteration B ← g(B) takes 1/(1 − ρ) gathers per digit. From the last m steps the mixture
 is taken whose changes f = g(B) − B cancel best (Anderson 1965). For a linear g that does what
 GMRES restarted after m steps does (Walker and Ni 2011), with one gather a step, no transpose
-and no symmetric matrix; a g that is linear but for a clamp at 0 does no harm.
+and no symmetric matrix; a g that is linear except for a clamp at 0 does no harm.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ DEPTH = 5
 """Steps remembered: two arrays of radiosity each."""
 
 GROWTH = 2.0
-"""When the change grows so many times beyond the least one, all is forgotten."""
+"""When the change exceeds this many times the smallest one, the history is discarded."""
 
 
 class Anderson:

@@ -1,4 +1,4 @@
-"""What becomes of the power of lamps: rays from them tell, apart from what links say arrives."""
+"""The power that lamps bring to surfaces, measured by rays from them, independently of the links."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ...scene import Faces, Scene
 from ..hierarchy import Hierarchy
 from ..links import LightLinks
 
-RAYS = 1 << 17
+LAMP_RAYS = 1 << 17
 """Rays of all lamps together, …"""
 
 LEAST_RAYS, MOST_RAYS = 1 << 8, 1 << 14
@@ -32,7 +32,7 @@ LYING = 1.0 / 32.0
 
 
 def is_stopped(light: Light) -> TypeGuard[Emitter]:
-    """Tell whether each part of a light's power ends at one surface, or none."""
+    """Return whether each part of a light's power ends at one surface, or none."""
     return isinstance(light, Emitter) and light.casts_shadow
 
 
@@ -83,7 +83,7 @@ def lamps_within_power(
     lamps = [number for number, light in enumerate(scene.lights) if is_stopped(light) and light.flux.any()]
     if not lamps:
         return links
-    rays = min(max(RAYS // len(lamps), LEAST_RAYS), MOST_RAYS)
+    rays = min(max(LAMP_RAYS // len(lamps), LEAST_RAYS), MOST_RAYS)
     receiver = links.receiver
     gain = hierarchy.area[receiver] * hierarchy.opacity[receiver] * links.gain.mean(axis=1)
     gain *= scene.in_shadows[hierarchy.faces.triangle[hierarchy.face[receiver]]]

@@ -64,25 +64,25 @@ class LinkRecord:
         Returns arriving (n,) float32 [W/m²].
         """
         own = np.unique(elements)
-        asked = [own + self.n_clusters]
+        nodes = [own + self.n_clusters]
         above, face = own, own
         while len(above):
             face = np.concatenate([face[self.parent[face] == LEAF], above[self.parent[above] == LEAF]])
             above = np.unique(self.parent[above])
             above = above[above != LEAF]
-            asked.append(above + self.n_clusters)
+            nodes.append(above + self.n_clusters)
         node = np.unique(face) + self.n_clusters
         while len(node):
             node = np.unique(self.cluster_above[node])
             node = node[node != LEAF]
-            asked.append(node)
-        rows = np.flatnonzero(np.isin(self.receiver, np.concatenate(asked)))
+            nodes.append(node)
+        rows = np.flatnonzero(np.isin(self.receiver, np.concatenate(nodes)))
         center = self.corners[own].mean(axis=1)
         start = np.broadcast_to(center.mean(axis=0), (len(rows), 3)).copy()
         receiver = self.receiver[rows] - self.n_clusters
         place = np.searchsorted(own, receiver).clip(max=len(own) - 1)
-        mine = own[place] == receiver
-        start[mine] = center[place[mine]]
+        is_own = own[place] == receiver
+        start[is_own] = center[place[is_own]]
         return start, self._middle(self.source[rows], start), self.arriving[rows]
 
     def _middle(self, node: Array, start: Array) -> Array:
@@ -157,8 +157,8 @@ def _distance(corners: Array, point: Array) -> Array:
     edge = np.roll(corners, -1, axis=1) - corners
     apart = point - corners
     along = np.einsum("nck,nck->nc", apart, edge) / np.maximum(np.einsum("nck,nck->nc", edge, edge), 1e-300)
-    beside = apart - np.clip(along, 0.0, 1.0)[:, :, None] * edge
-    to_edges = np.einsum("nck,nck->nc", beside, beside).min(axis=1)
+    to_edge = apart - np.clip(along, 0.0, 1.0)[:, :, None] * edge
+    to_edges = np.einsum("nck,nck->nc", to_edge, to_edge).min(axis=1)
     normal = np.cross(edge[:, 0], edge[:, 1])
     square = np.maximum(np.einsum("nk,nk->n", normal, normal), 1e-300)
     above = np.einsum("nk,nk->n", apart[:, 0], normal) ** 2 / square

@@ -1,8 +1,8 @@
 """What the hierarchical method may allocate: `memory_limit`, shared out among its stages.
 
-Faces are there whatever is asked for, so a scene whose faces and coarsest links do not fit
-is refused before anything is allocated. What they leave is for elements that lamps ask for,
-then for links and the elements that these split.
+Faces are always needed, so a scene whose faces and coarsest links do not fit is refused before
+anything is allocated. The rest is for elements that lamps need, then for links and the elements
+that these split.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from ...base import UsageError
 from ...scene import Scene
 from ..hierarchy import Hierarchy
-from ..links import FEWEST, SLACK
+from ..links import LINK_SLACK, MIN_LINKS
 from ..settings import SolverSettings
 
 LINK_BYTES = 200
@@ -60,10 +60,10 @@ def refuse_large_scene(scene: Scene, settings: SolverSettings) -> None:
     solid = scene.areas > 0
     faces = int(solid.sum() + (solid & scene.two_sided).sum())
     pairs = float(faces) ** 2
-    links = min(SLACK * FEWEST, pairs)
+    links = min(LINK_SLACK * MIN_LINKS, pairs)
     threads = settings.threads or os.cpu_count() or 1
     # A thread measures a chunk of pairs at most; small scenes have no more.
-    working = (WORKING_BYTES + threads * THREAD_BYTES) * min(1.0, pairs / FEWEST)
+    working = (WORKING_BYTES + threads * THREAD_BYTES) * min(1.0, pairs / MIN_LINKS)
     needed = faces * FACE_BYTES + links * LINK_BYTES + working
     what = f"the hierarchical method with {faces:,} faces"
     refuse_beyond(settings.memory_limit, needed, what, "raise the limit, or bake fewer objects")
@@ -75,7 +75,7 @@ def free_bytes(hierarchy: Hierarchy, settings: SolverSettings, light_links: int 
     threads = settings.threads or os.cpu_count() or 1
     taken = FACE_BYTES * faces + ELEMENT_BYTES * (hierarchy.n_elements - faces)
     taken += LIGHT_LINK_BYTES * light_links
-    working = (WORKING_BYTES + threads * THREAD_BYTES) * min(1.0, float(faces) ** 2 / FEWEST)
+    working = (WORKING_BYTES + threads * THREAD_BYTES) * min(1.0, float(faces) ** 2 / MIN_LINKS)
     return max(settings.memory_limit * 2**30 - taken - working, 0.0)
 
 
@@ -91,7 +91,7 @@ def link_budget(hierarchy: Hierarchy, settings: SolverSettings, light_links: int
 
 
 def refinable(hierarchy: Hierarchy, settings: SolverSettings, links: int, light_links: int) -> int:
-    """Return how many of so many links may be refined at once: three more links each, and four elements."""
+    """Return how many of `count` links may be refined at once: three more links each, and four elements."""
     free = free_bytes(hierarchy, settings, light_links) - LINK_BYTES * links
     in_memory = int(max(free, 0.0) / (3 * LINK_BYTES + 4 * ELEMENT_BYTES))
     room = min(max((settings.max_links - links - light_links) // 3, 0), in_memory)

@@ -32,9 +32,9 @@ ESCAPE_RAYS = 1 << 17
 def power_balance(state: SolverState) -> dict[str, float]:
     """Return the emitted, absorbed and escaped power [W].
 
-    Lamps and emission count over all their sides, sun and sky what arrives at the faces. So does a
-    lamp without shadows: each surface on its light's way gets all of it. Other lamps count beside their
-    own power what arrives at faces that their light passes all the same.
+    Lamps and emission count with all they send, sun and sky with what arrives at the faces. So does a
+    lamp without shadows: each surface in its light's way gets all of it. Other lamps also count with the
+    light at faces that it reaches through others.
     """
     hierarchy, scene = state.hierarchy, state.scene
     leaves = hierarchy.leaves

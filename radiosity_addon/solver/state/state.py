@@ -60,7 +60,7 @@ class SolverState:
     """Largest misplaced power left unrefined for want of links, relative to Φ; 0 if none."""
     history: list[HistoryEntry] = field(default_factory=list)
     details: dict[str, Any] = field(default_factory=dict)
-    """What only this method can tell, for the report."""
+    """Details of this method for the report."""
     started: float = field(default_factory=time.perf_counter)
 
     @property

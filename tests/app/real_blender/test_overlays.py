@@ -92,7 +92,7 @@ def test_false_colors_outlast_a_reload_and_links_do_not(seen: dict[str, Any]) ->
     assert "memory" in seen["missing"]["reloaded"]["LINKS"]
 
 
-def test_the_panel_tells_numbers_of_the_active_object(seen: dict[str, Any]) -> None:
+def test_the_panel_reports_numbers_of_the_active_object(seen: dict[str, Any]) -> None:
     # Whatever a panel's drawing raises is in what Blender printed, which has no traceback.
     assert set(seen["statistics_of"]) == {"Floor"}
 

@@ -35,7 +35,7 @@ def test_the_lightmap_follows_within_a_fifth_of_a_second(seen: dict[str, Any]) -
     assert max(seen["latencies"]) < 0.2
 
 
-def test_relight_runs_beside_the_window(seen: dict[str, Any]) -> None:
+def test_relight_runs_next_to_the_window(seen: dict[str, Any]) -> None:
     assert seen["modal"]
     assert seen["halved"] == pytest.approx(0.5 * seen["baked"], rel=1e-3)
 

@@ -25,7 +25,7 @@ def test_an_odd_scene_is_shown_before_it_is_baked_first(seen: dict[str, Any]) ->
     assert seen["after_check"] == []
 
 
-def test_the_second_press_bakes_and_tells_the_time_left(seen: dict[str, Any]) -> None:
+def test_the_second_press_bakes_and_reports_the_time_left(seen: dict[str, Any]) -> None:
     assert seen["baking_after_check"]
     assert 0.0 < seen["seconds_left"] < 600.0
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...numerics import Array
-from ..texels import NO_TEXEL, TexelGeometry
-from .seams import Seams
+from radiosity_addon.lightmap.images.seams import Seams
+from radiosity_addon.lightmap.texels import NO_TEXEL, TexelGeometry
+from radiosity_addon.numerics import Array
 
 NEIGHBOR = 2.5
 """Texels side by side on the page are neighbors if they lie no farther apart [texels] in the world."""
@@ -21,20 +21,20 @@ class SeamSteps:
 
     across (s,): At places on seams, between bilinear look-ups on either side.
     inside (p,): Between texels side by side in one chart, everywhere.
-    beside (q,): The same, for texels that a look-up on a seam reads.
+    near_seams (q,): The same, for texels that a look-up on a seam reads.
     """
 
     across: Array
     inside: Array
-    beside: Array
+    near_seams: Array
 
     def medians(self) -> tuple[float, float, float]:
         """Return the medians of the three; 0 for none."""
-        across, inside, beside = (
+        across, inside, near_seams = (
             float(np.median(steps)) if len(steps) else 0.0
-            for steps in (self.across, self.inside, self.beside)
+            for steps in (self.across, self.inside, self.near_seams)
         )
-        return across, inside, beside
+        return across, inside, near_seams
 
 
 def seam_steps(geometry: TexelGeometry, seams: Seams, pages: Sequence[Array]) -> SeamSteps:

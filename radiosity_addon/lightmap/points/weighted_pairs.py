@@ -10,7 +10,7 @@ from ...numerics import Array
 
 
 @dataclass(frozen=True)
-class Weighed:
+class WeightedPairs:
     """What was weighed when the first `levels` levels of points were there.
 
     texels (n,) int: Ascending; they were no points themselves.
@@ -24,10 +24,10 @@ class Weighed:
     weight: Array
 
     @staticmethod
-    def nothing() -> Weighed:
+    def nothing() -> WeightedPairs:
         """Return what is known before anything is weighed."""
         none = np.zeros(0, dtype=np.int32)
-        return Weighed(0, none, none, none, np.zeros(0, dtype=np.float32))
+        return WeightedPairs(0, none, none, none, np.zeros(0, dtype=np.float32))
 
     def pairs_of(self, texels: slice) -> tuple[Array, Array, Array]:
         """Return texels, points and weights of a run of texels."""
