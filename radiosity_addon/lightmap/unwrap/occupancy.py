@@ -103,7 +103,7 @@ class _Page:
         return np.flatnonzero((sliding_window_view(free, mask.height) >= mask.longest).all(axis=1))
 
     def _windows(self, height: int, first: int, last: int) -> list[int]:
-        """Return, for each row, what is taken in so many rows from it on."""
+        """Return, for each row, what is taken in `height` rows from it on."""
         rows, span = self._rows[first : last + height], 1
         while 2 * span <= height:
             rows = [one | other for one, other in zip(rows, rows[span:], strict=False)]
