@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from radiosity_addon.lightmap.images.seams import find_seams
 from radiosity_addon.lightmap.texels import TexelGeometry, rasterize, texel_areas
 from radiosity_addon.lightmap.texels.shared_texels import collapsed_pieces, is_collapsed
 from radiosity_addon.rays import Hits
@@ -25,9 +26,9 @@ def point(column: int, row: int) -> np.ndarray:
     return np.full((3, 2), ((column + 0.5) / SIZE, (row + 0.5) / SIZE), dtype=np.float32)
 
 
-def geometry_of(triangles: np.ndarray, uv: np.ndarray) -> TexelGeometry:
+def geometry_of(triangles: np.ndarray, uv: np.ndarray, size: int = SIZE) -> TexelGeometry:
     scene = gray(triangles)
-    texels = rasterize(uv, SIZE, surface=scene.areas)
+    texels = rasterize(uv, size, surface=scene.areas)
     pages = np.zeros(len(uv), dtype=np.int32)
     return TexelGeometry(scene, uv, pages, [texels], [np.arange(len(uv))])
 
@@ -93,6 +94,27 @@ def test_a_line_is_cut_at_the_borders_of_texels(upright: bool) -> None:
         x = points[texel, :, 0] + 1.5
         assert (np.floor(x) == at[texel]).all()
         assert x.mean() == pytest.approx((1.75, 2.5, 3.5, 4.5, 5.25)[texel], abs=0.05)
+
+
+@pytest.mark.parametrize("upright", [False, True])
+@pytest.mark.parametrize("size", [8, 12, 36, 100, 300, 1300])
+def test_seams_of_lines_read_their_own_rows_only(size: int, upright: bool) -> None:
+    """Far surfaces lie next to the lines, and most sizes round the centers of texels."""
+    near = np.concatenate([strip(4.0, 0.1), np.add(strip(4.0, 0.1), (0, 0.1, 0))])
+    far = np.concatenate([np.add(strip(4.0, 0.1), (0, 0, 100.0 * step)) for step in range(1, 5)])
+    lines = (size - 6.5, size - 3.5)
+    along = size - 6.5 + near[..., 0]
+    across = np.broadcast_to(np.repeat(lines, 2)[:, None], along.shape)
+    corners = [(0.1, line + side) for line in lines for side in (-1.4, 0.6)]
+    others = np.concatenate([np.add(strip(size - 0.2, 0.8)[..., :2], corner) for corner in corners])
+    uv = (np.concatenate([np.stack((along, across), axis=-1), others]) / size).astype(np.float32)
+    triangles = np.concatenate([near, far])
+    geometry = geometry_of(triangles, uv[..., ::-1].copy() if upright else uv, size)
+    seams = find_seams(gray(triangles), geometry)
+    assert seams.length.sum() == pytest.approx(4.0, abs=size * 2.0**-23)
+    row, column = np.divmod(seams.texel, size)
+    assert set(np.floor(lines)) == set(np.unique(column if upright else row))
+    np.testing.assert_allclose(seams.weight.sum(axis=2), 1.0)
 
 
 def test_pieces_of_a_triangle_are_all_of_it() -> None:
