@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from .bake_warnings import coincident_counts, of_coincident
 from .estimate import Estimate, LightmappedObject, estimate_bake, refuse_many_triangles
+from .importance import thinned_out
 from .keep import KeepOptions, can_keep, run_pipeline
 from .plan import SHORT, BakeDigests, BakePlan, RememberedLightmap, ShownBake, plan_bake
 from .stages import timed
@@ -30,5 +31,6 @@ __all__ = [
     "refuse_large_pages",
     "refuse_many_triangles",
     "run_pipeline",
+    "thinned_out",
     "timed",
 ]

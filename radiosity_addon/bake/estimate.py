@@ -8,15 +8,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..lightmap.unwrap import ChartTotals, Limits, assign_pages, padding_for, page_size
-from ..numerics import thread_count
+from ..numerics import Array, thread_count
 from ..options import BakeSettings
 from ..scene import BakeScene
 from ..solver.state import refuse_large_scene, refuse_many_faces
+from .importance import Extent, justified_scales, may_thin_out
 from .quality import quality_of
 from .texel_memory import least_bytes, pages_of, refuse_large_pages, room
 
@@ -56,12 +57,16 @@ class LightmappedObject:
 
     area: In world space [m²].
     scale: Its texels per meter, relative to the other objects.
+    box (2, 3): Around it [m]; None if it is not known.
+    keeps_uvs: Whether its layout is kept.
     """
 
     name: str
     triangles: int
     area: float
     scale: float = 1.0
+    box: Array | None = None
+    keeps_uvs: bool = False
 
     @property
     def surface(self) -> float:
@@ -80,6 +85,8 @@ class Estimate:
 
     pages: Each page's width and height in texels.
     texels: Parallel to the objects: about how many each gets.
+    densities: Parallel to the objects: about how many texels per meter.
+    thinned: Parallel to the objects: below 1 for those that reach far beyond the others.
     memory: What it takes in addition to what Blender already uses [bytes], …
     files: … and what does not fit into the memory limit: temporary files take it [bytes].
     seconds: None where it depends on the results: bakes to a target error, and methods for study.
@@ -90,6 +97,13 @@ class Estimate:
     memory: float
     files: float
     seconds: float | None
+    densities: tuple[float, ...] = ()
+    thinned: tuple[float, ...] = ()
+
+    @property
+    def utilization(self) -> float:
+        """About which part of the pages shows a surface."""
+        return min(sum(self.texels) / max(sum(page**2 for page in self.pages), 1), 1.0)
 
 
 def estimate_bake(objects: Sequence[LightmappedObject], triangles: int, settings: BakeSettings) -> Estimate:
@@ -98,6 +112,8 @@ def estimate_bake(objects: Sequence[LightmappedObject], triangles: int, settings
     objects: Those that get a lightmap.
     triangles: Of the whole scene, what only lights and blocks among them.
     """
+    thinned = _thinned(objects, settings)
+    objects = [replace(item, scale=item.scale * scale) for item, scale in zip(objects, thinned, strict=True)]
     pages, texels = _pages(objects, settings)
     total = sum(texels)
     rays = total * RAYS_A_TEXEL[settings.quality] * max(triangles, 1) ** 0.25
@@ -117,7 +133,32 @@ def estimate_bake(objects: Sequence[LightmappedObject], triangles: int, settings
         cores = thread_count(settings.threads)
         seconds = UNWRAP_SECONDS * triangles + (solving + gathering) * (CORES / cores) ** 0.6
     in_memory = min(of_texels, most)
-    return Estimate(tuple(pages), tuple(texels), of_scene + in_memory, of_texels - in_memory, seconds)
+    densities = tuple(
+        math.sqrt(count / item.area) if item.area > 0 else 0.0
+        for count, item in zip(texels, objects, strict=True)
+    )
+    return Estimate(
+        tuple(pages),
+        tuple(texels),
+        of_scene + in_memory,
+        of_texels - in_memory,
+        seconds,
+        densities,
+        tuple(thinned),
+    )
+
+
+def _thinned(objects: Sequence[LightmappedObject], settings: BakeSettings) -> list[float]:
+    """Return a factor for each object's scale, below 1 for one that reaches far beyond the others."""
+    if not may_thin_out(settings) or any(item.box is None for item in objects):
+        return [1.0] * len(objects)
+    return justified_scales(
+        [
+            Extent(item.box, item.surface, item.scale == 1.0 and not item.keeps_uvs)
+            for item in objects
+            if item.box is not None
+        ]
+    )
 
 
 def refuse_many_triangles(triangles: int, settings: BakeSettings) -> None:

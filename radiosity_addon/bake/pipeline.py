@@ -24,7 +24,7 @@ from ..lightmap.lighting import (
 from ..lightmap.texels import FOOTPRINT, TexelGeometry, rasterize, texel_materials
 from ..lightmap.transport import GatherSettings, TexelLight
 from ..lightmap.unwrap import Atlas, AtlasInput, AtlasObject, AtlasOptions, Limits, build_atlas, padding_for
-from ..numerics import Array, Scratch, tiles
+from ..numerics import Array, Scratch, numbered, tiles
 from ..options import BakeSettings
 from ..rays import RayCaster
 from ..scene import BakeObject, BakeScene
@@ -32,6 +32,7 @@ from ..solver import Solution, SolverSettings, SolverState, solve
 from ..solver.element_transport import Relightable
 from .bake_warnings import coincident_counts, of_coincident, of_solution, small_objects
 from .estimate import refuse_before_unwrapping
+from .importance import scales_of, thinned_out
 from .quality import for_error, quality_of, used_settings
 from .relight import (
     HierarchyReport,
@@ -50,6 +51,7 @@ from .result import (
     Picture,
     TexelPictures,
     more_of,
+    object_density,
     solver_part,
 )
 from .stages import timed
@@ -74,6 +76,9 @@ UNWRAP, RASTERIZE, SOLVE, LIGHT, ENCODE = 0.0, 0.02, 0.04, 0.29, 0.98
 
 MOST_SHOWN = 1 << 22
 """More texels than these are not shown while they are lit: their pictures would take too much memory."""
+
+COLORS = 4.0
+"""Triangles share texels if they emit alike, and their reflectances are alike in units of a quarter."""
 
 DILATED = 8
 """Texels past the charts that are filled ring by ring, if not more are free."""
@@ -207,7 +212,8 @@ def finish(
     coincident = coincident_counts(baked, bake_scene.scene)
     warnings = (*bake_scene.warnings, *of_texels, *of_coincident(coincident), *solved.warnings)
     objects = tuple(
-        BakedObject(item, placed.uv, placed.page) for item, placed in zip(baked, atlas.objects, strict=True)
+        BakedObject(item, placed.uv, placed.page, object_density(geometry, item))
+        for item, placed in zip(baked, atlas.objects, strict=True)
     )
     light, details = more
     result = BakeResult(
@@ -234,7 +240,13 @@ def _unwrap(
     bake_scene: BakeScene, baked: list[BakeObject], settings: BakeSettings, progress: Progress
 ) -> Atlas:
     """Lay the objects' charts out on pages."""
-    inputs = [_to_lay_out(bake_scene, item) for item in baked]
+    scene, scales = bake_scene.scene, scales_of(bake_scene, baked, settings)
+    looks = np.column_stack((np.rint(COLORS * scene.reflectance), scene.emission))
+    kind = numbered(looks)
+    inputs = [
+        _to_lay_out(item, scene.triangles[item.rows], item.texel_scale * scale, kind[item.rows])
+        for item, scale in zip(baked, scales, strict=True)
+    ]
     options = AtlasOptions(
         settings.resolution,
         settings.texel_density,
@@ -242,18 +254,21 @@ def _unwrap(
         settings.pages,
         Limits(settings.max_resolution, _padding(settings)),
         settings.unwrap_seconds,
+        settings.threads,
     )
     atlas = build_atlas(inputs, options, progress)
+    thinned = thinned_out([item.name for item in baked], scales)
     placed = [_with_glass(item, each) for item, each in zip(baked, atlas.objects, strict=True)]
-    return replace(atlas, objects=tuple(placed))
+    return replace(atlas, objects=tuple(placed), warnings=(*thinned, *atlas.warnings))
 
 
-def _to_lay_out(bake_scene: BakeScene, item: BakeObject) -> AtlasInput:
+def _to_lay_out(item: BakeObject, triangles: Array, scale: float, kind: Array) -> AtlasInput:
     """Return what gets texels of an object."""
-    triangles, polygon, uv = bake_scene.scene.triangles[item.rows], item.polygon, item.uv
+    polygon, uv = item.polygon, item.uv
     if item.glass is not None:
-        triangles, polygon, uv = triangles[item.lit], polygon[item.lit], None if uv is None else uv[item.lit]
-    return AtlasInput(item.name, triangles, polygon, uv, item.texel_scale)
+        uv = None if uv is None else uv[item.lit]
+        triangles, polygon, kind = triangles[item.lit], polygon[item.lit], kind[item.lit]
+    return AtlasInput(item.name, triangles, polygon, uv, scale, kind)
 
 
 def _with_glass(item: BakeObject, placed: AtlasObject) -> AtlasObject:
@@ -281,7 +296,11 @@ def _texels(bake_scene: BakeScene, baked: list[BakeObject], atlas: Atlas, scratc
     # Triangles without area have no side to be lit from, even if their UVs have one.
     page_of_triangle[bake_scene.scene.areas == 0] = -1
     rows = [np.flatnonzero(page_of_triangle == page) for page in range(len(atlas.pages))]
-    texels = [rasterize(uv[of], page.resolution, scratch) for of, page in zip(rows, atlas.pages, strict=True)]
+    areas = bake_scene.scene.areas
+    texels = [
+        rasterize(uv[of], page.resolution, scratch, areas[of])
+        for of, page in zip(rows, atlas.pages, strict=True)
+    ]
     return TexelGeometry(bake_scene.scene, uv, page_of_triangle, texels, rows, scratch)
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from ..base import BakeWarning, SceneError
 from ..options import BakeSettings
 from ..scene import BakeScene
+from .importance import scales_of
 from .relight import KeptBake
 from .scene_diff import Part, compare, light_digest, rounded_digest, scene_record
 
@@ -139,7 +140,11 @@ def plan_bake(
         return BakePlan("nothing", bake_scene, settings, digests, unchanged=same.keys(), gone=gone)
     objects = tuple(replace(item, bake=item.bake and item.name not in same) for item in bake_scene.objects)
     if settings.atlas == "shared" and settings.texel_density is None:
-        # As sharp as what is kept, on a page of their own.
+        # As sharp as in a bake of all, on a page of their own.
+        all_baked = [item for item in bake_scene.objects if item.bake and item.count]
+        scales = scales_of(bake_scene, all_baked, settings)
+        thinned = {item.name: scale for item, scale in zip(all_baked, scales, strict=True)}
+        objects = tuple(replace(item, thinning=thinned.get(item.name, 1.0)) for item in objects)
         density = float(np.median([lightmap.density for lightmap in same.values()]))
         settings = replace(settings, texel_density=density, pages=1)
     changed = replace(bake_scene, objects=objects)

@@ -28,6 +28,7 @@ class BakeObject:
     loops (count, 3) int32: The mesh corner (loop) of each triangle corner: UVs go back through it.
     uv (count, 3, 2) float32: The existing `Lightmap` UVs to keep; None to unwrap.
     texel_scale: Its texels per meter, relative to the other objects.
+    thinning: A further factor, if a bake of part of a scene is to be like one of all of it.
     glass (count,) bool: Triangles that are glass, which get no texels; None for none.
     """
 
@@ -39,6 +40,7 @@ class BakeObject:
     loops: Array
     uv: Array | None = None
     texel_scale: float = 1.0
+    thinning: float = 1.0
     glass: Array | None = None
 
     @property

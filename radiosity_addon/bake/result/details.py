@@ -11,7 +11,7 @@ import numpy as np
 from ...lightmap.images import light_statistics, lit_texels
 from ...lightmap.texels import ENCLOSED, NO_TEXEL_HERE, TOUCHED, TexelGeometry
 from ...lightmap.transport import TexelLight
-from ...numerics import Array, luminous, tiles
+from ...numerics import Array, luminous, tiles, triangle_areas
 from ...options import EFFICACY
 from ...scene import BakeObject
 from ...solver import Solution
@@ -127,6 +127,17 @@ def statistics(
             continue
         found.append({"irradiance_W_m2": of_watts.as_dict(), "illuminance_lx": of_lumens.as_dict()})
     return tuple(found)
+
+
+def object_density(geometry: TexelGeometry, item: BakeObject) -> float | None:
+    """Return the texels per meter of an object, the median over its surface; None without texels."""
+    areas = triangle_areas(geometry.triangles[item.rows])
+    density = 1.0 / np.sqrt(np.maximum(geometry.texel_area[item.rows], 1e-300))
+    order = np.argsort(density, kind="stable")
+    surface = np.cumsum(areas[order])
+    if surface[-1] <= 0.0:
+        return None
+    return float(density[order[np.searchsorted(surface, 0.5 * surface[-1])]])
 
 
 def lit_values(

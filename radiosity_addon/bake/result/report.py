@@ -83,6 +83,8 @@ class BakeReport:
             }
             if file.scale is not None:
                 entry["scale"] = file.scale
+            if baked.density is not None:
+                entry["texels_per_metre"] = baked.density
             if baked.object.name in result.coincident:
                 entry["coincident_triangles"] = result.coincident[baked.object.name]
             objects.append({**entry, **_plain(of_light)})

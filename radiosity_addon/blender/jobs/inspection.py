@@ -16,7 +16,14 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
-from ...bake import Estimate, LightmappedObject, estimate_bake, refuse_large_pages, refuse_many_triangles
+from ...bake import (
+    Estimate,
+    LightmappedObject,
+    estimate_bake,
+    refuse_large_pages,
+    refuse_many_triangles,
+    thinned_out,
+)
 from ...base import BakeWarning, RadiosityError
 from ...lightmap.unwrap import greedy_object, share_of
 from ...numerics import double_area_vectors
@@ -151,7 +158,8 @@ def inspect(
         chosen = []
         findings.append(Finding(ERROR, context.scene.name, str(error)))
     shapes = {id(piece): _shape(piece) for piece in collected.pieces if len(piece.mesh)}
-    lit = lit_objects(chosen, {of: shape.area for of, shape in shapes.items()}, collected)
+    areas, boxes = ({of: getattr(shape, name) for of, shape in shapes.items()} for name in ("area", "box"))
+    lit = lit_objects(chosen, areas, boxes, collected, settings.keep_uvs)
     triangles = sum(len(piece.mesh) for piece in collected.pieces)
     plan = estimate_bake(lit, triangles, settings)
     refused = None if output is None else file_refusal(output, settings, collected, chosen, files)
@@ -297,7 +305,10 @@ def _of_texels(lit: Sequence[LightmappedObject], plan: Estimate) -> Iterator[Fin
         for item, texels in zip(lit, plan.texels, strict=True)
         if item.area > 0 and texels < TINY_TEXELS
     ]
-    greedy = greedy_object([item.name for item in lit], plan.texels)
+    names = [item.name for item in lit]
+    greedy = greedy_object(names, plan.texels)
+    for warning in thinned_out(names, plan.thinned):
+        yield Finding(WARNING, warning.name, warning.message)
     if tiny:
         advice = (
             "raise the resolution or the texel scale"

@@ -13,15 +13,27 @@ from ..scene_records.pieces import Piece, SceneContents
 
 
 def lit_objects(
-    chosen: Sequence[Piece], areas: Mapping[int, float], collected: SceneContents
+    chosen: Sequence[Piece],
+    areas: Mapping[int, float],
+    boxes: Mapping[int, np.ndarray],
+    collected: SceneContents,
+    keep_uvs: bool,
 ) -> list[LightmappedObject]:
     """Return the objects that get a lightmap.
 
     areas: The pieces' surfaces by their `id` [m²].
+    boxes: Around the pieces (2, 3) by their `id` [m].
     """
     clear = _clear(collected)
     return [
-        _lit(piece, areas.get(id(piece), 0.0), clear)
+        LightmappedObject(
+            piece.source.name,
+            int((~clear[piece.surface]).sum()),
+            _matte_area(piece, areas.get(id(piece), 0.0), clear),
+            piece.role.texel_scale,
+            boxes.get(id(piece), np.zeros((2, 3))),
+            keeps_uvs=keep_uvs and piece.has_lightmap_layer,
+        )
         for piece in chosen
         if not len(piece.mesh) or not clear[piece.surface].all()
     ]
@@ -39,9 +51,10 @@ def _clear(collected: SceneContents) -> np.ndarray:
     return np.array([surface.is_clear for surface in collected.surfaces], dtype=bool)
 
 
-def _lit(piece: Piece, area: float, clear: np.ndarray) -> LightmappedObject:
+def _matte_area(piece: Piece, area: float, clear: np.ndarray) -> float:
+    """Return the surface [m²] of a piece, of which the given one includes its glass."""
     matte = ~clear[piece.surface]
-    if area > 0.0 and not matte.all():
-        corners, _, _ = world_from_object(piece.mesh, piece.matrix)
-        area = float(triangle_areas(corners[matte]).sum())
-    return LightmappedObject(piece.source.name, int(matte.sum()), area, piece.role.texel_scale)
+    if matte.all():
+        return area
+    corners, _, _ = world_from_object(piece.mesh, piece.matrix)
+    return float(triangle_areas(corners[matte]).sum())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import bpy
@@ -58,13 +59,23 @@ def figures(found: Any) -> list[tuple[str, str]]:
         ("Objects", f"{found.objects:,}"),
         ("Triangles", f"{found.triangles:,} / {found.scene_triangles:,}"),
         ("Images", pages or "0"),
-        ("Texels", f"about {_rounded(found.texels):,}"),
+        ("Texels", f"about {_rounded(found.texels):,}, {plan.utilization:.0%} of the images"),
+        ("Density", _densities(plan.densities)),
         ("Memory", f"about {_bytes(plan.memory)}"),
         (
             "Time",
             "until the error is reached" if plan.seconds is None else f"roughly {duration(plan.seconds)}",
         ),
     ]
+
+
+def _densities(densities: Sequence[float]) -> str:
+    """Return the least and the highest texels per meter of objects."""
+    some = [density for density in densities if density > 0]
+    if not some:
+        return "0 px/m"
+    low, high = f"{min(some):.2g}", f"{max(some):.2g}"
+    return f"about {high} px/m" if low == high else f"about {low} to {high} px/m"
 
 
 def _rounded(count: int) -> int:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...bake.result import MEANS
 from ...lightmap.images import LightStatistics, light_statistics, lit_texels
-from ...lightmap.texels import NO_TEXEL_HERE, rasterize
+from ...lightmap.texels import NO_TEXEL_HERE, rasterize, texel_areas
 from ...numerics import Array, irradiance_under_sky, luminous, triangle_areas
 from ...scene import LIGHTMAP_UV_LAYER
 from ..datablocks.bake_record import is_made
@@ -40,12 +40,6 @@ class ShownLightmap:
     def areas(self) -> Array:
         """(t,) float64 [m²]"""
         return triangle_areas(self.corners.astype(np.float64))
-
-    @property
-    def uv_areas(self) -> Array:
-        """(t,) float64: shares of the page."""
-        first, second = (self.uv[:, corner].astype(np.float64) - self.uv[:, 0] for corner in (1, 2))
-        return np.asarray(0.5 * np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,10 +158,9 @@ def _summed_up(
     if shown is None:
         return None
     height = len(page.values)
-    texels = rasterize(shown.uv, height)
+    texels = rasterize(shown.uv, height, surface=shown.areas)
     values = page.values[texels.row, texels.column].astype(np.float64)
-    of_texel = shown.areas / np.maximum(shown.uv_areas * height**2, 1e-300)
-    areas = of_texel[texels.triangle] * texels.area
+    areas = texel_areas(shown.uv, shown.areas, height)[texels.triangle] * texels.area
     kept = kept_details.details_of(scene)
     details = None if kept is None else kept.page_of(image.name)
     if details is not None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ...lightmap.texels import DIVIDED, ENCLOSED, NO_TEXEL_HERE, OCCLUDED, TOUCHED
+from ...lightmap.texels import DIVIDED, ENCLOSED, NO_TEXEL_HERE, OCCLUDED, TOUCHED, texel_areas
 from ...numerics import Array
 from ...solver.state import leaves_on, nearest_leaf
 from ..session.kept_details import STAND_IN_SUFFIX, KeptDetails, details_of
@@ -186,7 +186,9 @@ def _density(context: bpy.types.Context, shown: list[ShownLightmap]) -> OverlayP
         [texels_per_meter(found, size) for found, size in zip(shown, sizes, strict=True)]
     )
     # What most has gets the middle color: blue is coarser, red finer.
-    usual = float(np.median(density))
+    order = np.argsort(density)
+    surface = np.cumsum(np.concatenate([found.areas for found in shown])[order])
+    usual = float(density[order[np.searchsorted(surface, 0.5 * surface[-1])]])
     scale = (
         ColorScale(0.0, 2.0 * usual) if settings.automatic and usual > 0 else _scale(context, density, False)
     )
@@ -206,7 +208,7 @@ def _density(context: bpy.types.Context, shown: list[ShownLightmap]) -> OverlayP
 
 def texels_per_meter(found: ShownLightmap, size: int) -> Array:
     """Return (t,) lightmap pixels along one meter of each triangle: the root of how many are in 1 m²."""
-    return np.asarray(np.sqrt(found.uv_areas * size**2 / np.maximum(found.areas, 1e-30)))
+    return np.asarray(1.0 / np.sqrt(np.maximum(texel_areas(found.uv, found.areas, size), 1e-30)))
 
 
 def _texels(context: bpy.types.Context, kept: KeptDetails) -> OverlayPicture | None:

@@ -8,13 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...base import SILENT, Progress
-from ...numerics import connected_faces, double_area_vectors, numbered, signed_double_areas
+from ...numerics import connected_faces, double_area_vectors, map_chunks, numbered, signed_double_areas
 from .flatten import project, project_polygons, rescale_to_area, undo_stretch
+from .join_coplanar import join_coplanar
 from .overlap import overlapping_triangles
 
 Float = NDArray[np.float64]
@@ -46,25 +48,41 @@ class Charts:
     count: int
 
 
-def unwrap(triangles: Float, polygon: Int, grow: GrowCharts | None, progress: Progress = SILENT) -> Charts:
+def unwrap(
+    triangles: Float,
+    polygon: Int,
+    grow: GrowCharts | None,
+    progress: Progress = SILENT,
+    threads: int = 1,
+) -> Charts:
     """Cut an object into charts, piece by piece.
 
     triangles (n, 3, 3): Corners in world space [m].
     polygon (n,) int: The polygon of each triangle.
     grow: The chart grower; None gives every polygon a chart of its own.
+    threads: Pieces that are cut at once; 0 means all cores.
     """
     polygon = numbered(polygon)
     uv = np.zeros((len(triangles), 3, 2))
     chart = np.full(len(triangles), -1, dtype=np.int64)
-    count = done = 0
-    for rows in _pieces(triangles, polygon):
-        piece_uv, piece_chart = _unwrap_piece(triangles[rows], polygon[rows], grow)
+    count = 0
+    pieces = list(_pieces(triangles, polygon))
+    cut = partial(_unwrap_one, triangles, polygon, grow, pieces)
+    for part, (piece_uv, piece_chart) in map_chunks(cut, len(pieces), 1, threads, progress):
+        rows = pieces[part.start]
         uv[rows] = piece_uv
         chart[rows] = np.where(piece_chart >= 0, piece_chart + count, -1)
         count = max(count, int(chart.max()) + 1)
-        done += len(rows)
-        progress.at(done / len(triangles))
-    return Charts(uv, chart, count)
+    if count > 1:
+        uv, chart = join_coplanar(uv, triangles, chart)
+    return Charts(uv, chart, int(chart.max(initial=-1)) + 1)
+
+
+def _unwrap_one(
+    triangles: Float, polygon: Int, grow: GrowCharts | None, pieces: list[NDArray[np.intp]], part: slice
+) -> tuple[Float, Int]:
+    rows = pieces[part.start]
+    return _unwrap_piece(triangles[rows], polygon[rows], grow)
 
 
 def _pieces(triangles: Float, polygon: Int) -> Iterator[NDArray[np.intp]]:

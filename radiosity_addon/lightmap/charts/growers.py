@@ -18,16 +18,16 @@ resting = DelayedRelease()
 """The latest of xatlas' atlases: destroyed right after their work they may hang."""
 
 
-def grow_charts(vertices: Float, faces: Int, in_window: bool = False) -> tuple[Float, Int]:
+def grow_charts(vertices: Float, faces: Int, apart: bool = False) -> tuple[Float, Int]:
     """Cut a mesh into charts with xatlas.
 
     vertices (v, 3): At a scale where triangles are about 1 in area, welded.
     faces (n, 3) int64.
-    in_window: Whether a window is drawn meanwhile; long work is then done in another process.
+    apart: Whether long work is done in another process, as a window is drawn or other threads work meanwhile.
     Returns uv (n, 3, 2): Stretched along u and v, each chart otherwise; charts may lie over each other.
     Returns chart (n,) int64: −1 for faces that xatlas left out.
     """
-    if in_window and len(faces) > WORTH_A_PROCESS:
+    if apart and len(faces) > WORTH_A_PROCESS:
         grown = run_apart(vertices, faces)
         if grown is not None:
             return grown
@@ -42,8 +42,8 @@ class PatientGrower:
     gave_up: Whether it came to that.
     """
 
-    def __init__(self, seconds: float, in_window: bool = False) -> None:
-        self._seconds, self._spent, self._in_window = seconds, 0.0, in_window
+    def __init__(self, seconds: float, apart: bool = False) -> None:
+        self._seconds, self._spent, self._apart = seconds, 0.0, apart
         self.gave_up = False
 
     def __call__(self, vertices: Float, faces: Int) -> tuple[Float, Int]:
@@ -52,6 +52,6 @@ class PatientGrower:
             self.gave_up = True
             return box_charts(vertices, faces)
         started = time.perf_counter()
-        grown = grow_charts(vertices, faces, self._in_window)
+        grown = grow_charts(vertices, faces, self._apart)
         self._spent += time.perf_counter() - started
         return grown

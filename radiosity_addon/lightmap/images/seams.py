@@ -32,6 +32,10 @@ SAMPLES_PER_TEXEL = 2.0
 SAME_UV = 1e-3
 """Sides that lie closer than this on the page [texels] are one."""
 
+ROUNDED = 2.0**-23
+"""Places closer to a texel's center than this part of the page's width are there: coordinates are
+single-precision numbers."""
+
 MAX_SEAM_DISTANCE = 3.0
 """Texels this far [texels] from a place on a seam do not belong to it."""
 
@@ -172,14 +176,21 @@ def _smooth(scene: Scene, triangle: Array, corner: Array) -> Array:
 
 
 def _bilinear(spots: Array, pages: Array, sizes: Sequence[int]) -> tuple[Array, Array, Array]:
-    """Return (s, 2, 4) texels and weights at (s, 2, 2) places in texels, and (s,) whether on the page."""
+    """Return what is read at places on the page, and which of the places are on it.
+
+    spots (s, 2, 2): In texels.
+    Returns (s, 2, 4) texels and weights; a texel without weight is replaced by the one with the most.
+    """
     size = np.asarray(sizes, dtype=np.int64)
     first, width = run_starts(size * size)[pages], size[pages]
     inside = ((spots >= 0) & (spots <= width[..., None])).all(axis=(1, 2))
     texels, share = texels_around(spots, width, width)
+    near = np.abs(share - np.rint(share)) <= ROUNDED * width[..., None]
+    share = np.where(near, np.rint(share), share)
     (left, below), (right, above) = np.moveaxis(1 - share, -1, 0), np.moveaxis(share, -1, 0)
     weights = np.stack([left * below, right * below, left * above, right * above], axis=2)
-    return first[..., None] + texels, weights, inside
+    most = np.take_along_axis(texels, weights.argmax(axis=2)[..., None], axis=2)
+    return first[..., None] + np.where(weights > 0, texels, most), weights, inside
 
 
 def _own_texels_only(geometry: TexelGeometry, numbers: Array, weight: Array, at: Array, size: Array) -> Array:

@@ -9,6 +9,7 @@ from .cells import TexelCells
 from .nearest_uncut import whole_neighbor
 from .occlusion import Crossings, below_hood, find_crossings
 from .rasterization import FOOTPRINT, coverage_sum, overlapping_pairs, rasterize
+from .shared_texels import texel_areas
 from .states import DIVIDED, ENCLOSED, NO_TEXEL_HERE, OCCLUDED, TOUCHED
 from .surface_materials import texel_materials
 from .terminator import SmoothLift
@@ -31,6 +32,7 @@ __all__ = [
     "find_crossings",
     "overlapping_pairs",
     "rasterize",
+    "texel_areas",
     "texel_materials",
     "whole_neighbor",
 ]

@@ -3,7 +3,8 @@
 A texel is the unit square [column, column + 1] × [row, row + 1] in texel coordinates; row 0 is
 v = 0. It is covered where a triangle overlaps it by a positive area, and it belongs to one
 triangle: the one that covers its center, else the one with the largest overlap. Its *footprint*
-is the overlap, a convex polygon of up to seven corners, over which the lightmap averages.
+is the overlap, a convex polygon of up to seven corners, over which the lightmap averages. Texels that no
+triangle covers may be shared by triangles without an area on the page (`shared_texels.py`).
 
 Candidates are found by row spans (for each triangle and row the columns the triangle reaches), so
 the work is proportional to the texels covered, not to bounding boxes; temporaries are chunked at
@@ -22,6 +23,7 @@ from numpy.typing import NDArray
 
 from ...numerics import Scratch, plane_weights_at, run_chunks, run_numbers, signed_double_areas, tiles
 from .clip import area_in_unit_square, clip_to_unit_square, polygon_area_centroid, sample_polygons
+from .shared_texels import collapsed_pieces, is_collapsed, largest_piece
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -108,13 +110,17 @@ class _TexelPairs(NamedTuple):
     center: Bool
 
 
-def rasterize(uv: Float32, resolution: int, scratch: Scratch | None = None) -> Texels:
+def rasterize(
+    uv: Float32, resolution: int, scratch: Scratch | None = None, surface: Float | None = None
+) -> Texels:
     """Find every texel that a triangle overlaps, and the one triangle it belongs to.
 
     uv (n, 3, 2) float32: Triangles in [0, 1], either orientation; what lies outside the page is cut off and
-        triangles without area cover nothing.
+        triangles without area cover nothing, but see `surface`.
     resolution: Width and height of the page in texels.
     scratch: Makes the texels' arrays; None keeps them in memory.
+    surface (n,): Areas of the triangles in the world. If given, what no triangle covers belongs to the
+        collapsed triangle that has the largest piece there.
     Returns row-major; ties go to the larger overlap, then to the lower triangle index.
     """
     uv = np.ascontiguousarray(uv, dtype=np.float32)
@@ -127,6 +133,12 @@ def rasterize(uv: Float32, resolution: int, scratch: Scratch | None = None) -> T
         wins = score == best[pairs.texel]
         owner[pairs.texel[wins & (score > before)]] = _NOBODY
         np.minimum.at(owner, pairs.texel[wins], pairs.triangle[wins])
+    shared = None
+    if surface is not None:
+        texel, triangle_there, centers = largest_piece(collapsed_pieces(uv, resolution), surface, resolution)
+        free = owner[texel] == _NOBODY
+        shared = texel[free], centers[free]
+        owner[texel[free]], best[texel[free]] = triangle_there[free], _CENTER + 1
     scratch = scratch or Scratch()
     covered = np.flatnonzero(owner != _NOBODY)
     count = len(covered)
@@ -139,12 +151,14 @@ def rasterize(uv: Float32, resolution: int, scratch: Scratch | None = None) -> T
         triangle[tile], score = owner[at], best[at]
         area[tile], center_inside[tile] = 1.0, score >= _CENTER
         whole = score >= _CENTER + 1
-        numbers = tile.start + np.flatnonzero(whole)
+        numbers = tile.start + np.flatnonzero(whole & ~is_collapsed(uv[owner[at]]))
         centroid[numbers] = center_weights(uv, resolution, triangle[numbers], row[numbers], column[numbers])
         numbers = tile.start + np.flatnonzero(~whole)
         polygon, origin, _ = _clip(uv, resolution, triangle[numbers], row[numbers], column[numbers])
         area[numbers], middle = polygon_area_centroid(polygon)
         centroid[numbers] = _weights_inside(middle[:, None], origin)[:, 0]
+    if shared is not None:
+        centroid[np.searchsorted(covered, shared[0])] = shared[1].astype(np.float32)
     return Texels(resolution, uv, row, column, triangle, area, centroid, center_inside)
 
 

@@ -56,7 +56,9 @@ class SmoothLift:
         directions (r, k, 3): Unit, toward the lamp.
         """
         texels = texels if self._texels is None else self._texels[texels]
-        rows = np.flatnonzero(self._smooth[self._geometry.triangle[texels]])
+        # The points of a shared texel lie on other triangles, too.
+        smooth = self._smooth[self._geometry.triangle[texels]] & ~self._geometry.is_shared(texels)
+        rows = np.flatnonzero(smooth)
         if len(rows) == 0:
             return starts
         texel = texels[rows]

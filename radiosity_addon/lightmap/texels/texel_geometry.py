@@ -8,10 +8,11 @@ from functools import cached_property
 
 import numpy as np
 
-from ...numerics import Array, Scratch, tiles
+from ...numerics import Array, Scratch, orthonormal_basis, tiles
 from ...rays import Hits, surface_offset
 from ...scene import Scene
 from .rasterization import FOOTPRINT, Texels, sample_footprints
+from .shared_texels import SharedTexels, find_shared, texel_areas
 
 NO_TEXEL = -1
 
@@ -52,6 +53,8 @@ class TexelGeometry:
     STORED = ("page", "page_start", "triangle", "center_inside", "index", "uv", "page_of_triangle")
 
     scratch = Scratch()
+    shared: SharedTexels | None = None
+    """the texels that several triangles share; None if there are none, or the bake comes from a file"""
 
     def __init__(
         self,
@@ -94,6 +97,11 @@ class TexelGeometry:
                 self.surface_normal[texels_of_tile] = scene.face_normals[triangle]
                 centroid = page.centroid[tile].astype(np.float64)
                 self._put(texels_of_tile, self._drawn_in(centroid[:, None], triangle)[:, 0])
+        self.shared = find_shared(scene, uv, page_of_triangle, self.index, self.triangle)
+        if self.shared is not None:
+            many = np.flatnonzero(self.shared.number >= 0)
+            self.whole[many] = False
+            self.surface_normal[many], self.normal[many] = self.shared.facing, self.shared.shading
 
     def _joined(self, texels: Sequence[Texels]) -> list[Texels]:
         """Put the pages' texels one after the other; return them as views of the whole."""
@@ -126,7 +134,9 @@ class TexelGeometry:
         """Move texels to barycentric weights (r, 3) of their triangles."""
         triangle, upright = self.triangle[rows], self.surface_normal[rows]
         self.barycentric[rows] = weights[:, 1:]
-        self.position[rows] = self._sunk(rows, _at(self.triangles[triangle], weights[:, None]))[:, 0]
+        self.position[rows] = self._sunk(triangle[:, None], _at(self.triangles[triangle], weights[:, None]))[
+            :, 0
+        ]
         shading = np.einsum("nc,nck->nk", weights, self.normals[triangle])
         length = np.linalg.norm(shading, axis=1, keepdims=True)
         # A shading normal that vanished or points behind the surface is not usable.
@@ -159,17 +169,24 @@ class TexelGeometry:
     @cached_property
     def texel_area(self) -> Array:
         """(t,) float64: what a texel is of every triangle [m²]; endless where it has none of a page."""
-        edges = self.uv[:, 1:].astype(np.float64) - self.uv[:, :1]
-        flat = 0.5 * np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
-        flat *= np.array([len(numbers) ** 2 for numbers in self.index])[np.maximum(self.page_of_triangle, 0)]
-        # Far below what single-precision UVs can enclose, and far enough from 0 for any area.
-        return np.asarray(self._scene.areas / np.maximum(flat, 1e-200))
+        result = np.full(len(self.triangles), np.inf)
+        for page, numbers in enumerate(self.index):
+            rows = np.flatnonzero(self.page_of_triangle == page)
+            result[rows] = texel_areas(self.uv[rows], self._scene.areas[rows], len(numbers))
+        return result
 
     @property
     def reach(self) -> Array:
         """(n,) float64: no point of a texel is farther from another one of it [m]."""
         across, up = self._texel_edges
-        return np.asarray((np.linalg.norm(across, axis=1) + np.linalg.norm(up, axis=1))[self.triangle])
+        reach = np.asarray((np.linalg.norm(across, axis=1) + np.linalg.norm(up, axis=1))[self.triangle])
+        if self.shared is not None:
+            rows, shared = np.flatnonzero(self.shared.number >= 0), self.shared
+            apart = self.triangles[shared.triangle] - self.position[rows][shared.of, None]
+            farthest = np.zeros(len(rows))
+            np.maximum.at(farthest, shared.of, np.linalg.norm(apart, axis=2).max(axis=1))
+            reach[rows] = 2.0 * farthest
+        return reach
 
     def on(self, scene: Scene) -> TexelGeometry:
         """Return the same texels over a scene whose triangles have moved."""
@@ -181,22 +198,43 @@ class TexelGeometry:
         points = np.empty((len(rows), u.shape[1], 3))
         # Texels that lie entirely on their triangle need no clipping.
         inner = self.whole[rows] & ((width < 1.0) | ((u > 0.0) & (u < 1.0)).all(axis=(1, 2)))
-        plain, cut = np.flatnonzero(inner), np.flatnonzero(~inner)
+        shared = self._shared_numbers(rows)
+        plain, cut = np.flatnonzero(inner), np.flatnonzero(~inner & (shared < 0))
         points[plain] = self._in_plane(rows[plain], 0.5 + (u[plain].astype(np.float64) - 0.5) * width)
         corners = self._scene.triangles[self.triangle[rows[cut]]]
         points[cut] = _at(corners, self.sample_weights(rows[cut], u[cut], width))
-        return self._sunk(rows, points)
+        triangle = np.broadcast_to(self.triangle[rows][:, None], points.shape[:2])
+        many = np.flatnonzero(shared >= 0)
+        if self.shared is not None and len(many):
+            own, weights = self.shared.sample(shared[many], u[many])
+            weights = self._drawn_in(weights.reshape(-1, 1, 3), own.ravel())
+            points[many] = _at(self._scene.triangles[own.ravel()], weights).reshape(*own.shape, 3)
+            triangle = triangle.copy()
+            triangle[many] = own
+        return self._sunk(triangle, points)
 
-    def _sunk(self, rows: Array | slice, points: Array) -> Array:
+    def _shared_numbers(self, rows: Array) -> Array:
+        """Return (r,) which shared texels some texels are, or NO_TEXEL."""
+        if self.shared is None:
+            return np.full(len(rows), NO_TEXEL, dtype=np.int32)
+        return np.asarray(self.shared.number[rows])
+
+    def is_shared(self, rows: Array) -> Array:
+        """Return (r,) which texels several triangles share."""
+        return np.asarray(self._shared_numbers(rows) >= 0)
+
+    def _sunk(self, triangle: Array, points: Array) -> Array:
         """Move points (r, k, 3) that lie against another surface behind their own, which stops their rays.
 
         Rays that start above would pass the surface that the texel lies on.
+
+        triangle (r, k or 1) int: That the points are on.
         """
         layers = self._scene.layers
-        pressed = np.flatnonzero(layers.pressed_triangles[self.triangle[rows]])
+        pressed = np.flatnonzero(layers.pressed_triangles[triangle].any(axis=1))
         if len(pressed) == 0:
             return points
-        triangle = np.repeat(self.triangle[rows][pressed], points.shape[1])
+        triangle = np.broadcast_to(triangle[pressed], (len(pressed), points.shape[1])).ravel()
         chosen = points[pressed].reshape(-1, 3)
         sunk = layers.is_pressed(triangle, layers.weights(2 * triangle.astype(np.int64), chosen))
         depth = SINK * surface_offset(self.triangles)
@@ -206,7 +244,16 @@ class TexelGeometry:
 
     def squares(self, rows: Array) -> Array:
         """Return (r, 4, 3) the corners of whole texels, in their triangles' planes but not cut by them."""
-        return self._in_plane(rows, np.broadcast_to(_SQUARE, (len(rows), 4, 2)))
+        squares = self._in_plane(rows, np.broadcast_to(_SQUARE, (len(rows), 4, 2)))
+        shared = self._shared_numbers(rows)
+        many = np.flatnonzero(shared >= 0)
+        if self.shared is not None and len(many):
+            # As large as what shares the texel.
+            across, up = orthonormal_basis(self.surface_normal[rows[many]])
+            half = 0.5 * np.sqrt(self.shared.area[shared[many]])[:, None]
+            for corner, (x, y) in enumerate(_SQUARE - 0.5):
+                squares[many, corner] = self.position[rows[many]] + 2.0 * half * (x * across + y * up)
+        return squares
 
     def _in_plane(self, rows: Array, spots: Array) -> Array:
         """Return (r, k, 3) points in the triangles' planes at places (r, k, 2) of texels as unit squares."""
@@ -234,13 +281,18 @@ class TexelGeometry:
     def sample_weights(self, rows: Array, u: Array, width: float = FOOTPRINT) -> Array:
         """Return (r, k, 3) the barycentric weights of the same points in the texels' triangles."""
         weights = np.empty((len(rows), u.shape[1], 3))
+        shared = self._shared_numbers(rows)
         for number, page in enumerate(self.texels):
-            on_page = np.flatnonzero(self.page[rows] == number)
+            on_page = np.flatnonzero((self.page[rows] == number) & (shared < 0))
             if len(on_page) == 0:
                 continue
             local = rows[on_page] - self.page_start[number]
             inside = sample_footprints(page.take(local), u[on_page], width)
             weights[on_page] = self._drawn_in(inside, self.triangle[rows[on_page]])
+        many = np.flatnonzero(shared >= 0)
+        if self.shared is not None and len(many):
+            main = self.shared.sample_main(shared[many], u[many])
+            weights[many] = self._drawn_in(main, self.triangle[rows[many]])
         return weights
 
     def _drawn_in(self, weights: Array, triangle: Array) -> Array:

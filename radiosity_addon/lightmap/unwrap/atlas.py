@@ -15,10 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base import SILENT, BakeError, BakeWarning, Progress
-from ...numerics import signed_double_areas, triangle_areas
-from ..charts import Charts, PatientGrower, rescale_to_area, unwrap
+from ...numerics import numbered, signed_double_areas, triangle_areas
+from ..charts import PIECE, Charts, PatientGrower, rescale_to_area, unwrap
 from ..texels import coverage_sum
+from .align import chart_extents
+from .collapse import chart_places
+from .cut_empty import cut_empty_charts
 from .dominant_object import greedy_object, share_of
+from .kept_uvs import are_apart, has_area, overlaps
 from .packing import Limits, Packing, pack, page_size
 from .page_assignment import ChartTotals, assign_pages
 
@@ -28,12 +32,6 @@ Int = NDArray[np.int64]
 
 _PROBE = 1024
 """Kept UVs are searched for overlaps at no more than this resolution: a finer one finds no larger ones."""
-
-_OVERLAP = 1.01
-"""A texel filled to more than this holds triangles that lie over each other."""
-
-_COLLAPSED = 1e-6
-"""Kept UVs whose area is less than this share of their extent, squared, are a line except for rounding."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +49,8 @@ class AtlasInput:
         UVs to keep; None to unwrap.
     scale : float
         Its texels per meter, relative to the other objects.
+    kind : (n,) int or None
+        Only triangles of one kind share texels; None if all are alike.
     """
 
     name: str
@@ -58,6 +58,7 @@ class AtlasInput:
     polygon: NDArray[np.int32]
     uv: Float32 | None = None
     scale: float = 1.0
+    kind: Int | None = None
 
 
 @dataclass(frozen=True)
@@ -78,6 +79,8 @@ class AtlasOptions:
         Of every page.
     unwrap_seconds : float
         After so long an object's rest is cut into charts by the directions its faces look.
+    threads : int
+        Pieces of large objects that are cut at once; 0 means all cores.
     """
 
     resolution: int = 512
@@ -86,6 +89,7 @@ class AtlasOptions:
     pages: int = 1
     limits: Limits = field(default_factory=Limits)
     unwrap_seconds: float = 60.0
+    threads: int = 0
 
 
 @dataclass(frozen=True)
@@ -157,9 +161,10 @@ def build_atlas(objects: Sequence[AtlasInput], options: AtlasOptions, progress: 
     for source in objects:
         before, done = done, done + len(source.triangles)
         part = progress.part(0.7 * before / max(total, 1), 0.7 * done / max(total, 1))
-        layouts.append(_lay_flat(source, probe, warnings, options.unwrap_seconds, part))
+        layouts.append(_lay_flat(source, probe, warnings, options, part))
         part.at(1.0)
 
+    layouts = _cut_empty(layouts, options)
     laid = _lay_on_pages(layouts, options, progress.part(0.7, 1.0))
     placed: list[AtlasObject | None] = [None] * len(layouts)
     for number, (group, packing) in enumerate(laid):
@@ -213,23 +218,34 @@ def _lay_on_pages(layouts: list[_Layout], options: AtlasOptions, progress: Progr
         return laid
 
 
+def _cut_empty(layouts: list[_Layout], options: AtlasOptions) -> list[_Layout]:
+    """Cut charts that are mostly empty at about the density that there will be."""
+    padding, density = options.limits.padding, options.texel_density
+    if density is None:
+        pages = options.pages if options.shared else len(layouts)
+        density = _totals(layouts, padding).density(float(pages * options.resolution**2))
+    cut = []
+    for layout in layouts:
+        source = layout.source
+        if not layout.kept:
+            size = triangle_areas(np.asarray(source.triangles, dtype=np.float64)) * source.scale**2
+            charts = cut_empty_charts(
+                layout.charts, np.asarray(source.polygon, dtype=np.int64), size, density, padding
+            )
+            layout = replace(layout, charts=charts)
+        cut.append(layout)
+    return cut
+
+
 def _totals(layouts: list[_Layout], padding: int) -> ChartTotals:
     """Return the sums over each object's charts, at its scale."""
     areas = [_surface([layout]) * layout.source.scale**2 for layout in layouts]
-    lengths = [float(_extents(layout.charts).sum()) for layout in layouts]
+    lengths = [
+        float(chart_extents(layout.charts.uv, layout.charts.chart, layout.charts.count).sum())
+        for layout in layouts
+    ]
     counts = [float(layout.charts.count) for layout in layouts]
     return ChartTotals(np.array(areas), np.array(lengths), np.array(counts), padding)
-
-
-def _extents(charts: Charts) -> Float:
-    """Return (c, 2) width and height of each chart [m]."""
-    inside = charts.chart >= 0
-    corners, owner = charts.uv[inside].reshape(-1, 2), np.repeat(charts.chart[inside], 3)
-    low, high = np.full((charts.count, 2), np.inf), np.full((charts.count, 2), -np.inf)
-    np.minimum.at(low, owner, corners)
-    np.maximum.at(high, owner, corners)
-    extents: Float = high - low
-    return extents
 
 
 def _pack_group(group: list[_Layout], options: AtlasOptions, progress: Progress) -> Packing:
@@ -241,7 +257,7 @@ def _pack_group(group: list[_Layout], options: AtlasOptions, progress: Progress)
 
 
 def _lay_flat(
-    source: AtlasInput, probe: int, warnings: list[BakeWarning], seconds: float, progress: Progress
+    source: AtlasInput, probe: int, warnings: list[BakeWarning], options: AtlasOptions, progress: Progress
 ) -> _Layout:
     """Cut one object into charts, or take the UVs it has."""
     triangles = np.asarray(source.triangles, dtype=np.float64).reshape(-1, 3, 3)
@@ -251,8 +267,11 @@ def _lay_flat(
             return _Layout(source, _scaled(kept, source.scale), kept=True)
     if not len(triangles):
         return _Layout(source, Charts(np.zeros((0, 3, 2)), np.zeros(0, dtype=np.int64), 0), kept=False)
-    grower = PatientGrower(seconds, progress.in_window)
-    charts = unwrap(triangles, np.asarray(source.polygon, dtype=np.int64), grower, progress)
+    seconds = options.unwrap_seconds
+    # Pieces of a large object are cut at once: xatlas keeps Python's lock, so in processes of their own.
+    grower = PatientGrower(seconds, progress.in_window or len(triangles) > PIECE)
+    polygon = np.asarray(source.polygon, dtype=np.int64)
+    charts = unwrap(triangles, polygon, grower, progress, options.threads)
     if grower.gave_up:
         warnings.append(
             BakeWarning(
@@ -278,7 +297,7 @@ def _kept_charts(
     """
     assert source.uv is not None
     uv = source.uv.astype(np.float64)
-    if not np.isfinite(uv).all() or not _has_area(uv):
+    if not np.isfinite(uv).all() or not has_area(uv):
         warnings.append(
             BakeWarning(source.name, "its Lightmap UVs have no area or are not numbers; unwrapped again")
         )
@@ -287,18 +306,12 @@ def _kept_charts(
         warnings.append(
             BakeWarning(source.name, "its Lightmap UVs leave the unit square; what is outside gets no light")
         )
-    elif (coverage_sum(source.uv, probe) > _OVERLAP).any():
+    elif overlaps(coverage_sum(source.uv, probe)):
         warnings.append(
             BakeWarning(source.name, "its Lightmap UVs overlap; faces that share texels show the same light")
         )
     chart = np.zeros(len(uv), dtype=np.int64)
     return Charts(rescale_to_area(uv, triangles, chart, 1), chart, 1)
-
-
-def _has_area(uv: Float) -> bool:
-    """Whether (n, 3, 2) UVs cover more than rounding leaves of a line or a point."""
-    area = np.abs(signed_double_areas(uv)).sum()
-    return bool(area > _COLLAPSED * (np.ptp(uv.reshape(-1, 2), axis=0) ** 2).sum())
 
 
 def _kept_as_they_are(
@@ -309,7 +322,7 @@ def _kept_as_they_are(
         return None
     kept = [layout.source.uv for layout in group if layout.source.uv is not None]
     uv = np.concatenate(kept).astype(np.float32, copy=False)
-    if len(group) > 1 and not _apart(kept, min(resolution, _PROBE)):
+    if len(group) > 1 and not are_apart(kept, min(resolution, _PROBE)):
         return None
     surface = _surface(group)
     flat = float(0.5 * np.abs(signed_double_areas(uv.astype(np.float64))).sum())
@@ -322,17 +335,6 @@ def _kept_as_they_are(
             )
         resolution = page_size(size)
     return Packing(uv, resolution, resolution * float(np.sqrt(flat / surface)) if surface > 0 else 0.0)
-
-
-def _apart(layouts: list[Float32], resolution: int) -> bool:
-    """Return whether no object's UVs lie over another's (nor wholly outside the page)."""
-    taken = np.zeros((resolution, resolution))
-    for uv in layouts:
-        if uv.min() < -1e-6 or uv.max() > 1 + 1e-6:
-            return False
-        # An object that overlaps itself is its own affair.
-        taken += np.minimum(coverage_sum(uv, resolution), 1.0)
-    return not (taken > _OVERLAP).any()
 
 
 def _pack_page(
@@ -350,8 +352,9 @@ def _pack_page(
     used = np.flatnonzero(chart >= 0)
     if not len(used):
         return Packing(np.full(uv.shape, 0.5, dtype=np.float32), resolution if density is None else 4, 0.0)
+    places = chart_places(_corners(group)[used], chart[used], _share_groups(group)[used])
     try:
-        packing = pack(uv[used], chart[used], resolution, density, limits, progress)
+        packing = pack(uv[used], chart[used], resolution, density, limits, progress, places)
     except BakeError as error:
         alone = f"object '{group[0].source.name}': " if len(group) == 1 else ""
         raise BakeError(f"{alone}{error}{_greedy(group)[1]}") from None
@@ -359,6 +362,18 @@ def _pack_page(
     pages[used] = packing.uv
     _park(pages, chart, [len(layout.source.triangles) for layout in group])
     return Packing(pages, packing.resolution, packing.density, packing.crowded)
+
+
+def _share_groups(group: list[_Layout]) -> Int:
+    """Return a number for each triangle: only those of one object and kind share texels, −1 for kept UVs."""
+    number = np.repeat(np.arange(len(group)), [len(layout.source.triangles) for layout in group])
+    kind = np.concatenate([_kinds(layout.source) for layout in group])
+    kept = np.array([layout.kept for layout in group])
+    return np.where(kept[number], -1, numbered(np.column_stack((number, kind))))
+
+
+def _kinds(source: AtlasInput) -> Int:
+    return np.zeros(len(source.triangles), dtype=np.int64) if source.kind is None else source.kind
 
 
 def _park(uv: Float32, chart: Int, lengths: list[int]) -> None:
@@ -379,8 +394,11 @@ def _page(packing: Packing) -> AtlasPage:
 
 def _surface(group: list[_Layout]) -> float:
     """Return the area of all triangles [m²]."""
-    corners = np.concatenate([np.asarray(layout.source.triangles, dtype=np.float64) for layout in group])
-    return float(triangle_areas(corners).sum())
+    return float(triangle_areas(_corners(group)).sum())
+
+
+def _corners(group: list[_Layout]) -> Float:
+    return np.concatenate([np.asarray(layout.source.triangles, dtype=np.float64) for layout in group])
 
 
 def _greedy(group: list[_Layout]) -> tuple[str, str]:

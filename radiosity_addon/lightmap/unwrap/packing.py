@@ -10,7 +10,7 @@ a limit on time, and cannot be run twice on one atlas (docs/decisions/0005).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +18,10 @@ from numpy.typing import NDArray
 from ...base import SILENT, BakeError, Progress
 from ...numerics import signed_double_areas
 from ...options import MAX_RESOLUTION
-from .chart_profiles import Shapes, align, measure, outline
-from .skyline import Placement, place
+from .align import align
+from .chart_masks import ChartMasks, chart_masks
+from .collapse import STRETCH, ChartPlaces, collapse, collapsed_corners
+from .occupancy import Placement, place
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -43,6 +45,10 @@ STRETCHES = (1.0, 0.8, 0.85, 0.9, 0.95, 1.05, 1.1, 1.15, 1.2, 1.25)
 A few large charts rarely fill a square; texels up to a quarter longer than wide do no harm and
 bring up to a quarter more of them.
 """
+
+
+TRIALS, PRECISION = (12, 40), (1.004, 1.002)
+"""Scales tried at most, and the ratio of one that does not fit to one that does: for many charts, for few."""
 
 
 @dataclass(frozen=True)
@@ -110,16 +116,15 @@ def padding_for(mip_levels: int) -> int:
 
 @dataclass(frozen=True)
 class _Job:
-    """Aligned charts, their outlines, and the orders worth trying."""
+    """Aligned charts, the orders worth trying, and where charts are if some may collapse."""
 
     uv: Float
     chart: Int
-    edges: Float
-    owner: Int
     extent: Float
     orders: tuple[Int, ...]
     area: float
     limits: Limits
+    places: ChartPlaces | None
 
 
 def pack(
@@ -129,6 +134,7 @@ def pack(
     density: float | None,
     limits: Limits | None = None,
     progress: Progress = SILENT,
+    places: ChartPlaces | None = None,
 ) -> Packing:
     """Pack charts into a square page.
 
@@ -145,23 +151,26 @@ def pack(
     limits : Limits or None
     progress : Progress
         How many trials there will be is not known: it stays where it is.
+    places : ChartPlaces or None
+        Where the charts are in the scene: many small ones are then collapsed. None keeps all shapes.
 
     Raises
     ------
     BakeError
         If the density asks for more than the largest page.
     """
-    job = _job(uv, chart, limits or Limits())
+    job = _job(uv, chart, limits or Limits(), places)
     if density is not None:
         return _pack_at(job, density)
     finer = resolution
     while (packing := _pack_into(job, finer, resolution, progress)) is None:
         # Too small to keep the charts apart: pack a finer page and shrink it.
         finer *= 2
+        job = replace(job, places=None)
     return packing
 
 
-def _job(uv: Float, chart: Int, limits: Limits) -> _Job:
+def _job(uv: Float, chart: Int, limits: Limits, places: ChartPlaces | None) -> _Job:
     count = int(chart.max()) + 1
     aligned = align(uv, chart, count)
     extent = np.zeros((count, 2))
@@ -172,33 +181,40 @@ def _job(uv: Float, chart: Int, limits: Limits) -> _Job:
         orders.append(np.lexsort((np.arange(count), -long, -extent.prod(axis=1))))
         orders.append(np.lexsort((np.arange(count), -long, -short)))
     area = float(0.5 * np.abs(signed_double_areas(aligned)).sum())
-    return _Job(aligned, chart, *outline(aligned, chart), extent, tuple(orders), area, limits)
+    # A few charts have room for their gaps.
+    places = places if count > FEW_CHARTS else None
+    return _Job(aligned, chart, extent, tuple(orders), area, limits, places)
 
 
 @dataclass(frozen=True)
 class _ScaledCharts:
-    """Cells per meter (count, 2) of each chart and the shapes they have then.
+    """Cells per meter (count, 2) of each chart and the cells that it covers then.
 
     For an even and for an odd number of quarter turns.
     """
 
     scale: tuple[Float, Float]
-    shapes: tuple[Shapes, Shapes]
+    masks: tuple[ChartMasks, ChartMasks]
 
 
-def _scaled(job: _Job, scale: float, cell: int, stretch: float = 1.0) -> _ScaledCharts:
-    """Return the charts at `scale` texels per meter, stretched along the page's u."""
-    even = _measured(job, scale * np.array((stretch**0.5, stretch**-0.5)), cell)
-    odd = even if stretch == 1.0 else _measured(job, scale * np.array((stretch**-0.5, stretch**0.5)), cell)
+def _scaled(job: _Job, scale: float, cell: int, side: int, stretch: float = 1.0) -> _ScaledCharts:
+    """Return the charts at `scale` texels per meter, stretched along u, for a room of `side` cells."""
+    even = _measured(job, scale * np.array((stretch**0.5, stretch**-0.5)), cell, side)
+    if stretch == 1.0:
+        return _ScaledCharts((even[0], even[0]), (even[1], even[1]))
+    odd = _measured(job, scale * np.array((stretch**-0.5, stretch**0.5)), cell, side)
     return _ScaledCharts((even[0], odd[0]), (even[1], odd[1]))
 
 
-def _measured(job: _Job, scale: Float, cell: int) -> tuple[Float, Shapes]:
-    """Return cells per meter (count, 2) at `scale` (2,) texels per meter, and the charts' shapes."""
+def _measured(job: _Job, scale: Float, cell: int, side: int) -> tuple[Float, ChartMasks]:
+    """Return cells per meter (count, 2) at `scale` (2,) texels per meter, and the cells charts cover."""
     extent = job.extent * scale
     widen = np.where(extent < MIN_CHART_WIDTH, MIN_CHART_WIDTH / np.maximum(extent, 1e-30), 1.0)
+    if job.places is not None:
+        too_long = (extent > side * cell) & (extent <= STRETCH * side * cell)
+        widen = np.where(too_long, side * cell / extent, widen)
     cells = scale / cell * widen
-    return cells, measure(job.edges * cells[job.owner][:, None], job.owner, job.extent * cells)
+    return cells, chart_masks(job.uv * cells[job.chart][:, None], job.chart, job.extent * cells)
 
 
 def _pack_into(job: _Job, resolution: int, page: int, progress: Progress) -> Packing | None:
@@ -213,31 +229,32 @@ def _pack_into(job: _Job, resolution: int, page: int, progress: Progress) -> Pac
         return None
     full = resolution / float(np.sqrt(job.area))
     best: Packing | None = None
-    low, scale, trials = 0.0, 0.85 * full, int(np.clip(6000 // count, 6, 40))
-    for stretch in STRETCHES if count <= FEW_CHARTS else (1.0,):
-        high = full
-        for _ in range(trials):
-            scaled = _scaled(job, scale, cell, stretch)
-            placement, height = _place(job, scaled.shapes, side, cell)
-            if placement is not None:
+    few = count <= FEW_CHARTS
+    low, scale = 0.0, (0.85 if few else 0.75) * full
+    for stretch in STRETCHES if few else (1.0,):
+        high = np.inf
+        for _ in range(TRIALS[few]):
+            placed, room = _placed(job, scale, side, cell, stretch)
+            if placed is not None:
                 low = scale
-                best = _packing(_moved(job, scaled, placement, cell) * cell, resolution, page, scale)
+                best = _packing(placed, resolution, page, scale)
             else:
                 high = scale
             progress.at(0.0)
             if low == 0.0:
                 if high * job.extent.max() < MIN_CHART_WIDTH:
                     break
-                guess = scale * np.sqrt(side / height) if height else 0.5 * scale
-                scale = float(np.clip(guess, 0.25 * scale, 0.97 * scale))
-            elif high < low * 1.002:
+                scale *= float(np.clip(np.sqrt(room), 0.25, 0.98)) if room else 0.5
+            elif high < low * PRECISION[few]:
                 break
+            elif high == np.inf:
+                scale *= max(float(np.sqrt(room)), PRECISION[few]) * PRECISION[few]
             else:
                 scale = float(np.sqrt(low * high))
         if low == 0.0:
             return best
         # Another stretch is worth a search only if it beats the best so far.
-        scale = low * 1.002
+        scale = low * PRECISION[few]
     return best
 
 
@@ -255,11 +272,9 @@ def _pack_at(job: _Job, density: float) -> Packing:
             raise _too_dense(density, largest)
         cell = -(-resolution // MAX_CELLS)
         side = resolution // cell - 2 * job.limits.border(cell)
-        scaled = _scaled(job, density, cell)
-        placement, _ = _place(job, scaled.shapes, side, cell) if side > 0 else (None, 0)
-        if placement is not None:
-            moved = _moved(job, scaled, placement, cell)
-            best = _packing(moved * cell, resolution, resolution, density)
+        placed, _ = _placed(job, density, side, cell) if side > 0 else (None, 0)
+        if placed is not None:
+            best = _packing(placed, resolution, resolution, density)
             resolution = page_size((too_small + best.resolution) / 2)
         else:
             too_small = resolution
@@ -280,21 +295,73 @@ def _too_dense(density: float, largest: int) -> BakeError:
     )
 
 
-def _place(job: _Job, shapes: tuple[Shapes, Shapes], side: int, cell: int) -> tuple[Placement | None, int]:
-    """Return the first placement within a square of `side` cells, else None and the height reached."""
-    gap = job.limits.gap(cell)
-    even = shapes[0]
-    if min(max(shape.width.max(), shape.height.max()) for shape in shapes) > side:
-        return None, 0
-    if ((even.width + gap) * (even.height + gap) * even.boxy).sum() > 1.3 * (side + gap) ** 2:
-        return None, 0
-    few = len(job.extent) <= FEW_CHARTS
+def _placed(
+    job: _Job, scale: float, side: int, cell: int, stretch: float = 1.0
+) -> tuple[Float | None, float]:
+    """Place the charts within a square of `side` cells, at `scale` texels per meter.
+
+    Returns (n, 3, 2) corners in texels of the page, or None if they do not fit.
+    Returns by which factor the charts' area might change: the room there is to what they take, 0 if unknown.
+    """
+    block = collapse(job.places, job.extent * scale, scale, side * cell)
+    if block is None:
+        return None, 0.0
+    below = -(-block.rows // cell) + job.limits.gap(cell) if block.rows else 0
+    part, rows = _without(job, block.is_in) if block.rows else (job, np.arange(len(job.uv)))
+    if len(rows):
+        scaled = _scaled(part, scale, cell, side, stretch)
+        placement, share = _place(part, scaled.masks, (side, side - below), cell)
+        if placement is None:
+            return None, share
+        placed, height = _moved(part, scaled, placement, cell) * cell, below + placement.height
+        if not block.rows:
+            return placed, side / height
+    elif block.rows > side * cell:
+        return None, side * cell / block.rows
+    corners = collapsed_corners(block, job.uv, job.chart, job.extent) + job.limits.border(cell) * cell
+    if len(rows):
+        corners[rows] = placed + np.array((0, below * cell))
+        return corners, side / height
+    return corners, side * cell / block.rows
+
+
+def _without(job: _Job, left_out: NDArray[np.bool_]) -> tuple[_Job, NDArray[np.intp]]:
+    """Return the other charts, renumbered, and the triangles they have."""
+    number = np.cumsum(~left_out) - 1
+    rows = np.flatnonzero(~left_out[job.chart])
+    orders = tuple(number[order[~left_out[order]]] for order in job.orders)
+    part = replace(
+        job,
+        uv=job.uv[rows],
+        chart=number[job.chart[rows]],
+        extent=job.extent[~left_out],
+        orders=orders,
+    )
+    return part, rows
+
+
+def _place(
+    job: _Job, masks: tuple[ChartMasks, ChartMasks], room: tuple[int, int], cell: int
+) -> tuple[Placement | None, float]:
+    """Return the first placement in a room so wide and high [cells], else None and which part was placed."""
+    gap, (width, height) = job.limits.gap(cell), room
+    even = masks[0]
+    longest = np.maximum(even.width, even.height).max(), np.minimum(even.width, even.height).max()
+    if longest[0] > max(room) or longest[1] > min(room):
+        return None, 0.0
+    needed, free = (
+        ((even.width + gap) * (even.height + gap) * even.boxy).sum(),
+        (width + gap) * (height + gap),
+    )
+    if needed > free:
+        return None, float(free / needed)
+    share = 0.0
     for order in job.orders:
-        for thrifty in (False, True) if few else (True,):
-            placement = place(shapes, order, side, gap, side if few else None, thrifty)
-            if placement is not None and placement.height <= side:
-                return placement, placement.height
-    return None, placement.height if placement is not None else 0
+        placement, part = place(masks, order, width, height, gap)
+        if placement is not None:
+            return placement, 1.0
+        share = max(share, part)
+    return None, share
 
 
 def _moved(job: _Job, scaled: _ScaledCharts, placement: Placement, cell: int) -> Float:
@@ -304,7 +371,7 @@ def _moved(job: _Job, scaled: _ScaledCharts, placement: Placement, cell: int) ->
     odd = (quarter % 2 == 1)[:, None]
     local = job.uv * np.where(odd, scaled.scale[1][chart], scaled.scale[0][chart])[:, None]
     x, y = local[..., 0], local[..., 1]
-    even_box, odd_box = (np.stack((shape.width, shape.height), axis=-1)[chart] for shape in scaled.shapes)
+    even_box, odd_box = (np.stack((mask.width, mask.height), axis=-1)[chart] for mask in scaled.masks)
     width, height = (np.where(odd, odd_box, even_box)[:, k : k + 1] for k in (0, 1))
     u = np.choose(quarter[:, None], (x, height - y, width - x, y))
     v = np.choose(quarter[:, None], (y, x, height - y, width - x))
