@@ -23,8 +23,8 @@ from ..lightmap.lighting import (
 )
 from ..lightmap.texels import FOOTPRINT, TexelGeometry, rasterize, texel_materials
 from ..lightmap.transport import GatherSettings, TexelLight
-from ..lightmap.unwrap import Atlas, AtlasInput, AtlasObject, AtlasOptions, Limits, build_atlas, padding_for
-from ..numerics import Array, Scratch, numbered, tiles
+from ..lightmap.unwrap import Atlas
+from ..numerics import Array, Scratch, tiles
 from ..options import BakeSettings
 from ..rays import RayCaster
 from ..scene import BakeObject, BakeScene
@@ -32,7 +32,7 @@ from ..solver import Solution, SolverSettings, SolverState, solve
 from ..solver.element_transport import Relightable
 from .bake_warnings import coincident_counts, of_coincident, of_solution, small_objects
 from .estimate import refuse_before_unwrapping
-from .importance import scales_of, thinned_out
+from .layout import lay_out, padding
 from .quality import for_error, quality_of, used_settings
 from .relight import (
     HierarchyReport,
@@ -76,9 +76,6 @@ UNWRAP, RASTERIZE, SOLVE, LIGHT, ENCODE = 0.0, 0.02, 0.04, 0.29, 0.98
 
 MOST_SHOWN = 1 << 22
 """More texels than these are not shown while they are lit: their pictures would take too much memory."""
-
-COLORS = 4.0
-"""Triangles share texels if they emit alike, and their reflectances are alike in units of a quarter."""
 
 DILATED = 8
 """Texels past the charts that are filled ring by ring, if not more are free."""
@@ -131,7 +128,7 @@ def _bake(
     part = progress.stage("unwrap", UNWRAP, RASTERIZE)
     part.at(0.0)
     with timed(seconds, "unwrap"):
-        atlas = _unwrap(bake_scene, baked, settings, part)
+        atlas = lay_out(bake_scene, baked, settings, part)
     progress.stage("rasterise", RASTERIZE, SOLVE).at(0.0)
     sizes = [page.resolution for page in atlas.pages]
     refuse_large_pages(sizes, settings)
@@ -179,7 +176,7 @@ def finish(
     progress.stage("encode", 0.0, 0.0).at(0.0)
     with timed(seconds, "encode"):
         seams = _seams(bake_scene, lit.caster, geometry, settings)
-        rings = max(DILATED, _padding(settings))
+        rings = max(DILATED, padding(settings))
         pages = texel_pages(geometry, lit.values, seams, rings)
         _check(solved.report, pages)
     kept = None
@@ -234,55 +231,6 @@ def finish(
 def baked_objects(bake_scene: BakeScene) -> list[BakeObject]:
     """Return the objects that get lightmaps."""
     return [item for item in bake_scene.objects if item.bake and item.count]
-
-
-def _unwrap(
-    bake_scene: BakeScene, baked: list[BakeObject], settings: BakeSettings, progress: Progress
-) -> Atlas:
-    """Lay the objects' charts out on pages."""
-    scene, scales = bake_scene.scene, scales_of(bake_scene, baked, settings)
-    looks = np.column_stack((np.rint(COLORS * scene.reflectance), scene.emission))
-    kind = numbered(looks)
-    inputs = [
-        _to_lay_out(item, scene.triangles[item.rows], item.texel_scale * scale, kind[item.rows])
-        for item, scale in zip(baked, scales, strict=True)
-    ]
-    options = AtlasOptions(
-        settings.resolution,
-        settings.texel_density,
-        settings.atlas == "shared",
-        settings.pages,
-        Limits(settings.max_resolution, _padding(settings)),
-        settings.unwrap_seconds,
-        settings.threads,
-    )
-    atlas = build_atlas(inputs, options, progress)
-    thinned = thinned_out([item.name for item in baked], scales)
-    placed = [_with_glass(item, each) for item, each in zip(baked, atlas.objects, strict=True)]
-    return replace(atlas, objects=tuple(placed), warnings=(*thinned, *atlas.warnings))
-
-
-def _to_lay_out(item: BakeObject, triangles: Array, scale: float, kind: Array) -> AtlasInput:
-    """Return what gets texels of an object."""
-    polygon, uv = item.polygon, item.uv
-    if item.glass is not None:
-        uv = None if uv is None else uv[item.lit]
-        triangles, polygon, kind = triangles[item.lit], polygon[item.lit], kind[item.lit]
-    return AtlasInput(item.name, triangles, polygon, uv, scale, kind)
-
-
-def _with_glass(item: BakeObject, placed: AtlasObject) -> AtlasObject:
-    """Return where all triangles of an object lie: glass where it was, or nowhere."""
-    if item.glass is None:
-        return placed
-    uv = np.zeros((item.count, 3, 2), dtype=np.float32) if item.uv is None else item.uv.copy()
-    uv[item.lit] = placed.uv
-    return replace(placed, uv=uv)
-
-
-def _padding(settings: BakeSettings) -> int:
-    """Return the free texels between charts."""
-    return padding_for(settings.mip_levels) if settings.padding is None else settings.padding
 
 
 def _texels(bake_scene: BakeScene, baked: list[BakeObject], atlas: Atlas, scratch: Scratch) -> TexelGeometry:
