@@ -242,7 +242,7 @@ def _replacement(
         made = Replacement(source, baked, stand_in, mesh, False, stands_for, known, list(mesh.materials))
         return _with_object_slots(made, own_object)
     if source.needs_evaluated_mesh or obj is None or obj.type != "MESH":
-        raise BakeError(f"object '{source.name}' was removed while it was being baked: bake again")
+        raise BakeError(f"object '{source.name}' was removed or renamed while it was being baked: bake again")
     drawn = drawn_materials(obj)
     check_room(obj.data, source.name)
     if obj.data in own and not stand_in:

@@ -85,7 +85,7 @@ def _named(name: str) -> bpy.types.World:
     """
     world = next((each for each in bpy.data.worlds if each.name_full == name), None)
     if world is None:
-        raise SceneError(f"world '{name}' was removed while the scene was read: bake again")
+        raise SceneError(f"world '{name}' was removed or renamed while the scene was read: bake again")
     return world
 
 

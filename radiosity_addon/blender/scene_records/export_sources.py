@@ -71,7 +71,8 @@ class MaterialSource:
         """
         material = bpy.data.materials.get((self.name, self.library))
         if material is None:
-            raise SceneError(f"material '{self.name}' was removed while the scene was read: bake again")
+            what = f"material '{self.name}' was removed or renamed while the scene was read"
+            raise SceneError(f"{what}: bake again")
         return material
 
 

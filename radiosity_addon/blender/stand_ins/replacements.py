@@ -151,7 +151,7 @@ def show(context: bpy.types.Context, replacements: Sequence[Replacement]) -> Non
         obj = replacement.obj
         if obj is None:
             name = replacement.source.name
-            raise BakeError(f"object '{name}' was removed while it was being baked: bake again")
+            raise BakeError(f"object '{name}' was removed or renamed while it was being baked: bake again")
         record_baked(obj, context.scene)
         if replacement.in_place:
             _show_in_place(obj, replacement)
