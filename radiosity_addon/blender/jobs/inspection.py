@@ -26,12 +26,10 @@ from ...bake import (
 )
 from ...base import BakeWarning, RadiosityError
 from ...lightmap.unwrap import greedy_object, share_of
-from ...numerics import double_area_vectors
 from ...numerics import folder as scratch_folder
 from ...options import BakeSettings
 from ...scene import LIGHTMAP_UV_LAYER
 from ..apply.rebake import originals_shown
-from ..datablocks.mesh_arrays import world_from_object
 from ..files.foreseen_files import file_refusal
 from ..materials.materials import uses_nodes
 from ..scene_export.collect import collect
@@ -40,7 +38,7 @@ from ..scene_records.object_roles import BAKEABLE_TYPES
 from ..scene_records.pieces import Piece, SceneContents
 from ..scene_records.render_state import render_depsgraph
 from .coincident_check import coincident_warnings
-from .lit_objects import glass_materials, lit_objects
+from .lit_objects import PieceShape, glass_materials, lit_objects, piece_shape
 
 if TYPE_CHECKING:
     from ..cycles.lamps import LampFactors
@@ -60,9 +58,6 @@ ODD_SCALE = 100.0
 
 HUGE, MINUTE = 5000.0, 0.02
 """Sizes of a scene [m] that look like a mistaken unit."""
-
-CLOSED = 1e-4
-"""A surface is taken for closed if the vectors of its areas sum to less than this share of them."""
 
 NOTED_FILES = 1e9
 """Temporary files are reported from this size on [bytes]."""
@@ -112,15 +107,6 @@ class Inspection:
         return any(finding.level != INFO for finding in self.findings)
 
 
-@dataclass(frozen=True)
-class _Shape:
-    """A piece in the world: its area [m²], the box around it (2, 3) and, if it is closed, its volume [m³]."""
-
-    area: float
-    box: np.ndarray
-    volume: float | None
-
-
 def inspect(
     context: bpy.types.Context,
     settings: BakeSettings,
@@ -157,9 +143,8 @@ def inspect(
     except RadiosityError as error:
         chosen = []
         findings.append(Finding(ERROR, context.scene.name, str(error)))
-    shapes = {id(piece): _shape(piece) for piece in collected.pieces if len(piece.mesh)}
-    areas, boxes = ({of: getattr(shape, name) for of, shape in shapes.items()} for name in ("area", "box"))
-    lit = lit_objects(chosen, areas, boxes, collected, settings.keep_uvs)
+    shapes = {id(piece): piece_shape(piece) for piece in collected.pieces if len(piece.mesh)}
+    lit = lit_objects(chosen, shapes, collected, settings.keep_uvs)
     triangles = sum(len(piece.mesh) for piece in collected.pieces)
     plan = estimate_bake(lit, triangles, settings)
     refused = None if output is None else file_refusal(output, settings, collected, chosen, files)
@@ -198,18 +183,6 @@ def _of_glass(collected: SceneContents) -> Iterator[Finding]:
 
 def _more_warnings(collected: SceneContents, chosen: Sequence[Piece]) -> list[BakeWarning]:
     return [*collected.warnings, *coincident_warnings(collected.pieces, chosen)]
-
-
-def _shape(piece: Piece) -> _Shape:
-    corners, _, _ = world_from_object(piece.mesh, piece.matrix)
-    flat = corners.reshape(-1, 3)
-    box = np.stack([flat.min(axis=0), flat.max(axis=0)])
-    local = corners - box.mean(axis=0)
-    vectors = 0.5 * double_area_vectors(local)
-    area = float(np.linalg.norm(vectors, axis=1).sum())
-    closed = area > 0 and np.linalg.norm(vectors.sum(axis=0)) < CLOSED * area
-    volume = float(np.einsum("tk,tk->t", local[:, 0], vectors).sum() / 3.0) if closed else None
-    return _Shape(area, box, volume)
 
 
 def _of_the_file(folder: Path | None) -> Iterator[Finding]:
@@ -326,7 +299,7 @@ def _of_texels(lit: Sequence[LightmappedObject], plan: Estimate) -> Iterator[Fin
 
 
 def _of_shapes(
-    context: bpy.types.Context, collected: SceneContents, shapes: dict[int, _Shape]
+    context: bpy.types.Context, collected: SceneContents, shapes: dict[int, PieceShape]
 ) -> Iterator[Finding]:
     """Name objects that are inside out, and scales that look forgotten."""
     pieces = [piece for piece in collected.pieces if id(piece) in shapes]
@@ -356,7 +329,7 @@ def _of_shapes(
             yield Finding(WARNING, piece.source.name, message)
 
 
-def _of_size(shapes: dict[int, _Shape]) -> Iterator[Finding]:
+def _of_size(shapes: dict[int, PieceShape]) -> Iterator[Finding]:
     """Doubt the unit of a scene of an unlikely size."""
     if not shapes:
         return

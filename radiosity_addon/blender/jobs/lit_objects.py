@@ -1,39 +1,53 @@
-"""What gets texels of the objects to be baked, before anything is unwrapped: glass gets none."""
+"""What gets texels of the objects to be baked, before anything is unwrapped, and how large it is."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ...bake import LightmappedObject
-from ...numerics import triangle_areas
+from ...numerics import double_area_vectors, triangle_areas
 from ..datablocks.mesh_arrays import world_from_object
 from ..scene_records.pieces import Piece, SceneContents
 
+CLOSED = 1e-4
+"""A surface is taken for closed if the vectors of its areas sum to less than this share of them."""
+
+
+@dataclass(frozen=True)
+class PieceShape:
+    """A piece in the world: its area [m²], the box around it (2, 3) and, if it is closed, its volume [m³]."""
+
+    area: float
+    box: np.ndarray
+    volume: float | None
+
+
+def piece_shape(piece: Piece) -> PieceShape:
+    """Return the shape of a piece with faces."""
+    corners, _, _ = world_from_object(piece.mesh, piece.matrix)
+    flat = corners.reshape(-1, 3)
+    box = np.stack([flat.min(axis=0), flat.max(axis=0)])
+    local = corners - box.mean(axis=0)
+    vectors = 0.5 * double_area_vectors(local)
+    area = float(np.linalg.norm(vectors, axis=1).sum())
+    closed = area > 0 and np.linalg.norm(vectors.sum(axis=0)) < CLOSED * area
+    volume = float(np.einsum("tk,tk->t", local[:, 0], vectors).sum() / 3.0) if closed else None
+    return PieceShape(area, box, volume)
+
 
 def lit_objects(
-    chosen: Sequence[Piece],
-    areas: Mapping[int, float],
-    boxes: Mapping[int, np.ndarray],
-    collected: SceneContents,
-    keep_uvs: bool,
+    chosen: Sequence[Piece], shapes: Mapping[int, PieceShape], collected: SceneContents, keep_uvs: bool
 ) -> list[LightmappedObject]:
     """Return the objects that get a lightmap.
 
-    areas: The pieces' surfaces by their `id` [m²].
-    boxes: Around the pieces (2, 3) by their `id` [m].
+    shapes: Of the pieces with faces, by their `id`.
     """
     clear = _clear(collected)
     return [
-        LightmappedObject(
-            piece.source.name,
-            int((~clear[piece.surface]).sum()),
-            _matte_area(piece, areas.get(id(piece), 0.0), clear),
-            piece.role.texel_scale,
-            boxes.get(id(piece), np.zeros((2, 3))),
-            keeps_uvs=keep_uvs and piece.has_lightmap_layer,
-        )
+        _lit_object(piece, shapes.get(id(piece)), clear, keep_uvs)
         for piece in chosen
         if not len(piece.mesh) or not clear[piece.surface].all()
     ]
@@ -51,10 +65,19 @@ def _clear(collected: SceneContents) -> np.ndarray:
     return np.array([surface.is_clear for surface in collected.surfaces], dtype=bool)
 
 
-def _matte_area(piece: Piece, area: float, clear: np.ndarray) -> float:
-    """Return the surface [m²] of a piece, of which the given one includes its glass."""
+def _lit_object(
+    piece: Piece, shape: PieceShape | None, clear: np.ndarray, keep_uvs: bool
+) -> LightmappedObject:
     matte = ~clear[piece.surface]
-    if matte.all():
-        return area
-    corners, _, _ = world_from_object(piece.mesh, piece.matrix)
-    return float(triangle_areas(corners[matte]).sum())
+    area, box = (0.0, np.zeros((2, 3))) if shape is None else (shape.area, shape.box)
+    if not matte.all():
+        corners, _, _ = world_from_object(piece.mesh, piece.matrix)
+        area = float(triangle_areas(corners[matte]).sum())
+    return LightmappedObject(
+        piece.source.name,
+        int(matte.sum()),
+        area,
+        piece.role.texel_scale,
+        box,
+        keeps_uvs=keep_uvs and piece.has_lightmap_layer,
+    )

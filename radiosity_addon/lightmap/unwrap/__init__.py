@@ -5,7 +5,8 @@ Our own packer; see `docs/decisions/0005-our-own-packer.md`.
 
 from __future__ import annotations
 
-from .atlas import Atlas, AtlasInput, AtlasObject, AtlasOptions, build_atlas
+from .atlas import Atlas, AtlasObject, build_atlas
+from .atlas_input import AtlasInput, AtlasOptions
 from .dominant_object import greedy_object, share_of
 from .packing import Limits, padding_for, page_size
 from .page_assignment import ChartTotals, assign_pages

@@ -11,7 +11,7 @@ import math
 import bpy
 
 from . import row
-from .materials import NOWHERE, _image, _tile
+from .materials import NOWHERE, image_node, tile_uvs
 from .stage import (
     add_lamp,
     add_mesh,
@@ -64,8 +64,8 @@ def glass_image() -> None:
     stage(blockers=False)
     glass = shader_material("Stained", "ShaderNodeBsdfGlass")
     shader = next(node for node in glass.node_tree.nodes if node.type == "BSDF_GLASS")
-    glass.node_tree.links.new(_image(glass).outputs["Color"], shader.inputs["Color"])
-    _tile(add_quad("Pane", PANE, NOWHERE, glass))
+    glass.node_tree.links.new(image_node(glass).outputs["Color"], shader.inputs["Color"])
+    tile_uvs(add_quad("Pane", PANE, NOWHERE, glass))
     _lamp(shadow_soft_size=0.05)
 
 

@@ -20,7 +20,7 @@ def image_texture() -> None:
     """Image texture on floor and wall, whose colors bounce."""
     _lit_stage()
     material = diffuse("Tiles", 0.8)
-    _paint("Floor", material, _image(material))
+    _paint("Floor", material, image_node(material))
     _paint("Left", material)
 
 
@@ -30,7 +30,7 @@ def uv_mapping() -> None:
     _lit_stage()
     material = diffuse("Tiles", 0.8)
     tree = material.node_tree
-    image = _image(material)
+    image = image_node(material)
     uv_map = tree.nodes.new("ShaderNodeUVMap")
     uv_map.uv_map = "Tiling"
     mapping = add_node(tree, "ShaderNodeMapping", Rotation=(0.0, 0.0, 0.5), Scale=(1.7, 2.3, 1.0))
@@ -134,11 +134,11 @@ def textured_emission() -> None:
     shader = next(node for node in screen.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
     shader.inputs["Base Color"].default_value = (0, 0, 0, 1)
     shader.inputs["Specular IOR Level"].default_value = 0
-    image = _image(screen)
+    image = image_node(screen)
     screen.node_tree.links.new(image.outputs["Color"], shader.inputs["Emission Color"])
     corners = ((1.6, -1.2, 0.5), (1.6, 0.8, 0.5), (1.6, 0.8, 1.7), (1.6, -1.2, 1.7))
     panel = add_quad("Screen", corners, NOWHERE, screen)
-    _tile(panel)
+    tile_uvs(panel)
 
 
 @row("cut-out")
@@ -148,14 +148,14 @@ def cut_out() -> None:
     fence = shader_material("Fence", "ShaderNodeMixShader")
     tree = fence.node_tree
     mix = next(node for node in tree.nodes if node.type == "MIX_SHADER")
-    image = _image(fence)
+    image = image_node(fence)
     tree.links.new(image.outputs["Alpha"], mix.inputs[0])
     tree.links.new(tree.nodes.new("ShaderNodeBsdfTransparent").outputs[0], mix.inputs[1])
     paint = add_node(tree, "ShaderNodeBsdfDiffuse", Color=(0.7, 0.4, 0.1, 1))
     tree.links.new(paint.outputs[0], mix.inputs[2])
     corners = ((-1.2, -0.6, 0), (1.4, -0.6, 0), (1.4, -0.6, 1.4), (-1.2, -0.6, 1.4))
     plane = add_quad("Fence", corners, NOWHERE, fence)
-    _tile(plane)
+    tile_uvs(plane)
     add_lamp("POINT", location=(0.5, -1.7, 1.2), energy=100, shadow_soft_size=0.02)
 
 
@@ -172,7 +172,7 @@ def _object_coordinates(tree: bpy.types.NodeTree) -> bpy.types.NodeSocket:
     return mapping.outputs["Vector"]
 
 
-def _image(material: bpy.types.Material) -> bpy.types.Node:
+def image_node(material: bpy.types.Material) -> bpy.types.Node:
     """Add an image of eight by eight colored squares, some of them cut out, to a material's nodes."""
     image = bpy.data.images.new("Squares", 8, 8)
     pixels = np.ones((8, 8, 4), dtype=np.float32)
@@ -189,14 +189,14 @@ def _image(material: bpy.types.Material) -> bpy.types.Node:
 def _paint(name: str, material: bpy.types.Material, color: bpy.types.Node | None = None) -> None:
     """Give an object a UV map of its own and a material, whose color is a node's."""
     obj = bpy.data.objects[name]
-    _tile(obj)
+    tile_uvs(obj)
     obj.data.materials[0] = material
     if color is not None:
         shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_DIFFUSE")
         material.node_tree.links.new(color.outputs[0], shader.inputs["Color"])
 
 
-def _tile(obj: bpy.types.Object) -> None:
+def tile_uvs(obj: bpy.types.Object) -> None:
     """Add a UV map in which every face is the unit square, and make it the rendered one."""
     layer = obj.data.uv_layers.new(name="Tiling")
     layer.data.foreach_set("uv", [0, 0, 1, 0, 1, 1, 0, 1] * len(obj.data.polygons))
