@@ -64,7 +64,7 @@ def test_visibility_asks_no_more_samples_than_it_needs() -> None:
     samples = PairSamples(hierarchy, one, source, 3)
     traced, free = trace_pairs(caster, samples, empty_too=True)
     visibility = pair_visibility(hierarchy, caster, one, source, 3)
-    np.testing.assert_array_equal(visibility, open_share(samples, traced, free))
+    np.testing.assert_array_equal(visibility, open_share(samples.transfer, traced, free)[0])
     assert set(np.unique(traced.sum(axis=1))) >= {4, 16}
     assert {0.0, 1.0} < set(visibility.tolist())
 

@@ -29,8 +29,9 @@ def with_arrays(**changes: Callable[[np.ndarray], np.ndarray]) -> BakeScene:
     scene = lit_bake()
     (box,) = [item for item in scene.objects if item.name == "Box"]
     for name, change in changes.items():
-        values = getattr(scene.scene, name)
+        values = getattr(scene.scene, name).copy()
         values[box.rows] = change(values[box.rows])
+        setattr(scene.scene, name, values)
     return scene
 
 

@@ -37,7 +37,9 @@ def _report(files: tuple[LightmapFile, ...]) -> BakeReport:
         LightmapPage(np.zeros((2, 2, 3), np.float32), np.ones((2, 2), bool)),
     )
     names = ("Wände", "B")
-    baked = tuple(SimpleNamespace(object=SimpleNamespace(name=n), page=i) for i, n in enumerate(names))
+    baked = tuple(
+        SimpleNamespace(object=SimpleNamespace(name=n), page=i, density=64.0) for i, n in enumerate(names)
+    )
     result = BakeResult(pages, baked, SOLVER, (BakeWarning("B", "something is odd"),))
     return BakeReport.of(result, files, {"export": 0.123456, "solve": 2})
 
@@ -48,11 +50,12 @@ def test_the_file_holds_what_the_format_promises(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["report.json"]
     read = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
     assert read == report.as_dict()
+    of_each = {"uv_layer": "Lightmap", "texels_per_metre": 64.0}
     assert read == {
         "version": 2,
         "objects": [
-            {"object": "Wände", "uv_layer": "Lightmap", "image": "a.exr", "resolution": [8, 4], "atlas": 0},
-            {"object": "B", "uv_layer": "Lightmap", "image": "b.exr", "resolution": [2, 2], "atlas": 1},
+            {"object": "Wände", "image": "a.exr", "resolution": [8, 4], "atlas": 0, **of_each},
+            {"object": "B", "image": "b.exr", "resolution": [2, 2], "atlas": 1, **of_each},
         ],
         "pages": [{"image": "a.exr"}, {"image": "b.exr"}],
         "solver": {

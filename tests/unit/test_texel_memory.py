@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from radiosity_addon.bake import pipeline, texel_memory
+from radiosity_addon.bake import layout, texel_memory
 from radiosity_addon.bake.estimate import LightmappedObject, estimate_bake
 from radiosity_addon.bake.pipeline import bake
 from radiosity_addon.bake.texel_memory import least_bytes, pages_of, process_bytes, refuse_large_pages
@@ -86,7 +86,7 @@ def test_a_bake_is_refused_before_anything_is_unwrapped(
     def unwrapped(*_: object) -> None:
         raise AssertionError("it was unwrapped")
 
-    monkeypatch.setattr(pipeline, "build_atlas", unwrapped)
+    monkeypatch.setattr(layout, "build_atlas", unwrapped)
     triangles, _ = box_room()
     scene = bake_scene(gray_scene(triangles), ("Room", 12))
     with pytest.raises(UsageError, match="memory limit"):

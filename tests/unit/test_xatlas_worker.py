@@ -31,7 +31,7 @@ def test_the_other_process_gives_the_same_charts(bowl) -> None:
     np.testing.assert_array_equal(found[1], chart)
 
 
-def test_only_long_work_with_a_window_starts_a_process(bowl, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_long_work_that_runs_apart_starts_a_process(bowl, monkeypatch: pytest.MonkeyPatch) -> None:
     asked = []
 
     def apart(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -43,8 +43,8 @@ def test_only_long_work_with_a_window_starts_a_process(bowl, monkeypatch: pytest
     growers.grow_charts(vertices, faces[:20])
     growers.grow_charts(vertices, faces)
     assert asked == []
-    growers.grow_charts(vertices, faces[:20], in_window=True)
-    growers.grow_charts(vertices, faces, in_window=True)
+    growers.grow_charts(vertices, faces[:20], apart=True)
+    growers.grow_charts(vertices, faces, apart=True)
     assert asked == [len(faces)]
 
 
@@ -54,7 +54,7 @@ def test_without_another_process_the_work_is_done_here(
 ) -> None:
     monkeypatch.setattr(sys, "executable", program)
     assert xatlas_worker.run_apart(*bowl) is None
-    _, chart = growers.grow_charts(*bowl, in_window=True)
+    _, chart = growers.grow_charts(*bowl, apart=True)
     assert len(chart) == len(bowl[1])
 
 

@@ -117,7 +117,7 @@ class Hierarchy:
         if self._by_channel is None or len(self._by_channel) != self.n_elements:
             triangle = self.faces.triangle[self.face]
             rows = np.flatnonzero(self._images.tinting[triangle])
-            stopped = 1.0 - self._images.mean_passes(triangle[rows], self._weights[rows])
+            stopped = 1.0 - self._images.mean_passes(triangle[rows], self._weights_of(rows))
             self._by_channel = np.repeat(self.opacity[:, None], 3, axis=1)
             # By the same mean as above: what others cover is no part of it.
             mean = np.maximum(stopped.mean(axis=1), 1e-300)

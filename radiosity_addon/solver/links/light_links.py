@@ -73,10 +73,16 @@ class LightLinks:
         """Return (n_elements, 4, k): each element's share on its quarters, for (n_lights, k) strengths."""
         total = np.zeros((n_elements, 4, strengths.shape[1]))
         for channel in range(strengths.shape[1]):
-            for quarter in range(4):
-                gain = self.gain[:, quarter] if self.gain.ndim == 2 else self.gain[:, quarter, channel]
-                arriving = gain * strengths[self.light, channel]
-                total[:, quarter, channel] = np.bincount(self.receiver, arriving, minlength=n_elements)
+            total[..., channel] = self._of_channel(channel, strengths, n_elements)
+        return total
+
+    def _of_channel(self, channel: int, strengths: Array, n_elements: int) -> Array:
+        """Return (n_elements, 4): the shares of one channel."""
+        total = np.zeros((n_elements, 4))
+        for quarter in range(4):
+            gain = self.gain[:, quarter] if self.gain.ndim == 2 else self.gain[:, quarter, channel]
+            arriving = gain * strengths[self.light, channel]
+            total[:, quarter] = np.bincount(self.receiver, arriving, minlength=n_elements)
         return total
 
     def at_leaves(self, hierarchy: Hierarchy, strengths: Array) -> Array:
@@ -84,8 +90,8 @@ class LightLinks:
         total = np.empty((hierarchy.n_elements, 3))
         # One channel at a time: quarters of all elements are large.
         for channel in range(3):
-            own = self.irradiance(strengths[:, channel : channel + 1], hierarchy.n_elements)
-            total[:, channel] = push(hierarchy, own)[:, 0]
+            own = self._of_channel(channel, strengths, hierarchy.n_elements)
+            total[:, channel] = push(hierarchy, own[..., None])[:, 0]
         return total
 
 
