@@ -23,7 +23,7 @@ from .atlas_input import AtlasInput, AtlasOptions
 from .collapse import chart_places
 from .cut_empty import cut_empty_charts
 from .dominant_object import greedy_object, share_of
-from .kept_uvs import are_apart, has_area, overlaps
+from .kept_uvs import are_apart, has_area, is_collapsed, overlaps
 from .packing import Limits, Packing, pack, page_size
 from .page_assignment import ChartTotals, assign_pages
 
@@ -205,7 +205,7 @@ def _lay_flat(
     """Cut one object into charts, or take the UVs it has."""
     triangles = np.asarray(source.triangles, dtype=np.float64).reshape(-1, 3, 3)
     if source.uv is not None:
-        kept = _kept_charts(source, triangles, probe, warnings)
+        kept = _kept_charts(source, triangles, probe, options, warnings)
         if kept is not None:
             return _Layout(source, _scaled(kept, source.scale), kept=True)
     if not len(triangles):
@@ -232,7 +232,7 @@ def _scaled(charts: Charts, scale: float) -> Charts:
 
 
 def _kept_charts(
-    source: AtlasInput, triangles: Float, probe: int, warnings: list[BakeWarning]
+    source: AtlasInput, triangles: Float, probe: int, options: AtlasOptions, warnings: list[BakeWarning]
 ) -> Charts | None:
     """Take an object's UVs as one chart at world scale; None, with a warning, if they are useless.
 
@@ -240,7 +240,8 @@ def _kept_charts(
     """
     assert source.uv is not None
     uv = source.uv.astype(np.float64)
-    if not np.isfinite(uv).all() or not has_area(uv):
+    collapsed = options.texel_density is None and is_collapsed(uv, options.resolution)
+    if not np.isfinite(uv).all() or not (has_area(uv) or collapsed):
         warnings.append(
             BakeWarning(source.name, "its Lightmap UVs have no area or are not numbers; unwrapped again")
         )

@@ -17,6 +17,9 @@ _OVERLAP = 1.01
 _COLLAPSED = 1e-6
 """Kept UVs whose area is less than this share of their extent, squared, are a line except for rounding."""
 
+_OFF_CENTER = 1e-2
+"""Single precision puts coordinates at most this far [texels] off a texel's center."""
+
 
 def overlaps(coverage: Float) -> bool:
     """Return whether triangles lie over each other, by the sum of what they cover of each texel."""
@@ -27,6 +30,13 @@ def has_area(uv: Float) -> bool:
     """Whether (n, 3, 2) UVs cover more than rounding leaves of a line or a point."""
     area = np.abs(signed_double_areas(uv)).sum()
     return bool(area > _COLLAPSED * (np.ptp(uv.reshape(-1, 2), axis=0) ** 2).sum())
+
+
+def is_collapsed(uv: Float, resolution: int) -> bool:
+    """Whether all of (n, 3, 2) UVs are points or lines on texel centers, as `chart_places` makes."""
+    spots = uv * resolution - 0.5
+    on_center = np.abs(spots - np.rint(spots)).max(axis=1) < _OFF_CENTER
+    return bool((on_center & (np.ptp(spots, axis=1) < _OFF_CENTER)).any(axis=1).all())
 
 
 def are_apart(layouts: list[Float32], resolution: int) -> bool:
