@@ -1,6 +1,5 @@
 """Atlases: polygons stay whole, charts stay apart and to scale, pages hold what was asked."""
 
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -397,18 +396,3 @@ def test_what_does_not_overlap_is_left_alone():
     triangles, polygon = uv_sphere(12, 16)
     charts = unwrap(triangles, polygon, grow_charts)
     assert len(overlapping_triangles(charts.uv, charts.chart)) == 0
-
-
-def test_a_layout_of_tiny_objects_is_kept_bit_for_bit() -> None:
-    """Objects smaller than a texel lie on its center; a later bake that keeps UVs finds them there."""
-    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
-    quad = corners[[[0, 1, 2], [0, 2, 3]]]
-    polygon = np.zeros(2, dtype=np.int32)
-    objects = [AtlasInput("Floor", 20.0 * quad, polygon)]
-    objects += [AtlasInput(f"Chip {n}", 0.01 * quad + (n, 0, 1), polygon) for n in range(100)]
-    laid = run_atlas(objects, 64)
-    assert any(np.ptp(placed.uv.reshape(-1, 2), axis=0).max() == 0 for placed in laid.objects)
-    again = run_atlas([replace(o, uv=p.uv) for o, p in zip(objects, laid.objects, strict=True)], 64)
-    assert again.warnings == ()
-    for first, second in zip(laid.objects, again.objects, strict=True):
-        np.testing.assert_array_equal(first.uv, second.uv)

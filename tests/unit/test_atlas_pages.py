@@ -1,5 +1,7 @@
 """Several pages, texel scales, padding for mip levels, and meshes that take too long to unwrap."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -96,3 +98,18 @@ def test_an_object_that_takes_too_long_is_cut_more_simply_and_named():
     assert (area_uv(uv) > 0).all()
     assert coverage_sum(uv, 256).max() < 1.01
     assert atlas.pages[0].utilisation > 0.4
+
+
+def test_a_layout_of_tiny_objects_is_kept_bit_for_bit() -> None:
+    """Objects smaller than a texel lie on its center; a later bake that keeps UVs finds them there."""
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
+    quad = corners[[[0, 1, 2], [0, 2, 3]]]
+    polygon = np.zeros(2, dtype=np.int32)
+    objects = [AtlasInput("Floor", 20.0 * quad, polygon)]
+    objects += [AtlasInput(f"Chip {n}", 0.01 * quad + (n, 0, 1), polygon) for n in range(100)]
+    laid = run_atlas(objects, 64)
+    assert any(np.ptp(placed.uv.reshape(-1, 2), axis=0).max() == 0 for placed in laid.objects)
+    again = run_atlas([replace(o, uv=p.uv) for o, p in zip(objects, laid.objects, strict=True)], 64)
+    assert again.warnings == ()
+    for first, second in zip(laid.objects, again.objects, strict=True):
+        np.testing.assert_array_equal(first.uv, second.uv)
