@@ -15,7 +15,7 @@ from radiosity_addon.lightmap.unwrap.collapse import ChartPlaces, collapse
 from radiosity_addon.lightmap.unwrap.cut_empty import cut_empty_charts
 from radiosity_addon.lightmap.unwrap.occupancy import place
 from radiosity_addon.lightmap.unwrap.packing import Limits, pack
-from radiosity_addon.numerics import triangle_areas
+from radiosity_addon.numerics import signed_double_areas, triangle_areas
 
 from .lightmap_meshes import QUAD, area_uv, box, islands, quads
 
@@ -58,9 +58,7 @@ def test_charts_of_all_shapes_keep_their_gap(padding: int) -> None:
     rng = np.random.default_rng(padding)
     parts = [rng.random((1, 3, 2)) * rng.uniform(0.5, 4) for _ in range(40)] + [frame(4, 6, 0.3)] * 4
     uv = np.concatenate(parts)
-    uv[:40] = np.where(
-        np.cross(uv[:40, 1] - uv[:40, 0], uv[:40, 2] - uv[:40, 0])[:, None, None] > 0, uv[:40], uv[:40, ::-1]
-    )
+    uv[:40] = np.where(signed_double_areas(uv[:40])[:, None, None] > 0, uv[:40], uv[:40, ::-1])
     chart = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
     packing = pack(uv, chart, 128, None, Limits(padding=padding))
     assert packing.uv.min() >= 0
