@@ -123,7 +123,7 @@ def blender_version() -> str:
 
 
 def _file(name: str, title: str, path: str, **more: Any) -> Case:
-    settings: dict[str, Any] = {"samples": (8, 32, 128), "reference_samples": 128, "resolution": 512, **more}
+    settings: dict[str, Any] = {"samples": (16, 64, 256), "reference_samples": 256, "resolution": 512, **more}
     return Case(name=name, title=title, builder="file", path=path, **settings)
 
 
@@ -135,6 +135,7 @@ CASES = {
         Case("cornell", "Cornell box", "cornell", 256, (16, 64, 256, 1024), 2048),
         Case("interior", "Office", "interior", 512, (4, 16, 64), 256),
         _file("staircase", "The Wooden Staircase (Wig42)", "staircase/staircase.blend"),
+        _file("classroom", "Japanese Classroom (NovaZeeke), matte", "classroom/classroom-matte.blend"),
         _file("sponza", "Sponza (Dabrovic)", "sponza/sponza.blend"),
         _file("bevy-mixed", "Mixed lighting (Bevy)", "bevy-mixed/MixedLightingExample.gltf"),
         _file("platformer", "Platformer (Armory)", "platformer/platformer.blend"),

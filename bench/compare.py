@@ -13,7 +13,7 @@ import numpy as np
 
 from . import curves, processes
 from .cases import ERROR_SETTING, Case, label, with_asked_errors
-from .error_measure import error_figures
+from .error_measure import block_error, error_figures
 
 MAX_BUSY = 0.2
 """Cores that may be busy elsewhere before times are doubted."""
@@ -85,7 +85,8 @@ class Prepared:
 
     def judged(self, pixels: np.ndarray) -> dict[str, float]:
         at = self.compared
-        return error_figures(pixels[at], self.first[at], self.second[at])
+        figures = error_figures(pixels[at], self.first[at], self.second[at])
+        return {**figures, "block_error": block_error(pixels, self.first, self.second, at)}
 
 
 def say(line: str) -> None:

@@ -1,4 +1,4 @@
-"""The open scene as a bake sees it: plain triangles with one diffuse color a material, lamps, an even sky.
+"""The open scene as a bake sees it: plain triangles with one diffuse color a material, lamps, the sky.
 
 What is approximated on export (images by their means, gloss as matte) would count as our error against Cycles
 although no solver could help it. So both programs bake the scene after this: modifiers applied, instances
@@ -11,19 +11,18 @@ import bpy
 import numpy as np
 
 from radiosity_addon.blender.scene_export.export import export_scene
-from radiosity_addon.lights.sun_and_sky import EnvironmentLight
 from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeObject
 from radiosity_addon.scene.scene import Scene
 
 
 def flatten(sky: tuple[float, float, float] | None) -> None:
-    """Replace the open scene's meshes and materials; `sky` lights it instead of the sky it has."""
+    """Replace the open scene's meshes and materials; `sky` lights it instead of the world it has."""
     scene = bpy.context.scene
     bake_scene = export_scene(bpy.context, BakeSettings()).bake_scene
     solved = bake_scene.scene
-    even = [light.radiance for light in solved.lights if isinstance(light, EnvironmentLight)]
-    _set_sky(scene, sky or (tuple(np.broadcast_to(even[0], 3)) if even else (0.0, 0.0, 0.0)))
+    if sky is not None:
+        _set_sky(scene, sky)
     lamps = [obj for obj in scene.objects if obj.type == "LIGHT" and not obj.hide_render]
     places = [obj.matrix_world.copy() for obj in lamps]
     for obj in list(bpy.data.objects):
