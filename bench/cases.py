@@ -43,7 +43,7 @@ class Case:
     ----------
     name : str
     title : str
-    builder : "cornell", "interior" or "file"
+    builder : "cornell", "interior", "living-room", "apartment" or "file"
     resolution : int
         Of the one atlas page.
     samples : tuple of int
@@ -95,9 +95,8 @@ class Case:
         """Return what changes whenever the prepared scene must: a folder name for the cache."""
         sources = {
             "cornell": [ROOT / "radiosity_addon" / "blender" / "files" / "cornell.py"],
-            "interior": sorted((ROOT / "bench" / "interior").glob("*.py")),
             "file": [ROOT / "bench" / "flatten.py"],
-        }[self.builder]
+        }.get(self.builder, sorted((ROOT / "bench" / "interior").glob("*.py")))
         digest = hashlib.sha256()
         for source in sources:
             # Without comments and line breaks, which change no scene.
@@ -134,6 +133,8 @@ CASES = {
     for case in (
         Case("cornell", "Cornell box", "cornell", 256, (16, 64, 256, 1024), 2048),
         Case("interior", "Office", "interior", 512, (4, 16, 64), 256),
+        Case("living-room", "Living room under a sky image", "living-room", 512, (16, 64, 256), 512),
+        Case("apartment", "Apartment, sun and sky", "apartment", 512, (16, 64, 256), 512),
         _file("staircase", "The Wooden Staircase (Wig42)", "staircase/staircase.blend"),
         _file("classroom", "Japanese Classroom (NovaZeeke), matte", "classroom/classroom-matte.blend"),
         _file("sponza", "Sponza (Dabrovic)", "sponza/sponza.blend"),

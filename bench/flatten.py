@@ -15,6 +15,8 @@ from radiosity_addon.options.bake_settings import BakeSettings
 from radiosity_addon.scene.bake_scene import BakeObject
 from radiosity_addon.scene.scene import Scene
 
+from .interior.blender_parts import even_sky
+
 
 def flatten(sky: tuple[float, float, float] | None) -> None:
     """Replace the open scene's meshes and materials; `sky` lights it instead of the world it has."""
@@ -22,7 +24,7 @@ def flatten(sky: tuple[float, float, float] | None) -> None:
     bake_scene = export_scene(bpy.context, BakeSettings()).bake_scene
     solved = bake_scene.scene
     if sky is not None:
-        _set_sky(scene, sky)
+        even_sky(scene, sky)
     lamps = [obj for obj in scene.objects if obj.type == "LIGHT" and not obj.hide_render]
     places = [obj.matrix_world.copy() for obj in lamps]
     for obj in list(bpy.data.objects):
@@ -84,13 +86,3 @@ def _material(
     tree.links.new(shader.outputs[0], output.inputs["Surface"])
     materials[surface] = material
     return material
-
-
-def _set_sky(scene: bpy.types.Scene, radiance: tuple[float, ...]) -> None:
-    world = bpy.data.worlds.new("Even Sky")
-    if bpy.app.version < (5, 0):
-        world.use_nodes = True
-    background = next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
-    background.inputs["Color"].default_value = (*radiance, 1.0)
-    background.inputs["Strength"].default_value = 1.0
-    scene.world = world

@@ -19,8 +19,11 @@ from tests.golden import cornell_reference
 from . import cycles
 from .cases import CASES, SMALL_CASES, Case, Lamp
 from .flatten import flatten
+from .interior.homes import build_apartment, build_living_room
 from .interior.office import build_office
 from .layout import lay_out, write_layout
+
+INTERIORS = {"interior": build_office, "living-room": build_living_room, "apartment": build_apartment}
 
 SCENE, TEXELS = "scene.blend", "texels.npz"
 
@@ -63,9 +66,9 @@ def _build(case: Case) -> cornell_reference.Reference | None:
         build_cornell_box()
         golden = cornell_reference.load()
         return golden if golden.resolution == case.resolution else None
-    if case.builder == "interior":
+    if case.builder in INTERIORS:
         empty_scene()
-        build_office(**case.parameters)
+        INTERIORS[case.builder](**case.parameters)
         return None
     assert case.file is not None
     open_scene(case.file)

@@ -8,7 +8,8 @@ import bpy
 import numpy as np
 
 from . import furniture
-from .shapes import Shape, box, join, polygon, wall_with_holes
+from .blender_parts import COLORS, add, add_mesh, diffuse, even_sky, glowing
+from .shapes import Shape, box, join, polygon, reveal, wall_with_holes
 
 WIDTH, DEPTH, HEIGHT = 10.0, 7.0, 2.9
 WINDOWS = tuple((x, 0.9, x + 1.8, 2.5) for x in (0.7, 3.0, 5.3, 7.6))
@@ -26,24 +27,6 @@ PANEL_POWER, DESK_LAMP_POWER, BULB_RADIANCE, SCREEN_RADIANCE = 55.0, 4.0, 90.0, 
 LAMP_TURN = -40
 """Of the desk lamps [°]: their heads hang over the desk, away from the monitors' edges."""
 
-COLORS = {
-    "Wall": (0.76, 0.74, 0.70),
-    "Accent": (0.30, 0.42, 0.50),
-    "Ceiling": (0.82, 0.82, 0.82),
-    "Floor": (0.36, 0.25, 0.16),
-    "Carpet": (0.42, 0.16, 0.13),
-    "Oak": (0.48, 0.33, 0.19),
-    "White": (0.74, 0.74, 0.73),
-    "Paper": (0.68, 0.63, 0.54),
-    "Steel": (0.45, 0.46, 0.48),
-    "Black": (0.05, 0.05, 0.055),
-    "Blue Cloth": (0.08, 0.16, 0.36),
-    "Green": (0.14, 0.30, 0.17),
-    "Leaf": (0.10, 0.32, 0.07),
-    "Clay": (0.52, 0.27, 0.18),
-    "Red": (0.55, 0.09, 0.06),
-    "Yellow": (0.72, 0.50, 0.10),
-}
 GLOWS = {"Bulb": BULB_RADIANCE, "Screen": SCREEN_RADIANCE}
 
 
@@ -57,12 +40,12 @@ def build_office(detail: float = 1.0) -> bpy.types.Scene:
     """
     scene = bpy.context.scene
     scene.name = "Office"
-    materials = {name: _diffuse(name, color) for name, color in COLORS.items()}
-    materials |= {name: _glowing(name, radiance) for name, radiance in GLOWS.items()}
+    materials = {name: diffuse(name, color) for name, color in COLORS.items()}
+    materials |= {name: glowing(name, radiance) for name, radiance in GLOWS.items()}
     for name, shape in pieces(detail):
-        _add_mesh(scene, name, shape, materials)
+        add_mesh(scene, name, shape, materials)
     _add_lamps(scene, detail)
-    _add_sky(scene)
+    even_sky(scene, SKY)
     _add_camera(scene)
     return scene
 
@@ -126,7 +109,12 @@ def _room() -> Iterator[tuple[str, Shape]]:
     yield "Back Wall", polygon("Wall", (0, y, 0), (x, y, 0), (x, y, z), (0, y, z))
     yield "Left Wall", polygon("Accent", (0, 0, 0), (0, y, 0), (0, y, z), (0, 0, z))
     yield "Right Wall", polygon("Wall", (x, 0, 0), (x, 0, z), (x, y, z), (x, y, 0))
-    yield "Window Wall", join([wall_with_holes("Wall", x, z, WINDOWS), *map(_reveal, WINDOWS)])
+    yield (
+        "Window Wall",
+        join(
+            [wall_with_holes("Wall", x, z, WINDOWS), *(reveal("Wall", window, REVEAL) for window in WINDOWS)]
+        ),
+    )
     frames = []
     for x_0, z_0, x_1, z_1 in WINDOWS:
         middle, width, height = (x_0 + x_1) / 2, x_1 - x_0, z_1 - z_0
@@ -141,35 +129,8 @@ def _room() -> Iterator[tuple[str, Shape]]:
     yield "Housings", join([furniture.lamp_housing().at(*at, HEIGHT) for at in PANELS])
 
 
-def _reveal(window: tuple[float, float, float, float]) -> Shape:
-    """Return the four inner sides of a window's opening."""
-    x_0, z_0, x_1, z_1 = window
-    d = -REVEAL
-    return join(
-        [
-            polygon("Wall", (x_0, d, z_0), (x_1, d, z_0), (x_1, 0, z_0), (x_0, 0, z_0)),
-            polygon("Wall", (x_0, 0, z_1), (x_1, 0, z_1), (x_1, d, z_1), (x_0, d, z_1)),
-            polygon("Wall", (x_0, 0, z_0), (x_0, 0, z_1), (x_0, d, z_1), (x_0, d, z_0)),
-            polygon("Wall", (x_1, d, z_0), (x_1, d, z_1), (x_1, 0, z_1), (x_1, 0, z_0)),
-        ]
-    )
-
-
 def _some(places: tuple, detail: float) -> tuple:
     return places[: max(1, round(len(places) * min(detail, 1.0)))]
-
-
-def _add_mesh(
-    scene: bpy.types.Scene, name: str, shape: Shape, materials: dict[str, bpy.types.Material]
-) -> None:
-    used = list(dict.fromkeys(shape.paint))
-    mesh = bpy.data.meshes.new(name)
-    mesh.from_pydata(shape.vertices.tolist(), [], shape.faces)
-    for paint in used:
-        mesh.materials.append(materials[paint])
-    mesh.polygons.foreach_set("material_index", [used.index(paint) for paint in shape.paint])
-    mesh.update()
-    scene.collection.objects.link(bpy.data.objects.new(name, mesh))
 
 
 def _add_lamps(scene: bpy.types.Scene, detail: float) -> None:
@@ -177,68 +138,23 @@ def _add_lamps(scene: bpy.types.Scene, detail: float) -> None:
         lamp = bpy.data.lights.new("Panel", "AREA")
         lamp.shape, lamp.size, lamp.size_y = "RECTANGLE", 1.2, 0.28
         lamp.energy, lamp.color = PANEL_POWER, (1.0, 0.9, 0.76)
-        _add(scene, f"Panel {number}", lamp, (x, y, HEIGHT - 0.061))
+        add(scene, f"Panel {number}", lamp, (x, y, HEIGHT - 0.061))
     for number, (x, y) in enumerate(_some(DESKS, detail)):
         if number % 2 == 0:
             lamp = bpy.data.lights.new("Desk Lamp", "POINT")
             lamp.energy, lamp.shadow_soft_size, lamp.color = DESK_LAMP_POWER, 0.03, (1.0, 0.8, 0.55)
             turn = np.radians(LAMP_TURN)
             head = (x - 0.7 + 0.3 * np.cos(turn), y + 0.25 + 0.3 * np.sin(turn), 0.74 + 0.45)
-            _add(scene, f"Bulb {number}", lamp, head)
-
-
-def _add(
-    scene: bpy.types.Scene, name: str, data: bpy.types.ID, place: tuple[float, float, float]
-) -> bpy.types.Object:
-    obj = bpy.data.objects.new(name, data)
-    obj.location = place
-    scene.collection.objects.link(obj)
-    return obj
-
-
-def _add_sky(scene: bpy.types.Scene) -> None:
-    world = bpy.data.worlds.new("Sky")
-    if bpy.app.version < (5, 0):
-        world.use_nodes = True
-    background = next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
-    background.inputs["Color"].default_value = (*SKY, 1.0)
-    background.inputs["Strength"].default_value = 1.0
-    scene.world = world
+            add(scene, f"Bulb {number}", lamp, head)
 
 
 def _add_camera(scene: bpy.types.Scene) -> None:
     camera = bpy.data.cameras.new("Camera")
     camera.lens = 19.0
-    obj = _add(scene, "Camera", camera, (0.35, 6.75, 1.75))
+    obj = add(scene, "Camera", camera, (0.35, 6.75, 1.75))
     obj.rotation_euler = (np.radians(80), 0.0, np.radians(-127))
     scene.camera = obj
     scene.view_settings.view_transform = "Standard"
     scene.view_settings.look = "None"
     scene.view_settings.exposure = -1.0
     scene.render.resolution_x, scene.render.resolution_y = 960, 600
-
-
-def _diffuse(name: str, color: tuple[float, float, float]) -> bpy.types.Material:
-    return _material(name, "ShaderNodeBsdfDiffuse", color)
-
-
-def _glowing(name: str, radiance: float) -> bpy.types.Material:
-    color = (0.6, 0.8, 1.0) if name == "Screen" else (1.0, 0.78, 0.5)
-    material = _material(name, "ShaderNodeEmission", color)
-    next(node for node in material.node_tree.nodes if node.type == "EMISSION").inputs[
-        "Strength"
-    ].default_value = radiance
-    return material
-
-
-def _material(name: str, kind: str, color: tuple[float, float, float]) -> bpy.types.Material:
-    material = bpy.data.materials.new(name)
-    if bpy.app.version < (5, 0):
-        material.use_nodes = True
-    material.diffuse_color = (*color, 1.0)
-    tree = material.node_tree
-    tree.nodes.clear()
-    output, shader = tree.nodes.new("ShaderNodeOutputMaterial"), tree.nodes.new(kind)
-    shader.inputs["Color"].default_value = (*color, 1.0)
-    tree.links.new(shader.outputs[0], output.inputs["Surface"])
-    return material

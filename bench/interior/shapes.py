@@ -173,3 +173,17 @@ def wall_with_holes(
             faces.append(tuple(number[corner] for corner in corners))
     vertices = np.array([(x, 0.0, z) for x, z in number])
     return Shape(vertices, faces, [paint] * len(faces))
+
+
+def reveal(paint: str, window: tuple[float, float, float, float], depth: float) -> Shape:
+    """Return the four inner sides of a hole in the wall y = 0, `depth` deep toward -y."""
+    x_0, z_0, x_1, z_1 = window
+    d = -depth
+    return join(
+        [
+            polygon(paint, (x_0, d, z_0), (x_1, d, z_0), (x_1, 0, z_0), (x_0, 0, z_0)),
+            polygon(paint, (x_0, 0, z_1), (x_1, 0, z_1), (x_1, d, z_1), (x_0, d, z_1)),
+            polygon(paint, (x_0, 0, z_0), (x_0, 0, z_1), (x_0, d, z_1), (x_0, d, z_0)),
+            polygon(paint, (x_1, d, z_0), (x_1, d, z_1), (x_1, 0, z_1), (x_1, 0, z_0)),
+        ]
+    )
