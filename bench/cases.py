@@ -133,8 +133,8 @@ CASES = {
     for case in (
         Case("cornell", "Cornell box", "cornell", 256, (16, 64, 256, 1024), 2048),
         Case("interior", "Office", "interior", 512, (4, 16, 64), 256),
-        Case("living-room", "Living room under a sky image", "living-room", 512, (16, 64, 256), 512),
-        Case("apartment", "Apartment, sun and sky", "apartment", 512, (16, 64, 256), 512),
+        Case("living-room", "Living room under a sky image", "living-room", 512, (16, 64, 256), 256),
+        Case("apartment", "Apartment, sun and sky", "apartment", 512, (16, 64, 256), 256),
         _file("staircase", "The Wooden Staircase (Wig42)", "staircase/staircase.blend"),
         _file("classroom", "Japanese Classroom (NovaZeeke), matte", "classroom/classroom-matte.blend"),
         _file("sponza", "Sponza (Dabrovic)", "sponza/sponza.blend"),
