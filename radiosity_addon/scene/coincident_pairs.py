@@ -158,6 +158,7 @@ def _near_pairs(low: Array, high: Array) -> Iterator[tuple[Array, Array]]:
     size = np.maximum((high - low).max(axis=1), extent * 2.0**-LEVELS)
     level = np.clip(np.floor(np.log2(extent / size)).astype(np.int64), 0, LEVELS)
     lows, highs = np.ascontiguousarray(low.T), np.ascontiguousarray(high.T)
+    thin = (high - low).argmin(axis=1)
     for at in np.unique(level):
         cell = extent * 2.0 ** -float(at)
         asking = np.flatnonzero(level >= at)
@@ -166,29 +167,45 @@ def _near_pairs(low: Array, high: Array) -> Iterator[tuple[Array, Array]]:
         row, place = _cells(lower, upper)
         key = (place[0] << 42) | (place[1] << 21) | place[2]
         begins = np.ascontiguousarray(lower.T)
-        hosts = np.flatnonzero(level[asking[row]] == at)
-        hosts = hosts[np.argsort(key[hosts], kind="stable")]
-        begin = np.searchsorted(key[hosts], key, side="left")
-        count = np.searchsorted(key[hosts], key, side="right") - begin
-        candidates = np.flatnonzero(count)
-        for chunk in run_chunks(count[candidates], CHUNK_PAIRS):
-            chunk_rows = candidates[chunk]
-            small = np.repeat(chunk_rows, count[chunk_rows])
-            large = hosts[run_numbers(count[chunk_rows], begin[chunk_rows])]
-            one, other = asking[row[small]], asking[row[large]]
-            keep = np.flatnonzero((level[one] > at) | (one < other))
-            for axis in range(3):
-                # Both may lie in several cells: the first one they share counts.
-                bound, here = begins[axis], place[axis]
-                shared = np.maximum(bound[row[small[keep]]], bound[row[large[keep]]])
-                keep = keep[shared == here[small[keep]]]
-            one, other = one[keep], other[keep]
-            for axis in range(3):
-                bottom, top = lows[axis], highs[axis]
-                keep = np.flatnonzero((bottom[one] <= top[other]) & (bottom[other] <= top[one]))
-                one, other = one[keep], other[keep]
-            if len(one):
-                yield one, other
+        large = np.flatnonzero(level[asking[row]] == at)
+        large = large[np.argsort(key[large], kind="stable")]
+        # Most boxes of a cell are not near the flat one of a large triangle: its thinnest axis tells first.
+        for axis in range(3):
+            hosts = large[thin[asking[row[large]]] == axis]
+            for small, host in _sharing(key, hosts, asking[row], lows[axis], highs[axis]):
+                one, other = asking[row[small]], asking[row[host]]
+                keep = (level[one] > at) | (one < other)
+                for side in range(3):
+                    bottom, top = lows[side], highs[side]
+                    keep &= (bottom[one] <= top[other]) & (bottom[other] <= top[one])
+                    # Both may lie in several cells: the first one they share counts.
+                    shared = np.maximum(begins[side][row[small]], begins[side][row[host]])
+                    keep &= shared == place[side][small]
+                if keep.any():
+                    yield one[keep], other[keep]
+
+
+def _sharing(key: Array, hosts: Array, box: Array, low: Array, high: Array) -> Iterator[tuple[Array, Array]]:
+    """Yield pairs of entries that are in one cell and overlap along an axis, in parts.
+
+    key, box (c,): The cell and the box of each entry.
+    hosts: The second entries of pairs, sorted by their cells.
+    low, high (n,): The boxes' bounds along the axis.
+    """
+    begin = np.searchsorted(key[hosts], key, side="left")
+    count = np.searchsorted(key[hosts], key, side="right") - begin
+    candidates = np.flatnonzero(count)
+    bottom, top = low[box], high[box]
+    host_bottom, host_top = bottom[hosts], top[hosts]
+    for chunk in run_chunks(count[candidates], CHUNK_PAIRS):
+        rows = candidates[chunk]
+        repeats = count[rows]
+        number = run_numbers(repeats, begin[rows])
+        near = np.repeat(bottom[rows], repeats) <= host_top[number]
+        near &= np.repeat(top[rows], repeats) >= host_bottom[number]
+        near = np.flatnonzero(near)
+        if len(near):
+            yield np.repeat(rows, repeats)[near], hosts[number[near]]
 
 
 def _cells(lower: Array, upper: Array) -> tuple[Array, Array]:
