@@ -203,9 +203,9 @@ def _sharing(key: Array, hosts: Array, box: Array, low: Array, high: Array) -> I
         number = run_numbers(repeats, begin[rows])
         near = np.repeat(bottom[rows], repeats) <= host_top[number]
         near &= np.repeat(top[rows], repeats) >= host_bottom[number]
-        near = np.flatnonzero(near)
-        if len(near):
-            yield np.repeat(rows, repeats)[near], hosts[number[near]]
+        found = np.flatnonzero(near)
+        if len(found):
+            yield np.repeat(rows, repeats)[found], hosts[number[found]]
 
 
 def _cells(lower: Array, upper: Array) -> tuple[Array, Array]:
