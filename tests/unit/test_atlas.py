@@ -279,8 +279,8 @@ def test_without_a_chart_grower_every_polygon_is_a_chart():
 def test_a_polygon_that_the_grower_cuts_gets_its_own_chart():
     triangles, polygon = box((1, 1, 1))
 
-    def cutting(vertices, faces):
-        uv, chart = grow_charts(vertices, faces)
+    def cutting(vertices, faces, mesh):
+        uv, chart = grow_charts(vertices, faces, mesh)
         chart[0] = chart.max() + 1
         return uv, chart
 
@@ -379,7 +379,7 @@ def test_overlaps_within_a_chart_are_found_and_cut_out():
     outer = np.stack((2 * np.cos(angle), 2 * np.sin(angle), 0.02 * angle), axis=-1)
     triangles, polygon = quads(np.stack((inner[:-1], outer[:-1], outer[1:], inner[1:]), axis=1))
 
-    def from_above(vertices, faces):
+    def from_above(vertices, faces, _):
         return vertices[faces][..., :2], np.zeros(len(faces), dtype=np.int64)
 
     wound = triangles[..., :2]

@@ -183,11 +183,17 @@ def test_a_frame_becomes_four_bars_where_that_saves_texels() -> None:
 def test_the_halves_of_a_quad_are_joined() -> None:
     triangles, _ = quads([[(0, 0, 1), (8, 0, 1), (8, 3, 1), (0, 3, 1)]])
     apart = triangles[..., :2] + np.array([0.0, 10.0])[:, None, None]
-    uv, chart = join_coplanar(apart, triangles, np.array([0, 1]))
+    uv, chart = join_coplanar(apart, triangles, np.array([0, 1]), np.zeros(2, dtype=np.int64))
     assert chart.tolist() == [0, 0]
     np.testing.assert_allclose(area_uv(uv), 12.0)
     extent = np.ptp(align(uv, chart, 1).reshape(-1, 2), axis=0)
     np.testing.assert_allclose(np.sort(extent), (3, 8), atol=1e-9)
+
+
+def test_the_halves_of_two_objects_are_not_joined() -> None:
+    triangles, _ = quads([[(0, 0, 1), (8, 0, 1), (8, 3, 1), (0, 3, 1)]])
+    _, chart = join_coplanar(triangles[..., :2], triangles, np.array([0, 1]), np.array([0, 1]))
+    np.testing.assert_array_equal(chart, [0, 1])
 
 
 def test_what_is_folded_is_not_joined() -> None:
