@@ -199,7 +199,7 @@ def test_the_halves_of_two_objects_are_not_joined() -> None:
 def test_what_is_folded_is_not_joined() -> None:
     triangles, _ = quads([[(0, 0, 0), (8, 0, 0), (8, 3, 0), (0, 3, 0.5)]])
     chart = np.array([0, 1])
-    assert join_coplanar(triangles[..., :2], triangles, chart)[1].tolist() == [0, 1]
+    assert join_coplanar(triangles[..., :2], triangles, chart, np.zeros(2, dtype=np.int64))[1].tolist() == [0, 1]
 
 
 def test_no_texel_is_stretched_by_more_than_two() -> None:
